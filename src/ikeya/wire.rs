@@ -1,0 +1,358 @@
+//! The four packets of the standard bus, in the order of the protocol document.
+
+use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
+
+use super::{NodeId, Position, Rps};
+use crate::{crc16, error::ParseError};
+
+/// Headers, each an enum of one variant: any other byte is not a value of the packet.
+pub(super) mod header {
+    use super::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
+
+    pub(crate) const READ: u8 = 0xAA;
+    pub(crate) const WRITE: u8 = 0xBB;
+    pub(crate) const VELOCITY: u8 = 0x55;
+    pub(crate) const POSITION: u8 = 0x56;
+
+    macro_rules! header {
+        ($name:ident = $value:expr) => {
+            #[derive(
+                Clone,
+                Copy,
+                Debug,
+                Eq,
+                Hash,
+                PartialEq,
+                TryFromBytes,
+                IntoBytes,
+                Immutable,
+                KnownLayout,
+                Unaligned,
+            )]
+            #[cfg_attr(
+                feature = "bytemuck",
+                derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit)
+            )]
+            #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+            #[repr(u8)]
+            pub(crate) enum $name {
+                Value = $value,
+            }
+        };
+    }
+
+    header!(Read = READ);
+    header!(Write = WRITE);
+    header!(Velocity = VELOCITY);
+    header!(Position = POSITION);
+}
+
+/// Master to slave, asks for the status: `AA | id | crc: u16`, 4 bytes, 80 µs at 500 kbit/s.
+///
+/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+///
+/// ```
+/// use axlewire::ikeya::{NodeId, ReadRequest};
+/// assert_eq!(ReadRequest::new(NodeId::N1).as_bytes(), &[0xAA, 0x01, 0xBE, 0xD0]);
+/// ```
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct ReadRequest {
+    header: header::Read,
+    id: NodeId,
+    crc: [u8; 2],
+}
+
+impl ReadRequest {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = size_of::<Self>();
+
+    /// Asks node `id` for its status.
+    #[must_use]
+    pub fn new(id: NodeId) -> Self {
+        Self { header: header::Read::Value, id, crc: [0; 2] }.sealed()
+    }
+
+    /// The node that is asked.
+    #[must_use]
+    pub const fn id(&self) -> NodeId {
+        self.id
+    }
+}
+
+/// Master to slave, commands a motor: `BB | id | payload: 4 bytes | crc: u16`, 8 bytes, 160 µs at
+/// 500 kbit/s. It is not answered (ruling I3).
+///
+/// The bytes do not say whether the payload is a speed or a position: the slave reads it according
+/// to its DIP switch, so only who knows the node's [`Mode`](super::Mode) can choose. 1.0 rps taken
+/// for a position is 16,256 turns. Hence two constructors and two readings.
+///
+/// Every value has a legal header and id. One got from a constructor, [`parse`](Self::parse) or a
+/// decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+///
+/// ```
+/// use axlewire::ikeya::{NodeId, Position, Rps, WriteRequest};
+///
+/// let turn = WriteRequest::velocity(NodeId::N1, Rps::new(1.0)?);
+/// assert_eq!(turn.as_bytes(), &[0xBB, 0x01, 0x00, 0x00, 0x80, 0x3F, 0x07, 0x40]);
+/// assert_eq!(turn.as_position().rotation(), 16_256); // what a position node would make of it
+///
+/// let go = WriteRequest::position(NodeId::N6, Position::new(4096, 1));
+/// assert_eq!(go.as_bytes(), &[0xBB, 0x06, 0x00, 0x10, 0x01, 0x00, 0x93, 0x05]);
+/// # Ok::<(), axlewire::error::EncodeError>(())
+/// ```
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct WriteRequest {
+    header: header::Write,
+    id: NodeId,
+    payload: [u8; 4],
+    crc: [u8; 2],
+}
+
+impl WriteRequest {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = size_of::<Self>();
+
+    /// Commands node `id`, which must be in velocity mode, to turn at `target`.
+    #[must_use]
+    pub fn velocity(id: NodeId, target: Rps) -> Self {
+        Self::new(id, target.get().to_le_bytes())
+    }
+
+    /// Commands node `id`, which must be in position mode, to go to `target`.
+    #[must_use]
+    pub fn position(id: NodeId, target: Position) -> Self {
+        Self::new(id, target.to_le_bytes())
+    }
+
+    fn new(id: NodeId, payload: [u8; 4]) -> Self {
+        Self { header: header::Write::Value, id, payload, crc: [0; 2] }.sealed()
+    }
+
+    /// The node that is commanded.
+    #[must_use]
+    pub const fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// The payload read as a speed, revolutions per second: any `f32`, NaN and infinities included.
+    #[must_use]
+    pub const fn as_velocity(&self) -> f32 {
+        f32::from_le_bytes(self.payload)
+    }
+
+    /// The payload read as a position.
+    #[must_use]
+    pub const fn as_position(&self) -> Position {
+        Position::from_le_bytes(self.payload)
+    }
+
+    /// The payload as it stands on the wire.
+    #[must_use]
+    pub const fn payload(&self) -> [u8; 4] {
+        self.payload
+    }
+}
+
+/// Slave to master, status of a velocity node: `55 | id | rps: f32 | crc: u16`, 8 bytes, 160 µs at
+/// 500 kbit/s.
+///
+/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+///
+/// ```
+/// use axlewire::ikeya::{NodeId, VelocityResponse};
+///
+/// let response = VelocityResponse::parse(&[0x55, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x54, 0x0E])?;
+/// assert_eq!((response.id(), response.rps()), (NodeId::N2, 1.0));
+/// # Ok::<(), axlewire::error::ParseError>(())
+/// ```
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct VelocityResponse {
+    header: header::Velocity,
+    id: NodeId,
+    rps: [u8; 4],
+    crc: [u8; 2],
+}
+
+impl VelocityResponse {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = size_of::<Self>();
+
+    /// Node `id` turns at `current`.
+    #[must_use]
+    pub fn new(id: NodeId, current: Rps) -> Self {
+        let rps = current.get().to_le_bytes();
+        Self { header: header::Velocity::Value, id, rps, crc: [0; 2] }.sealed()
+    }
+
+    /// The node that answers.
+    #[must_use]
+    pub const fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// Speed, revolutions per second: any `f32`, NaN and infinities included.
+    #[must_use]
+    pub const fn rps(&self) -> f32 {
+        f32::from_le_bytes(self.rps)
+    }
+}
+
+/// Slave to master, status of a position node: `56 | id | count: i16 | rotation: i16 | crc: u16`,
+/// 8 bytes, 160 µs at 500 kbit/s.
+///
+/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+///
+/// ```
+/// use axlewire::ikeya::{NodeId, Position, PositionResponse};
+///
+/// let response = PositionResponse::new(NodeId::N3, Position::new(4096, 1));
+/// assert_eq!(response.as_bytes(), &[0x56, 0x03, 0x00, 0x10, 0x01, 0x00, 0x48, 0x78]);
+/// ```
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct PositionResponse {
+    header: header::Position,
+    id: NodeId,
+    position: [u8; 4],
+    crc: [u8; 2],
+}
+
+impl PositionResponse {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = size_of::<Self>();
+
+    /// Node `id` is at `current`.
+    #[must_use]
+    pub fn new(id: NodeId, current: Position) -> Self {
+        let position = current.to_le_bytes();
+        Self { header: header::Position::Value, id, position, crc: [0; 2] }.sealed()
+    }
+
+    /// The node that answers.
+    #[must_use]
+    pub const fn id(&self) -> NodeId {
+        self.id
+    }
+
+    /// Where the shaft is.
+    #[must_use]
+    pub const fn position(&self) -> Position {
+        Position::from_le_bytes(self.position)
+    }
+}
+
+/// What all packets of both variants have: bytes in, bytes out.
+macro_rules! packet {
+    ($($packet:ident),+) => {$(
+        impl $packet {
+            /// Borrows `bytes` as this packet.
+            ///
+            /// # Errors
+            ///
+            /// [`ParseError::Field`] for another header or an id outside 1..=8, otherwise
+            /// [`ParseError::Crc`].
+            pub fn parse(bytes: &[u8; Self::LEN]) -> Result<&Self, $crate::error::ParseError> {
+                super::wire::parsed(bytes)
+            }
+
+            /// The packet as it goes over the wire.
+            #[must_use]
+            pub fn as_bytes(&self) -> &[u8; Self::LEN] {
+                zerocopy::transmute_ref!(self)
+            }
+
+            /// The same packet with the CRC that belongs to it.
+            fn sealed(self) -> Self {
+                Self { crc: $crate::crc16::seal(self.as_bytes()), ..self }
+            }
+        }
+
+        impl $crate::stream::Encode for $packet {
+            fn encoded_len(&self) -> usize {
+                Self::LEN
+            }
+
+            fn encode<'b>(
+                &self,
+                buffer: &'b mut [u8],
+            ) -> Result<&'b [u8], $crate::error::EncodeError> {
+                $crate::stream::encode_bytes(self.as_bytes(), buffer)
+            }
+        }
+    )+};
+}
+pub(super) use packet;
+
+packet!(ReadRequest, WriteRequest, VelocityResponse, PositionResponse);
+
+/// Borrows `bytes` as a packet if header, id and CRC are right.
+pub(super) fn parsed<P>(bytes: &[u8]) -> Result<&P, ParseError>
+where
+    P: TryFromBytes + Immutable + KnownLayout + Unaligned,
+{
+    let packet = P::try_ref_from_bytes(bytes).map_err(|_| ParseError::Field)?;
+    crc16::verify(bytes)?;
+    Ok(packet)
+}

@@ -1,0 +1,89 @@
+//! Small codes that keep what they do not know.
+
+/// A `u8` code with names for some values; `Other` keeps the rest as received.
+macro_rules! code {
+    (
+        $(#[$meta:meta])*
+        $name:ident: $raw:ty { $($(#[$variant_meta:meta])* $variant:ident = $value:literal,)+ }
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+        #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(from = stringify!($raw), into = stringify!($raw)))]
+        pub enum $name {
+            $($(#[$variant_meta])* $variant,)+
+            /// Any other value, as it stood on the wire.
+            Other($raw),
+        }
+
+        impl From<$raw> for $name {
+            fn from(raw: $raw) -> Self {
+                match raw {
+                    $($value => Self::$variant,)+
+                    other => Self::Other(other),
+                }
+            }
+        }
+
+        impl From<$name> for $raw {
+            fn from(code: $name) -> Self {
+                match code {
+                    $($name::$variant => $value,)+
+                    $name::Other(other) => other,
+                }
+            }
+        }
+    };
+}
+
+code! {
+    /// What a pong or an acknowledgement says of the frame that it answers (ruling U12).
+    ErrorCode: u8 {
+        /// It arrived undamaged.
+        Fine = 0,
+        /// It arrived damaged.
+        Damaged = 1,
+    }
+}
+
+code! {
+    /// What is calibrated.
+    CalibrationKind: u8 {
+        /// The magnetometer; the host has to turn the robot meanwhile.
+        Magnetometer = 1,
+        /// Accelerometer and gyroscope; the robot has to stand still meanwhile.
+        Imu = 2,
+    }
+}
+
+code! {
+    /// The robot's answer to a firmware update request. Shipped robots never send it.
+    OtaStatus: u8 {
+        /// The update starts.
+        Accepted = 0,
+        /// An unknown error.
+        Failed = 1,
+        /// Not allowed.
+        Forbidden = 2,
+    }
+}
+
+code! {
+    /// State of the host's network, shown by the robot's lamp (ruling U8).
+    ///
+    /// A host sends one byte; some send four, hence the wide `Other`.
+    NetworkState: u32 {
+        /// Not known yet: the state after power-on.
+        Unknown = 0,
+        /// No SIM card.
+        SimAbsent = 1,
+        /// No network.
+        Disconnected = 2,
+        /// Connected.
+        Connected = 3,
+        /// Firmware update under way; not in the protocol document.
+        Ota = 4,
+    }
+}

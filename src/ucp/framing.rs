@@ -1,0 +1,304 @@
+//! Frames: found in a byte stream, read as a view, built as a value or in place.
+
+use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
+
+use super::{Body, Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, Message, MessageId, SYNC};
+use crate::{
+    crc16,
+    error::{EncodeError, ParseError},
+    stream::{Encode, Framing, Reason, Verdict, encode_bytes},
+};
+
+/// Finds UCP frames whose length field is 4..=`CAP` (ruling U2).
+///
+/// The default of 60, frames of at most 64 bytes, is the most that a shipped robot survives, and
+/// far above the largest known message. A larger cap, at most 252, lets foreign frames through and
+/// holds good ones back longer behind a false header.
+#[derive(Debug)]
+pub enum Ucp<const CAP: usize = 60> {}
+
+impl<const CAP: usize> Framing for Ucp<CAP> {
+    type Frame<'a> = &'a Frame;
+
+    const MAX_LEN: usize = {
+        assert!(CAP >= LEN_WITHOUT_BODY && CAP <= 252, "the cap is 4..=252");
+        CAP + OUTSIDE_LEN
+    };
+
+    #[inline]
+    fn judge(bytes: &[u8]) -> Verdict {
+        let len = match *bytes {
+            [first, second, low, high, ..] if [first, second] == SYNC => {
+                usize::from(u16::from_le_bytes([low, high]))
+            }
+            _ => return Self::judge_start(bytes),
+        };
+        if !(LEN_WITHOUT_BODY..=CAP).contains(&len) {
+            return Verdict::Reject { reason: Reason::Length, len: 1 };
+        }
+        let len = len + OUTSIDE_LEN;
+        match bytes.get(..len) {
+            Some(frame) if crc16::check(frame) => Verdict::Frame { len },
+            Some(_) => Verdict::Reject { reason: Reason::Crc, len: 1 },
+            None => Verdict::Partial { need: len },
+        }
+    }
+
+    #[inline]
+    fn view(frame: &[u8]) -> Option<&Frame> {
+        Frame::try_ref_from_bytes(frame).ok()
+    }
+}
+
+impl<const CAP: usize> Ucp<CAP> {
+    /// Judges less than a length field, or no sync.
+    fn judge_start(bytes: &[u8]) -> Verdict {
+        match *bytes {
+            [first, second, low] if [first, second] == SYNC => {
+                // No length up to 252 has a high byte, so the low one tells already.
+                if (LEN_WITHOUT_BODY..=CAP).contains(&usize::from(low)) {
+                    Verdict::Partial { need: 4 }
+                } else {
+                    Verdict::Reject { reason: Reason::Length, len: 1 }
+                }
+            }
+            [first, second] if [first, second] == SYNC => Verdict::Partial { need: 3 },
+            [first] if first == SYNC[0] => Verdict::Partial { need: 2 },
+            [] => Verdict::Partial { need: 1 },
+            [_, ref rest @ ..] => {
+                let run = rest.iter().take_while(|&&byte| byte != SYNC[0]).count();
+                Verdict::Reject { reason: Reason::Header, len: 1 + run }
+            }
+        }
+    }
+}
+
+/// Bytes of a frame that `len` does not count: the sync and the CRC.
+const OUTSIDE_LEN: usize = 4;
+
+/// A frame on the wire: `FD | FF | len: u16 | id | index | body | crc: u16` (ruling U1).
+///
+/// A reference to one is a view of the bytes it arrived in. The decoder and [`parse`](Self::parse)
+/// hand out only frames whose length and CRC are right; a raw zerocopy cast checks neither.
+///
+/// ```
+/// use axlewire::ucp::{Frame, Message};
+///
+/// let frame = Frame::parse(&[0xFD, 0xFF, 0x05, 0x00, 0x01, 0x00, 0x00, 0xBE, 0x00])?;
+/// assert_eq!((frame.id(), frame.body()), (1, &[0][..]));
+/// assert!(matches!(frame.message(), Message::Pong(_)));
+/// # Ok::<(), axlewire::error::ParseError>(())
+/// ```
+#[derive(
+    Debug, Eq, Hash, PartialEq, TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned,
+)]
+#[repr(C)]
+pub struct Frame {
+    header: Header,
+    /// Body and CRC.
+    tail: [u8],
+}
+
+impl Frame {
+    /// Borrows `bytes`, exactly one frame of any length up to 256, as a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`ParseError::Length`] when there are fewer than 8 bytes or another number than the length
+    /// field says, [`ParseError::Field`] without FD FF in front, otherwise [`ParseError::Crc`].
+    pub fn parse(bytes: &[u8]) -> Result<&Self, ParseError> {
+        let found = bytes.len();
+        let smallest = LEN_WITHOUT_BODY + OUTSIDE_LEN;
+        if found < smallest {
+            return Err(ParseError::Length { expected: smallest, found });
+        }
+        let frame = Self::try_ref_from_bytes(bytes).map_err(|_| ParseError::Field)?;
+        let expected = usize::from(frame.header.len()) + OUTSIDE_LEN;
+        if found != expected {
+            return Err(ParseError::Length { expected, found });
+        }
+        crc16::verify(bytes)?;
+        Ok(frame)
+    }
+
+    /// The six bytes in front of the body.
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The message id, known or not.
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        self.header.id()
+    }
+
+    /// The sender's counter (ruling U9).
+    #[must_use]
+    pub const fn index(&self) -> u8 {
+        self.header.index()
+    }
+
+    /// The bytes between header and CRC.
+    #[must_use]
+    pub const fn body(&self) -> &[u8] {
+        match self.tail.split_last_chunk::<2>() {
+            Some((body, _)) => body,
+            None => &[],
+        }
+    }
+
+    /// What the frame says.
+    #[must_use]
+    pub fn message(&self) -> Message<'_> {
+        Message::of(self)
+    }
+
+    /// The frame as it went over the wire.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        IntoBytes::as_bytes(self)
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Frame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{} index {}: {}", self.id(), self.index(), self.message());
+    }
+}
+
+/// Sends what was received, byte for byte: a relay is as dangerous as its source.
+impl Encode for Frame {
+    fn encoded_len(&self) -> usize {
+        self.as_bytes().len()
+    }
+
+    fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+        encode_bytes(self.as_bytes(), buffer)
+    }
+}
+
+/// A whole frame with a body of known type, as a value.
+///
+/// ```
+/// use axlewire::ucp::{Body, Ping};
+/// assert_eq!(Ping {}.frame(0).as_bytes(), [0xFD, 0xFF, 0x04, 0, 0x01, 0, 0x01, 0x42]);
+/// ```
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct FrameOf<B> {
+    header: Header,
+    body: B,
+    crc: [u8; 2],
+}
+
+impl<B: Body> FrameOf<B> {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = {
+        assert!(size_of::<B>() <= MAX_BODY_LEN, "shipped robots overflow");
+        size_of::<Self>()
+    };
+
+    /// The frame with the sender's counter `index` and its right CRC.
+    #[must_use]
+    pub fn new(index: u8, body: B) -> Self {
+        let header =
+            Header::new(B::ID as u8, index, (Self::LEN - LEN_WITHOUT_BODY - OUTSIDE_LEN) as u8);
+        let frame = Self { header, body, crc: [0; 2] };
+        Self { crc: crc16::seal(IntoBytes::as_bytes(&frame)), ..frame }
+    }
+
+    /// The sender's counter.
+    #[must_use]
+    pub const fn index(&self) -> u8 {
+        self.header.index()
+    }
+
+    /// The body.
+    #[must_use]
+    pub const fn body(&self) -> &B {
+        &self.body
+    }
+
+    /// The frame as it goes over the wire.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        IntoBytes::as_bytes(self)
+    }
+}
+
+impl<B: Body> Encode for FrameOf<B> {
+    fn encoded_len(&self) -> usize {
+        Self::LEN
+    }
+
+    fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+        encode_bytes(self.as_bytes(), buffer)
+    }
+}
+
+/// A frame by its parts, for ids that this crate has no message for (ruling U3).
+///
+/// ```
+/// use axlewire::{stream::Encode, ucp::RawFrame};
+///
+/// let mut buffer = [0; 64];
+/// let frame = RawFrame { id: 0x20, index: 0, body: &[1, 2, 3] }.encode(&mut buffer)?;
+/// assert_eq!(frame.len(), 11);
+/// assert!(RawFrame { id: 5, index: 0, body: &[] }.encode(&mut buffer).is_err());
+/// # Ok::<(), axlewire::error::EncodeError>(())
+/// ```
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct RawFrame<'a> {
+    /// The message id; to be sent, none of [`MessageId`].
+    pub id: u8,
+    /// The sender's counter.
+    pub index: u8,
+    /// The body; to be sent, at most 56 bytes.
+    pub body: &'a [u8],
+}
+
+/// Built in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what hangs
+/// or corrupts shipped robots (ruling U13).
+impl Encode for RawFrame<'_> {
+    fn encoded_len(&self) -> usize {
+        self.body.len() + LEN_WITHOUT_BODY + OUTSIDE_LEN
+    }
+
+    fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+        if MessageId::from_u8(self.id).is_some() {
+            return Err(EncodeError::KnownId { id: self.id });
+        }
+        let length = self.body.len();
+        if length > MAX_BODY_LEN {
+            return Err(EncodeError::BodyTooLong { length, limit: MAX_BODY_LEN });
+        }
+        let (needed, available) = (self.encoded_len(), buffer.len());
+        let too_small = EncodeError::BufferTooSmall { needed, available };
+        let frame = buffer.get_mut(..needed).ok_or(too_small)?;
+        let (header, tail) = frame.split_first_chunk_mut::<{ Header::LEN }>().ok_or(too_small)?;
+        let (body, _) = tail.split_last_chunk_mut::<2>().ok_or(too_small)?;
+        *header = zerocopy::transmute!(Header::new(self.id, self.index, length as u8));
+        body.copy_from_slice(self.body);
+        let crc = crc16::seal(frame);
+        if let Some(field) = frame.last_chunk_mut::<2>() {
+            *field = crc;
+        }
+        Ok(frame)
+    }
+}

@@ -1,0 +1,152 @@
+//! The six bytes in front of every body, and the names of the ids.
+
+use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
+
+/// First byte of a frame: no other value is a header.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+enum FirstSync {
+    Value = super::SYNC[0],
+}
+
+/// Second byte of a frame.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+enum SecondSync {
+    Value = super::SYNC[1],
+}
+
+/// What stands in front of every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Eq,
+    Hash,
+    PartialEq,
+    TryFromBytes,
+    IntoBytes,
+    Immutable,
+    KnownLayout,
+    Unaligned,
+)]
+#[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(C)]
+pub struct Header {
+    first: FirstSync,
+    second: SecondSync,
+    len: [u8; 2],
+    id: u8,
+    index: u8,
+}
+
+impl Header {
+    /// Size on the wire, bytes.
+    pub const LEN: usize = size_of::<Self>();
+
+    /// Header of a frame with a body of `body_len` bytes, at most 251.
+    pub(super) const fn new(id: u8, index: u8, body_len: u8) -> Self {
+        let len = [body_len + super::LEN_WITHOUT_BODY as u8, 0];
+        Self { first: FirstSync::Value, second: SecondSync::Value, len, id, index }
+    }
+
+    /// The length field: 4 + body length, which is the frame length minus 4.
+    #[must_use]
+    pub const fn len(&self) -> u16 {
+        u16::from_le_bytes(self.len)
+    }
+
+    /// Says no more than that the length field is 0, which no frame has.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The message id, known or not.
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        self.id
+    }
+
+    /// The sender's counter, wrapping; many senders leave it 0 (ruling U9).
+    #[must_use]
+    pub const fn index(&self) -> u8 {
+        self.index
+    }
+}
+
+/// The ids of the known messages (ruling U4).
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+pub enum MessageId {
+    /// Ping to the robot, pong to the host.
+    Ping = 1,
+    /// Motor and lamp command to the robot.
+    MotorControl = 2,
+    /// Calibration start to the robot, its acknowledgement to the host.
+    CalibrationStart = 3,
+    /// Calibration end to the robot, its acknowledgement to the host.
+    CalibrationEnd = 4,
+    /// Telemetry to the host.
+    Report = 5,
+    /// Accelerometer and gyroscope biases to the host, their acknowledgement to the robot.
+    ImuBias = 6,
+    /// Magnetometer biases to the host, their acknowledgement to the robot.
+    MagBias = 7,
+    /// Request for the stored biases to the host, the biases to the robot.
+    Biases = 8,
+    /// Firmware update request to the robot, its acknowledgement to the host.
+    Ota = 9,
+    /// State of the host's network to the robot, shown by its lamp.
+    NetworkState = 0x0A,
+}
+
+impl MessageId {
+    /// The known message with this id, if there is one.
+    #[must_use]
+    pub const fn from_u8(id: u8) -> Option<Self> {
+        Some(match id {
+            1 => Self::Ping,
+            2 => Self::MotorControl,
+            3 => Self::CalibrationStart,
+            4 => Self::CalibrationEnd,
+            5 => Self::Report,
+            6 => Self::ImuBias,
+            7 => Self::MagBias,
+            8 => Self::Biases,
+            9 => Self::Ota,
+            0x0A => Self::NetworkState,
+            _ => return None,
+        })
+    }
+}
