@@ -9,13 +9,13 @@ use crate::{crc16, error::ParseError};
 pub(super) mod header {
     use super::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
-    pub(crate) const READ: u8 = 0xAA;
-    pub(crate) const WRITE: u8 = 0xBB;
-    pub(crate) const VELOCITY: u8 = 0x55;
-    pub(crate) const POSITION: u8 = 0x56;
+    pub(crate) const READ: u8 = Read::Value as u8;
+    pub(crate) const WRITE: u8 = Write::Value as u8;
+    pub(crate) const VELOCITY: u8 = Velocity::Value as u8;
+    pub(crate) const POSITION: u8 = Position::Value as u8;
 
     macro_rules! header {
-        ($name:ident = $value:expr) => {
+        ($name:ident = $value:tt) => {
             #[derive(
                 Clone,
                 Copy,
@@ -41,10 +41,10 @@ pub(super) mod header {
         };
     }
 
-    header!(Read = READ);
-    header!(Write = WRITE);
-    header!(Velocity = VELOCITY);
-    header!(Position = POSITION);
+    header!(Read = 0xAA);
+    header!(Write = 0xBB);
+    header!(Velocity = 0x55);
+    header!(Position = 0x56);
 }
 
 /// Master to slave, asks for the status: `AA | id | crc: u16`, 4 bytes, 80 µs at 500 kbit/s.

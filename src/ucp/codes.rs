@@ -4,14 +4,14 @@
 macro_rules! code {
     (
         $(#[$meta:meta])*
-        $name:ident: $raw:ty { $($(#[$variant_meta:meta])* $variant:ident = $value:literal,)+ }
+        $name:ident: $raw:ty = $serde:literal { $($(#[$variant_meta:meta])* $variant:ident = $value:literal,)+ }
     ) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
         #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-        #[cfg_attr(feature = "serde", serde(from = stringify!($raw), into = stringify!($raw)))]
+        #[cfg_attr(feature = "serde", serde(from = $serde, into = $serde))]
         pub enum $name {
             $($(#[$variant_meta])* $variant,)+
             /// Any other value, as it stood on the wire.
@@ -40,7 +40,7 @@ macro_rules! code {
 
 code! {
     /// What a pong or an acknowledgement says of the frame that it answers (ruling U12).
-    ErrorCode: u8 {
+    ErrorCode: u8 = "u8" {
         /// It arrived undamaged.
         Fine = 0,
         /// It arrived damaged.
@@ -50,7 +50,7 @@ code! {
 
 code! {
     /// What is calibrated.
-    CalibrationKind: u8 {
+    CalibrationKind: u8 = "u8" {
         /// The magnetometer; the host has to turn the robot meanwhile.
         Magnetometer = 1,
         /// Accelerometer and gyroscope; the robot has to stand still meanwhile.
@@ -60,7 +60,7 @@ code! {
 
 code! {
     /// The robot's answer to a firmware update request. Shipped robots never send it.
-    OtaStatus: u8 {
+    OtaStatus: u8 = "u8" {
         /// The update starts.
         Accepted = 0,
         /// An unknown error.
@@ -74,7 +74,7 @@ code! {
     /// State of the host's network, shown by the robot's lamp (ruling U8).
     ///
     /// A host sends one byte; some send four, hence the wide `Other`.
-    NetworkState: u32 {
+    NetworkState: u32 = "u32" {
         /// Not known yet: the state after power-on.
         Unknown = 0,
         /// No SIM card.

@@ -20,7 +20,7 @@ use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 enum FirstSync {
-    Value = super::SYNC[0],
+    Value = 0xFD,
 }
 
 /// Second byte of a frame.
@@ -41,8 +41,11 @@ enum FirstSync {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 enum SecondSync {
-    Value = super::SYNC[1],
+    Value = 0xFF,
 }
+
+/// The first two bytes of every frame.
+pub const SYNC: [u8; 2] = [FirstSync::Value as u8, SecondSync::Value as u8];
 
 /// What stands in front of every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
 #[derive(

@@ -74,7 +74,7 @@ mod report;
 
 pub use codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
 pub use framing::{Frame, FrameOf, RawFrame, Ucp};
-pub use header::{Header, MessageId};
+pub use header::{Header, MessageId, SYNC};
 pub use message::{
     BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationStart,
     CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, MotorControl, OtaAck,
@@ -84,9 +84,6 @@ pub use report::{DocumentReport, FirmwareReport, Report, Telemetry};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;
-
-/// The first two bytes of every frame.
-pub const SYNC: [u8; 2] = [0xFD, 0xFF];
 
 /// Longest frame that is sent, and that is accepted by default, bytes (ruling U2).
 pub const MAX_LEN: usize = 64;
