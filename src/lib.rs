@@ -11,6 +11,8 @@ pub mod crc16;
 pub mod error;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
+#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+pub mod io;
 pub mod stream;
 #[cfg(feature = "ucp")]
 pub mod ucp;

@@ -19,15 +19,21 @@ use super::{
     wire::{header, packet},
 };
 
-/// Decoder for what a master sends to three-motor boards.
+/// Longest packet of a bus of three-motor boards, bytes.
+pub const MAX_LEN: usize = WriteRequest::LEN;
+
+/// Decoder with the smallest buffer that such a bus needs.
+pub type Decoder<F = ToMaster> = crate::stream::Decoder<F, MAX_LEN>;
+
+/// What a master sends to three-motor boards.
 #[derive(Debug)]
 pub enum ToSlave {}
 
-/// Decoder for what three-motor boards send.
+/// What three-motor boards send.
 #[derive(Debug)]
 pub enum ToMaster {}
 
-/// Decoder for both directions of a bus of three-motor boards.
+/// Everything on a bus of three-motor boards.
 #[derive(Debug)]
 pub enum Either {}
 

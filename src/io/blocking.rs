@@ -1,0 +1,62 @@
+//! The blocking calls.
+
+use embedded_io::{Read, Write};
+
+use super::{FrameReader, FrameWriter, WriteError};
+use crate::stream::{Encode, Event, Framing};
+
+impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
+    /// The next event; waits for the port where there is none yet. `None` at an end of file.
+    ///
+    /// # Errors
+    ///
+    /// The port's own. Nothing that was received is lost: the next call goes on where this one
+    /// stopped.
+    pub fn read_event(&mut self) -> Result<Option<Event<F::Frame<'_>>>, R::Error> {
+        loop {
+            if let Some(found) = self.decoder.advance(&mut [].as_slice()) {
+                return Ok(self.decoder.event(found));
+            }
+            let count = self.port.read(self.decoder.spare())?;
+            if count == 0 {
+                return Ok(None);
+            }
+            self.decoder.commit(count);
+        }
+    }
+}
+
+impl<W: Write, const N: usize> FrameWriter<W, N> {
+    /// Sends what waits, then `frame`, and returns when the port has taken it all; the line may
+    /// still be busy, see [`flush`](Self::flush).
+    ///
+    /// # Errors
+    ///
+    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during the
+    /// frame itself its rest waits, and [`flush`](Self::flush) goes on with it.
+    pub fn write(&mut self, frame: &impl Encode) -> Result<(), WriteError<W::Error>> {
+        self.send()?;
+        self.queue(frame)?;
+        self.send()
+    }
+
+    /// Sends what waits, and returns when the port says that its last byte is out.
+    ///
+    /// # Errors
+    ///
+    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest waits on.
+    pub fn flush(&mut self) -> Result<(), WriteError<W::Error>> {
+        self.send()?;
+        self.port.flush().map_err(WriteError::Port)
+    }
+
+    fn send(&mut self) -> Result<(), WriteError<W::Error>> {
+        while !self.unsent.is_empty() {
+            match self.port.write(&self.unsent).map_err(WriteError::Port)? {
+                0 => return Err(WriteError::Zero),
+                count => self.sent(count),
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,401 @@
+//! Readers and writers over ports that fail, end, stall and stutter: nothing received is lost.
+
+#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
+
+use std::{
+    collections::VecDeque,
+    future::{Future, pending},
+    pin::pin,
+    task::{Context, Poll, Waker},
+};
+
+use axlewire::{
+    error::EncodeError,
+    ikeya::{NodeId, Response, Rps, ToMaster, VelocityResponse},
+    io::{FrameReader, FrameWriter, WriteError},
+    stream::{Event, Framing, Gap, Reason},
+    ucp::{Body, ErrorCode, Ping, Pong, RawFrame, Ucp},
+};
+
+/// What the port does at one call.
+#[derive(Clone, Debug)]
+enum Step {
+    /// Gives these bytes, or takes as many as there are.
+    Bytes(Vec<u8>),
+    /// Fails.
+    Error,
+    /// Says that the file has ended, or that it takes nothing.
+    Zero,
+    /// Never answers: the future has to be dropped. Then goes on with the next step.
+    Stall,
+}
+
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+struct Unplugged;
+
+impl core::fmt::Display for Unplugged {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("unplugged")
+    }
+}
+
+impl core::error::Error for Unplugged {}
+
+impl embedded_io::Error for Unplugged {
+    fn kind(&self) -> embedded_io::ErrorKind {
+        embedded_io::ErrorKind::NotConnected
+    }
+}
+
+/// A port that follows a script, and takes all that is written once the script is over.
+#[derive(Debug, Default)]
+struct Script {
+    steps: VecDeque<Step>,
+    written: Vec<u8>,
+    flushed: usize,
+}
+
+impl Script {
+    fn new(steps: impl IntoIterator<Item = Step>) -> Self {
+        Self { steps: steps.into_iter().collect(), ..Self::default() }
+    }
+
+    fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        assert!(!buffer.is_empty(), "an empty buffer would look like an end of file");
+        match self.steps.pop_front() {
+            Some(Step::Bytes(mut bytes)) => {
+                let rest = bytes.split_off(bytes.len().min(buffer.len()));
+                if !rest.is_empty() {
+                    self.steps.push_front(Step::Bytes(rest));
+                }
+                buffer[..bytes.len()].copy_from_slice(&bytes);
+                Ok(bytes.len())
+            }
+            Some(Step::Error) => Err(Unplugged),
+            Some(Step::Zero) | None => Ok(0),
+            Some(Step::Stall) => panic!("a blocking port cannot stall"),
+        }
+    }
+
+    fn take(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        let count = match self.steps.pop_front() {
+            Some(Step::Bytes(bytes)) => bytes.len().min(buffer.len()),
+            Some(Step::Error) => return Err(Unplugged),
+            Some(Step::Zero) => 0,
+            Some(Step::Stall) => panic!("a blocking port cannot stall"),
+            None => buffer.len(),
+        };
+        self.written.extend(&buffer[..count]);
+        Ok(count)
+    }
+
+    /// Stays in this call for ever if the script says so; its next call goes on.
+    async fn stall(&mut self) {
+        if matches!(self.steps.front(), Some(Step::Stall)) {
+            self.steps.pop_front();
+            pending::<()>().await;
+        }
+    }
+}
+
+impl embedded_io::ErrorType for Script {
+    type Error = Unplugged;
+}
+
+impl embedded_io::Read for Script {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        self.give(buffer)
+    }
+}
+
+impl embedded_io::Write for Script {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.take(buffer)
+    }
+
+    fn flush(&mut self) -> Result<(), Unplugged> {
+        self.flushed += 1;
+        Ok(())
+    }
+}
+
+impl embedded_io_async::Read for Script {
+    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        self.stall().await;
+        self.give(buffer)
+    }
+}
+
+impl embedded_io_async::Write for Script {
+    async fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.stall().await;
+        self.take(buffer)
+    }
+
+    async fn flush(&mut self) -> Result<(), Unplugged> {
+        self.flushed += 1;
+        Ok(())
+    }
+}
+
+/// Polls once, and drops the future if it is not ready: what a timeout does.
+fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(output) => Some(output),
+        Poll::Pending => None,
+    }
+}
+
+/// An event without its borrow.
+fn owned<F: Framing>(event: Event<F::Frame<'_>>, bytes: impl Fn(F::Frame<'_>) -> Vec<u8>) -> Owned {
+    match event {
+        Event::Frame(frame) => Owned::Frame(bytes(frame)),
+        Event::Skipped(gap) => Owned::Skipped(gap),
+    }
+}
+
+#[derive(Clone, Debug, Eq, PartialEq)]
+enum Owned {
+    Frame(Vec<u8>),
+    Skipped(Gap),
+    Error,
+    Cancelled,
+    End,
+}
+
+fn next_blocking(reader: &mut FrameReader<Script, Ucp, 64>) -> Owned {
+    match reader.read_event() {
+        Ok(Some(event)) => owned::<Ucp>(event, |frame| frame.as_bytes().to_vec()),
+        Ok(None) => Owned::End,
+        Err(Unplugged) => Owned::Error,
+    }
+}
+
+fn next_async(reader: &mut FrameReader<Script, Ucp, 64>) -> Owned {
+    match poll_once(reader.read_event_async()) {
+        Some(Ok(Some(event))) => owned::<Ucp>(event, |frame| frame.as_bytes().to_vec()),
+        Some(Ok(None)) => Owned::End,
+        Some(Err(Unplugged)) => Owned::Error,
+        None => Owned::Cancelled,
+    }
+}
+
+/// Both kinds of call, for the stories that hold for both.
+const CALLS: [fn(&mut FrameReader<Script, Ucp, 64>) -> Owned; 2] = [next_blocking, next_async];
+
+fn ping(index: u8) -> Vec<u8> {
+    Ping {}.frame(index).as_bytes().to_vec()
+}
+
+fn pong(index: u8) -> Vec<u8> {
+    Pong::new(ErrorCode::Fine).frame(index).as_bytes().to_vec()
+}
+
+#[test]
+fn short_reads_of_every_size_deliver_every_frame() {
+    let line: Vec<u8> =
+        (0..20).flat_map(|index| [ping(index), pong(index), vec![0x00]].concat()).collect();
+    for size in 1..=line.len() {
+        for next in CALLS {
+            let chunks = line.chunks(size).map(|chunk| Step::Bytes(chunk.to_vec()));
+            let mut reader = FrameReader::new(Script::new(chunks));
+            for index in 0..20 {
+                if index > 0 {
+                    let gap = Gap { len: 1, reason: Reason::Header };
+                    assert_eq!(next(&mut reader), Owned::Skipped(gap));
+                }
+                assert_eq!(next(&mut reader), Owned::Frame(ping(index)), "chunks of {size}");
+                assert_eq!(next(&mut reader), Owned::Frame(pong(index)), "chunks of {size}");
+            }
+            assert_eq!(next(&mut reader), Owned::End);
+        }
+    }
+}
+
+#[test]
+fn a_read_error_in_the_middle_of_a_frame_loses_nothing() {
+    for cut in 1..8 {
+        for next in CALLS {
+            let (head, tail) = (ping(9)[..cut].to_vec(), ping(9)[cut..].to_vec());
+            let steps = [Step::Bytes(head), Step::Error, Step::Error, Step::Bytes(tail)];
+            let mut reader = FrameReader::new(Script::new(steps));
+            assert_eq!(next(&mut reader), Owned::Error);
+            assert_eq!(reader.pending(), cut);
+            assert_eq!(next(&mut reader), Owned::Error);
+            assert_eq!(next(&mut reader), Owned::Frame(ping(9)));
+        }
+    }
+}
+
+#[test]
+fn an_end_of_file_in_the_middle_of_a_frame_loses_nothing_when_the_file_grows() {
+    for cut in 1..8 {
+        for next in CALLS {
+            let (head, tail) = (ping(9)[..cut].to_vec(), ping(9)[cut..].to_vec());
+            let steps = [Step::Bytes(head), Step::Zero, Step::Zero, Step::Bytes(tail)];
+            let mut reader = FrameReader::new(Script::new(steps));
+            assert_eq!((next(&mut reader), reader.pending()), (Owned::End, cut));
+            assert_eq!((next(&mut reader), reader.pending()), (Owned::End, cut));
+            assert_eq!((next(&mut reader), reader.pending()), (Owned::Frame(ping(9)), 0));
+        }
+    }
+}
+
+#[test]
+fn at_a_final_end_of_file_idle_frees_what_a_false_header_hides() {
+    for next in CALLS {
+        // Two nested promises of 64 bytes, and a whole ping behind them.
+        let mut line = vec![0xFD, 0xFF, 60, 0, 0xFD, 0xFF, 60, 0];
+        line.extend(ping(1));
+        let mut reader = FrameReader::new(Script::new([Step::Bytes(line)]));
+        assert_eq!((next(&mut reader), reader.pending()), (Owned::End, 16));
+        reader.idle();
+        let gap = Gap { len: 4, reason: Reason::Idle };
+        assert_eq!((next(&mut reader), reader.pending()), (Owned::Skipped(gap), 12));
+        assert_eq!(next(&mut reader), Owned::End);
+        reader.idle();
+        assert_eq!(next(&mut reader), Owned::Skipped(gap));
+        assert_eq!(next(&mut reader), Owned::Frame(ping(1)));
+        assert_eq!((next(&mut reader), reader.pending()), (Owned::End, 0));
+        let counters = reader.decoder().counters();
+        assert_eq!((counters.received, counters.framed, counters.skipped()), (16, 8, 8));
+    }
+}
+
+#[test]
+fn a_cancelled_read_loses_nothing_wherever_it_is_cancelled() {
+    for cut in 0..=17 {
+        let line = [ping(1), pong(2)].concat();
+        let (head, tail) = (line[..cut].to_vec(), line[cut..].to_vec());
+        let steps = [Step::Bytes(head), Step::Stall, Step::Stall, Step::Bytes(tail)];
+        let steps =
+            steps.into_iter().filter(|step| !matches!(step, Step::Bytes(b) if b.is_empty()));
+        let mut reader = FrameReader::new(Script::new(steps));
+        let (mut frames, mut cancelled) = (vec![], 0);
+        loop {
+            match next_async(&mut reader) {
+                Owned::Frame(frame) => frames.push(frame),
+                Owned::Cancelled => cancelled += 1,
+                Owned::End => break,
+                other => panic!("{other:?}"),
+            }
+        }
+        assert_eq!((frames, cancelled), (vec![ping(1), pong(2)], 2), "cut at {cut}");
+    }
+}
+
+#[test]
+fn the_reader_serves_the_motor_bus_with_the_smallest_buffer() {
+    let response = VelocityResponse::new(NodeId::N4, Rps::ZERO);
+    let line = [&[0xAA][..], response.as_bytes(), response.as_bytes()].concat();
+    let mut reader = FrameReader::<_, ToMaster, 8>::new(Script::new([Step::Bytes(line)]));
+    assert!(matches!(reader.read_event(), Ok(Some(Event::Skipped(Gap { len: 1, .. })))));
+    for _ in 0..2 {
+        let Ok(Some(Event::Frame(Response::Velocity(found)))) = reader.read_event() else {
+            panic!()
+        };
+        assert_eq!(*found, response);
+    }
+    let (_, decoder) = reader.into_parts();
+    assert_eq!((decoder.pending(), decoder.counters().received), (0, 17));
+}
+
+type Writer = FrameWriter<Script, 24>;
+
+fn write_blocking(writer: &mut Writer, index: u8) -> Result<(), WriteError<Unplugged>> {
+    writer.write(&Ping {}.frame(index))
+}
+
+fn write_async(writer: &mut Writer, index: u8) -> Result<(), WriteError<Unplugged>> {
+    poll_once(writer.write_async(&Ping {}.frame(index))).expect("ready")
+}
+
+const WRITES: [fn(&mut Writer, u8) -> Result<(), WriteError<Unplugged>>; 2] =
+    [write_blocking, write_async];
+
+#[test]
+fn short_writes_of_every_size_send_every_byte_once() {
+    for size in 1..=8 {
+        for write in WRITES {
+            let steps = (0..100).map(|_| Step::Bytes(vec![0; size]));
+            let mut writer = Writer::new(Script::new(steps));
+            for index in 0..10 {
+                write(&mut writer, index).unwrap();
+                assert!(writer.unsent().is_empty());
+            }
+            let expected: Vec<u8> = (0..10).flat_map(ping).collect();
+            assert_eq!(writer.into_port().written, expected);
+        }
+    }
+}
+
+#[test]
+fn a_write_error_in_the_middle_of_a_frame_leaves_the_rest_for_the_next_call() {
+    for (failure, error) in
+        [(Step::Error, WriteError::Port(Unplugged)), (Step::Zero, WriteError::Zero)]
+    {
+        for cut in 1..8 {
+            for write in WRITES {
+                let steps = [Step::Bytes(vec![0; cut]), failure.clone(), failure.clone()];
+                let mut writer = Writer::new(Script::new(steps));
+                assert_eq!(write(&mut writer, 1), Err(error));
+                assert_eq!(writer.unsent(), &ping(1)[cut..]);
+                // The second frame is refused as long as the first cannot be finished.
+                assert_eq!(write(&mut writer, 2), Err(error));
+                assert_eq!(writer.unsent(), &ping(1)[cut..]);
+                assert_eq!(write(&mut writer, 3), Ok(()));
+                assert_eq!(writer.into_port().written, [ping(1), ping(3)].concat());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cancelled_write_is_finished_by_the_next_call() {
+    let steps = [Step::Bytes(vec![0; 3]), Step::Stall];
+    let mut writer = Writer::new(Script::new(steps));
+    assert_eq!(poll_once(writer.write_async(&Ping {}.frame(1))), None);
+    assert_eq!(writer.unsent(), &ping(1)[3..]);
+    assert_eq!(poll_once(writer.flush_async()), Some(Ok(())));
+    let port = writer.into_port();
+    assert_eq!((port.written, port.flushed), (ping(1), 1));
+}
+
+#[test]
+fn flush_sends_what_is_queued_and_flushes_the_port() {
+    let mut writer = Writer::new(Script::default());
+    writer.queue(&Ping {}.frame(1)).unwrap();
+    writer.queue(&Ping {}.frame(2)).unwrap();
+    assert!(writer.port_mut().written.is_empty());
+    writer.flush().unwrap();
+    let port = writer.into_port();
+    assert_eq!((port.written, port.flushed), ([ping(1), ping(2)].concat(), 1));
+}
+
+#[test]
+fn a_frame_without_room_is_refused_and_the_queue_stays_as_it_was() {
+    let mut writer = Writer::new(Script::default());
+    for index in 0..3 {
+        writer.queue(&Ping {}.frame(index)).unwrap();
+    }
+    let error = EncodeError::BufferTooSmall { needed: 8, available: 0 };
+    assert_eq!(writer.queue(&Ping {}.frame(3)), Err(error));
+    assert_eq!(writer.unsent().len(), 24);
+    assert_eq!(writer.discard(), 24);
+    let hazard = RawFrame { id: 5, index: 0, body: &[] };
+    assert_eq!(writer.write(&hazard), Err(WriteError::Encode(EncodeError::KnownId { id: 5 })));
+    assert!(writer.unsent().is_empty());
+    let long = RawFrame { id: 99, index: 0, body: &[0; 20] };
+    let error = EncodeError::BufferTooSmall { needed: 28, available: 24 };
+    assert_eq!(writer.write(&long), Err(WriteError::Encode(error)));
+}
+
+#[test]
+fn a_write_error_keeps_the_ports_own_as_its_source() {
+    use std::error::Error;
+    let error = WriteError::Port(Unplugged);
+    assert_eq!(error.source().unwrap().to_string(), "unplugged");
+    assert_eq!(error.to_string(), "port failed while sending: unplugged");
+    assert!(WriteError::<Unplugged>::Zero.source().is_none());
+}

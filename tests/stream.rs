@@ -1,0 +1,508 @@
+//! The stream layer against the slow oracle, on hostile streams, and as stories told by hand.
+#![cfg(all(feature = "ikeya", feature = "ucp"))]
+
+#[path = "support/generate.rs"]
+mod generate;
+#[path = "support/line.rs"]
+mod line;
+#[path = "support/oracle.rs"]
+mod oracle;
+
+use std::cell::Cell;
+
+use axlewire::{
+    ikeya::{self, NodeId, Position, Rps, three},
+    stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
+    ucp::{self, Body, MotorControl, Ucp},
+};
+use line::{Known, Line, Op};
+use oracle::Rules;
+use proptest::{collection::vec, prelude::*};
+
+// Properties, for every framing.
+
+macro_rules! properties {
+    ($($name:ident: $framing:ty, $max_len:literal;)+) => {$(
+        mod $name {
+            use super::*;
+
+            type F = $framing;
+            const MAX_LEN: usize = $max_len;
+
+            fn stream() -> impl Strategy<Value = Vec<u8>> {
+                generate::stream(F::RULES)
+            }
+
+            #[test]
+            fn the_smallest_buffer_is_the_longest_frame() {
+                assert_eq!(<F as Framing>::MAX_LEN, MAX_LEN);
+            }
+
+            proptest! {
+                #[test]
+                fn a_slice_gives_what_the_oracle_says(stream in stream()) {
+                    check_slice::<F>(&stream);
+                }
+
+                #[test]
+                fn a_finished_slice_gives_what_the_oracle_says(stream in stream()) {
+                    check_finished_slice::<F>(&stream);
+                }
+
+                #[test]
+                fn single_bytes_give_what_the_oracle_says(stream in stream()) {
+                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Slice(1)]);
+                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Commit(1), Op::Drain]);
+                }
+
+                #[test]
+                fn chunks_do_not_matter(stream in stream(), chunks in vec(0..80_usize, 1..8)) {
+                    let ops: Vec<_> = chunks.into_iter().map(Op::Slice).collect();
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn a_port_may_fill_the_buffer(
+                    stream in stream(),
+                    chunks in vec((0..300_usize, any::<bool>()), 1..8),
+                ) {
+                    let drained = |(len, drain)| [Op::Commit(len), if drain { Op::Drain } else { Op::Commit(1) }];
+                    let mut ops: Vec<_> = chunks.into_iter().flat_map(drained).collect();
+                    ops.push(Op::Drain);
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    Line::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
+                    Line::<F, 512>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn an_idle_line_ends_candidates_anywhere(
+                    stream in stream(),
+                    chunks in vec(0..40_usize, 1..8),
+                ) {
+                    let quiet = |len| [Op::Slice(len), Op::Idle];
+                    let ops: Vec<_> = chunks.into_iter().flat_map(quiet).collect();
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn an_idle_line_loses_no_frame_that_is_still_in_the_buffer(
+                    stream in stream(),
+                    chunks in vec(0..300_usize, 1..8),
+                ) {
+                    let quiet = |len| [Op::Commit(len), Op::Idle, Op::Drain];
+                    let ops: Vec<_> = chunks.into_iter().flat_map(quiet).collect();
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    Line::<F, 512>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn stopping_early_loses_nothing(
+                    stream in stream(),
+                    stops in vec((1..200_usize, 0..4_usize), 1..8),
+                ) {
+                    let stop = |(len, events)| Op::Stop { len, events };
+                    let ops: Vec<_> = stops.into_iter().map(stop).collect();
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn nothing_that_a_user_does_matters(stream in stream(), ops in generate::ops()) {
+                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    Line::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
+                    Line::<F, 512>::new().play(&stream, &ops);
+                }
+
+                #[test]
+                fn a_start_delays_a_frame_by_less_than_a_frame(
+                    stream in stream(),
+                    frame in generate::frame(F::RULES),
+                ) {
+                    check_stall::<F, MAX_LEN>(&stream, &frame);
+                }
+
+                #[test]
+                fn work_is_bounded(stream in stream(), ops in generate::ops()) {
+                    check_work::<F, MAX_LEN>(&stream, &ops);
+                    check_work::<F, MAX_LEN>(&stream, &[Op::Slice(1)]);
+                }
+            }
+        }
+    )+};
+}
+
+properties! {
+    ikeya_to_slave: ikeya::ToSlave, 8;
+    ikeya_to_master: ikeya::ToMaster, 8;
+    ikeya_either: ikeya::Either, 8;
+    three_to_slave: three::ToSlave, 16;
+    three_to_master: three::ToMaster, 16;
+    three_either: three::Either, 16;
+    ucp_by_default: Ucp, 64;
+    ucp_with_the_largest_cap: Ucp<252>, 256;
+}
+
+/// The slice iterator gives the oracle's frames, borrowed, and leaves its rest.
+fn check_slice<F: Known>(stream: &[u8]) {
+    let told = oracle::answer(F::RULES, stream, &[]);
+    let mut frames = Frames::<F>::new(stream);
+    let mut found = Vec::new();
+    while let Some(frame) = frames.next() {
+        found.push(place_in(stream, F::bytes(&frame)));
+        let counters = frames.counters();
+        let booked = counters.framed + counters.skipped() + frames.rest().len() as u64;
+        assert_eq!(counters.received, booked);
+    }
+    assert_eq!(found, told.frames());
+    assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
+    line::check_counters(frames.counters(), &told, stream.len());
+}
+
+/// With `idle` as often as there is a rest, the slice iterator gives all frames there are.
+fn check_finished_slice<F: Known>(stream: &[u8]) {
+    let mut frames = Frames::<F>::new(stream);
+    let (mut found, mut idles) = (Vec::new(), Vec::new());
+    loop {
+        found.extend(frames.by_ref().map(|frame| place_in(stream, F::bytes(&frame))));
+        if frames.rest().is_empty() {
+            break;
+        }
+        frames.idle();
+        idles.push(stream.len());
+    }
+    let told = oracle::answer(F::RULES, stream, &idles);
+    assert_eq!((found, told.pending), (told.frames(), 0));
+    assert_eq!(frames.counters().idle as usize, told.skipped[oracle::Reason::Idle as usize]);
+    assert_eq!(frames.counters().skipped() as usize, told.skipped.iter().sum::<usize>());
+}
+
+fn place_in(stream: &[u8], frame: &[u8]) -> (usize, usize) {
+    assert!(stream.as_ptr_range().contains(&frame.as_ptr()), "the frame is not borrowed");
+    (frame.as_ptr().addr() - stream.as_ptr().addr(), frame.len())
+}
+
+/// B3: whatever came before, `MAX_LEN` bytes behind any byte its fate is decided; after a quiet
+/// line it is as if nothing had been before, other than a candidate that the quiet did not end.
+fn check_stall<F: Known, const N: usize>(stream: &[u8], frame: &[u8]) {
+    let mut line = Line::<F, N>::new();
+    line.slice(stream);
+    assert!(line.decoder().pending() < F::MAX_LEN);
+    while line.decoder().pending() > 0 {
+        let before = line.decoder().pending();
+        line.idle();
+        line.slice(&[]);
+        assert!(line.decoder().pending() < before, "an idle line ends nothing");
+    }
+    // Nothing is pending: a good frame comes out with its last byte.
+    let good = oracle::answer(F::RULES, frame, &[]);
+    let before = line.events().len();
+    line.slice(frame);
+    assert_eq!(line.events().len() - before, good.events.len());
+    line.finish();
+}
+
+thread_local! {
+    static JUDGED: Cell<u64> = const { Cell::new(0) };
+    static CHECKED: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Another framing that counts how often it is asked, and how often about a whole candidate.
+struct Counted<F>(F);
+
+impl<F: Known> Framing for Counted<F> {
+    type Frame<'a> = F::Frame<'a>;
+    const MAX_LEN: usize = F::MAX_LEN;
+
+    fn judge(bytes: &[u8]) -> Verdict {
+        let verdict = F::judge(bytes);
+        JUDGED.set(JUDGED.get() + 1);
+        let whole = match verdict {
+            Verdict::Frame { .. } => true,
+            Verdict::Reject { reason, .. } => matches!(reason, Reason::Crc | Reason::Id),
+            Verdict::Partial { .. } => false,
+        };
+        CHECKED.set(CHECKED.get() + u64::from(whole));
+        verdict
+    }
+
+    fn view(frame: &[u8]) -> Option<F::Frame<'_>> {
+        F::view(frame)
+    }
+}
+
+impl<F: Known> Known for Counted<F> {
+    const RULES: Rules = F::RULES;
+
+    fn bytes<'a: 'a>(frame: &F::Frame<'a>) -> &'a [u8] {
+        F::bytes(frame)
+    }
+}
+
+/// A checksum is computed once for every place where a candidate starts, and again at most twice
+/// for a frame: when a gap is reported in front of it, and when it is read where it lies. Short
+/// looks are a few for each byte and one for each call.
+fn check_work<F: Known, const N: usize>(stream: &[u8], ops: &[Op]) {
+    JUDGED.set(0);
+    CHECKED.set(0);
+    let calls = Line::<Counted<F>, N>::new().play(stream, ops);
+    let bytes = stream.len() as u64;
+    let frames = bytes / 4;
+    assert!(CHECKED.get() <= bytes + 2 * frames, "{} of {bytes} bytes", CHECKED.get());
+    assert!(JUDGED.get() <= 6 * bytes + calls, "{} for {bytes} bytes", JUDGED.get());
+}
+
+// Stories.
+
+/// An event with the frame's bytes in it.
+#[derive(Debug, PartialEq)]
+enum Seen {
+    Frame(Vec<u8>),
+    Gap(u64, Reason),
+}
+
+/// What a decoder with the smallest buffer makes of `chunks`, then of a quiet line.
+fn seen<F: Known, const N: usize>(chunks: &[&[u8]], quiet: bool) -> (Vec<Seen>, usize) {
+    let mut decoder = Decoder::<F, N>::new();
+    let mut seen = Vec::new();
+    let mut drain = |decoder: &mut Decoder<F, N>, mut chunk: &[u8]| {
+        while let Some(event) = decoder.decode(&mut chunk) {
+            seen.push(match event {
+                Event::Frame(frame) => Seen::Frame(F::bytes(&frame).to_vec()),
+                Event::Skipped(Gap { len, reason }) => Seen::Gap(len, reason),
+            });
+        }
+    };
+    for chunk in chunks {
+        drain(&mut decoder, chunk);
+    }
+    if quiet {
+        decoder.idle();
+        drain(&mut decoder, &[]);
+    }
+    (seen, decoder.pending())
+}
+
+fn read() -> Vec<u8> {
+    ikeya::ReadRequest::new(NodeId::N1).as_bytes().to_vec()
+}
+
+fn write() -> Vec<u8> {
+    ikeya::WriteRequest::velocity(NodeId::N2, Rps::new(1.0).unwrap()).as_bytes().to_vec()
+}
+
+fn response() -> Vec<u8> {
+    ikeya::VelocityResponse::new(NodeId::N2, Rps::new(1.0).unwrap()).as_bytes().to_vec()
+}
+
+fn motor() -> Vec<u8> {
+    MotorControl::new(60, 20).unwrap().frame(7).as_bytes().to_vec()
+}
+
+#[test]
+fn a_false_header_swallows_nothing() {
+    let stream = [&[0x55][..], &response(), &response()].concat();
+    let (seen, pending) = seen::<ikeya::ToMaster, 8>(&[&stream], false);
+    let gap = Seen::Gap(1, Reason::Crc);
+    assert_eq!(seen, [gap, Seen::Frame(response()), Seen::Frame(response())]);
+    assert_eq!(pending, 0);
+}
+
+#[test]
+fn a_frame_inside_a_damaged_frame_is_delivered() {
+    let mut outer = generate::ucp_frame_around(0x20, &motor());
+    *outer.last_mut().unwrap() ^= 1;
+    let (seen, _) = seen::<Ucp, 64>(&[&outer], true);
+    let before = Seen::Gap(6, Reason::Crc);
+    assert_eq!(seen, [before, Seen::Frame(motor()), Seen::Gap(2, Reason::Header)]);
+}
+
+#[test]
+fn a_frame_inside_the_payload_of_a_good_one_is_not() {
+    let outer = generate::ucp_frame_around(0x20, &motor());
+    let (seen, _) = seen::<Ucp, 64>(&[&outer], true);
+    assert_eq!(seen, [Seen::Frame(outer)]);
+}
+
+#[test]
+fn the_payload_of_a_bad_id_packet_is_not_searched() {
+    for id in [0, 9, 255] {
+        let packet = generate::ikeya_packet_around(0xBB, id, &read());
+        let (seen, pending) = seen::<ikeya::ToSlave, 8>(&[&packet, &read()], false);
+        assert_eq!(seen, [Seen::Gap(8, Reason::Id), Seen::Frame(read())], "id {id}");
+        assert_eq!(pending, 0);
+    }
+}
+
+#[test]
+fn a_bad_id_with_a_bad_crc_is_noise() {
+    let mut packet = generate::ikeya_packet_around(0xBB, 9, &read());
+    packet[7] ^= 0x80;
+    let (seen, _) = seen::<ikeya::ToSlave, 8>(&[&packet], true);
+    let (before, after) = (Seen::Gap(2, Reason::Crc), Seen::Gap(2, Reason::Header));
+    assert_eq!(seen, [before, Seen::Frame(read()), after]);
+}
+
+#[test]
+fn a_packet_of_the_other_direction_is_no_header() {
+    let stream = [response(), write()].concat();
+    let (at_slave, _) = seen::<ikeya::ToSlave, 8>(&[&stream], true);
+    assert_eq!(at_slave, [Seen::Gap(8, Reason::Header), Seen::Frame(write())]);
+    let (between, _) = seen::<ikeya::Either, 8>(&[&stream], true);
+    assert_eq!(between, [Seen::Frame(response()), Seen::Frame(write())]);
+}
+
+#[test]
+fn boards_with_three_motors_need_their_own_framing() {
+    let positions = [Position::new(1, 2), Position::new(3, 4), Position::new(5, 6)];
+    let packet = three::PositionResponse::new(NodeId::N8, positions);
+    let (with_three, _) = seen::<three::ToMaster, 16>(&[packet.as_bytes()], true);
+    assert_eq!(with_three, [Seen::Frame(packet.as_bytes().to_vec())]);
+    let (with_one, _) = seen::<ikeya::ToMaster, 8>(&[packet.as_bytes()], true);
+    assert_eq!(with_one, [Seen::Gap(16, Reason::Crc)]);
+}
+
+#[test]
+fn a_doubled_first_sync_byte_hides_no_frame() {
+    let stream = [&[0xFD][..], &motor()].concat();
+    let single_bytes: Vec<_> = stream.chunks(1).collect();
+    for chunks in [&[stream.as_slice()][..], &single_bytes] {
+        let (seen, _) = seen::<Ucp, 64>(chunks, false);
+        assert_eq!(seen, [Seen::Gap(1, Reason::Header), Seen::Frame(motor())]);
+    }
+}
+
+#[test]
+fn length_61_is_refused_unless_the_cap_is_raised() {
+    let longest = generate::ucp_frame_around(0x20, &[0; 56]);
+    let longer = generate::ucp_frame_around(0x20, &[0; 57]);
+    let (by_default, _) = seen::<Ucp, 64>(&[&longest], true);
+    assert_eq!(by_default, [Seen::Frame(longest)]);
+    let (by_default, _) = seen::<Ucp, 64>(&[&longer], true);
+    assert_eq!(by_default, [Seen::Gap(65, Reason::Length)]);
+    let (with_cap, _) = seen::<Ucp<61>, 65>(&[&longer], true);
+    assert_eq!(with_cap, [Seen::Frame(longer)]);
+}
+
+#[test]
+fn a_length_that_no_frame_has_stalls_nothing() {
+    for len in [0_u16, 3, 61, 253, 0x0100, 0x0104, 0x0400, 0xFFFF] {
+        let [low, high] = len.to_le_bytes();
+        let (seen, _) = seen::<Ucp, 64>(&[&[0xFD, 0xFF, low, high], &motor()], false);
+        assert_eq!(seen, [Seen::Gap(4, Reason::Length), Seen::Frame(motor())], "len {len}");
+    }
+}
+
+#[test]
+fn an_unknown_id_is_delivered() {
+    for (id, body) in [(0x20, &[1, 2, 3][..]), (0, &[]), (2, &[0; 15]), (5, &[0; 35])] {
+        let frame = generate::ucp_frame_around(id, body);
+        let mut decoder = ucp::Decoder::new();
+        let mut input = frame.as_slice();
+        let Some(Event::Frame(frame)) = decoder.decode(&mut input) else { panic!("id {id}") };
+        let ucp::Message::Unknown(raw) = frame.message() else { panic!("id {id}") };
+        assert_eq!((raw.id, raw.index, raw.body), (id, 0, body));
+    }
+}
+
+#[test]
+fn a_truncated_frame_takes_nothing_with_it() {
+    for len in 1..motor().len() {
+        let stream = [&motor()[..len], &motor(), &motor()].concat();
+        let (seen, pending) = seen::<Ucp, 64>(&[&stream], false);
+        assert_eq!(seen.len(), 3, "cut to {len}");
+        assert_eq!(seen[1..], [Seen::Frame(motor()), Seen::Frame(motor())], "cut to {len}");
+        assert_eq!(pending, 0);
+    }
+}
+
+#[test]
+fn one_gap_is_one_event_with_the_reason_of_its_first_byte() {
+    // A false header with a wrong CRC, stray bytes, a packet for node 9.
+    let stranger = generate::ikeya_packet_around(0xBB, 9, &[0; 4]);
+    let stream = [&[0xAA, 0x00, 0x00][..], &stranger, &read()].concat();
+    let (gap_first, _) = seen::<ikeya::ToSlave, 8>(&[&stream], false);
+    assert_eq!(gap_first, [Seen::Gap(11, Reason::Crc), Seen::Frame(read())]);
+    // Each byte is still counted under its own reason.
+    let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
+    let mut input = stream.as_slice();
+    while decoder.decode(&mut input).is_some() {}
+    let counters = decoder.counters();
+    let by_reason = [counters.header, counters.length, counters.id, counters.crc, counters.idle];
+    assert_eq!((by_reason, counters.gaps), ([2, 0, 8, 1, 0], 1));
+}
+
+#[test]
+fn the_longest_false_header_delays_a_frame_by_at_most_a_longest_frame() {
+    // A frame of 64 bytes is promised; then motor commands of 24 come.
+    let header = [0xFD, 0xFF, 60, 0];
+    let mut line = Line::<Ucp, 64>::new();
+    line.slice(&header);
+    for (sent, byte) in motor().into_iter().cycle().take(59).enumerate() {
+        line.slice(&[byte]);
+        assert!(line.events().is_empty(), "after {sent} bytes");
+    }
+    line.slice(&[motor()[59 % 24]]);
+    // The gap, and both commands that had arrived: 60 of 72 bytes.
+    assert_eq!(line.events().len(), 3);
+    assert_eq!(line.decoder().pending(), 60 - 48);
+    line.finish();
+}
+
+#[test]
+fn a_quiet_line_ends_the_delay_at_once() {
+    let (seen, pending) = seen::<Ucp, 64>(&[&[0xFD, 0xFF, 60, 0], &motor()], true);
+    assert_eq!(seen, [Seen::Gap(4, Reason::Idle), Seen::Frame(motor())]);
+    assert_eq!(pending, 0);
+}
+
+#[test]
+fn a_new_candidate_at_the_very_end_outlives_one_quiet_line() {
+    let start = &motor()[..10];
+    let (first, pending) = seen::<Ucp, 64>(&[&[0xFD, 0xFF, 60, 0], start], true);
+    assert_eq!((first, pending), (vec![Seen::Gap(4, Reason::Idle)], 10));
+    // Its rest comes after all.
+    let mut line = Line::<Ucp, 64>::new();
+    line.slice(&[&[0xFD, 0xFF, 60, 0], start].concat());
+    line.idle();
+    line.slice(&motor()[10..]);
+    assert!(matches!(line.events(), [_, oracle::Event::Frame { offset: 4, len: 24 }]));
+    line.finish();
+}
+
+#[test]
+fn a_quiet_line_without_a_candidate_reports_the_gap_and_nothing_else() {
+    let (first, pending) = seen::<ikeya::ToSlave, 8>(&[&[1, 2, 3]], true);
+    assert_eq!((first, pending), (vec![Seen::Gap(3, Reason::Header)], 0));
+    assert_eq!(seen::<ikeya::ToSlave, 8>(&[], true), (vec![], 0));
+    assert_eq!(seen::<ikeya::ToSlave, 8>(&[&read()], true), (vec![Seen::Frame(read())], 0));
+}
+
+#[test]
+fn a_quiet_line_does_not_touch_whole_frames_that_wait_in_the_buffer() {
+    let mut line = Line::<ikeya::ToSlave, 64>::new();
+    line.commit(&[&read()[..], &write(), &read()[..2]].concat());
+    line.idle();
+    line.slice(&[]);
+    let idle = oracle::Event::Skipped { offset: 12, len: 2, reason: oracle::Reason::Idle };
+    assert_eq!(line.events().len(), 3);
+    assert_eq!(line.events().last(), Some(&idle));
+    line.finish();
+}
+
+#[test]
+fn a_frame_cut_anywhere_arrives_whole() {
+    for cut in 0..=motor().len() {
+        let (head, tail) = (&motor()[..cut], &motor()[cut..]);
+        let (seen, pending) = seen::<Ucp, 64>(&[head, &[], tail], false);
+        assert_eq!((seen, pending), (vec![Seen::Frame(motor())], 0), "cut at {cut}");
+    }
+}
+
+#[test]
+fn no_more_is_committed_than_there_is_room_for() {
+    let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
+    decoder.commit(usize::MAX);
+    assert_eq!((decoder.counters().received, decoder.pending()), (8, 8));
+    assert!(decoder.spare().is_empty());
+    while decoder.decode(&mut &[][..]).is_some() {}
+    assert_eq!((decoder.counters().header, decoder.spare().len()), (8, 8));
+}
