@@ -1,0 +1,46 @@
+//! A whole capture at once, for hosts.
+
+use alloc::vec::Vec;
+
+use super::{Counters, Event, Framing, Front, Reason, ledger::Ledger, search};
+
+/// Everything in a capture that is already in memory: each event with the offset of its first
+/// byte, and the account.
+///
+/// Nothing follows a capture, so a candidate that its end cuts off is refused as
+/// [`Reason::Idle`], and whole frames inside it are found. Needs feature `alloc`.
+///
+/// ```
+/// use axlewire::{stream::{Event, Gap, Reason, decode_capture}, ucp::Ucp};
+///
+/// // A ping, and half a ping.
+/// let bytes = [0xFD, 0xFF, 4, 0, 1, 0, 0x01, 0x42, 0xFD, 0xFF, 4, 0];
+/// let (events, counters) = decode_capture::<Ucp>(&bytes);
+/// assert!(matches!(events[0], (0, Event::Frame(frame)) if frame.id() == 1));
+/// assert!(matches!(events[1], (8, Event::Skipped(Gap { len: 4, reason: Reason::Idle }))));
+/// assert_eq!((counters.frames, counters.skipped()), (1, 4));
+/// ```
+#[cfg_attr(docsrs, doc(cfg(feature = "alloc")))]
+#[must_use]
+pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<(usize, Event<F::Frame<'_>>)>, Counters) {
+    let (mut events, mut ledger, mut at) = (Vec::new(), Ledger::new(), 0);
+    ledger.counters.received = bytes.len() as u64;
+    while let Some(rest) = bytes.get(at..) {
+        let (skipped, front) = search::<F>(rest, &mut ledger);
+        at += skipped;
+        if matches!(front, Front::Partial { .. }) && at < bytes.len() {
+            ledger.skip(Reason::Idle, 1);
+            at += 1;
+            continue;
+        }
+        if let Some(gap) = ledger.gap.take() {
+            events.push((at - gap.len as usize, Event::Skipped(gap)));
+        }
+        let Front::Frame { len } = front else { break };
+        let frame = bytes.get(at..).and_then(|rest| rest.get(..len)).and_then(F::view);
+        events.extend(frame.map(|frame| (at, Event::Frame(frame))));
+        ledger.frame(len);
+        at += len;
+    }
+    (events, ledger.counters)
+}

@@ -1,0 +1,80 @@
+//! Frames of a slice.
+
+use core::marker::PhantomData;
+
+use super::{Counters, Framing, Front, Reason, Verdict, ledger::Ledger, search};
+
+/// Frames of a slice that is already in memory, borrowed from it.
+///
+/// The iterator stops where the slice ends, or where a candidate begins that the slice cuts off:
+/// [`rest`](Self::rest) is then that tail, to be kept until more has arrived. When nothing more
+/// will come, [`idle`](Self::idle) lets the search go on inside it.
+///
+/// ```
+/// use axlewire::{ikeya, stream::Frames};
+///
+/// // A stray byte, node 2 at 1.0 rps, and the start of another response.
+/// let bytes = [0x00, 0x55, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x54, 0x0E, 0x55, 0x03];
+/// let mut frames = Frames::<ikeya::ToMaster>::new(&bytes);
+/// let Some(ikeya::Response::Velocity(response)) = frames.next() else { panic!() };
+/// assert_eq!((response.id(), response.rps()), (ikeya::NodeId::N2, 1.0));
+/// assert!(frames.next().is_none());
+/// assert_eq!(frames.rest(), [0x55, 0x03]);
+/// assert_eq!(frames.counters().header, 1);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Frames<'a, F> {
+    rest: &'a [u8],
+    ledger: Ledger,
+    framing: PhantomData<fn() -> F>,
+}
+
+impl<'a, F: Framing> Frames<'a, F> {
+    /// Frames of `bytes`, from the first byte on.
+    #[must_use]
+    pub fn new(bytes: &'a [u8]) -> Self {
+        let mut ledger = Ledger::new();
+        ledger.counters.received = bytes.len() as u64;
+        Self { rest: bytes, ledger, framing: PhantomData }
+    }
+
+    /// What has not been judged yet; once the iterator has ended, the candidate that the slice
+    /// cuts off, shorter than [`Framing::MAX_LEN`].
+    #[must_use]
+    pub fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    /// Nothing follows the slice: refuses the candidate that it cuts off, if there is one, so that
+    /// the search can go on inside it (ruling B3).
+    ///
+    /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
+    pub fn idle(&mut self) {
+        if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {
+            self.ledger.skip(Reason::Idle, 1);
+            self.rest = rest;
+        }
+    }
+
+    /// Where every byte went so far.
+    #[must_use]
+    pub fn counters(&self) -> &Counters {
+        &self.ledger.counters
+    }
+}
+
+impl<'a, F: Framing> Iterator for Frames<'a, F> {
+    type Item = F::Frame<'a>;
+
+    #[inline]
+    fn next(&mut self) -> Option<F::Frame<'a>> {
+        let (skipped, front) = search::<F>(self.rest, &mut self.ledger);
+        self.rest = self.rest.get(skipped..)?;
+        let Front::Frame { len } = front else { return None };
+        let (frame, rest) = self.rest.split_at_checked(len)?;
+        self.rest = rest;
+        self.ledger.gap = None;
+        self.ledger.frame(len);
+        F::view(frame)
+    }
+}
