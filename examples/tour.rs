@@ -114,7 +114,7 @@ fn ikeya_line(packet: Packet<'_>) -> Line {
 
 fn ucp_line(frame: &ucp::Frame) -> Line {
     let (name, meaning) = match frame.message() {
-        Message::Ping(_) => ("ping", String::new()),
+        Message::Ping(_) => ("ping", "are you there?".into()),
         Message::Pong(it) => ("pong", format!("{:?}", it.err())),
         Message::MotorControl(it) => {
             let lamp = if it.front_led() == 0 { "off" } else { "on" };
@@ -147,7 +147,7 @@ fn ucp_line(frame: &ucp::Frame) -> Line {
         Message::ImuBiasAck(it) => ("IMU bias ack", format!("{:?}", it.err())),
         Message::MagBias(it) => ("magnetometer bias", format!("{:?}", it.mag())),
         Message::MagBiasAck(it) => ("magnetometer bias ack", format!("{:?}", it.err())),
-        Message::BiasRequest(_) => ("bias request", String::new()),
+        Message::BiasRequest(_) => ("bias request", "the robot has just booted".into()),
         Message::Biases(it) => {
             let meaning = format!(
                 "acc {:?}, gyro {:?}, mag {:?}",
@@ -172,7 +172,8 @@ fn ucp_line(frame: &ucp::Frame) -> Line {
 }
 
 fn show(name: &str, bytes: &[u8]) {
-    println!("{name:<24} {bytes:02x?}");
+    let hex: Vec<_> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    println!("{name:<24} {}", hex.join(" "));
 }
 
 fn build_ikeya() -> Result<(), EncodeError> {

@@ -26,7 +26,7 @@ mod frames;
 mod ledger;
 
 #[cfg(feature = "alloc")]
-pub use capture::decode_capture;
+pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
 pub use frames::Frames;
 pub use ledger::{Counters, Gap, Reason};

@@ -181,8 +181,10 @@ fn next_async(reader: &mut FrameReader<Script, Ucp, 64>) -> Owned {
     }
 }
 
+type NextEvent = fn(&mut FrameReader<Script, Ucp, 64>) -> Owned;
+
 /// Both kinds of call, for the stories that hold for both.
-const CALLS: [fn(&mut FrameReader<Script, Ucp, 64>) -> Owned; 2] = [next_blocking, next_async];
+const CALLS: [NextEvent; 2] = [next_blocking, next_async];
 
 fn ping(index: u8) -> Vec<u8> {
     Ping {}.frame(index).as_bytes().to_vec()
@@ -311,8 +313,9 @@ fn write_async(writer: &mut Writer, index: u8) -> Result<(), WriteError<Unplugge
     poll_once(writer.write_async(&Ping {}.frame(index))).expect("ready")
 }
 
-const WRITES: [fn(&mut Writer, u8) -> Result<(), WriteError<Unplugged>>; 2] =
-    [write_blocking, write_async];
+type WritePing = fn(&mut Writer, u8) -> Result<(), WriteError<Unplugged>>;
+
+const WRITES: [WritePing; 2] = [write_blocking, write_async];
 
 #[test]
 fn short_writes_of_every_size_send_every_byte_once() {

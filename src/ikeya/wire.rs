@@ -311,8 +311,8 @@ macro_rules! packet {
             ///
             /// # Errors
             ///
-            /// [`ParseError::Field`] for another header or an id outside 1..=8, otherwise
-            /// [`ParseError::Crc`].
+            /// [`ParseError::Field`](crate::error::ParseError::Field) for another header or an id
+            /// outside 1..=8, otherwise [`ParseError::Crc`](crate::error::ParseError::Crc).
             pub fn parse(bytes: &[u8; Self::LEN]) -> Result<&Self, $crate::error::ParseError> {
                 super::wire::parsed(bytes)
             }

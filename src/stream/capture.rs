@@ -4,6 +4,9 @@ use alloc::vec::Vec;
 
 use super::{Counters, Event, Framing, Front, Reason, ledger::Ledger, search};
 
+/// An event, and the offset of its first byte in the capture.
+pub type Located<T> = (usize, Event<T>);
+
 /// Everything in a capture that is already in memory: each event with the offset of its first
 /// byte, and the account.
 ///
@@ -20,9 +23,8 @@ use super::{Counters, Event, Framing, Front, Reason, ledger::Ledger, search};
 /// assert!(matches!(events[1], (8, Event::Skipped(Gap { len: 4, reason: Reason::Idle }))));
 /// assert_eq!((counters.frames, counters.skipped()), (1, 4));
 /// ```
-#[cfg_attr(docsrs, doc(cfg(feature = "alloc")))]
 #[must_use]
-pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<(usize, Event<F::Frame<'_>>)>, Counters) {
+pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, Counters) {
     let (mut events, mut ledger, mut at) = (Vec::new(), Ledger::new(), 0);
     ledger.counters.received = bytes.len() as u64;
     while let Some(rest) = bytes.get(at..) {

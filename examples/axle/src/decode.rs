@@ -1,0 +1,205 @@
+//! `axle decode`: a byte stream in, one line for each frame and each gap out.
+
+use std::{
+    io::{self, BufWriter, Write},
+    path::PathBuf,
+};
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{Decoder, Event, Framing, Gap},
+    ucp,
+};
+use clap::ValueEnum;
+
+use crate::{
+    EXIT_CODES,
+    failure::Failure,
+    human,
+    input::{self, Input},
+    record::{Frame, Record, Summary},
+};
+
+/// List the frames of a captured byte stream, and the gaps between them
+///
+/// Every byte of the input is in exactly one line: a frame, or a gap with the reason why no frame
+/// starts there. The end of the input counts as a quiet line: a frame that it cuts off becomes a
+/// gap. Memory does not grow with the input.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Args {
+    /// What is spoken on the line
+    #[arg(long, value_enum)]
+    protocol: Protocol,
+
+    /// Ikeya: look for the packets of one direction only; without it, for both
+    #[arg(long, value_enum)]
+    direction: Option<Direction>,
+
+    /// Print one JSON object per line
+    #[arg(long)]
+    json: bool,
+
+    /// The capture; none, or -, is standard input
+    file: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Protocol {
+    /// Linux board and robot of a rover
+    Ucp,
+    /// Motor bus, one motor a board
+    Ikeya,
+    /// Motor bus, three motors a board
+    #[value(name = "ikeya-3")]
+    Ikeya3,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Direction {
+    /// What the master sends
+    ToSlave,
+    /// What the slaves send
+    ToMaster,
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let decode = match (args.protocol, args.direction) {
+        (Protocol::Ucp, None) => decode::<ucp::Ucp>,
+        (Protocol::Ucp, Some(_)) => {
+            let line = "--direction is for ikeya and ikeya-3: a UCP frame tells its direction";
+            return Err(Failure::Usage(line.to_owned()));
+        }
+        (Protocol::Ikeya, None) => decode::<ikeya::Either>,
+        (Protocol::Ikeya, Some(Direction::ToSlave)) => decode::<ikeya::ToSlave>,
+        (Protocol::Ikeya, Some(Direction::ToMaster)) => decode::<ikeya::ToMaster>,
+        (Protocol::Ikeya3, None) => decode::<three::Either>,
+        (Protocol::Ikeya3, Some(Direction::ToSlave)) => decode::<three::ToSlave>,
+        (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
+    };
+    let input = Input::open(args.file.as_deref())?;
+    let number = match args.protocol {
+        Protocol::Ucp => "index",
+        Protocol::Ikeya | Protocol::Ikeya3 => "node",
+    };
+    let style = if args.json { Style::Json } else { Style::Human(human::Listing::new(number)) };
+    decode(input, Listing::new(style))
+}
+
+/// Room for the longest frame of any framing here.
+const BUFFER_LEN: usize = ucp::MAX_LEN;
+
+fn decode<F>(mut input: Input, mut listing: Listing) -> Result<(), Failure>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Into<Frame<'a>>,
+{
+    let mut decoder = Decoder::<F, BUFFER_LEN>::new();
+    let broken = loop {
+        let mut bytes = match input.read() {
+            Ok([]) => break None,
+            Ok(bytes) => bytes,
+            Err(failure) => break Some(failure),
+        };
+        // The source is slower than we are: perhaps somebody is watching it live.
+        let waiting = bytes.len() < input::CHUNK_LEN;
+        listing.drain(&mut decoder, &mut bytes).map_err(Failure::Write)?;
+        if waiting {
+            listing.flush().map_err(Failure::Write)?;
+        }
+    };
+    if let Some(failure) = broken {
+        // What was decoded is still good; that there is no summary says that it is not all.
+        listing.flush().map_err(Failure::Write)?;
+        return Err(failure);
+    }
+    // Nothing follows. Each call refuses what the end cuts off and searches on inside it, so that
+    // a frame behind a false header is still found (ruling B3).
+    loop {
+        decoder.idle();
+        listing.drain(&mut decoder, &mut &[][..]).map_err(Failure::Write)?;
+        if decoder.pending() == 0 {
+            break;
+        }
+    }
+    listing.finish(Summary::new(decoder.counters(), decoder.pending())).map_err(Failure::Write)
+}
+
+/// How a record is printed.
+enum Style {
+    Json,
+    Human(human::Listing),
+}
+
+/// Gives each event its offset and prints it.
+struct Listing {
+    out: BufWriter<io::StdoutLock<'static>>,
+    style: Style,
+    /// Where the next event begins, or the gap that is held.
+    offset: u64,
+    /// The last gap: at the end of the input a second one may follow right behind it, and both
+    /// are one to the reader.
+    gap: Option<Gap>,
+}
+
+impl Listing {
+    fn new(style: Style) -> Self {
+        let out = BufWriter::with_capacity(64 * 1024, io::stdout().lock());
+        Self { out, style, offset: 0, gap: None }
+    }
+
+    /// Prints all that the decoder has to say of `bytes`.
+    fn drain<F, const N: usize>(
+        &mut self,
+        decoder: &mut Decoder<F, N>,
+        bytes: &mut &[u8],
+    ) -> io::Result<()>
+    where
+        F: Framing,
+        for<'a> F::Frame<'a>: Into<Frame<'a>>,
+    {
+        while let Some(event) = decoder.decode(bytes) {
+            match event {
+                Event::Skipped(gap) => match &mut self.gap {
+                    Some(held) => held.len += gap.len,
+                    None => self.gap = Some(gap),
+                },
+                Event::Frame(frame) => {
+                    self.end_gap()?;
+                    let (frame, offset) = (frame.into(), self.offset);
+                    self.offset += frame.length() as u64;
+                    self.print(&Record::Frame { offset, frame })?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn end_gap(&mut self) -> io::Result<()> {
+        let Some(Gap { len: length, reason }) = self.gap.take() else { return Ok(()) };
+        let offset = self.offset;
+        self.offset += length;
+        self.print(&Record::Skipped { offset, length, reason })
+    }
+
+    fn finish(&mut self, summary: Summary) -> io::Result<()> {
+        self.end_gap()?;
+        self.print(&Record::Summary(summary))?;
+        self.flush()
+    }
+
+    fn print(&mut self, record: &Record<'_>) -> io::Result<()> {
+        match &mut self.style {
+            Style::Json => {
+                serde_json::to_writer(&mut self.out, record)?;
+                self.out.write_all(b"\n")
+            }
+            Style::Human(listing) => listing.print(&mut self.out, record),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}

@@ -1,0 +1,138 @@
+//! The listing for people: aligned columns, units written out.
+
+mod ikeya;
+mod ucp;
+
+use core::fmt;
+use std::io::{self, Write};
+
+use axlewire::stream::Reason;
+
+use crate::record::{Frame, Record, Summary};
+
+/// A listing under way.
+#[derive(Debug)]
+pub(crate) struct Listing {
+    /// Title of the column of numbers that frames have: node or index.
+    number: &'static str,
+    titled: bool,
+}
+
+impl Listing {
+    pub(crate) const fn new(number: &'static str) -> Self {
+        Self { number, titled: false }
+    }
+
+    /// Prints one record, the titles in front of the first event.
+    pub(crate) fn print(&mut self, out: &mut impl Write, record: &Record<'_>) -> io::Result<()> {
+        if let Record::Summary(summary) = record {
+            return print_summary(out, summary, self.titled);
+        }
+        if !self.titled {
+            self.titled = true;
+            row(out, &"offset", &"bytes", "message", &self.number)?;
+            writeln!(out, "  contents")?;
+        }
+        match record {
+            Record::Frame { offset, frame } => print_frame(out, *offset, frame),
+            Record::Skipped { offset, length, reason } => {
+                row(out, offset, length, "(skipped)", &"")?;
+                writeln!(out, "  {reason}: {}", explain(*reason))
+            }
+            Record::Summary(_) => Ok(()),
+        }
+    }
+}
+
+fn print_frame(out: &mut impl Write, offset: u64, frame: &Frame<'_>) -> io::Result<()> {
+    match frame {
+        Frame::Ikeya(frame) => {
+            row(out, &offset, &frame.length, frame.message, &frame.node)?;
+            ikeya::contents(out, &frame.fields)?;
+        }
+        Frame::Ucp(frame) => {
+            row(out, &offset, &frame.length, frame.message, &frame.index)?;
+            ucp::contents(out, frame.id, &frame.fields)?;
+        }
+    }
+    writeln!(out)
+}
+
+/// The columns that all lines have; the longest message name has 21 letters.
+fn row(
+    out: &mut impl Write,
+    offset: &dyn fmt::Display,
+    length: &dyn fmt::Display,
+    message: &str,
+    number: &dyn fmt::Display,
+) -> io::Result<()> {
+    write!(out, "{offset:>10}  {length:>5}  {message:<21}  {number:>5}")
+}
+
+const fn explain(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Header => "no frame starts here",
+        Reason::Length => "no frame has such a length",
+        Reason::Id => "a packet for a node that cannot exist",
+        Reason::Crc => "damaged, or no frame at all",
+        Reason::Idle => "cut off by the end",
+        _ => "no frame",
+    }
+}
+
+fn print_summary(out: &mut impl Write, summary: &Summary, events: bool) -> io::Result<()> {
+    let Summary { received, framed, skipped, pending, frames, counters } = summary;
+    if *received == 0 {
+        return writeln!(out, "The input is empty: 0 bytes received, 0 frames.");
+    }
+    if events {
+        writeln!(out)?;
+    }
+    writeln!(out, "{received:>10} bytes received")?;
+    writeln!(out, "{framed:>10} in {frames} {}", if *frames == 1 { "frame" } else { "frames" })?;
+    write!(out, "{skipped:>10} skipped")?;
+    let reasons = [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
+    let mut before = ": ";
+    for reason in reasons {
+        let bytes = counters.skipped_for(reason);
+        if bytes > 0 {
+            write!(out, "{before}{bytes} {reason}")?;
+            before = ", ";
+        }
+    }
+    writeln!(out)?;
+    if *pending > 0 {
+        writeln!(out, "{pending:>10} pending")?;
+    }
+    Ok(())
+}
+
+/// Values in a row, one space between them.
+struct Spaced<'a, T>(&'a [T]);
+
+impl<T: fmt::Display> fmt::Display for Spaced<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        spaced(self.0, f, T::fmt)
+    }
+}
+
+impl<T: fmt::Debug> fmt::Debug for Spaced<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        spaced(self.0, f, T::fmt)
+    }
+}
+
+/// Width and precision of `f` apply to each value.
+fn spaced<T>(
+    values: &[T],
+    f: &mut fmt::Formatter<'_>,
+    write: fn(&T, &mut fmt::Formatter<'_>) -> fmt::Result,
+) -> fmt::Result {
+    for (at, value) in values.iter().enumerate() {
+        if at > 0 {
+            f.write_str(" ")?;
+        }
+        write(value, f)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,452 @@
+//! `axle decode` says what is in a byte stream.
+
+mod support;
+
+use core::time::Duration;
+use std::{
+    io::{BufRead, BufReader, Write},
+    process::Stdio,
+    sync::mpsc,
+    thread,
+};
+
+use axlewire::{
+    ikeya::{NodeId, Rps, VelocityResponse},
+    ucp::{Body, Ping},
+};
+use serde_json::{Value, json};
+use support::{Capture, axle, bytes, decode, file, run, run_in_pieces, stdout};
+
+/// The frames of running implementations, and what they mean.
+fn vectors(name: &str) -> Vec<Value> {
+    let path = format!("{}/../../tests/vectors/{name}.jsonl", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    let vectors: Vec<_> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(vectors.len() > 80, "the vectors are missing");
+    vectors
+}
+
+fn hex(vector: &Value) -> &str {
+    vector["hex"].as_str().unwrap()
+}
+
+/// Our name for a vector's UCP message, which in the vectors is the same in both directions.
+fn message(fields: &Value) -> &'static str {
+    match (fields["name"].as_str().unwrap(), fields["len"].as_u64().unwrap() - 4) {
+        ("keep_alive", 0) => "ping",
+        ("keep_alive", 1) => "pong",
+        ("motor_ctl", 16) => "motor_control",
+        ("imu_correction_start", 1) => "calibration_start",
+        ("imu_correction_start", 2) => "calibration_start_ack",
+        ("imu_correction_end", 1) => "calibration_end",
+        ("imu_correction_end", 2) => "calibration_end_ack",
+        ("report", 34 | 36) => "report",
+        ("imu_write", 12) => "imu_bias",
+        ("imu_write", 1) => "imu_bias_ack",
+        ("mag_write", 6) => "mag_bias",
+        ("mag_write", 1) => "mag_bias_ack",
+        ("imumag_read", 0) => "bias_request",
+        ("imumag_read", 19) => "biases",
+        ("ota", 2) => "ota_request",
+        ("ota", 1) => "ota_ack",
+        ("state", 1 | 4) => "network_state",
+        _ => "unknown",
+    }
+}
+
+#[test]
+fn ucp_frames_say_what_running_implementations_mean() {
+    const ABOUT_THE_VECTOR: [&str; 6] =
+        ["name", "len", "inputs", "note", "stm_v638_parser", "go_reader_accepts"];
+
+    for vector in vectors("ucp") {
+        let fields = &vector["fields"];
+        let input = bytes(hex(&vector));
+        let (events, summary) = decode(&["--protocol", "ucp"], &input);
+
+        let length = fields["len"].as_u64().unwrap() + 4;
+        let mut expected = json!({
+            "event": "frame", "offset": 0, "length": length, "protocol": "ucp",
+            "message": message(fields),
+        });
+        for (name, value) in fields.as_object().unwrap() {
+            match (&**name, value.as_str()) {
+                ("layout", Some("firmware-36")) => expected["layout"] = "firmware".into(),
+                ("layout", Some("wiki-34")) => expected["layout"] = "document".into(),
+                ("trailing_bytes", _) => {}
+                (name, _) if ABOUT_THE_VECTOR.contains(&name) => {}
+                (name, _) => expected[name] = value.clone(),
+            }
+        }
+        assert_eq!(events[0], expected, "{vector}");
+
+        let trailing = input.len() as u64 - length;
+        assert_eq!(trailing > 0, fields.get("trailing_bytes").is_some());
+        let gap =
+            json!({"event": "skipped", "offset": length, "length": trailing, "reason": "header"});
+        assert_eq!(events[1..], [gap][..usize::from(trailing > 0)]);
+        assert_eq!((&summary["framed"], &summary["frames"]), (&json!(length), &json!(1)));
+    }
+}
+
+#[test]
+fn ikeya_packets_say_what_running_implementations_mean() {
+    let mut refused = 0;
+    for vector in vectors("ikeya") {
+        let (fields, input) = (&vector["fields"], bytes(hex(&vector)));
+        let protocol = if vector["protocol"] == "ikeya-md" { "ikeya" } else { "ikeya-3" };
+        let direction = if vector["dir"] == "master->slave" { "to-slave" } else { "to-master" };
+        let one_way = decode(&["--protocol", protocol, "--direction", direction], &input);
+        let (events, summary) = decode(&["--protocol", protocol], &input);
+        assert_eq!((&events, &summary), (&one_way.0, &one_way.1));
+
+        let id = fields["id"].as_u64().unwrap();
+        let reason = if fields["crc_ok"] == false {
+            "crc"
+        } else if ![0xAA, 0xBB, 0x55, 0x56].contains(&input[0]) {
+            "header"
+        } else if !(1..=8).contains(&id) {
+            "id"
+        } else {
+            ""
+        };
+        if !reason.is_empty() {
+            refused += 1;
+            let gap = json!({
+                "event": "skipped", "offset": 0, "length": input.len(), "reason": reason,
+            });
+            assert_eq!(events, [gap], "{vector}");
+            assert_eq!(summary["skipped"], input.len());
+            continue;
+        }
+
+        let [frame] = &*events else { panic!("{vector} gives {events:?}") };
+        let name = match input[0] {
+            0xAA => "read_request",
+            0xBB => "write",
+            0x55 => "velocity_response",
+            _ => "position_response",
+        };
+        let has = json!({
+            "event": "frame", "offset": 0, "length": input.len(), "protocol": protocol,
+            "message": name, "node": id,
+        });
+        for (field, value) in has.as_object().unwrap() {
+            assert_eq!(&frame[field], value, "{field} of {vector}");
+        }
+        for field in ["count", "rotation"] {
+            if let Some(value) = fields.get(field) {
+                assert_eq!(&frame[field], value, "{field} of {vector}");
+            }
+        }
+        if let Some(bits) = fields.get("rps_bits") {
+            assert_same_speeds(&frame["rps"], bits, &fields["rps"]);
+        }
+        let payload = (name == "write").then(|| &hex(&vector)[4..hex(&vector).len() - 4]);
+        assert_eq!(frame["payload"].as_str(), payload);
+        let keys = match name {
+            "read_request" => 6,
+            "velocity_response" => 7,
+            "position_response" => 8,
+            _ => 10,
+        };
+        assert_eq!(frame.as_object().unwrap().len(), keys, "{frame}");
+    }
+    assert_eq!(refused, 10);
+}
+
+/// Bit for bit, except that all NaNs are one; an array of speeds speed for speed.
+fn assert_same_speeds(found: &Value, bits: &Value, expected: &Value) {
+    if let Value::Array(found) = found {
+        assert_eq!(found.len(), 3);
+        for (at, found) in found.iter().enumerate() {
+            assert_same_speeds(found, &bits[at], &expected[at]);
+        }
+        return;
+    }
+    let bits = u32::from_str_radix(bits.as_str().unwrap(), 16).unwrap();
+    match found {
+        Value::String(_) => {
+            assert_eq!(found, expected);
+            assert!(!f32::from_bits(bits).is_finite());
+        }
+        _ => assert_eq!((found.as_f64().unwrap() as f32).to_bits(), bits, "{found}"),
+    }
+}
+
+#[test]
+fn a_speed_has_no_more_digits_than_it_needs() {
+    let packet = VelocityResponse::new(NodeId::N1, Rps::new(0.1).unwrap());
+    let listing = stdout(run(&["decode", "--protocol", "ikeya", "--json"], packet.as_bytes()));
+    assert_eq!(
+        listing.lines().next().unwrap(),
+        r#"{"event":"frame","offset":0,"length":8,"protocol":"ikeya","message":"velocity_response","node":1,"rps":0.1}"#
+    );
+}
+
+#[test]
+fn the_direction_decides_what_is_a_frame() {
+    // READ for node 1, velocity response of node 2.
+    let input = bytes("aa01bed0 55020000803f540e");
+    let messages = |args: &[&str]| {
+        let (events, _) = decode(args, &input);
+        events.iter().map(|event| (event["message"].clone(), event["reason"].clone())).collect()
+    };
+    let both: Vec<(Value, Value)> = messages(&["--protocol", "ikeya"]);
+    let to_slave: Vec<_> = messages(&["--protocol", "ikeya", "--direction", "to-slave"]);
+    let to_master: Vec<_> = messages(&["--protocol", "ikeya", "--direction", "to-master"]);
+
+    let (read, velocity) = (json!("read_request"), json!("velocity_response"));
+    let (header, none) = (json!("header"), Value::Null);
+    assert_eq!(both, [(read.clone(), none.clone()), (velocity.clone(), none.clone())]);
+    assert_eq!(to_slave, [(read, none.clone()), (none.clone(), header.clone())]);
+    assert_eq!(to_master, [(none.clone(), header), (velocity, none)]);
+}
+
+#[test]
+fn events_tile_the_input_and_add_up() {
+    let mut input = Vec::new();
+    for (at, vector) in vectors("ucp").iter().chain(&vectors("ikeya")).enumerate() {
+        input.extend(bytes(hex(vector)));
+        input.extend([0xFD, 0xAA, 0x55, 0xFF, 0x00].iter().cycle().skip(at).take(at % 7));
+    }
+    let lines: [&[&str]; 5] = [
+        &["--protocol", "ucp"],
+        &["--protocol", "ikeya"],
+        &["--protocol", "ikeya-3"],
+        &["--protocol", "ikeya", "--direction", "to-slave"],
+        &["--protocol", "ikeya-3", "--direction", "to-master"],
+    ];
+    for line in lines {
+        let (events, summary) = decode(line, &input);
+        let (mut end, mut framed, mut skipped, mut frames) = (0, 0, 0, 0);
+        let mut after_gap = false;
+        for event in &events {
+            assert_eq!(event["offset"], end, "{event}");
+            let length = event["length"].as_u64().unwrap();
+            assert!(length > 0);
+            end += length;
+            if event["event"] == "frame" {
+                (framed, frames, after_gap) = (framed + length, frames + 1, false);
+            } else {
+                assert_eq!(event["event"], "skipped");
+                assert!(!after_gap, "two gaps in a row are one: {event}");
+                (skipped, after_gap) = (skipped + length, true);
+            }
+        }
+        assert!(frames > 3 && skipped > 0, "{line:?} shows too little");
+        assert_eq!(end, input.len() as u64);
+        assert_eq!(
+            summary,
+            json!({
+                "event": "summary", "received": end, "framed": framed, "skipped": skipped,
+                "pending": 0, "frames": frames,
+            })
+        );
+    }
+}
+
+#[test]
+fn each_reason_has_its_name() {
+    let reason = |protocol: &str, hex: &str| {
+        let (events, _) = decode(&["--protocol", protocol], &bytes(hex));
+        assert_eq!(events.len(), 1);
+        events[0]["reason"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(reason("ucp", "00 01"), "header");
+    assert_eq!(reason("ucp", "fd ff 3d 00"), "length");
+    assert_eq!(reason("ikeya", "aa 09 bf 16"), "id");
+    assert_eq!(reason("ikeya", "aa 01 be d1"), "crc");
+    assert_eq!(reason("ucp", "fd ff 04 00 01"), "idle");
+}
+
+#[test]
+fn a_frame_behind_a_false_header_at_the_end_is_not_lost() {
+    // Two headers that promise 64 bytes, a ping, and the start of another one.
+    let input = bytes("fdff3c00 fdff3c00 fdff040001000142 fdff0400");
+    let (events, summary) = decode(&["--protocol", "ucp"], &input);
+    assert_eq!(
+        events,
+        [
+            json!({"event": "skipped", "offset": 0, "length": 8, "reason": "idle"}),
+            json!({
+                "event": "frame", "offset": 8, "length": 8, "protocol": "ucp",
+                "message": "ping", "id": 1, "index": 0,
+            }),
+            json!({"event": "skipped", "offset": 16, "length": 4, "reason": "idle"}),
+        ]
+    );
+    assert_eq!((&summary["pending"], &summary["skipped"]), (&json!(0), &json!(12)));
+}
+
+#[test]
+fn chunk_boundaries_change_nothing() {
+    const CHUNK_LEN: u64 = 64 * 1024;
+    let capture = Capture::noisy(6 * CHUNK_LEN as usize, 0x9E37_79B9_7F4A_7C15);
+    let split = capture.events.iter().filter(|event| {
+        let offset = event["offset"].as_u64().unwrap();
+        let last = offset + event["length"].as_u64().unwrap() - 1;
+        event["event"] == "frame" && offset / CHUNK_LEN != last / CHUNK_LEN
+    });
+    assert!(split.count() >= 3, "no frame lies across a boundary");
+
+    let path = file("chunks.bin", &capture.bytes);
+    let args = ["decode", "--json", "--protocol", "ucp", path.to_str().unwrap()];
+    let (found, summary) = support::events(&stdout(run(&args, &[])));
+    for (found, expected) in found.iter().zip(&capture.events) {
+        assert_eq!(found, expected);
+    }
+    assert_eq!(found.len(), capture.events.len());
+    assert_eq!(summary["received"], capture.bytes.len());
+}
+
+#[test]
+fn a_file_and_standard_input_give_the_same_output() {
+    let capture = Capture::noisy(150_000, 42);
+    let path = file("same.bin", &capture.bytes);
+    for style in [&["--json"][..], &[]] {
+        let args = [&["decode", "--protocol", "ucp"], style].concat();
+        let from_file = stdout(run(&[&args[..], &[path.to_str().unwrap()]].concat(), &[]));
+        assert!(from_file.lines().count() > capture.events.len());
+        assert!(from_file == stdout(run(&args, &capture.bytes)), "no FILE");
+        assert!(from_file == stdout(run(&[&args[..], &["-"]].concat(), &capture.bytes)), "-");
+        assert!(from_file == stdout(run_in_pieces(&args, &capture.bytes, 997)), "in pieces");
+    }
+}
+
+#[test]
+fn a_live_line_is_listed_as_it_speaks() {
+    let mut child = axle(&["decode", "--protocol", "ucp", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (heard, listing) = mpsc::channel();
+    let output = BufReader::new(child.stdout.take().unwrap());
+    let listener = thread::spawn(move || {
+        output.lines().map_while(Result::ok).for_each(|line| heard.send(line).unwrap());
+    });
+
+    let mut line = child.stdin.take().unwrap();
+    for index in 0..3 {
+        line.write_all(Ping {}.frame(index).as_bytes()).unwrap();
+        let event = listing.recv_timeout(Duration::from_secs(10)).unwrap();
+        assert!(event.ends_with(&format!(r#""index":{index}}}"#)), "{event}");
+    }
+    drop(line);
+    assert!(listing.recv().unwrap().contains("summary"));
+    listener.join().unwrap();
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn an_empty_input_is_all_zeros() {
+    let path = file("empty.bin", &[]);
+    let args = ["decode", "--protocol", "ucp", path.to_str().unwrap()];
+    assert_eq!(stdout(run(&args, &[])), "The input is empty: 0 bytes received, 0 frames.\n");
+
+    let (events, summary) = decode(&["--protocol", "ikeya"], &[]);
+    assert!(events.is_empty());
+    assert_eq!(
+        summary,
+        json!({
+            "event": "summary", "received": 0, "framed": 0, "skipped": 0, "pending": 0,
+            "frames": 0,
+        })
+    );
+}
+
+#[test]
+fn people_get_columns_and_units_of_a_rover() {
+    let input = bytes(concat!(
+        "fdff040001000142",
+        "fdff0500010000be00",
+        "00ff00",
+        "fdff280005035700c4ffc4ffc4ffc4ff9cffc800d4fe90010cfe580244fd20037cfcb400067737002600c121",
+        "fdff260005fdfffffffffefffdfffcfffdfdfdff0100020003000400050006000700080009006701bef8",
+        "fdff140002ff9cff9cff6400640000000000000000006dd9",
+        "fdff14000209c4ff14006400000027000000000000002c52",
+        "fdff060003000100806b",
+        "fdff17000800000100ffff0040f4ff2200c8ff5f0536013ff83539",
+        "fdff05000900003fc200",
+        "fdff05000a01010f92",
+        "fdff14000a0000000000000000000000000000000000b314",
+        "fdff0500010000be01",
+        "fdff1400",
+    ));
+    let listing = "
+    offset  bytes  message                index  contents
+         0      8  ping                       0
+         8      9  pong                       0  fine
+        17      3  (skipped)                     header: no frame starts here
+        20     44  report                     3  battery  87 %  11.9 V   0.55 A    6 W  rpm  -60  -60  -60  -60  acc -0.01  0.01 -0.02 g  gyro   24.4  -30.5   36.6 deg/s  mag  -700   800  -900  heading 180 deg  firmware 38
+        64     42  report                   253  battery 65535 (no percentage)  25.3 V  655.33 A  253 W  rpm   -1   -2   -3   -4  acc  0.00  0.00  0.00 g  gyro    0.2    0.3    0.4 deg/s  mag     7     8     9  heading 359 deg  (document layout)
+       106     24  motor_control            255  speed -100 %  angular -100 %  front led on  back led 100
+       130     24  motor_control              9  speed  -60 %  angular   20 %  front led on  version 39  (starts a firmware update)
+       154     10  calibration_start_ack      0  magnetometer, fine
+       164     27  biases                     0  fine, acc 1 -1 16384, gyro -12 34 -56, mag 1375 310 -1985
+       191      9  ota_ack                    0  accepted
+       200      1  (skipped)                     header: no frame starts here
+       201      9  network_state              1  SIM absent, in 1 byte
+       210     24  unknown                    0  id 10, body 00000000000000000000000000000000
+       234     13  (skipped)                     crc: damaged, or no frame at all
+
+       247 bytes received
+       230 in 11 frames
+        17 skipped: 15 header, 1 crc, 1 idle
+";
+    assert_eq!(
+        stdout(run(&["decode", "--protocol", "ucp"], &input)),
+        listing.trim_start_matches('\n')
+    );
+}
+
+#[test]
+fn people_get_columns_and_units_of_a_motor_bus() {
+    let input = bytes(concat!(
+        "aa01bed0",
+        "bb01000000bf6720",
+        "5606ff7fff7f85f1",
+        "aa09bf16",
+        "5502ffff7fff158a",
+        "bb020000807f42b0",
+        "5503",
+    ));
+    let listing = "
+    offset  bytes  message                 node  contents
+         0      4  read_request               1
+         4      8  write                      1  -0.5 rps or -16640.0000 turns (rotation -16640, count 0)
+        12      8  position_response          6  32770.9999 turns (rotation 32767, count 32767)
+        20      4  (skipped)                     id: a packet for a node that cannot exist
+        24      8  velocity_response          2  -3.4028235e38 rps
+        32      8  write                      2  inf rps or 32640.0000 turns (rotation 32640, count 0)
+        40      2  (skipped)                     idle: cut off by the end
+
+        42 bytes received
+        36 in 5 frames
+         6 skipped: 1 header, 4 id, 1 idle
+";
+    assert_eq!(
+        stdout(run(&["decode", "--protocol", "ikeya"], &input)),
+        listing.trim_start_matches('\n')
+    );
+}
+
+#[test]
+fn people_get_three_values_of_a_three_motor_board() {
+    let input =
+        bytes(concat!("55030000803f0000004000004040d871", "5605ff1f01e00000ff7f008000005abf",));
+    let listing = "
+    offset  bytes  message                 node  contents
+         0     16  velocity_response          3  1.0 2.0 3.0 rps
+        16     16  position_response          5  32767.9999 -32768.9999 0.0000 turns (rotation 32767 -32768 0, count 8191 -8191 0)
+
+        32 bytes received
+        32 in 2 frames
+         0 skipped
+";
+    assert_eq!(
+        stdout(run(&["decode", "--protocol", "ikeya-3"], &input)),
+        listing.trim_start_matches('\n')
+    );
+}
