@@ -114,3 +114,8 @@ pub mod io;
 pub mod stream;
 #[cfg(feature = "ucp")]
 pub mod ucp;
+
+/// The examples of the README are tests, too.
+#[cfg(all(doctest, feature = "ikeya", feature = "ucp"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

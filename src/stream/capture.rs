@@ -14,6 +14,7 @@ pub type Located<T> = (usize, Event<T>);
 /// [`Reason::Idle`], and whole frames inside it are found. Needs feature `alloc`.
 ///
 /// ```
+/// # #[cfg(feature = "ucp")] {
 /// use axlewire::{stream::{Event, Gap, Reason, decode_capture}, ucp::Ucp};
 ///
 /// // A ping, and half a ping.
@@ -22,6 +23,7 @@ pub type Located<T> = (usize, Event<T>);
 /// assert!(matches!(events[0], (0, Event::Frame(frame)) if frame.id() == 1));
 /// assert!(matches!(events[1], (8, Event::Skipped(Gap { len: 4, reason: Reason::Idle }))));
 /// assert_eq!((counters.frames, counters.skipped()), (1, 4));
+/// # }
 /// ```
 #[must_use]
 pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, Counters) {

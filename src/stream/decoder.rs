@@ -17,6 +17,7 @@ use super::{Counters, Event, Framing, Front, Gap, Reason, ledger::Ledger, search
 ///   much, and `decode` with an empty slice reads it out.
 ///
 /// ```
+/// # #[cfg(feature = "ucp")] {
 /// use axlewire::{stream::Event, ucp};
 ///
 /// let mut decoder = ucp::Decoder::new();
@@ -32,6 +33,7 @@ use super::{Counters, Event, Framing, Front, Gap, Reason, ledger::Ledger, search
 ///     }
 /// }
 /// assert_eq!((frames, decoder.pending()), (2, 0));
+/// # }
 /// ```
 #[derive(Clone)]
 pub struct Decoder<F, const N: usize> {
@@ -113,7 +115,9 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     ///
     /// Takes effect in the calls of [`decode`](Self::decode) that follow, which deliver whole
     /// frames still held, refuse the pending candidate, search on inside it and report the gap.
-    /// What can still be the start of a frame at the very end remains pending.
+    /// What can still be the start of a frame at the very end remains pending: when nothing at all
+    /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
+    /// one may then follow right behind the first.
     pub fn idle(&mut self) {
         self.line = Line::Quiet;
     }
@@ -184,8 +188,16 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     fn advance_held<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         let start = *input;
         loop {
-            match self.judge_held() {
-                Front::Frame { len } => {
+            let front = self.judge_held();
+            let taken = start.len() - input.len();
+            if taken > 0 && self.pending() <= taken {
+                // All that is still held came from this input: read it there.
+                *input = start.get(taken - self.pending()..)?;
+                (self.at, self.end, self.front) = (0, 0, None);
+                return self.advance_input(input);
+            }
+            match (front, self.line) {
+                (Front::Frame { len }, _) => {
                     if let Some(gap) = self.ledger.gap.take() {
                         return Some(Found::Gap(gap));
                     }
@@ -194,31 +206,22 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     self.ledger.frame(len);
                     return Some(Found::Held { at, len });
                 }
-                Front::Partial { need } => {
-                    match self.line {
-                        Line::Quiet if self.pending() > 0 => {
-                            self.line = Line::Settling;
-                            self.ledger.skip(Reason::Idle, 1);
-                            self.consume(1);
-                            continue;
-                        }
-                        Line::Quiet | Line::Settling => {
-                            self.line = Line::Busy;
-                            if let Some(gap) = self.ledger.gap.take() {
-                                return Some(Found::Gap(gap));
-                            }
-                        }
-                        Line::Busy => {}
+                (Front::Partial { .. }, Line::Quiet) if self.pending() > 0 => {
+                    self.line = Line::Settling;
+                    self.ledger.skip(Reason::Idle, 1);
+                    self.consume(1);
+                }
+                (Front::Partial { .. }, Line::Quiet | Line::Settling) => {
+                    self.line = Line::Busy;
+                    if let Some(gap) = self.ledger.gap.take() {
+                        return Some(Found::Gap(gap));
                     }
-                    let taken = start.len() - input.len();
-                    if self.pending() <= taken {
-                        // All that is still held came from this input: read it there.
-                        *input = start.get(taken - self.pending()..)?;
-                        (self.at, self.end, self.front) = (0, 0, None);
-                        return self.advance_input(input);
-                    }
-                    let missing = need.saturating_sub(self.pending());
-                    if self.hold(input, missing) == 0 {
+                }
+                (Front::Partial { .. }, Line::Busy) if self.pending() == 0 => {
+                    return self.advance_input(input);
+                }
+                (Front::Partial { need }, Line::Busy) => {
+                    if self.hold(input, need.saturating_sub(self.pending())) == 0 {
                         return None;
                     }
                 }

@@ -11,6 +11,7 @@ use super::{Counters, Framing, Front, Reason, Verdict, ledger::Ledger, search};
 /// will come, [`idle`](Self::idle) lets the search go on inside it.
 ///
 /// ```
+/// # #[cfg(feature = "ikeya")] {
 /// use axlewire::{ikeya, stream::Frames};
 ///
 /// // A stray byte, node 2 at 1.0 rps, and the start of another response.
@@ -21,6 +22,7 @@ use super::{Counters, Framing, Front, Reason, Verdict, ledger::Ledger, search};
 /// assert!(frames.next().is_none());
 /// assert_eq!(frames.rest(), [0x55, 0x03]);
 /// assert_eq!(frames.counters().header, 1);
+/// # }
 /// ```
 #[derive(Clone, Debug)]
 pub struct Frames<'a, F> {
