@@ -1,1 +1,71 @@
-//! draft
+//! What the benchmarks share: byte streams to decode, the decoders of axlewire, C and other crates
+//! behind one signature, and a slow oracle that says what is in a stream.
+//!
+//! `cargo bench -p axlewire-benches` measures; with `-- --test` it runs everything once and so
+//! checks all answers in a few seconds.
+
+pub mod oracle;
+pub mod ours;
+pub mod peers;
+pub mod reference;
+pub mod streams;
+
+/// What a decoder found. All decoders of the same bytes can be compared by it.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+#[repr(C)]
+pub struct Tally {
+    /// Frames.
+    pub frames: u64,
+    /// Sum over what was in them, so that no decoder can get away without handing them out: the
+    /// id of every frame, and its first four payload bytes as a number where it has so many.
+    pub sum: u64,
+}
+
+impl Tally {
+    fn add(&mut self, id: u8, payload: Option<[u8; 4]>) {
+        let number = payload.map_or(0, u32::from_le_bytes);
+        self.frames += 1;
+        self.sum = self.sum.wrapping_add(id.into()).wrapping_add(number.into());
+    }
+}
+
+/// One protocol with all that decodes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Protocol {
+    /// For reports.
+    pub name: &'static str,
+    /// `axlewire::stream::Frames` over the whole slice.
+    pub frames: fn(&[u8]) -> Tally,
+    /// `axlewire::stream::Decoder`, fed with pieces of so many bytes.
+    pub decoder: fn(&[u8], usize) -> Tally,
+    /// The C receiver with the two-table CRC.
+    pub c_table: fn(&[u8]) -> Tally,
+    /// The C receiver with the bitwise CRC.
+    pub c_bitwise: fn(&[u8]) -> Tally,
+    /// What is in the bytes.
+    pub oracle: fn(&[u8]) -> Tally,
+    /// Where the frames end that axlewire finds.
+    pub frame_ends: fn(&[u8]) -> Vec<usize>,
+}
+
+/// Ikeya MD, both directions on one line.
+pub const IKEYA: Protocol = Protocol {
+    name: "Ikeya",
+    frames: ours::frames::<axlewire::ikeya::Either>,
+    decoder: ours::decoder::<axlewire::ikeya::Either, { axlewire::ikeya::MAX_LEN }>,
+    c_table: reference::ikeya_table,
+    c_bitwise: reference::ikeya_bitwise,
+    oracle: oracle::ikeya,
+    frame_ends: ours::frame_ends::<axlewire::ikeya::Either>,
+};
+
+/// UCP with the default cap of 64-byte frames.
+pub const UCP: Protocol = Protocol {
+    name: "UCP",
+    frames: ours::frames::<axlewire::ucp::Ucp>,
+    decoder: ours::decoder::<axlewire::ucp::Ucp, { axlewire::ucp::MAX_LEN }>,
+    c_table: reference::ucp_table,
+    c_bitwise: reference::ucp_bitwise,
+    oracle: oracle::ucp,
+    frame_ends: ours::frame_ends::<axlewire::ucp::Ucp>,
+};

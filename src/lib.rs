@@ -106,12 +106,14 @@ extern crate alloc;
 extern crate std;
 
 pub mod crc16;
+pub mod endpoint;
 pub mod error;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
 pub mod stream;
+pub mod time;
 #[cfg(feature = "ucp")]
 pub mod ucp;
 

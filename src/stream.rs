@@ -94,20 +94,18 @@ enum Front {
     Partial { need: usize },
 }
 
-/// Books refusals from the front of `bytes` until something else stands there; says how many bytes
-/// that took and what it is.
-#[inline]
-fn search<F: Framing>(bytes: &[u8], ledger: &mut Ledger) -> (usize, Front) {
-    let mut at = 0;
+/// Books refusals from the front of `bytes` until something else stands there; returns the bytes
+/// from there on and what it is.
+#[inline(always)]
+fn search<'b, F: Framing>(mut bytes: &'b [u8], ledger: &mut Ledger) -> (&'b [u8], Front) {
     loop {
-        let rest = bytes.get(at..).unwrap_or_default();
-        match F::judge(rest) {
-            Verdict::Frame { len } => return (at, Front::Frame { len }),
-            Verdict::Partial { need } => return (at, Front::Partial { need }),
+        match F::judge(bytes) {
+            Verdict::Frame { len } => return (bytes, Front::Frame { len }),
+            Verdict::Partial { need } => return (bytes, Front::Partial { need }),
             Verdict::Reject { reason, len } => {
                 let len = len.max(1);
                 ledger.skip(reason, len);
-                at += len;
+                bytes = bytes.get(len..).unwrap_or_default();
             }
         }
     }

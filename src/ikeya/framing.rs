@@ -171,9 +171,21 @@ fn judge<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: 
         Some(&WRITE) if TO_SLAVE => judge_packet::<LONG>(bytes),
         Some(&(VELOCITY | POSITION)) if TO_MASTER => judge_packet::<LONG>(bytes),
         Some(&READ) if TO_SLAVE => judge_packet::<{ ReadRequest::LEN }>(bytes),
-        Some(_) => Verdict::Reject { reason: Reason::Header, len: 1 },
+        Some(_) => {
+            Verdict::Reject { reason: Reason::Header, len: noise::<TO_SLAVE, TO_MASTER>(bytes) }
+        }
         None => Verdict::Partial { need: 1 },
     }
+}
+
+/// How many bytes at the front are no headers.
+fn noise<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> usize {
+    let is_header = |byte: &u8| match *byte {
+        READ | WRITE => TO_SLAVE,
+        VELOCITY | POSITION => TO_MASTER,
+        _ => false,
+    };
+    bytes.iter().position(is_header).unwrap_or(bytes.len())
 }
 
 /// Judges a packet of `LEN` bytes whose header is right.

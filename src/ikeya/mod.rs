@@ -42,8 +42,8 @@
 //!
 //! # Decoding
 //!
-//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`Either`] both. All three never read past
-//! the packet that a header promises, at most 8 bytes.
+//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`Either`] both. None of them waits for more
+//! than the packet that a header promises, at most 8 bytes.
 //!
 //! ```
 //! use axlewire::{ikeya, stream::Event};
@@ -60,11 +60,13 @@
 //! assert_eq!(decoder.counters().framed, 4);
 //! ```
 
+mod board;
 mod framing;
 pub mod three;
 mod units;
 mod wire;
 
+pub use board::{Board, Command, OneMotor, Status, ThreeMotors};
 pub use framing::{Either, Packet, Request, Response, ToMaster, ToSlave};
 pub use units::{DipSwitch, IdReading, Mode, NodeId, Position, Rps};
 pub use wire::{PositionResponse, ReadRequest, VelocityResponse, WriteRequest};

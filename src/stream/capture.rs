@@ -30,8 +30,8 @@ pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, 
     let (mut events, mut ledger, mut at) = (Vec::new(), Ledger::new(), 0);
     ledger.counters.received = bytes.len() as u64;
     while let Some(rest) = bytes.get(at..) {
-        let (skipped, front) = search::<F>(rest, &mut ledger);
-        at += skipped;
+        let (found, front) = search::<F>(rest, &mut ledger);
+        at = bytes.len() - found.len();
         if matches!(front, Front::Partial { .. }) && at < bytes.len() {
             ledger.skip(Reason::Idle, 1);
             at += 1;

@@ -139,7 +139,11 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[inline]
     pub(crate) fn advance<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         let before = input.len();
-        let found = if self.pending() == 0 && self.line == Line::Busy {
+        let found = if self.is_short_of(before) {
+            // Byte by byte from a port, this is what happens nearly every time.
+            self.hold(input, before);
+            None
+        } else if self.pending() == 0 && self.line == Line::Busy {
             self.advance_input(input)
         } else {
             self.advance_held(input)
@@ -163,14 +167,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// Nothing is held: reads `input` where it lies, and holds the candidate that it cuts off.
     #[inline]
     fn advance_input<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
-        let (skipped, front) = search::<F>(input, &mut self.ledger);
-        *input = input.get(skipped..)?;
+        let (found, front) = search::<F>(input, &mut self.ledger);
+        *input = found;
         match front {
             Front::Frame { len } => {
                 if let Some(gap) = self.ledger.gap.take() {
                     return Some(Found::Gap(gap));
                 }
-                let (frame, rest) = input.split_at_checked(len)?;
+                let (frame, rest) = found.split_at_checked(len)?;
                 *input = rest;
                 self.ledger.frame(len);
                 Some(Found::Input(frame))
@@ -229,6 +233,17 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
+    /// Is it known that `more` bytes do not complete the candidate that is held?
+    #[inline]
+    fn is_short_of(&self, more: usize) -> bool {
+        match self.front {
+            Some(Front::Partial { need }) => {
+                self.line == Line::Busy && self.pending() + more < need
+            }
+            _ => false,
+        }
+    }
+
     /// What stands at the front of the held bytes, refusals booked.
     #[inline]
     fn judge_held(&mut self) -> Front {
@@ -237,8 +252,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             Some(front @ Front::Partial { need }) if self.pending() < need => front,
             _ => {
                 let held = self.buffer.get(self.at..self.end).unwrap_or_default();
-                let (skipped, front) = search::<F>(held, &mut self.ledger);
-                self.at += skipped;
+                let (found, front) = search::<F>(held, &mut self.ledger);
+                self.at = self.end - found.len();
                 self.front = Some(front);
                 front
             }

@@ -70,10 +70,10 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
 
     #[inline]
     fn next(&mut self) -> Option<F::Frame<'a>> {
-        let (skipped, front) = search::<F>(self.rest, &mut self.ledger);
-        self.rest = self.rest.get(skipped..)?;
+        let (found, front) = search::<F>(self.rest, &mut self.ledger);
+        self.rest = found;
         let Front::Frame { len } = front else { return None };
-        let (frame, rest) = self.rest.split_at_checked(len)?;
+        let (frame, rest) = found.split_at_checked(len)?;
         self.rest = rest;
         self.ledger.gap = None;
         self.ledger.frame(len);

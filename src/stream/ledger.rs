@@ -135,7 +135,8 @@ impl Ledger {
         Self { counters, gap: None }
     }
 
-    #[inline]
+    // Out of line: inlined, an open gap takes the registers that the next good frame needs.
+    #[inline(never)]
     pub(super) fn skip(&mut self, reason: Reason, len: usize) {
         let len = len as u64;
         let count = self.counters.skipped_for_mut(reason);

@@ -1,0 +1,66 @@
+//! CRC-16/MODBUS of 2 to 4096 bytes: ours, C and the `crc` crate.
+//!
+//! 6 and 42 bytes are what the CRC covers in an Ikeya packet and in a UCP report. All are called
+//! through a function pointer, as C has to be, which costs each of them the same.
+
+use std::hint::black_box;
+
+use axlewire::crc16;
+use axlewire_benches::{reference, streams::Rng};
+use crc::{CRC_16_MODBUS, Crc, NoTable, Table};
+use criterion::{BenchmarkId, Criterion, Throughput};
+
+const LENGTHS: [usize; 7] = [2, 6, 14, 22, 42, 256, 4096];
+
+type Compute = fn(&[u8]) -> u16;
+
+const COMPUTE: [(&str, Compute); 6] = [
+    ("axlewire compute", crc16::compute),
+    ("C two tables", reference::crc_table),
+    ("C bitwise", reference::crc_bitwise),
+    ("crc Table<1>", |bytes| {
+        const CRC: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
+        CRC.checksum(bytes)
+    }),
+    ("crc Table<16>", |bytes| {
+        const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MODBUS);
+        CRC.checksum(bytes)
+    }),
+    ("crc NoTable", |bytes| {
+        const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_MODBUS);
+        CRC.checksum(bytes)
+    }),
+];
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    for len in LENGTHS {
+        length(&mut criterion, len);
+    }
+    criterion.final_summary();
+}
+
+fn length(criterion: &mut Criterion, len: usize) {
+    let mut rng = Rng::new(len as u64);
+    let bytes: Vec<u8> = (0..len).map(|_| rng.byte()).collect();
+    let expected = reference::crc_bitwise(&bytes);
+    let frame = [&bytes[..], &expected.to_le_bytes()].concat();
+
+    let mut group = criterion.benchmark_group(format!("crc of {len}"));
+    group.throughput(Throughput::Bytes(len as u64));
+    for (name, compute) in COMPUTE {
+        assert_eq!(compute(&bytes), expected, "{name}, {len} bytes");
+        group.bench_with_input(BenchmarkId::from_parameter(name), &bytes[..], |bencher, bytes| {
+            let compute = black_box(compute);
+            bencher.iter(|| compute(black_box(bytes)));
+        });
+    }
+
+    // `check` reads the two bytes of the CRC on top.
+    assert!(crc16::check(&frame), "{len} bytes");
+    group.bench_with_input("axlewire check", &frame[..], |bencher, frame| {
+        let check = black_box(crc16::check as fn(&[u8]) -> bool);
+        bencher.iter(|| check(black_box(frame)));
+    });
+    group.finish();
+}

@@ -1,0 +1,123 @@
+//! Frames out of a byte stream: ours, C and other crates, in bytes and frames per second.
+//!
+//! The streams have 4 MiB: more than the second-level cache of today's machines, less than most
+//! third-level ones. Every iteration checks what was found against the slow oracle; axlewire must
+//! find exactly that, C must find it on clean streams and the same as before on all others.
+
+use std::hint::black_box;
+
+use axlewire_benches::{
+    Tally, ours, peers,
+    streams::{self, Stream},
+};
+use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
+
+const LEN: usize = 4 << 20;
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    for stream in streams::clean(LEN) {
+        sent(&mut criterion, &stream);
+        sent(&mut criterion, &stream.with_bit_errors(10_000));
+        sent(&mut criterion, &stream.with_bit_errors(1000));
+    }
+    for stream in streams::hostile(LEN) {
+        hostile(&mut criterion, &stream);
+    }
+    frames_of_44_bytes(&mut criterion);
+    frames_of_8_bytes(&mut criterion);
+    criterion.final_summary();
+}
+
+/// A stream with frames in it: however it is cut, every intact one is found.
+fn sent(criterion: &mut Criterion, stream: &Stream) {
+    let Stream { name, protocol, bytes, intact, .. } = stream;
+    let found = (protocol.frame_ends)(bytes);
+    assert!(intact.iter().all(|end| found.binary_search(end).is_ok()), "{name}: frames were lost");
+
+    let expected = (protocol.oracle)(bytes);
+    let mut group = criterion.benchmark_group(name);
+    bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
+    for chunk in [4096, 512, 64, 7, 1] {
+        let decode = |bytes: &[u8]| (protocol.decoder)(bytes, chunk);
+        bench(&mut group, &format!("axlewire Decoder by {chunk}"), bytes, expected, decode);
+    }
+    bench_c(&mut group, stream);
+}
+
+/// A stream without frames, except for those that chance made.
+fn hostile(criterion: &mut Criterion, stream: &Stream) {
+    let Stream { name, protocol, bytes, .. } = stream;
+    let expected = (protocol.oracle)(bytes);
+    let mut group = criterion.benchmark_group(name);
+    bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
+    let decode = |bytes: &[u8]| (protocol.decoder)(bytes, 4096);
+    bench(&mut group, "axlewire Decoder by 4096", bytes, expected, decode);
+    bench_c(&mut group, stream);
+}
+
+/// C must find everything on a clean line; on others it loses frames, and always the same ones.
+fn bench_c(group: &mut Group<'_>, stream: &Stream) {
+    let Stream { name, protocol, bytes, sent, intact } = stream;
+    let all = (protocol.oracle)(bytes);
+    let expected = (protocol.c_table)(bytes);
+    if *sent > 0 && intact.len() == *sent {
+        assert_eq!(expected, all, "{name}: C");
+    }
+    bench(group, "C two tables", bytes, expected, protocol.c_table);
+    bench(group, "C bitwise", bytes, expected, protocol.c_bitwise);
+}
+
+/// UCP reports against frames as long, or a byte shorter, of other protocols.
+fn frames_of_44_bytes(criterion: &mut Criterion) {
+    let ours = streams::reports(LEN);
+    let frames = ours.intact.len();
+    let count = LEN / peers::MAVLINK_LEN;
+    let mut group = criterion.benchmark_group("peers, 44 bytes");
+    bench_peer(&mut group, "axlewire Frames", &ours.bytes, frames, ours.protocol.frames);
+    bench_peer(&mut group, "axlewire Frames, unpacked", &ours.bytes, frames, ours::reports);
+    bench_peer(&mut group, "mavlink", &peers::mavlink_frames(count), count, peers::mavlink_read);
+    let responses = peers::modbus_responses(count);
+    bench_peer(&mut group, "modbus-core", &responses, count, peers::modbus_read_responses);
+}
+
+/// Ikeya responses against Modbus requests.
+fn frames_of_8_bytes(criterion: &mut Criterion) {
+    let ours = streams::responses(LEN);
+    let count = LEN / peers::MODBUS_REQUEST_LEN;
+    let mut group = criterion.benchmark_group("peers, 8 bytes");
+    bench_peer(&mut group, "axlewire Frames", &ours.bytes, ours.sent, ours.protocol.frames);
+    let requests = peers::modbus_requests(count);
+    bench_peer(&mut group, "modbus-core", &requests, count, peers::modbus_read_requests);
+}
+
+fn bench_peer(
+    group: &mut Group<'_>,
+    name: &str,
+    bytes: &[u8],
+    frames: usize,
+    decode: fn(&[u8]) -> Tally,
+) {
+    let expected = decode(bytes);
+    assert_eq!(expected.frames, frames as u64, "{name}");
+    bench(group, name, bytes, expected, decode);
+}
+
+type Group<'a> = BenchmarkGroup<'a, WallTime>;
+
+/// Measures one decoder, in bytes and frames, and checks what it finds every time.
+fn bench(
+    group: &mut Group<'_>,
+    name: &str,
+    bytes: &[u8],
+    expected: Tally,
+    decode: impl Fn(&[u8]) -> Tally,
+) {
+    group.throughput(Throughput::ElementsAndBytes {
+        elements: expected.frames,
+        bytes: bytes.len() as u64,
+    });
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| assert_eq!(decode(black_box(bytes)), expected, "{name}"));
+    });
+}

@@ -1,0 +1,126 @@
+//! The decoders of axlewire behind the signature that all decoders here share.
+
+use axlewire::{
+    ikeya::{Packet, Request, Response},
+    stream::{Decoder, Event, Frames, Framing},
+    ucp,
+};
+
+use crate::Tally;
+
+/// A frame that can be added to a [`Tally`].
+pub trait Sample {
+    /// Reads id and payload as a user of the frame would, and adds them.
+    fn add_to(&self, tally: &mut Tally);
+}
+
+impl Sample for Packet<'_> {
+    #[inline]
+    fn add_to(&self, tally: &mut Tally) {
+        match self {
+            Packet::Request(Request::Read(read)) => tally.add(read.id().get(), None),
+            Packet::Request(Request::Write(write)) => {
+                tally.add(write.id().get(), Some(write.payload()));
+            }
+            Packet::Response(Response::Velocity(velocity)) => {
+                tally.add(velocity.id().get(), Some(velocity.rps().to_le_bytes()));
+            }
+            Packet::Response(Response::Position(response)) => {
+                let ([a, b], [c, d]) = (
+                    response.position().count().to_le_bytes(),
+                    response.position().rotation().to_le_bytes(),
+                );
+                tally.add(response.id().get(), Some([a, b, c, d]));
+            }
+        }
+    }
+}
+
+impl Sample for &ucp::Frame {
+    #[inline]
+    fn add_to(&self, tally: &mut Tally) {
+        tally.add(self.id(), self.body().first_chunk::<4>().copied());
+    }
+}
+
+/// Decodes a slice that is in memory; nothing follows it.
+pub fn frames<F>(bytes: &[u8]) -> Tally
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    let mut tally = Tally::default();
+    let mut frames = Frames::<F>::new(bytes);
+    loop {
+        for frame in frames.by_ref() {
+            frame.add_to(&mut tally);
+        }
+        if frames.rest().is_empty() {
+            return tally;
+        }
+        frames.idle();
+    }
+}
+
+/// Decodes a stream that arrives in pieces of `chunk` bytes and then ends.
+pub fn decoder<F, const N: usize>(bytes: &[u8], chunk: usize) -> Tally
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    fn drain<F, const N: usize>(decoder: &mut Decoder<F, N>, mut input: &[u8], tally: &mut Tally)
+    where
+        F: Framing,
+        for<'a> F::Frame<'a>: Sample,
+    {
+        while let Some(event) = decoder.decode(&mut input) {
+            if let Event::Frame(frame) = event {
+                frame.add_to(tally);
+            }
+        }
+    }
+
+    let mut tally = Tally::default();
+    let mut decoder = Decoder::<F, N>::new();
+    for piece in bytes.chunks(chunk) {
+        drain(&mut decoder, piece, &mut tally);
+    }
+    while decoder.pending() > 0 {
+        decoder.idle();
+        drain(&mut decoder, &[], &mut tally);
+    }
+    tally
+}
+
+/// Where the frames end that [`frames`] finds, bytes from the front.
+pub fn frame_ends<F: Framing>(bytes: &[u8]) -> Vec<usize> {
+    let mut ends = Vec::new();
+    let mut frames = Frames::<F>::new(bytes);
+    loop {
+        while frames.next().is_some() {
+            ends.push(bytes.len() - frames.rest().len());
+        }
+        if frames.rest().is_empty() {
+            return ends;
+        }
+        frames.idle();
+    }
+}
+
+/// Like [`frames`] for UCP, but unpacks every report into native numbers.
+#[must_use]
+pub fn reports(bytes: &[u8]) -> Tally {
+    let mut tally = Tally::default();
+    for frame in Frames::<ucp::Ucp>::new(bytes) {
+        match frame.message() {
+            ucp::Message::Report(report) => {
+                let telemetry = std::hint::black_box(report.telemetry());
+                let ([a, b], [c, d]) =
+                    (telemetry.battery_pct.to_le_bytes(), telemetry.rpm[0].to_le_bytes());
+                tally.add(frame.id(), Some([a, b, c, d]));
+            }
+            _ => frame.add_to(&mut tally),
+        }
+    }
+    tally
+}

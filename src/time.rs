@@ -1,0 +1,192 @@
+//! Time as the roles see it: microseconds, handed in by the caller.
+//!
+//! No role reads a clock. Whoever drives one passes the time of each call as an [`Instant`], from
+//! any free-running source: only differences count. An `Instant` has 64 bits, which wrap after
+//! 584,000 years; a hardware timer of 32 bits wraps after 71 minutes, and [`Wrapping32`] makes one
+//! of the other. Comparisons look at differences, so even the wrap of the 64 bits is harmless.
+
+use core::{
+    cmp::Ordering,
+    ops::{Add, AddAssign, Sub},
+};
+
+/// A span of time, microseconds, up to 71 minutes.
+#[derive(Clone, Copy, Debug, Default, Eq, Hash, Ord, PartialEq, PartialOrd)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Duration {
+    micros: u32,
+}
+
+impl Duration {
+    /// No time at all.
+    pub const ZERO: Self = Self::from_micros(0);
+
+    /// A span in microseconds.
+    #[must_use]
+    pub const fn from_micros(micros: u32) -> Self {
+        Self { micros }
+    }
+
+    /// A span in milliseconds, at most 4,294,967 of them: a longer one is cut to 71 minutes.
+    #[must_use]
+    pub const fn from_millis(millis: u32) -> Self {
+        Self { micros: millis.saturating_mul(1000) }
+    }
+
+    /// The span in microseconds.
+    #[must_use]
+    pub const fn as_micros(self) -> u32 {
+        self.micros
+    }
+
+    /// Both spans together, at most 71 minutes.
+    #[must_use]
+    pub const fn saturating_add(self, other: Self) -> Self {
+        Self { micros: self.micros.saturating_add(other.micros) }
+    }
+
+    /// The span `times` over, at most 71 minutes.
+    #[must_use]
+    pub const fn saturating_mul(self, times: u32) -> Self {
+        Self { micros: self.micros.saturating_mul(times) }
+    }
+}
+
+impl Add for Duration {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.saturating_add(other)
+    }
+}
+
+/// A point in time, microseconds since any moment that the caller likes.
+///
+/// Of two instants less than 292,000 years apart the later one is the greater.
+///
+/// ```
+/// use axlewire::time::{Duration, Instant};
+///
+/// let start = Instant::from_micros(u64::MAX - 100);
+/// let end = start + Duration::from_micros(500); // over the wrap
+/// assert!(end > start);
+/// assert_eq!(end - start, Duration::from_micros(500));
+/// assert_eq!(start - end, Duration::ZERO);
+/// ```
+#[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Instant {
+    micros: u64,
+}
+
+impl Instant {
+    /// The time in microseconds.
+    #[must_use]
+    pub const fn from_micros(micros: u64) -> Self {
+        Self { micros }
+    }
+
+    /// The time in milliseconds.
+    #[must_use]
+    pub const fn from_millis(millis: u64) -> Self {
+        Self { micros: millis.wrapping_mul(1000) }
+    }
+
+    /// Microseconds since the caller's zero.
+    #[must_use]
+    pub const fn as_micros(self) -> u64 {
+        self.micros
+    }
+
+    /// Signed distance from `other` to `self`, microseconds.
+    const fn distance(self, other: Self) -> i64 {
+        self.micros.wrapping_sub(other.micros) as i64
+    }
+}
+
+impl Ord for Instant {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.distance(*other).cmp(&0)
+    }
+}
+
+impl PartialOrd for Instant {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Add<Duration> for Instant {
+    type Output = Self;
+
+    fn add(self, span: Duration) -> Self {
+        Self { micros: self.micros.wrapping_add(span.micros.into()) }
+    }
+}
+
+impl AddAssign<Duration> for Instant {
+    fn add_assign(&mut self, span: Duration) {
+        *self = *self + span;
+    }
+}
+
+/// The time from `other` to `self`: zero if that is backwards, at most 71 minutes.
+impl Sub for Instant {
+    type Output = Duration;
+
+    fn sub(self, other: Self) -> Duration {
+        let micros = self.distance(other).max(0);
+        Duration { micros: u32::try_from(micros).unwrap_or(u32::MAX) }
+    }
+}
+
+/// Makes instants of a 32-bit microsecond counter that wraps every 71 minutes.
+///
+/// ```
+/// use axlewire::time::Wrapping32;
+///
+/// let mut clock = Wrapping32::new();
+/// let before = clock.at(0xFFFF_FFF0);
+/// let after = clock.at(0x0000_0010); // the counter has wrapped
+/// assert_eq!((after - before).as_micros(), 0x20);
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wrapping32 {
+    last: u64,
+}
+
+impl Wrapping32 {
+    /// Starts with the counter's first turn.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { last: 0 }
+    }
+
+    /// The time at a reading of the counter. To be asked at least once in 71 minutes, in order.
+    pub fn at(&mut self, counter: u32) -> Instant {
+        let elapsed = counter.wrapping_sub(self.last as u32);
+        self.last = self.last.wrapping_add(elapsed.into());
+        Instant::from_micros(self.last)
+    }
+}
+
+/// How long `bytes` bytes take on a line: 10 bit times each, rounded up (ruling B6).
+///
+/// A `baud` of 0 is a line that never gets done: the longest span there is.
+///
+/// ```
+/// use axlewire::time::wire_time;
+/// assert_eq!(wire_time(4, 500_000).as_micros(), 80); // a READ
+/// assert_eq!(wire_time(8, 500_000).as_micros(), 160); // its answer
+/// assert_eq!(wire_time(44, 115_200).as_micros(), 3820); // a report
+/// ```
+#[must_use]
+pub const fn wire_time(bytes: usize, baud: u32) -> Duration {
+    if baud == 0 {
+        return Duration::from_micros(u32::MAX);
+    }
+    let bit_micros = (bytes as u64).saturating_mul(10 * 1_000_000);
+    let micros = bit_micros.div_ceil(baud as u64);
+    Duration::from_micros(if micros > u32::MAX as u64 { u32::MAX } else { micros as u32 })
+}
