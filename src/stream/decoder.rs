@@ -44,6 +44,8 @@ pub struct Decoder<F, const N: usize> {
     /// What stands at the front of the held bytes, where that is known.
     front: Option<Front>,
     line: Line,
+    /// Where the held bytes ended when the line went quiet: what lies behind came later.
+    quiet_end: usize,
     ledger: Ledger,
     framing: PhantomData<fn() -> F>,
 }
@@ -77,6 +79,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             end: 0,
             front: None,
             line: Line::Busy,
+            quiet_end: 0,
             ledger: Ledger::new(),
             framing: PhantomData,
         }
@@ -113,13 +116,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
 
     /// The line went quiet: what is pending will not be completed (ruling B3).
     ///
+    /// Concerns the bytes that the decoder has taken in; hand in what came before the silence first.
     /// Takes effect in the calls of [`decode`](Self::decode) that follow, which deliver whole
     /// frames still held, refuse the pending candidate, search on inside it and report the gap.
     /// What can still be the start of a frame at the very end remains pending: when nothing at all
     /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
     /// one may then follow right behind the first.
     pub fn idle(&mut self) {
-        self.line = Line::Quiet;
+        (self.line, self.quiet_end) = (Line::Quiet, self.end);
     }
 
     /// Bytes received and neither framed nor skipped yet.
@@ -210,7 +214,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     self.ledger.frame(len);
                     return Some(Found::Held { at, len });
                 }
-                (Front::Partial { .. }, Line::Quiet) if self.pending() > 0 => {
+                (Front::Partial { .. }, Line::Quiet) if self.at < self.quiet_end => {
                     self.line = Line::Settling;
                     self.ledger.skip(Reason::Idle, 1);
                     self.consume(1);
@@ -247,13 +251,15 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// What stands at the front of the held bytes, refusals booked.
     #[inline]
     fn judge_held(&mut self) -> Front {
+        // What came behind a silence does not complete what was pending before it.
+        let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
         match self.front {
             Some(front @ Front::Frame { .. }) => front,
-            Some(front @ Front::Partial { need }) if self.pending() < need => front,
+            Some(front @ Front::Partial { need }) if end.saturating_sub(self.at) < need => front,
             _ => {
-                let held = self.buffer.get(self.at..self.end).unwrap_or_default();
+                let held = self.buffer.get(self.at..end).unwrap_or_default();
                 let (found, front) = search::<F>(held, &mut self.ledger);
-                self.at = self.end - found.len();
+                self.at = end - found.len();
                 self.front = Some(front);
                 front
             }
@@ -287,6 +293,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     fn compact(&mut self) {
         if self.at > 0 {
             self.buffer.copy_within(self.at..self.end, 0);
+            self.quiet_end = self.quiet_end.saturating_sub(self.at);
             (self.at, self.end) = (0, self.end - self.at);
         }
     }

@@ -8,7 +8,6 @@ macro_rules! code {
     ) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-        #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[cfg_attr(feature = "serde", serde(from = $serde, into = $serde))]
@@ -24,6 +23,14 @@ macro_rules! code {
                     $($value => Self::$variant,)+
                     other => Self::Other(other),
                 }
+            }
+        }
+
+        /// By the value on the wire, so that `Other` never stands for a value with a name.
+        #[cfg(feature = "arbitrary")]
+        impl<'a> arbitrary::Arbitrary<'a> for $name {
+            fn arbitrary(u: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
+                u.arbitrary::<$raw>().map(Self::from)
             }
         }
 

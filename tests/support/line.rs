@@ -1,0 +1,348 @@
+//! A decoder on a line that keeps the history of everything, so that the oracle can be asked.
+//!
+//! Every call checks the account; [`Line::finish`] checks the rest.
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{self, Counters, Decoder, Framing},
+    ucp,
+};
+
+use super::oracle::{self, Event, Reason, Rules};
+
+/// A framing that the oracle knows too.
+pub(crate) trait Known: Framing {
+    const RULES: Rules;
+
+    /// The bytes behind a frame, where they lie. (`'a: 'a` because a projection alone leaves it
+    /// open whether a caller may name the lifetime, and the impls have to agree.)
+    fn bytes<'a: 'a>(frame: &Self::Frame<'a>) -> &'a [u8];
+}
+
+fn request_bytes<'a>(frame: &ikeya::Request<'a>) -> &'a [u8] {
+    match frame {
+        ikeya::Request::Read(packet) => packet.as_bytes(),
+        ikeya::Request::Write(packet) => packet.as_bytes(),
+    }
+}
+
+fn response_bytes<'a>(frame: &ikeya::Response<'a>) -> &'a [u8] {
+    match frame {
+        ikeya::Response::Velocity(packet) => packet.as_bytes(),
+        ikeya::Response::Position(packet) => packet.as_bytes(),
+    }
+}
+
+fn three_request_bytes<'a>(frame: &three::Request<'a>) -> &'a [u8] {
+    match frame {
+        three::Request::Read(packet) => packet.as_bytes(),
+        three::Request::Write(packet) => packet.as_bytes(),
+    }
+}
+
+fn three_response_bytes<'a>(frame: &three::Response<'a>) -> &'a [u8] {
+    match frame {
+        three::Response::Velocity(packet) => packet.as_bytes(),
+        three::Response::Position(packet) => packet.as_bytes(),
+    }
+}
+
+impl Known for ikeya::ToSlave {
+    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: false, long: 8 };
+
+    fn bytes<'a: 'a>(frame: &ikeya::Request<'a>) -> &'a [u8] {
+        request_bytes(frame)
+    }
+}
+
+impl Known for ikeya::ToMaster {
+    const RULES: Rules = Rules::Ikeya { to_slave: false, to_master: true, long: 8 };
+
+    fn bytes<'a: 'a>(frame: &ikeya::Response<'a>) -> &'a [u8] {
+        response_bytes(frame)
+    }
+}
+
+impl Known for ikeya::Either {
+    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 8 };
+
+    fn bytes<'a: 'a>(frame: &ikeya::Packet<'a>) -> &'a [u8] {
+        match frame {
+            ikeya::Packet::Request(request) => request_bytes(request),
+            ikeya::Packet::Response(response) => response_bytes(response),
+        }
+    }
+}
+
+impl Known for three::ToSlave {
+    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: false, long: 16 };
+
+    fn bytes<'a: 'a>(frame: &three::Request<'a>) -> &'a [u8] {
+        three_request_bytes(frame)
+    }
+}
+
+impl Known for three::ToMaster {
+    const RULES: Rules = Rules::Ikeya { to_slave: false, to_master: true, long: 16 };
+
+    fn bytes<'a: 'a>(frame: &three::Response<'a>) -> &'a [u8] {
+        three_response_bytes(frame)
+    }
+}
+
+impl Known for three::Either {
+    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 16 };
+
+    fn bytes<'a: 'a>(frame: &three::Packet<'a>) -> &'a [u8] {
+        match frame {
+            three::Packet::Request(request) => three_request_bytes(request),
+            three::Packet::Response(response) => three_response_bytes(response),
+        }
+    }
+}
+
+impl<const CAP: usize> Known for ucp::Ucp<CAP> {
+    const RULES: Rules = Rules::Ucp { cap: CAP };
+
+    fn bytes<'a: 'a>(frame: &&'a ucp::Frame) -> &'a [u8] {
+        frame.as_bytes()
+    }
+}
+
+/// One thing that a user of a decoder may do.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Op {
+    /// Gives so many bytes as a slice and takes all events.
+    Slice(usize),
+    /// Gives so many bytes as a slice, takes so many events and walks away.
+    Stop { len: usize, events: usize },
+    /// Writes up to so many bytes into the decoder's own buffer, and takes no event.
+    Commit(usize),
+    /// Takes all events that are left.
+    Drain,
+    /// Says that the line went quiet, drained or not.
+    Idle,
+}
+
+/// A decoder and the history of its line.
+pub(crate) struct Line<F, const N: usize> {
+    decoder: Decoder<F, N>,
+    history: Vec<u8>,
+    idles: Vec<usize>,
+    events: Vec<Event>,
+    /// `idle` has been called and its events have not all been taken.
+    quiet: bool,
+    /// How much of the stream `decode` has been shown, taken or not.
+    shown: usize,
+    /// Where the latest chunk of input began, and how many calls it has had.
+    chunk: (usize, usize),
+    calls: u64,
+}
+
+impl<F: Known, const N: usize> Line<F, N> {
+    pub(crate) fn new() -> Self {
+        let (history, idles, events) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            decoder: Decoder::new(),
+            history,
+            idles,
+            events,
+            quiet: false,
+
+            shown: 0,
+            chunk: (0, 0),
+            calls: 0,
+        }
+    }
+
+    /// Does `ops`, again and again until `stream` is used up or they have had a fair chance, gives
+    /// the rest, and asks the oracle about all of it. Says how often `decode` was called.
+    pub(crate) fn play(mut self, stream: &[u8], ops: &[Op]) -> u64 {
+        let mut rest = stream;
+        for &op in ops.iter().cycle().take(ops.len().max(4 * stream.len())) {
+            rest = self.perform(op, rest);
+            if rest.is_empty() {
+                break;
+            }
+        }
+        self.slice(rest);
+        self.finish();
+        self.calls
+    }
+
+    /// Does `op` with bytes from the front of `stream`; says what it left.
+    fn perform<'s>(&mut self, op: Op, stream: &'s [u8]) -> &'s [u8] {
+        match op {
+            Op::Slice(len) => {
+                let (piece, rest) = stream.split_at(len.min(stream.len()));
+                self.slice(piece);
+                rest
+            }
+            Op::Stop { len, events } => {
+                let mut piece = &stream[..len.min(stream.len())];
+                let given = piece.len();
+                self.chunk = (self.history.len(), 0);
+                // What is left comes again in another op, from another place in memory.
+                for _ in 0..events {
+                    if !self.step(&mut piece) {
+                        break;
+                    }
+                }
+                &stream[given - piece.len()..]
+            }
+            Op::Commit(len) => {
+                let taken = self.commit(&stream[..len.min(stream.len())]);
+                &stream[taken..]
+            }
+            Op::Drain => {
+                self.slice(&[]);
+                stream
+            }
+            Op::Idle => {
+                self.idle();
+                stream
+            }
+        }
+    }
+
+    /// Gives `input` from a buffer of its own and takes all events.
+    pub(crate) fn slice(&mut self, input: &[u8]) {
+        let copy = input.to_vec();
+        let mut input = copy.as_slice();
+        self.chunk = (self.history.len(), 0);
+        while self.step(&mut input) {}
+    }
+
+    /// Takes one event; `false` when there is none.
+    fn step(&mut self, input: &mut &[u8]) -> bool {
+        let given = *input;
+        self.calls += 1;
+        self.chunk.1 += 1;
+        let nothing_held = self.decoder.pending() == 0;
+        let found = match self.decoder.decode(input) {
+            None => None,
+            Some(stream::Event::Skipped(gap)) => Some((Err(gap.reason), gap.len as usize)),
+            Some(stream::Event::Frame(frame)) => {
+                let bytes = F::bytes(&frame);
+                let borrowed = given.as_ptr_range().contains(&bytes.as_ptr());
+                Some((Ok((bytes.to_vec(), borrowed)), bytes.len()))
+            }
+        };
+        let (taken, left) = given.split_at(given.len() - input.len());
+        assert!(left == *input, "the input was not advanced but replaced");
+        self.history.extend_from_slice(taken);
+        self.shown = self.shown.max(self.history.len() + left.len());
+        self.check_account();
+
+        let Some((what, len)) = found else {
+            assert!(input.is_empty(), "no event, yet {} bytes are left", input.len());
+            assert!(self.decoder.pending() < F::MAX_LEN, "a whole candidate is held (B3)");
+            self.quiet = false;
+            return false;
+        };
+        // A gap ends, and so does a frame, where the booked bytes end.
+        let counters = self.decoder.counters();
+        let offset = (counters.framed + counters.skipped()) as usize - len;
+        self.events.push(match what {
+            Err(reason) => Event::Skipped { offset, len, reason: oracle_reason(reason) },
+            Ok((bytes, borrowed)) => {
+                // Only the rest of a candidate that was cut off goes through the buffer, and a call
+                // completes at most one.
+                let (start, calls) = self.chunk;
+                let split = !nothing_held && offset < start + calls * F::MAX_LEN;
+                assert!(borrowed || split, "a frame that lies whole in the input was copied");
+                assert_eq!(bytes, self.history[offset..offset + len], "frame of other bytes");
+                Event::Frame { offset, len }
+            }
+        });
+        true
+    }
+
+    /// Writes as much of `bytes` into the decoder as it has room for; says how much.
+    pub(crate) fn commit(&mut self, bytes: &[u8]) -> usize {
+        let room = N - self.decoder.pending();
+        let spare = self.decoder.spare();
+        assert_eq!(spare.len(), room, "a port does not get all the room there is");
+        let len = bytes.len().min(spare.len());
+        spare[..len].copy_from_slice(&bytes[..len]);
+        self.decoder.commit(len);
+        self.history.extend_from_slice(&bytes[..len]);
+        self.check_account();
+        len
+    }
+
+    /// The line goes quiet, unless it already has and the decoder is about to say so, or bytes
+    /// that the decoder has been shown have not been given again.
+    pub(crate) fn idle(&mut self) {
+        if !self.quiet && self.history.len() >= self.shown {
+            self.decoder.idle();
+            self.idles.push(self.history.len());
+            self.quiet = true;
+            self.check_account();
+        }
+    }
+
+    /// Everything so far is what the oracle says.
+    pub(crate) fn finish(&mut self) {
+        self.slice(&[]);
+        let told = oracle::answer(F::RULES, &self.history, &self.idles);
+        assert_eq!(self.events, told.events, "history {:02x?}", self.history);
+        assert_eq!(self.decoder.pending(), told.pending);
+        check_counters(self.decoder.counters(), &told, self.history.len());
+    }
+
+    pub(crate) fn decoder(&self) -> &Decoder<F, N> {
+        &self.decoder
+    }
+
+    pub(crate) fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// B2: every byte is in exactly one place, after every call.
+    fn check_account(&self) {
+        let (counters, pending) = (self.decoder.counters(), self.decoder.pending() as u64);
+        assert_eq!(counters.received, counters.framed + counters.skipped() + pending);
+        assert_eq!(counters.received, self.history.len() as u64);
+    }
+}
+
+/// An event of a capture as the oracle writes it.
+pub(crate) fn located<F: Known>((offset, event): stream::Located<F::Frame<'_>>) -> Event {
+    match event {
+        stream::Event::Frame(frame) => Event::Frame { offset, len: F::bytes(&frame).len() },
+        stream::Event::Skipped(gap) => {
+            let (len, reason) = (gap.len as usize, oracle_reason(gap.reason));
+            Event::Skipped { offset, len, reason }
+        }
+    }
+}
+
+/// The counters are those of the oracle's answer, and the sums of its events.
+pub(crate) fn check_counters(counters: &Counters, told: &oracle::Answer, received: usize) {
+    let (mut frames, mut framed, mut skipped) = (0, 0, told.open);
+    for event in &told.events {
+        match event {
+            Event::Frame { len, .. } => (frames, framed) = (frames + 1, framed + len),
+            Event::Skipped { len, .. } => skipped += len,
+        }
+    }
+    assert_eq!(counters.received, received as u64, "received");
+    assert_eq!(counters.frames, frames as u64, "frames");
+    assert_eq!(counters.framed, framed as u64, "framed");
+    assert_eq!(counters.skipped(), skipped as u64, "skipped");
+    assert_eq!(counters.gaps, told.gaps as u64, "gaps");
+    let by_reason = [counters.header, counters.length, counters.id, counters.crc, counters.idle];
+    assert_eq!(by_reason.map(|count| count as usize), told.skipped, "skipped by reason");
+}
+
+fn oracle_reason(reason: stream::Reason) -> Reason {
+    match reason {
+        stream::Reason::Header => Reason::Header,
+        stream::Reason::Length => Reason::Length,
+        stream::Reason::Id => Reason::Id,
+        stream::Reason::Crc => Reason::Crc,
+        stream::Reason::Idle => Reason::Idle,
+        other => panic!("the oracle knows no reason {other}"),
+    }
+}
