@@ -17,6 +17,7 @@
 //! the highest power; multiplying by `x` is a shift to the *right*, and a bit that is reduced
 //! reappears further to the *left*.
 
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
 use crate::error::ParseError;
 
 /// Is `frame`, a whole frame with its CRC in the last two bytes, undamaged?
@@ -57,6 +58,7 @@ pub const fn compute(bytes: &[u8]) -> u16 {
 }
 
 /// [`check`] with an answer that says what was wrong.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) fn verify(frame: &[u8]) -> Result<(), ParseError> {
     if check(frame) {
         return Ok(());
@@ -68,6 +70,7 @@ pub(crate) fn verify(frame: &[u8]) -> Result<(), ParseError> {
 }
 
 /// The CRC that belongs into the last two bytes of `frame`, whatever stands there now.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) fn seal(frame: &[u8]) -> [u8; 2] {
     let body = frame.split_last_chunk::<2>().map_or(&[][..], |(body, _)| body);
     compute(body).to_le_bytes()

@@ -126,6 +126,7 @@ pub trait Encode {
 }
 
 /// Copies a frame that lies ready to the front of `buffer`.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) fn encode_bytes<'b>(
     frame: &[u8],
     buffer: &'b mut [u8],
