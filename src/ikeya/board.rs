@@ -8,7 +8,7 @@ use crate::stream::{Encode, Framing};
 /// What a kind of board sends and understands (rulings I3, I10).
 ///
 /// Implemented by [`OneMotor`] and [`ThreeMotors`] and by nothing else.
-pub trait Board: sealed::Sealed + Sized + 'static {
+pub trait Board: sealed::Sealed + Copy + fmt::Debug + PartialEq + 'static {
     /// A target or current speed.
     type Velocity: Copy + fmt::Debug + PartialEq;
     /// A speed as a packet carries it: any bits.
