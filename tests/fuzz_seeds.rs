@@ -6,6 +6,10 @@
 #[expect(unreachable_pub, reason = "the fuzz crate exports them")]
 mod bodies;
 
+#[path = "../fuzz/src/roles.rs"]
+#[expect(unreachable_pub, reason = "the fuzz crate exports them")]
+mod roles;
+
 use std::{fs, path::Path};
 
 /// Runs `body` over the seeds of `target`, whole, cut and damaged.
@@ -70,6 +74,26 @@ fn ikeya_streams_give_what_the_oracle_says() {
 #[test]
 fn ucp_streams_give_what_the_oracle_says() {
     run("ucp_stream", bodies::ucp_stream);
+}
+
+/// Roles have no seeds: their scripts are as good when they are drawn.
+fn play(body: fn(&[u8])) {
+    let mut dice = Dice(0x5EED);
+    for len in 0..600 {
+        for _ in 0..5 {
+            body(&(0..len).map(|_| dice.below(256) as u8).collect::<Vec<_>>());
+        }
+    }
+}
+
+#[test]
+fn a_master_survives_any_calls_bytes_and_times() {
+    play(roles::ikeya_master);
+}
+
+#[test]
+fn a_slave_survives_any_calls_bytes_and_times() {
+    play(roles::ikeya_slave);
 }
 
 #[test]

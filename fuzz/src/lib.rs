@@ -2,3 +2,4 @@
 //! them too: `tests/fuzz_seeds.rs`.
 
 pub mod bodies;
+pub mod roles;

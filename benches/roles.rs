@@ -1,0 +1,79 @@
+//! What an exchange costs the processor: a WRITE and a READ with its answer, master and slave
+//! together, without a port in between.
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{Master, MasterConfig, MasterEvent, Mode, NodeId, Rps, Slave, SlaveConfig},
+    time::{Duration, Instant},
+};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+
+const EXCHANGES: u32 = 1000;
+
+/// A bus with one node, and the time on it.
+struct Bus {
+    master: Master,
+    slave: Slave,
+    now: Instant,
+}
+
+impl Bus {
+    fn new() -> Self {
+        let mut bus = Self {
+            master: Master::new(MasterConfig::direct()),
+            slave: Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct()),
+            now: Instant::from_micros(0),
+        };
+        bus.master.discover();
+        while bus.master.is_discovering() {
+            bus.step();
+        }
+        let target = Rps::new(1.0).expect("finite");
+        bus.master.set_velocity(NodeId::N1, target).expect("node 1 is online");
+        bus
+    }
+
+    /// Hands over what is sent, or lets time pass; says how many statuses were told.
+    fn step(&mut self) -> u32 {
+        while let Some(bytes) = self.master.poll_transmit(self.now) {
+            self.slave.handle_input(bytes, self.now);
+        }
+        if let Some(answer) = self.slave.poll_transmit(self.now) {
+            self.now += Duration::from_micros(450);
+            self.master.handle_input(answer, self.now);
+        } else if let Some(next) = self.master.poll_timeout() {
+            self.now = next;
+            self.master.handle_timeout(next);
+        }
+        let mut told = 0;
+        while let Some(event) = self.master.poll_event() {
+            told += u32::from(matches!(event, MasterEvent::Status { .. }));
+        }
+        while self.slave.poll_event().is_some() {}
+        told
+    }
+
+    /// A thousand exchanges, each with its WRITE, READ and answer.
+    fn exchanges(&mut self) {
+        let before = (self.slave.statistics().writes, self.slave.statistics().replies);
+        let mut told = 0;
+        while told < EXCHANGES {
+            told += self.step();
+        }
+        let after = (self.slave.statistics().writes, self.slave.statistics().replies);
+        assert_eq!((after.0 - before.0, after.1 - before.1), (EXCHANGES, EXCHANGES));
+    }
+}
+
+fn roles(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("Ikeya roles");
+    group.throughput(Throughput::Elements(EXCHANGES.into()));
+    let mut bus = Bus::new();
+    group.bench_function("WRITE, READ and answer, both ends", |bencher| {
+        bencher.iter(|| bus.exchanges());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, roles);
+criterion_main!(benches);

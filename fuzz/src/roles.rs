@@ -1,0 +1,202 @@
+//! Any bytes at any time, and any calls: no role panics, spins, or forgets what it promised.
+//!
+//! The data is a list of ops, one byte each with its arguments behind it; see `op` of each role.
+
+use arbitrary::{Result, Unstructured};
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Board, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, OneMotor, Polling,
+        Position, PositionResponse, ReadRequest, Rps, Slave, SlaveConfig, Status, Target,
+        ThreeMotors, VelocityResponse, WriteRequest, three,
+    },
+    time::{Duration, Instant},
+};
+
+/// Polls a role as its contract says, and checks what holds for every role. Returns the packets
+/// that it has sent.
+fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)) -> Vec<Vec<u8>> {
+    if role.poll_timeout().is_some_and(|at| now >= at) {
+        role.handle_timeout(now);
+    }
+    let mut events = 0;
+    while let Some(event) = role.poll_event() {
+        told(event);
+        events += 1;
+        assert!(events <= 64, "events without end");
+    }
+    let mut sent = Vec::new();
+    while let Some(bytes) = role.poll_transmit(now) {
+        assert!(!bytes.is_empty(), "a packet of no bytes");
+        sent.push(bytes.to_vec());
+        assert!(sent.len() <= 64, "packets without end");
+    }
+    // A call too many does nothing.
+    role.handle_input(&[], now);
+    assert!(role.poll_transmit(now).is_none());
+    let next = role.poll_timeout();
+    assert!(next.is_none_or(|at| at > now), "a busy loop: {next:?} at {now:?}");
+    sent
+}
+
+/// The time: anywhere, also just before it wraps, and then forward only.
+struct Clock(Instant);
+
+impl Clock {
+    fn new(u: &mut Unstructured<'_>) -> Result<Self> {
+        let begin = [0, u64::MAX - 5_000, u64::MAX / 2 - 5_000, 1 << 40];
+        Ok(Self(Instant::from_micros(*u.choose(&begin)?)))
+    }
+
+    /// A little time, or a lot.
+    fn pass(&mut self, u: &mut Unstructured<'_>) -> Result<Instant> {
+        let (step, scale): (u8, u8) = u.arbitrary()?;
+        self.0 += Duration::from_micros(u32::from(step) << (scale % 16));
+        Ok(self.0)
+    }
+}
+
+/// Up to 20 bytes as they come.
+fn raw<'a>(u: &mut Unstructured<'a>) -> Result<&'a [u8]> {
+    let len = u.arbitrary_len::<u8>()?.min(20);
+    u.bytes(len)
+}
+
+/// The master of a motor bus of either kind of boards.
+pub fn ikeya_master(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let _ = match u.arbitrary() {
+        Ok(true) => master::<ThreeMotors>(&mut u, |id, mode| match mode {
+            Mode::Velocity => three::VelocityResponse::new(id, [Rps::ZERO; 3]).as_bytes().to_vec(),
+            Mode::Position => {
+                three::PositionResponse::new(id, [Position::default(); 3]).as_bytes().to_vec()
+            }
+        }),
+        _ => master::<OneMotor>(&mut u, |id, mode| match mode {
+            Mode::Velocity => VelocityResponse::new(id, Rps::ZERO).as_bytes().to_vec(),
+            Mode::Position => PositionResponse::new(id, Position::default()).as_bytes().to_vec(),
+        }),
+    };
+}
+
+fn master<B: Board>(u: &mut Unstructured<'_>, answer: fn(NodeId, Mode) -> Vec<u8>) -> Result<()> {
+    let mut config =
+        if u.arbitrary()? { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+    config.attempts = u.int_in_range(0..=5)?;
+    config.removes_echo = u.arbitrary()?;
+    config.recovery_share_pct = u.arbitrary()?;
+    config.turnaround_gap = Duration::from_micros(*u.choose(&[0, 0, 35])?);
+    let polling = [Polling::Fastest, Polling::Every(Duration::from_millis(5)), Polling::Manual];
+    config.polling = *u.choose(&polling)?;
+    let mut clock = Clock::new(u)?;
+    let mut master = Master::<B>::new(config);
+    // The node that was asked and may answer.
+    let mut asked = None;
+    while !u.is_empty() {
+        let id = *u.choose(&NodeId::ALL)?;
+        let now = clock.pass(u)?;
+        let mut statuses = 0;
+        match u.int_in_range(0..=9)? {
+            0 => master.discover(),
+            1 => drop(master.set_velocity(id, B::ZERO)),
+            2 => drop(master.stop(id)),
+            3 => drop(master.stop_all()),
+            4 => drop(master.confirm(id)),
+            5 => master.release(id),
+            6 => master.read(id),
+            7 => master.handle_input(raw(u)?, now),
+            8 => {
+                let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
+                master.handle_input(&answer(id, mode), now);
+                // Only the node that was asked can have answered.
+                statuses = u32::from(asked == Some(id));
+            }
+            _ => {
+                if let Some(id) = asked {
+                    master.handle_input(&answer(id, Mode::Velocity), now);
+                    statuses = 1;
+                }
+            }
+        }
+        let mut told = 0;
+        let sent = serve(&mut master, now, |event| {
+            told += u32::from(matches!(event, MasterEvent::Status { .. }));
+        });
+        // Raw input may hold a good answer, too; it is as long as one then.
+        assert!(told <= statuses.max(1), "{told} answers to one request");
+        for packet in sent {
+            let id = NodeId::new(packet[1]).expect("an id on the wire");
+            if packet[0] == 0xAA || B::ANSWERS_WRITE {
+                asked = Some(id);
+            }
+            assert!(packet[0] == 0xAA || packet[0] == 0xBB);
+            let known = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
+            assert!(packet[0] == 0xAA || known, "a command for a node that is not online");
+        }
+        for id in NodeId::ALL {
+            let node = master.node_statistics(id);
+            let closed =
+                u64::from(node.replies) + u64::from(node.timeouts) + u64::from(node.other_mode);
+            let open = u64::from(node.requests) - closed;
+            assert!(open <= 1, "every request ends in an answer or a counted failure: {node:?}");
+            let mode = master.status(id).map(|(status, _): (Status<B>, _)| status.mode());
+            assert_eq!(mode, master.mode(id));
+        }
+    }
+    Ok(())
+}
+
+/// A slave of a motor bus of either kind of boards.
+pub fn ikeya_slave(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let _ = match u.arbitrary() {
+        Ok(true) => slave::<ThreeMotors>(&mut u, |id, target| match target {
+            None => ReadRequest::new(id).as_bytes().to_vec(),
+            Some(rps) => three::WriteRequest::velocity(id, [rps; 3]).as_bytes().to_vec(),
+        }),
+        _ => slave::<OneMotor>(&mut u, |id, target| match target {
+            None => ReadRequest::new(id).as_bytes().to_vec(),
+            Some(rps) => WriteRequest::velocity(id, rps).as_bytes().to_vec(),
+        }),
+    };
+}
+
+fn slave<B: Board>(
+    u: &mut Unstructured<'_>,
+    request: fn(NodeId, Option<Rps>) -> Vec<u8>,
+) -> Result<()> {
+    let mut config = SlaveConfig::direct();
+    config.watchdog = u.arbitrary::<bool>()?.then_some(Duration::from_millis(20));
+    config.turnaround_gap = Duration::from_micros(*u.choose(&[0, 30])?);
+    let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
+    let mut clock = Clock::new(u)?;
+    let id = *u.choose(&NodeId::ALL)?;
+    let mut slave = Slave::<B>::new(id, mode, config);
+    while !u.is_empty() {
+        let now = clock.pass(u)?;
+        match u.int_in_range(0..=4)? {
+            0 => slave.handle_input(raw(u)?, now),
+            1 => slave.handle_input(&request(id, None), now),
+            2 => slave.handle_input(&request(*u.choose(&NodeId::ALL)?, u.arbitrary().ok()), now),
+            3 => slave.set_velocity(B::ZERO),
+            _ => slave.set_mode(if u.arbitrary()? { Mode::Velocity } else { Mode::Position }),
+        }
+        let sent = serve(&mut slave, now, |_| {});
+        assert!(sent.len() <= 1, "one answer to one request");
+        for packet in sent {
+            assert_eq!(packet[1], id.get());
+            assert!(packet[0] == 0x55 || packet[0] == 0x56);
+            let expected = if slave.mode() == Mode::Velocity { 0x55 } else { 0x56 };
+            assert_eq!(packet[0], expected);
+        }
+        let counts = slave.statistics();
+        let asked = counts.reads + if B::ANSWERS_WRITE { counts.writes } else { 0 };
+        assert!(counts.replies + counts.overtaken <= asked, "{counts:?}");
+        match slave.command() {
+            None => {}
+            Some(Target::Velocity(_)) => assert_eq!(slave.mode(), Mode::Velocity),
+            Some(Target::Position(_)) => assert_eq!(slave.mode(), Mode::Position),
+        }
+    }
+    Ok(())
+}
