@@ -33,12 +33,23 @@
 //!   truncates unless asked otherwise; out of range is an error, never a wrap or a clamp.
 //! * **I6** There is no stop in position mode: stopping such a node means holding the last measured
 //!   position, never going to 0.
-//! * **I7 to I9** say who speaks when and what a timeout means. They concern masters and slaves, not
-//!   packets; until those roles are part of this crate, mind that a reply with another id, of
-//!   another kind or from before the request is not the answer, that a slave keeps its last command
-//!   on any error, and that only a READ can be repeated on evidence.
+//! * **I7** The reply timeout, 500 µs unless set otherwise, runs from the end of the request on the
+//!   wire, and the answer's own wire time is added. Bytes left from before the request are dropped;
+//!   answers of another node or another kind, or after the deadline, are counted and never taken.
+//!   Three windows in a row without the answer make a node abnormal, one answer brings it back, and
+//!   a WRITE changes nothing. [`Master`] keeps to it.
+//! * **I8** A READ is repeated, three attempts unless set otherwise. A WRITE is silent, so the latest
+//!   set-point is repeated in every cycle and, where asked, confirmed by a READ.
+//! * **I9** A slave follows foreign traffic to stay in step, answers only a READ for its own id, and
+//!   keeps the last command on any error. [`Slave`] does; from the last byte of the request to the
+//!   first of the answer it should not take longer than 50 µs.
 //! * **I10** Boards with three motors use the 16-byte packets of [`three`], with the same headers.
 //!   They are another framing, chosen by you.
+//!
+//! # Roles
+//!
+//! [`Master`] and [`Slave`] speak the protocol without a clock and without a port, see
+//! [`endpoint`](crate::endpoint). [`Schedule`] tells how fast a bus can be before it is wired.
 //!
 //! # Decoding
 //!
