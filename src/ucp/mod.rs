@@ -45,11 +45,17 @@
 //!   `version` and the reserved fields are 0, because a `version` above 38 starts a firmware update.
 //! * **U8** Network states 0 to 4, one byte sent, one or four read, unknown values kept.
 //! * **U9** `index` is a wrapping counter per sender; a gap in it is never an error.
-//! * **U10, U11** say who repeats what and when each side gives up. They concern hosts and robots,
-//!   not frames: the periods stand at the messages.
+//! * **U10, U11** say who repeats what and when each side gives up. [`Host`] and [`Robot`] keep them:
+//!   motor commands every 100 ms and a dead-man at 500 ms, a watchdog of 500 ms on valid commands,
+//!   reports every 20 ms, results and the request for biases every 1000 ms until answered.
 //! * **U12** Pong 0 means fine, 1 that the ping arrived damaged.
 //! * **U13** Never sent: a report by a host, a body shorter than its message, `len` above 60. Each
 //!   hangs or corrupts shipped robots, so no constructor makes one.
+//!
+//! # Layers
+//!
+//! [`Decoder`] finds frames, [`Frame::message`] reads one, [`Body::frame`] builds one. [`Host`] and
+//! [`Robot`] do the talking: who repeats what, who waits how long, what is safe.
 //!
 //! # Decoding and encoding
 //!
@@ -66,21 +72,31 @@
 //! # Ok::<(), axlewire::error::EncodeError>(())
 //! ```
 
+mod bias;
 mod codes;
 mod framing;
 mod header;
+mod host;
 mod message;
 mod report;
+mod robot;
+mod role;
 
+pub use bias::{BiasStore, MemoryStore, NoStore, NotStored};
 pub use codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
 pub use framing::{Frame, FrameOf, RawFrame, Ucp};
 pub use header::{Header, MessageId, SYNC};
+pub use host::{
+    CalibrationFailure, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
+    HostStats, Link, ReceivedReport, RoundTrip, UnknownFrame,
+};
 pub use message::{
     BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationStart,
     CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, MotorControl, OtaAck,
     OtaRequest, Ping, Pong, SetNetworkState, SetNetworkStateWide,
 };
 pub use report::{DocumentReport, FirmwareReport, Report, Telemetry};
+pub use robot::{ReportLayout, Robot, RobotConfig, RobotEvent, RobotStats, UpdateSource};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;

@@ -1,0 +1,115 @@
+//! Calibration requests: acknowledged, repeated, given up.
+
+use super::{CalibrationFailure, CalibrationStep, FailureCause, HostConfig, HostEvent};
+use crate::{
+    time::Instant,
+    ucp::{CalibrationKind, ErrorCode},
+};
+
+/// A request that has not been settled.
+#[derive(Debug)]
+pub(super) struct Request {
+    step: CalibrationStep,
+    kind: CalibrationKind,
+    attempts: u8,
+    /// What the latest attempt has come to so far.
+    cause: FailureCause,
+    wait: Wait,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Wait {
+    /// To be sent then.
+    Send(Instant),
+    /// To be acknowledged by then.
+    Ack(Instant),
+}
+
+/// What an acknowledgement has done.
+#[derive(Debug)]
+pub(super) enum Answer {
+    /// Nobody was waiting for it.
+    Unasked,
+    /// The request will be sent again.
+    Again,
+    /// The request is settled.
+    Settled(HostEvent),
+}
+
+impl Request {
+    pub(super) const fn new(step: CalibrationStep, kind: CalibrationKind, now: Instant) -> Self {
+        Self { step, kind, attempts: 0, cause: FailureCause::NoAnswer, wait: Wait::Send(now) }
+    }
+
+    /// What to send now, if anything, and whether it was sent before.
+    pub(super) fn take(
+        &mut self,
+        now: Instant,
+        config: &HostConfig,
+    ) -> Option<(CalibrationStep, CalibrationKind, bool)> {
+        let Wait::Send(at) = self.wait else { return None };
+        if at > now {
+            return None;
+        }
+        let again = self.attempts > 0;
+        self.attempts = self.attempts.saturating_add(1);
+        self.cause = FailureCause::NoAnswer;
+        self.wait = Wait::Ack(now + config.ack_wait());
+        Some((self.step, self.kind, again))
+    }
+
+    /// Takes in an acknowledgement.
+    ///
+    /// Its kind is looked at only where the vendor firmware tells the truth: after a good start. It
+    /// tells the kind of the start before in a bad one, and that of the last start in an end.
+    pub(super) fn acknowledge(
+        &mut self,
+        step: CalibrationStep,
+        kind: CalibrationKind,
+        err: ErrorCode,
+        now: Instant,
+        config: &HostConfig,
+    ) -> Answer {
+        let good_start = step == CalibrationStep::Start && err == ErrorCode::Fine;
+        if step != self.step || self.attempts == 0 || (good_start && kind != self.kind) {
+            return Answer::Unasked;
+        }
+        if err != ErrorCode::Fine {
+            self.cause = FailureCause::Refused(err);
+            return match self.retry(now, config) {
+                Some(failure) => Answer::Settled(HostEvent::CalibrationFailed(failure)),
+                None => Answer::Again,
+            };
+        }
+        Answer::Settled(match step {
+            CalibrationStep::Start => HostEvent::CalibrationStarted(self.kind),
+            CalibrationStep::End => HostEvent::CalibrationEnded(self.kind),
+        })
+    }
+
+    /// Sends again, or gives up, when the acknowledgement is late.
+    pub(super) fn expire(
+        &mut self,
+        now: Instant,
+        config: &HostConfig,
+    ) -> Option<CalibrationFailure> {
+        match self.wait {
+            Wait::Ack(until) if until <= now => self.retry(now, config),
+            _ => None,
+        }
+    }
+
+    pub(super) const fn deadline(&self) -> Instant {
+        match self.wait {
+            Wait::Send(at) | Wait::Ack(at) => at,
+        }
+    }
+
+    fn retry(&mut self, now: Instant, config: &HostConfig) -> Option<CalibrationFailure> {
+        if self.attempts < config.attempts {
+            self.wait = Wait::Send(now);
+            return None;
+        }
+        Some(CalibrationFailure::new(self.step, self.kind, self.cause, self.attempts))
+    }
+}

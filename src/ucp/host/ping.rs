@@ -1,0 +1,62 @@
+//! Pings, one at a time: a pong does not say which ping it answers.
+
+use super::HostConfig;
+use crate::time::{Duration, Instant};
+
+/// Where the ping is.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Ping {
+    /// Not wanted.
+    Off,
+    /// To be sent then.
+    Due(Instant),
+    /// Sent, and lost if no pong comes.
+    Sent { at: Instant, until: Instant },
+}
+
+impl Ping {
+    pub(super) fn new(now: Instant, config: &HostConfig) -> Self {
+        if config.ping_period.is_some() { Self::Due(now) } else { Self::Off }
+    }
+
+    /// Is a ping to be sent now? It counts as sent.
+    pub(super) fn take(&mut self, now: Instant, config: &HostConfig) -> bool {
+        let due = matches!(*self, Self::Due(at) if at <= now);
+        if due {
+            *self = Self::Sent { at: now, until: now + config.ping_timeout };
+        }
+        due
+    }
+
+    /// A pong has arrived: how long it took, if it was waited for.
+    pub(super) fn pong(&mut self, now: Instant, config: &HostConfig) -> Option<Duration> {
+        let Self::Sent { at, .. } = *self else { return None };
+        self.next(at, now, config);
+        Some(now - at)
+    }
+
+    /// Gives up the ping whose pong is late; says whether that is now.
+    pub(super) fn expire(&mut self, now: Instant, config: &HostConfig) -> bool {
+        let Self::Sent { at, until } = *self else { return false };
+        let late = until <= now;
+        if late {
+            self.next(at, now, config);
+        }
+        late
+    }
+
+    pub(super) const fn deadline(&self) -> Option<Instant> {
+        match *self {
+            Self::Off => None,
+            Self::Due(at) | Self::Sent { until: at, .. } => Some(at),
+        }
+    }
+
+    /// The ping sent at `sent` is done with.
+    fn next(&mut self, sent: Instant, now: Instant, config: &HostConfig) {
+        *self = match config.ping_period {
+            Some(period) => Self::Due(now.max(sent + period)),
+            None => Self::Off,
+        };
+    }
+}

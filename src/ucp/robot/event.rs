@@ -1,0 +1,91 @@
+//! What a robot tells its application: events and figures.
+
+use crate::ucp::{Biases, CalibrationKind, MotorControl, NetworkState};
+
+/// What the host wants, or no longer says.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum RobotEvent {
+    /// The command has changed, or is back after a [`WatchdogStop`](Self::WatchdogStop). In range,
+    /// the lamp field 100 or 0, all other fields 0.
+    ///
+    /// What moves the robot should ask [`Robot::command`](super::Robot::command) instead: that cannot
+    /// be lost in a full queue.
+    Motor(MotorControl),
+    /// No valid command for 500 ms: speed and turn are 0, the lamp is as it was (ruling U10).
+    WatchdogStop,
+    /// A calibration is to begin; it has been acknowledged. A repetition is no event.
+    CalibrationStart(CalibrationKind),
+    /// The calibration is to end, and its result to be handed in; it has been acknowledged. A
+    /// repetition is no event.
+    CalibrationEnd(CalibrationKind),
+    /// The host has the IMU biases.
+    ImuBiasTaken,
+    /// The host has the magnetometer biases.
+    MagBiasTaken,
+    /// The host has sent the biases that it keeps. The vendor firmware takes them whatever their
+    /// `err` says.
+    Biases(Biases),
+    /// State of the host's network, for the lamp. Also when it has not changed.
+    NetworkState(NetworkState),
+    /// The host asks for a firmware update. Nothing has been done about it: the application decides,
+    /// and says so by [`Robot::answer_update`](super::Robot::answer_update) if it was a request.
+    UpdateRequested {
+        /// The version on offer.
+        version: i16,
+        /// How the host asked.
+        by: UpdateSource,
+    },
+}
+
+/// How a host asks for a firmware update.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum UpdateSource {
+    /// By the request that is meant for it (id 9).
+    Request,
+    /// By a motor command whose version is above 38 (ruling U7): on purpose, or because it did not
+    /// clear its memory. Speed and turn of such a command are not taken, and it does not feed the
+    /// watchdog.
+    MotorCommand,
+}
+
+/// What a robot has seen. Counts stop at 2^32 - 1. What noise has cost is in
+/// [`line`](super::Robot::line).
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct RobotStats {
+    /// Motor commands taken.
+    pub commands: u32,
+    /// Motor commands taken with speed or turn cut to -100..=100.
+    pub commands_clamped: u32,
+    /// Motor commands not taken because they would start a firmware update.
+    pub commands_refused: u32,
+    /// Times that the watchdog has stopped the robot.
+    pub watchdog_stops: u32,
+    /// Pings received.
+    pub pings: u32,
+    /// Pongs sent. Pings that arrive together are answered together, so these can be fewer.
+    pub pongs: u32,
+    /// Reports sent.
+    pub reports: u32,
+    /// Reports not sent because the driver came a period or more too late.
+    pub reports_skipped: u32,
+    /// Starts of a calibration that had started already: the acknowledgement was lost.
+    pub calibration_repeats: u32,
+    /// Calibration requests of a kind that there is not, or to end what is not under way, be it
+    /// because the acknowledgement of the end was lost: acknowledged and without effect.
+    pub calibration_refused: u32,
+    /// Calibration results sent, repetitions included.
+    pub results: u32,
+    /// Acknowledgements of results that were not waited for, or that say that the result was damaged.
+    pub acks_refused: u32,
+    /// Requests for biases sent.
+    pub bias_requests: u32,
+    /// Good frames without a message.
+    pub unknown: u32,
+    /// Frames that only a robot sends, such as our own on an echoing line: not looked at (U13).
+    pub misdirected: u32,
+}

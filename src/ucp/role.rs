@@ -1,0 +1,154 @@
+//! What both roles are made of: received bytes, queued events, the frame going out.
+
+use heapless::Deque;
+
+use super::{Body, Decoder, Frame, MAX_LEN, Message, MotorControl};
+use crate::{
+    stream::{Counters, Encode, Event},
+    time::{Duration, Instant, wire_time},
+};
+
+/// Shortest period or timeout that a role keeps: a shorter one would make its driver spin.
+pub(super) const SHORTEST: Duration = Duration::from_millis(1);
+
+/// Received bytes, made frames of.
+#[derive(Debug)]
+pub(super) struct Inbox {
+    decoder: Decoder,
+    /// When the newest byte had arrived.
+    last: Instant,
+    /// A pause this long cuts a frame off.
+    quiet: Duration,
+}
+
+impl Inbox {
+    /// A pause of two byte times and `margin` cuts a frame off.
+    pub(super) fn new(baud: u32, margin: Duration) -> Self {
+        let quiet = (wire_time(2, baud) + margin).max(SHORTEST);
+        Self { decoder: Decoder::new(), last: Instant::from_micros(0), quiet }
+    }
+
+    /// Hands on the frames that `bytes` complete, and when they had arrived.
+    pub(super) fn take(
+        &mut self,
+        bytes: &[u8],
+        now: Instant,
+        mut receive: impl FnMut(&Frame, Instant),
+    ) {
+        if !bytes.is_empty() {
+            self.last = now;
+            self.decode(bytes, &mut receive);
+        }
+    }
+
+    /// Once the line has been quiet, nothing that is pending will be completed: hands on the frames
+    /// that a false header has held back (ruling B3).
+    pub(super) fn settle(&mut self, now: Instant, mut receive: impl FnMut(&Frame, Instant)) {
+        if reached(self.deadline(), now) {
+            while self.decoder.pending() > 0 {
+                self.decoder.idle();
+                self.decode(&[], &mut receive);
+            }
+        }
+    }
+
+    /// When the line counts as quiet, if that matters.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        (self.decoder.pending() > 0).then(|| self.last + self.quiet)
+    }
+
+    pub(super) fn counters(&self) -> &Counters {
+        self.decoder.counters()
+    }
+
+    fn decode(&mut self, mut bytes: &[u8], receive: &mut impl FnMut(&Frame, Instant)) {
+        while let Some(event) = self.decoder.decode(&mut bytes) {
+            // A gap is in the counters already.
+            if let Event::Frame(frame) = event {
+                receive(frame, self.last);
+            }
+        }
+    }
+}
+
+/// Events for the application: when there is no room, the newest is refused and counted.
+#[derive(Debug)]
+pub(super) struct Events<E, const N: usize> {
+    queue: Deque<E, N>,
+    lost: u32,
+}
+
+impl<E, const N: usize> Events<E, N> {
+    pub(super) const fn new() -> Self {
+        Self { queue: Deque::new(), lost: 0 }
+    }
+
+    pub(super) fn push(&mut self, event: E) {
+        if self.queue.push_back(event).is_err() {
+            bump(&mut self.lost);
+        }
+    }
+
+    pub(super) fn pop(&mut self) -> Option<E> {
+        self.queue.pop_front()
+    }
+
+    pub(super) const fn lost(&self) -> u32 {
+        self.lost
+    }
+}
+
+/// Writes a frame to the front of `buffer` and says how long it is.
+pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {
+    body.frame(index).encode(buffer).map_or(0, <[u8]>::len)
+}
+
+/// Is this message one that only a host sends? `None` for a message of neither side (ruling U4).
+pub(super) const fn is_from_host(message: &Message<'_>) -> Option<bool> {
+    Some(match message {
+        Message::Ping(_)
+        | Message::MotorControl(_)
+        | Message::CalibrationStart(_)
+        | Message::CalibrationEnd(_)
+        | Message::ImuBiasAck(_)
+        | Message::MagBiasAck(_)
+        | Message::Biases(_)
+        | Message::OtaRequest(_)
+        | Message::SetNetworkState(_)
+        | Message::SetNetworkStateWide(_) => true,
+        Message::Pong(_)
+        | Message::CalibrationStartAck(_)
+        | Message::CalibrationEndAck(_)
+        | Message::Report(_)
+        | Message::ImuBias(_)
+        | Message::MagBias(_)
+        | Message::BiasRequest(_)
+        | Message::OtaAck(_) => false,
+        Message::Unknown(_) => return None,
+    })
+}
+
+/// Does the vendor firmware light the lamp? It looks at the low byte only.
+pub(super) const fn lamp_is_on(command: &MotorControl) -> bool {
+    !matches!(command.front_led().to_le_bytes()[0], 0x00 | 0xFF)
+}
+
+/// Neither driving nor turning.
+pub(super) const fn stands_still(command: &MotorControl) -> bool {
+    command.speed() == 0 && command.angular() == 0
+}
+
+/// Speed and turn 0, the lamp as it is: a stop does not make a robot harder to see.
+pub(super) const fn halted(command: &MotorControl) -> MotorControl {
+    MotorControl::STOP.with_front_led(lamp_is_on(command))
+}
+
+/// Has this deadline been reached?
+pub(super) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
+    deadline.is_some_and(|at| at <= now)
+}
+
+/// Counts one more, up to the largest number there is.
+pub(super) const fn bump(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}
