@@ -97,6 +97,16 @@ fn a_slave_survives_any_calls_bytes_and_times() {
 }
 
 #[test]
+fn a_host_survives_any_calls_bytes_and_times() {
+    play(roles::ucp_host);
+}
+
+#[test]
+fn a_robot_survives_any_calls_bytes_and_times() {
+    play(roles::ucp_robot);
+}
+
+#[test]
 fn values_survive_the_wire() {
     run("roundtrip", bodies::roundtrip);
 }

@@ -5,10 +5,9 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Cause, CommandError, DipSwitch, Health, IdReading, Master, MasterConfig,
-        MasterEvent, Mode, NodeId, OneMotor, Polling, Position, PositionResponse, ReadRequest, Rps,
-        Schedule, Slave, SlaveConfig, SlaveEvent, Status, Target, ThreeMotors, VelocityResponse,
-        WriteRequest,
+        Cause, CommandError, DipSwitch, Health, IdReading, Master, MasterConfig, MasterEvent, Mode,
+        NodeId, OneMotor, Polling, Position, PositionResponse, ReadRequest, Rps, Schedule, Slave,
+        SlaveConfig, SlaveEvent, Status, Target, ThreeMotors, VelocityResponse, WriteRequest,
     },
     time::{Duration, Instant},
 };
@@ -668,6 +667,23 @@ fn latencies_are_measured_from_the_end_of_the_request_to_the_beginning_of_the_an
     assert_eq!((statistics.requests, statistics.replies), (4, 4));
 }
 
+#[test]
+fn a_late_answer_to_the_third_strike_does_not_answer_the_search_for_the_node() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.told();
+    assert_eq!(desk.master.poll_transmit(desk.now), None);
+    assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(500)));
+    desk.hear(400, &velocity(NodeId::N1, 9.0));
+    assert_eq!((desk.told(), desk.master.health(NodeId::N1)), (vec![], Some(Health::Abnormal)));
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(1.0));
+}
+
 // Slave
 
 fn slave(mode: Mode) -> Slave {
@@ -806,6 +822,17 @@ fn a_turnaround_gap_holds_the_answer_back() {
     assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), Vec::<Vec<u8>>::new());
     assert_eq!(slave.poll_timeout(), Some(T0 + US(30)));
     assert!(slave.poll_transmit(T0 + US(30)).is_some());
+}
+
+#[test]
+fn a_read_that_comes_to_light_with_the_next_bytes_is_not_answered_any_more() {
+    let mut slave = slave(Mode::Velocity);
+    // A false header in front of a READ, and nobody who calls when the line is quiet.
+    let line = [&[0xBB][..], &read(NodeId::N2)].concat();
+    assert_eq!(answers(&mut slave, &line, T0), Vec::<Vec<u8>>::new());
+    let late = T0 + Duration::from_millis(90);
+    assert_eq!(answers(&mut slave, &read(NodeId::N5), late), Vec::<Vec<u8>>::new());
+    assert_eq!((slave.statistics().reads, slave.statistics().overtaken), (1, 1));
 }
 
 // Boards with three motors

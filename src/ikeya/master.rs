@@ -525,10 +525,17 @@ impl<B: Board> Master<B> {
     /// When an abnormal node may be looked for.
     fn probe_due(&self) -> Due {
         let wanted = self.config.recovery_share_pct > 0 && self.discovery.is_none();
-        if !wanted || !self.nodes.iter().any(Node::is_abnormal) {
+        if !wanted {
             return Due::Never;
         }
-        self.probe_at.map_or(Due::Now, Due::At)
+        // Nor before a late answer of the node can be told from the one that is asked for.
+        let guards = self.nodes.iter().filter(|node| node.is_abnormal());
+        let guard = guards.map(|node| node.guarded_until.unwrap_or(self.now)).min();
+        match (guard, self.probe_at) {
+            (None, _) => Due::Never,
+            (Some(guard), None) => Due::At(guard),
+            (Some(guard), Some(probe)) => Due::At(guard.max(probe)),
+        }
     }
 
     /// What to send now, if anything.
@@ -542,7 +549,8 @@ impl<B: Board> Master<B> {
             return None;
         }
         let fresh = |jumped| {
-            let wanted = move |node: &Node<B>| node.fresh_due().is_reached(now) && node.jumped == jumped;
+            let wanted =
+                move |node: &Node<B>| node.fresh_due().is_reached(now) && node.jumped == jumped;
             let index = self.nodes.iter().position(wanted)?;
             Some((index, Request::Write, Source::Fresh))
         };
@@ -555,9 +563,10 @@ impl<B: Board> Master<B> {
             Source::Fresh => self.nodes[index & 7].jumped = true,
             Source::Discovery => {}
             Source::Probe => {
-                let share = u32::from(self.config.recovery_share_pct.clamp(1, 100));
+                let share = u32::from(self.config.recovery_share_pct.clamp(1, 50));
                 let pause = self.window().saturating_mul(100).as_micros() / share;
-                (self.probe_turn, self.probe_at) = (index, Some(now + Duration::from_micros(pause)));
+                (self.probe_turn, self.probe_at) =
+                    (index, Some(now + Duration::from_micros(pause)));
             }
             // Behind its WRITE the node is still to be read.
             Source::Poll if request == Request::Write && !B::ANSWERS_WRITE => self.turn = index,
@@ -576,7 +585,9 @@ impl<B: Board> Master<B> {
             return is_open.then_some((discovery.next, Request::Read, Source::Discovery));
         }
         if self.probe_due().is_reached(now) {
-            let index = from(self.probe_turn + 1).find(|&index| self.nodes[index].is_abnormal())?;
+            let is_open = |node: &Node<B>| node.guarded_until.is_none_or(|until| now >= until);
+            let is_sought = |node: &Node<B>| node.is_abnormal() && is_open(node);
+            let index = from(self.probe_turn + 1).find(|&index| is_sought(&self.nodes[index]))?;
             return Some((index, Request::Read, Source::Probe));
         }
         let is_due = |index: &usize| self.nodes[*index].due(&self.config).is_reached(now);

@@ -2,11 +2,11 @@
 
 use heapless::Vec;
 
-use super::{BAUD, Board, DipSwitch, IdReading, Mode, NodeId, OneMotor};
+use super::{BAUD, Board, DipSwitch, IdReading, Mode, NodeId, OneMotor, ReadRequest};
 use crate::{
     endpoint::Endpoint,
     error::EncodeError,
-    stream::{Counters, Decoder, Encode, Event},
+    stream::{Counters, Decoder, Encode, Event, Framing},
     time::{Duration, Instant, wire_time},
 };
 
@@ -31,10 +31,16 @@ pub struct SlaveConfig {
 }
 
 impl SlaveConfig {
-    /// For a UART of the processor itself: a pause of five bytes ends a packet.
+    /// For a UART of the processor itself at 500 kbit/s: a pause of five bytes ends a packet.
     #[must_use]
     pub const fn direct() -> Self {
-        Self { watchdog: None, turnaround_gap: Duration::ZERO, idle: wire_time(5, BAUD) }
+        Self::at(BAUD)
+    }
+
+    /// For a UART of the processor itself at another speed, bit/s.
+    #[must_use]
+    pub const fn at(baud: u32) -> Self {
+        Self { watchdog: None, turnaround_gap: Duration::ZERO, idle: wire_time(5, baud) }
     }
 
     /// For a slave on a host: a USB adapter makes pauses of up to 16 ms.
@@ -88,6 +94,8 @@ pub struct Slave<B: Board = OneMotor> {
     /// When the answer to the request that was heard last may be sent.
     answer_at: Option<Instant>,
     heard_at: Option<Instant>,
+    /// How many of the received bytes the decoder has reported, in packets and gaps.
+    reported: u64,
     decoder: Decoder<B::ToSlave, PACKET_LEN>,
     packet: Vec<u8, PACKET_LEN>,
     event: Option<SlaveEvent<B>>,
@@ -149,6 +157,7 @@ impl<B: Board> Slave<B> {
             commanded_at: None,
             answer_at: None,
             heard_at: None,
+            reported: 0,
             decoder: Decoder::new(),
             packet: Vec::new(),
             event: None,
@@ -219,6 +228,22 @@ impl<B: Board> Slave<B> {
         self.decoder.counters()
     }
 
+    /// Takes in bytes and what they complete.
+    ///
+    /// A READ whose bytes had all been received before, and that new ones have freed from behind a
+    /// false header, is overtaken by them. (A WRITE is never held back whole: it is as long as any
+    /// false header can promise.)
+    fn take(&mut self, mut bytes: &[u8], now: Instant) {
+        let (before, is_input) = (self.decoder.counters().received, !bytes.is_empty());
+        while let Some((node, command)) = self.next_request(&mut bytes) {
+            self.hear(node, command, now);
+            let is_old = is_input && self.reported <= before;
+            if is_old && self.answer_at.take().is_some() {
+                count(&mut self.statistics.overtaken);
+            }
+        }
+    }
+
     /// Takes one whole packet, whoever it is for.
     fn hear(&mut self, node: NodeId, command: Option<super::Command<B>>, now: Instant) {
         if self.answer_at.take().is_some() {
@@ -261,8 +286,14 @@ impl<B: Board> Slave<B> {
     fn next_request(&mut self, bytes: &mut &[u8]) -> Option<(NodeId, Option<super::Command<B>>)> {
         loop {
             match self.decoder.decode(bytes)? {
-                Event::Frame(frame) => return Some(B::request(frame)),
-                Event::Skipped(_) => {}
+                Event::Frame(frame) => {
+                    let (node, command) = B::request(frame);
+                    let len =
+                        if command.is_some() { B::ToSlave::MAX_LEN } else { ReadRequest::LEN };
+                    self.reported = self.reported.wrapping_add(len as u64);
+                    return Some((node, command));
+                }
+                Event::Skipped(gap) => self.reported = self.reported.wrapping_add(gap.len),
             }
         }
     }
@@ -285,20 +316,18 @@ fn count(counter: &mut u32) {
 impl<B: Board> Endpoint for Slave<B> {
     type Event = SlaveEvent<B>;
 
-    fn handle_input(&mut self, mut bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         if !bytes.is_empty() {
             self.heard_at = Some(now);
-        }
-        while let Some((node, command)) = self.next_request(&mut bytes) {
-            self.hear(node, command, now);
+            self.take(bytes, now);
         }
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         if self.idle_at().is_some_and(|at| now >= at) {
             self.decoder.idle();
+            self.take(&[], now);
             // What is left may be the start of a packet again, with the same patience.
-            self.handle_input(&[], now);
             self.heard_at = Some(now);
         }
         if self.watchdog_at().is_some_and(|at| now >= at) {

@@ -17,6 +17,10 @@ pub(super) struct Inbox {
     decoder: Decoder,
     /// When the newest byte had arrived.
     last: Instant,
+    /// When the oldest byte that the decoder holds had arrived.
+    since: Instant,
+    /// How many of the received bytes the decoder has reported, in frames and gaps.
+    reported: u64,
     /// A pause this long cuts a frame off.
     quiet: Duration,
 }
@@ -24,8 +28,9 @@ pub(super) struct Inbox {
 impl Inbox {
     /// A pause of two byte times and `margin` cuts a frame off.
     pub(super) fn new(baud: u32, margin: Duration) -> Self {
+        const ZERO: Instant = Instant::from_micros(0);
         let quiet = (wire_time(2, baud) + margin).max(SHORTEST);
-        Self { decoder: Decoder::new(), last: Instant::from_micros(0), quiet }
+        Self { decoder: Decoder::new(), last: ZERO, since: ZERO, reported: 0, quiet }
     }
 
     /// Hands on the frames that `bytes` complete, and when they had arrived.
@@ -36,8 +41,12 @@ impl Inbox {
         mut receive: impl FnMut(&Frame, Instant),
     ) {
         if !bytes.is_empty() {
+            let received = self.decoder.counters().received;
             self.last = now;
-            self.decode(bytes, &mut receive);
+            self.decode(bytes, received, &mut receive);
+            if self.decoder.pending() <= bytes.len() {
+                self.since = now;
+            }
         }
     }
 
@@ -47,7 +56,7 @@ impl Inbox {
         if reached(self.deadline(), now) {
             while self.decoder.pending() > 0 {
                 self.decoder.idle();
-                self.decode(&[], &mut receive);
+                self.decode(&[], self.decoder.counters().received, &mut receive);
             }
         }
     }
@@ -61,11 +70,23 @@ impl Inbox {
         self.decoder.counters()
     }
 
-    fn decode(&mut self, mut bytes: &[u8], receive: &mut impl FnMut(&Frame, Instant)) {
+    /// A frame whose bytes are all among the first `received` had arrived before, held back by a
+    /// false header: it is as old as the first byte that was held, for a command that comes to light
+    /// late is an old one.
+    fn decode(
+        &mut self,
+        mut bytes: &[u8],
+        received: u64,
+        receive: &mut impl FnMut(&Frame, Instant),
+    ) {
         while let Some(event) = self.decoder.decode(&mut bytes) {
-            // A gap is in the counters already.
-            if let Event::Frame(frame) = event {
-                receive(frame, self.last);
+            match event {
+                // A gap is in the counters already.
+                Event::Skipped(gap) => self.reported = self.reported.wrapping_add(gap.len),
+                Event::Frame(frame) => {
+                    self.reported = self.reported.wrapping_add(frame.as_bytes().len() as u64);
+                    receive(frame, if self.reported <= received { self.since } else { self.last });
+                }
             }
         }
     }

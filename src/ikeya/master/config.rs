@@ -29,8 +29,8 @@ pub struct MasterConfig {
     pub attempts: u8,
     /// When nodes are read.
     pub polling: Polling,
-    /// How much of the line's time abnormal nodes may cost while they are looked for, percent;
-    /// 0 never looks for them.
+    /// How much of the line's time abnormal nodes may cost while they are looked for, percent; 0
+    /// never looks for them, and more than 50 counts as 50.
     pub recovery_share_pct: u8,
     /// Whether the line is a 2-wire one whose adapter hears its own bytes: they are then removed.
     pub removes_echo: bool,
