@@ -1,0 +1,56 @@
+//! A line with faults, in virtual time, and models of what hangs on it: for tests of applications,
+//! and of this crate.
+//!
+//! [`Line`] drives roles exactly as [`Endpoint`](crate::endpoint::Endpoint) says, byte by byte, with
+//! the [`Faults`] and the slow or chunky [`Driver`]s that you set. A second on it takes milliseconds,
+//! and the same seed gives the same second. An endpoint that would make a real driver spin is an
+//! error, [`Stuck`].
+//!
+//! `Motor` and `Rover` are models without a line, for tests that have another one; `MotorNode` and
+//! `RoverNode` are these with the slave or the robot that drives them.
+//!
+//! ```
+//! # #[cfg(feature = "ikeya")] {
+//! use axlewire::{
+//!     ikeya::{Health, Master, MasterConfig, Mode, NodeId},
+//!     sim::{Direction, Faults, Line, MotorNode},
+//!     time::Duration,
+//! };
+//!
+//! let master: Master = Master::new(MasterConfig::direct());
+//! let mut line = Line::new(500_000, 42, master);
+//! for node in [NodeId::N1, NodeId::N2] {
+//!     line.add(MotorNode::new(node, Mode::Position));
+//! }
+//! *line.pair_mut(Direction::ToHead) = Faults::noise(1e-3); // every 1000th bit is wrong
+//! line.head_mut().discover();
+//! line.run_for(Duration::from_millis(1000))?;
+//! assert_ne!(line.head().health(NodeId::N2), None);
+//! assert!(line.statistics(Direction::ToHead).bit_errors > 0);
+//! # }
+//! # Ok::<(), axlewire::sim::Stuck>(())
+//! ```
+
+mod faults;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod lag;
+mod line;
+#[cfg(feature = "ikeya")]
+mod motor;
+mod port;
+mod rng;
+#[cfg(feature = "ucp")]
+mod rover;
+#[cfg(feature = "ucp")]
+mod rover_node;
+
+pub use faults::{Faults, PairStatistics};
+pub use line::{Direction, Line, Stuck, Traced, Who};
+#[cfg(feature = "ikeya")]
+pub use motor::{Motor, MotorNode};
+pub use port::{Driver, Input};
+pub use rng::Rng;
+#[cfg(feature = "ucp")]
+pub use rover::Rover;
+#[cfg(feature = "ucp")]
+pub use rover_node::RoverNode;

@@ -1,0 +1,493 @@
+//! Two pairs of wire, one head, any number of tails, and virtual time.
+
+use alloc::vec::Vec;
+use core::{error::Error, fmt, mem};
+
+use super::{
+    Driver, Faults, PairStatistics, Rng,
+    port::{Port, Trouble, WireByte, earlier},
+};
+use crate::{
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+};
+
+/// Somebody on the line.
+#[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
+pub enum Who {
+    /// The one at the head: a master, a host.
+    Head,
+    /// One at the tail, in the order in which they were added: a slave, a robot.
+    Tail(usize),
+}
+
+/// One of the two pairs.
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+pub enum Direction {
+    /// What the head sends and every tail hears.
+    ToTails,
+    /// What the tails send and the head hears.
+    ToHead,
+}
+
+/// A byte that stood on the line.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct Traced {
+    /// When it was whole.
+    pub at: Instant,
+    /// Who sent it.
+    pub who: Who,
+    /// The byte, with what the sender's stub and the pair have done to it.
+    pub byte: u8,
+}
+
+/// An endpoint breaks the contract: virtual time cannot go on.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[non_exhaustive]
+pub enum Stuck {
+    /// It wants to be called again at once, for ever, and does nothing when it is.
+    BusyLoop {
+        /// Which endpoint.
+        who: Who,
+        /// When.
+        at: Instant,
+    },
+    /// It sends, or tells events, without end at one instant.
+    Endless {
+        /// Which endpoint.
+        who: Who,
+        /// When.
+        at: Instant,
+    },
+}
+
+impl fmt::Display for Stuck {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (who, at, what) = match self {
+            Self::BusyLoop { who, at } => (who, at, "its poll_timeout has passed and stays so"),
+            Self::Endless { who, at } => (who, at, "it sends or tells events without end"),
+        };
+        match who {
+            Who::Head => f.write_str("the head")?,
+            Who::Tail(index) => write!(f, "tail {index}")?,
+        }
+        write!(f, " makes its driver spin at {} µs: {what}", at.as_micros())
+    }
+}
+
+impl Error for Stuck {}
+
+/// A full-duplex line in virtual time: what the head sends is heard by every tail, what a tail sends
+/// by the head. A motor bus is a master with its slaves, a link is one with a single tail.
+///
+/// Every endpoint is driven exactly as [`Endpoint`] says, in an order that depends on nothing but the
+/// seed: bytes first, then the head, then the tails in their order.
+///
+/// * A byte takes 10 bit times (ruling B6). A sender's bytes follow one another, however much it
+///   sends at once; one to another sender's on the same pair garbles both.
+/// * Faults come where they are set: on a pair, for all who share it, with [`pair_mut`](Self::pair_mut),
+///   or on the stub of one station, for what it sends and for what it hears, with
+///   [`stub_mut`](Self::stub_mut). What a delayed stub sends comes onto the pair later, so that an
+///   answer can be late; all other delays are on the way from the pair to whom it concerns.
+/// * How late and in which pieces an endpoint's loop sees things is its [`Driver`].
+///
+/// ```
+/// # #[cfg(feature = "ikeya")] {
+/// use axlewire::{
+///     ikeya::{Master, MasterConfig, MasterEvent, Mode, NodeId, Rps},
+///     sim::{Line, MotorNode, Who},
+///     time::Duration,
+/// };
+///
+/// let master: Master = Master::new(MasterConfig::direct());
+/// let mut line = Line::new(500_000, 1, master);
+/// line.add(MotorNode::new(NodeId::N3, Mode::Velocity));
+///
+/// line.head_mut().discover();
+/// line.run_for(Duration::from_millis(50))?;
+/// assert_eq!(line.head().mode(NodeId::N3), Some(Mode::Velocity));
+///
+/// line.head_mut().set_velocity(NodeId::N3, Rps::new(2.0)?)?;
+/// line.run_for(Duration::from_millis(500))?;
+/// assert!((line.tail(0).motor().velocity().get() - 2.0).abs() < 0.01);
+///
+/// line.stub_mut(Who::Tail(0)).unplugged = true;
+/// line.take_head_events();
+/// line.run_for(Duration::from_millis(50))?;
+/// let is_failure = |event: &MasterEvent| matches!(event, MasterEvent::ReadFailed { .. });
+/// assert!(line.take_head_events().iter().any(|(_, event)| is_failure(event)));
+/// # }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Line<H: Endpoint, T: Endpoint> {
+    head: H,
+    tails: Vec<T>,
+    /// The head's, then the tails'.
+    ports: Vec<Port>,
+    to_tails: Pair,
+    to_head: Pair,
+    baud: u32,
+    rng: Rng,
+    now: Instant,
+    head_events: Vec<(Instant, H::Event)>,
+    tail_events: Vec<(Instant, usize, T::Event)>,
+    trace: Option<Vec<Traced>>,
+}
+
+#[derive(Debug, Default)]
+struct Pair {
+    faults: Faults,
+    statistics: PairStatistics,
+    /// The end of the last byte.
+    busy_until: Option<Instant>,
+}
+
+const fn port_of(who: Who) -> usize {
+    match who {
+        Who::Head => 0,
+        Who::Tail(index) => index + 1,
+    }
+}
+
+const fn who_at(port: usize) -> Who {
+    match port {
+        0 => Who::Head,
+        port => Who::Tail(port - 1),
+    }
+}
+
+/// Who hangs on the line, and how.
+impl<H: Endpoint, T: Endpoint> Line<H, T> {
+    /// A clean line of this speed, bit/s, with nobody at the tail yet. All chance comes from `seed`.
+    /// A `baud` of 0 counts as 1.
+    #[must_use]
+    pub fn new(baud: u32, seed: u64, head: H) -> Self {
+        let now = Instant::from_micros(0);
+        Self {
+            head,
+            tails: Vec::new(),
+            ports: Vec::from([Port::new(now)]),
+            to_tails: Pair::default(),
+            to_head: Pair::default(),
+            baud: baud.max(1),
+            rng: Rng::new(seed),
+            now,
+            head_events: Vec::new(),
+            tail_events: Vec::new(),
+            trace: None,
+        }
+    }
+
+    /// The same line with its time starting at `now` instead of 0. To be called before anything
+    /// else, as with a clock that is about to wrap.
+    #[must_use]
+    pub fn starting_at(mut self, now: Instant) -> Self {
+        self.now = now;
+        self.ports = Vec::from([Port::new(now)]);
+        self.ports.extend(self.tails.iter().map(|_| Port::new(now)));
+        self
+    }
+
+    /// Hangs another endpoint onto the tail; says which it is.
+    pub fn add(&mut self, tail: T) -> usize {
+        self.tails.push(tail);
+        self.ports.push(Port::new(self.now));
+        self.tails.len() - 1
+    }
+
+    /// The endpoint at the head.
+    #[must_use]
+    pub const fn head(&self) -> &H {
+        &self.head
+    }
+
+    /// The endpoint at the head, to be commanded. Its loop then runs once more.
+    pub fn head_mut(&mut self) -> &mut H {
+        self.ports[0].touch(self.now);
+        &mut self.head
+    }
+
+    /// The endpoints at the tail.
+    #[must_use]
+    pub fn tails(&self) -> &[T] {
+        &self.tails
+    }
+
+    /// An endpoint at the tail.
+    ///
+    /// # Panics
+    ///
+    /// Where there is none of this number.
+    #[must_use]
+    pub fn tail(&self, index: usize) -> &T {
+        &self.tails[index]
+    }
+
+    /// An endpoint at the tail, to be commanded. Its loop then runs once more.
+    ///
+    /// # Panics
+    ///
+    /// Where there is none of this number.
+    pub fn tail_mut(&mut self, index: usize) -> &mut T {
+        self.ports[index + 1].touch(self.now);
+        &mut self.tails[index]
+    }
+
+    /// What is wrong with a pair, to be changed at any time.
+    pub const fn pair_mut(&mut self, direction: Direction) -> &mut Faults {
+        match direction {
+            Direction::ToTails => &mut self.to_tails.faults,
+            Direction::ToHead => &mut self.to_head.faults,
+        }
+    }
+
+    /// What is wrong with the wires between one station and the pairs, to be changed at any time.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such tail.
+    pub fn stub_mut(&mut self, who: Who) -> &mut Faults {
+        &mut self.ports[port_of(who)].stub
+    }
+
+    /// How a station's loop runs, to be changed at any time.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such tail.
+    pub fn driver_mut(&mut self, who: Who) -> &mut Driver {
+        &mut self.ports[port_of(who)].driver
+    }
+}
+
+/// Time.
+impl<H: Endpoint, T: Endpoint> Line<H, T> {
+    /// The time.
+    #[must_use]
+    pub const fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// When something happens next; `None` if nothing ever does.
+    #[must_use]
+    pub fn next(&self) -> Option<Instant> {
+        let mut next = None;
+        for port in &self.ports {
+            next = earlier(next, earlier(port.sent_at(), port.wakes_at()));
+        }
+        next.map(|at| at.max(self.now))
+    }
+
+    /// Goes on to the next instant at which something happens, and lets it happen. `None` if nothing
+    /// ever does.
+    ///
+    /// # Errors
+    ///
+    /// [`Stuck`]: an endpoint breaks the contract.
+    pub fn step(&mut self) -> Result<Option<Instant>, Stuck> {
+        let next = self.next();
+        if let Some(at) = next {
+            self.happen(at)?;
+        }
+        Ok(next)
+    }
+
+    /// Lets all that is due at `now` happen.
+    fn happen(&mut self, now: Instant) -> Result<(), Stuck> {
+        self.now = now;
+        for port in 0..self.ports.len() {
+            while self.ports[port].sent_at().is_some_and(|end| end <= now) {
+                if let Some(byte) = self.ports[port].sending.pop_front() {
+                    self.carry(port, byte);
+                }
+            }
+        }
+        for port in 0..self.ports.len() {
+            if self.ports[port].wakes_at().is_some_and(|at| at <= now) {
+                self.run_port(port)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets everything up to and at `end` happen; it is `end` then.
+    ///
+    /// # Errors
+    ///
+    /// [`Stuck`]: an endpoint breaks the contract.
+    pub fn run_until(&mut self, end: Instant) -> Result<(), Stuck> {
+        while let Some(at) = self.next().filter(|at| *at <= end) {
+            self.happen(at)?;
+        }
+        self.now = self.now.max(end);
+        Ok(())
+    }
+
+    /// Lets `span` pass.
+    ///
+    /// # Errors
+    ///
+    /// [`Stuck`]: an endpoint breaks the contract.
+    pub fn run_for(&mut self, span: Duration) -> Result<(), Stuck> {
+        self.run_until(self.now + span)
+    }
+
+    fn run_port(&mut self, port: usize) -> Result<(), Stuck> {
+        let (at, mut sent) = (self.now, Vec::new());
+        let round = match who_at(port) {
+            Who::Head => {
+                let tell = |event| self.head_events.push((at, event));
+                self.ports[port].run(&mut self.head, at, &mut sent, tell)
+            }
+            Who::Tail(index) => {
+                let tell = |event| self.tail_events.push((at, index, event));
+                self.ports[port].run(&mut self.tails[index], at, &mut sent, tell)
+            }
+        };
+        for bytes in &sent {
+            self.send(port, bytes);
+        }
+        let who = who_at(port);
+        round.map_err(|trouble| match trouble {
+            Trouble::BusyLoop => Stuck::BusyLoop { who, at },
+            Trouble::Endless => Stuck::Endless { who, at },
+        })
+    }
+}
+
+/// What is on the wires.
+impl<H: Endpoint, T: Endpoint> Line<H, T> {
+    /// Sends `bytes` from a station without asking its endpoint, behind what that is sending.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such tail.
+    pub fn inject(&mut self, who: Who, bytes: &[u8]) {
+        self.send(port_of(who), bytes);
+    }
+
+    fn send(&mut self, port: usize, bytes: &[u8]) {
+        let held_up = self.ports[port].stub.hold_up(&mut self.rng);
+        let older = self.ports[port].send(bytes, self.now + held_up, self.baud);
+        if port != 0 && !self.ports[port].stub.unplugged {
+            self.collide(port, older);
+        }
+    }
+
+    /// Marks the bytes from `older` on that meet another tail's, and those that they meet.
+    fn collide(&mut self, port: usize, older: usize) {
+        let (before, rest) = self.ports.split_at_mut(port);
+        let Some((own, behind)) = rest.split_first_mut() else { return };
+        let others = before.iter_mut().skip(1).chain(behind).filter(|port| !port.stub.unplugged);
+        for other in others.flat_map(|port| &mut port.sending) {
+            for byte in own.sending.iter_mut().skip(older) {
+                if byte.start < other.end && other.start < byte.end {
+                    (byte.is_collided, other.is_collided) = (true, true);
+                }
+            }
+        }
+    }
+
+    /// A byte has come off a station's transmitter: hands it to all who hear it.
+    fn carry(&mut self, port: usize, sent: WireByte) {
+        let (pair, receivers) = match port {
+            0 => (&mut self.to_tails, 1..self.ports.len()),
+            _ => (&mut self.to_head, 0..1),
+        };
+        let (rng, stub, faults) = (&mut self.rng, self.ports[port].stub, pair.faults);
+        let statistics = &mut pair.statistics;
+
+        let mut on_stub = Vec::new();
+        stub.pass(sent.byte, sent.is_first, rng, statistics, &mut on_stub);
+        let mut on_pair = Vec::new();
+        if !stub.unplugged {
+            statistics.bytes += 1;
+            statistics.collided += u64::from(sent.is_collided);
+            let since = pair.busy_until.map_or(sent.start, |until| until.max(sent.start));
+            statistics.busy_us += u64::from((sent.end - since).as_micros());
+            pair.busy_until = Some(sent.end);
+            for (index, byte) in on_stub.iter().copied().enumerate() {
+                // Never the same byte again, or it would be no collision.
+                let garble = if sent.is_collided { 1 + rng.below(255) as u8 } else { 0 };
+                let is_first = sent.is_first && index == 0;
+                faults.pass(byte ^ garble, is_first, rng, statistics, &mut on_pair);
+            }
+            if let Some(trace) = &mut self.trace {
+                let traced = |byte: &u8| Traced { at: sent.end, who: who_at(port), byte: *byte };
+                trace.extend(on_pair.iter().map(traced));
+            }
+        }
+        let echo = match (stub.echo, faults.echo && !stub.unplugged) {
+            (_, true) => on_pair.as_slice(),
+            (true, false) => on_stub.as_slice(),
+            (false, false) => &[],
+        };
+        for &byte in echo {
+            self.ports[port].receive(byte, sent.end);
+        }
+        if faults.unplugged {
+            return;
+        }
+        let mut through = Vec::new();
+        for receiver in &mut self.ports[receivers] {
+            let stub = receiver.stub;
+            if stub.unplugged {
+                continue;
+            }
+            through.clear();
+            for (index, byte) in on_pair.iter().copied().enumerate() {
+                stub.pass(byte, sent.is_first && index == 0, rng, statistics, &mut through);
+            }
+            for &byte in &through {
+                let held_up = faults.hold_up(rng) + stub.hold_up(rng);
+                receiver.receive(byte, sent.end + held_up);
+            }
+        }
+    }
+}
+
+/// What has happened.
+impl<H: Endpoint, T: Endpoint> Line<H, T> {
+    /// The head's events so far, with the time at which each was told. Only once each.
+    pub fn take_head_events(&mut self) -> Vec<(Instant, H::Event)> {
+        mem::take(&mut self.head_events)
+    }
+
+    /// The tails' events so far: when, which tail, and what. Only once each.
+    pub fn take_tail_events(&mut self) -> Vec<(Instant, usize, T::Event)> {
+        mem::take(&mut self.tail_events)
+    }
+
+    /// What has happened on a pair since the beginning.
+    #[must_use]
+    pub const fn statistics(&self, direction: Direction) -> &PairStatistics {
+        match direction {
+            Direction::ToTails => &self.to_tails.statistics,
+            Direction::ToHead => &self.to_head.statistics,
+        }
+    }
+
+    /// How often a station's loop has run since the beginning: many times without a byte and without
+    /// a deadline are a busy loop, too.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such tail.
+    #[must_use]
+    pub fn polls(&self, who: Who) -> u64 {
+        self.ports[port_of(who)].polls
+    }
+
+    /// Keeps every byte that stands on the line from now on.
+    pub fn record(&mut self) {
+        self.trace.get_or_insert_default();
+    }
+
+    /// The bytes so far, by the time at which they were whole; nothing without
+    /// [`record`](Self::record).
+    #[must_use]
+    pub fn trace(&self) -> &[Traced] {
+        self.trace.as_deref().unwrap_or_default()
+    }
+}

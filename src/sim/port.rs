@@ -1,0 +1,278 @@
+//! One end of the line: the loop around an endpoint, and what waits on either side of it.
+
+use alloc::{collections::VecDeque, vec::Vec};
+
+use super::Faults;
+use crate::{
+    endpoint::Endpoint,
+    time::{Duration, Instant, wire_time},
+};
+
+/// Rounds in a row in which an endpoint wants to be called again at once, and nothing comes of it,
+/// before that is a busy loop.
+const PATIENCE: u32 = 3;
+
+/// Most that an endpoint may say in one round.
+const ROUND_LIMIT: usize = 10_000;
+
+/// Most rounds that an endpoint may want at one instant.
+const ROUNDS_AT_ONCE: u32 = 10_000;
+
+/// How the loop around an endpoint runs: at once and byte by byte, unless set otherwise.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[non_exhaustive]
+pub struct Driver {
+    /// How far the loop is behind: whatever arrives, and every deadline, is seen so much later.
+    pub latency: Duration,
+    /// In which pieces received bytes come.
+    pub input: Input,
+    /// Whether the loop takes the events out. An application that does not lets them pile up.
+    pub takes_events: bool,
+}
+
+/// One that is never late.
+impl Default for Driver {
+    fn default() -> Self {
+        Self { latency: Duration::ZERO, input: Input::Bytes, takes_events: true }
+    }
+}
+
+/// In which pieces received bytes reach an endpoint.
+///
+/// ```
+/// use axlewire::{sim::Input, time::Duration};
+/// let dma = Input::AfterPause { pause: Duration::from_micros(20), at_most: 64 };
+/// assert_ne!(dma, Input::usb_adapter());
+/// ```
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Input {
+    /// Each by itself, as an interrupt per byte does it.
+    Bytes,
+    /// Together, once nothing has come for `pause` or `at_most` bytes are there: DMA with the idle
+    /// interrupt of a UART.
+    AfterPause {
+        /// Silence that ends a piece.
+        pause: Duration,
+        /// Bytes that end a piece.
+        at_most: usize,
+    },
+    /// Together, `wait` after the first of them or once `at_most` bytes are there: a USB adapter
+    /// with its latency timer.
+    AfterFirst {
+        /// Time from the first byte of a piece to its end.
+        wait: Duration,
+        /// Bytes that end a piece.
+        at_most: usize,
+    },
+}
+
+impl Input {
+    /// A USB adapter with its latency timer as delivered: 16 ms, or 62 bytes.
+    #[must_use]
+    pub const fn usb_adapter() -> Self {
+        Self::AfterFirst { wait: Duration::from_millis(16), at_most: 62 }
+    }
+}
+
+/// What is wrong with an endpoint.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Trouble {
+    BusyLoop,
+    Endless,
+}
+
+/// A byte on its way along the pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WireByte {
+    pub(super) start: Instant,
+    pub(super) end: Instant,
+    pub(super) byte: u8,
+    /// The first of its transmission.
+    pub(super) is_first: bool,
+    /// Another sender talks meanwhile.
+    pub(super) is_collided: bool,
+}
+
+/// Bytes without a gap between them: their ends are counted from the first start, so that no
+/// rounding adds up.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    start: Instant,
+    bytes: usize,
+}
+
+/// The earlier of two times that may never come.
+pub(super) fn earlier(a: Option<Instant>, b: Option<Instant>) -> Option<Instant> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
+}
+
+/// One end of the line, without its endpoint.
+#[derive(Debug)]
+pub(super) struct Port {
+    pub(super) driver: Driver,
+    pub(super) stub: Faults,
+    pub(super) polls: u64,
+    /// Sent, and not yet at the end of the wire.
+    pub(super) sending: VecDeque<WireByte>,
+    run: Option<Run>,
+    /// Received, in order, with the times of arrival, some of them yet to come.
+    arrivals: VecDeque<(Instant, u8)>,
+    last_arrival: Option<Instant>,
+    /// What the endpoint last answered to `poll_timeout`.
+    deadline: Option<Instant>,
+    /// The application may have commanded something.
+    touched: Option<Instant>,
+    fruitless: u32,
+    /// The time of the last round, and how many there were.
+    rounds: (Option<Instant>, u32),
+}
+
+impl Port {
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            driver: Driver::default(),
+            stub: Faults::CLEAN,
+            polls: 0,
+            sending: VecDeque::new(),
+            run: None,
+            arrivals: VecDeque::new(),
+            last_arrival: None,
+            deadline: None,
+            touched: Some(now),
+            fruitless: 0,
+            rounds: (None, 0),
+        }
+    }
+
+    /// The application has had its hands on the endpoint.
+    pub(super) fn touch(&mut self, now: Instant) {
+        self.touched.get_or_insert(now);
+    }
+
+    /// Puts bytes onto the wire behind those that are on it, not before `from`; returns how many
+    /// of `sending` are older.
+    pub(super) fn send(&mut self, bytes: &[u8], from: Instant, baud: u32) -> usize {
+        let older = self.sending.len();
+        for (index, &byte) in bytes.iter().enumerate() {
+            let end_of = |run: &Run| run.start + wire_time(run.bytes, baud);
+            let mut run = match self.run {
+                Some(run) if end_of(&run) > from => run,
+                _ => Run { start: from, bytes: 0 },
+            };
+            let start = end_of(&run);
+            run.bytes += 1;
+            let end = end_of(&run);
+            // So many bytes take 10 s to the bit: no rounding is lost, and no run gets too long.
+            if run.bytes == baud as usize {
+                run = Run { start: end, bytes: 0 };
+            }
+            self.run = Some(run);
+            let is_first = index == 0;
+            self.sending.push_back(WireByte { start, end, byte, is_first, is_collided: false });
+        }
+        older
+    }
+
+    /// A byte will be there at `at`, but not before the one in front of it.
+    pub(super) fn receive(&mut self, byte: u8, at: Instant) {
+        let at = self.last_arrival.map_or(at, |last| last.max(at));
+        self.last_arrival = Some(at);
+        self.arrivals.push_back((at, byte));
+    }
+
+    /// The next byte to come off the wire is whole then.
+    pub(super) fn sent_at(&self) -> Option<Instant> {
+        self.sending.front().map(|byte| byte.end)
+    }
+
+    /// When the loop runs next.
+    pub(super) fn wakes_at(&self) -> Option<Instant> {
+        let piece = self.next_piece().map(|(at, _)| at);
+        let trigger = earlier(piece, earlier(self.deadline, self.touched));
+        trigger.map(|at| at + self.driver.latency)
+    }
+
+    /// The next piece of input: when it is complete, and how many bytes it has.
+    fn next_piece(&self) -> Option<(Instant, usize)> {
+        let first = self.arrivals.front()?.0;
+        let arrived_by = |limit: Instant| self.arrivals.partition_point(|(at, _)| *at <= limit);
+        let arrival = |index: usize| self.arrivals.get(index).map(|(at, _)| *at);
+        match self.driver.input {
+            Input::Bytes => Some((first, 1)),
+            Input::AfterFirst { wait, at_most } => match arrival(at_most.max(1) - 1) {
+                Some(full) if full <= first + wait => Some((full, at_most.max(1))),
+                _ => Some((first + wait, arrived_by(first + wait))),
+            },
+            Input::AfterPause { pause, at_most } => {
+                let mut last = (first, 1);
+                while last.1 < at_most.max(1) {
+                    match arrival(last.1) {
+                        Some(at) if at <= last.0 + pause => last = (at, last.1 + 1),
+                        _ => return Some((last.0 + pause, last.1)),
+                    }
+                }
+                Some(last)
+            }
+        }
+    }
+
+    /// One round of the loop that [`Endpoint`] describes. Appends what is to be sent to `sent`.
+    pub(super) fn run<E: Endpoint>(
+        &mut self,
+        endpoint: &mut E,
+        now: Instant,
+        sent: &mut Vec<Vec<u8>>,
+        mut tell: impl FnMut(E::Event),
+    ) -> Result<(), Trouble> {
+        self.polls += 1;
+        let latency = self.driver.latency;
+        let is_seen = |at: &Instant| now >= *at + latency;
+        let mut is_fruitful = self.touched.take_if(|at| is_seen(at)).is_some();
+        while let Some((_, len)) = self.next_piece().filter(|(at, _)| is_seen(at)) {
+            let piece: Vec<u8> = self.arrivals.drain(..len).map(|(_, byte)| byte).collect();
+            endpoint.handle_input(&piece, now);
+            is_fruitful = true;
+        }
+        if endpoint.poll_timeout().is_some_and(|at| is_seen(&at)) {
+            endpoint.handle_timeout(now);
+        }
+        if self.driver.takes_events {
+            for count in 0.. {
+                let Some(event) = endpoint.poll_event() else { break };
+                tell(event);
+                is_fruitful = true;
+                if count == ROUND_LIMIT {
+                    return Err(Trouble::Endless);
+                }
+            }
+        }
+        for count in 0.. {
+            let Some(bytes) = endpoint.poll_transmit(now) else { break };
+            sent.push(bytes.to_vec());
+            is_fruitful = true;
+            if count == ROUND_LIMIT {
+                return Err(Trouble::Endless);
+            }
+        }
+        self.deadline = endpoint.poll_timeout();
+        self.judge(is_fruitful, now)
+    }
+
+    /// Whether the endpoint lets time go on.
+    fn judge(&mut self, is_fruitful: bool, now: Instant) -> Result<(), Trouble> {
+        let wants_more = self.deadline.is_some_and(|at| at <= now);
+        self.fruitless = if wants_more && !is_fruitful { self.fruitless + 1 } else { 0 };
+        self.rounds = match self.rounds {
+            (Some(at), count) if at == now && wants_more => (Some(now), count + 1),
+            _ => (Some(now), 1),
+        };
+        match (self.fruitless, self.rounds.1) {
+            (PATIENCE.., _) => Err(Trouble::BusyLoop),
+            (_, ROUNDS_AT_ONCE..) => Err(Trouble::Endless),
+            _ => Ok(()),
+        }
+    }
+}

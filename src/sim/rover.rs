@@ -1,0 +1,161 @@
+//! A rover with four wheels, two a side.
+
+use super::lag::{Lag, seconds};
+use crate::{
+    time::Duration,
+    ucp::{MotorControl, Telemetry},
+};
+
+/// A rover on flat ground: motor commands and time go in, telemetry comes out.
+///
+/// A positive `angular` turns it right, as the vendor firmware does (ruling U6): the left wheels then
+/// run faster. At full speed a wheel makes 120 rpm, and 63 % of a new speed is reached in 150 ms.
+/// The heading is a compass's, growing to the right. The battery gives 40 Wh, at 12.6 V full and
+/// 9.6 V empty; an empty one turns no wheel.
+///
+/// It has no watchdog: that is the [`Robot`](crate::ucp::Robot)'s.
+///
+/// ```
+/// use axlewire::{sim::Rover, time::Duration, ucp::MotorControl};
+///
+/// let mut rover = Rover::new();
+/// rover.command(&MotorControl::turn_right(50, 20)?);
+/// rover.step(Duration::from_millis(1000));
+/// let [front_left, front_right, ..] = rover.telemetry().rpm;
+/// assert_eq!((front_left, front_right), (84, 36)); // 50 % + 20 %, 50 % - 20 %
+/// assert!(rover.heading_deg() > 0.0);
+/// # Ok::<(), axlewire::error::EncodeError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rover {
+    /// Speeds of the wheels as parts of the full one.
+    left: Lag,
+    right: Lag,
+    heading_deg: f64,
+    turn_deg_per_s: f64,
+    forward_acc_g: f64,
+    distance_m: f64,
+    battery_wh: f64,
+    power_w: f64,
+}
+
+impl Rover {
+    /// Speed of a wheel at 100 %, rpm.
+    pub const FULL_RPM: f64 = 120.0;
+
+    const WHEEL_ROUND_M: f64 = 0.4;
+    const TRACK_M: f64 = 0.3;
+    const BATTERY_WH: f64 = 40.0;
+    const FULL_V: f64 = 12.6;
+    const EMPTY_V: f64 = 9.6;
+    const IDLE_W: f64 = 4.0;
+    const DRIVING_W: f64 = 20.0;
+    const GRAVITY_M_PER_S2: f64 = 9.81;
+    /// The earth's field along the ground and into it, sensor counts.
+    const FIELD: (f64, f64) = (300.0, -400.0);
+
+    /// A rover that stands still, heads north and is fully charged.
+    #[must_use]
+    pub const fn new() -> Self {
+        let time_constant = Duration::from_millis(150);
+        let wheel = Lag { value: 0.0, target: 0.0, time_constant };
+        Self {
+            left: wheel,
+            right: wheel,
+            heading_deg: 0.0,
+            turn_deg_per_s: 0.0,
+            forward_acc_g: 0.0,
+            distance_m: 0.0,
+            battery_wh: Self::BATTERY_WH,
+            power_w: Self::IDLE_W,
+        }
+    }
+
+    /// The same rover with another charge, percent, 0 to 100.
+    #[must_use]
+    pub const fn with_battery(mut self, percent: f64) -> Self {
+        self.battery_wh = Self::BATTERY_WH * percent.clamp(0.0, 100.0) / 100.0;
+        self
+    }
+
+    /// Drives as commanded from now on. Beyond ±100 % a wheel does not go.
+    pub fn command(&mut self, command: &MotorControl) {
+        let (speed, turn) = (f64::from(command.speed()), f64::from(command.angular()));
+        self.left.target = ((speed + turn) / 100.0).clamp(-1.0, 1.0);
+        self.right.target = ((speed - turn) / 100.0).clamp(-1.0, 1.0);
+    }
+
+    /// Lets `dt` pass.
+    pub fn step(&mut self, dt: Duration) {
+        let span = seconds(dt);
+        if span <= 0.0 {
+            return;
+        }
+        if self.battery_wh <= 0.0 {
+            (self.left.target, self.right.target) = (0.0, 0.0);
+        }
+        let speed_m_per_s = Self::FULL_RPM / 60.0 * Self::WHEEL_ROUND_M;
+        let before = (self.left.value + self.right.value) / 2.0;
+        let (left, right) = (self.left.step(dt), self.right.step(dt));
+        let after = (self.left.value + self.right.value) / 2.0;
+
+        self.distance_m += (left + right) / 2.0 * speed_m_per_s;
+        self.forward_acc_g = (after - before) * speed_m_per_s / span / Self::GRAVITY_M_PER_S2;
+        let turned = ((left - right) * speed_m_per_s / Self::TRACK_M).to_degrees();
+        self.heading_deg = (self.heading_deg + turned).rem_euclid(360.0);
+        self.turn_deg_per_s = turned / span;
+
+        let effort = (left.abs() + right.abs()) / 2.0 / span;
+        self.power_w = Self::IDLE_W + Self::DRIVING_W * effort;
+        self.battery_wh = (self.battery_wh - self.power_w * span / 3600.0).max(0.0);
+    }
+
+    /// Where it heads, degrees from north to the right, 0 up to 360.
+    #[must_use]
+    pub const fn heading_deg(&self) -> f64 {
+        self.heading_deg
+    }
+
+    /// The way it has made, metres, backwards counted off.
+    #[must_use]
+    pub const fn distance_m(&self) -> f64 {
+        self.distance_m
+    }
+
+    /// What is left in the battery, percent.
+    #[must_use]
+    pub const fn battery(&self) -> f64 {
+        self.battery_wh / Self::BATTERY_WH * 100.0
+    }
+
+    /// What its sensors say: x is ahead, y is to the left, z is up. Accelerations and turns are means
+    /// over the last step.
+    #[must_use]
+    pub fn telemetry(&self) -> Telemetry {
+        let volts = Self::EMPTY_V + (Self::FULL_V - Self::EMPTY_V) * self.battery() / 100.0;
+        let rpm = |wheel: &Lag| (wheel.value * Self::FULL_RPM).round() as i16;
+        let (left, right) = (rpm(&self.left), rpm(&self.right));
+        let one_g = f64::from(Telemetry::ACC_PER_G);
+        let (sin, cos) = self.heading_deg.to_radians().sin_cos();
+        let (along, into) = Self::FIELD;
+        // To the right is negative around an axis that points up.
+        let turn = -self.turn_deg_per_s * f64::from(Telemetry::GYRO_PER_DEG_PER_S);
+        Telemetry {
+            battery_pct: self.battery() as u16,
+            rpm: [left, right, left, right],
+            acc: [(self.forward_acc_g * one_g) as i16, 0, one_g as i16],
+            gyro: [0, 0, turn as i16],
+            mag: [(along * cos) as i16, (along * sin) as i16, into as i16],
+            heading_deg: self.heading_deg as i16,
+            power_w: self.power_w as u8,
+            voltage_dv: (volts * 10.0) as u8,
+            current_ca: (self.power_w / volts * 100.0) as u16,
+        }
+    }
+}
+
+impl Default for Rover {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,107 @@
+//! A rover with the robot that drives it.
+
+use super::Rover;
+use crate::{
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+    ucp::{Robot, RobotConfig, RobotEvent},
+};
+
+/// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports are
+/// what the rover does at that moment.
+///
+/// ```
+/// use axlewire::{
+///     endpoint::Endpoint,
+///     sim::RoverNode,
+///     time::Instant,
+///     ucp::{Body, MotorControl, RobotConfig},
+/// };
+///
+/// let mut node = RoverNode::new(RobotConfig::default(), Instant::from_millis(0));
+/// let drive = MotorControl::new(50, 0)?.frame(0);
+/// node.handle_input(drive.as_bytes(), Instant::from_millis(0));
+/// node.handle_input(&[], Instant::from_millis(400));
+/// assert!(node.rover().distance_m() > 0.05);
+/// # Ok::<(), axlewire::error::EncodeError>(())
+/// ```
+#[derive(Debug)]
+pub struct RoverNode {
+    robot: Robot,
+    rover: Rover,
+    /// The time up to which the rover has run.
+    now: Instant,
+}
+
+impl RoverNode {
+    /// A rover that has just booted and stands still.
+    #[must_use]
+    pub fn new(config: RobotConfig, now: Instant) -> Self {
+        Self::from_parts(Robot::new(config, now), Rover::new(), now)
+    }
+
+    /// A node of this robot and this rover.
+    #[must_use]
+    pub fn from_parts(robot: Robot, rover: Rover, now: Instant) -> Self {
+        let mut node = Self { robot, rover, now };
+        node.robot.set_telemetry(&node.rover.telemetry(), now);
+        node
+    }
+
+    /// The robot.
+    #[must_use]
+    pub const fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// The robot, to answer its events.
+    pub const fn robot_mut(&mut self) -> &mut Robot {
+        &mut self.robot
+    }
+
+    /// The rover, as it was when the node was last called.
+    #[must_use]
+    pub const fn rover(&self) -> &Rover {
+        &self.rover
+    }
+
+    /// Lets the rover run up to `now`, and the robot report what it does.
+    fn run(&mut self, now: Instant) {
+        self.rover.command(&self.robot.command(now));
+        let dt = now - self.now;
+        if dt != Duration::ZERO {
+            self.now = now;
+            self.rover.step(dt);
+        }
+        self.robot.set_telemetry(&self.rover.telemetry(), now);
+    }
+}
+
+impl Endpoint for RoverNode {
+    type Event = RobotEvent;
+
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.run(now);
+        self.robot.handle_input(bytes, now);
+        self.rover.command(&self.robot.command(now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.run(now);
+        self.robot.handle_timeout(now);
+        self.rover.command(&self.robot.command(now));
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
+        self.run(now);
+        self.robot.poll_transmit(now)
+    }
+
+    fn poll_event(&mut self) -> Option<RobotEvent> {
+        self.robot.poll_event()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.robot.poll_timeout()
+    }
+}
