@@ -11,13 +11,16 @@
 //!
 //! | floor | what it does | where |
 //! |---|---|---|
+//! | drive | moves bytes between a port and a role; the calls that a user wants first | [`drive`] |
+//! | roles | who speaks when, what a timeout means, what is safe: masters, slaves, hosts, robots | [`endpoint`], [`ikeya`], [`ucp`] |
 //! | ports | frames in and out of an `embedded-io` port | [`io`] |
 //! | stream | finds frames in bytes, counts every byte, resyncs after noise | [`stream`] |
 //! | wire | typed packets: views without a copy, values with the right CRC | [`ikeya`], [`ucp`] |
 //! | checksum | CRC-16/MODBUS without a table | [`crc16`] |
 //!
-//! Nothing here allocates, blocks, reads a clock or panics, except that `io` waits for its port and
-//! [`stream::decode_capture`](stream) collects into a `Vec`. There is no `unsafe` in this crate.
+//! Nothing here allocates, blocks, reads a clock or panics, except that `drive` and `io` wait for their
+//! port, `drive` asks the clock that it is given, and [`stream::decode_capture`](stream) collects into
+//! a `Vec`. There is no `unsafe` in this crate.
 //!
 //! # A motor bus
 //!
@@ -78,14 +81,16 @@
 //! |---|---|---|
 //! | `ikeya` | yes | the motor bus |
 //! | `ucp` | yes | the rover link |
-//! | `embedded-io` | yes | [`io::FrameReader`] and [`io::FrameWriter`], blocking |
+//! | `embedded-io` | yes | [`drive::Driver`], [`io::FrameReader`] and [`io::FrameWriter`], blocking |
 //! | `embedded-io-async` | | the same calls, async |
+//! | `embedded-hal` | | [`drive::Directed`]: the driver-enable pin of an RS485 port |
 //! | `alloc` | | [`stream::decode_capture`](stream): a whole capture at once |
-//! | `std` | | `alloc`, and `std::io` errors in the port traits |
+//! | `std` | | `alloc`, `std::io` errors in the port traits, [`drive::StdClock`](drive) |
 //! | `arbitrary` | | value types made from fuzz input; brings `std` |
 //! | `bytemuck` | | `CheckedBitPattern` and `NoUninit` for packets, `Pod` for bodies |
 //! | `defmt` | | `Format` for everything |
 //! | `serde` | | values as data |
+//! | `sim` | | [`sim`]: a line with faults in virtual time, a motor, a rover; brings `std` |
 //!
 //! All are additive, and every combination builds.
 //!
@@ -106,12 +111,16 @@ extern crate alloc;
 extern crate std;
 
 pub mod crc16;
+#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+pub mod drive;
 pub mod endpoint;
 pub mod error;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
+#[cfg(feature = "sim")]
+pub mod sim;
 pub mod stream;
 pub mod time;
 #[cfg(feature = "ucp")]

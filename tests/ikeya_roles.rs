@@ -469,6 +469,37 @@ fn a_node_that_comes_back_does_not_move_until_somebody_says_so() {
 }
 
 #[test]
+fn a_stop_goes_to_an_abnormal_node_too_once() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0)).unwrap();
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.sent.clear();
+    desk.master.stop(NodeId::N1).unwrap();
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+    }
+    assert_eq!(desk.sent, [write(NodeId::N1, 0.0)], "it may still hear");
+}
+
+#[test]
+fn a_stop_that_waits_survives_the_third_strike() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..2 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.turn();
+    desk.master.stop(NodeId::N1).unwrap();
+    desk.silence();
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Abnormal));
+    assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
+}
+
+#[test]
 fn garbage_in_the_window_is_a_strike_that_names_its_cause() {
     for (bytes, cause) in [
         (vec![0x55, 1, 2, 3, 4, 5, 6, 7, 8], Cause::Damaged),
@@ -559,7 +590,9 @@ fn manual_polling_reads_when_asked_and_writes_when_told() {
     desk.master.set_velocity(NodeId::N1, rps(1.0)).unwrap();
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
     assert_eq!(desk.master.poll_timeout(), None, "nothing more to do");
-    desk.master.read(NodeId::N1);
+    desk.master.read(NodeId::N1).unwrap();
+    let unknown = CommandError::NotOnline { node: NodeId::N2 };
+    assert_eq!(desk.master.read(NodeId::N2), Err(unknown));
     desk.now += US(1000);
     assert_eq!(desk.turn(), read(NodeId::N1));
 }

@@ -94,8 +94,8 @@ fn master<B: Board>(u: &mut Unstructured<'_>, answer: fn(NodeId, Mode) -> Vec<u8
     config.polling = *u.choose(&polling)?;
     let mut clock = Clock::new(u)?;
     let mut master = Master::<B>::new(config);
-    // The node that was asked and may answer.
-    let mut asked = None;
+    // The node that was asked and may answer; whether anything was ever stopped.
+    let (mut asked, mut stopped) = (None, false);
     while !u.is_empty() {
         let id = *u.choose(&NodeId::ALL)?;
         let now = clock.pass(u)?;
@@ -103,11 +103,14 @@ fn master<B: Board>(u: &mut Unstructured<'_>, answer: fn(NodeId, Mode) -> Vec<u8
         match u.int_in_range(0..=9)? {
             0 => master.discover(),
             1 => drop(master.set_velocity(id, B::ZERO)),
-            2 => drop(master.stop(id)),
-            3 => drop(master.stop_all()),
+            2 => stopped |= master.stop(id).is_ok(),
+            3 => {
+                master.stop_all();
+                stopped = true;
+            }
             4 => drop(master.confirm(id)),
             5 => master.release(id),
-            6 => master.read(id),
+            6 => drop(master.read(id)),
             7 => master.handle_input(raw(u)?, now),
             8 => {
                 let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
@@ -135,7 +138,11 @@ fn master<B: Board>(u: &mut Unstructured<'_>, answer: fn(NodeId, Mode) -> Vec<u8
             }
             assert!(packet[0] == 0xAA || packet[0] == 0xBB);
             let known = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
-            assert!(packet[0] == 0xAA || known, "a command for a node that is not online");
+            // Only a stop goes to a node that does not answer.
+            assert!(
+                packet[0] == 0xAA || known || stopped,
+                "a command for a node that is not online"
+            );
         }
         for id in NodeId::ALL {
             let node = master.node_statistics(id);

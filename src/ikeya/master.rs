@@ -294,22 +294,27 @@ impl<B: Board> Master<B> {
 
     /// Stops a node: 0 rps, or *hold at the last measured position*, never "go to 0" (ruling I6).
     ///
+    /// Goes to an abnormal node as well, once: it may still hear what it can no longer answer.
+    ///
     /// # Errors
     ///
-    /// [`CommandError`]: the node is not online, or has not told a position yet.
+    /// [`CommandError`]: the node has never answered, or has not told a position yet.
     pub fn stop(&mut self, node: NodeId) -> Result<(), CommandError> {
-        match self.mode(node) {
-            Some(Mode::Position) => match self.status(node) {
-                Some((Status::Position(held), _)) => self.set_position(node, held),
-                _ => Err(CommandError::NoPosition { node }),
-            },
-            _ => self.set_velocity(node, B::ZERO),
-        }
+        let target = match (self.mode(node), self.status(node)) {
+            (None, _) => return Err(CommandError::NotOnline { node }),
+            (Some(Mode::Velocity), _) => Target::Velocity(B::ZERO),
+            (_, Some((Status::Position(held), _))) => Target::Position(held),
+            _ => return Err(CommandError::NoPosition { node }),
+        };
+        let node = self.node_mut(node);
+        node.aim(target);
+        node.is_stop = true;
+        Ok(())
     }
 
-    /// Stops every node that is online; says how many could not be stopped.
+    /// Stops every node that has ever answered; says how many could not be stopped.
     pub fn stop_all(&mut self) -> usize {
-        let failed = |node: &NodeId| self.node(*node).is_online() && self.stop(*node).is_err();
+        let failed = |node: &NodeId| self.mode(*node).is_some() && self.stop(*node).is_err();
         NodeId::ALL.into_iter().filter(failed).count()
     }
 
@@ -333,8 +338,18 @@ impl<B: Board> Master<B> {
     }
 
     /// Reads a node once more than the polling does: the way to read with [`Polling::Manual`].
-    pub fn read(&mut self, node: NodeId) {
+    ///
+    /// Comes to [`MasterEvent::Status`] or [`MasterEvent::ReadFailed`].
+    ///
+    /// # Errors
+    ///
+    /// [`CommandError::NotOnline`].
+    pub fn read(&mut self, node: NodeId) -> Result<(), CommandError> {
+        if !self.node(node).is_online() {
+            return Err(CommandError::NotOnline { node });
+        }
         self.node_mut(node).asked = true;
+        Ok(())
     }
 
     /// How a node is; `None` if it has never answered.
@@ -379,13 +394,19 @@ impl<B: Board> Master<B> {
         self.discovery.is_some()
     }
 
-    /// Longest time from the first request of a READ to its answer or its failure, where the
-    /// driver is called in time.
+    /// Longest time from the first request of a READ to its answer or its
+    /// [failure](MasterEvent::ReadFailed), on any line, where the driver is called in time and no
+    /// discovery is under way, which goes first.
+    ///
+    /// Between two attempts lie the guard, one exchange with each other node, the search for an
+    /// abnormal one, and a new set-point for every node.
     #[must_use]
     pub fn read_bound(&self) -> Duration {
-        // In front of each attempt: the guard, and one exchange with another node.
-        let once = self.window().saturating_mul(2) + self.config.late_guard;
-        once.saturating_mul(self.config.attempts.max(1).into())
+        let gap = self.config.turnaround_gap;
+        let write = wire_time(PACKET_LEN, self.config.baud) + gap;
+        let exchange = write + self.window() + gap;
+        let attempt = self.config.late_guard + exchange.saturating_mul(9) + write.saturating_mul(8);
+        attempt.saturating_mul(self.config.attempts.max(1).into())
     }
 
     fn node(&self, node: NodeId) -> &Node<B> {
@@ -765,7 +786,7 @@ impl<B: Board> Master<B> {
         let is_failed = is_abnormal || node.attempt >= attempts;
         let health = if is_abnormal { Health::Abnormal } else { Health::Suspect(node.strikes) };
         node.health = Some(health);
-        if is_abnormal {
+        if is_abnormal && !(node.is_stop && node.fresh) {
             node.forget_target();
         }
         let confirm = node.confirm;

@@ -126,6 +126,12 @@ impl<S: BiasStore> Host<S> {
         self.state.motor.command(command, now, &self.state.config);
     }
 
+    /// The settings.
+    #[must_use]
+    pub const fn config(&self) -> &HostConfig {
+        &self.state.config
+    }
+
     /// The motor command that is being repeated, the dead-man's if he has spoken.
     #[must_use]
     pub const fn command(&self) -> Option<MotorControl> {

@@ -119,6 +119,8 @@ pub(super) struct Node<B: Board> {
     pub(super) target: Option<Target<B>>,
     /// The set-point has not been sent yet.
     pub(super) fresh: bool,
+    /// The set-point is a stop, which goes to abnormal nodes too.
+    pub(super) is_stop: bool,
     /// A new set-point has been sent out of turn since the last exchange.
     pub(super) jumped: bool,
     /// The set-point has been sent in this cycle.
@@ -147,6 +149,7 @@ impl<B: Board> Node<B> {
         other_mode: false,
         target: None,
         fresh: false,
+        is_stop: false,
         jumped: false,
         written: false,
         confirm: Confirm::Unasked,
@@ -181,11 +184,11 @@ impl<B: Board> Node<B> {
 
     /// Takes a new set-point; the latest wins.
     pub(super) fn aim(&mut self, target: Target<B>) {
-        (self.target, self.fresh) = (Some(target), true);
+        (self.target, self.fresh, self.is_stop) = (Some(target), true, false);
     }
 
     pub(super) fn forget_target(&mut self) {
-        (self.target, self.fresh) = (None, false);
+        (self.target, self.fresh, self.is_stop) = (None, false, false);
     }
 
     /// The set-point has been sent.
@@ -193,6 +196,9 @@ impl<B: Board> Node<B> {
         (self.fresh, self.written) = (false, true);
         if self.confirm == Confirm::AfterWrite {
             self.confirm = Confirm::AfterRead;
+        }
+        if !self.is_online() {
+            self.forget_target();
         }
     }
 

@@ -1,0 +1,113 @@
+//! Where a driver gets its time from.
+
+use crate::time::Instant;
+
+/// A clock of microseconds that does not go backwards.
+///
+/// A closure is a clock: `|| Instant::from_micros(counter())`. A counter of 32 bits becomes one with
+/// [`Wrapping32`](crate::time::Wrapping32).
+pub trait Clock {
+    /// The time.
+    fn now(&mut self) -> Instant;
+
+    /// Passes the time until `until`, or a part of it: bytes may come in meanwhile, and whoever
+    /// calls this looks for them when it returns.
+    ///
+    /// Only the blocking calls use it. As provided it returns at once, so that they spin, which is
+    /// right for a processor with nothing else to do.
+    fn idle_until(&mut self, until: Instant) {
+        let _ = until;
+        core::hint::spin_loop();
+    }
+}
+
+impl<F: FnMut() -> Instant> Clock for F {
+    fn now(&mut self) -> Instant {
+        self()
+    }
+}
+
+/// The monotonic clock of `std`, from its creation on.
+///
+/// Idles in naps of 200 µs: short for an answer on the line, long for a processor, which is then
+/// free for others most of the time.
+#[cfg(feature = "std")]
+#[derive(Clone, Copy, Debug)]
+pub struct StdClock {
+    zero: std::time::Instant,
+}
+
+#[cfg(feature = "std")]
+impl StdClock {
+    /// Longest nap, microseconds.
+    const NAP_US: u32 = 200;
+
+    /// A clock that starts at 0.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { zero: std::time::Instant::now() }
+    }
+}
+
+/// [`new`](StdClock::new).
+#[cfg(feature = "std")]
+impl Default for StdClock {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(feature = "std")]
+impl Clock for StdClock {
+    fn now(&mut self) -> Instant {
+        Instant::from_micros(self.zero.elapsed().as_micros() as u64)
+    }
+
+    fn idle_until(&mut self, until: Instant) {
+        let micros = (until - self.now()).as_micros().min(Self::NAP_US);
+        if micros > 0 {
+            std::thread::sleep(core::time::Duration::from_micros(micros.into()));
+        }
+    }
+}
+
+/// A clock and a delay in one, which the async calls need: `WithDelay { clock, delay }`.
+///
+/// Both have to tell the same time: a delay that runs fast makes a driver look at its clock more
+/// often, one that runs slow makes it late.
+#[cfg(feature = "embedded-io-async")]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WithDelay<C, D> {
+    /// Tells the time.
+    pub clock: C,
+    /// Waits.
+    pub delay: D,
+}
+
+#[cfg(feature = "embedded-io-async")]
+impl<C: Clock, D> Clock for WithDelay<C, D> {
+    fn now(&mut self) -> Instant {
+        self.clock.now()
+    }
+
+    fn idle_until(&mut self, until: Instant) {
+        self.clock.idle_until(until);
+    }
+}
+
+#[cfg(feature = "embedded-io-async")]
+impl<C, D: embedded_hal_async::delay::DelayNs> embedded_hal_async::delay::DelayNs
+    for WithDelay<C, D>
+{
+    async fn delay_ns(&mut self, ns: u32) {
+        self.delay.delay_ns(ns).await;
+    }
+
+    async fn delay_us(&mut self, us: u32) {
+        self.delay.delay_us(us).await;
+    }
+
+    async fn delay_ms(&mut self, ms: u32) {
+        self.delay.delay_ms(ms).await;
+    }
+}

@@ -1,0 +1,286 @@
+//! RS485 driver enable: a pin that is on while bytes are being sent.
+
+use core::{error::Error, fmt};
+
+use embedded_hal::digital::OutputPin;
+#[cfg(feature = "embedded-io")]
+use embedded_io as io;
+#[cfg(not(feature = "embedded-io"))]
+use embedded_io_async as io;
+
+use crate::time::Duration;
+
+/// A port whose transceiver has a driver-enable pin (DE, often joined with /RE).
+///
+/// The pin goes on before the first byte that is written and off once the port's `flush` says that
+/// the last is out, or as soon as writing or flushing fails. So *flush after each packet*, as a
+/// [`Driver`](super::Driver) does: until then nobody else can speak. The port's `flush` has to wait
+/// for the last stop bit, and not only for a buffer to be empty; where it does not, the delay behind
+/// makes up for it.
+///
+/// A cancelled async `write` or `flush` leaves the pin as it is, because a part of the packet may be
+/// on the line: go on with the packet, or give it up with [`release`](Self::release).
+///
+/// High is on. For a transceiver that is enabled by low, hand in an inverted pin.
+#[derive(Debug)]
+pub struct Directed<P, O, D = NoDelay> {
+    port: P,
+    pin: O,
+    delay: D,
+    before: Duration,
+    after: Duration,
+    state: State,
+}
+
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum State {
+    Off,
+    /// The pin is on, or may be, and the time before the first byte is not over.
+    Settling,
+    On,
+}
+
+impl<P, O: OutputPin> Directed<P, O> {
+    /// Sends through `port` with `pin` on. It is put off first.
+    ///
+    /// # Errors
+    ///
+    /// The pin's own.
+    pub fn new(port: P, pin: O) -> Result<Self, O::Error> {
+        Self::with_delays(port, pin, NoDelay, Duration::ZERO, Duration::ZERO)
+    }
+}
+
+impl<P, O: OutputPin, D> Directed<P, O, D> {
+    /// The same for a transceiver that needs the time `before` between the pin and the first byte, or
+    /// `after` between the last byte and the pin.
+    ///
+    /// # Errors
+    ///
+    /// The pin's own.
+    pub fn with_delays(
+        port: P,
+        mut pin: O,
+        delay: D,
+        before: Duration,
+        after: Duration,
+    ) -> Result<Self, O::Error> {
+        pin.set_low()?;
+        Ok(Self { port, pin, delay, before, after, state: State::Off })
+    }
+
+    /// Puts the pin off, whatever is still being sent.
+    ///
+    /// # Errors
+    ///
+    /// The pin's own: it may still be on.
+    pub fn release(&mut self) -> Result<(), O::Error> {
+        self.pin.set_low()?;
+        self.state = State::Off;
+        Ok(())
+    }
+
+    /// Is the pin on? After an error of the pin it may be.
+    #[must_use]
+    pub const fn is_on(&self) -> bool {
+        !matches!(self.state, State::Off)
+    }
+
+    /// The port, to change its settings.
+    pub fn port_mut(&mut self) -> &mut P {
+        &mut self.port
+    }
+
+    /// The port and the pin, which stays as it is.
+    #[must_use]
+    pub fn into_parts(self) -> (P, O, D) {
+        (self.port, self.pin, self.delay)
+    }
+
+    /// Puts the pin on; says how long to wait before the first byte.
+    fn engage(&mut self) -> Result<Duration, O::Error> {
+        match self.state {
+            State::On => return Ok(Duration::ZERO),
+            // A cancelled write has not waited to the end.
+            State::Settling => return Ok(self.before),
+            State::Off => {}
+        }
+        // A pin that fails may have switched all the same.
+        self.state = State::Settling;
+        if let Err(error) = self.pin.set_high() {
+            // The first error is the one to tell.
+            let _ = self.release();
+            return Err(error);
+        }
+        Ok(self.before)
+    }
+
+    /// Puts the pin off because of `error`, which is the one to tell.
+    fn fail<T, E>(&mut self, error: E) -> Result<T, DirectedError<E, O::Error>> {
+        let _ = self.release();
+        Err(DirectedError::Port(error))
+    }
+}
+
+/// No delay: the pin and the bytes follow each other at once.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoDelay;
+
+impl embedded_hal::delay::DelayNs for NoDelay {
+    fn delay_ns(&mut self, _: u32) {}
+}
+
+#[cfg(feature = "embedded-io-async")]
+impl embedded_hal_async::delay::DelayNs for NoDelay {
+    async fn delay_ns(&mut self, _: u32) {}
+}
+
+/// The port's error, or the pin's.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum DirectedError<E, F> {
+    /// The port failed.
+    Port(E),
+    /// The driver-enable pin failed.
+    Pin(F),
+}
+
+impl<E: fmt::Display, F: fmt::Debug> fmt::Display for DirectedError<E, F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Port(error) => error.fmt(f),
+            Self::Pin(error) => write!(f, "driver-enable pin failed: {error:?}"),
+        }
+    }
+}
+
+impl<E: Error + 'static, F: fmt::Debug> Error for DirectedError<E, F> {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Port(error) => Some(error),
+            Self::Pin(_) => None,
+        }
+    }
+}
+
+impl<E: io::Error + 'static, F: fmt::Debug> io::Error for DirectedError<E, F> {
+    fn kind(&self) -> io::ErrorKind {
+        match self {
+            Self::Port(error) => error.kind(),
+            // Pins know no other kind.
+            Self::Pin(_) => io::ErrorKind::Other,
+        }
+    }
+}
+
+impl<P: io::ErrorType, O: OutputPin, D> io::ErrorType for Directed<P, O, D>
+where
+    P::Error: 'static,
+{
+    type Error = DirectedError<P::Error, O::Error>;
+}
+
+impl<P: io::ReadReady, O: OutputPin, D> io::ReadReady for Directed<P, O, D>
+where
+    P::Error: 'static,
+{
+    fn read_ready(&mut self) -> Result<bool, Self::Error> {
+        self.port.read_ready().map_err(DirectedError::Port)
+    }
+}
+
+#[cfg(feature = "embedded-io")]
+impl<P: embedded_io::Read, O: OutputPin, D> embedded_io::Read for Directed<P, O, D>
+where
+    P::Error: 'static,
+{
+    fn read(&mut self, buf: &mut [u8]) -> Result<usize, Self::Error> {
+        self.port.read(buf).map_err(DirectedError::Port)
+    }
+}
+
+#[cfg(feature = "embedded-io")]
+impl<P: embedded_io::Write, O: OutputPin, D: embedded_hal::delay::DelayNs> embedded_io::Write
+    for Directed<P, O, D>
+where
+    P::Error: 'static,
+{
+    fn write(&mut self, buf: &[u8]) -> Result<usize, Self::Error> {
+        if buf.is_empty() {
+            return Ok(0);
+        }
+        let before = self.engage().map_err(DirectedError::Pin)?;
+        if before > Duration::ZERO {
+            self.delay.delay_us(before.as_micros());
+        }
+        self.state = State::On;
+        match self.port.write(buf) {
+            Ok(0) => {
+                self.release().map_err(DirectedError::Pin)?;
+                Ok(0)
+            }
+            Ok(count) => Ok(count),
+            Err(error) => self.fail(error),
+        }
+    }
+
+    fn flush(&mut self) -> Result<(), Self::Error> {
+        if let Err(error) = self.port.flush() {
+            return self.fail(error);
+        }
+        if self.is_on() {
+            self.delay.delay_us(self.after.as_micros());
+            self.release().map_err(DirectedError::Pin)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "embedded-io-async")]
+impl<P: embedded_io_async::Read, O: OutputPin, D> embedded_io_async::Read for Directed<P, O, D>
+where
+    P::Error: 'static,
+{
+    async fn read(&mut self, buf: &mut [u8]) -> Result<usize, Self::Error> {
+        self.port.read(buf).await.map_err(DirectedError::Port)
+    }
+}
+
+#[cfg(feature = "embedded-io-async")]
+impl<P, O, D> embedded_io_async::Write for Directed<P, O, D>
+where
+    P: embedded_io_async::Write,
+    P::Error: 'static,
+    O: OutputPin,
+    D: embedded_hal_async::delay::DelayNs,
+{
+    async fn write(&mut self, buf: &[u8]) -> Result<usize, Self::Error> {
+        if buf.is_empty() {
+            return Ok(0);
+        }
+        let before = self.engage().map_err(DirectedError::Pin)?;
+        if before > Duration::ZERO {
+            self.delay.delay_us(before.as_micros()).await;
+        }
+        self.state = State::On;
+        match self.port.write(buf).await {
+            Ok(0) => {
+                self.release().map_err(DirectedError::Pin)?;
+                Ok(0)
+            }
+            Ok(count) => Ok(count),
+            Err(error) => self.fail(error),
+        }
+    }
+
+    async fn flush(&mut self) -> Result<(), Self::Error> {
+        if let Err(error) = self.port.flush().await {
+            return self.fail(error);
+        }
+        if self.is_on() {
+            self.delay.delay_us(self.after.as_micros()).await;
+            self.release().map_err(DirectedError::Pin)?;
+        }
+        Ok(())
+    }
+}

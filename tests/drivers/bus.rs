@@ -1,0 +1,406 @@
+//! Master and slaves, each behind a driver, on one line.
+
+use std::{cell::RefCell, rc::Rc};
+
+use axlewire::{
+    drive::{DriveError, Driver, Wish},
+    ikeya::{
+        Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling,
+        Position, Rps, Slave, SlaveConfig, SlaveEvent, Status, Target,
+    },
+    time::{Duration, Instant},
+};
+
+use crate::world::{End, Unplugged, VirtualClock, World};
+
+type Bus = Driver<Master, End, VirtualClock>;
+type Node = Rc<RefCell<Driver<Slave, End, VirtualClock>>>;
+
+/// Node 2 turns, node 5 goes to positions. They act whenever the world does.
+struct Story {
+    world: World,
+    bus: Bus,
+    two: Node,
+    five: Node,
+}
+
+impl Story {
+    fn new(config: MasterConfig) -> Self {
+        let world = World::default();
+        let mut master = End::new(&world, 20);
+        let mut node = |id, mode| {
+            let mut end = End::new(&world, 20);
+            end.outboxes.push(master.inbox.clone());
+            master.outboxes.push(end.inbox.clone());
+            let slave = Slave::new(id, mode, SlaveConfig::direct());
+            Rc::new(RefCell::new(Driver::new(slave, end, VirtualClock(world.clone()))))
+        };
+        let (two, five) = (node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position));
+        two.borrow_mut().role_mut().set_velocity(rps(0.5));
+        five.borrow_mut().role_mut().set_position(Position::new(7, 1));
+        for slave in [two.clone(), five.clone()] {
+            world.add(move || {
+                let mut slave = slave.borrow_mut();
+                if !slave.port().unplugged.get() {
+                    slave.service().unwrap();
+                } else {
+                    slave.port_mut().inbox.borrow_mut().clear();
+                }
+            });
+        }
+        let bus = Driver::new(Master::new(config), master, VirtualClock(world.clone()));
+        Self { world, bus, two, five }
+    }
+
+    fn discovered(mut self) -> Self {
+        assert_eq!(self.bus.discover().unwrap(), FOUND);
+        self
+    }
+}
+
+const FOUND: [(NodeId, Mode); 2] = [(NodeId::N2, Mode::Velocity), (NodeId::N5, Mode::Position)];
+
+fn rps(value: f32) -> Rps {
+    Rps::new(value).unwrap()
+}
+
+fn manual() -> MasterConfig {
+    let mut config = MasterConfig::direct();
+    (config.polling, config.attempts) = (Polling::Manual, 1);
+    config
+}
+
+#[test]
+fn discovery_finds_who_is_there_within_its_bound() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct());
+        let bound = story.bus.role().read_bound();
+        let found = if is_async {
+            story.world.block_on(story.bus.discover_async())
+        } else {
+            story.bus.discover()
+        };
+        assert_eq!(found.unwrap(), FOUND);
+        assert!(story.world.now() < Instant::from_micros(0) + bound);
+    }
+}
+
+#[test]
+fn a_bus_with_nobody_on_it_is_discovered_as_empty() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let master: Master = Master::new(MasterConfig::direct());
+        let mut bus = Driver::new(master, End::new(&world, 20), VirtualClock(world.clone()));
+        let found = if is_async { world.block_on(bus.discover_async()) } else { bus.discover() };
+        assert!(found.unwrap().is_empty());
+    }
+}
+
+#[test]
+fn set_points_have_been_sent_when_the_call_returns_and_reach_the_right_node() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        let (to, at) = (rps(-2.5), Position::new(100, -3));
+        if is_async {
+            story.world.block_on(story.bus.set_velocity_async(NodeId::N2, to)).unwrap();
+            story.world.block_on(story.bus.set_position_async(NodeId::N5, at)).unwrap();
+        } else {
+            story.bus.set_velocity(NodeId::N2, to).unwrap();
+            story.bus.set_position(NodeId::N5, at).unwrap();
+        }
+        // What is on the line arrives, whether or not the master is called again.
+        for _ in 0..50 {
+            story.world.step(20);
+        }
+        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(to)));
+        assert_eq!(story.five.borrow().role().command(), Some(Target::Position(at)));
+    }
+}
+
+#[test]
+fn a_read_gives_what_the_node_measures_now() {
+    for is_async in [false, true] {
+        for config in [MasterConfig::direct(), manual()] {
+            let mut story = Story::new(config).discovered();
+            for turn in 0..20 {
+                // An older reading lies about.
+                story.bus.next_event(story.world.now()).unwrap();
+                let (speed, place) = (rps(turn as f32), Position::new(turn, 0));
+                story.two.borrow_mut().role_mut().set_velocity(speed);
+                story.five.borrow_mut().role_mut().set_position(place);
+                // What was on its way before this moment has arrived.
+                let pause = story.world.now() + Duration::from_millis(1);
+                story.bus.run_until(pause, |_, _| {}).unwrap();
+                let mut read = |node| match is_async {
+                    true => story.world.block_on(story.bus.read_async(node)),
+                    false => story.bus.read(node),
+                };
+                assert_eq!(read(NodeId::N2), Ok(Status::Velocity(speed.get())));
+                assert_eq!(read(NodeId::N5), Ok(Status::Position(place)));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_read_does_not_take_an_old_reading_for_the_answer() {
+    let mut story = Story::new(manual()).discovered();
+    story.bus.role_mut().read(NodeId::N2).unwrap();
+    // The answer arrives and waits as an event.
+    for _ in 0..50 {
+        story.bus.service().unwrap();
+        story.world.step(20);
+    }
+    story.two.borrow_mut().role_mut().set_velocity(rps(9.0));
+    assert_eq!(story.bus.read(NodeId::N2), Ok(Status::Velocity(9.0)));
+}
+
+#[test]
+fn stop_and_stop_all_are_on_the_line_when_they_return() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
+        story.bus.set_position(NodeId::N5, Position::new(0, 9)).unwrap();
+        let failed = if is_async {
+            story.world.block_on(story.bus.stop_all_async())
+        } else {
+            story.bus.stop_all()
+        };
+        assert_eq!(failed.unwrap(), []);
+        for _ in 0..50 {
+            story.world.step(20);
+        }
+        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+        let held = Target::Position(Position::new(7, 1));
+        assert_eq!(story.five.borrow().role().command(), Some(held));
+
+        story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
+        if is_async {
+            story.world.block_on(story.bus.stop_async(NodeId::N2)).unwrap();
+        } else {
+            story.bus.stop(NodeId::N2).unwrap();
+        }
+        for _ in 0..50 {
+            story.world.step(20);
+        }
+        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+    }
+}
+
+#[test]
+fn a_command_that_cannot_be_is_refused_with_the_node_and_the_reason() {
+    let mut story = Story::new(MasterConfig::direct()).discovered();
+    let error = story.bus.set_velocity(NodeId::N5, rps(1.0)).unwrap_err();
+    let wrong = CommandError::WrongMode { node: NodeId::N5, mode: Mode::Position };
+    assert_eq!(
+        (error, error.to_string().as_str()),
+        (DriveError::Bus(wrong), "node 5 is in position mode")
+    );
+    let error = story.bus.read(NodeId::N7).unwrap_err();
+    let absent = CommandError::NotOnline { node: NodeId::N7 };
+    assert_eq!(
+        (error, error.to_string().as_str()),
+        (DriveError::Bus(absent), "node 7 is not online")
+    );
+}
+
+#[test]
+fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
+    for is_async in [false, true] {
+        let lost = || {
+            let mut story = Story::new(manual()).discovered();
+            story.two.borrow().port().unplugged.set(true);
+            for _ in 0..2 {
+                assert!(story.bus.read(NodeId::N2).is_err());
+                story.world.step(1000);
+            }
+            // The third READ is on the line, and nothing else can be until its window closes.
+            story.bus.role_mut().read(NodeId::N2).unwrap();
+            story.bus.service().unwrap();
+            assert_eq!(story.bus.role().health(NodeId::N2), Some(Health::Suspect(2)));
+            story
+        };
+        let (mut one, mut other) = (lost(), lost());
+        let (turned, not_stopped) = if is_async {
+            let turned = one.world.block_on(one.bus.set_velocity_async(NodeId::N2, rps(1.0)));
+            (turned, other.world.block_on(other.bus.stop_all_async()))
+        } else {
+            (one.bus.set_velocity(NodeId::N2, rps(1.0)), other.bus.stop_all())
+        };
+        let error = DriveError::Bus(CommandError::NotOnline { node: NodeId::N2 });
+        assert_eq!(turned, Err(error));
+        assert_eq!(not_stopped.unwrap(), [NodeId::N2]);
+    }
+}
+
+#[test]
+fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        while story.bus.poll_event().is_some() {}
+        story.two.borrow_mut().port().unplugged.set(true);
+        let start = story.world.now();
+        let error = if is_async {
+            story.world.block_on(story.bus.read_async(NodeId::N2)).unwrap_err()
+        } else {
+            story.bus.read(NodeId::N2).unwrap_err()
+        };
+        assert_eq!(error, DriveError::ReadFailed { node: NodeId::N2, cause: Cause::Silent });
+        assert_eq!(error.to_string(), "node 2 did not answer: nothing was heard");
+        assert!(story.world.now() - start < Duration::from_millis(10));
+        // What the read was not about has been kept, in order; readings have not.
+        let told: Vec<_> = core::iter::from_fn(|| story.bus.poll_event()).collect();
+        let health = |health| MasterEvent::Health { node: NodeId::N2, health };
+        let expected = [Health::Suspect(1), Health::Suspect(2), Health::Abnormal].map(health);
+        assert_eq!((&told[..], story.bus.lost_events()), (&expected[..], 0));
+    }
+}
+
+#[test]
+fn events_come_in_the_order_in_which_they_happened_whoever_has_kept_them() {
+    let mut story = Story::new(manual()).discovered();
+    story.two.borrow().port().unplugged.set(true);
+    for _ in 0..3 {
+        assert!(story.bus.read(NodeId::N2).is_err());
+        story.world.step(1000);
+    }
+    story.two.borrow().port().unplugged.set(false);
+    while story.bus.role().health(NodeId::N2) != Some(Health::Online) {
+        story.bus.service().unwrap();
+        story.world.step(20);
+    }
+    let told = core::iter::from_fn(|| story.bus.poll_event()).filter_map(|event| match event {
+        MasterEvent::Health { health, .. } => Some(health),
+        _ => None,
+    });
+    let expected = [Health::Suspect(1), Health::Suspect(2), Health::Abnormal, Health::Online];
+    assert_eq!(told.collect::<Vec<_>>(), expected);
+}
+
+#[test]
+fn events_that_find_no_room_are_counted() {
+    let mut story = Story::new(MasterConfig::direct()).discovered();
+    // Node 2 comes and goes, and nobody takes out the news.
+    for _ in 0..10 {
+        story.two.borrow_mut().port().unplugged.set(true);
+        assert!(story.bus.read(NodeId::N2).is_err());
+        story.two.borrow_mut().port().unplugged.set(false);
+        assert_eq!(story.bus.discover().unwrap(), FOUND);
+    }
+    let kept = core::iter::from_fn(|| story.bus.poll_event()).count();
+    assert_eq!(kept, 16);
+    // Three bad news and one good per turn; of the last turn some may still be in the role.
+    assert!(story.bus.lost_events() >= 40 - 16 - 1, "{}", story.bus.lost_events());
+}
+
+#[test]
+fn a_port_that_vanishes_is_an_error_of_every_call() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        let unplugged = story.bus.port().unplugged.clone();
+        unplugged.set(true);
+        let (world, bus) = (&story.world, &mut story.bus);
+        let gone = DriveError::Port(Unplugged);
+        if is_async {
+            assert_eq!(world.block_on(bus.discover_async()), Err(gone));
+            assert_eq!(world.block_on(bus.read_async(NodeId::N2)), Err(gone));
+            assert_eq!(world.block_on(bus.set_velocity_async(NodeId::N2, rps(1.0))), Err(gone));
+            assert_eq!(world.block_on(bus.stop_all_async()), Err(gone));
+        } else {
+            assert_eq!(bus.discover(), Err(gone));
+            assert_eq!(bus.read(NodeId::N2), Err(gone));
+            assert_eq!(bus.set_velocity(NodeId::N2, rps(1.0)), Err(gone));
+            assert_eq!(bus.stop_all(), Err(gone));
+        }
+        // It comes back: the driver goes on, and the last command is the one that counts.
+        unplugged.set(false);
+        assert_eq!(bus.discover(), Ok(FOUND.into_iter().collect()));
+        for _ in 0..50 {
+            world.step(20);
+        }
+        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+    }
+}
+
+#[test]
+fn a_dropped_discovery_made_again_finds_the_same_and_cuts_no_packet() {
+    let mut polls = 0;
+    loop {
+        let mut story = Story::new(manual());
+        (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
+        let done = story.world.poll_times(polls, story.bus.discover_async());
+        let found = match done.clone() {
+            Some(found) => found,
+            None => story.world.block_on(story.bus.discover_async()),
+        };
+        assert_eq!(found.unwrap(), FOUND, "dropped after {polls} polls");
+        for node in [&story.two, &story.five] {
+            assert_eq!(node.borrow().role().counters().skipped(), 0, "after {polls} polls");
+        }
+        if done.is_some() {
+            break;
+        }
+        polls += 1;
+    }
+    assert!(polls > 100, "{polls}");
+}
+
+#[test]
+fn a_dropped_read_or_command_made_again_ends_the_same() {
+    let mut polls = 0;
+    loop {
+        let mut story = Story::new(manual()).discovered();
+        (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
+        let (world, bus) = (&story.world, &mut story.bus);
+        let done = world
+            .poll_times(polls, async {
+                bus.set_velocity_async(NodeId::N2, rps(4.0)).await?;
+                bus.read_async(NodeId::N5).await
+            })
+            .is_some();
+        world.block_on(bus.set_velocity_async(NodeId::N2, rps(4.0))).unwrap();
+        let read = world.block_on(bus.read_async(NodeId::N5));
+        assert_eq!(read, Ok(Status::Position(Position::new(7, 1))), "after {polls} polls");
+        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(rps(4.0))));
+        for node in [&story.two, &story.five] {
+            assert_eq!(node.borrow().role().counters().skipped(), 0, "after {polls} polls");
+        }
+        if done {
+            break;
+        }
+        polls += 1;
+    }
+    assert!(polls > 20, "{polls}");
+}
+
+#[test]
+fn a_slaves_next_command_comes_in_time_or_not_at_all() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let (mut far, near) = End::pair(&world, 20);
+        let mut config = SlaveConfig::direct();
+        config.watchdog = Some(Duration::from_millis(5));
+        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+        let mut driver = Driver::new(slave, near, VirtualClock(world.clone()));
+        let mut next = |deadline| match is_async {
+            true => world.block_on(driver.next_command_async(deadline)),
+            false => driver.next_command(deadline),
+        };
+        assert_eq!(next(Instant::from_millis(2)), Ok(None));
+        assert_eq!(world.now(), Instant::from_millis(2));
+        let write = axlewire::ikeya::WriteRequest::velocity(NodeId::N2, rps(1.5));
+        embedded_io::Write::write(&mut far, write.as_bytes()).unwrap();
+        assert_eq!(next(Instant::from_millis(100)), Ok(Some(Target::Velocity(rps(1.5)))));
+        assert_eq!(world.now(), Instant::from_micros(2160));
+        // Then the watchdog ends the wait, and its event is there.
+        assert_eq!(next(Instant::from_millis(100)), Ok(None));
+        assert_eq!(world.now(), Instant::from_micros(7160));
+        assert_eq!(driver.poll_event(), Some(SlaveEvent::Watchdog));
+    }
+}
+
+#[test]
+fn what_was_not_done_in_time_says_which_node() {
+    let error = DriveError::<Unplugged>::Timeout(Wish::Read { node: NodeId::N3 });
+    assert_eq!(error.to_string(), "node 3 was not read in time");
+}

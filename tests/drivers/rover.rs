@@ -1,0 +1,287 @@
+//! Host and robot, each behind a driver, on one line.
+
+use std::{cell::RefCell, rc::Rc};
+
+use axlewire::{
+    drive::{DriveError, Driver, Wish},
+    time::{Duration, Instant},
+    ucp::{
+        CalibrationKind, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
+        Link, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry,
+    },
+};
+
+use crate::world::{End, Unplugged, VirtualClock, World};
+
+type Rover = Driver<Host, End, VirtualClock>;
+type Far = Rc<RefCell<Driver<Robot, End, VirtualClock>>>;
+
+/// A byte at 115,200 bit/s, microseconds.
+const BYTE_US: u64 = 87;
+
+/// A host and a robot that reports its battery. The robot acts whenever the world does.
+fn story() -> (World, Rover, Far) {
+    let world = World::default();
+    let (near, far) = End::pair(&world, BYTE_US);
+    let mut robot = Robot::new(RobotConfig::default(), world.now());
+    let values = Telemetry { battery_pct: 87, ..Telemetry::default() };
+    robot.set_telemetry(&values, world.now());
+    let robot = Rc::new(RefCell::new(Driver::new(robot, far, VirtualClock(world.clone()))));
+    let actor = robot.clone();
+    world.add(move || {
+        let mut robot = actor.borrow_mut();
+        if !robot.port().unplugged.get() {
+            robot.service().unwrap();
+        }
+    });
+    let host = Host::new(HostConfig::default(), world.now());
+    let rover = Driver::new(host, near, VirtualClock(world.clone()));
+    (world, rover, robot)
+}
+
+fn after(world: &World, millis: u32) -> Instant {
+    world.now() + Duration::from_millis(millis)
+}
+
+#[test]
+fn a_ping_comes_back_with_its_round_trip() {
+    for is_async in [false, true] {
+        let (world, mut rover, _) = story();
+        let deadline = after(&world, 700);
+        let trip = if is_async {
+            world.block_on(rover.ping_async(deadline))
+        } else {
+            rover.ping(deadline)
+        };
+        // 8 bytes there, 9 back, and up to a report in front of the pong.
+        let micros = u64::from(trip.unwrap().as_micros());
+        assert!((17 * BYTE_US..70 * BYTE_US).contains(&micros), "{micros}");
+        assert_eq!(rover.role().link(), Link::Up);
+        // What the ping was not about has been kept.
+        assert_eq!(rover.poll_event(), Some(HostEvent::LinkUp));
+    }
+}
+
+#[test]
+fn a_pong_from_before_is_not_the_answer_to_a_ping() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        for _ in 0..500 {
+            rover.service().unwrap();
+            world.step(20);
+        }
+        assert_eq!(rover.role().stats().round_trip.count(), 1);
+        robot.borrow().port().unplugged.set(true);
+        let deadline = after(&world, 700);
+        let pong = if is_async {
+            world.block_on(rover.ping_async(deadline))
+        } else {
+            rover.ping(deadline)
+        };
+        assert_eq!(pong, Err(DriveError::Timeout(Wish::Ping)));
+    }
+}
+
+#[test]
+fn a_robot_that_never_answers_is_a_timeout_and_a_lost_link() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        robot.borrow_mut().port().unplugged.set(true);
+        let deadline = after(&world, 700);
+        let error = if is_async {
+            world.block_on(rover.ping_async(deadline)).unwrap_err()
+        } else {
+            rover.ping(deadline).unwrap_err()
+        };
+        assert_eq!(error, DriveError::Timeout(Wish::Ping));
+        assert_eq!(error.to_string(), "the robot did not answer a ping in time");
+        assert_eq!(world.now(), deadline);
+        assert_eq!(rover.poll_event(), Some(HostEvent::LinkDown));
+    }
+}
+
+#[test]
+fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        let commanded = || robot.borrow().role().command(world.now());
+        if is_async {
+            world.block_on(rover.drive_async(60, -20)).unwrap();
+        } else {
+            rover.drive(60, -20).unwrap();
+        }
+        for _ in 0..200 {
+            world.step(20);
+        }
+        assert_eq!((commanded().speed(), commanded().angular()), (60, -20));
+        // Without the driver being called again.
+        if is_async {
+            world.block_on(rover.stop_async()).unwrap();
+        } else {
+            rover.stop().unwrap();
+        }
+        for _ in 0..200 {
+            world.step(20);
+        }
+        assert_eq!((commanded().speed(), commanded().angular()), (0, 0));
+    }
+}
+
+#[test]
+fn driving_leaves_the_lamp_as_it_is() {
+    let (world, mut rover, _) = story();
+    let lit = MotorControl::new(10, 0).unwrap().with_front_led(true);
+    rover.role_mut().drive(lit, world.now()).unwrap();
+    rover.drive(20, 0).unwrap();
+    assert_eq!(
+        rover.role().command(),
+        Some(MotorControl::new(20, 0).unwrap().with_front_led(true))
+    );
+}
+
+#[test]
+fn a_command_out_of_range_is_refused_and_the_one_before_stays() {
+    let (_, mut rover, _) = story();
+    rover.drive(20, 0).unwrap();
+    let error = rover.drive(101, 0).unwrap_err();
+    assert!(matches!(error, DriveError::Rover(CommandError::Value(_))), "{error:?}");
+    assert_eq!(error.to_string(), "motor command is out of range");
+    assert_eq!(rover.role().command(), Some(MotorControl::new(20, 0).unwrap()));
+}
+
+#[test]
+fn reports_come_one_by_one_and_in_time() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        for index in 0..10 {
+            let deadline = after(&world, 25);
+            let report = if is_async {
+                world.block_on(rover.next_report_async(deadline))
+            } else {
+                rover.next_report(deadline)
+            };
+            let report = report.unwrap().unwrap();
+            assert_eq!((report.index, report.lost, report.telemetry.battery_pct), (index, 0, 87));
+        }
+        robot.borrow_mut().port().unplugged.set(true);
+        let deadline = after(&world, 25);
+        let none = if is_async {
+            world.block_on(rover.next_report_async(deadline))
+        } else {
+            rover.next_report(deadline)
+        };
+        assert_eq!((none, world.now()), (Ok(None), deadline));
+    }
+}
+
+#[test]
+fn a_calibration_is_begun_and_ended_when_the_calls_return() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        let kind = CalibrationKind::Magnetometer;
+        let deadline = after(&world, 1000);
+        if is_async {
+            world.block_on(rover.start_calibration_async(kind, deadline)).unwrap();
+        } else {
+            rover.start_calibration(kind, deadline).unwrap();
+        }
+        assert_eq!(robot.borrow().role().calibrating(), Some(kind));
+        if is_async {
+            world.block_on(rover.end_calibration_async(kind, deadline)).unwrap();
+        } else {
+            rover.end_calibration(kind, deadline).unwrap();
+        }
+        assert_eq!(robot.borrow().role().calibrating(), None);
+    }
+}
+
+#[test]
+fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        robot.borrow_mut().port().unplugged.set(true);
+        let kind = CalibrationKind::Imu;
+        let bound = world.now() + HostConfig::default().calibration_bound();
+        let deadline = bound + Duration::from_millis(100);
+        let error = if is_async {
+            world.block_on(rover.start_calibration_async(kind, deadline)).unwrap_err()
+        } else {
+            rover.start_calibration(kind, deadline).unwrap_err()
+        };
+        let DriveError::Calibration(failure) = error else { panic!("{error:?}") };
+        assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
+        assert_eq!(error.to_string(), "calibration of Imu was not begun: no answer to 3 requests");
+        assert!(world.now() < deadline);
+        // With a deadline before that, the deadline counts.
+        let deadline = after(&world, 50);
+        let error = if is_async {
+            world.block_on(rover.end_calibration_async(kind, deadline)).unwrap_err()
+        } else {
+            rover.end_calibration(kind, deadline).unwrap_err()
+        };
+        assert_eq!((error, world.now()), (DriveError::Timeout(Wish::Calibration), deadline));
+    }
+}
+
+#[test]
+fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let (near, far) = End::pair(&world, BYTE_US);
+        let mut host = Host::new(HostConfig::default(), world.now());
+        let command = MotorControl::new(30, 5).unwrap();
+        host.drive(command, world.now()).unwrap();
+        let mut host = Driver::new(host, near, VirtualClock(world.clone()));
+        host.service().unwrap();
+        let robot = Robot::new(RobotConfig::default(), world.now());
+        let mut robot = Driver::new(robot, far, VirtualClock(world.clone()));
+        let mut next = |deadline| match is_async {
+            true => world.block_on(robot.next_command_async(deadline)),
+            false => robot.next_command(deadline),
+        };
+        assert_eq!(next(Instant::from_millis(100)), Ok(Some(command)));
+        assert_eq!(next(Instant::from_millis(100)), Ok(None));
+        assert_eq!(world.now(), Instant::from_millis(100));
+        assert_eq!(next(Instant::from_millis(1000)), Ok(Some(MotorControl::STOP)));
+        assert!(world.now() < Instant::from_millis(510));
+        assert_eq!(robot.poll_event(), None::<RobotEvent>);
+    }
+}
+
+#[test]
+fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
+    let (world, mut rover, _) = story();
+    rover.port().unplugged.set(true);
+    let gone = DriveError::Port(Unplugged);
+    let deadline = after(&world, 1000);
+    assert_eq!(rover.ping(deadline), Err(gone));
+    assert_eq!(rover.drive(10, 0), Err(gone));
+    assert_eq!(rover.stop(), Err(gone));
+    assert_eq!(rover.next_report(deadline), Err(gone));
+    assert_eq!(world.block_on(rover.ping_async(deadline)), Err(gone));
+    assert_eq!(world.block_on(rover.drive_async(10, 0)), Err(gone));
+    assert_eq!(world.block_on(rover.stop_async()), Err(gone));
+    assert_eq!(world.block_on(rover.next_report_async(deadline)), Err(gone));
+    assert_eq!(world.now(), Instant::from_micros(0));
+}
+
+#[test]
+fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
+    let mut polls = 0;
+    loop {
+        let (world, mut rover, robot) = story();
+        (rover.port_mut().most, rover.port_mut().stutters) = (1, true);
+        rover.role_mut().drive(MotorControl::new(10, 0).unwrap(), world.now()).unwrap();
+        let deadline = after(&world, 2000);
+        let done = world.poll_times(polls, rover.ping_async(deadline)).is_some();
+        world.block_on(rover.ping_async(deadline)).unwrap();
+        assert_eq!(robot.borrow().role().line().skipped(), 0, "dropped after {polls} polls");
+        assert_eq!(rover.role().line().skipped(), 0, "dropped after {polls} polls");
+        assert_eq!(rover.role().stats().reports_lost, 0);
+        if done {
+            break;
+        }
+        polls += 1;
+    }
+    assert!(polls > 100, "{polls}");
+}

@@ -1,0 +1,239 @@
+//! Ports and clocks in virtual time, for the tests of the drivers.
+
+use std::{
+    cell::{Cell, RefCell},
+    collections::VecDeque,
+    future::{Future, poll_fn},
+    pin::{Pin, pin},
+    rc::Rc,
+    task::{Context, Poll, Waker},
+};
+
+use axlewire::{drive::Clock, time::Instant};
+
+/// The port was pulled out.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) struct Unplugged;
+
+impl core::fmt::Display for Unplugged {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("unplugged")
+    }
+}
+
+impl core::error::Error for Unplugged {}
+
+impl embedded_io::Error for Unplugged {
+    fn kind(&self) -> embedded_io::ErrorKind {
+        embedded_io::ErrorKind::NotConnected
+    }
+}
+
+type Actor = Box<dyn FnMut()>;
+
+/// Time, and who else lives in it.
+#[derive(Clone, Default)]
+pub(crate) struct World {
+    micros: Rc<Cell<u64>>,
+    actors: Rc<RefCell<Vec<Actor>>>,
+}
+
+impl World {
+    pub(crate) fn now(&self) -> Instant {
+        Instant::from_micros(self.micros.get())
+    }
+
+    pub(crate) fn add(&self, actor: impl FnMut() + 'static) {
+        self.actors.borrow_mut().push(Box::new(actor));
+    }
+
+    /// Lets time pass and everybody act.
+    pub(crate) fn step(&self, micros: u64) {
+        self.micros.set(self.micros.get() + micros);
+        for actor in &mut *self.actors.borrow_mut() {
+            actor();
+        }
+    }
+
+    /// Runs a future to its end, which has to come within a minute of virtual time.
+    pub(crate) fn block_on<T>(&self, future: impl Future<Output = T>) -> T {
+        let mut future = pin!(future);
+        for _ in 0..3_000_000 {
+            if let Poll::Ready(output) = poll(future.as_mut()) {
+                return output;
+            }
+            self.step(20);
+        }
+        panic!("hangs");
+    }
+
+    /// Polls a future so many times, then drops it.
+    pub(crate) fn poll_times<T>(&self, times: usize, future: impl Future<Output = T>) -> Option<T> {
+        let mut future = pin!(future);
+        for _ in 0..times {
+            if let Poll::Ready(output) = poll(future.as_mut()) {
+                return Some(output);
+            }
+            self.step(20);
+        }
+        None
+    }
+}
+
+pub(crate) fn poll<T>(future: Pin<&mut impl Future<Output = T>>) -> Poll<T> {
+    future.poll(&mut Context::from_waker(Waker::noop()))
+}
+
+/// Whoever idles by this clock lets the others act.
+#[derive(Clone, Default)]
+pub(crate) struct VirtualClock(pub(crate) World);
+
+impl Clock for VirtualClock {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn idle_until(&mut self, until: Instant) {
+        // At least one, so that nobody idles for ever at one moment.
+        self.0.step(u64::from((until - self.0.now()).as_micros()).clamp(1, 20));
+    }
+}
+
+impl embedded_hal_async::delay::DelayNs for VirtualClock {
+    async fn delay_ns(&mut self, ns: u32) {
+        let world = self.0.clone();
+        let end = world.micros.get() + u64::from(ns).div_ceil(1000);
+        poll_fn(|_| if world.micros.get() >= end { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+}
+
+/// Bytes on their way, each with the time at which it arrives.
+pub(crate) type Wire = Rc<RefCell<VecDeque<(u64, u8)>>>;
+
+/// One end of a line: what it sends, all the others receive.
+pub(crate) struct End {
+    world: World,
+    pub(crate) inbox: Wire,
+    pub(crate) outboxes: Vec<Wire>,
+    /// Time of a byte on the line, microseconds.
+    byte_us: u64,
+    /// Bytes taken per write at the most.
+    pub(crate) most: usize,
+    /// Async writes and flushes are ready at the second poll only.
+    pub(crate) stutters: bool,
+    pub(crate) unplugged: Rc<Cell<bool>>,
+}
+
+impl End {
+    pub(crate) fn new(world: &World, byte_us: u64) -> Self {
+        Self {
+            world: world.clone(),
+            inbox: Wire::default(),
+            outboxes: vec![],
+            byte_us,
+            most: usize::MAX,
+            stutters: false,
+            unplugged: Rc::default(),
+        }
+    }
+
+    /// Two ends, each the other's.
+    pub(crate) fn pair(world: &World, byte_us: u64) -> (Self, Self) {
+        let (mut one, mut other) = (Self::new(world, byte_us), Self::new(world, byte_us));
+        one.outboxes.push(other.inbox.clone());
+        other.outboxes.push(one.inbox.clone());
+        (one, other)
+    }
+
+    fn is_plugged(&self) -> Result<(), Unplugged> {
+        if self.unplugged.get() { Err(Unplugged) } else { Ok(()) }
+    }
+
+    fn has_arrived(&self) -> bool {
+        self.inbox.borrow().front().is_some_and(|&(at, _)| at <= self.world.micros.get())
+    }
+
+    fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        self.is_plugged()?;
+        assert!(self.has_arrived(), "read without a byte would block for ever");
+        let mut count = 0;
+        for slot in buffer {
+            if !self.has_arrived() {
+                break;
+            }
+            *slot = self.inbox.borrow_mut().pop_front().unwrap().1;
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    fn take(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.is_plugged()?;
+        let count = buffer.len().min(self.most);
+        for outbox in &self.outboxes {
+            let mut outbox = outbox.borrow_mut();
+            for &byte in &buffer[..count] {
+                let free = outbox.back().map_or(0, |&(at, _)| at).max(self.world.micros.get());
+                outbox.push_back((free + self.byte_us, byte));
+            }
+        }
+        Ok(count)
+    }
+
+    async fn stutter(&self) {
+        let mut ready = !self.stutters;
+        poll_fn(
+            |_| if core::mem::replace(&mut ready, true) { Poll::Ready(()) } else { Poll::Pending },
+        )
+        .await;
+    }
+}
+
+impl embedded_io::ErrorType for End {
+    type Error = Unplugged;
+}
+
+impl embedded_io::ReadReady for End {
+    fn read_ready(&mut self) -> Result<bool, Unplugged> {
+        self.is_plugged()?;
+        Ok(self.has_arrived())
+    }
+}
+
+impl embedded_io::Read for End {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        self.give(buffer)
+    }
+}
+
+impl embedded_io::Write for End {
+    fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.take(buffer)
+    }
+
+    fn flush(&mut self) -> Result<(), Unplugged> {
+        self.is_plugged()
+    }
+}
+
+impl embedded_io_async::Read for End {
+    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        poll_fn(|_| match self.is_plugged() {
+            Ok(()) if !self.has_arrived() => Poll::Pending,
+            _ => Poll::Ready(self.give(buffer)),
+        })
+        .await
+    }
+}
+
+impl embedded_io_async::Write for End {
+    async fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.stutter().await;
+        self.take(buffer)
+    }
+
+    async fn flush(&mut self) -> Result<(), Unplugged> {
+        self.stutter().await;
+        self.is_plugged()
+    }
+}
