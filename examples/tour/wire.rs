@@ -1,6 +1,6 @@
-//! The first thing to run: a capture of each protocol, decoded with its noise, and one packet of
-//! each kind, built. No hardware, no arguments: `cargo run --example tour`.
+//! First act: a capture of each protocol, decoded with its noise, and one packet of each kind, built.
 
+use crate::title;
 use axlewire::{
     error::EncodeError,
     ikeya::{self, NodeId, Packet, Position, Request, Response, Rps, three},
@@ -11,21 +11,19 @@ use axlewire::{
 /// What is shown of a frame: its length, its name and its meaning.
 type Line = (usize, &'static str, String);
 
-fn main() -> Result<(), EncodeError> {
-    title("Ikeya MD: a master finds its motors, over an RS485 line with noise");
-    decode::<ikeya::Either>(include_bytes!("captures/ikeya.bin"), ikeya_line);
+pub(crate) fn decode_captures() {
+    title("Ikeya MD: a capture of an RS485 line with noise");
+    decode::<ikeya::Either>(include_bytes!("../captures/ikeya.bin"), ikeya_line);
 
-    title("UCP: a rover boots, drives, reports and is calibrated, over a UART with noise");
-    decode::<Ucp>(include_bytes!("captures/ucp.bin"), ucp_line);
+    title("UCP: a capture of a rover's UART with noise");
+    decode::<Ucp>(include_bytes!("../captures/ucp.bin"), ucp_line);
+}
 
+pub(crate) fn build_packets() -> Result<(), EncodeError> {
     title("One packet of each kind, built");
     build_ikeya()?;
     println!();
     build_ucp()
-}
-
-fn title(text: &str) {
-    println!("\n{text}\n{}\n", "─".repeat(text.chars().count()));
 }
 
 /// Feeds a capture in pieces of 10 bytes, as a serial port would, and prints what comes out.
