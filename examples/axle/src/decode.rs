@@ -14,6 +14,7 @@ use clap::ValueEnum;
 
 use crate::{
     EXIT_CODES,
+    args::Protocol,
     failure::Failure,
     human,
     input::{self, Input},
@@ -45,17 +46,6 @@ pub(crate) struct Args {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Protocol {
-    /// Linux board and robot of a rover
-    Ucp,
-    /// Motor bus, one motor a board
-    Ikeya,
-    /// Motor bus, three motors a board
-    #[value(name = "ikeya-3")]
-    Ikeya3,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Direction {
     /// What the master sends
     ToSlave,
@@ -79,16 +69,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
     };
     let input = Input::open(args.file.as_deref())?;
-    let number = match args.protocol {
-        Protocol::Ucp => "index",
-        Protocol::Ikeya | Protocol::Ikeya3 => "node",
+    let style = match args.json {
+        true => Style::Json,
+        false => Style::Human(human::Listing::new(args.protocol.number())),
     };
-    let style = if args.json { Style::Json } else { Style::Human(human::Listing::new(number)) };
     decode(input, Listing::new(style))
 }
 
 /// Room for the longest frame of any framing here.
-const BUFFER_LEN: usize = ucp::MAX_LEN;
+pub(crate) const BUFFER_LEN: usize = ucp::MAX_LEN;
 
 fn decode<F>(mut input: Input, mut listing: Listing) -> Result<(), Failure>
 where

@@ -20,6 +20,12 @@ pub(crate) enum Failure {
     Read { path: Option<PathBuf>, error: io::Error },
     /// The output broke off.
     Write(io::Error),
+    /// The port cannot be used.
+    Port { path: String, cause: String },
+    /// The port was good and is no more; what that means for what moves, if anything does.
+    PortLost { path: String, cause: String, moving: Option<String> },
+    /// What was to be done did not come about.
+    Undone(String),
 }
 
 impl Failure {
@@ -30,6 +36,16 @@ impl Failure {
         let words: Vec<_> = paragraph.split_whitespace().collect();
         let line = words.join(" ");
         Self::Usage(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
+    }
+
+    /// The same, happening while something moves: a lost port then says what becomes of that.
+    pub(crate) fn while_moving(self, consequence: &str) -> Self {
+        match self {
+            Self::PortLost { path, cause, .. } => {
+                Self::PortLost { path, cause, moving: Some(consequence.to_owned()) }
+            }
+            other => other,
+        }
     }
 
     /// Tells the user, and gives the exit code.
@@ -53,12 +69,19 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(line) => f.write_str(line),
+            Self::Usage(line) | Self::Undone(line) => f.write_str(line),
             Self::Open { path, error } => write!(f, "cannot open {path:?}: {error}"),
             Self::Directory { path } => write!(f, "cannot read {path:?}: it is a directory"),
             Self::Read { path: Some(path), error } => write!(f, "cannot read {path:?}: {error}"),
             Self::Read { path: None, error } => write!(f, "cannot read standard input: {error}"),
             Self::Write(error) => write!(f, "cannot write the output: {error}"),
+            Self::Port { path, cause } => write!(f, "cannot use port {path:?}: {cause}"),
+            Self::PortLost { path, cause, moving: None } => {
+                write!(f, "port {path:?} has failed: {cause}")
+            }
+            Self::PortLost { path, cause, moving: Some(consequence) } => {
+                write!(f, "port {path:?} has failed: {cause}; {consequence}")
+            }
         }
     }
 }

@@ -58,6 +58,16 @@ fn print_frame(out: &mut impl Write, offset: u64, frame: &Frame<'_>) -> io::Resu
     writeln!(out)
 }
 
+/// What a frame says, without its name.
+pub(crate) fn contents(frame: &Frame<'_>) -> String {
+    let mut text = Vec::new();
+    let written = match frame {
+        Frame::Ikeya(frame) => ikeya::contents(&mut text, &frame.fields),
+        Frame::Ucp(frame) => ucp::contents(&mut text, frame.id, &frame.fields),
+    };
+    written.map_or_else(|_| String::new(), |()| String::from_utf8_lossy(&text).trim().to_owned())
+}
+
 /// The columns that all lines have; the longest message name has 21 letters.
 fn row(
     out: &mut impl Write,
@@ -80,7 +90,12 @@ const fn explain(reason: Reason) -> &'static str {
     }
 }
 
-fn print_summary(out: &mut impl Write, summary: &Summary, events: bool) -> io::Result<()> {
+/// Prints where every byte went.
+pub(crate) fn print_summary(
+    out: &mut impl Write,
+    summary: &Summary,
+    events: bool,
+) -> io::Result<()> {
     let Summary { received, framed, skipped, pending, frames, counters } = summary;
     if *received == 0 {
         return writeln!(out, "The input is empty: 0 bytes received, 0 frames.");

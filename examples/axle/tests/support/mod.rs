@@ -1,6 +1,8 @@
 //! Runs the real binary, and builds captures whose events are known beforehand.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod process;
+
 use std::{
     fs,
     io::Write,

@@ -1,0 +1,130 @@
+//! `axle scan`: who is on a motor bus.
+
+use std::io::{self, Write};
+
+use axlewire::ikeya::{DipSwitch, IdReading, Mode, NodeId, Status};
+use serde::Serialize;
+
+use crate::{
+    EXIT_CODES,
+    bus::{self, Bus, Measured},
+    ctrl_c::CtrlC,
+    failure::Failure,
+    record::ikeya::{Fields, Motors, Positions, Rps},
+};
+
+/// List the nodes of a motor bus
+///
+/// Asks ids 1 to 8 for their status, silent ones three times; nothing moves. A node's DIP switch is
+/// shown in both readings, because the protocol document has two: compare one board with both
+/// columns and you know which one its maker meant. Finding no node is no failure.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    bus: bus::MasterArgs,
+
+    /// Print one JSON object per line
+    #[arg(long)]
+    json: bool,
+}
+
+/// One line of output.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "lowercase")]
+enum Record {
+    /// A node that has answered.
+    Node {
+        node: NodeId,
+        mode: Mode,
+        #[serde(flatten)]
+        status: Fields<'static>,
+        dip: Dip,
+    },
+    /// An id that something damaged came from.
+    Damaged { node: NodeId },
+    /// The end.
+    Summary { nodes: usize, damaged: usize },
+}
+
+/// The four digits of a node's DIP switch under both readings (ruling I2).
+#[derive(Debug, Serialize)]
+struct Dip {
+    value_plus_one: Option<String>,
+    value: Option<String>,
+}
+
+impl Dip {
+    fn of(node: NodeId, mode: Mode) -> Self {
+        let digits = |reading| {
+            let is_it = |dip: &DipSwitch| dip.mode() == mode && dip.node_id(reading) == Ok(node);
+            let dip = (0..16).filter_map(|bits| DipSwitch::from_bits(bits).ok()).find(is_it)?;
+            Some(format!("{:04b}", dip.bits()))
+        };
+        Self { value_plus_one: digits(IdReading::ValuePlusOne), value: digits(IdReading::Value) }
+    }
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let ctrl_c = CtrlC::listen()?;
+    let mut bus = Bus::open(&args.bus)?;
+    if !bus.discover(&ctrl_c)? {
+        return Err(Failure::Undone("interrupted before all ids were asked".to_owned()));
+    }
+    let print = if args.json { print_json } else { print_table };
+    print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)
+}
+
+/// Ids that have not answered, though bytes came when they were asked.
+fn damaged(bus: &Bus) -> Vec<NodeId> {
+    let is_damaged = |node: &NodeId| {
+        bus.status(*node).is_none() && bus.master.node_statistics(*node).crc_errors > 0
+    };
+    NodeId::ALL.into_iter().filter(is_damaged).collect()
+}
+
+fn print_json(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
+    let nodes = bus.nodes().map(|(node, mode, status)| {
+        let status = match status {
+            Status::Velocity(rps) => Fields::Velocity { rps: Motors::One(Rps(rps)) },
+            Status::Position(position) => Fields::Position(Positions(Motors::One(position))),
+        };
+        Record::Node { node, mode, status, dip: Dip::of(node, mode) }
+    });
+    let damaged = damaged(bus);
+    let summary = Record::Summary { nodes: bus.nodes().count(), damaged: damaged.len() };
+    let damaged = damaged.into_iter().map(|node| Record::Damaged { node });
+    for record in nodes.chain(damaged).chain([summary]) {
+        serde_json::to_writer(&mut *out, &record)?;
+        writeln!(out)?;
+    }
+    out.flush()
+}
+
+fn print_table(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
+    let count = bus.nodes().count();
+    if count > 0 {
+        writeln!(out, "node  mode      DIP, id = value + 1  DIP, id = value  status")?;
+    }
+    for (node, mode, status) in bus.nodes() {
+        let Dip { value_plus_one, value } = Dip::of(node, mode);
+        let [first, second] = [value_plus_one, value].map(|it| it.unwrap_or("none".to_owned()));
+        writeln!(out, "{node:>4}  {mode:<8}  {first:<19}  {second:<15}  {}", Measured(status))?;
+    }
+    let damaged = damaged(bus);
+    for node in &damaged {
+        writeln!(out, "id {node}: only damaged answers: noise, two boards, or another --baud")?;
+    }
+    let (path, baud) = (bus.port.path(), bus.baud);
+    match (count, damaged.is_empty()) {
+        (0, true) => writeln!(
+            out,
+            "No node answers on {path:?} at {baud} bit/s: power? wires A and B? --baud?"
+        ),
+        (0, false) => writeln!(out, "No node answers on {path:?} at {baud} bit/s undamaged."),
+        (1, _) => writeln!(out, "1 node answers."),
+        (count, _) => writeln!(out, "{count} nodes answer."),
+    }?;
+    out.flush()
+}

@@ -1,0 +1,176 @@
+//! Motors on a bus.
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{Mode, NodeId, Slave, SlaveConfig, SlaveEvent, Target},
+    sim::{Motor, MotorNode},
+    time::{Duration, Instant},
+};
+
+use super::{Faults, pty::Pty, say};
+use crate::{EXIT_CODES, args, ctrl_c::CtrlC, failure::Failure, port::Line};
+
+/// Motors on a bus: they answer, and turn as they are told
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(super) struct Args {
+    /// A node and its mode, such as 1:velocity or 3:position; once for each
+    #[arg(long = "node", value_name = "N:MODE", required = true, value_parser = node)]
+    nodes: Vec<(NodeId, Mode)>,
+
+    /// Stop a motor that gets no command for so long; without it, it goes on for ever, as the
+    /// protocol has it
+    #[arg(long, value_name = "SECONDS", value_parser = args::seconds)]
+    watchdog: Option<u64>,
+
+    #[command(flatten)]
+    faults: Faults,
+}
+
+fn node(text: &str) -> Result<(NodeId, Mode), String> {
+    let (node, mode) =
+        text.split_once(':').ok_or("a node is written N:MODE, as in 1:velocity".to_owned())?;
+    let mode = match mode {
+        "velocity" => Mode::Velocity,
+        "position" => Mode::Position,
+        _ => return Err("a mode is velocity or position".to_owned()),
+    };
+    Ok((args::node(node)?, mode))
+}
+
+/// Time to 63 % of a new speed: slow enough to be watched.
+const TIME_CONSTANT: Duration = Duration::from_millis(150);
+
+/// Slower than this is standing still, and closer than this is there.
+const STILL_RPS: f32 = 0.005;
+
+/// How often the motors are looked at.
+const STEP: Duration = Duration::from_millis(20);
+
+/// Runs the subcommand.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let mut nodes = Nodes(Vec::new());
+    for &(node, mode) in &args.nodes {
+        if nodes.0.iter().any(|other| other.motor.slave().node() == node) {
+            return Err(Failure::Usage(format!("node {node} is given twice")));
+        }
+        nodes.0.push(Node::new(node, mode, args.watchdog));
+    }
+    let ctrl_c = CtrlC::listen()?;
+    let mut pty = Pty::open(args.faults)?;
+    while !ctrl_c.is_pressed() {
+        let until = pty.now() + STEP;
+        pty.round(&mut nodes, until)?;
+        let now = pty.now();
+        nodes.handle_input(&[], now);
+        while let Some(line) = nodes.poll_event() {
+            say(now, &line)?;
+        }
+        for node in &mut nodes.0 {
+            if let Some(line) = node.arrival() {
+                say(now, &line)?;
+            }
+        }
+    }
+    for node in &nodes.0 {
+        let slave = node.motor.slave();
+        let (id, seen) = (slave.node(), slave.statistics());
+        let line = format!(
+            "node {id}: {} READ, {} WRITE, {} answers",
+            seen.reads, seen.writes, seen.replies
+        );
+        say(pty.now(), &line)?;
+    }
+    Ok(())
+}
+
+/// A node, and what has been said of it.
+struct Node {
+    motor: MotorNode,
+    /// The command that was printed last.
+    told: Option<Target>,
+    /// It has not yet done what it was told.
+    is_under_way: bool,
+}
+
+impl Node {
+    fn new(node: NodeId, mode: Mode, watchdog: Option<u64>) -> Self {
+        let mut config = SlaveConfig::usb_adapter();
+        config.watchdog =
+            watchdog.map(|micros| Duration::from_micros(micros.try_into().unwrap_or(u32::MAX)));
+        let slave = Slave::new(node, mode, config);
+        let motor = Motor::new().with_time_constant(TIME_CONSTANT);
+        Self { motor: MotorNode::from_parts(slave, motor), told: None, is_under_way: false }
+    }
+
+    /// A line for what is new; a command is repeated many times a second.
+    fn describe(&mut self, event: SlaveEvent) -> Option<String> {
+        let node = self.motor.slave().node();
+        let told = match event {
+            SlaveEvent::Command(target) => Some(target),
+            _ => None,
+        };
+        if told.is_some() && told == self.told {
+            return None;
+        }
+        (self.told, self.is_under_way) = (told, true);
+        Some(match told {
+            Some(Target::Velocity(rps)) => format!("node {node}: command {:.2} rps", rps.get()),
+            Some(Target::Position(position)) => {
+                format!("node {node}: command {:.4} turns", position.revolutions())
+            }
+            None => format!("node {node}: watchdog, no command any more"),
+        })
+    }
+
+    /// A line when the motor has come to what it was told.
+    fn arrival(&mut self) -> Option<String> {
+        let (node, motor) = (self.motor.slave().node(), self.motor.motor());
+        let (now, at) = (motor.velocity().get(), motor.position());
+        let is_there = match self.told {
+            Some(Target::Velocity(rps)) => (now - rps.get()).abs() < STILL_RPS,
+            Some(Target::Position(position)) => at.counts() == position.counts(),
+            None => now.abs() < STILL_RPS,
+        };
+        if !self.is_under_way || !is_there {
+            return None;
+        }
+        self.is_under_way = false;
+        Some(match self.told {
+            Some(Target::Velocity(rps)) if rps.get().abs() >= STILL_RPS => {
+                format!("node {node}: turns at {now:.2} rps")
+            }
+            _ => format!("node {node}: stands still at {:.4} turns", at.revolutions()),
+        })
+    }
+}
+
+/// All nodes hear everything, and each says what it has to.
+struct Nodes(Vec<Node>);
+
+impl Endpoint for Nodes {
+    type Event = String;
+
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.0.iter_mut().for_each(|node| node.motor.handle_input(bytes, now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.0.iter_mut().for_each(|node| node.motor.handle_timeout(now));
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
+        self.0.iter_mut().find_map(|node| node.motor.poll_transmit(now))
+    }
+
+    fn poll_event(&mut self) -> Option<String> {
+        self.0.iter_mut().find_map(|node| {
+            let event = node.motor.poll_event()?;
+            node.describe(event)
+        })
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.0.iter().filter_map(|node| node.motor.poll_timeout()).min()
+    }
+}

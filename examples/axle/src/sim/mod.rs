@@ -1,0 +1,60 @@
+//! `axle sim`: what hangs on a line, played on a pseudo-terminal.
+
+mod ikeya;
+mod pty;
+mod ucp;
+
+use std::io::{self, Write};
+
+use axlewire::time::Instant;
+
+use crate::{EXIT_CODES, failure::Failure};
+
+/// Play motors or a rover on a pseudo-terminal
+///
+/// The first line of the output is `pty: PATH`: use that path as the --port of another program. The
+/// lines that follow say what happens, until Ctrl-C.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES, arg_required_else_help = false)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    Ikeya(ikeya::Args),
+    Ucp(ucp::Args),
+}
+
+/// What is wrong with the line.
+#[derive(Clone, Copy, Debug, clap::Args)]
+struct Faults {
+    /// Wrong bits, from 0 (none) to 1 (all), in both directions; 1e-4 is one in 10,000
+    #[arg(long, value_name = "RATE", default_value = "0", value_parser = rate)]
+    noise: f64,
+
+    /// Where the noise begins: the same seed and the same bytes, the same wrong bits
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let rate: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err(format!("{rate} is not within 0..=1")) }
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    match &args.what {
+        What::Ikeya(args) => ikeya::run(args),
+        What::Ucp(args) => ucp::run(args),
+    }
+}
+
+/// One line, with the time in front.
+fn say(now: Instant, what: &str) -> Result<(), Failure> {
+    let seconds = now.as_micros() as f64 / 1e6;
+    let mut out = io::stdout().lock();
+    writeln!(out, "{seconds:8.2} s  {what}").and_then(|()| out.flush()).map_err(Failure::Write)
+}

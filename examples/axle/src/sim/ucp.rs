@@ -1,0 +1,99 @@
+//! A rover.
+
+use axlewire::{
+    endpoint::Endpoint,
+    sim::Rover,
+    time::Duration,
+    ucp::{CalibrationKind, ImuBias, MagBias, MotorControl, Robot, RobotConfig, RobotEvent},
+};
+
+use super::{Faults, pty::Pty, say};
+use crate::{EXIT_CODES, ctrl_c::CtrlC, failure::Failure, port::Line};
+
+/// A rover: it reports, drives as it is told, and stops when it is told nothing
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(super) struct Args {
+    #[command(flatten)]
+    faults: Faults,
+}
+
+/// How often the rover is looked at: it reports every 20 ms.
+const STEP: Duration = Duration::from_millis(10);
+
+/// Runs the subcommand.
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let ctrl_c = CtrlC::listen()?;
+    let mut pty = Pty::open(args.faults)?;
+    let mut last = pty.now();
+    let (mut robot, mut rover) = (Robot::new(RobotConfig::default(), last), Rover::new());
+    let mut is_moving = false;
+    while !ctrl_c.is_pressed() {
+        let until = pty.now() + STEP;
+        pty.round(&mut robot, until)?;
+        let now = pty.now();
+        while let Some(event) = robot.poll_event() {
+            if let Some(line) = react(&mut robot, event, now) {
+                say(now, &line)?;
+            }
+        }
+        rover.step(now - last);
+        rover.command(&robot.command(now));
+        robot.set_telemetry(&rover.telemetry(), now);
+        last = now;
+
+        let was_moving = is_moving;
+        is_moving = rover.telemetry().rpm != [0; 4];
+        if is_moving && !was_moving {
+            say(now, "moves")?;
+        }
+        if was_moving && !is_moving {
+            let (way, heading) = (rover.distance_m(), rover.heading_deg());
+            say(now, &format!("stands still after {way:.2} m, heading {heading:.0} deg"))?;
+        }
+    }
+    let seen = robot.stats();
+    let line =
+        format!("{} commands, {} pings, {} reports", seen.commands, seen.pings, seen.reports);
+    say(last, &line)
+}
+
+/// Does what the host asks for, and says so.
+fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> Option<String> {
+    Some(match event {
+        RobotEvent::Motor(command) => describe(&command),
+        RobotEvent::WatchdogStop => "watchdog: no command for 500 ms".to_owned(),
+        RobotEvent::CalibrationStart(kind) => format!("calibration begins: {kind:?}"),
+        RobotEvent::CalibrationEnd(kind) => {
+            // A perfect sensor has no bias.
+            match kind {
+                CalibrationKind::Imu => {
+                    robot.calibration_result_imu(ImuBias::new([0; 3], [0; 3]), now);
+                }
+                CalibrationKind::Magnetometer => {
+                    robot.calibration_result_mag(MagBias::new([0; 3]), now);
+                }
+                CalibrationKind::Other(_) => {}
+            }
+            format!("calibration ends: {kind:?}")
+        }
+        RobotEvent::NetworkState(state) => format!("network state: {state:?}"),
+        RobotEvent::UpdateRequested { version, .. } => {
+            format!("firmware update to version {version} asked for, and ignored")
+        }
+        _ => return None,
+    })
+}
+
+fn describe(command: &MotorControl) -> String {
+    let (speed, turn) = (command.speed(), command.angular());
+    let side = if turn < 0 {
+        " left"
+    } else if turn > 0 {
+        " right"
+    } else {
+        ""
+    };
+    let lamp = if command.front_led() == 0 { "off" } else { "on" };
+    format!("command: speed {speed} %, turn {} %{side}, lamp {lamp}", turn.abs())
+}

@@ -1,0 +1,257 @@
+//! `axle watch`: what is said on a line, live, without a word of our own.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, IsTerminal, Write},
+};
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{Counters, Decoder, Event, Framing, Reason},
+    time::{Duration, Instant},
+    ucp,
+};
+
+use crate::{
+    EXIT_CODES,
+    args::{self, Protocol},
+    ctrl_c::CtrlC,
+    decode::BUFFER_LEN,
+    failure::Failure,
+    human,
+    port::{Line, Port},
+    record::{Frame, Summary},
+};
+
+/// Watch a line without sending anything
+///
+/// Decodes what comes in, of both directions: how often each message of each node is heard, what it
+/// said last, and where all other bytes went. On a terminal the table is redrawn in place;
+/// elsewhere there is one line a second. Ctrl-C ends it with a summary.
+///
+/// Nothing is asked, so only what is on the line anyway is seen: robots report by themselves, nodes
+/// of a motor bus answer only to a master, and on a four-wire bus an adapter hears one direction.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    line: args::Line,
+
+    /// What is spoken on the line
+    #[arg(long, value_enum)]
+    protocol: Protocol,
+}
+
+/// How often the table is redrawn, and how often a line is printed.
+const REDRAW_PERIOD: Duration = Duration::from_millis(250);
+const PRINT_PERIOD: Duration = Duration::from_millis(1000);
+
+/// The time over which a rate is measured.
+const RATE_PERIOD: Duration = Duration::from_millis(1000);
+
+/// A silence that ends what looked like the start of a frame (ruling B3): longer than the pauses of
+/// a USB adapter.
+const QUIET: Duration = Duration::from_millis(30);
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let ctrl_c = CtrlC::listen()?;
+    match args.protocol {
+        Protocol::Ucp => watch::<ucp::Ucp>(args, ucp::BAUD, &ctrl_c),
+        Protocol::Ikeya => watch::<ikeya::Either>(args, ikeya::BAUD, &ctrl_c),
+        Protocol::Ikeya3 => watch::<three::Either>(args, ikeya::BAUD, &ctrl_c),
+    }
+}
+
+fn watch<F>(args: &Args, baud: u32, ctrl_c: &CtrlC) -> Result<(), Failure>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Into<Frame<'a>>,
+{
+    let mut port = Port::open(&args.line, baud)?;
+    let mut out = io::stdout().lock();
+    let is_live = out.is_terminal();
+    let mut decoder = Decoder::<F, BUFFER_LEN>::new();
+    let mut table = Table::new(args.protocol, port.now());
+    let period = if is_live { REDRAW_PERIOD } else { PRINT_PERIOD };
+    let (mut print_at, mut heard_at) = (port.now() + period, port.now());
+
+    let broken = loop {
+        if ctrl_c.is_pressed() {
+            break Ok(());
+        }
+        let received = match port.receive(print_at) {
+            Ok(received) => received.to_vec(),
+            Err(failure) => break Err(failure),
+        };
+        let now = port.now();
+        if !received.is_empty() {
+            heard_at = now;
+        } else if now >= heard_at + QUIET && decoder.pending() > 0 {
+            decoder.idle();
+        }
+        table.take(&mut decoder, &received);
+        if now >= print_at {
+            print_at = now + period;
+            table.measure(now);
+            let printed = match is_live {
+                true => table.redraw(&mut out, decoder.counters()),
+                false => table.print_line(&mut out, decoder.counters(), now),
+            };
+            printed.map_err(Failure::Write)?;
+        }
+    };
+    table
+        .finish(&mut out, decoder.counters(), decoder.pending(), port.now())
+        .map_err(Failure::Write)?;
+    broken
+}
+
+/// What has been heard of each message. There are not many kinds of messages, so it stays small.
+struct Table {
+    protocol: Protocol,
+    rows: BTreeMap<(u8, &'static str), Row>,
+    start: Instant,
+    measured_at: Instant,
+    /// Lines on the screen that the next table replaces.
+    drawn: usize,
+}
+
+/// One kind of message of one node.
+#[derive(Default)]
+struct Row {
+    count: u64,
+    /// Of these, how many were there when the rate was measured.
+    measured: u64,
+    per_second: f64,
+    last: String,
+}
+
+impl Table {
+    fn new(protocol: Protocol, now: Instant) -> Self {
+        Self { protocol, rows: BTreeMap::new(), start: now, measured_at: now, drawn: 0 }
+    }
+
+    /// Counts the frames in `bytes`.
+    fn take<F>(&mut self, decoder: &mut Decoder<F, BUFFER_LEN>, mut bytes: &[u8])
+    where
+        F: Framing,
+        for<'a> F::Frame<'a>: Into<Frame<'a>>,
+    {
+        while let Some(event) = decoder.decode(&mut bytes) {
+            // A gap is in the counters already.
+            let Event::Frame(frame) = event else { continue };
+            let frame = frame.into();
+            let key = match &frame {
+                Frame::Ikeya(frame) => (frame.node.get(), frame.message),
+                Frame::Ucp(frame) => (frame.id, frame.message),
+            };
+            let row = self.rows.entry(key).or_default();
+            row.count += 1;
+            row.last = human::contents(&frame);
+        }
+    }
+
+    /// Measures the rates, once in their period.
+    fn measure(&mut self, now: Instant) {
+        if now < self.measured_at + RATE_PERIOD {
+            return;
+        }
+        let seconds = f64::from((now - self.measured_at).as_micros()) / 1e6;
+        self.measured_at = now;
+        for row in self.rows.values_mut() {
+            row.per_second = (row.count - row.measured) as f64 / seconds;
+            row.measured = row.count;
+        }
+    }
+
+    /// The title of the first column.
+    const fn key(&self) -> &'static str {
+        match self.protocol {
+            Protocol::Ucp => "id",
+            Protocol::Ikeya | Protocol::Ikeya3 => "node",
+        }
+    }
+
+    /// Replaces the table on the screen.
+    fn redraw(&mut self, out: &mut impl Write, counters: &Counters) -> io::Result<()> {
+        let mut text = String::new();
+        for line in self.lines() {
+            // Cut at the edge of the screen instead of wrapped: the next table counts on one row
+            // for each line.
+            text.push_str(&format!("{line}\n"));
+        }
+        text.push_str(&format!("{}\n", account(counters)));
+        let up = match self.drawn {
+            0 => String::new(),
+            lines => format!("\x1b[{lines}A\x1b[J"),
+        };
+        self.drawn = self.rows.len() + 2;
+        write!(out, "\x1b[?7l{up}{text}\x1b[?7h")?;
+        out.flush()
+    }
+
+    /// The titles and the rows.
+    fn lines(&self) -> impl Iterator<Item = String> {
+        let title =
+            format!("{:>4}  {:<21}  {:>9}  {:>8}  last", self.key(), "message", "count", "per s");
+        let rows = self.rows.iter().map(|((key, message), row)| {
+            let Row { count, per_second, last, .. } = row;
+            format!("{key:>4}  {message:<21}  {count:>9}  {per_second:>8.1}  {last}")
+        });
+        [title].into_iter().chain(rows)
+    }
+
+    /// The rates in one line.
+    fn print_line(
+        &self,
+        out: &mut impl Write,
+        counters: &Counters,
+        now: Instant,
+    ) -> io::Result<()> {
+        write!(out, "{:5} s  {}", (now - self.start).as_micros() / 1_000_000, account(counters))?;
+        for ((key, message), row) in &self.rows {
+            write!(out, "; {} {key} {message} {:.1}/s", self.key(), row.per_second)?;
+        }
+        writeln!(out)?;
+        out.flush()
+    }
+
+    /// The table with the rates of the whole time, and where every byte went.
+    fn finish(
+        &mut self,
+        out: &mut impl Write,
+        counters: &Counters,
+        pending: usize,
+        now: Instant,
+    ) -> io::Result<()> {
+        let seconds = f64::from((now - self.start).as_micros()) / 1e6;
+        for row in self.rows.values_mut() {
+            row.per_second = row.count as f64 / seconds;
+        }
+        if self.drawn > 0 {
+            self.redraw(out, counters)?;
+        } else if !self.rows.is_empty() {
+            for line in self.lines() {
+                writeln!(out, "{line}")?;
+            }
+        }
+        if counters.received == 0 {
+            writeln!(out, "Nothing was heard in {seconds:.0} s.")?;
+        } else {
+            human::print_summary(out, &Summary::new(counters, pending), !self.rows.is_empty())?;
+        }
+        out.flush()
+    }
+}
+
+/// Where the bytes went, in one line.
+fn account(counters: &Counters) -> String {
+    let mut text = format!("{} bytes, {} frames", counters.received, counters.frames);
+    text.push_str(&format!(", {} skipped", counters.skipped()));
+    let reasons = [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
+    for reason in reasons.into_iter().filter(|reason| counters.skipped_for(*reason) > 0) {
+        text.push_str(&format!(" {reason} {}", counters.skipped_for(reason)));
+    }
+    text
+}

@@ -1,0 +1,150 @@
+//! The tool as a process that goes on: its lines as they come, and signals by its id.
+
+use std::{
+    io::{BufRead, BufReader, Read},
+    process::{Child, Command, Stdio},
+    sync::{Arc, Condvar, Mutex},
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
+};
+
+use super::axle;
+
+/// Far more than anything here takes, even on a machine that is busy.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A running tool; killed when it is dropped.
+pub(crate) struct Process {
+    child: Child,
+    stdout: Lines,
+    stderr: Lines,
+}
+
+/// How a tool has ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: Vec<String>,
+    pub(crate) stderr: Vec<String>,
+}
+
+impl Process {
+    /// Starts the tool with these arguments, separated by spaces.
+    pub(crate) fn start(args: &str) -> Self {
+        let args: Vec<_> = args.split_whitespace().collect();
+        Self::spawn(&mut axle(&args)).unwrap()
+    }
+
+    pub(crate) fn spawn(command: &mut Command) -> std::io::Result<Self> {
+        let mut child =
+            command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+        let stdout = Lines::of(child.stdout.take().unwrap());
+        let stderr = Lines::of(child.stderr.take().unwrap());
+        Ok(Self { child, stdout, stderr })
+    }
+
+    /// The first line that contains `what`, as soon as there is one.
+    pub(crate) fn line(&self, what: &str) -> String {
+        self.lines_up_to(what).pop().unwrap()
+    }
+
+    /// All lines up to the first that contains `what`, as soon as there is one.
+    pub(crate) fn lines_up_to(&self, what: &str) -> Vec<String> {
+        self.stdout.up_to(what)
+    }
+
+    /// All lines so far.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        self.stdout.all()
+    }
+
+    /// Sends a signal by its name, such as INT, to this process alone.
+    pub(crate) fn signal(&self, name: &str) {
+        let command = format!("kill -{name} {}", self.child.id());
+        assert!(Command::new("sh").args(["-c", &command]).status().unwrap().success());
+    }
+
+    /// As by a power cut.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// Waits until it ends by itself.
+    pub(crate) fn end(mut self) -> Ended {
+        let start = Instant::now();
+        let status = loop {
+            match self.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None if start.elapsed() > PATIENCE => {
+                    panic!("does not end; lines: {:?}", self.lines());
+                }
+                None => thread::sleep(Duration::from_millis(5)),
+            }
+        };
+        let (stdout, stderr) = (self.stdout.finish(), self.stderr.finish());
+        Ended { code: status.code(), stdout, stderr }
+    }
+
+    /// Waits until it ends well, having complained of nothing; gives its lines.
+    pub(crate) fn success(self) -> Vec<String> {
+        let ended = self.end();
+        assert_eq!((ended.code, &*ended.stderr), (Some(0), &[][..]), "{ended:?}");
+        ended.stdout
+    }
+
+    /// Waits until it ends with `code`; gives its one line of complaint.
+    pub(crate) fn complaint(self, code: i32) -> String {
+        let ended = self.end();
+        assert_eq!((ended.code, ended.stderr.len()), (Some(code), 1), "{ended:?}");
+        ended.stderr[0].strip_prefix("axle: ").expect("the tool's name in front").to_owned()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended long ago.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Lines of a stream, read by a thread.
+struct Lines {
+    shared: Arc<(Mutex<Vec<String>>, Condvar)>,
+    reader: Option<JoinHandle<()>>,
+}
+
+impl Lines {
+    fn of(stream: impl Read + Send + 'static) -> Self {
+        let shared = Arc::new((Mutex::new(Vec::new()), Condvar::new()));
+        let filled = Arc::clone(&shared);
+        let reader = thread::spawn(move || {
+            for line in BufReader::new(stream).lines().map_while(Result::ok) {
+                filled.0.lock().unwrap().push(line);
+                filled.1.notify_all();
+            }
+        });
+        Self { shared, reader: Some(reader) }
+    }
+
+    fn all(&self) -> Vec<String> {
+        self.shared.0.lock().unwrap().clone()
+    }
+
+    fn up_to(&self, what: &str) -> Vec<String> {
+        let (lines, filled) = &*self.shared;
+        let is_missing = |lines: &mut Vec<String>| !lines.iter().any(|line| line.contains(what));
+        let (lines, wait) =
+            filled.wait_timeout_while(lines.lock().unwrap(), PATIENCE, is_missing).unwrap();
+        assert!(!wait.timed_out(), "no line with {what:?} in {lines:?}");
+        let count = lines.iter().position(|line| line.contains(what)).unwrap() + 1;
+        lines[..count].to_vec()
+    }
+
+    /// All lines, when the stream has ended.
+    fn finish(&mut self) -> Vec<String> {
+        self.reader.take().unwrap().join().unwrap();
+        self.all()
+    }
+}
