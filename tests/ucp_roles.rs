@@ -15,7 +15,7 @@ use axlewire::{
         BAUD, BiasRequest, BiasStore, Biases, Body, CalibrationEnd, CalibrationEndAck,
         CalibrationKind, CalibrationStart, CalibrationStartAck, CalibrationStep, CommandError,
         ErrorCode, FailureCause, FirmwareReport, Frame, FrameOf, Host, HostConfig, HostEvent,
-        HostStats, ImuBias, ImuBiasAck, Link, MagBias, MagBiasAck, MemoryStore, Message,
+        HostStatistics, ImuBias, ImuBiasAck, Link, MagBias, MagBiasAck, MemoryStore, Message,
         MotorControl, NetworkState, NoStore, NotStored, OtaAck, OtaRequest, OtaStatus, Ping, Pong,
         RawFrame, ReportLayout, Robot, RobotConfig, RobotEvent, SetNetworkState, Telemetry,
         UpdateSource,
@@ -299,7 +299,7 @@ fn the_latest_motor_command_is_repeated_every_100_ms() {
     let frames = wait(&mut host, ms(450));
     let at = |millis: u64| (millis * 1000, 40);
     assert_eq!(speeds(&frames), [at(100), at(200), at(300), at(400)]);
-    assert_eq!(host.stats().commands, 5);
+    assert_eq!(host.statistics().commands, 5);
 }
 
 #[test]
@@ -375,7 +375,7 @@ fn the_host_sends_zero_when_the_application_has_been_silent_for_500_ms() {
     sent(&mut host, ms(0));
     let before = wait(&mut host, us(499_999));
     assert!(speeds(&before).iter().all(|(_, speed)| *speed == 40));
-    assert_eq!(host.stats().dead_man, 0);
+    assert_eq!(host.statistics().dead_man, 0);
 
     let after = wait(&mut host, ms(1000));
     assert_eq!(after[0].0, ms(500));
@@ -384,7 +384,7 @@ fn the_host_sends_zero_when_the_application_has_been_silent_for_500_ms() {
     let Message::MotorControl(command) = message(&after[5].1) else { panic!() };
     assert_eq!(command.front_led(), 100, "the lamp stays");
     let dead_men = events(&mut host).into_iter().filter(|event| *event == HostEvent::DeadMan);
-    assert_eq!((dead_men.count(), host.stats().dead_man), (1, 1), "once");
+    assert_eq!((dead_men.count(), host.statistics().dead_man), (1, 1), "once");
 
     host.drive(go(30), ms(1010)).unwrap();
     assert_eq!(wait(&mut host, ms(1030)).len(), 1, "and the next call drives again");
@@ -490,7 +490,7 @@ fn a_robot_that_never_answers_is_reported_after_500_ms() {
     let pings = wait(&mut host, ms(60_000));
     assert_eq!(events(&mut host), [HostEvent::LinkDown]);
     assert_eq!(pings.len(), 120, "one ping per ping timeout, no flood");
-    assert_eq!(host.stats().pings_lost, 120);
+    assert_eq!(host.statistics().pings_lost, 120);
 }
 
 #[test]
@@ -505,7 +505,7 @@ fn an_echoing_line_is_no_robot() {
     }
     assert_eq!(host.link(), Link::Down);
     assert_eq!(events(&mut host), [HostEvent::LinkDown]);
-    assert_eq!(u64::from(host.stats().misdirected), host.line().frames);
+    assert_eq!(u64::from(host.statistics().misdirected), host.counters().frames);
 }
 
 #[test]
@@ -520,11 +520,11 @@ fn a_pong_tells_the_round_trip_time() {
         let round_trip = Duration::from_micros(micros);
         assert!(events(&mut host).contains(&HostEvent::Pong { round_trip, err: ErrorCode::Fine }));
     }
-    let trip = host.stats().round_trip;
+    let trip = host.statistics().round_trip;
     let micros = |span: Option<Duration>| span.unwrap().as_micros();
     assert_eq!((trip.count(), micros(trip.min()), micros(trip.max())), (3, 1000, 3000));
     assert_eq!(micros(trip.mean()), 2000);
-    assert_eq!(HostStats::default().round_trip.mean(), None);
+    assert_eq!(HostStatistics::default().round_trip.mean(), None);
 }
 
 #[test]
@@ -535,7 +535,7 @@ fn a_pong_that_says_damaged_reaches_the_application() {
     let round_trip = Duration::from_millis(2);
     let pong = HostEvent::Pong { round_trip, err: ErrorCode::Damaged };
     assert!(events(&mut host).contains(&pong));
-    assert_eq!(host.stats().pings_damaged, 1);
+    assert_eq!(host.statistics().pings_damaged, 1);
 }
 
 #[test]
@@ -543,10 +543,10 @@ fn a_late_pong_answers_no_ping() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     sent(&mut host, ms(0));
     host.handle_timeout(ms(500));
-    assert_eq!(host.stats().pings_lost, 1);
+    assert_eq!(host.statistics().pings_lost, 1);
     host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(500));
-    assert_eq!(host.stats().pongs_unasked, 1);
-    assert_eq!(host.stats().round_trip.count(), 0);
+    assert_eq!(host.statistics().pongs_unasked, 1);
+    assert_eq!(host.statistics().round_trip.count(), 0);
 }
 
 #[test]
@@ -565,7 +565,7 @@ fn missing_reports_are_counted_by_their_index() {
     assert_eq!(report(&mut host, 0, 120), 0, "it wraps");
     assert_eq!(report(&mut host, 2, 160), 1);
     assert_eq!(report(&mut host, 2, 180), 0, "repeated");
-    assert_eq!((host.stats().reports_lost, host.stats().reports_repeated), (4, 1));
+    assert_eq!((host.statistics().reports_lost, host.statistics().reports_repeated), (4, 1));
     assert_eq!(report(&mut host, 0, 200), 253, "a restart in disguise");
     // A restart that the robot announces, or that takes the link down, costs nothing.
     report(&mut host, 100, 220);
@@ -574,7 +574,7 @@ fn missing_reports_are_counted_by_their_index() {
     assert_eq!(report(&mut host, 0, 240), 0);
     host.handle_timeout(ms(740));
     assert_eq!(report(&mut host, 77, 800), 0);
-    assert_eq!(host.stats().reports, 10);
+    assert_eq!(host.statistics().reports, 10);
     assert_eq!(host.last_report().unwrap().index, 77);
 }
 
@@ -585,11 +585,11 @@ fn a_false_header_holds_a_report_back_no_longer_than_the_quiet_margin() {
     let mut line = vec![0xFD, 0xFF, 60, 0, 5];
     line.extend(bytes(FirmwareReport::new(&Telemetry::default(), 38)));
     host.handle_input(&line, ms(10));
-    assert_eq!(host.line().frames, 0);
+    assert_eq!(host.counters().frames, 0);
     let quiet = ms(30) + wire_time(2, BAUD);
     assert_eq!(host.poll_timeout(), Some(quiet));
     host.handle_timeout(quiet);
-    assert_eq!((host.line().frames, host.stats().reports), (1, 1));
+    assert_eq!((host.counters().frames, host.statistics().reports), (1, 1));
     assert_eq!(host.poll_timeout(), Some(ms(510)), "the link counts from its arrival");
 }
 
@@ -616,7 +616,7 @@ fn unknown_frames_pass_through_raw() {
         let Some(HostEvent::Unknown(frame)) = events(&mut host).pop() else { panic!() };
         assert_eq!(frame.as_raw(), raw);
     }
-    assert_eq!(host.stats().unknown, 2);
+    assert_eq!(host.statistics().unknown, 2);
 }
 
 #[test]
@@ -672,8 +672,8 @@ fn a_calibration_ends_with_biases_in_the_store() {
     assert_eq!(rig.host_has_seen(&HostEvent::ImuBias(imu_bias())), 1);
     assert_eq!(rig.robot_has_seen(&RobotEvent::ImuBiasTaken), 1);
     assert_eq!(rig.host.store().imu, Some(imu_bias()));
-    assert_eq!(rig.robot.stats().results, 1, "acknowledged at once, not repeated");
-    assert_eq!(rig.host.stats().calibration_retries, 0);
+    assert_eq!(rig.robot.statistics().results, 1, "acknowledged at once, not repeated");
+    assert_eq!(rig.host.statistics().calibration_retries, 0);
 }
 
 #[test]
@@ -703,7 +703,10 @@ fn a_calibration_request_that_comes_again_is_acknowledged_and_no_event() {
         assert_eq!(sent(&mut robot, ms(at)).len(), 1);
     }
     assert_eq!(events(&mut robot).len(), 2);
-    assert_eq!((robot.stats().calibration_repeats, robot.stats().calibration_refused), (1, 2));
+    assert_eq!(
+        (robot.statistics().calibration_repeats, robot.statistics().calibration_refused),
+        (1, 2)
+    );
     assert_eq!(robot.calibrating(), None);
 }
 
@@ -723,7 +726,7 @@ fn a_lost_acknowledgement_is_asked_for_again() {
     rig.run_for(1000);
     assert_eq!(rig.host_has_seen(&HostEvent::CalibrationStarted(MAG)), 1);
     assert_eq!(rig.robot_has_seen(&RobotEvent::CalibrationStart(MAG)), 1);
-    assert_eq!(rig.host.stats().calibration_retries, 2);
+    assert_eq!(rig.host.statistics().calibration_retries, 2);
 }
 
 #[test]
@@ -739,7 +742,7 @@ fn a_calibration_request_that_nobody_answers_fails_within_its_bound() {
     let HostEvent::CalibrationFailed(failure) = event else { panic!("{event:?}") };
     assert_eq!((failure.step, failure.kind), (CalibrationStep::Start, IMU));
     assert_eq!((failure.cause, failure.attempts), (FailureCause::NoAnswer, 3));
-    assert_eq!(host.stats().calibration_failures, 1);
+    assert_eq!(host.statistics().calibration_failures, 1);
     host.start_calibration(IMU, ms(5000)).unwrap();
 }
 
@@ -795,7 +798,7 @@ fn acknowledgements_that_nobody_waits_for_are_counted() {
     sent(&mut host, ms(1));
     host.handle_input(&ack, ms(2)); // another kind
     host.handle_input(&bytes(CalibrationEndAck::new(MAG, ErrorCode::Fine)), ms(3));
-    assert_eq!(host.stats().acks_unasked, 4);
+    assert_eq!(host.statistics().acks_unasked, 4);
     assert_eq!(events(&mut host), [HostEvent::LinkUp]);
     let unknown = host.start_calibration(CalibrationKind::Other(7), ms(4));
     assert_eq!(unknown, Err(CommandError::Calibrating));
@@ -827,7 +830,7 @@ fn results_are_repeated_every_1000_ms_until_acknowledged() {
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(5000));
     assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken]);
     assert_eq!(robot.poll_timeout(), None, "nothing is left to do");
-    assert_eq!(robot.stats().acks_refused, 2);
+    assert_eq!(robot.statistics().acks_refused, 2);
 }
 
 #[test]
@@ -855,16 +858,16 @@ fn a_repeated_result_is_acknowledged_again_and_stored_once() {
         assert!(matches!(message(&acks[0]), Message::MagBiasAck(_)));
         wait(&mut host, ms(at + 999));
     }
-    assert_eq!(host.stats().results_repeated, 2);
+    assert_eq!(host.statistics().results_repeated, 2);
     // The same result of a new calibration is a new one.
     host.start_calibration(MAG, ms(3000)).unwrap();
     host.handle_input(&bytes(mag_bias()), ms(3001));
-    assert_eq!(host.stats().results_repeated, 2);
+    assert_eq!(host.statistics().results_repeated, 2);
     wait(&mut host, ms(4000));
     host.handle_input(&bytes(imu_bias()), ms(4000));
     host.start_calibration(IMU, ms(4001)).unwrap();
     host.handle_input(&bytes(imu_bias()), ms(4002));
-    assert_eq!(host.stats().results_repeated, 2);
+    assert_eq!(host.statistics().results_repeated, 2);
     assert_eq!(store.1, 4);
 }
 
@@ -888,7 +891,7 @@ fn a_result_that_is_not_stored_is_not_acknowledged() {
     assert_eq!(sent(&mut host, ms(2)), [] as [Vec<u8>; 0]);
     let seen = events(&mut host);
     assert_eq!(seen[1..], [HostEvent::BiasNotStored(IMU), HostEvent::BiasNotStored(MAG)]);
-    assert_eq!(host.stats().results_not_stored, 2);
+    assert_eq!(host.statistics().results_not_stored, 2);
 }
 
 #[test]
@@ -916,7 +919,7 @@ fn the_robots_boot_request_is_answered_only_if_all_biases_are_stored() {
     rig.run_for(5000);
     assert_eq!(rig.robot_has_seen(&RobotEvent::Biases(Biases::new(imu_bias(), mag_bias()))), 1);
     assert_eq!(rig.host_has_seen(&HostEvent::BiasesSent), 1);
-    assert_eq!(rig.robot.stats().bias_requests, 4);
+    assert_eq!(rig.robot.statistics().bias_requests, 4);
 }
 
 #[test]
@@ -1009,7 +1012,7 @@ fn a_damaged_ping_is_not_answered() {
     let mut ping = bytes(Ping {});
     ping[7] ^= 1;
     robot.handle_input(&ping, ms(1));
-    assert!(robot.stats().pings == 0 && robot.line().crc > 0);
+    assert!(robot.statistics().pings == 0 && robot.counters().crc > 0);
     assert_eq!(wait(&mut robot, ms(1000)), []);
 }
 
@@ -1067,7 +1070,7 @@ fn a_repeated_command_is_no_event() {
         robot.handle_input(&bytes(go(60)), ms(at));
     }
     assert_eq!(events(&mut robot), [RobotEvent::Motor(go(60))]);
-    assert_eq!(robot.stats().commands, 20);
+    assert_eq!(robot.statistics().commands, 20);
 }
 
 #[test]
@@ -1079,7 +1082,7 @@ fn out_of_range_is_cut_as_the_vendor_firmware_does() {
     assert_eq!(command.front_led(), 100, "any low byte but 00 and FF is on");
     robot.handle_input(&bytes(careless(1, 2, -1, 0)), ms(1));
     assert_eq!(robot.command(ms(1)), MotorControl::new(1, 2).unwrap());
-    assert_eq!((robot.stats().commands, robot.stats().commands_clamped), (2, 1));
+    assert_eq!((robot.statistics().commands, robot.statistics().commands_clamped), (2, 1));
 }
 
 #[test]
@@ -1103,7 +1106,7 @@ fn reports_come_every_20_ms_without_drift() {
         count += 1;
     }
     assert_eq!(count, 500);
-    assert_eq!(robot.stats().reports_skipped, 0);
+    assert_eq!(robot.statistics().reports_skipped, 0);
 }
 
 #[test]
@@ -1113,11 +1116,11 @@ fn a_robot_that_was_held_up_skips_the_reports_it_missed() {
     assert_eq!(sent(&mut robot, ms(0)).len(), 1);
     assert_eq!(sent(&mut robot, ms(1005)).len(), 1, "no burst");
     assert_eq!(robot.poll_timeout(), Some(ms(1020)), "in step");
-    assert_eq!((robot.stats().reports, robot.stats().reports_skipped), (2, 49));
+    assert_eq!((robot.statistics().reports, robot.statistics().reports_skipped), (2, 49));
     // Longer than a Duration can tell.
     assert_eq!(sent(&mut robot, ms(20_000_000)).len(), 1);
     assert_eq!(robot.poll_timeout(), Some(ms(20_000_020)));
-    assert!(robot.stats().reports_skipped > 200_000);
+    assert!(robot.statistics().reports_skipped > 200_000);
 }
 
 #[test]
@@ -1156,7 +1159,7 @@ fn frames_of_a_robot_do_not_disturb_a_robot() {
     ] {
         robot.handle_input(&frame, ms(1));
     }
-    assert_eq!((robot.stats().misdirected, events(&mut robot)), (5, vec![]));
+    assert_eq!((robot.statistics().misdirected, events(&mut robot)), (5, vec![]));
     assert_eq!(sent(&mut robot, ms(1)), [] as [Vec<u8>; 0]);
     robot.handle_input(&bytes(Ping {}), ms(2));
     assert_eq!(sent(&mut robot, ms(2)).len(), 1, "and it is as lively as before");
@@ -1164,7 +1167,7 @@ fn frames_of_a_robot_do_not_disturb_a_robot() {
     let mut buffer = [0; 64];
     let raw = RawFrame { id: 0x77, index: 0, body: &[1] };
     robot.handle_input(raw.encode(&mut buffer).unwrap(), ms(3));
-    assert_eq!((robot.stats().unknown, events(&mut robot)), (1, vec![]));
+    assert_eq!((robot.statistics().unknown, events(&mut robot)), (1, vec![]));
 }
 
 // --- Both ---
@@ -1180,7 +1183,7 @@ fn a_host_that_floods_gets_one_answer_of_each_sort_at_a_time() {
     }
     robot.handle_input(&flood, ms(0));
     assert_eq!(sent(&mut robot, ms(0)).len(), 2);
-    assert_eq!((robot.stats().pings, robot.stats().pongs), (1000, 1));
+    assert_eq!((robot.statistics().pings, robot.statistics().pongs), (1000, 1));
     assert_eq!(events(&mut robot).len(), 16);
     assert_eq!(robot.lost_events(), 1001 - 16);
 }
@@ -1219,7 +1222,7 @@ fn garbage_for_ever_is_reported_as_a_lost_link() {
         sent(&mut host, ms(at));
     }
     assert_eq!(events(&mut host), [HostEvent::LinkDown]);
-    let line = host.line();
+    let line = host.counters();
     assert_eq!((line.received, line.frames), (30_000, 0));
     assert!(line.received - line.skipped() < 64);
 }
@@ -1249,7 +1252,7 @@ fn unplugging_stops_the_robot_and_is_reported_and_plugging_in_goes_on() {
     drive_for(&mut rig, 200);
     assert_eq!((rig.motion.last().unwrap().1, rig.host.link()), (70, Link::Up));
     assert_eq!(rig.robot_has_seen(&RobotEvent::NetworkState(NetworkState::Connected)), 3);
-    assert_eq!(rig.host.stats().links_lost, 1);
+    assert_eq!(rig.host.statistics().links_lost, 1);
 }
 
 #[test]
@@ -1272,7 +1275,7 @@ fn a_session_goes_the_same_way_over_the_wrap_of_time() {
         let host: Vec<_> = rig.host_events.into_iter().map(|(at, e)| (since(at), e)).collect();
         let robot: Vec<_> = rig.robot_events.into_iter().map(|(at, e)| (since(at), e)).collect();
         assert!(host.len() > 50 && robot.len() > 5);
-        (host, robot, *rig.host.stats(), *rig.robot.stats())
+        (host, robot, *rig.host.statistics(), *rig.robot.statistics())
     };
     let reference = session(ms(0));
     for before in [0, 1, 499_999, 500_000, 1_000_000, 1_999_999] {
@@ -1489,7 +1492,7 @@ proptest! {
                     _ => { host.stop(now); Ok(()) }
                 };
             });
-            let line = host.line();
+            let line = host.counters();
             prop_assert!(line.received - line.framed - line.skipped() < 64);
         }
     }
@@ -1642,7 +1645,7 @@ proptest! {
             prop_assert!(*end >= *request && *end <= *request + bound);
         }
         let failed = ends.iter().filter(|(_, e)| matches!(e, HostEvent::CalibrationFailed(_)));
-        prop_assert_eq!(failed.count(), rig.host.stats().calibration_failures as usize);
+        prop_assert_eq!(failed.count(), rig.host.statistics().calibration_failures as usize);
         // The events of a rig are taken out at every step.
         prop_assert_eq!((rig.host.lost_events(), rig.robot.lost_events()), (0, 0));
     }

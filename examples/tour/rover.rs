@@ -107,7 +107,7 @@ fn report(link: &Link) {
 }
 
 fn account(link: &Link) {
-    let line = link.head().line();
+    let line = link.head().counters();
     println!(
         "\nThe rover made {:.2} m. The host heard {} bytes: {} in {} frames, {} skipped.",
         link.tail(0).rover().distance_m(),

@@ -9,7 +9,7 @@ mod state;
 
 pub use config::HostConfig;
 pub use event::{
-    CalibrationFailure, CalibrationStep, CommandError, FailureCause, HostEvent, HostStats,
+    CalibrationFailure, CalibrationStep, CommandError, FailureCause, HostEvent, HostStatistics,
     ReceivedReport, RoundTrip, UnknownFrame,
 };
 
@@ -241,13 +241,13 @@ impl<S: BiasStore> Host<S> {
 
     /// What the host has seen.
     #[must_use]
-    pub const fn stats(&self) -> &HostStats {
+    pub const fn statistics(&self) -> &HostStatistics {
         &self.state.stats
     }
 
     /// Where every received byte went.
     #[must_use]
-    pub fn line(&self) -> &Counters {
+    pub fn counters(&self) -> &Counters {
         self.inbox.counters()
     }
 

@@ -88,7 +88,7 @@ pub use framing::{Frame, FrameOf, RawFrame, Ucp};
 pub use header::{Header, MessageId, SYNC};
 pub use host::{
     CalibrationFailure, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
-    HostStats, Link, ReceivedReport, RoundTrip, UnknownFrame,
+    HostStatistics, Link, ReceivedReport, RoundTrip, UnknownFrame,
 };
 pub use message::{
     BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationStart,
@@ -96,7 +96,7 @@ pub use message::{
     OtaRequest, Ping, Pong, SetNetworkState, SetNetworkStateWide,
 };
 pub use report::{DocumentReport, FirmwareReport, Report, Telemetry};
-pub use robot::{ReportLayout, Robot, RobotConfig, RobotEvent, RobotStats, UpdateSource};
+pub use robot::{ReportLayout, Robot, RobotConfig, RobotEvent, RobotStatistics, UpdateSource};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;

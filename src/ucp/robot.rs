@@ -5,7 +5,7 @@ mod event;
 mod repeat;
 
 pub use config::{ReportLayout, RobotConfig};
-pub use event::{RobotEvent, RobotStats, UpdateSource};
+pub use event::{RobotEvent, RobotStatistics, UpdateSource};
 
 use super::{
     BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, DocumentReport,
@@ -111,13 +111,13 @@ impl Robot {
 
     /// What the robot has seen.
     #[must_use]
-    pub const fn stats(&self) -> &RobotStats {
+    pub const fn statistics(&self) -> &RobotStatistics {
         &self.state.stats
     }
 
     /// Where every received byte went.
     #[must_use]
-    pub fn line(&self) -> &Counters {
+    pub fn counters(&self) -> &Counters {
         self.inbox.counters()
     }
 
@@ -161,7 +161,7 @@ impl Endpoint for Robot {
 struct State {
     config: RobotConfig,
     events: Events<RobotEvent, 16>,
-    stats: RobotStats,
+    stats: RobotStatistics,
     command: MotorControl,
     /// When the command is too old; `None` while the robot stands still for want of one.
     command_until: Option<Instant>,
@@ -199,7 +199,7 @@ impl State {
         Self {
             config,
             events: Events::new(),
-            stats: RobotStats::default(),
+            stats: RobotStatistics::default(),
             command: MotorControl::STOP,
             command_until: None,
             answers: Answers::default(),

@@ -70,7 +70,7 @@ fn a_pong_from_before_is_not_the_answer_to_a_ping() {
             rover.service().unwrap();
             world.step(20);
         }
-        assert_eq!(rover.role().stats().round_trip.count(), 1);
+        assert_eq!(rover.role().statistics().round_trip.count(), 1);
         robot.borrow().port().unplugged.set(true);
         let deadline = after(&world, 700);
         let pong = if is_async {
@@ -275,9 +275,9 @@ fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
         let deadline = after(&world, 2000);
         let done = world.poll_times(polls, rover.ping_async(deadline)).is_some();
         world.block_on(rover.ping_async(deadline)).unwrap();
-        assert_eq!(robot.borrow().role().line().skipped(), 0, "dropped after {polls} polls");
-        assert_eq!(rover.role().line().skipped(), 0, "dropped after {polls} polls");
-        assert_eq!(rover.role().stats().reports_lost, 0);
+        assert_eq!(robot.borrow().role().counters().skipped(), 0, "dropped after {polls} polls");
+        assert_eq!(rover.role().counters().skipped(), 0, "dropped after {polls} polls");
+        assert_eq!(rover.role().statistics().reports_lost, 0);
         if done {
             break;
         }

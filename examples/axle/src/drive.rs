@@ -107,7 +107,7 @@ impl Drive {
         while self.host.link() != Link::Up && !ctrl_c.is_pressed() {
             if self.port.now() >= end {
                 let (path, seconds) = (self.port.path(), LINK_PATIENCE.as_micros() / 1_000_000);
-                let heard = match self.host.line().received {
+                let heard = match self.host.counters().received {
                     0 => "nothing".to_owned(),
                     bytes => format!("{bytes} bytes that are no message"),
                 };
@@ -153,12 +153,12 @@ impl Drive {
 
     /// Sends the stop several times, and waits until the robot reports that it stands.
     fn stop(&mut self) -> Result<(), Failure> {
-        let (begin, sent) = (self.port.now(), self.host.stats().commands);
+        let (begin, sent) = (self.port.now(), self.host.statistics().commands);
         let (end, mut reports) = (begin + STOP_PATIENCE, None);
         self.host.stop(begin);
         while self.port.now() < end {
             self.round(end)?;
-            let stats = self.host.stats();
+            let stats = self.host.statistics();
             if stats.commands.saturating_sub(sent) < STOPS {
                 continue;
             }
@@ -173,7 +173,7 @@ impl Drive {
                 break;
             }
         }
-        let sent = self.host.stats().commands.saturating_sub(sent);
+        let sent = self.host.statistics().commands.saturating_sub(sent);
         Err(Failure::Undone(match self.host.link() {
             Link::Up => {
                 format!("the robot was told {sent} times to stop, and its wheels still turn")
@@ -195,7 +195,7 @@ impl Drive {
 
     fn say_report(&mut self, what: &str) -> Result<(), Failure> {
         let Some(report) = self.host.last_report() else { return Ok(()) };
-        let (now, lost) = (report.telemetry, self.host.stats().reports_lost);
+        let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);
         let [front_left, front_right, back_left, back_right] = now.rpm;
         self.say(&format!(
             "rpm {front_left:4} {front_right:4} {back_left:4} {back_right:4}  heading {:3} deg  \

@@ -217,7 +217,7 @@ impl Error for CommandError {
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct HostStats {
+pub struct HostStatistics {
     /// Motor commands sent.
     pub commands: u32,
     /// Times that the dead-man has stopped the robot.

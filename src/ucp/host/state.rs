@@ -1,7 +1,7 @@
 //! What a host knows, is waiting for and has to send.
 
 use super::{
-    CalibrationStep, CommandError, HostConfig, HostEvent, HostStats, Link, ReceivedReport,
+    CalibrationStep, CommandError, HostConfig, HostEvent, HostStatistics, Link, ReceivedReport,
     UnknownFrame,
     calibration::{Answer, Request},
     motor::Motor,
@@ -23,7 +23,7 @@ pub(super) struct State<S> {
     pub(super) config: HostConfig,
     pub(super) store: S,
     pub(super) events: Events<HostEvent, 16>,
-    pub(super) stats: HostStats,
+    pub(super) stats: HostStatistics,
     /// Counter of the next frame.
     pub(super) index: u8,
     pub(super) link: Link,
@@ -66,7 +66,7 @@ impl<S: BiasStore> State<S> {
             config,
             store,
             events: Events::new(),
-            stats: HostStats::default(),
+            stats: HostStatistics::default(),
             index: 0,
             link: Link::Waiting,
             link_until: Some(now + config.link_timeout),

@@ -56,7 +56,7 @@ pub enum UpdateSource {
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct RobotStats {
+pub struct RobotStatistics {
     /// Motor commands taken.
     pub commands: u32,
     /// Motor commands taken with speed or turn cut to -100..=100.

@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             say(now, &format!("stands still after {way:.2} m, heading {heading:.0} deg"))?;
         }
     }
-    let seen = robot.stats();
+    let seen = robot.statistics();
     let line =
         format!("{} commands, {} pings, {} reports", seen.commands, seen.pings, seen.reports);
     say(last, &line)
