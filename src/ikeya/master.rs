@@ -55,6 +55,9 @@ const ECHO_LEN: usize = 64;
 /// of a node that becomes abnormal is dropped: a board that comes back after an unknown while shall
 /// not move until somebody says so.
 ///
+/// Nobody can help a switch that is moved while a command is on its way: the node reads it in its
+/// new mode. Move it on a machine that stands still.
+///
 /// ```
 /// use axlewire::{endpoint::Endpoint, ikeya::{Master, MasterConfig}, time::Instant};
 ///
