@@ -87,7 +87,7 @@ impl<P, C: Clock> Driver<Robot, P, C> {
 /// The blocking calls of a host.
 ///
 /// Reports and pongs that come in meanwhile are not kept as events, because
-/// [`Host::last_report`] and [`Host::stats`] have what counts; all other events are.
+/// [`Host::last_report`] and [`Host::statistics`] have what counts; all other events are.
 #[cfg(feature = "embedded-io")]
 impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C>
 where
