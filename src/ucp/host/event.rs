@@ -213,7 +213,7 @@ impl Error for CommandError {
 }
 
 /// What a host has seen. Counts stop at 2^32 - 1. What noise has cost is in
-/// [`line`](super::Host::counters).
+/// [`counters`](super::Host::counters).
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -52,7 +52,7 @@ pub enum UpdateSource {
 }
 
 /// What a robot has seen. Counts stop at 2^32 - 1. What noise has cost is in
-/// [`line`](super::Robot::counters).
+/// [`counters`](super::Robot::counters).
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
