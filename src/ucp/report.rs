@@ -37,6 +37,23 @@ body! {
     }
 }
 
+/// The values of a report: the layouts differ in the order of their fields, not in their names.
+macro_rules! telemetry_of {
+    ($report:expr) => {
+        Telemetry {
+            battery_pct: u16::from_le_bytes($report.battery),
+            rpm: $report.rpm.map(i16::from_le_bytes),
+            acc: $report.acc.map(i16::from_le_bytes),
+            gyro: $report.gyro.map(i16::from_le_bytes),
+            mag: $report.mag.map(i16::from_le_bytes),
+            heading_deg: i16::from_le_bytes($report.heading),
+            power_w: $report.power,
+            voltage_dv: $report.voltage,
+            current_ca: u16::from_le_bytes($report.current),
+        }
+    };
+}
+
 impl FirmwareReport {
     /// A report of these values from a robot with firmware `version`.
     #[must_use]
@@ -58,17 +75,7 @@ impl FirmwareReport {
     /// The values that both layouts have.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
-        Telemetry {
-            battery_pct: u16::from_le_bytes(self.battery),
-            rpm: self.rpm.map(i16::from_le_bytes),
-            acc: self.acc.map(i16::from_le_bytes),
-            gyro: self.gyro.map(i16::from_le_bytes),
-            mag: self.mag.map(i16::from_le_bytes),
-            heading_deg: i16::from_le_bytes(self.heading),
-            power_w: self.power,
-            voltage_dv: self.voltage,
-            current_ca: u16::from_le_bytes(self.current),
-        }
+        telemetry_of!(self)
     }
 
     /// Version of the robot's firmware.
@@ -98,17 +105,7 @@ impl DocumentReport {
     /// The values that both layouts have.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
-        Telemetry {
-            battery_pct: u16::from_le_bytes(self.battery),
-            rpm: self.rpm.map(i16::from_le_bytes),
-            acc: self.acc.map(i16::from_le_bytes),
-            gyro: self.gyro.map(i16::from_le_bytes),
-            mag: self.mag.map(i16::from_le_bytes),
-            heading_deg: i16::from_le_bytes(self.heading),
-            power_w: self.power,
-            voltage_dv: self.voltage,
-            current_ca: u16::from_le_bytes(self.current),
-        }
+        telemetry_of!(self)
     }
 }
 
