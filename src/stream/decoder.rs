@@ -43,6 +43,9 @@ pub struct Decoder<F, const N: usize> {
     end: usize,
     /// What stands at the front of the held bytes, where that is known.
     front: Option<Front>,
+    /// Where a candidate is held: how many bytes, for which there is room, have to come before
+    /// anything can be said; 0 where that is not known.
+    missing: usize,
     line: Line,
     /// Where the held bytes ended when the line went quiet: what lies behind came later.
     quiet_end: usize,
@@ -78,6 +81,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             at: 0,
             end: 0,
             front: None,
+            missing: 0,
             line: Line::Busy,
             quiet_end: 0,
             ledger: Ledger::new(),
@@ -110,7 +114,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// No more than `spare` has are taken.
     pub fn commit(&mut self, len: usize) {
         let len = len.min(N - self.end);
-        self.end += len;
+        (self.end, self.missing) = (self.end + len, 0);
         self.receive(len);
     }
 
@@ -123,7 +127,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
     /// one may then follow right behind the first.
     pub fn idle(&mut self) {
-        (self.line, self.quiet_end) = (Line::Quiet, self.end);
+        (self.line, self.quiet_end, self.missing) = (Line::Quiet, self.end, 0);
     }
 
     /// Bytes received and neither framed nor skipped yet.
@@ -143,11 +147,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[inline]
     pub(crate) fn advance<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         let before = input.len();
-        let found = if self.is_short_of(before) {
+        if before < self.missing {
             // Byte by byte from a port, this is what happens nearly every time.
-            self.hold(input, before);
-            None
-        } else if self.pending() == 0 && self.line == Line::Busy {
+            self.hold_on(input);
+            self.receive(before);
+            return None;
+        }
+        self.missing = 0;
+        let found = if self.pending() == 0 && self.line == Line::Busy {
             self.advance_input(input)
         } else {
             self.advance_held(input)
@@ -183,10 +190,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 self.ledger.frame(len);
                 Some(Found::Input(frame))
             }
-            Front::Partial { .. } => {
-                (self.at, self.end) = (0, 0);
-                self.hold(input, N);
-                self.front = Some(front);
+            Front::Partial { need } => {
+                self.hold_cut_off(input, need);
                 None
             }
         }
@@ -230,6 +235,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 }
                 (Front::Partial { need }, Line::Busy) => {
                     if self.hold(input, need.saturating_sub(self.pending())) == 0 {
+                        self.wait_for(need);
                         return None;
                     }
                 }
@@ -237,15 +243,38 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Is it known that `more` bytes do not complete the candidate that is held?
+    /// Holds the candidate that the input cuts off. Out of line: it happens once per input.
+    #[inline(never)]
+    fn hold_cut_off(&mut self, input: &mut &[u8], need: usize) {
+        (self.at, self.end) = (0, 0);
+        self.hold(input, N);
+        self.front = Some(Front::Partial { need });
+        self.wait_for(need);
+    }
+
+    /// Nothing can be said before the held bytes are `need`; sees to it that there is room for them.
     #[inline]
-    fn is_short_of(&self, more: usize) -> bool {
-        match self.front {
-            Some(Front::Partial { need }) => {
-                self.line == Line::Busy && self.pending() + more < need
-            }
-            _ => false,
+    fn wait_for(&mut self, need: usize) {
+        if self.at + need > N {
+            self.compact();
         }
+        self.missing = need.saturating_sub(self.pending());
+    }
+
+    /// Moves an input that completes nothing behind the held bytes.
+    #[inline]
+    fn hold_on(&mut self, input: &mut &[u8]) {
+        let end = self.end + input.len();
+        if let Some(room) = self.buffer.get_mut(self.end..end) {
+            match (room, *input) {
+                // A single byte is not worth a call to copy it.
+                ([room], [byte]) => *room = *byte,
+                (room, bytes) => room.copy_from_slice(bytes),
+            }
+        }
+        self.missing -= input.len();
+        self.end = end;
+        *input = &[];
     }
 
     /// What stands at the front of the held bytes, refusals booked.
