@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# What axlewire costs on a Cortex-M4: builds for thumbv7em, runs in QEMU, prints `name value goal`.
+#
+#   examples/firmware/bench.sh            prints the figures
+#   examples/firmware/bench.sh --check    also compares them with figures.txt: fails above +3 %
+#   examples/firmware/bench.sh --record   writes figures.txt
+#
+# Instructions first, then flash in bytes. A goal of `-` is none. Uses the rustup target where it is
+# installed, otherwise Debian's compiler; QEMU and lld come from Debian if they are missing.
+set -euo pipefail
+cd "$(dirname "$0")"
+mode=${1:-}
+case $mode in '' | --check | --record) ;; *) sed -n '2,6s/^# \?//p' "$0" >&2; exit 2 ;; esac
+
+target=thumbv7em-none-eabihf
+out=${CARGO_TARGET_DIR:-$PWD/target}
+export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
+
+need() {
+    local missing=()
+    for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package"); done
+    [ ${#missing[@]} -gt 0 ] || return 0
+    local sudo
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive $sudo apt-get install -qq -y --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+command -v qemu-system-arm >/dev/null || need qemu-system-arm
+command -v readelf >/dev/null || need binutils
+if [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
+    cargo=(cargo build) compiler=$(rustc --version)
+else
+    need rustc-web cargo-web rust-web-src lld
+    RUSTC=$(dpkg -L rustc-web | grep -m1 'bin/rustc$')
+    export RUSTC RUSTC_BOOTSTRAP=1 CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=ld.lld
+    cargo=("$(dpkg -L cargo-web | grep -m1 'bin/cargo$')" build -Zbuild-std=core)
+    compiler=$("$RUSTC" --version)
+fi
+"${cargo[@]}" --quiet --locked --release --bins
+"${cargo[@]}" --quiet --locked --profile fast --bin size_empty --bin size_crc --bin size_both
+
+# Bytes in the sections whose names match $2 of the program $1, e.g. release/size_crc.
+bytes() {
+    local total=0 size
+    for size in $(readelf -SW "$out/$target/$1" | sed 's/^ *\[ *[0-9]*\] *//' | awk -v s="^($2)\$" '$1 ~ s { print $5 }'); do
+        total=$((total + 0x$size))
+    done
+    echo "$total"
+}
+
+# name program sections goal: what the program has more than the empty one.
+over_empty() {
+    local profile=${2%/*}
+    echo "$1 $(($(bytes "$2" "$3") - $(bytes "$profile/size_empty" "$3"))) $4"
+}
+
+figures=$(
+    timeout 120 qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 \
+        -semihosting-config enable=on,target=native -kernel "$out/$target/release/bench" </dev/null
+    flash='\\.text|\\.rodata|\\.data'
+    over_empty flash_crc release/size_crc "$flash" 350
+    over_empty flash_ikeya8_slice release/size_ikeya8 "$flash" 230
+    over_empty flash_ucp44_slice release/size_ucp44 "$flash" 370
+    over_empty flash_both_slices release/size_both "$flash" 600
+    for role in master slave host robot; do
+        over_empty "flash_$role" "release/size_$role" "$flash" -
+    done
+    # All constants together, so that no table can hide among them.
+    over_empty constants_crc_opt3 fast/size_crc '\\.rodata' 64
+    over_empty constants_both_opt3 fast/size_both '\\.rodata' 64
+)
+echo "# $compiler"
+echo "$figures"
+
+case $mode in
+--record)
+    { echo "# $compiler"; echo "$figures"; } >figures.txt
+    ;;
+--check)
+    [ "$(head -1 figures.txt)" = "# $compiler" ] || echo "recorded with another compiler: $(head -1 figures.txt)"
+    awk '
+        /^#/ { next }
+        NR == FNR { recorded[$1] = $2; next }
+        !($1 in recorded) { print "not recorded: " $1; bad = 1; next }
+        { seen[$1] = 1 }
+        $2 > recorded[$1] * 1.03 { print $1 " grew from " recorded[$1] " to " $2; bad = 1 }
+        END {
+            for (name in recorded) if (!(name in seen)) { print "not measured: " name; bad = 1 }
+            exit bad
+        }
+    ' figures.txt <(echo "$figures")
+    ;;
+esac
