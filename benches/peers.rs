@@ -9,11 +9,16 @@ use mavlink::{
     dialects::common::{ATTITUDE_QUATERNION_DATA, MavMessage},
 };
 use modbus_core::rtu::{self, DecodedFrame};
+use rmodbus::{ModbusProto, server::ModbusFrame};
+use ublox::{Parser, UbxPacket, proto23::PacketRef};
 
 use crate::{Tally, streams::Rng};
 
 /// Length of a MAVLink frame here, bytes: that of a UCP report.
 pub const MAVLINK_LEN: usize = 44;
+
+/// Length of a UBX frame here, bytes: that of a UCP report.
+pub const UBLOX_LEN: usize = 44;
 
 /// Length of a Modbus response here, bytes: registers come in pairs, so one less than a report.
 pub const MODBUS_RESPONSE_LEN: usize = 43;
@@ -54,6 +59,42 @@ pub fn mavlink_read(bytes: &[u8]) -> Tally {
     while let Ok((header, message)) = reader.read_message::<MavMessage>(MavlinkVersion::V2) {
         if let MavMessage::ATTITUDE_QUATERNION(attitude) = message {
             tally.add(header.sequence, Some(attitude.time_boot_ms.to_le_bytes()));
+        }
+    }
+    tally
+}
+
+/// UBX frames with a velocity (NAV-VELNED) each.
+#[must_use]
+pub fn ublox_frames(count: usize) -> Vec<u8> {
+    let mut rng = Rng::new(7);
+    let mut bytes = Vec::with_capacity(count * UBLOX_LEN);
+    for _ in 0..count {
+        let mut frame = [0; UBLOX_LEN];
+        let (content, sums) = frame.split_at_mut(UBLOX_LEN - 2);
+        content.fill_with(|| rng.byte());
+        content[..6].copy_from_slice(&[0xB5, 0x62, 0x01, 0x12, 36, 0]);
+        // Fletcher's two sums leave out the two bytes of the header.
+        let (mut first, mut second) = (0u8, 0u8);
+        for byte in &content[2..] {
+            first = first.wrapping_add(*byte);
+            second = second.wrapping_add(first);
+        }
+        sums.copy_from_slice(&[first, second]);
+        bytes.extend(frame);
+    }
+    bytes
+}
+
+/// `ublox`, given everything at once, so that it borrows all frames and copies none.
+#[must_use]
+pub fn ublox_read(bytes: &[u8]) -> Tally {
+    let mut tally = Tally::default();
+    let mut parser = Parser::default_proto();
+    let mut packets = parser.consume_ubx(bytes);
+    while let Some(packet) = packets.next() {
+        if let Ok(UbxPacket::Proto23(PacketRef::NavVelNed(velocity))) = packet {
+            tally.add(0x12, Some(velocity.itow().to_le_bytes()));
         }
     }
     tally
@@ -105,6 +146,21 @@ fn modbus_read(kind: modbus_core::DecoderType, mut bytes: &[u8]) -> Tally {
     tally
 }
 
+/// `rmodbus` as the server that the requests are for. It does not look for frames: it is handed
+/// each one, cut out.
+#[must_use]
+pub fn rmodbus_read_requests(bytes: &[u8]) -> Tally {
+    let mut tally = Tally::default();
+    let mut response = Vec::new();
+    for request in bytes.chunks_exact(MODBUS_REQUEST_LEN) {
+        let mut frame = ModbusFrame::new(1, request, ModbusProto::Rtu, &mut response);
+        if frame.parse().is_ok() && frame.processing_required {
+            tally.add(frame.unit_id, Some(u32::from(frame.reg).to_le_bytes()));
+        }
+    }
+    tally
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,6 +168,7 @@ mod tests {
     #[test]
     fn the_frames_are_as_long_as_they_say() {
         assert_eq!(mavlink_frames(100).len(), 100 * MAVLINK_LEN);
+        assert_eq!(ublox_frames(100).len(), 100 * UBLOX_LEN);
         assert_eq!(modbus_responses(100).len(), 100 * MODBUS_RESPONSE_LEN);
         assert_eq!(modbus_requests(100).len(), 100 * MODBUS_REQUEST_LEN);
     }
@@ -119,7 +176,9 @@ mod tests {
     #[test]
     fn every_peer_finds_all_its_frames() {
         assert_eq!(mavlink_read(&mavlink_frames(1000)).frames, 1000);
+        assert_eq!(ublox_read(&ublox_frames(1000)).frames, 1000);
         assert_eq!(modbus_read_responses(&modbus_responses(1000)).frames, 1000);
         assert_eq!(modbus_read_requests(&modbus_requests(1000)).frames, 1000);
+        assert_eq!(rmodbus_read_requests(&modbus_requests(1000)).frames, 1000);
     }
 }

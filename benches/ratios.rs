@@ -1,0 +1,417 @@
+//! How many times faster axlewire is than C and than other crates: one line per figure,
+//! `name value goal`, more is better.
+//!
+//! `cargo bench -p axlewire-benches --bench ratios` takes less than 50 seconds once it is built.
+//! Contenders take turns, and a value is the ratio of their medians, so whatever else the machine
+//! does meets both sides alike. It ends with an error when an answer is wrong, never because a
+//! figure is slow.
+
+use std::{env, hint::black_box, time::Instant};
+
+use axlewire::crc16;
+use axlewire_benches::{
+    Tally, peers, reference,
+    streams::{self, Rng, Stream},
+};
+use crc::{CRC_16_MODBUS, Crc, Table};
+
+/// How much work is done, so that a test run can do little of it.
+struct Effort {
+    /// Clean streams, bytes: more than any cache holds.
+    clean_len: usize,
+    /// Streams for other crates, bytes.
+    peers_len: usize,
+    /// Streams with bit errors, bytes: drawing the errors is what takes long.
+    damaged_len: usize,
+    /// Hostile streams, bytes: the oracle needs seconds for each MiB of the worst.
+    hostile_len: usize,
+    /// CRCs for one time.
+    crc_calls: u64,
+    /// Times of each stream decoder.
+    rounds: usize,
+    /// Times of each CRC.
+    crc_rounds: usize,
+}
+
+const FULL: Effort = Effort {
+    clean_len: 64 << 20,
+    peers_len: 32 << 20,
+    damaged_len: 16 << 20,
+    hostile_len: 8 << 20,
+    crc_calls: 10_000,
+    rounds: 7,
+    crc_rounds: 101,
+};
+
+const TINY: Effort = Effort {
+    clean_len: 64 << 10,
+    peers_len: 64 << 10,
+    damaged_len: 64 << 10,
+    hostile_len: 64 << 10,
+    crc_calls: 10,
+    rounds: 1,
+    crc_rounds: 1,
+};
+
+fn main() {
+    // Like criterion: `cargo bench` passes `--bench`, and without it nobody wants to wait.
+    let given = |wanted: &str| env::args().any(|argument| argument == wanted);
+    let effort = if given("--bench") && !given("--test") { FULL } else { TINY };
+
+    let clean = STREAMS.map(|(_, make)| StreamTimes::measure(make, &effort));
+    let crc_6 = CrcTimes::measure(6, &effort);
+    let crc_42 = CrcTimes::measure(42, &effort);
+    let hostile = hostile(&effort);
+    let peers = PeerTimes::measure(&effort);
+
+    let of = |name: &str| hostile.iter().find(|pattern| pattern.name == name).expect("is listed");
+    let worst = hostile
+        .iter()
+        .filter(|pattern| !pattern.name.ends_with("noise") && pattern.name != LONGEST_CANDIDATES)
+        .map(|pattern| pattern.over_c)
+        .fold(f64::INFINITY, f64::min);
+
+    let [ikeya8, mixed, ucp44] = &clean;
+    print("ikeya8_frames_over_c", ikeya8.c / ikeya8.frames, 4.2);
+    print("ikeya_mixed_over_c", mixed.c / mixed.frames, 4.2);
+    print("ucp44_frames_over_c", ucp44.c / ucp44.frames, 8.5);
+    print("ikeya8_decoder4096_over_frames", ikeya8.frames / ikeya8.decoder_4096, 0.85);
+    print("ucp44_decoder4096_over_frames", ucp44.frames / ucp44.decoder_4096, 0.85);
+    print("ikeya8_decoder1_over_c", ikeya8.c / ikeya8.decoder_1, 1.0);
+    print("ucp44_decoder1_over_c", ucp44.c / ucp44.decoder_1, 1.0);
+    print("crc42_over_c_table", crc_42.c / crc_42.ours, 6.5);
+    print("crc6_over_best_crate", crc_6.best_crate() / crc_6.ours, 1.0);
+    print("crc42_over_best_crate", crc_42.best_crate() / crc_42.ours, 1.0);
+    print("noise_ikeya_over_c", of("Ikeya noise").over_c, 1.0);
+    print("noise_ucp_over_c", of("UCP noise").over_c, 1.0);
+    print("hostile_worst_over_c", worst, 0.45);
+    print("ucp44_over_mavlink", peers.mavlink / peers.ucp_44, 8.0);
+    print("ucp44_over_modbus_core", peers.modbus_core_43 / peers.ucp_44, 6.5);
+    print("ucp44_over_ublox", peers.ublox / peers.ucp_44, 1.8);
+    print("ikeya8_over_modbus_core", peers.modbus_core_8 / peers.ikeya_8, 3.5);
+    print("ikeya8_over_rmodbus", peers.rmodbus / peers.ikeya_8, 12.0);
+
+    // What the figures above are made of, and what they leave out.
+    for ((name, _), times) in STREAMS.iter().zip(&clean) {
+        times.print_throughput(name);
+    }
+    crc_6.print_crates();
+    crc_42.print_crates();
+    for pattern in &hostile {
+        let name = pattern.name.to_lowercase().replace(' ', "_");
+        print(&format!("hostile_{name}_over_c"), pattern.over_c, None);
+    }
+    for (name, make) in STREAMS {
+        with_bit_errors(name, &make(effort.damaged_len), &effort);
+    }
+}
+
+/// Makes a stream of so many bytes.
+type Make = fn(usize) -> Stream;
+
+/// What ordinary traffic looks like.
+const STREAMS: [(&str, Make); 3] = [
+    ("ikeya8", streams::responses),
+    ("ikeya_mixed", streams::requests_and_responses),
+    ("ucp44", streams::reports),
+];
+
+/// One line. A figure without a goal has a dash.
+fn print(name: &str, value: f64, goal: impl Into<Option<f64>>) {
+    let goal = goal.into().map_or("-".into(), |goal| goal.to_string());
+    println!("{name} {value:.3} {goal}");
+}
+
+/// One side of a comparison.
+struct Contender<'a> {
+    name: String,
+    work: Box<dyn Fn() -> Tally + 'a>,
+    /// What it must answer, every time.
+    expected: Tally,
+}
+
+impl<'a> Contender<'a> {
+    fn new(name: &str, expected: Tally, work: impl Fn() -> Tally + 'a) -> Self {
+        Self { name: name.into(), work: Box::new(work), expected }
+    }
+}
+
+/// Lets all take turns; the median of the times that each one took, seconds.
+fn race<const N: usize>(rounds: usize, contenders: [Contender<'_>; N]) -> [f64; N] {
+    let mut times = [const { Vec::new() }; N];
+    // The first round fills the caches and is not counted.
+    for round in 0..=rounds {
+        for (contender, times) in contenders.iter().zip(&mut times) {
+            let start = Instant::now();
+            let found = black_box((contender.work)());
+            let seconds = start.elapsed().as_secs_f64();
+            assert_eq!(found, contender.expected, "{}", contender.name);
+            if round > 0 {
+                times.push(seconds);
+            }
+        }
+    }
+    times.map(|mut times| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    })
+}
+
+/// The times for one clean stream, seconds.
+struct StreamTimes {
+    /// The stream, bytes.
+    len: usize,
+    c: f64,
+    frames: f64,
+    decoder_4096: f64,
+    decoder_1: f64,
+}
+
+impl StreamTimes {
+    fn measure(make: Make, effort: &Effort) -> Self {
+        let Stream { name, protocol, bytes, intact, .. } = make(effort.clean_len);
+        let bytes = &bytes[..];
+        let all = (protocol.oracle)(bytes);
+        assert_eq!(all.frames, intact.len() as u64, "{name}: the oracle");
+        let [c, frames, decoder_4096, decoder_1] = race(
+            effort.rounds,
+            [
+                Contender::new("C", all, || (protocol.c_table)(bytes)),
+                Contender::new("Frames", all, || (protocol.frames)(bytes)),
+                Contender::new("Decoder by 4096", all, || (protocol.decoder)(bytes, 4096)),
+                Contender::new("Decoder by 1", all, || (protocol.decoder)(bytes, 1)),
+            ],
+        );
+        Self { len: bytes.len(), c, frames, decoder_4096, decoder_1 }
+    }
+
+    /// Of all figures the ones that depend most on the machine.
+    fn print_throughput(&self, stream: &str) {
+        for (decoder, seconds) in [
+            ("c", self.c),
+            ("frames", self.frames),
+            ("decoder4096", self.decoder_4096),
+            ("decoder1", self.decoder_1),
+        ] {
+            println!("mb_per_s_{stream}_{decoder} {:.0} -", self.len as f64 / seconds / 1e6);
+        }
+    }
+}
+
+/// Bit errors: how many of the frames that stayed intact are recovered, and at what speed compared
+/// with the same stream undamaged.
+fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
+    let protocol = clean.protocol;
+    let sent = (protocol.oracle)(&clean.bytes);
+    for (one_in, rate, goal) in
+        [(100_000, "1e-5", None), (10_000, "1e-4", Some(0.85)), (1000, "1e-3", Some(0.5))]
+    {
+        let damaged = clean.with_bit_errors(one_in);
+        let intact = &damaged.intact;
+        let ends = (protocol.frame_ends)(&damaged.bytes);
+        let found = intact.iter().filter(|end| ends.binary_search(end).is_ok()).count();
+        assert_eq!(found, intact.len(), "{}: intact frames were lost", damaged.name);
+
+        // C tells how many it found, not where. A damaged frame passes for a good one so rarely
+        // that this is what it recovered.
+        let by_c = (protocol.c_table)(&damaged.bytes).frames;
+        let percent = |found: f64| 100.0 * found / intact.len() as f64;
+        println!("recovered_{name}_{rate}_axlewire_percent {:.4} 100", percent(found as f64));
+        println!("recovered_{name}_{rate}_c_percent {:.4} -", percent(by_c as f64));
+
+        let expected = (protocol.oracle)(&damaged.bytes);
+        let [clean_time, damaged_time] = race(
+            effort.rounds,
+            [
+                Contender::new(&clean.name, sent, || (protocol.frames)(&clean.bytes)),
+                Contender::new(&damaged.name, expected, || (protocol.frames)(&damaged.bytes)),
+            ],
+        );
+        print(&format!("speed_{name}_{rate}_over_clean"), clean_time / damaged_time, goal);
+    }
+}
+
+/// A hostile stream, and how fast axlewire gets rid of it.
+struct Pattern {
+    name: String,
+    over_c: f64,
+}
+
+/// Its candidates have 64 bytes, the cap. The goal is for at most 44.
+const LONGEST_CANDIDATES: &str = "UCP FD FF 3C 00 repeated";
+
+fn hostile(effort: &Effort) -> Vec<Pattern> {
+    let measure = |Stream { name, protocol, bytes, .. }: Stream| {
+        let expected = (protocol.oracle)(&bytes);
+        // C loses frames that chance made, always the same ones.
+        let by_c = (protocol.c_table)(&bytes);
+        let [c, frames] = race(
+            effort.rounds,
+            [
+                Contender::new("C", by_c, || (protocol.c_table)(&bytes)),
+                Contender::new(&name, expected, || (protocol.frames)(&bytes)),
+            ],
+        );
+        Pattern { name, over_c: c / frames }
+    };
+    streams::hostile(effort.hostile_len).into_iter().map(measure).collect()
+}
+
+type Compute = fn(&[u8]) -> u16;
+
+/// The forms of each crate that were the fastest at some length of ours.
+const CRATES: [(&str, Compute); 5] = [
+    ("crc_table1", |bytes| {
+        const CRC: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
+        CRC.checksum(bytes)
+    }),
+    ("crc_table16", |bytes| {
+        const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MODBUS);
+        CRC.checksum(bytes)
+    }),
+    ("crc16", crc16_crate::State::<crc16_crate::MODBUS>::calculate),
+    ("crcxx_lut256x8", |bytes| {
+        use crcxx::crc16::{Crc, LookupTable256xN, catalog::CRC_16_MODBUS};
+        const CRC: Crc<LookupTable256xN<8>> = Crc::<LookupTable256xN<8>>::new(&CRC_16_MODBUS);
+        CRC.compute(bytes)
+    }),
+    ("rscrypto", |bytes| {
+        use rscrypto::{Checksum, checksum::Crc16Ibm};
+        // It has no preset for 0xFFFF as the initial value; this makes one.
+        let mut crc = Crc16Ibm::resume(0xFFFF);
+        crc.update(bytes);
+        crc.finalize()
+    }),
+];
+
+/// The times of CRCs of one length, seconds.
+struct CrcTimes {
+    len: usize,
+    calls: u64,
+    ours: f64,
+    c: f64,
+    crates: [f64; CRATES.len()],
+}
+
+impl CrcTimes {
+    /// All are called through a pointer, as C has to be, which costs each of them the same.
+    fn measure(len: usize, effort: &Effort) -> Self {
+        let mut rng = Rng::new(len as u64);
+        let bytes: Vec<u8> = (0..len).map(|_| rng.byte()).collect();
+        let right = reference::crc_bitwise(&bytes);
+        let frames = effort.crc_calls;
+        let expected = Tally { frames, sum: frames * u64::from(right) };
+        let contender = |name: &str, compute: Compute| {
+            let bytes = &bytes[..];
+            Contender::new(&format!("{name}, {len} bytes"), expected, move || {
+                let mut sum = 0;
+                for _ in 0..frames {
+                    // Hiding the pointer anew loads it into the register of the last result. Code
+                    // that sets only the low half of it would wait for that result otherwise, and
+                    // look three times slower than it is.
+                    let compute = black_box(compute);
+                    sum += u64::from(compute(black_box(bytes)));
+                }
+                Tally { frames, sum }
+            })
+        };
+        let [ours, c, crates @ ..] = race(
+            effort.crc_rounds,
+            [
+                contender("axlewire", crc16::compute),
+                contender("C", reference::crc_table),
+                contender(CRATES[0].0, CRATES[0].1),
+                contender(CRATES[1].0, CRATES[1].1),
+                contender(CRATES[2].0, CRATES[2].1),
+                contender(CRATES[3].0, CRATES[3].1),
+                contender(CRATES[4].0, CRATES[4].1),
+            ],
+        );
+        Self { len, calls: frames, ours, c, crates }
+    }
+
+    fn best_crate(&self) -> f64 {
+        self.crates.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    fn print_crates(&self) {
+        let Self { len, calls, ours, c, crates } = self;
+        println!("ns_crc{len} {:.2} -", 1e9 * ours / *calls as f64);
+        print(&format!("crc{len}_over_c_two_tables"), c / ours, None);
+        for ((name, _), time) in CRATES.iter().zip(crates) {
+            print(&format!("crc{len}_over_{name}"), time / ours, None);
+        }
+    }
+}
+
+/// The times for one frame, seconds.
+struct PeerTimes {
+    ucp_44: f64,
+    mavlink: f64,
+    ublox: f64,
+    modbus_core_43: f64,
+    ikeya_8: f64,
+    modbus_core_8: f64,
+    rmodbus: f64,
+}
+
+impl PeerTimes {
+    fn measure(effort: &Effort) -> Self {
+        let reports = streams::reports(effort.peers_len);
+        let responses = streams::responses(effort.peers_len);
+        let all_of = |Stream { name, protocol, bytes, intact, .. }: &Stream| {
+            let expected = (protocol.oracle)(bytes);
+            assert_eq!(expected.frames, intact.len() as u64, "{name}");
+            expected
+        };
+
+        let count = effort.peers_len / 44;
+        let mavlink = peers::mavlink_frames(count);
+        let ublox = peers::ublox_frames(count);
+        let modbus = peers::modbus_responses(count);
+        let [ucp_time, mavlink_time, ublox_time, modbus_core_time] = race(
+            effort.rounds,
+            [
+                Contender::new("Frames", all_of(&reports), || {
+                    (reports.protocol.frames)(&reports.bytes)
+                }),
+                peer("mavlink", count, &mavlink, peers::mavlink_read),
+                peer("ublox", count, &ublox, peers::ublox_read),
+                peer("modbus-core", count, &modbus, peers::modbus_read_responses),
+            ],
+        );
+
+        let short_count = effort.peers_len / peers::MODBUS_REQUEST_LEN;
+        let requests = peers::modbus_requests(short_count);
+        let [ikeya_time, modbus_core_8_time, rmodbus_time] = race(
+            effort.rounds,
+            [
+                Contender::new("Frames", all_of(&responses), || {
+                    (responses.protocol.frames)(&responses.bytes)
+                }),
+                peer("modbus-core", short_count, &requests, peers::modbus_read_requests),
+                peer("rmodbus", short_count, &requests, peers::rmodbus_read_requests),
+            ],
+        );
+
+        let (count, short_count) = (count as f64, short_count as f64);
+        Self {
+            // Two in a hundred of these frames are shorter: the time for 44 bytes is dearer than
+            // that for an average frame.
+            ucp_44: ucp_time / (reports.bytes.len() as f64 / 44.0),
+            mavlink: mavlink_time / count,
+            ublox: ublox_time / count,
+            modbus_core_43: modbus_core_time / count,
+            ikeya_8: ikeya_time / (responses.bytes.len() as f64 / 8.0),
+            modbus_core_8: modbus_core_8_time / short_count,
+            rmodbus: rmodbus_time / short_count,
+        }
+    }
+}
+
+/// A peer must find each of its frames, and the same in them every time.
+fn peer<'a>(name: &str, count: usize, bytes: &'a [u8], read: fn(&[u8]) -> Tally) -> Contender<'a> {
+    let expected = read(bytes);
+    assert_eq!(expected.frames, count as u64, "{name}");
+    Contender::new(name, expected, move || read(bytes))
+}
