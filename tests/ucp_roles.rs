@@ -995,6 +995,23 @@ fn an_update_never_starts_by_itself() {
     assert!(!robot.answer_update(OtaStatus::Forbidden, ms(30)), "once");
 }
 
+#[test]
+fn a_command_that_a_false_header_held_back_is_as_old_as_its_bytes() {
+    let mut robot = Robot::new(RobotConfig::default(), ms(0));
+    // A start of 64 bytes that never comes, a command behind it, and a driver that is late.
+    let held = [&[0xFD, 0xFF, 60, 0][..], go(60).frame(0).as_bytes()].concat();
+    robot.handle_input(&held, ms(10));
+    assert_eq!(robot.command(ms(11)).speed(), 0, "not yet to be seen");
+    robot.handle_input(&[0; 36], ms(400));
+    assert_eq!(robot.command(ms(400)).speed(), 60, "it holds for 500 ms ...");
+    assert_eq!(robot.command(ms(510)).speed(), 0, "... from when it had arrived");
+
+    let mut robot = Robot::new(RobotConfig::default(), ms(0));
+    robot.handle_input(&held, ms(10));
+    robot.handle_input(&[0; 36], ms(2000));
+    assert_eq!(robot.command(ms(2000)).speed(), 0, "nobody wants it any more");
+}
+
 // --- The robot (U9, U10, U12, U13) ---
 
 #[test]
