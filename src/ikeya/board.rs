@@ -70,6 +70,15 @@ pub struct Command<B: Board> {
     pub position: B::Position,
 }
 
+/// What a motor is to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target<B: Board = OneMotor> {
+    /// Turn, revolutions per second.
+    Velocity(B::Velocity),
+    /// Go there.
+    Position(B::Position),
+}
+
 /// What a node measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Status<B: Board> {

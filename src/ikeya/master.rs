@@ -12,8 +12,8 @@ pub use node::{Health, NodeStatistics};
 
 use heapless::{Deque, Vec};
 
-use self::node::{Confirm, Node, Target};
-use super::{Board, Mode, NodeId, OneMotor, ReadRequest, Status};
+use self::node::{Confirm, Node};
+use super::{Board, Mode, NodeId, OneMotor, ReadRequest, Status, Target};
 use crate::{
     endpoint::Endpoint,
     stream::Decoder,

@@ -80,14 +80,14 @@ pub mod three;
 mod units;
 mod wire;
 
-pub use board::{Board, Command, OneMotor, Status, ThreeMotors};
+pub use board::{Board, Command, OneMotor, Status, Target, ThreeMotors};
 pub use framing::{Either, Packet, Request, Response, ToMaster, ToSlave};
 pub use master::{
     Cause, CommandError, Health, Master, MasterConfig, MasterEvent, MasterStatistics,
     NodeStatistics, Polling,
 };
 pub use schedule::Schedule;
-pub use slave::{Slave, SlaveConfig, SlaveEvent, SlaveStatistics, Target};
+pub use slave::{Slave, SlaveConfig, SlaveEvent, SlaveStatistics};
 pub use units::{DipSwitch, IdReading, Mode, NodeId, Position, Rps};
 pub use wire::{PositionResponse, ReadRequest, VelocityResponse, WriteRequest};
 

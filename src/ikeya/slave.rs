@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{BAUD, Board, DipSwitch, IdReading, Mode, NodeId, OneMotor, ReadRequest};
+use super::{BAUD, Board, DipSwitch, IdReading, Mode, NodeId, OneMotor, ReadRequest, Target};
 use crate::{
     endpoint::Endpoint,
     error::EncodeError,
@@ -100,15 +100,6 @@ pub struct Slave<B: Board = OneMotor> {
     packet: Vec<u8, PACKET_LEN>,
     event: Option<SlaveEvent<B>>,
     statistics: SlaveStatistics,
-}
-
-/// What a motor is to do.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target<B: Board = OneMotor> {
-    /// Turn, revolutions per second.
-    Velocity(B::Velocity),
-    /// Go there.
-    Position(B::Position),
 }
 
 /// What the slave tells its application.

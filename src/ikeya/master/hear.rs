@@ -18,8 +18,11 @@ impl<B: Board> Master<B> {
 
     /// `request` and the time that its answer may take.
     fn answer_time(&self, request: Duration) -> Duration {
-        let answer = wire_time(<B::ToMaster as Framing>::MAX_LEN, self.config.baud);
-        request + self.config.reply_timeout + answer
+        request + self.config.reply_timeout + self.answer_wire_time()
+    }
+
+    fn answer_wire_time(&self) -> Duration {
+        wire_time(<B::ToMaster as Framing>::MAX_LEN, self.config.baud)
     }
 
     /// Opens the window of a request, and drops what was left on the line before it (I7).
@@ -92,8 +95,7 @@ impl<B: Board> Master<B> {
 
     /// Takes an answer.
     fn accept(&mut self, id: NodeId, status: Status<B>, request_end: Instant, now: Instant) {
-        let answer = wire_time(<B::ToMaster as Framing>::MAX_LEN, self.config.baud);
-        let latency = now - (request_end + answer);
+        let latency = now - (request_end + self.answer_wire_time());
         let mode = status.mode();
         let node = self.node_mut(id);
         let (was, was_mode) = (node.health, node.mode);

@@ -2,7 +2,7 @@
 
 use super::{MasterConfig, Mode, Polling, Status};
 use crate::{
-    ikeya::Board,
+    ikeya::{Board, Target},
     time::{Duration, Instant},
 };
 
@@ -74,13 +74,6 @@ impl NodeStatistics {
         self.latency_sum_us = self.latency_sum_us.wrapping_add(micros.into());
         self.replies = self.replies.wrapping_add(1);
     }
-}
-
-/// A set-point.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Target<B: Board> {
-    Velocity(B::Velocity),
-    Position(B::Position),
 }
 
 /// How far the confirmation of a WRITE has come.
@@ -236,8 +229,13 @@ impl<B: Board> Node<B> {
         match (self.fresh, B::ANSWERS_WRITE) {
             (false, _) => Due::Never,
             (true, false) => Due::Now,
-            (true, true) => self.guarded(Due::Now),
+            (true, true) => self.askable(),
         }
+    }
+
+    /// When it may be asked at all: a late answer of it has to be over.
+    pub(super) fn askable(&self) -> Due {
+        self.guarded(Due::Now)
     }
 
     /// Not before the guard is over.

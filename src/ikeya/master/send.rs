@@ -1,8 +1,8 @@
 //! Choosing and sending requests.
 
 use super::{
-    Board, ECHO_LEN, Master, NodeId, PACKET_LEN, ReadRequest, Request,
-    node::{Due, Node, Target},
+    Board, ECHO_LEN, Master, NodeId, PACKET_LEN, ReadRequest, Request, Target,
+    node::{Due, Node},
 };
 use crate::{
     stream::Encode,
@@ -27,10 +27,7 @@ impl<B: Board> Master<B> {
             Due::At(at) => Some(at),
         };
         let fresh = self.nodes.iter().filter_map(|node| at(node.fresh_due())).min();
-        let discovery = self.discovery.map(|discovery| {
-            let guard = self.nodes[discovery.next & 7].guarded_until;
-            guard.map_or(self.now, |until| until.max(self.now))
-        });
+        let discovery = self.discovery.and_then(|it| at(self.nodes[it.next & 7].askable()));
         let polled = match self.discovery {
             Some(_) => None,
             None => self.nodes.iter().filter_map(|node| at(node.due(&self.config))).min(),
@@ -96,13 +93,11 @@ impl<B: Board> Master<B> {
     fn next_exchange(&self, now: Instant) -> Option<(usize, Request, Source)> {
         let from = |first: usize| (0..8).map(move |step| (first + step) & 7);
         if let Some(discovery) = self.discovery {
-            let guard = self.nodes[discovery.next & 7].guarded_until;
-            let is_open = guard.is_none_or(|until| now >= until);
-            return is_open.then_some((discovery.next, Request::Read, Source::Discovery));
+            let is_askable = self.nodes[discovery.next & 7].askable().is_reached(now);
+            return is_askable.then_some((discovery.next, Request::Read, Source::Discovery));
         }
         if self.probe_due().is_reached(now) {
-            let is_open = |node: &Node<B>| node.guarded_until.is_none_or(|until| now >= until);
-            let is_sought = |node: &Node<B>| node.is_abnormal() && is_open(node);
+            let is_sought = |node: &Node<B>| node.is_abnormal() && node.askable().is_reached(now);
             let index = from(self.probe_turn + 1).find(|&index| is_sought(&self.nodes[index]))?;
             return Some((index, Request::Read, Source::Probe));
         }
