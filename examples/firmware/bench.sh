@@ -12,31 +12,8 @@ cd "$(dirname "$0")"
 mode=${1:-}
 case $mode in '' | --check | --record) ;; *) sed -n '2,6s/^# \?//p' "$0" >&2; exit 2 ;; esac
 
-target=thumbv7em-none-eabihf
-out=${CARGO_TARGET_DIR:-$PWD/target}
-export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
-
-need() {
-    local missing=()
-    for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package"); done
-    [ ${#missing[@]} -gt 0 ] || return 0
-    local sudo
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update -qq
-    DEBIAN_FRONTEND=noninteractive $sudo apt-get install -qq -y --no-install-recommends "${missing[@]}" >/dev/null
-}
-
-command -v qemu-system-arm >/dev/null || need qemu-system-arm
+. ./toolchain.sh
 command -v readelf >/dev/null || need binutils
-if [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
-    cargo=(cargo build) compiler=$(rustc --version)
-else
-    need rustc-web cargo-web rust-web-src lld
-    RUSTC=$(dpkg -L rustc-web | grep -m1 'bin/rustc$')
-    export RUSTC RUSTC_BOOTSTRAP=1 CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=ld.lld
-    cargo=("$(dpkg -L cargo-web | grep -m1 'bin/cargo$')" build -Zbuild-std=core)
-    compiler=$("$RUSTC" --version)
-fi
 "${cargo[@]}" --quiet --locked --release --bins
 "${cargo[@]}" --quiet --locked --profile fast --bin size_empty --bin size_crc --bin size_both
 

@@ -1,0 +1,196 @@
+//! The master of a motor bus: finds the nodes, lets each do something of its own, says what happens.
+//!
+//! A velocity node turns at half a revolution per second times its id; a position node goes as many
+//! revolutions on from where it was found as its id says. A node that comes back is commanded anew.
+//! On the text port: a line for each event that is no measurement, and a line per second and per
+//! received byte.
+
+#![no_std]
+#![no_main]
+
+use axlewire::{
+    drive::{Clock as _, Directed, Driver},
+    ikeya::{
+        self, Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId,
+        Polling, Position, Rps, Status,
+    },
+    time::Duration,
+};
+use axlewire_firmware::{
+    board::{BUS, Board},
+    clock::milliseconds,
+    line::Line,
+    serve_usarts,
+};
+use panic_halt as _;
+
+serve_usarts!();
+
+/// How often each node is read, and its set-point repeated.
+const CYCLE: Duration = Duration::from_millis(10);
+
+/// How often a line of counts is written, and how long after a discovery that found nobody the next
+/// one begins.
+const REPORT: Duration = Duration::from_millis(1000);
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    if let Some(board) = Board::take(ikeya::BAUD) {
+        run(board);
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+fn run(mut board: Board) {
+    let mut config = MasterConfig::direct();
+    config.reply_timeout = board.patience(config.reply_timeout);
+    config.polling = Polling::Every(CYCLE);
+    let Ok(port) = Directed::new(board.bus, board.driver_enable);
+    let mut report_at = board.clock.now();
+    let mut driver = Driver::new(Master::new(config), port, board.clock);
+    let (mut program, mut exchanges) = (Program::default(), 0u32);
+    driver.role_mut().discover();
+    loop {
+        // Neither the port nor the pin can fail.
+        if let Ok(Some(event)) = driver.next_event(report_at) {
+            if let MasterEvent::Status { .. } = event {
+                exchanges = exchanges.wrapping_add(1);
+            }
+            program.react(driver.role_mut(), event);
+            let mut line = Line::new("event");
+            if describe(&mut line, event) {
+                board.text.try_send(line.end());
+            }
+        }
+        let asked = board.text.poll_byte().is_some();
+        let now = driver.now();
+        if asked || now >= report_at {
+            let master = driver.role_mut();
+            let mut line = Line::new("master");
+            report(&mut line, master, exchanges);
+            board.text.try_send(line.count("ms", milliseconds(now)).end());
+            if !asked {
+                report_at = now + REPORT;
+                if !master.is_discovering()
+                    && NodeId::ALL.iter().all(|&id| master.mode(id).is_none())
+                {
+                    master.discover();
+                }
+            }
+        }
+    }
+}
+
+/// What the nodes do.
+#[derive(Default)]
+struct Program {
+    /// Nodes whose command the master has dropped, a bit for each: a board that comes back after an
+    /// unknown while shall not move by itself.
+    dropped: u8,
+}
+
+impl Program {
+    /// Commands a node once it is there, or there again after it was abnormal.
+    fn react(&mut self, master: &mut Master, event: MasterEvent) {
+        let (node, is_new) = match event {
+            MasterEvent::Discovered { node, .. } | MasterEvent::ModeChanged { node, .. } => {
+                (node, true)
+            }
+            MasterEvent::Health { node, health: Health::Abnormal } => {
+                self.dropped |= bit_of(node);
+                return;
+            }
+            MasterEvent::Health { node, health: Health::Online } => {
+                (node, self.dropped & bit_of(node) != 0)
+            }
+            _ => return,
+        };
+        if is_new {
+            self.dropped &= !bit_of(node);
+            // Refused only where the node has gone again, and then it will come again, too.
+            let _ = command(master, node);
+        }
+    }
+}
+
+fn bit_of(node: NodeId) -> u8 {
+    1u8.rotate_left(node.get().into())
+}
+
+fn command(master: &mut Master, node: NodeId) -> Result<(), CommandError> {
+    let id = node.get();
+    match (master.mode(node), master.status(node)) {
+        (Some(Mode::Velocity), _) => {
+            let half_turns = Rps::new(f32::from(id) * 0.5).unwrap_or(Rps::ZERO);
+            master.set_velocity(node, half_turns)
+        }
+        (Some(Mode::Position), Some((Status::Position(at), _))) => {
+            let way = i32::from(id) * Position::COUNTS_PER_REVOLUTION;
+            let goal = Position::from_counts(at.counts().saturating_add(way)).unwrap_or(at);
+            master.set_position(node, goal)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says what happens; `false` for measurements, which come a hundred times a second.
+fn describe(line: &mut Line, event: MasterEvent) -> bool {
+    let (what, node, how) = match event {
+        MasterEvent::Discovered { node, mode } => ("discovered", node, name_of(mode)),
+        MasterEvent::Health { node, health } => {
+            let health = match health {
+                Health::Online => "online",
+                Health::Suspect(_) => "suspect",
+                Health::Abnormal => "abnormal",
+            };
+            ("health", node, health)
+        }
+        MasterEvent::ModeChanged { node, mode } => ("mode", node, name_of(mode)),
+        MasterEvent::ReadFailed { node, cause } => {
+            let cause = match cause {
+                Cause::Silent => "silent",
+                Cause::Damaged => "damaged",
+                Cause::Unexpected => "unexpected",
+                _ => "unknown",
+            };
+            ("failed", node, cause)
+        }
+        MasterEvent::DiscoveryDone { online } => {
+            line.word("discovery done").count("online", online.into());
+            return true;
+        }
+        _ => return false,
+    };
+    line.word(what).count("node", node.get().into()).word(how);
+    true
+}
+
+const fn name_of(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Velocity => "velocity",
+        Mode::Position => "position",
+    }
+}
+
+/// What every node measures, and the counts.
+fn report(line: &mut Line, master: &Master, exchanges: u32) {
+    let statistics = master.statistics();
+    line.count("reads", statistics.reads)
+        .count("writes", statistics.writes)
+        .count("exchanges", exchanges)
+        .count("lost_events", statistics.lost_events)
+        .count("overruns", BUS.overruns())
+        .count("lost", BUS.lost())
+        .count("damaged", BUS.damaged());
+    for node in NodeId::ALL {
+        if let Some((status, _)) = master.status(node) {
+            line.count("node", node.get().into());
+            match status {
+                Status::Velocity(rps) => line.thousandths("mrps", rps),
+                Status::Position(at) => line.number("counts", at.counts()),
+            };
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! A slave of a motor bus with one motor, or rather the model of one.
+//!
+//! Answers what it is asked, turns as it is told, and stops half a second after the last command. On
+//! the text port: a line per second, and one for each received byte.
+
+#![no_std]
+#![no_main]
+
+use axlewire::{
+    drive::{Clock as _, Directed, Driver},
+    ikeya::{
+        self, DipSwitch, IdReading, Mode, NodeId, Slave, SlaveConfig, SlaveStatistics, Target,
+    },
+    time::Duration,
+};
+use axlewire_firmware::{
+    board::{BUS, Board},
+    clock::milliseconds,
+    line::Line,
+    motor::Motor,
+    serve_usarts,
+};
+use panic_halt as _;
+
+serve_usarts!();
+
+/// Where a board has four DIP switches: `0000` is node 1 in velocity mode (ruling I2).
+const DIP: u8 = 0b0000;
+const READING: IdReading = IdReading::ValuePlusOne;
+
+/// The motor stands still after this long without a command. The protocol document has no such time;
+/// a motor that nobody talks to any more had better stop.
+const WATCHDOG: Duration = Duration::from_millis(500);
+
+/// How often the motor's model moves on, and the answers with it.
+const STEP: Duration = Duration::from_millis(5);
+
+/// How often a line is written.
+const REPORT: Duration = Duration::from_millis(1000);
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    // The DIP constant is good, and the board is taken once.
+    if let (Some(board), Ok(dip)) = (Board::take(ikeya::BAUD), DipSwitch::from_bits(DIP))
+        && let Ok(node) = dip.node_id(READING)
+    {
+        run(board, node, dip.mode());
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+fn run(mut board: Board, node: NodeId, mode: Mode) {
+    let mut config = SlaveConfig::direct();
+    config.watchdog = Some(WATCHDOG);
+    config.idle = board.patience(config.idle);
+    let mut motor = Motor::new();
+    let mut slave: Slave = Slave::new(node, mode, config);
+    slave.set_position(motor.position());
+    let Ok(port) = Directed::new(board.bus, board.driver_enable);
+    let mut last = board.clock.now();
+    let mut driver = Driver::new(slave, port, board.clock);
+    let (mut report_at, mut stops) = (last, 0u32);
+    loop {
+        // Answers are sent in here, from the wake-up on: nothing else stands in front of them.
+        // Neither the port nor the pin can fail.
+        let until = last + STEP;
+        let _ = driver.run_until(until, |_, event| {
+            if event == ikeya::SlaveEvent::Watchdog {
+                stops = stops.wrapping_add(1);
+            }
+        });
+        let now = driver.now();
+        let slave = driver.role_mut();
+        motor.obey(slave.command(), mode);
+        motor.step(now - last);
+        slave.set_velocity(motor.velocity());
+        slave.set_position(motor.position());
+        last = now;
+
+        let asked = board.text.poll_byte().is_some();
+        if asked || now >= report_at {
+            let mut line = Line::new("slave");
+            report(&mut line, slave, &motor, stops);
+            // A reader who asks faster than lines can be sent gets fewer.
+            board.text.try_send(line.count("ms", milliseconds(now)).end());
+            if !asked {
+                report_at = now + REPORT;
+            }
+        }
+    }
+}
+
+/// Everything that a test or a curious user wants to know.
+fn report(line: &mut Line, slave: &Slave, motor: &Motor, stops: u32) {
+    let SlaveStatistics { reads, writes, refused, foreign, replies, overtaken, .. } =
+        *slave.statistics();
+    line.count("node", slave.node().get().into());
+    match slave.command() {
+        Some(Target::Velocity(to)) => line.thousandths("target_mrps", to.get()),
+        Some(Target::Position(to)) => line.number("target_counts", to.counts()),
+        None => line.word("target none"),
+    }
+    .thousandths("mrps", motor.velocity().get())
+    .number("counts", motor.position().counts())
+    .count("reads", reads)
+    .count("writes", writes)
+    .count("replies", replies)
+    .count("refused", refused)
+    .count("foreign", foreign)
+    .count("overtaken", overtaken)
+    .count("stops", stops)
+    .count("skipped", slave.counters().skipped() as u32)
+    .count("overruns", BUS.overruns())
+    .count("lost", BUS.lost())
+    .count("damaged", BUS.damaged());
+}

@@ -1,0 +1,128 @@
+//! 168 MHz, microseconds, and sleeping until something happens.
+
+use axlewire::{
+    drive::Clock as DriverClock,
+    time::{Instant, Wrapping32},
+};
+use cortex_m::peripheral::{SCB, SYST, syst::SystClkSource};
+use stm32f4::stm32f405::{FLASH, RCC, TIM2};
+
+use crate::uart;
+
+/// The crystal of the board, MHz. Boards of this family carry 8, 12 or 25: change it to yours. Where
+/// no crystal starts, the processor's own oscillator takes its place.
+const CRYSTAL_MHZ: u8 = 8;
+
+/// The processor's own oscillator, MHz: within 1 % at 25 °C.
+const INTERNAL_MHZ: u8 = 16;
+
+/// Clock of the processor, MHz.
+const CORE_MHZ: u32 = 168;
+
+/// Clock of USART1, Hz.
+pub const APB2_HZ: u32 = 84_000_000;
+
+/// Clock of USART2, Hz.
+pub const APB1_HZ: u32 = 42_000_000;
+
+/// Clock of the timers on APB1, MHz: twice the bus.
+const TIMER_MHZ: u16 = 84;
+
+/// Clock of the same timers in QEMU, MHz, whatever the bus does.
+const EMULATED_TIMER_MHZ: u16 = 1000;
+
+/// How often a crystal is looked at before it counts as missing: some 30 ms at 16 MHz. One that is
+/// there starts within 10.
+const CRYSTAL_PATIENCE: u32 = 50_000;
+
+/// Is this QEMU, which models neither clocks nor pins?
+///
+/// After every reset the processor runs from its own oscillator, so that HSIRDY is 1 wherever there is
+/// somebody to say so.
+pub fn is_emulated(rcc: &RCC) -> bool {
+    rcc.cr().read().hsirdy().bit_is_clear()
+}
+
+/// Runs the processor at 168 MHz, APB1 at 42 MHz and APB2 at 84 MHz.
+///
+/// An emulator is left alone: it runs at its own speed, and would never say that a clock is ready.
+pub fn speed_up(rcc: &RCC, flash: &FLASH) {
+    if is_emulated(rcc) {
+        return;
+    }
+    rcc.cr().modify(|_, w| w.hseon().on());
+    let has_crystal = (0..CRYSTAL_PATIENCE).any(|_| rcc.cr().read().hserdy().is_ready());
+    // 1 MHz · 336 / 2 = 168 MHz; 336 / 7 = 48 MHz for a USB that nobody uses.
+    let divider = if has_crystal { CRYSTAL_MHZ } else { INTERNAL_MHZ };
+    rcc.pllcfgr().write(|w| {
+        // SAFETY: M, N and Q may hold values that the PLL cannot run with; these are within its
+        // limits (reference manual RM0090, RCC_PLLCFGR).
+        unsafe { w.pllm().bits(divider).plln().bits(336).pllq().bits(7) };
+        w.pllp().div2().pllsrc().bit(has_crystal)
+    });
+    // 5 wait states at 168 MHz, before the clock goes up.
+    flash.acr().write(|w| w.latency().ws5().prften().enabled().icen().enabled().dcen().enabled());
+    rcc.cfgr().write(|w| w.ppre1().div4().ppre2().div2());
+    rcc.cr().modify(|_, w| w.pllon().on());
+    // Both waits end: the PLL has a running input.
+    while !rcc.cr().read().pllrdy().is_ready() {}
+    rcc.cfgr().modify(|_, w| w.sw().pll());
+    while !rcc.cfgr().read().sws().is_pll() {}
+}
+
+/// The time since the start: TIM2 counts microseconds. SysTick is the alarm clock.
+pub struct Clock {
+    timer: TIM2,
+    alarm: SYST,
+    wrapping: Wrapping32,
+}
+
+impl Clock {
+    /// Starts at 0. The timer's own clock has to be on.
+    pub fn new(timer: TIM2, mut alarm: SYST, is_emulated: bool) -> Self {
+        let mhz = if is_emulated { EMULATED_TIMER_MHZ } else { TIMER_MHZ };
+        timer.psc().write(|w| w.psc().set(mhz - 1));
+        // The update event loads the prescaler.
+        timer.egr().write(|w| w.ug().set_bit());
+        timer.cr1().write(|w| w.cen().enabled());
+        alarm.set_clock_source(SystClkSource::Core);
+        Self { timer, alarm, wrapping: Wrapping32::new() }
+    }
+}
+
+/// A time for people, milliseconds since the start. Wraps after 49 days.
+pub fn milliseconds(now: Instant) -> u32 {
+    (now.as_micros() / 1000) as u32
+}
+
+impl DriverClock for Clock {
+    fn now(&mut self) -> Instant {
+        self.wrapping.at(self.timer.cnt().read().bits())
+    }
+
+    /// Sleeps until `until`, until an interrupt of a USART, or for 90 ms, whichever is first.
+    fn idle_until(&mut self, until: Instant) {
+        /// As long as SysTick can count, microseconds.
+        const LONGEST: u32 = 90_000;
+        let micros = (until - self.now()).as_micros().min(LONGEST);
+        if micros == 0 {
+            return;
+        }
+        // With interrupts off: one that came before is seen in the flag, one that comes later wakes
+        // the processor all the same, and is served behind the critical section. So is the alarm,
+        // which has no handler.
+        critical_section::with(|cs| {
+            if uart::has_happened(cs) {
+                return;
+            }
+            self.alarm.set_reload(micros * CORE_MHZ);
+            self.alarm.clear_current();
+            self.alarm.enable_interrupt();
+            self.alarm.enable_counter();
+            cortex_m::asm::wfi();
+            self.alarm.disable_interrupt();
+            self.alarm.disable_counter();
+            SCB::clear_pendst();
+        });
+    }
+}

@@ -1,0 +1,80 @@
+//! A small model of a rover, in place of one.
+
+use axlewire::{
+    time::Duration,
+    ucp::{MotorControl, Telemetry},
+};
+
+use crate::lag::{Lag, seconds};
+
+/// Speed of a wheel at 100 %, rpm.
+const FULL_RPM: f32 = 120.0;
+
+/// How fast it turns when one side runs a rpm faster than the other, degrees per second.
+const TURN_PER_RPM: f32 = 4.0;
+
+/// A rover on flat ground with a battery that stays full: commands go in, telemetry comes out.
+///
+/// A positive `angular` turns it right, as the vendor firmware does (ruling U6).
+#[derive(Debug)]
+pub struct Rover {
+    left_rpm: Lag,
+    right_rpm: Lag,
+    heading_deg: f32,
+}
+
+impl Rover {
+    /// A rover that stands still and heads north.
+    pub const fn new() -> Self {
+        Self { left_rpm: Lag::new(0.15), right_rpm: Lag::new(0.15), heading_deg: 0.0 }
+    }
+
+    /// Drives as commanded from now on.
+    pub fn command(&mut self, command: &MotorControl) {
+        let (speed, turn) = (f32::from(command.speed()), f32::from(command.angular()));
+        let rpm = |percent: f32| percent.clamp(-100.0, 100.0) / 100.0 * FULL_RPM;
+        self.left_rpm.target = rpm(speed + turn);
+        self.right_rpm.target = rpm(speed - turn);
+    }
+
+    /// Lets `dt` pass, less than a second.
+    pub fn step(&mut self, dt: Duration) {
+        self.left_rpm.step(dt);
+        self.right_rpm.step(dt);
+        let turn = (self.left_rpm.value - self.right_rpm.value) * TURN_PER_RPM * seconds(dt);
+        self.heading_deg += turn;
+        if self.heading_deg >= 360.0 {
+            self.heading_deg -= 360.0;
+        } else if self.heading_deg < 0.0 {
+            self.heading_deg += 360.0;
+        }
+    }
+
+    /// Speeds of the wheels on the left and on the right, rpm.
+    pub fn rpm(&self) -> (i16, i16) {
+        let rounded = |rpm: f32| (rpm + if rpm < 0.0 { -0.5 } else { 0.5 }) as i16;
+        (rounded(self.left_rpm.value), rounded(self.right_rpm.value))
+    }
+
+    /// What its sensors say.
+    pub fn telemetry(&self) -> Telemetry {
+        let (left, right) = self.rpm();
+        Telemetry {
+            battery_pct: 87,
+            rpm: [left, right, left, right],
+            acc: [0, 0, Telemetry::ACC_PER_G as i16],
+            mag: [300, 0, -400],
+            heading_deg: self.heading_deg as i16,
+            power_w: 4,
+            voltage_dv: 119,
+            current_ca: 34,
+            ..Telemetry::default()
+        }
+    }
+}
+
+impl Default for Rover {
+    fn default() -> Self {
+        Self::new()
+    }
+}

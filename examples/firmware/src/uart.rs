@@ -1,0 +1,263 @@
+//! A USART with a queue each way.
+//!
+//! The interrupt moves bytes and nothing else: a received byte goes from the data register into a
+//! queue, a queued byte into the data register. Decoding, answering and everything that takes its
+//! time is the main loop's.
+//!
+//! Why not decode in the interrupt: at 500 kbit/s a byte comes every 20 µs, and the next one must have
+//! been fetched when it is over. Moving a byte takes less than 1 µs; a decoder may have to search
+//! through a whole packet for one byte, and a role sends answers. The price is the way from the
+//! interrupt to the main loop, less than 1 µs on a processor that has nothing else to do.
+
+use core::{
+    cell::{Cell, OnceCell},
+    convert::Infallible,
+    ops::Deref,
+    sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed},
+};
+
+use cortex_m::peripheral::NVIC;
+use critical_section::{CriticalSection, Mutex};
+use heapless::spsc::Queue as Spsc;
+use stm32f4::stm32f405::{Interrupt, usart1::RegisterBlock};
+
+/// Bytes between an interrupt and the main loop, 511 of them: 10 ms of a full line at 500 kbit/s.
+pub type Queue = Spsc<u8, 512>;
+
+/// A queue that both sides reach in a critical section.
+///
+/// Taken out of its cell and put back: no cell is ever found borrowed, so that nothing can panic. Not
+/// split into two ends, because those look up the queue's length at run time and divide by it.
+struct Shared(Mutex<Cell<Option<&'static mut Queue>>>);
+
+impl Shared {
+    const fn new() -> Self {
+        Self(Mutex::new(Cell::new(None)))
+    }
+
+    /// Does something with the queue; `None` before there is one.
+    fn with<T>(&self, work: impl FnOnce(&mut Queue) -> T) -> Option<T> {
+        critical_section::with(|cs| {
+            let cell = self.0.borrow(cs);
+            let queue = cell.take()?;
+            let result = work(queue);
+            cell.set(Some(queue));
+            Some(result)
+        })
+    }
+}
+
+/// Set by every interrupt of a USART: there may be something to do.
+static HAPPENED: AtomicBool = AtomicBool::new(false);
+
+/// Has an interrupt of a USART been served since the last call?
+pub fn has_happened(_: CriticalSection<'_>) -> bool {
+    // Load and store, in a critical section: there is nobody to come between.
+    let happened = HAPPENED.load(Relaxed);
+    HAPPENED.store(false, Relaxed);
+    happened
+}
+
+/// What the interrupt of a USART and the main loop share. `U` is its register block.
+pub struct Channel<U> {
+    interrupt: Interrupt,
+    usart: Mutex<OnceCell<U>>,
+    inbox: Shared,
+    outbox: Shared,
+    /// Bytes that came while the one before was still in the data register: the hardware lost them.
+    overruns: AtomicU32,
+    /// Bytes that found the queue full: the main loop was too slow.
+    lost: AtomicU32,
+    /// Bytes with a framing error or noise in the middle of a bit. They are received all the same.
+    damaged: AtomicU32,
+}
+
+impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
+    /// A channel that does nothing until [`start`](Self::start).
+    pub const fn new(interrupt: Interrupt) -> Self {
+        Self {
+            interrupt,
+            usart: Mutex::new(OnceCell::new()),
+            inbox: Shared::new(),
+            outbox: Shared::new(),
+            overruns: AtomicU32::new(0),
+            lost: AtomicU32::new(0),
+            damaged: AtomicU32::new(0),
+        }
+    }
+
+    /// Starts the USART, 8N1, with its clock divided by `divider` for the speed, and gives its port.
+    ///
+    /// To be called once, with the USART's clock on; the interrupt is unmasked by the caller.
+    pub fn start(
+        &'static self,
+        usart: U,
+        divider: u32,
+        [inbox, outbox]: [&'static mut Queue; 2],
+    ) -> Port<U> {
+        usart.brr().write(|w| {
+            w.div_mantissa().set((divider >> 4) as u16);
+            w.div_fraction().set((divider & 0xF) as u8)
+        });
+        usart.cr1().write(|w| w.ue().enabled().te().enabled().re().enabled().rxneie().enabled());
+        critical_section::with(|cs| {
+            self.inbox.0.borrow(cs).set(Some(inbox));
+            self.outbox.0.borrow(cs).set(Some(outbox));
+            // A second start finds the cell full and changes nothing.
+            let _ = self.usart.borrow(cs).set(usart);
+        });
+        Port(self)
+    }
+
+    /// What the interrupt does.
+    pub fn serve(&self) {
+        self.on_usart(|usart| {
+            // Status first: reading the data behind it is what clears the error flags.
+            let status = usart.sr().read();
+            if status.ore().bit_is_set() {
+                count(&self.overruns);
+            }
+            if status.rxne().bit_is_set() || status.ore().bit_is_set() {
+                let byte = usart.dr().read().bits() as u8;
+                if status.fe().bit_is_set() || status.nf().bit_is_set() {
+                    count(&self.damaged);
+                }
+                if status.rxne().bit_is_set() {
+                    self.receive(byte);
+                }
+            }
+            if usart.cr1().read().txeie().bit_is_set() {
+                self.feed(usart);
+            }
+        });
+        HAPPENED.store(true, Relaxed);
+    }
+
+    fn receive(&self, byte: u8) {
+        if self.inbox.with(|inbox| inbox.enqueue(byte).is_ok()) != Some(true) {
+            count(&self.lost);
+        }
+    }
+
+    /// Fills the data register; once there is nothing left to send, the interrupt is no more asked for.
+    ///
+    /// On a board the register is full after two bytes. In QEMU it never is.
+    fn feed(&self, usart: &RegisterBlock) {
+        while usart.sr().read().txe().bit_is_set() {
+            let Some(byte) = self.outbox.with(Queue::dequeue).flatten() else {
+                usart.cr1().modify(|_, w| w.txeie().disabled());
+                return;
+            };
+            usart.dr().write(|w| w.dr().set(byte.into()));
+        }
+    }
+
+    /// Lets the interrupt fetch what has been queued.
+    fn wake_sender(&self) {
+        self.on_usart(|usart| {
+            usart.cr1().modify(|_, w| w.txeie().enabled());
+        });
+        // An empty data register asks for it at once, except in QEMU.
+        NVIC::pend(self.interrupt);
+    }
+
+    /// Has everything been sent, and has the last stop bit left the pin?
+    fn is_sent(&self) -> bool {
+        // In this order: what has left the queue is in the data register, and TC is 0.
+        self.outbox.with(|outbox| outbox.is_empty()) != Some(false)
+            && self.on_usart(|usart| usart.sr().read().tc().bit_is_set()) != Some(false)
+    }
+
+    fn on_usart<T>(&self, work: impl FnOnce(&RegisterBlock) -> T) -> Option<T> {
+        critical_section::with(|cs| self.usart.borrow(cs).get().map(|usart| work(usart)))
+    }
+
+    /// Bytes that the hardware lost because the one before had not been fetched.
+    pub fn overruns(&self) -> u32 {
+        self.overruns.load(Relaxed)
+    }
+
+    /// Bytes that were lost because the main loop had not emptied the queue.
+    pub fn lost(&self) -> u32 {
+        self.lost.load(Relaxed)
+    }
+
+    /// Bytes with a wrong stop bit or noise within a bit.
+    pub fn damaged(&self) -> u32 {
+        self.damaged.load(Relaxed)
+    }
+}
+
+/// Only the interrupt counts, and it is not interrupted by itself.
+fn count(counter: &AtomicU32) {
+    counter.store(counter.load(Relaxed).wrapping_add(1), Relaxed);
+}
+
+/// The main loop's end of a [`Channel`]: a port with the traits of `embedded-io`.
+pub struct Port<U: 'static>(&'static Channel<U>);
+
+impl<U: Deref<Target = RegisterBlock> + Send> Port<U> {
+    /// The next received byte, if there is one.
+    pub fn poll_byte(&mut self) -> Option<u8> {
+        self.0.inbox.with(Queue::dequeue).flatten()
+    }
+
+    /// Queues all of `bytes`, or nothing where there is no room; says whether there was. Never waits.
+    pub fn try_send(&mut self, bytes: &[u8]) -> bool {
+        let queued = self.0.outbox.with(|outbox| {
+            let has_room = outbox.capacity().saturating_sub(outbox.len()) >= bytes.len();
+            has_room && bytes.iter().all(|&byte| outbox.enqueue(byte).is_ok())
+        });
+        self.0.wake_sender();
+        queued == Some(true)
+    }
+}
+
+impl<U> embedded_io::ErrorType for Port<U> {
+    type Error = Infallible;
+}
+
+impl<U: Deref<Target = RegisterBlock> + Send> embedded_io::ReadReady for Port<U> {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(self.0.inbox.with(|inbox| !inbox.is_empty()) == Some(true))
+    }
+}
+
+impl<U: Deref<Target = RegisterBlock> + Send> embedded_io::Read for Port<U> {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
+        let mut count = 0;
+        while count == 0 && !buffer.is_empty() {
+            for slot in &mut *buffer {
+                let Some(byte) = self.poll_byte() else { break };
+                *slot = byte;
+                count += 1;
+            }
+        }
+        Ok(count)
+    }
+}
+
+impl<U: Deref<Target = RegisterBlock> + Send> embedded_io::Write for Port<U> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        let mut count = 0;
+        while count == 0 && !bytes.is_empty() {
+            for &byte in bytes {
+                if self.0.outbox.with(|outbox| outbox.enqueue(byte).is_ok()) == Some(false) {
+                    break;
+                }
+                count += 1;
+            }
+            self.0.wake_sender();
+        }
+        Ok(count)
+    }
+
+    /// Waits until the last stop bit is out, as a driver-enable pin needs it. What comes in meanwhile
+    /// is received by the interrupt.
+    fn flush(&mut self) -> Result<(), Infallible> {
+        while !self.0.is_sent() {
+            core::hint::spin_loop();
+        }
+        Ok(())
+    }
+}

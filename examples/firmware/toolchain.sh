@@ -1,0 +1,32 @@
+# Builds for thumbv7em: sourced by bench.sh and run.sh, which stand in this folder.
+#
+# Uses the rustup target where it is installed, otherwise Debian's compiler; QEMU and lld come from
+# Debian if they are missing, or it fails where INSTALL=no is set. Afterwards: `out` is the target folder, `target` the target's name,
+# `cargo` the words of a build, `compiler` its name and version.
+
+target=thumbv7em-none-eabihf
+out=${CARGO_TARGET_DIR:-$PWD/target}
+export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
+
+# Installs Debian packages that are missing.
+need() {
+    local missing=()
+    for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package"); done
+    [ ${#missing[@]} -gt 0 ] || return 0
+    [ "${INSTALL:-}" != no ] || { echo "missing Debian packages: ${missing[*]}" >&2; exit 1; }
+    local sudo
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive $sudo apt-get install -qq -y --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+command -v qemu-system-arm >/dev/null || need qemu-system-arm
+if [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
+    cargo=(cargo build) compiler=$(rustc --version)
+else
+    need rustc-web cargo-web rust-web-src lld
+    RUSTC=$(dpkg -L rustc-web | grep -m1 'bin/rustc$')
+    export RUSTC RUSTC_BOOTSTRAP=1 CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=ld.lld
+    cargo=("$(dpkg -L cargo-web | grep -m1 'bin/cargo$')" build -Zbuild-std=core)
+    compiler=$("$RUSTC" --version)
+fi

@@ -1,0 +1,21 @@
+//! The roles on a Cortex-M4: the programs of `examples/firmware` in QEMU, against the roles on this
+//! machine and against each other, over sockets and in real time.
+//!
+//! Order and content are asserted, never how long something takes: QEMU runs beside whatever else this
+//! machine does. Waits end after 30 s.
+//!
+//! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Where they are missing
+//! the tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
+
+#![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
+
+#[path = "firmware/master.rs"]
+mod master;
+#[path = "firmware/qemu.rs"]
+mod qemu;
+#[path = "firmware/robot.rs"]
+mod robot;
+#[path = "firmware/slave.rs"]
+mod slave;
+#[path = "firmware/wire.rs"]
+mod wire;

@@ -1,0 +1,141 @@
+//! The firmware master against slaves on this machine, and against the firmware slave.
+
+use std::{io, os::unix::net::UnixStream, thread};
+
+use axlewire::{
+    drive::Driver,
+    endpoint::Endpoint,
+    ikeya::{Mode, NodeId, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+    sim::{Motor, MotorNode},
+    time::{Duration, Instant},
+};
+
+use crate::{
+    qemu::{Board, PATIENCE, Program},
+    wire::{Wire, WireClock},
+};
+
+/// Two nodes that hear everything. One of them can lose its voice and its ears.
+struct Nodes {
+    nodes: [MotorNode; 2],
+    is_mute: bool,
+}
+
+impl Nodes {
+    fn new() -> Self {
+        // As on a USB adapter: bytes come when this machine has time for them.
+        let node = |id, mode| {
+            let slave = Slave::new(id, mode, SlaveConfig::usb_adapter());
+            MotorNode::from_parts(slave, Motor::new())
+        };
+        let nodes = [node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position)];
+        Self { nodes, is_mute: false }
+    }
+
+    fn alive(&mut self) -> &mut [MotorNode] {
+        &mut self.nodes[usize::from(self.is_mute)..]
+    }
+
+    fn command(&self, index: usize) -> Option<Target> {
+        self.nodes[index].slave().command()
+    }
+}
+
+impl Endpoint for Nodes {
+    type Event = SlaveEvent;
+
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.alive().iter_mut().for_each(|node| node.handle_input(bytes, now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.alive().iter_mut().for_each(|node| node.handle_timeout(now));
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
+        self.alive().iter_mut().find_map(|node| node.poll_transmit(now))
+    }
+
+    fn poll_event(&mut self) -> Option<SlaveEvent> {
+        self.nodes.iter_mut().find_map(MotorNode::poll_event)
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let alive = &self.nodes[usize::from(self.is_mute)..];
+        alive.iter().filter_map(MotorNode::poll_timeout).min()
+    }
+}
+
+/// Lets the nodes work until the board has written these lines in this order.
+fn written(board: &Board, bus: &mut Driver<Nodes, Wire, WireClock>, wanted: &[&str]) {
+    let end = std::time::Instant::now() + PATIENCE;
+    while !board.has_written(wanted) {
+        let pause = bus.now() + Duration::from_millis(20);
+        bus.run_until(pause, |_, _| {}).unwrap();
+        assert!(std::time::Instant::now() < end, "never {wanted:?}: {:#?}", board.lines());
+    }
+}
+
+#[test]
+fn the_board_finds_two_nodes_commands_each_in_its_mode_and_takes_one_back() {
+    let Some(mut board) = Board::start(Program::Master) else { return };
+    let wire = Wire::new(board.bus());
+    let clock = wire.clock();
+    let mut bus = Driver::new(Nodes::new(), wire, clock);
+    let found = [
+        "event discovered node 2 velocity",
+        "event discovered node 5 position",
+        "event discovery done online 2",
+    ];
+    written(&board, &mut bus, &found);
+    // Half a revolution per second times the id; as many revolutions on as the id says.
+    let (turn, go) = (Rps::new(1.0).unwrap(), Position::from_revolutions(5.0).unwrap());
+    let wanted = [Some(Target::Velocity(turn)), Some(Target::Position(go))];
+    let end = std::time::Instant::now() + PATIENCE;
+    while [0, 1].map(|index| bus.role().command(index)) != wanted {
+        let pause = bus.now() + Duration::from_millis(20);
+        bus.run_until(pause, |_, _| {}).unwrap();
+        assert!(std::time::Instant::now() < end, "not commanded: {:#?}", board.lines());
+    }
+
+    bus.role_mut().is_mute = true;
+    written(&board, &mut bus, &["event health node 2 abnormal"]);
+    let writes = bus.role().nodes[0].slave().statistics().writes;
+    bus.role_mut().is_mute = false;
+    written(&board, &mut bus, &["event health node 2 abnormal", "event health node 2 online"]);
+    let end = std::time::Instant::now() + PATIENCE;
+    while bus.role().nodes[0].slave().statistics().writes == writes {
+        let pause = bus.now() + Duration::from_millis(20);
+        bus.run_until(pause, |_, _| {}).unwrap();
+        assert!(std::time::Instant::now() < end, "not commanded anew: {:#?}", board.lines());
+    }
+    assert_eq!(bus.role().command(0), wanted[0]);
+    board.report_when("told", |_| true).assert_nothing_lost();
+}
+
+/// Carries what one board says to the other, until either has gone.
+fn relay(mut from: UnixStream, mut to: UnixStream) {
+    thread::spawn(move || io::copy(&mut from, &mut to));
+}
+
+#[test]
+fn two_boards_on_one_line_turn_a_motor() {
+    let Some(mut slave) = Board::start(Program::Slave) else { return };
+    let Some(mut master) = Board::start(Program::Master) else { return };
+    let (one, other) = (slave.bus(), master.bus());
+    relay(one.try_clone().unwrap(), other.try_clone().unwrap());
+    relay(other, one);
+
+    let turning = slave.report_when("turning", |report| {
+        report.get("target_mrps") == Some(500) && report.at("mrps") == 500
+    });
+    turning.assert_nothing_lost();
+    assert_eq!(turning.at("skipped"), 0, "{turning:?}");
+    let told = master.report_when("reading that", |report| report.get("mrps") == Some(500));
+    assert_eq!((told.at("node"), told.at("lost_events")), (1, 0));
+    assert!(told.at("exchanges") > 0, "{told:?}");
+    told.assert_nothing_lost();
+    assert!(
+        master.has_written(&["event discovered node 1 velocity", "event discovery done online 1"])
+    );
+}

@@ -1,0 +1,244 @@
+//! The images, and a board in QEMU that runs one of them.
+
+use std::{
+    collections::HashMap,
+    env, fs,
+    io::{BufRead, BufReader, Write},
+    os::unix::net::UnixStream,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::{
+        Arc, Mutex, OnceLock,
+        atomic::{AtomicU32, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+/// How long anything may take before it counts as never.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
+
+/// The programs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Program {
+    Slave,
+    Master,
+    Robot,
+}
+
+impl Program {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Slave => "ikeya_slave",
+            Self::Master => "ikeya_master",
+            Self::Robot => "ucp_robot",
+        }
+    }
+}
+
+/// The folder with the images, or why there is none. They are built once per run.
+///
+/// `AXLEWIRE_FIRMWARE_IMAGES` names a folder with images that are built already.
+fn images() -> &'static Result<PathBuf, String> {
+    static IMAGES: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    IMAGES.get_or_init(|| {
+        let found = find_images();
+        if let Err(reason) = &found {
+            assert!(!is_required(), "the firmware cannot be tested: {reason}");
+            // Not by eprintln!, which is kept back where a test passes.
+            let _ = writeln!(std::io::stderr(), "SKIPPED, the firmware is not tested: {reason}");
+        }
+        found
+    })
+}
+
+fn is_required() -> bool {
+    env::var("AXLEWIRE_FIRMWARE").is_ok_and(|value| value == "required")
+}
+
+fn find_images() -> Result<PathBuf, String> {
+    if let Some(folder) = env::var_os("AXLEWIRE_FIRMWARE_IMAGES") {
+        return Ok(folder.into());
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/firmware/run.sh");
+    if !script.is_file() {
+        return Err("its sources are not here".to_owned());
+    }
+    let programs = [Program::Slave, Program::Master, Program::Robot];
+    let mut build = Command::new("bash");
+    build.arg(script).arg("--build").args(programs.map(Program::name));
+    // Cargo sets these for this test; the other compiler is to find its own.
+    for name in ["LD_LIBRARY_PATH", "RUSTC", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
+        build.env_remove(name);
+    }
+    if !is_required() {
+        build.env("INSTALL", "no");
+    }
+    let built = build.stdin(Stdio::null()).output().map_err(|error| format!("bash: {error}"))?;
+    if !built.status.success() {
+        return Err(String::from_utf8_lossy(&built.stderr).trim().to_owned());
+    }
+    let paths = String::from_utf8_lossy(&built.stdout).into_owned();
+    let first = paths.lines().next().map(Path::new).and_then(Path::parent);
+    first.map(Path::to_owned).ok_or("the build names no image".to_owned())
+}
+
+/// A board that runs a program. It ends, and its sockets go, when this is dropped.
+pub(crate) struct Board {
+    qemu: Child,
+    folder: PathBuf,
+    text: UnixStream,
+    lines: Arc<Mutex<Vec<String>>>,
+    /// The socket of the line, until a wire takes it.
+    bus: Option<UnixStream>,
+}
+
+impl Board {
+    /// Starts a board; `None` where it cannot be tested.
+    ///
+    /// It runs from the moment when both of its sockets are connected, so that nothing is missed.
+    pub(crate) fn start(program: Program) -> Option<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let image = images().as_ref().ok()?.join(program.name());
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let folder = env::temp_dir().join(format!("axlewire-{}-{number}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let serial =
+            |name: &str| format!("unix:{},server=on,wait=on", folder.join(name).to_str().unwrap());
+        let mut qemu = Command::new("qemu-system-arm")
+            .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none"])
+            .args(["-serial", &serial("bus"), "-serial", &serial("text")])
+            .arg("-kernel")
+            .arg(image)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(fs::File::create(folder.join("errors")).unwrap())
+            .spawn()
+            .expect("qemu-system-arm starts");
+        let bus = connect(&folder.join("bus"), &mut qemu);
+        let text = connect(&folder.join("text"), &mut qemu);
+        let lines = Arc::new(Mutex::new(Vec::new()));
+        let (reader, sink) = (BufReader::new(text.try_clone().unwrap()), lines.clone());
+        thread::spawn(move || {
+            for line in reader.lines().map_while(Result::ok) {
+                sink.lock().unwrap().push(line.trim_end().to_owned());
+            }
+        });
+        let mut board = Self { qemu, folder, text, lines, bus: Some(bus) };
+        board.await_first_line();
+        Some(board)
+    }
+
+    /// A USART that has not been started drops what it hears.
+    fn await_first_line(&mut self) {
+        let end = Instant::now() + PATIENCE;
+        while self.lines.lock().unwrap().is_empty() {
+            assert_runs(&mut self.qemu, &self.folder);
+            assert!(Instant::now() < end, "the firmware says nothing");
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// The line of the board; a new connection, when the one before has gone.
+    pub(crate) fn bus(&mut self) -> UnixStream {
+        self.bus.take().unwrap_or_else(|| connect(&self.folder.join("bus"), &mut self.qemu))
+    }
+
+    /// Everything that the firmware has written.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        self.lines.lock().unwrap().clone()
+    }
+
+    /// Asks for reports until one is as it should be.
+    pub(crate) fn report_when(&mut self, what: &str, done: impl Fn(&Report) -> bool) -> Report {
+        let end = Instant::now() + PATIENCE;
+        let mut seen = self.lines().len();
+        loop {
+            self.text.write_all(b"?").unwrap();
+            thread::sleep(Duration::from_millis(10));
+            let lines = self.lines();
+            for report in lines[seen..].iter().filter_map(|line| Report::parse(line)) {
+                if done(&report) {
+                    return report;
+                }
+            }
+            seen = lines.len();
+            assert!(Instant::now() < end, "never {what}; the last lines: {:#?}", tail(&lines));
+        }
+    }
+
+    /// Has the firmware written these lines in this order, whatever lies between?
+    pub(crate) fn has_written(&self, wanted: &[&str]) -> bool {
+        let lines = self.lines();
+        let mut lines = lines.iter();
+        wanted.iter().all(|wanted| lines.any(|line| line == wanted))
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        let _ = self.qemu.kill();
+        let _ = self.qemu.wait();
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn tail(lines: &[String]) -> &[String] {
+    &lines[lines.len().saturating_sub(5)..]
+}
+
+fn assert_runs(qemu: &mut Child, folder: &Path) {
+    if let Some(status) = qemu.try_wait().unwrap() {
+        let errors = fs::read_to_string(folder.join("errors"));
+        panic!("QEMU has ended, {status}: {errors:?}");
+    }
+}
+
+/// Connects to a socket that QEMU is about to make.
+fn connect(path: &Path, qemu: &mut Child) -> UnixStream {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        match UnixStream::connect(path) {
+            Ok(stream) => return stream,
+            Err(error) => assert!(Instant::now() < end, "{path:?}: {error}"),
+        }
+        assert_runs(qemu, path.parent().unwrap());
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A line of names and numbers.
+#[derive(Debug)]
+pub(crate) struct Report(HashMap<String, i64>);
+
+impl Report {
+    /// `None` for a line that tells an event.
+    fn parse(line: &str) -> Option<Self> {
+        let mut words = line.split(' ').peekable();
+        if !["slave", "master", "robot"].contains(&words.next()?) {
+            return None;
+        }
+        let mut values = HashMap::new();
+        while let Some(name) = words.next() {
+            if let Some(value) = words.next_if(|word| word.parse::<i64>().is_ok()) {
+                values.insert(name.to_owned(), value.parse().unwrap());
+            }
+        }
+        Some(Self(values))
+    }
+
+    /// The number behind a name, if it is there.
+    pub(crate) fn get(&self, name: &str) -> Option<i64> {
+        self.0.get(name).copied()
+    }
+
+    /// The number behind a name that is always there.
+    pub(crate) fn at(&self, name: &str) -> i64 {
+        self.get(name).unwrap_or_else(|| panic!("no {name} in {self:?}"))
+    }
+
+    /// No byte was lost on its way into the decoder.
+    pub(crate) fn assert_nothing_lost(&self) {
+        assert_eq!(["overruns", "lost", "damaged"].map(|name| self.at(name)), [0; 3], "{self:?}");
+    }
+}

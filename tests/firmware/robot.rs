@@ -1,0 +1,156 @@
+//! The firmware robot against a host on this machine.
+
+use axlewire::{
+    drive::Driver,
+    time::Duration,
+    ucp::{
+        CalibrationKind, Host, HostConfig, HostEvent, ImuBias, Link, MagBias, MemoryStore,
+        MotorControl, NetworkState, OtaStatus,
+    },
+};
+
+use crate::{
+    qemu::{Board, PATIENCE, Program, Report},
+    wire::{Wire, WireClock},
+};
+
+type Rover = Driver<Host<MemoryStore>, Wire, WireClock>;
+
+fn linked() -> Option<(Board, Rover)> {
+    let mut board = Board::start(Program::Robot)?;
+    let wire = Wire::new(board.bus());
+    let mut clock = wire.clock();
+    let mut config = HostConfig::default();
+    // QEMU answers when this machine has time for it.
+    config.ack_timeout = Duration::from_millis(3000);
+    config.ping_timeout = Duration::from_millis(10_000);
+    config.link_timeout = Duration::from_millis(10_000);
+    config.quiet_margin = Duration::from_millis(200);
+    let now = axlewire::drive::Clock::now(&mut clock);
+    let host = Host::with_store(config, MemoryStore::default(), now);
+    Some((board, Driver::new(host, wire, clock)))
+}
+
+fn end_of(rover: &mut Rover) -> axlewire::time::Instant {
+    rover.now() + Duration::from_millis(PATIENCE.as_millis() as u32)
+}
+
+/// Lets the host talk, and drive if it is told to, until an event is as it should be.
+fn event_when(
+    rover: &mut Rover,
+    what: &str,
+    command: Option<MotorControl>,
+    done: impl Fn(&HostEvent) -> bool,
+) {
+    let end = end_of(rover);
+    loop {
+        let now = rover.now();
+        assert!(now < end, "never {what}");
+        if let Some(command) = command {
+            rover.role_mut().drive(command, now).unwrap();
+        }
+        let event = rover.next_event((now + Duration::from_millis(50)).min(end)).unwrap();
+        if event.is_some_and(|event| done(&event)) {
+            return;
+        }
+    }
+}
+
+fn wheels_turn_at(event: &HostEvent, wanted: [i16; 2]) -> bool {
+    let HostEvent::Report(report) = event else { return false };
+    let [left, right, ..] = report.telemetry.rpm;
+    [left, right] == wanted
+}
+
+/// Reports that were due by the robot's own clock; one more or less may be on its way.
+fn assert_fifty_reports_a_second(told: &Report) {
+    let due = told.at("ms") / 20;
+    assert!((told.at("reports") + told.at("late") - due).abs() <= 2, "{told:?}");
+}
+
+#[test]
+fn pings_are_answered_and_reports_come_in_order_fifty_times_a_second() {
+    let Some((mut board, mut rover)) = linked() else { return };
+    let end = end_of(&mut rover);
+    rover.ping(end).unwrap();
+    assert_eq!(rover.role().link(), Link::Up);
+    let mut before = rover.next_report(end).unwrap().expect("a report");
+    for _ in 0..100 {
+        let report = rover.next_report(end).unwrap().expect("a report");
+        assert_eq!((report.index, report.lost), (before.index.wrapping_add(1), 0));
+        assert_eq!((report.version, report.telemetry.battery()), (Some(38), Some(87)));
+        assert_eq!(report.telemetry.rpm, [0; 4]);
+        before = report;
+    }
+    assert_eq!(rover.role().statistics().reports_lost, 0);
+    assert_eq!(rover.role().counters().skipped(), 0);
+    let told = board.report_when("pinged", |report| report.at("pongs") >= 1);
+    assert_fifty_reports_a_second(&told);
+    told.assert_nothing_lost();
+}
+
+#[test]
+fn the_robot_drives_as_commanded_and_stops_when_the_host_goes_silent() {
+    let Some((mut board, mut rover)) = linked() else { return };
+    let ahead = MotorControl::turn_right(50, 10).unwrap().with_front_led(true);
+    event_when(&mut rover, "at speed", Some(ahead), |event| wheels_turn_at(event, [72, 48]));
+    // The host is there, but says nothing any more: not even its dead-man's stop.
+    let told = board.report_when("stopped", |report| {
+        report.at("stops") >= 1 && report.at("left_rpm") == 0 && report.at("right_rpm") == 0
+    });
+    let state = ["speed", "angular", "lamp"].map(|name| told.at(name));
+    assert_eq!(state, [0, 0, 1], "{told:?}");
+    assert_fifty_reports_a_second(&told);
+    told.assert_nothing_lost();
+
+    // What the host did not read is read now; the next command drives again.
+    let back = MotorControl::new(-100, 0).unwrap();
+    event_when(&mut rover, "driving back", Some(back), |event| wheels_turn_at(event, [-120; 2]));
+    // The application is silent, the host is not: its dead-man stops the robot.
+    event_when(&mut rover, "a dead man", None, |event| *event == HostEvent::DeadMan);
+    event_when(&mut rover, "standing", None, |event| wheels_turn_at(event, [0; 2]));
+}
+
+#[test]
+fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
+    let Some((mut board, mut rover)) = linked() else { return };
+    for kind in [CalibrationKind::Imu, CalibrationKind::Magnetometer] {
+        let end = end_of(&mut rover);
+        rover.start_calibration(kind, end).unwrap();
+        rover.end_calibration(kind, end).unwrap();
+        event_when(&mut rover, "a result", None, |event| {
+            matches!(event, HostEvent::ImuBias(_) | HostEvent::MagBias(_))
+        });
+    }
+    let (imu, mag) = (ImuBias::new([12, -7, 3], [-2, 4, 1]), MagBias::new([150, -80, 25]));
+    let store = *rover.role_mut().store();
+    assert_eq!(store, MemoryStore { imu: Some(imu), mag: Some(mag) });
+    // The robot asks for its biases until it has them.
+    event_when(&mut rover, "asked", None, |event| *event == HostEvent::BiasesSent);
+
+    let now = rover.now();
+    rover.role_mut().set_network_state(NetworkState::Connected, now).unwrap();
+    board_shows(&mut board, &mut rover, |told| told.at("network") == 3 && told.at("biases") >= 1);
+
+    let now = rover.now();
+    rover.role_mut().start_firmware_update(39, now).unwrap();
+    let refused = HostEvent::UpdateAnswered(OtaStatus::Forbidden);
+    event_when(&mut rover, "refused", None, |event| *event == refused);
+    let told = board.report_when("refusing", |report| report.at("updates_refused") > 0);
+    assert_eq!((told.at("calibrations"), told.at("updates_refused")), (2, 1));
+    told.assert_nothing_lost();
+}
+
+/// Lets the host talk until the robot's report is as it should be.
+fn board_shows(board: &mut Board, rover: &mut Rover, done: impl Fn(&Report) -> bool) {
+    let end = end_of(rover);
+    loop {
+        let pause = rover.now() + Duration::from_millis(20);
+        rover.run_until(pause, |_, _| {}).unwrap();
+        let told = board.report_when("told", |_| true);
+        if done(&told) {
+            return;
+        }
+        assert!(rover.now() < end, "{told:?}");
+    }
+}

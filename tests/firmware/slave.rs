@@ -1,0 +1,208 @@
+//! The firmware slave against a master on this machine.
+
+use axlewire::{
+    drive::Driver,
+    ikeya::{
+        self, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling, ReadRequest,
+        Response, Rps, ToMaster, WriteRequest,
+    },
+    sim::Rng,
+    stream::{Encode, Event},
+    time::Duration,
+};
+
+use crate::{
+    qemu::{Board, PATIENCE, Program, Report},
+    wire::{Wire, WireClock},
+};
+
+type Bus = Driver<Master, Wire, WireClock>;
+
+const NODE: NodeId = NodeId::N1;
+
+fn rps(value: f32) -> Rps {
+    Rps::new(value).unwrap()
+}
+
+/// A board, and a master that has found it.
+fn discovered() -> Option<(Board, Bus)> {
+    let mut board = Board::start(Program::Slave)?;
+    let wire = Wire::new(board.bus());
+    let mut config = MasterConfig::direct();
+    // QEMU answers when this machine has time for it.
+    (config.reply_timeout, config.attempts) = (Duration::from_millis(150), 2);
+    config.polling = Polling::Every(Duration::from_millis(10));
+    let clock = wire.clock();
+    let mut bus = Driver::new(Master::new(config), wire, clock);
+    assert_eq!(bus.discover().unwrap(), [(NODE, Mode::Velocity)]);
+    Some((board, bus))
+}
+
+/// Lets the master talk until an event is as it should be.
+fn event_when(bus: &mut Bus, what: &str, done: impl Fn(&MasterEvent) -> bool) {
+    let end = bus.now() + Duration::from_millis(PATIENCE.as_millis() as u32);
+    while let Some(event) = bus.next_event(end).unwrap() {
+        if done(&event) {
+            return;
+        }
+    }
+    panic!("never {what}");
+}
+
+fn is_turning_at(event: &MasterEvent, wanted: f32) -> bool {
+    let MasterEvent::Status { node: NODE, status: ikeya::Status::Velocity(rps) } = *event else {
+        return false;
+    };
+    (rps - wanted).abs() < 0.01
+}
+
+#[test]
+fn discovery_finds_the_board_and_its_motor_turns_and_stops_as_commanded() {
+    let Some((mut board, mut bus)) = discovered() else { return };
+    for speed in [2.0, -1.5] {
+        bus.set_velocity(NODE, rps(speed)).unwrap();
+        event_when(&mut bus, "at speed", |event| is_turning_at(event, speed));
+    }
+    bus.stop_all().unwrap();
+    event_when(&mut bus, "standing still", |event| is_turning_at(event, 0.0));
+    let told = board.report_when("stopped", |report| report.at("mrps").abs() <= 10);
+    assert!(told.at("counts") != 0 && told.at("writes") >= 3, "{told:?}");
+    told.assert_nothing_lost();
+}
+
+#[test]
+fn a_motor_that_is_read_but_not_commanded_any_more_stops() {
+    let Some((mut board, mut bus)) = discovered() else { return };
+    bus.set_velocity(NODE, rps(3.0)).unwrap();
+    event_when(&mut bus, "at speed", |event| is_turning_at(event, 3.0));
+    bus.role_mut().release(NODE);
+    event_when(&mut bus, "standing still", |event| is_turning_at(event, 0.0));
+    let told = board.report_when("stopped", |report| report.at("mrps").abs() <= 10);
+    assert_eq!((told.at("stops"), told.get("target_mrps")), (1, None));
+}
+
+#[test]
+fn an_unplugged_board_is_abnormal_stops_and_does_not_move_when_it_comes_back() {
+    let Some((mut board, mut bus)) = discovered() else { return };
+    bus.set_velocity(NODE, rps(2.0)).unwrap();
+    event_when(&mut bus, "at speed", |event| is_turning_at(event, 2.0));
+
+    bus.port_mut().unplug();
+    let abnormal = MasterEvent::Health { node: NODE, health: Health::Abnormal };
+    event_when(&mut bus, "abnormal", |event| *event == abnormal);
+    assert!(bus.set_velocity(NODE, rps(2.0)).is_err());
+    let told = board.report_when("stopped", |report| report.at("mrps").abs() <= 10);
+    assert_eq!((told.at("stops"), told.get("target_mrps")), (1, None));
+
+    let stream = board.bus();
+    bus.port_mut().plug(stream);
+    let online = MasterEvent::Health { node: NODE, health: Health::Online };
+    event_when(&mut bus, "online again", |event| *event == online);
+    // Twenty readings on, it still stands.
+    for _ in 0..20 {
+        event_when(&mut bus, "read", |event| matches!(event, MasterEvent::Status { .. }));
+    }
+    let still = board.report_when("read again", |report| report.at("reads") > told.at("reads"));
+    assert_eq!((still.at("writes"), still.get("target_mrps")), (told.at("writes"), None));
+
+    bus.set_velocity(NODE, rps(1.0)).unwrap();
+    event_when(&mut bus, "at speed again", |event| is_turning_at(event, 1.0));
+}
+
+/// A master that is nothing but its packets: it sends when it is told to and waits as long as it takes.
+struct Bare {
+    board: Board,
+    wire: Wire,
+    decoder: ikeya::Decoder<ToMaster>,
+}
+
+impl Bare {
+    fn new(mut board: Board) -> Self {
+        let wire = Wire::new(board.bus());
+        Self { board, wire, decoder: ikeya::Decoder::new() }
+    }
+
+    fn write(&mut self, speed: f32) {
+        self.wire.send(&packet(&WriteRequest::velocity(NODE, rps(speed))));
+    }
+
+    /// What the board says once it has answered so often.
+    fn told(&mut self, replies: i64) -> Report {
+        self.board.report_when("answered", |report| report.at("replies") >= replies)
+    }
+
+    /// Asks, and gives the speed that is answered. Bytes that are no answer fail the test.
+    fn read(&mut self) -> f32 {
+        self.wire.send(&packet(&ReadRequest::new(NODE)));
+        loop {
+            let Some(byte) = self.wire.receive(PATIENCE) else {
+                panic!("no answer: {:?}", self.board.report_when("told", |_| true));
+            };
+            if let Some(event) = self.decoder.decode(&mut [byte].as_slice()) {
+                match event {
+                    Event::Frame(Response::Velocity(now)) if now.id() == NODE => return now.rps(),
+                    other => panic!("no answer: {other:?}"),
+                }
+            }
+        }
+    }
+}
+
+fn packet(packet: &impl Encode) -> Vec<u8> {
+    let mut buffer = [0; 16];
+    packet.encode(&mut buffer).unwrap().to_vec()
+}
+
+#[test]
+fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
+    const EXCHANGES: i64 = 10_000;
+    let Some(board) = Board::start(Program::Slave) else { return };
+    let mut master = Bare::new(board);
+    for turn in 0..EXCHANGES {
+        master.write((turn % 7) as f32);
+        let speed = master.read();
+        assert!((0.0..=6.0).contains(&speed), "{speed} rps were never commanded");
+    }
+    let counters = *master.decoder.counters();
+    assert_eq!((counters.frames, counters.received), (EXCHANGES as u64, 8 * EXCHANGES as u64));
+    let told = master.told(EXCHANGES);
+    let counts = ["reads", "writes", "replies"].map(|name| told.at(name));
+    assert_eq!(counts, [EXCHANGES; 3], "{told:?}");
+    let nothing = ["foreign", "overtaken", "refused", "skipped"].map(|name| told.at(name));
+    assert_eq!(nothing, [0; 4], "{told:?}");
+    told.assert_nothing_lost();
+}
+
+#[test]
+fn noise_costs_no_intact_packet_and_commands_nothing() {
+    const ROUNDS: i64 = 120;
+    let Some(board) = Board::start(Program::Slave) else { return };
+    let mut master = Bare::new(board);
+    let mut rng = Rng::new(7);
+    for _ in 0..ROUNDS {
+        // Stray bytes, often false headers; then a command with one bit turned.
+        let strays = (0..rng.below(6)).map(|_| match rng.below(4) {
+            0 => 0xAA,
+            1 => 0xBB,
+            2 => 0x01,
+            _ => rng.below(256) as u8,
+        });
+        let strays: Vec<u8> = strays.collect();
+        master.wire.send(&strays);
+        let mut damaged = packet(&WriteRequest::velocity(NODE, rps(90.0)));
+        let bit = rng.below(64) as usize;
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        master.wire.send(&damaged);
+        // And what is meant.
+        master.write(1.0);
+        master.wire.send(&strays);
+        let speed = master.read();
+        assert!((0.0..=1.01).contains(&speed), "a damaged command was obeyed: {speed} rps");
+    }
+    assert_eq!(master.decoder.counters().frames, ROUNDS as u64);
+    let told = master.told(ROUNDS);
+    let counts = ["reads", "writes", "replies"].map(|name| told.at(name));
+    assert_eq!(counts, [ROUNDS; 3], "{told:?}");
+    assert!(told.at("skipped") >= 8 * ROUNDS, "{told:?}");
+    told.assert_nothing_lost();
+}

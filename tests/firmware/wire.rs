@@ -1,0 +1,121 @@
+//! The wire between a role on this machine and a board: a port, a clock, and a loose plug.
+
+use std::{
+    collections::VecDeque,
+    io::{self, Read as _, Write as _},
+    net::Shutdown,
+    os::unix::net::UnixStream,
+    sync::{Arc, Condvar, Mutex},
+    thread,
+    time::{Duration, Instant as Clock},
+};
+
+use axlewire::{drive, time::Instant};
+
+/// Received bytes, and who waits for them.
+#[derive(Debug, Default)]
+struct Inbox {
+    bytes: Mutex<VecDeque<u8>>,
+    arrived: Condvar,
+}
+
+/// One end of the wire: a port with the traits of `embedded-io`.
+#[derive(Debug)]
+pub(crate) struct Wire {
+    stream: Option<UnixStream>,
+    inbox: Arc<Inbox>,
+}
+
+impl Wire {
+    /// A wire to a board.
+    pub(crate) fn new(stream: UnixStream) -> Self {
+        let mut wire = Self { stream: None, inbox: Arc::default() };
+        wire.plug(stream);
+        wire
+    }
+
+    /// Plugs it in again.
+    pub(crate) fn plug(&mut self, stream: UnixStream) {
+        let (mut reader, inbox) = (stream.try_clone().unwrap(), self.inbox.clone());
+        self.stream = Some(stream);
+        thread::spawn(move || {
+            let mut chunk = [0; 1024];
+            while let Ok(count @ 1..) = reader.read(&mut chunk) {
+                inbox.bytes.lock().unwrap().extend(&chunk[..count]);
+                inbox.arrived.notify_all();
+            }
+        });
+    }
+
+    /// Pulls it out: what is sent goes nowhere, and nothing comes.
+    pub(crate) fn unplug(&mut self) {
+        if let Some(stream) = self.stream.take() {
+            stream.shutdown(Shutdown::Both).unwrap();
+        }
+    }
+
+    /// A clock that sleeps until bytes arrive.
+    pub(crate) fn clock(&self) -> WireClock {
+        WireClock { zero: Clock::now(), inbox: self.inbox.clone() }
+    }
+
+    /// Sends bytes.
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
+        if let Some(stream) = &mut self.stream {
+            stream.write_all(bytes).unwrap();
+        }
+    }
+
+    /// The next byte; `None` when none comes within `patience`.
+    pub(crate) fn receive(&self, patience: Duration) -> Option<u8> {
+        let bytes = self.inbox.bytes.lock().unwrap();
+        let wait = self.inbox.arrived.wait_timeout_while(bytes, patience, |bytes| bytes.is_empty());
+        wait.unwrap().0.pop_front()
+    }
+}
+
+impl embedded_io::ErrorType for Wire {
+    type Error = io::Error;
+}
+
+impl embedded_io::ReadReady for Wire {
+    fn read_ready(&mut self) -> io::Result<bool> {
+        Ok(!self.inbox.bytes.lock().unwrap().is_empty())
+    }
+}
+
+impl embedded_io::Read for Wire {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        io::Read::read(&mut *self.inbox.bytes.lock().unwrap(), buffer)
+    }
+}
+
+impl embedded_io::Write for Wire {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.send(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// The time of this machine.
+#[derive(Debug)]
+pub(crate) struct WireClock {
+    zero: Clock,
+    inbox: Arc<Inbox>,
+}
+
+impl drive::Clock for WireClock {
+    fn now(&mut self) -> Instant {
+        Instant::from_micros(self.zero.elapsed().as_micros() as u64)
+    }
+
+    fn idle_until(&mut self, until: Instant) {
+        let wait = Duration::from_micros((until - self.now()).as_micros().into());
+        let bytes = self.inbox.bytes.lock().unwrap();
+        let _woken = self.inbox.arrived.wait_timeout_while(bytes, wait, |bytes| bytes.is_empty());
+    }
+}
