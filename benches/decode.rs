@@ -42,6 +42,7 @@ fn sent(criterion: &mut Criterion, stream: &Stream) {
         let decode = |bytes: &[u8]| (protocol.decoder)(bytes, chunk);
         bench(&mut group, &format!("axlewire Decoder by {chunk}"), bytes, expected, decode);
     }
+    bench(&mut group, "axlewire Decoder, pushed", bytes, expected, protocol.pushed);
     bench_c(&mut group, stream);
 }
 

@@ -22,6 +22,8 @@ pub struct Tally {
 }
 
 impl Tally {
+    // The C reference adds inline, too.
+    #[inline]
     fn add(&mut self, id: u8, payload: Option<[u8; 4]>) {
         let number = payload.map_or(0, u32::from_le_bytes);
         self.frames += 1;
@@ -38,6 +40,8 @@ pub struct Protocol {
     pub frames: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Decoder`, fed with pieces of so many bytes.
     pub decoder: fn(&[u8], usize) -> Tally,
+    /// The same, with each byte pushed as a receive interrupt does.
+    pub pushed: fn(&[u8]) -> Tally,
     /// The C receiver with the two-table CRC.
     pub c_table: fn(&[u8]) -> Tally,
     /// The C receiver with the bitwise CRC.
@@ -53,6 +57,7 @@ pub const IKEYA: Protocol = Protocol {
     name: "Ikeya",
     frames: ours::frames::<axlewire::ikeya::Either>,
     decoder: ours::decoder::<axlewire::ikeya::Either, { axlewire::ikeya::MAX_LEN }>,
+    pushed: ours::pushed::<axlewire::ikeya::Either, { axlewire::ikeya::MAX_LEN }>,
     c_table: reference::ikeya_table,
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
@@ -64,6 +69,7 @@ pub const UCP: Protocol = Protocol {
     name: "UCP",
     frames: ours::frames::<axlewire::ucp::Ucp>,
     decoder: ours::decoder::<axlewire::ucp::Ucp, { axlewire::ucp::MAX_LEN }>,
+    pushed: ours::pushed::<axlewire::ucp::Ucp, { axlewire::ucp::MAX_LEN }>,
     c_table: reference::ucp_table,
     c_bitwise: reference::ucp_bitwise,
     oracle: oracle::ucp,

@@ -68,28 +68,54 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Sample,
 {
-    fn drain<F, const N: usize>(decoder: &mut Decoder<F, N>, mut input: &[u8], tally: &mut Tally)
-    where
-        F: Framing,
-        for<'a> F::Frame<'a>: Sample,
-    {
-        while let Some(event) = decoder.decode(&mut input) {
+    let mut tally = Tally::default();
+    let mut decoder = Decoder::<F, N>::new();
+    for mut piece in bytes.chunks(chunk) {
+        while let Some(event) = decoder.decode(&mut piece) {
+            if let Event::Frame(frame) = event {
+                frame.add_to(&mut tally);
+            }
+        }
+    }
+    finish(decoder, &mut tally);
+    tally
+}
+
+/// Decodes a stream that arrives byte by byte and then ends.
+pub fn pushed<F, const N: usize>(bytes: &[u8]) -> Tally
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    let mut tally = Tally::default();
+    let mut decoder = Decoder::<F, N>::new();
+    for &byte in bytes {
+        if decoder.push(byte) {
+            while let Some(event) = decoder.poll() {
+                if let Event::Frame(frame) = event {
+                    frame.add_to(&mut tally);
+                }
+            }
+        }
+    }
+    finish(decoder, &mut tally);
+    tally
+}
+
+/// The line goes quiet: what is still held is looked through.
+fn finish<F, const N: usize>(mut decoder: Decoder<F, N>, tally: &mut Tally)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    while decoder.pending() > 0 {
+        decoder.idle();
+        while let Some(event) = decoder.poll() {
             if let Event::Frame(frame) = event {
                 frame.add_to(tally);
             }
         }
     }
-
-    let mut tally = Tally::default();
-    let mut decoder = Decoder::<F, N>::new();
-    for piece in bytes.chunks(chunk) {
-        drain(&mut decoder, piece, &mut tally);
-    }
-    while decoder.pending() > 0 {
-        decoder.idle();
-        drain(&mut decoder, &[], &mut tally);
-    }
-    tally
 }
 
 /// Where the frames end that [`frames`] finds, bytes from the front.

@@ -179,7 +179,7 @@ impl StreamTimes {
                 Contender::new("C", all, || (protocol.c_table)(bytes)),
                 Contender::new("Frames", all, || (protocol.frames)(bytes)),
                 Contender::new("Decoder by 4096", all, || (protocol.decoder)(bytes, 4096)),
-                Contender::new("Decoder by 1", all, || (protocol.decoder)(bytes, 1)),
+                Contender::new("Decoder, pushed", all, || (protocol.pushed)(bytes)),
             ],
         );
         Self { len: bytes.len(), c, frames, decoder_4096, decoder_1 }

@@ -93,15 +93,31 @@ mod wide {
 
     #[inline(always)]
     pub(super) const fn compute(bytes: &[u8]) -> u16 {
-        let (state, parity) = residue(bytes);
-        // The CRC is the remainder of the message times x^16. Its 15 bits modulo x^15 + x + 1 ...
-        let remainder = (reduce(fold(times_x16(state))) >> 48) as u16;
-        // ... name two 16-bit values; the parity of the message says which one.
-        if (parity.count_ones() ^ remainder.count_ones()) & 1 == 0 {
-            remainder
-        } else {
-            remainder ^ TRINOMIAL
+        match bytes {
+            // Six bytes are what most packets of the bus have before their CRC: one word, with the
+            // two zero bytes behind them that multiply by x^16.
+            &[a, b, c, d, e, f] => {
+                let (low, high) = (u32::from_le_bytes([a, b, c, d]), u16::from_le_bytes([e, f]));
+                let word = (low ^ 0xFFFF) as u64 | (high as u64) << 32;
+                crc_of(word, word)
+            }
+            _ => compute_any(bytes),
         }
+    }
+
+    #[inline(never)]
+    const fn compute_any(bytes: &[u8]) -> u16 {
+        let (state, parity) = residue(bytes);
+        crc_of(times_x16(state), parity)
+    }
+
+    /// The CRC is the remainder of the message times x^16. Its 15 bits modulo x^15 + x + 1 name two
+    /// 16-bit values; the parity of the message says which one.
+    #[inline(always)]
+    const fn crc_of(product: u64, parity: u64) -> u16 {
+        let remainder = reduce(fold(product));
+        let is_odd = (parity ^ remainder).count_ones() & 1 == 1;
+        (remainder >> 48) as u16 ^ if is_odd { TRINOMIAL } else { 0 }
     }
 
     /// The state before the first byte: `0xFFFF · x^-16` modulo the trinomial. Multiplied up to the
@@ -113,7 +129,17 @@ mod wide {
     const fn residue(mut bytes: &[u8]) -> (u64, u64) {
         let mut state = INITIAL;
         let mut parity = 0;
-        while let Some((word, rest)) = bytes.split_first_chunk::<8>() {
+        while let Some((&[a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p], rest)) =
+            bytes.split_first_chunk::<16>()
+        {
+            let first = u64::from_le_bytes([a, b, c, d, e, f, g, h]);
+            let second = u64::from_le_bytes([i, j, k, l, m, n, o, p]);
+            parity ^= first ^ second;
+            state = fold(first ^ times_x64(state));
+            state = fold(second ^ times_x64(state));
+            bytes = rest;
+        }
+        if let Some((word, rest)) = bytes.split_first_chunk::<8>() {
             let word = u64::from_le_bytes(*word);
             parity ^= word;
             state = fold(word ^ times_x64(state));
@@ -192,13 +218,29 @@ mod narrow {
 
     #[inline(always)]
     pub(super) const fn check(frame: &[u8]) -> bool {
-        let (state, parity) = residue(frame);
+        let (mut state, mut parity, mut tail) = whole_words(frame);
+        if !tail.is_empty() {
+            // A multiple of the polynomial stays one with zeros behind it: they make it a whole word.
+            let mut word = 0;
+            while let [rest @ .., byte] = tail {
+                word = (word << 8) | *byte as u32;
+                tail = rest;
+            }
+            parity ^= word;
+            state = fold(word ^ times_x32(state));
+        }
         frame.len() >= 2 && fold(state) == 0 && !is_odd(parity)
     }
 
     #[inline(always)]
     pub(super) const fn compute(bytes: &[u8]) -> u16 {
-        let (state, parity) = residue(bytes);
+        let (mut state, mut parity, mut tail) = whole_words(bytes);
+        while let [byte, rest @ ..] = tail {
+            let word = (*byte as u32) << 24;
+            parity ^= word;
+            state = fold(word ^ times_x8(state));
+            tail = rest;
+        }
         // As above: the 15 bits of the remainder, and the parity for the 16th.
         let remainder = fold(fold(times_x16(state)));
         let crc = (remainder >> 16) as u16;
@@ -208,9 +250,10 @@ mod narrow {
     /// The state before the first byte, as in the wide form.
     const INITIAL: u32 = 0xD556_0000;
 
-    /// The message modulo the trinomial, folded but not fully reduced, and the XOR of its words.
+    /// The whole words of a message modulo the trinomial, folded but not fully reduced, their XOR, and
+    /// the bytes behind them.
     #[inline(always)]
-    const fn residue(mut bytes: &[u8]) -> (u32, u32) {
+    const fn whole_words(mut bytes: &[u8]) -> (u32, u32, &[u8]) {
         let mut state = INITIAL;
         let mut parity = 0;
         while let Some((word, rest)) = bytes.split_first_chunk::<4>() {
@@ -219,21 +262,15 @@ mod narrow {
             state = fold(word ^ times_x32(state));
             bytes = rest;
         }
-        while let [byte, rest @ ..] = bytes {
-            let word = (*byte as u32) << 24;
-            parity ^= word;
-            state = fold(word ^ times_x8(state));
-            bytes = rest;
-        }
-        (state, parity)
+        (state, parity, bytes)
     }
 
     /// One reduction by `x^15 = x + 1`: the first 14 bits become zero. Twice, and 15 bits at the end
     /// remain.
     #[inline(always)]
     const fn fold(word: u32) -> u32 {
-        let high = word & 0x1_FFFF;
-        (word ^ high) ^ (word << 15) ^ (high << 14)
+        let moved = word << 15;
+        (word & !0x1_FFFF) ^ moved ^ (moved >> 1)
     }
 
     // Multiplications of a folded state. Its first 14 bits are zero, so nothing is shifted out.
@@ -262,8 +299,9 @@ mod narrow {
         word ^= word >> 16;
         word ^= word >> 8;
         word ^= word >> 4;
-        // Bit n is the parity of n.
-        (0x6996_u32 >> (word & 15)) & 1 == 1
+        word ^= word >> 2;
+        word ^= word >> 1;
+        word & 1 == 1
     }
 }
 

@@ -48,12 +48,12 @@ pub enum Verdict {
         /// Bytes needed, counted from the front; more than the slice has.
         need: usize,
     },
-    /// No frame starts at any of so many bytes.
+    /// No frame starts at the first byte.
     Reject {
         /// Why not.
         reason: Reason,
-        /// How many bytes to skip, at least 1.
-        len: usize,
+        /// Nor does one, for the same reason, at any of so many bytes behind it.
+        more: usize,
     },
 }
 
@@ -61,6 +61,9 @@ pub enum Verdict {
 pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
     type Frame<'a>;
+
+    /// Shortest frame, bytes, at least 1: where no candidate is known, fewer need not be judged.
+    const MIN_LEN: usize;
 
     /// Longest frame, bytes. Given this many, `judge` never answers [`Verdict::Partial`].
     const MAX_LEN: usize;
@@ -96,19 +99,58 @@ enum Front {
 
 /// Books refusals from the front of `bytes` until something else stands there; returns the bytes
 /// from there on and what it is.
+///
+/// On a host, good frames do not wait for the registers that refusals need: those have a function
+/// of their own. A microcontroller has no flash for it, and its caller says how to book them.
 #[inline(always)]
-fn search<'b, F: Framing>(mut bytes: &'b [u8], ledger: &mut Ledger) -> (&'b [u8], Front) {
-    loop {
+fn search<'b, F: Framing>(
+    bytes: &'b [u8],
+    ledger: &mut Ledger,
+    refuse: impl Fn(&mut Ledger, Reason, usize),
+) -> (&'b [u8], Front) {
+    if cfg!(target_pointer_width = "64") {
         match F::judge(bytes) {
-            Verdict::Frame { len } => return (bytes, Front::Frame { len }),
-            Verdict::Partial { need } => return (bytes, Front::Partial { need }),
-            Verdict::Reject { reason, len } => {
-                let len = len.max(1);
-                ledger.skip(reason, len);
-                bytes = bytes.get(len..).unwrap_or_default();
+            Verdict::Frame { len } => (bytes, Front::Frame { len }),
+            Verdict::Partial { need } => (bytes, Front::Partial { need }),
+            Verdict::Reject { .. } => search_on::<F>(bytes, ledger),
+        }
+    } else {
+        search_through::<F>(bytes, ledger, refuse)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn search_on<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> (&'b [u8], Front) {
+    search_through::<F>(bytes, ledger, Ledger::refuse)
+}
+
+#[inline(always)]
+fn search_through<'b, F: Framing>(
+    bytes: &'b [u8],
+    ledger: &mut Ledger,
+    refuse: impl Fn(&mut Ledger, Reason, usize),
+) -> (&'b [u8], Front) {
+    let mut rest = bytes;
+    let front = loop {
+        match F::judge(rest) {
+            Verdict::Frame { len } => break Front::Frame { len },
+            Verdict::Partial { need } => break Front::Partial { need },
+            Verdict::Reject { reason, more } => {
+                let len = 1 + more;
+                refuse(ledger, reason, len);
+                let Some(behind) = rest.get(len..) else {
+                    rest = &[];
+                    break Front::Partial { need: 1 };
+                };
+                rest = behind;
             }
         }
+    };
+    if rest.len() < bytes.len() {
+        ledger.skip(bytes.len() - rest.len());
     }
+    (rest, front)
 }
 
 /// A whole frame that can be sent: it knows its bytes, CRC included.

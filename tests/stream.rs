@@ -56,6 +56,12 @@ macro_rules! properties {
                 }
 
                 #[test]
+                fn pushed_bytes_give_what_the_oracle_says(stream in stream()) {
+                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Push(1)]);
+                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Push(5), Op::Slice(3), Op::Idle]);
+                }
+
+                #[test]
                 fn chunks_do_not_matter(stream in stream(), chunks in vec(0..80_usize, 1..8)) {
                     let ops: Vec<_> = chunks.into_iter().map(Op::Slice).collect();
                     Line::<F, MAX_LEN>::new().play(&stream, &ops);
@@ -154,7 +160,7 @@ fn check_slice<F: Known>(stream: &[u8]) {
     }
     assert_eq!(found, told.frames());
     assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
-    line::check_counters(frames.counters(), &told, stream.len());
+    line::check_counters(&frames.counters(), &told, stream.len());
 }
 
 /// With `idle` as often as there is a rest, the slice iterator gives all frames there are, and a
@@ -173,7 +179,7 @@ fn check_finished_slice<F: Known>(stream: &[u8]) {
     let mut told = oracle::answer(F::RULES, stream, &[&idles[..], &[stream.len()]].concat());
     told.join_gaps();
     assert_eq!((found, told.pending), (told.frames(), 0));
-    line::check_counters(frames.counters(), &told, stream.len());
+    line::check_counters(&frames.counters(), &told, stream.len());
 
     let (events, counters) = decode_capture::<F>(stream);
     let events: Vec<_> = events.into_iter().map(|located| line::located::<F>(located)).collect();
@@ -217,6 +223,7 @@ struct Counted<F>(F);
 
 impl<F: Known> Framing for Counted<F> {
     type Frame<'a> = F::Frame<'a>;
+    const MIN_LEN: usize = F::MIN_LEN;
     const MAX_LEN: usize = F::MAX_LEN;
 
     fn judge(bytes: &[u8]) -> Verdict {
@@ -517,6 +524,22 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
         }
     }
     assert_eq!(places, [(0, 24), (24, 24), (48, 24)]);
+}
+
+#[test]
+fn a_byte_pushed_into_a_full_buffer_is_not_taken() {
+    let mut decoder = Decoder::<ikeya::ToMaster, 8>::new();
+    let answers: Vec<_> = (0..10).map(|_| decoder.push(0)).collect();
+    assert_eq!(answers, [[false; 7].as_slice(), &[true; 3]].concat());
+    assert_eq!((decoder.received(), decoder.pending()), (8, 8));
+    assert_eq!(decoder.poll(), None);
+    assert_eq!((decoder.received(), decoder.counters().header, decoder.pending()), (8, 8, 0));
+    // And there is room again.
+    for byte in response() {
+        decoder.push(byte);
+    }
+    assert!(matches!(decoder.poll(), Some(Event::Skipped(Gap { len: 8, reason: Reason::Header }))));
+    assert!(matches!(decoder.poll(), Some(Event::Frame(_))));
 }
 
 #[test]

@@ -110,7 +110,7 @@ fn every_ikeya_vector_decodes_to_its_fields_and_encodes_back() {
 fn is_refused<F: Framing>(vector: &Vector, reason: Reason) {
     let mut frames = Frames::<F>::new(&vector.bytes);
     assert!(frames.next().is_none());
-    let counters: &Counters = frames.counters();
+    let counters: Counters = frames.counters();
     let expected = if reason == Reason::Id { vector.bytes.len() as u64 } else { 1 };
     assert!(counters.skipped_for(reason) >= expected, "{reason}: {counters:?}");
     let mut decoder = axlewire::stream::Decoder::<F, 64>::new();

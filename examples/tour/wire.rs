@@ -42,7 +42,7 @@ fn decode<F: Framing>(capture: &[u8], line: fn(F::Frame<'_>) -> Line) {
             offset += print(offset, event, line);
         }
     }
-    account(decoder.counters(), decoder.pending());
+    account(&decoder.counters(), decoder.pending());
 }
 
 /// Prints one event and says how many bytes it covers.

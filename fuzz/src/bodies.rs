@@ -109,7 +109,7 @@ fn iterate<F: Known>(stream: &[u8]) {
     }
     assert!(frames.next().is_none(), "one frame more than the oracle has");
     assert_eq!(frames.rest().len(), told.pending);
-    line::check_counters(frames.counters(), &told, stream.len());
+    line::check_counters(&frames.counters(), &told, stream.len());
 }
 
 /// One op of the script: its upper bits say what, its lower ones how much.
@@ -122,7 +122,8 @@ fn op(byte: u8) -> Op {
         3 => Op::Commit(8 * amount),
         4 => Op::Stop { len: 4 * amount, events: 1 },
         5 => Op::Stop { len: 4 * amount, events: 2 },
-        6 => Op::Drain,
+        6 if amount == 0 => Op::Drain,
+        6 => Op::Push(amount),
         _ => Op::Idle,
     }
 }

@@ -55,9 +55,10 @@ pub enum Packet<'a> {
 
 impl Framing for ToSlave {
     type Frame<'a> = Request<'a>;
+    const MIN_LEN: usize = ReadRequest::LEN;
     const MAX_LEN: usize = WriteRequest::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
@@ -73,9 +74,10 @@ impl Framing for ToSlave {
 
 impl Framing for ToMaster {
     type Frame<'a> = Response<'a>;
+    const MIN_LEN: usize = VelocityResponse::LEN;
     const MAX_LEN: usize = VelocityResponse::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
@@ -91,9 +93,10 @@ impl Framing for ToMaster {
 
 impl Framing for Either {
     type Frame<'a> = Packet<'a>;
+    const MIN_LEN: usize = ReadRequest::LEN;
     const MAX_LEN: usize = WriteRequest::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
@@ -109,9 +112,10 @@ impl Framing for Either {
 
 impl Framing for three::ToSlave {
     type Frame<'a> = three::Request<'a>;
+    const MIN_LEN: usize = ReadRequest::LEN;
     const MAX_LEN: usize = three::WriteRequest::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
@@ -127,9 +131,10 @@ impl Framing for three::ToSlave {
 
 impl Framing for three::ToMaster {
     type Frame<'a> = three::Response<'a>;
+    const MIN_LEN: usize = three::VelocityResponse::LEN;
     const MAX_LEN: usize = three::VelocityResponse::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
@@ -145,9 +150,10 @@ impl Framing for three::ToMaster {
 
 impl Framing for three::Either {
     type Frame<'a> = three::Packet<'a>;
+    const MIN_LEN: usize = ReadRequest::LEN;
     const MAX_LEN: usize = three::WriteRequest::LEN;
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
@@ -172,20 +178,20 @@ fn judge<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: 
         Some(&(VELOCITY | POSITION)) if TO_MASTER => judge_packet::<LONG>(bytes),
         Some(&READ) if TO_SLAVE => judge_packet::<{ ReadRequest::LEN }>(bytes),
         Some(_) => {
-            Verdict::Reject { reason: Reason::Header, len: noise::<TO_SLAVE, TO_MASTER>(bytes) }
+            Verdict::Reject { reason: Reason::Header, more: noise::<TO_SLAVE, TO_MASTER>(bytes) }
         }
         None => Verdict::Partial { need: 1 },
     }
 }
 
-/// How many bytes at the front are no headers.
+/// How many bytes behind the first are no headers.
 fn noise<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> usize {
     let is_header = |byte: &u8| match *byte {
         READ | WRITE => TO_SLAVE,
         VELOCITY | POSITION => TO_MASTER,
         _ => false,
     };
-    bytes.iter().position(is_header).unwrap_or(bytes.len())
+    bytes.iter().skip(1).take_while(|byte| !is_header(byte)).count()
 }
 
 /// Judges a packet of `LEN` bytes whose header is right.
@@ -195,9 +201,9 @@ fn judge_packet<const LEN: usize>(bytes: &[u8]) -> Verdict {
         return Verdict::Partial { need: LEN };
     };
     if !crc16::check(packet) {
-        Verdict::Reject { reason: Reason::Crc, len: 1 }
+        Verdict::Reject { reason: Reason::Crc, more: 0 }
     } else if !matches!(packet.get(1), Some(1..=8)) {
-        Verdict::Reject { reason: Reason::Id, len: LEN }
+        Verdict::Reject { reason: Reason::Id, more: LEN - 1 }
     } else {
         Verdict::Frame { len: LEN }
     }

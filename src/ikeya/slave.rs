@@ -215,7 +215,7 @@ impl<B: Board> Slave<B> {
 
     /// Where every byte went.
     #[must_use]
-    pub const fn counters(&self) -> &Counters {
+    pub const fn counters(&self) -> Counters {
         self.decoder.counters()
     }
 
@@ -225,7 +225,7 @@ impl<B: Board> Slave<B> {
     /// false header, is overtaken by them. (A WRITE is never held back whole: it is as long as any
     /// false header can promise.)
     fn take(&mut self, mut bytes: &[u8], now: Instant) {
-        let (before, is_input) = (self.decoder.counters().received, !bytes.is_empty());
+        let (before, is_input) = (self.decoder.received(), !bytes.is_empty());
         while let Some((node, command)) = self.next_request(&mut bytes) {
             self.hear(node, command, now);
             let is_old = is_input && self.reported <= before;

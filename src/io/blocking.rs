@@ -14,8 +14,8 @@ impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
     /// stopped.
     pub fn read_event(&mut self) -> Result<Option<Event<F::Frame<'_>>>, R::Error> {
         loop {
-            if let Some(found) = self.decoder.advance(&mut [].as_slice()) {
-                return Ok(self.decoder.event(found));
+            if let Some(found) = self.decoder.advance_held() {
+                return Ok(self.decoder.held_event(found));
             }
             let count = self.port.read(self.decoder.spare())?;
             if count == 0 {

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::{Counters, Event, Framing, Front, Reason, ledger::Ledger, search};
+use super::{Counters, Event, Framing, Front, ledger::Ledger, search};
 
 /// An event, and the offset of its first byte in the capture.
 pub type Located<T> = (usize, Event<T>);
@@ -28,16 +28,15 @@ pub type Located<T> = (usize, Event<T>);
 #[must_use]
 pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, Counters) {
     let (mut events, mut ledger, mut at) = (Vec::new(), Ledger::new(), 0);
-    ledger.counters.received = bytes.len() as u64;
     while let Some(rest) = bytes.get(at..) {
-        let (found, front) = search::<F>(rest, &mut ledger);
+        let (found, front) = search::<F>(rest, &mut ledger, Ledger::refuse);
         at = bytes.len() - found.len();
         if matches!(front, Front::Partial { .. }) && at < bytes.len() {
-            ledger.skip(Reason::Idle, 1);
+            ledger.refuse_idle();
             at += 1;
             continue;
         }
-        if let Some(gap) = ledger.gap.take() {
+        if let Some(gap) = ledger.take_gap() {
             events.push((at - gap.len as usize, Event::Skipped(gap)));
         }
         let Front::Frame { len } = front else { break };
@@ -46,5 +45,5 @@ pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, 
         ledger.frame(len);
         at += len;
     }
-    (events, ledger.counters)
+    (events, ledger.counters(0))
 }

@@ -2,7 +2,7 @@
 
 use core::{fmt, marker::PhantomData};
 
-use super::{Counters, Event, Framing, Front, Gap, Reason, ledger::Ledger, search};
+use super::{Counters, Event, Framing, Front, Gap, ledger::Ledger, search};
 
 /// Frames of a stream that arrives in pieces of any size.
 ///
@@ -10,11 +10,12 @@ use super::{Counters, Event, Framing, Front, Gap, Reason, ledger::Ledger, search
 /// compiled. A frame lying whole in the input is borrowed from the input; only one that is split
 /// over two inputs goes through the buffer.
 ///
-/// Feed it in one of two ways, or both in turn:
+/// Feed it in one of three ways, or all in turn:
 ///
 /// * [`decode`](Self::decode) takes a slice and advances it;
 /// * a port or a DMA channel writes into [`spare`](Self::spare), [`commit`](Self::commit) says how
-///   much, and `decode` with an empty slice reads it out.
+///   much, and [`poll`](Self::poll) reads it out;
+/// * a receive interrupt [`push`](Self::push)es single bytes, and `poll` reads them out.
 ///
 /// ```
 /// # #[cfg(feature = "ucp")] {
@@ -39,13 +40,10 @@ use super::{Counters, Event, Framing, Front, Gap, Reason, ledger::Ledger, search
 pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
     buffer: [u8; N],
-    at: usize,
     end: usize,
-    /// What stands at the front of the held bytes, where that is known.
-    front: Option<Front>,
-    /// Where a candidate is held: how many bytes, for which there is room, have to come before
-    /// anything can be said; 0 where that is not known.
-    missing: usize,
+    /// While `end` is less, nothing can be said about the held bytes, and there is room for more.
+    wake: usize,
+    at: usize,
     line: Line,
     /// Where the held bytes ended when the line went quiet: what lies behind came later.
     quiet_end: usize,
@@ -66,9 +64,14 @@ enum Line {
 
 /// An event that has been booked but borrows nothing from the decoder yet: where its bytes are.
 pub(crate) enum Found<'i> {
-    Gap(Gap),
-    Held { at: usize, len: usize },
+    Held(Held),
     Input(&'i [u8]),
+}
+
+/// One in what is held.
+pub(crate) enum Held {
+    Gap(Gap),
+    Frame { at: usize, len: usize },
 }
 
 impl<F: Framing, const N: usize> Decoder<F, N> {
@@ -76,12 +79,12 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N >= F::MAX_LEN, "the buffer is shorter than the longest frame") }
+        const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "no such lengths") }
         Self {
             buffer: [0; N],
-            at: 0,
             end: 0,
-            front: None,
-            missing: 0,
+            wake: F::MIN_LEN,
+            at: 0,
             line: Line::Busy,
             quiet_end: 0,
             ledger: Ledger::new(),
@@ -99,6 +102,13 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.event(found)
     }
 
+    /// The next event in what is held: [`decode`](Self::decode) with nothing new.
+    #[inline]
+    pub fn poll(&mut self) -> Option<Event<F::Frame<'_>>> {
+        let held = self.advance_held()?;
+        self.held_event(held)
+    }
+
     /// Room behind the held bytes for a port to write into.
     ///
     /// At least one byte long once [`decode`](Self::decode) has answered `None`; before that it
@@ -113,21 +123,57 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     ///
     /// No more than `spare` has are taken.
     pub fn commit(&mut self, len: usize) {
-        let len = len.min(N - self.end);
-        (self.end, self.missing) = (self.end + len, 0);
-        self.receive(len);
+        if self.pending() == 0 {
+            self.wake = 0;
+        }
+        self.end += len.min(N - self.end);
+    }
+
+    /// Takes in one byte, as a receive interrupt brings it; says whether [`poll`](Self::poll) may
+    /// have an event now, to be called until it has none.
+    ///
+    /// The cheapest way to feed single bytes: until a frame can be complete, they are only stored.
+    /// No frame is found later than by [`decode`](Self::decode), but bytes that start none may stay
+    /// [`pending`](Self::pending) until [`Framing::MIN_LEN`] of them are there.
+    ///
+    /// There is always room once `poll` has answered `None`. Who goes on pushing after a `true`
+    /// without it fills the buffer in the end; then the byte is not taken, and the answer is `true`.
+    ///
+    /// ```
+    /// # #[cfg(feature = "ikeya")] {
+    /// use axlewire::{ikeya, stream::{Decoder, Event}};
+    ///
+    /// let mut decoder = Decoder::<ikeya::ToSlave, 8>::new();
+    /// let mut frames = 0;
+    /// for byte in [0xAA, 0x01, 0xBE, 0xD0] {
+    ///     if decoder.push(byte) {
+    ///         while let Some(event) = decoder.poll() {
+    ///             frames += usize::from(matches!(event, Event::Frame(_)));
+    ///         }
+    ///     }
+    /// }
+    /// assert_eq!(frames, 1);
+    /// # }
+    /// ```
+    #[inline]
+    pub fn push(&mut self, byte: u8) -> bool {
+        let end = self.end;
+        let Some(room) = self.buffer.get_mut(end) else { return true };
+        *room = byte;
+        self.end = end + 1;
+        end + 1 >= self.wake
     }
 
     /// The line went quiet: what is pending will not be completed (ruling B3).
     ///
     /// Concerns the bytes that the decoder has taken in; hand in what came before the silence first.
-    /// Takes effect in the calls of [`decode`](Self::decode) that follow, which deliver whole
+    /// Takes effect in the calls of [`decode`](Self::decode) or [`poll`](Self::poll) that follow, which deliver whole
     /// frames still held, refuse the pending candidate, search on inside it and report the gap.
     /// What can still be the start of a frame at the very end remains pending: when nothing at all
     /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
     /// one may then follow right behind the first.
     pub fn idle(&mut self) {
-        (self.line, self.quiet_end, self.missing) = (Line::Quiet, self.end, 0);
+        (self.line, self.quiet_end, self.wake) = (Line::Quiet, self.end, 0);
     }
 
     /// Bytes received and neither framed nor skipped yet.
@@ -138,52 +184,74 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
 
     /// Where every byte went so far.
     #[must_use]
-    pub const fn counters(&self) -> &Counters {
-        &self.ledger.counters
+    pub const fn counters(&self) -> Counters {
+        self.ledger.counters(self.pending())
+    }
+
+    /// Bytes taken in: [`Counters::received`] alone.
+    #[must_use]
+    pub const fn received(&self) -> u64 {
+        self.ledger.received(self.pending())
     }
 
     /// Finds and books the next event. The answer borrows nothing from `self`, so that a caller
     /// can go on reading from its port where there is none.
     #[inline]
     pub(crate) fn advance<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
-        let before = input.len();
-        if before < self.missing {
-            // Byte by byte from a port, this is what happens nearly every time.
-            self.hold_on(input);
-            self.receive(before);
-            return None;
+        if self.end != 0 || self.line != Line::Busy {
+            if input.len() < self.wake.saturating_sub(self.end) {
+                self.hold(input, input.len());
+                return None;
+            }
+            if let Some(held) = self.complete(input) {
+                return Some(Found::Held(held));
+            }
+            if self.end != 0 {
+                return None;
+            }
         }
-        self.missing = 0;
-        let found = if self.pending() == 0 && self.line == Line::Busy {
-            self.advance_input(input)
-        } else {
-            self.advance_held(input)
-        };
-        self.receive(before - input.len());
-        found
+        self.advance_input(input)
+    }
+
+    /// Finds and books the next event in what is held.
+    #[inline]
+    pub(crate) fn advance_held(&mut self) -> Option<Held> {
+        if self.end < self.wake { None } else { self.judge_held(0) }
     }
 
     /// Makes an event of what `advance` has found.
     #[inline]
     pub(crate) fn event<'a, 'i: 'a>(&'a self, found: Found<'i>) -> Option<Event<F::Frame<'a>>> {
         match found {
-            Found::Gap(gap) => Some(Event::Skipped(gap)),
-            Found::Held { at, len } => {
-                F::view(self.buffer.get(at..)?.get(..len)?).map(Event::Frame)
-            }
+            Found::Held(held) => self.held_event(held),
             Found::Input(frame) => F::view(frame).map(Event::Frame),
         }
     }
 
-    /// Nothing is held: reads `input` where it lies, and holds the candidate that it cuts off.
+    /// Makes an event of what `advance_held` has found.
     #[inline]
+    pub(crate) fn held_event(&self, held: Held) -> Option<Event<F::Frame<'_>>> {
+        match held {
+            Held::Gap(gap) => Some(Event::Skipped(gap)),
+            Held::Frame { at, len } => {
+                F::view(self.buffer.get(at..)?.get(..len)?).map(Event::Frame)
+            }
+        }
+    }
+
+    /// Nothing is held: reads `input` where it lies, and holds the candidate that it cuts off.
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
+    #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
     fn advance_input<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
-        let (found, front) = search::<F>(input, &mut self.ledger);
-        *input = found;
+        if input.is_empty() {
+            return None;
+        }
+        let (found, front) = search::<F>(input, &mut self.ledger, Ledger::refuse_apart);
         match front {
             Front::Frame { len } => {
-                if let Some(gap) = self.ledger.gap.take() {
-                    return Some(Found::Gap(gap));
+                if let Some(gap) = self.ledger.take_gap() {
+                    *input = found;
+                    return Some(Found::Held(Held::Gap(gap)));
                 }
                 let (frame, rest) = found.split_at_checked(len)?;
                 *input = rest;
@@ -191,145 +259,134 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 Some(Found::Input(frame))
             }
             Front::Partial { need } => {
-                self.hold_cut_off(input, need);
+                *input = found;
+                if !found.is_empty() {
+                    self.hold(input, found.len());
+                    self.wake = need;
+                }
                 None
             }
         }
     }
 
-    /// Something is held, or the line went quiet: completes the candidate byte for byte.
-    fn advance_held<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
+    /// Something is held, or the line went quiet: completes the candidate from `input`. Either an
+    /// event comes of that, or more input is needed, or nothing is held any more.
+    #[inline(never)]
+    fn complete(&mut self, input: &mut &[u8]) -> Option<Held> {
         let start = *input;
         loop {
-            let front = self.judge_held();
-            let taken = start.len() - input.len();
-            if taken > 0 && self.pending() <= taken {
-                // All that is still held came from this input: read it there.
-                *input = start.get(taken - self.pending()..)?;
-                (self.at, self.end, self.front) = (0, 0, None);
-                return self.advance_input(input);
+            if self.end < self.wake {
+                self.hold(input, self.wake - self.end);
             }
-            match (front, self.line) {
-                (Front::Frame { len }, _) => {
-                    if let Some(gap) = self.ledger.gap.take() {
-                        return Some(Found::Gap(gap));
-                    }
-                    let at = self.at;
-                    self.consume(len);
-                    self.ledger.frame(len);
-                    return Some(Found::Held { at, len });
-                }
-                (Front::Partial { .. }, Line::Quiet) if self.at < self.quiet_end => {
-                    self.line = Line::Settling;
-                    self.ledger.skip(Reason::Idle, 1);
-                    self.consume(1);
-                }
-                (Front::Partial { .. }, Line::Quiet | Line::Settling) => {
-                    self.line = Line::Busy;
-                    if let Some(gap) = self.ledger.gap.take() {
-                        return Some(Found::Gap(gap));
-                    }
-                }
-                (Front::Partial { .. }, Line::Busy) if self.pending() == 0 => {
-                    return self.advance_input(input);
-                }
-                (Front::Partial { need }, Line::Busy) => {
-                    if self.hold(input, need.saturating_sub(self.pending())) == 0 {
-                        self.wait_for(need);
-                        return None;
-                    }
-                }
+            if self.end < self.wake {
+                return None;
+            }
+            let taken = start.len() - input.len();
+            if let Some(held) = self.judge_held(taken) {
+                return Some(held);
+            }
+            if self.pending() <= taken {
+                // All that is still held came from this input: it is read there.
+                *input = start.get(taken - self.pending()..)?;
+                self.clear();
+                return None;
             }
         }
     }
 
-    /// Holds the candidate that the input cuts off. Out of line: it happens once per input.
+    /// Finds and books the next event in what is held, of which something can be said; but none in
+    /// the last `taken` bytes, if nothing in front of them is left.
     #[inline(never)]
-    fn hold_cut_off(&mut self, input: &mut &[u8], need: usize) {
-        (self.at, self.end) = (0, 0);
-        self.hold(input, N);
-        self.front = Some(Front::Partial { need });
-        self.wait_for(need);
+    fn judge_held(&mut self, taken: usize) -> Option<Held> {
+        loop {
+            // What came behind a silence does not complete what was pending before it.
+            let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
+            let held = self.buffer.get(self.at..end)?;
+            let (found, front) = search::<F>(held, &mut self.ledger, Ledger::refuse_apart);
+            self.at = end - found.len();
+            if taken > 0 && self.pending() <= taken {
+                return None;
+            }
+            match (front, self.line) {
+                (Front::Frame { len }, _) => {
+                    self.wake = 0;
+                    if let Some(gap) = self.ledger.take_gap() {
+                        return Some(Held::Gap(gap));
+                    }
+                    self.ledger.frame(len);
+                    let at = self.at;
+                    self.at += len;
+                    if self.at == self.end && self.line == Line::Busy {
+                        self.clear();
+                    }
+                    return Some(Held::Frame { at, len });
+                }
+                (Front::Partial { need }, Line::Busy) => {
+                    self.wait_for(need);
+                    return None;
+                }
+                (Front::Partial { .. }, Line::Quiet) if self.at < self.quiet_end => {
+                    self.line = Line::Settling;
+                    self.ledger.refuse_idle();
+                    self.at += 1;
+                }
+                (Front::Partial { .. }, Line::Quiet | Line::Settling) => {
+                    self.line = Line::Busy;
+                    if self.at == self.end {
+                        self.clear();
+                    }
+                    if let Some(gap) = self.ledger.take_gap() {
+                        return Some(Held::Gap(gap));
+                    }
+                }
+            }
+        }
     }
 
     /// Nothing can be said before the held bytes are `need`; sees to it that there is room for them.
     #[inline]
     fn wait_for(&mut self, need: usize) {
+        if self.at == self.end {
+            return self.clear();
+        }
         if self.at + need > N {
             self.compact();
         }
-        self.missing = need.saturating_sub(self.pending());
+        self.wake = self.at + need;
     }
 
-    /// Moves an input that completes nothing behind the held bytes.
+    /// Moves up to `most` bytes from the input behind the held ones.
     #[inline]
-    fn hold_on(&mut self, input: &mut &[u8]) {
-        let end = self.end + input.len();
-        if let Some(room) = self.buffer.get_mut(self.end..end) {
-            match (room, *input) {
-                // A single byte is not worth a call to copy it.
-                ([room], [byte]) => *room = *byte,
-                (room, bytes) => room.copy_from_slice(bytes),
-            }
-        }
-        self.missing -= input.len();
-        self.end = end;
-        *input = &[];
-    }
-
-    /// What stands at the front of the held bytes, refusals booked.
-    #[inline]
-    fn judge_held(&mut self) -> Front {
-        // What came behind a silence does not complete what was pending before it.
-        let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
-        match self.front {
-            Some(front @ Front::Frame { .. }) => front,
-            Some(front @ Front::Partial { need }) if end.saturating_sub(self.at) < need => front,
-            _ => {
-                let held = self.buffer.get(self.at..end).unwrap_or_default();
-                let (found, front) = search::<F>(held, &mut self.ledger);
-                self.at = end - found.len();
-                self.front = Some(front);
-                front
-            }
-        }
-    }
-
-    /// Moves up to `most` bytes from the input behind the held ones; says how many.
-    #[inline]
-    fn hold(&mut self, input: &mut &[u8], most: usize) -> usize {
-        if self.end + most > N {
-            self.compact();
-        }
-        let count = most.min(input.len()).min(N - self.end);
+    fn hold(&mut self, input: &mut &[u8], most: usize) {
+        let count = most.min(input.len());
         if let (Some((taken, rest)), Some(room)) =
             (input.split_at_checked(count), self.buffer.get_mut(self.end..self.end + count))
         {
-            room.copy_from_slice(taken);
+            match (room, taken) {
+                // A single byte is not worth a call to copy it.
+                ([room], [byte]) => *room = *byte,
+                (room, taken) => room.copy_from_slice(taken),
+            }
             *input = rest;
             self.end += count;
         }
-        count
     }
 
-    /// The first `len` held bytes have been booked.
-    fn consume(&mut self, len: usize) {
-        self.at += len;
-        self.front = None;
+    /// Nothing is held.
+    fn clear(&mut self) {
+        (self.at, self.end, self.wake) = (0, 0, F::MIN_LEN);
     }
 
     /// Moves the held bytes to the front of the buffer.
     fn compact(&mut self) {
-        if self.at > 0 {
-            self.buffer.copy_within(self.at..self.end, 0);
-            self.quiet_end = self.quiet_end.saturating_sub(self.at);
-            (self.at, self.end) = (0, self.end - self.at);
+        let end = self.end.min(N);
+        let at = self.at.min(end);
+        if at > 0 {
+            self.buffer.copy_within(at..end, 0);
+            self.wake = self.wake.saturating_sub(at);
+            self.quiet_end = self.quiet_end.saturating_sub(at);
+            (self.at, self.end) = (0, end - at);
         }
-    }
-
-    fn receive(&mut self, len: usize) {
-        let received = &mut self.ledger.counters.received;
-        *received = received.wrapping_add(len as u64);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use super::{Counters, Framing, Front, Reason, Verdict, ledger::Ledger, search};
+use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
 
 /// Frames of a slice that is already in memory, borrowed from it.
 ///
@@ -35,9 +35,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// Frames of `bytes`, from the first byte on.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        let mut ledger = Ledger::new();
-        ledger.counters.received = bytes.len() as u64;
-        Self { rest: bytes, ledger, framing: PhantomData }
+        Self { rest: bytes, ledger: Ledger::new(), framing: PhantomData }
     }
 
     /// What has not been judged yet; once the iterator has ended, the candidate that the slice
@@ -51,31 +49,33 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// the search can go on inside it (ruling B3).
     ///
     /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
+    #[inline(never)]
     pub fn idle(&mut self) {
         if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {
-            self.ledger.skip(Reason::Idle, 1);
+            self.ledger.refuse_idle();
             self.rest = rest;
         }
     }
 
     /// Where every byte went so far.
     #[must_use]
-    pub fn counters(&self) -> &Counters {
-        &self.ledger.counters
+    pub fn counters(&self) -> Counters {
+        self.ledger.counters(self.rest.len())
     }
 }
 
 impl<'a, F: Framing> Iterator for Frames<'a, F> {
     type Item = F::Frame<'a>;
 
-    #[inline]
+    #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
-        let (found, front) = search::<F>(self.rest, &mut self.ledger);
-        self.rest = found;
-        let Front::Frame { len } = front else { return None };
+        let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
+        let Front::Frame { len } = front else {
+            self.rest = found;
+            return None;
+        };
         let (frame, rest) = found.split_at_checked(len)?;
         self.rest = rest;
-        self.ledger.gap = None;
         self.ledger.frame(len);
         F::view(frame)
     }

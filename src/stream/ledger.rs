@@ -52,7 +52,8 @@ pub struct Gap {
     pub reason: Reason,
 }
 
-/// Where every byte went. All counts wrap at 2^64, which no line reaches.
+/// Where every byte went, `received == framed + skipped() + pending`. All counts wrap at 2^64,
+/// which no line reaches.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -100,59 +101,116 @@ impl Counters {
             Reason::Idle => self.idle,
         }
     }
-
-    fn skipped_for_mut(&mut self, reason: Reason) -> &mut u64 {
-        match reason {
-            Reason::Header => &mut self.header,
-            Reason::Length => &mut self.length,
-            Reason::Id => &mut self.id,
-            Reason::Crc => &mut self.crc,
-            Reason::Idle => &mut self.idle,
-        }
-    }
 }
 
-/// The counters and the gap that is open; the one place where bytes are booked.
+/// The one place where bytes are booked.
+///
+/// Only what cannot be told from the rest is counted: a frame costs two additions, a byte that
+/// starts no frame none of its own.
 #[derive(Clone, Debug)]
 pub(super) struct Ledger {
-    pub(super) counters: Counters,
-    pub(super) gap: Option<Gap>,
+    framed: u64,
+    frames: u64,
+    /// Bytes in all gaps; those that no other count claims are [`Reason::Header`].
+    skipped: u64,
+    length: u64,
+    id: u64,
+    crc: u64,
+    idle: u64,
+    gaps: u64,
+    /// Why the gap that is open began.
+    gap: Option<Reason>,
+    /// `skipped` as it was then.
+    gap_start: u64,
 }
 
 impl Ledger {
     pub(super) const fn new() -> Self {
-        let counters = Counters {
-            received: 0,
+        Self {
             framed: 0,
             frames: 0,
-            gaps: 0,
-            header: 0,
+            skipped: 0,
             length: 0,
             id: 0,
             crc: 0,
             idle: 0,
-        };
-        Self { counters, gap: None }
-    }
-
-    // Out of line: inlined, an open gap takes the registers that the next good frame needs.
-    #[inline(never)]
-    pub(super) fn skip(&mut self, reason: Reason, len: usize) {
-        let len = len as u64;
-        let count = self.counters.skipped_for_mut(reason);
-        *count = count.wrapping_add(len);
-        match &mut self.gap {
-            Some(gap) => gap.len = gap.len.wrapping_add(len),
-            None => {
-                self.gap = Some(Gap { len, reason });
-                self.counters.gaps = self.counters.gaps.wrapping_add(1);
-            }
+            gaps: 0,
+            gap: None,
+            gap_start: 0,
         }
     }
 
-    #[inline]
+    /// A frame of `len` bytes. Ends the gap, which is to be reported before or not at all.
+    #[inline(always)]
     pub(super) fn frame(&mut self, len: usize) {
-        self.counters.framed = self.counters.framed.wrapping_add(len as u64);
-        self.counters.frames = self.counters.frames.wrapping_add(1);
+        self.framed = self.framed.wrapping_add(len as u64);
+        self.frames = self.frames.wrapping_add(1);
+        self.gap = None;
+    }
+
+    /// So many bytes are refused for this reason; `skip` counts them.
+    ///
+    /// Every count gets a number, most of them zero: on a microcontroller the compiler then leaves
+    /// out those that nobody reads.
+    #[inline(always)]
+    pub(super) fn refuse(&mut self, reason: Reason, len: usize) {
+        if self.gap.is_none() {
+            (self.gap, self.gap_start) = (Some(reason), self.skipped);
+            self.gaps = self.gaps.wrapping_add(1);
+        }
+        let if_for = |wanted: Reason| if reason == wanted { len as u64 } else { 0 };
+        self.length = self.length.wrapping_add(if_for(Reason::Length));
+        self.id = self.id.wrapping_add(if_for(Reason::Id));
+        self.crc = self.crc.wrapping_add(if_for(Reason::Crc));
+        self.idle = self.idle.wrapping_add(if_for(Reason::Idle));
+    }
+
+    /// `refuse` for callers whose counts are read by somebody: out of their way, and there once.
+    #[inline(never)]
+    pub(super) fn refuse_apart(&mut self, reason: Reason, len: usize) {
+        self.refuse(reason, len);
+    }
+
+    /// The first byte of a candidate that a quiet line cuts off.
+    pub(super) fn refuse_idle(&mut self) {
+        self.refuse(Reason::Idle, 1);
+        self.skip(1);
+    }
+
+    /// So many bytes have been refused.
+    #[inline(always)]
+    pub(super) fn skip(&mut self, len: usize) {
+        self.skipped = self.skipped.wrapping_add(len as u64);
+    }
+
+    /// The gap that has ended, if there is one.
+    #[inline(always)]
+    pub(super) fn take_gap(&mut self) -> Option<Gap> {
+        let reason = self.gap?;
+        self.gap = None;
+        Some(Gap { len: self.skipped.wrapping_sub(self.gap_start), reason })
+    }
+
+    /// Bytes taken in, `pending` of them not booked yet.
+    #[inline]
+    pub(super) const fn received(&self, pending: usize) -> u64 {
+        self.framed.wrapping_add(self.skipped).wrapping_add(pending as u64)
+    }
+
+    /// The account, with so many bytes not booked yet.
+    pub(super) const fn counters(&self, pending: usize) -> Counters {
+        let Self { framed, frames, skipped, length, id, crc, idle, gaps, .. } = *self;
+        let claimed = length.wrapping_add(id).wrapping_add(crc).wrapping_add(idle);
+        Counters {
+            received: self.received(pending),
+            framed,
+            frames,
+            gaps,
+            header: skipped.wrapping_sub(claimed),
+            length,
+            id,
+            crc,
+            idle,
+        }
     }
 }

@@ -20,26 +20,30 @@ pub enum Ucp<const CAP: usize = 60> {}
 impl<const CAP: usize> Framing for Ucp<CAP> {
     type Frame<'a> = &'a Frame;
 
+    const MIN_LEN: usize = LEN_WITHOUT_BODY + OUTSIDE_LEN;
     const MAX_LEN: usize = {
         assert!(CAP >= LEN_WITHOUT_BODY && CAP <= 252, "the cap is 4..=252");
         CAP + OUTSIDE_LEN
     };
 
-    #[inline]
+    #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
-        let len = match *bytes {
-            [first, second, low, high, ..] if [first, second] == SYNC => {
-                usize::from(u16::from_le_bytes([low, high]))
-            }
-            _ => return Self::judge_start(bytes),
-        };
+        let start = bytes.first_chunk().copied();
+        let [sync @ .., low, high] = start.unwrap_or_else(|| fill_up(bytes));
+        if sync != SYNC {
+            return Verdict::Reject { reason: Reason::Header, more: noise(bytes) };
+        }
+        let len = usize::from(u16::from_le_bytes([low, high]));
         if !(LEN_WITHOUT_BODY..=CAP).contains(&len) {
-            return Verdict::Reject { reason: Reason::Length, len: 1 };
+            return Verdict::Reject { reason: Reason::Length, more: 0 };
+        }
+        if start.is_none() {
+            return Verdict::Partial { need: bytes.len() + 1 };
         }
         let len = len + OUTSIDE_LEN;
         match bytes.get(..len) {
             Some(frame) if crc16::check(frame) => Verdict::Frame { len },
-            Some(_) => Verdict::Reject { reason: Reason::Crc, len: 1 },
+            Some(_) => Verdict::Reject { reason: Reason::Crc, more: 0 },
             None => Verdict::Partial { need: len },
         }
     }
@@ -50,27 +54,18 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
     }
 }
 
-impl<const CAP: usize> Ucp<CAP> {
-    /// Judges less than a length field, or no sync.
-    fn judge_start(bytes: &[u8]) -> Verdict {
-        match *bytes {
-            [first, second, low] if [first, second] == SYNC => {
-                // No length up to 252 has a high byte, so the low one tells already.
-                if (LEN_WITHOUT_BODY..=CAP).contains(&usize::from(low)) {
-                    Verdict::Partial { need: 4 }
-                } else {
-                    Verdict::Reject { reason: Reason::Length, len: 1 }
-                }
-            }
-            [first, second] if [first, second] == SYNC => Verdict::Partial { need: 3 },
-            [first] if first == SYNC[0] => Verdict::Partial { need: 2 },
-            [] => Verdict::Partial { need: 1 },
-            [_, ref rest @ ..] => {
-                let run = rest.iter().take_while(|&&byte| byte != SYNC[0]).count();
-                Verdict::Reject { reason: Reason::Header, len: 1 + run }
-            }
-        }
-    }
+/// Less than a sync and a length field, with those of the shortest frame where bytes are missing:
+/// what is there is wrong exactly when the whole is.
+fn fill_up(bytes: &[u8]) -> [u8; 4] {
+    let mut start = [SYNC[0], SYNC[1], LEN_WITHOUT_BODY as u8, 0];
+    start.iter_mut().zip(bytes).for_each(|(filled, byte)| *filled = *byte);
+    start
+}
+
+/// How many bytes behind the first start no sync.
+#[inline(always)]
+fn noise(bytes: &[u8]) -> usize {
+    bytes.iter().skip(1).take_while(|&&byte| byte != SYNC[0]).count()
 }
 
 /// Bytes of a frame that `len` does not count: the sync and the CRC.

@@ -247,7 +247,7 @@ impl<S: BiasStore> Host<S> {
 
     /// Where every received byte went.
     #[must_use]
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> Counters {
         self.inbox.counters()
     }
 

@@ -117,7 +117,7 @@ impl Robot {
 
     /// Where every received byte went.
     #[must_use]
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> Counters {
         self.inbox.counters()
     }
 

@@ -41,7 +41,7 @@ impl Inbox {
         mut receive: impl FnMut(&Frame, Instant),
     ) {
         if !bytes.is_empty() {
-            let received = self.decoder.counters().received;
+            let received = self.decoder.received();
             self.last = now;
             self.decode(bytes, received, &mut receive);
             if self.decoder.pending() <= bytes.len() {
@@ -56,7 +56,7 @@ impl Inbox {
         if reached(self.deadline(), now) {
             while self.decoder.pending() > 0 {
                 self.decoder.idle();
-                self.decode(&[], self.decoder.counters().received, &mut receive);
+                self.decode(&[], self.decoder.received(), &mut receive);
             }
         }
     }
@@ -66,7 +66,7 @@ impl Inbox {
         (self.decoder.pending() > 0).then(|| self.last + self.quiet)
     }
 
-    pub(super) fn counters(&self) -> &Counters {
+    pub(super) fn counters(&self) -> Counters {
         self.decoder.counters()
     }
 

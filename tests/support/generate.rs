@@ -25,6 +25,7 @@ pub(crate) fn ops() -> impl Strategy<Value = Vec<Op>> {
         4 => (0..80_usize).prop_map(Op::Slice),
         2 => (0..80_usize, 0..4_usize).prop_map(|(len, events)| Op::Stop { len, events }),
         4 => (0..80_usize).prop_map(Op::Commit),
+        2 => (0..80_usize).prop_map(Op::Push),
         2 => Just(Op::Drain),
         2 => Just(Op::Idle),
     ];

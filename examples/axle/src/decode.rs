@@ -112,7 +112,7 @@ where
             break;
         }
     }
-    listing.finish(Summary::new(decoder.counters(), decoder.pending())).map_err(Failure::Write)
+    listing.finish(Summary::new(&decoder.counters(), decoder.pending())).map_err(Failure::Write)
 }
 
 /// How a record is printed.

@@ -95,14 +95,14 @@ where
             print_at = now + period;
             table.measure(now);
             let printed = match is_live {
-                true => table.redraw(&mut out, decoder.counters()),
-                false => table.print_line(&mut out, decoder.counters(), now),
+                true => table.redraw(&mut out, &decoder.counters()),
+                false => table.print_line(&mut out, &decoder.counters(), now),
             };
             printed.map_err(Failure::Write)?;
         }
     };
     table
-        .finish(&mut out, decoder.counters(), decoder.pending(), port.now())
+        .finish(&mut out, &decoder.counters(), decoder.pending(), port.now())
         .map_err(Failure::Write)?;
     broken
 }

@@ -18,26 +18,34 @@ pub fn ucp_slice(bytes: &[u8]) -> u32 {
     Frames::<Ucp>::new(bytes).map(read_frame).fold(0, u32::wrapping_add)
 }
 
-/// Hands one byte to a decoder of the bus.
+/// Hands one byte to a decoder of the bus, as a receive interrupt does.
 pub fn ikeya_byte(decoder: &mut Decoder<ToMaster, 8>, byte: u8) -> u32 {
-    let (mut input, mut sum) = (&[byte][..], 0);
-    while let Some(event) = decoder.decode(&mut input) {
-        if let Event::Frame(response) = event {
-            sum += read_response(response);
+    #[inline(never)]
+    fn read(decoder: &mut Decoder<ToMaster, 8>) -> u32 {
+        let mut sum = 0;
+        while let Some(event) = decoder.poll() {
+            if let Event::Frame(response) = event {
+                sum += read_response(response);
+            }
         }
+        sum
     }
-    sum
+    if decoder.push(byte) { read(decoder) } else { 0 }
 }
 
-/// Hands one byte to a UCP decoder.
+/// Hands one byte to a UCP decoder, as a receive interrupt does.
 pub fn ucp_byte(decoder: &mut Decoder<Ucp, 64>, byte: u8) -> u32 {
-    let (mut input, mut sum) = (&[byte][..], 0);
-    while let Some(event) = decoder.decode(&mut input) {
-        if let Event::Frame(frame) = event {
-            sum += read_frame(frame);
+    #[inline(never)]
+    fn read(decoder: &mut Decoder<Ucp, 64>) -> u32 {
+        let mut sum = 0;
+        while let Some(event) = decoder.poll() {
+            if let Event::Frame(frame) = event {
+                sum += read_frame(frame);
+            }
         }
+        sum
     }
-    sum
+    if decoder.push(byte) { read(decoder) } else { 0 }
 }
 
 /// Drives a role as its loop does; the size of everything that hangs on it.

@@ -77,7 +77,8 @@ impl<B: Board> Master<B> {
             Source::Discovery => {}
             Source::Probe => {
                 let share = u32::from(self.config.recovery_share_pct.clamp(1, 50));
-                let pause = self.window().saturating_mul(100).as_micros() / share;
+                let window = self.window().saturating_mul(100).as_micros();
+                let pause = window.checked_div(share).unwrap_or(u32::MAX);
                 (self.probe_turn, self.probe_at) =
                     (index, Some(now + Duration::from_micros(pause)));
             }
