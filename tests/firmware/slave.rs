@@ -163,7 +163,7 @@ fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
         let speed = master.read();
         assert!((0.0..=6.0).contains(&speed), "{speed} rps were never commanded");
     }
-    let counters = *master.decoder.counters();
+    let counters = master.decoder.counters();
     assert_eq!((counters.frames, counters.received), (EXCHANGES as u64, 8 * EXCHANGES as u64));
     let told = master.told(EXCHANGES);
     let counts = ["reads", "writes", "replies"].map(|name| told.at(name));
