@@ -1,0 +1,128 @@
+//! A slave of a motor bus with RTIC: hears all, answers a READ for its own id within 50 µs.
+//!
+//! STM32F405. PA9 and PA10 are the UART at 500 kbit/s, PA8 enables the driver of the RS485
+//! transceiver, PC0 to PC3 are the DIP switch.
+
+#![no_std]
+#![no_main]
+
+mod board;
+
+use panic_halt as _;
+
+#[rtic::app(device = stm32f4::stm32f405, dispatchers = [EXTI0])]
+mod app {
+    use axlewire::{
+        endpoint::Endpoint,
+        ikeya::{DipSwitch, IdReading, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+        time::{Duration, Wrapping32},
+    };
+    use heapless::spsc::{Consumer, Producer, Queue};
+    use rtic_sync::signal::{Signal, SignalReader, SignalWriter};
+    use stm32f4::stm32f405::Interrupt;
+
+    use crate::board::{Board, Micros, Port};
+
+    #[shared]
+    struct Shared {
+        micros: Micros,
+    }
+
+    #[local]
+    struct Local {
+        port: Port,
+        heard: Producer<'static, u8>,
+        answer: Consumer<'static, u8>,
+        line_woke: SignalWriter<'static, ()>,
+        micros_woke: SignalWriter<'static, ()>,
+        slave: Slave,
+        hear: Consumer<'static, u8>,
+        say: Producer<'static, u8>,
+        woken: SignalReader<'static, ()>,
+    }
+
+    #[init(local = [
+        received: Queue<u8, 64> = Queue::new(),
+        to_send: Queue<u8, 32> = Queue::new(),
+        bell: Signal<()> = Signal::new(),
+    ])]
+    fn init(cx: init::Context) -> (Shared, Local) {
+        let Board { port, micros, dip } = Board::new(cx.device);
+        let (heard, hear) = cx.local.received.split();
+        let (say, answer) = cx.local.to_send.split();
+        let (wake, woken) = cx.local.bell.split();
+
+        let mut config = SlaveConfig::direct();
+        config.watchdog = Some(Duration::from_millis(500));
+        // With the reading that fits ids 1 to 8, every position of the switch is an id (ruling I2).
+        let slave = DipSwitch::from_bits(dip)
+            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config));
+        let Ok(mut slave) = slave else { panic!("every switch of four digits has an id") };
+        // The motor of this example stands at 0 when it starts.
+        slave.set_position(Position::new(0, 0));
+        // Nobody else spawns it, so there is room.
+        let _ = talk::spawn();
+        let (line_woke, micros_woke) = (wake.clone(), wake);
+        (
+            Shared { micros },
+            Local { port, heard, answer, line_woke, micros_woke, slave, hear, say, woken },
+        )
+    }
+
+    /// Moves bytes between the UART and the queues. Nobody else touches the UART.
+    #[task(binds = USART1, priority = 3, local = [port, heard, answer, line_woke])]
+    fn line(cx: line::Context) {
+        let line::LocalResources { port, heard, answer, line_woke, .. } = cx.local;
+        if let Some(byte) = port.receive() {
+            // Without room, or after an overrun, a byte is missing: the CRC will tell.
+            let _ = heard.enqueue(byte);
+            line_woke.write(());
+        }
+        port.send(|| answer.dequeue());
+    }
+
+    /// The time that the slave has asked for has come.
+    #[task(binds = TIM2, priority = 2, shared = [micros], local = [micros_woke])]
+    fn late(mut cx: late::Context) {
+        cx.shared.micros.lock(|micros| micros.acknowledge());
+        cx.local.micros_woke.write(());
+    }
+
+    /// The slave itself, woken by bytes and by time.
+    #[task(priority = 1, shared = [micros], local = [slave, hear, say, woken])]
+    async fn talk(mut cx: talk::Context) {
+        let talk::LocalResources { slave, hear, say, woken, .. } = cx.local;
+        let mut clock = Wrapping32::new();
+        loop {
+            let now = clock.at(cx.shared.micros.lock(|micros| micros.now()));
+            while let Some(byte) = hear.dequeue() {
+                slave.handle_input(&[byte], now);
+            }
+            slave.handle_timeout(now);
+            // The answer is due in 50 µs: everything else comes after it.
+            if let Some(answer) = slave.poll_transmit(now) {
+                for &byte in answer {
+                    // There is room: two answers are never on their way together.
+                    let _ = say.enqueue(byte);
+                }
+                rtic::pend(Interrupt::USART1);
+            }
+            while let Some(event) = slave.poll_event() {
+                // Your motor goes here. This one turns as it is told, at once.
+                match event {
+                    SlaveEvent::Command(Target::Velocity(speed)) => slave.set_velocity(speed),
+                    SlaveEvent::Command(Target::Position(at)) => slave.set_position(at),
+                    SlaveEvent::Watchdog => slave.set_velocity(Rps::ZERO),
+                    _ => {}
+                }
+            }
+            if let Some(at) = slave.poll_timeout() {
+                let counter = cx.shared.micros.lock(|micros| micros.wake_at(at.as_micros() as u32));
+                if clock.at(counter) >= at {
+                    continue;
+                }
+            }
+            woken.wait().await;
+        }
+    }
+}
