@@ -1,8 +1,10 @@
-# Builds for thumbv7em: sourced by bench.sh and run.sh, which stand in this folder.
+# Builds for thumbv7em: sourced by the scripts beside it, which stand in this folder.
 #
-# Uses the rustup target where it is installed, otherwise Debian's compiler; QEMU and lld come from
-# Debian if they are missing, or it fails where INSTALL=no is set. Afterwards: `out` is the target folder, `target` the target's name,
-# `cargo` the words of a build, `compiler` its name and version.
+# Uses the rustup target where it is installed, otherwise Debian's compiler. QEMU and lld come from
+# Debian if they are missing; with INSTALL=no that is an error.
+#
+# Afterwards `out` is the target folder, `target` the target's name, `cargo` the words of a build,
+# `compiler` its name and version.
 
 target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}

@@ -16,6 +16,7 @@ use stm32f4::stm32f405::{GPIOA, Interrupt, Peripherals, USART1, USART2};
 
 use crate::{
     clock::{self, Clock},
+    stack::Stack,
     uart::{Channel, Port, Queue},
 };
 
@@ -43,6 +44,8 @@ pub struct Board {
     pub text: Port<USART2>,
     /// The robot's lamp.
     pub lamp: Pin<5>,
+    /// The mark on the stack.
+    pub stack: Stack,
     is_emulated: bool,
 }
 
@@ -83,7 +86,8 @@ impl Board {
             NVIC::unmask(Interrupt::USART1);
             NVIC::unmask(Interrupt::USART2);
         }
-        Some(Self { clock, bus, driver_enable: Pin(pins), text, lamp: Pin(pins), is_emulated })
+        let (driver_enable, lamp, stack) = (Pin(pins), Pin(pins), Stack::new());
+        Some(Self { clock, bus, driver_enable, text, lamp, stack, is_emulated })
     }
 
     /// How long to wait for what is due `on_board`: longer in an emulator, whose host is never in time.

@@ -4,6 +4,7 @@
 //! * `clock`: microseconds, and sleeping until something happens;
 //! * `uart`: an interrupt-driven USART with a queue each way;
 //! * `line`: a line of text without `core::fmt`;
+//! * `stack`: how deep the stack has been;
 //! * `motor`, `rover`, `lag`: models of what the programs drive;
 //! * `work`: what `bench` measures.
 //!
@@ -24,6 +25,8 @@ pub mod motor;
 #[cfg(feature = "board")]
 pub mod rover;
 #[cfg(feature = "board")]
+pub mod stack;
+#[cfg(feature = "board")]
 pub mod uart;
 pub mod work;
 
@@ -42,6 +45,27 @@ macro_rules! size_program {
                 let bytes = core::hint::black_box(&INPUT[..]);
                 core::hint::black_box(($work)(bytes));
             }
+        }
+    };
+}
+
+/// What a program does about a panic: it stops.
+///
+/// With feature `no-panic` there is none: where one can be reached, the link fails for want of a
+/// function `a_panic_can_be_reached`.
+#[macro_export]
+macro_rules! on_panic {
+    () => {
+        #[cfg(not(feature = "no-panic"))]
+        use panic_halt as _;
+
+        #[cfg(feature = "no-panic")]
+        #[panic_handler]
+        fn on_panic(_: &core::panic::PanicInfo) -> ! {
+            unsafe extern "C" {
+                safe fn a_panic_can_be_reached() -> !;
+            }
+            a_panic_can_be_reached()
         }
     };
 }

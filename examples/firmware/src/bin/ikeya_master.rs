@@ -20,10 +20,10 @@ use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
     line::Line,
-    serve_usarts,
+    on_panic, serve_usarts,
 };
-use panic_halt as _;
 
+on_panic!();
 serve_usarts!();
 
 /// How often each node is read, and its set-point repeated.
@@ -70,7 +70,8 @@ fn run(mut board: Board) {
             let master = driver.role_mut();
             let mut line = Line::new("master");
             report(&mut line, master, exchanges);
-            board.text.try_send(line.count("ms", milliseconds(now)).end());
+            line.count("stack", board.stack.used()).count("ms", milliseconds(now));
+            board.text.try_send(line.end());
             if !asked {
                 report_at = now + REPORT;
                 if !master.is_discovering()

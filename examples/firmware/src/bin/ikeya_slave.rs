@@ -18,10 +18,10 @@ use axlewire_firmware::{
     clock::milliseconds,
     line::Line,
     motor::Motor,
-    serve_usarts,
+    on_panic, serve_usarts,
 };
-use panic_halt as _;
 
+on_panic!();
 serve_usarts!();
 
 /// Where a board has four DIP switches: `0000` is node 1 in velocity mode (ruling I2).
@@ -83,8 +83,9 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
         if asked || now >= report_at {
             let mut line = Line::new("slave");
             report(&mut line, slave, &motor, stops);
+            line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             // A reader who asks faster than lines can be sent gets fewer.
-            board.text.try_send(line.count("ms", milliseconds(now)).end());
+            board.text.try_send(line.end());
             if !asked {
                 report_at = now + REPORT;
             }

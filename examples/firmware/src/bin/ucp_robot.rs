@@ -19,12 +19,13 @@ use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
     line::Line,
+    on_panic,
     rover::Rover,
     serve_usarts,
 };
 use embedded_hal::digital::OutputPin;
-use panic_halt as _;
 
+on_panic!();
 serve_usarts!();
 
 /// How often the rover's model moves on, and its telemetry with it.
@@ -83,6 +84,7 @@ fn run(mut board: Board) {
         if asked || now >= report_at {
             let mut line = Line::new("robot");
             report(&mut line, robot, &rover, &shown, now);
+            line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             // A reader who asks faster than lines can be sent gets fewer.
             board.text.try_send(line.end());
             if !asked {
@@ -150,6 +152,5 @@ fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Ins
         .count("updates_refused", shown.updates_refused)
         .count("overruns", BUS.overruns())
         .count("lost", BUS.lost())
-        .count("damaged", BUS.damaged())
-        .count("ms", milliseconds(now));
+        .count("damaged", BUS.damaged());
 }

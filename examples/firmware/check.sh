@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# Checks the firmware in QEMU: a line per result, what the programs cost, then `N passed, N failed`.
+#
+#   examples/firmware/check.sh
+#
+# Exit status 1 when something failed. QEMU and a compiler for thumbv7em come from Debian if they are
+# missing. Takes some 35 s once everything is built.
+set -uo pipefail
+cd "$(dirname "$0")" || exit
+programs=(ikeya_slave ikeya_master ucp_robot)
+# 50 µs at 168 MHz and 1.5 cycles per instruction (ruling I9).
+budget=5600
+
+passed=0 failed=0
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+trap 'exit 130' INT TERM
+
+# check NAME COMMAND ...: the last line that the command prints is its result.
+check() {
+    local name=$1 begun=$SECONDS status=passed
+    shift
+    if "$@" >"$folder/out" 2>"$folder/err"; then
+        passed=$((passed + 1))
+    else
+        failed=$((failed + 1)) status=FAILED
+    fi
+    printf '%-7s%-42s%4d s  %s\n' "$status" "$name" $((SECONDS - begun)) "$(tail -1 "$folder/out")"
+    [ $status = passed ] || sed 's/^/    /' "$folder/err"
+}
+
+build() { ./run.sh --build "${programs[@]}" >"$folder/images" && [ "$(wc -l <"$folder/images")" = ${#programs[@]} ]; }
+image() { grep "/$1\$" "$folder/images"; }
+
+# Fails as well where the tests have been compiled out.
+end_to_end() {
+    local images
+    images=$(dirname "$(image ikeya_slave)")
+    # From the top, where cargo is not told to build for a board.
+    (
+        cd ../.. && AXLEWIRE_FIRMWARE=required AXLEWIRE_FIRMWARE_IMAGES=$images \
+            cargo test --quiet --test firmware -- --nocapture
+    ) >"$folder/tests" 2>&1
+    local status=$?
+    [ $status = 0 ] || cat "$folder/tests" >&2
+    grep -o '[0-9]* passed' "$folder/tests"
+    [ $status = 0 ] && grep -q '[1-9][0-9]* passed' "$folder/tests"
+}
+
+# The most that any test has seen; each compares it with its limit.
+stack() {
+    grep -o "stack $1 [0-9]*" "$folder/tests" | sort -n -k3 | tail -1 | cut -d' ' -f3 | tee "$folder/stack_$1" | grep . ||
+        { echo "no test has told it" >&2; false; }
+}
+
+no_panic() { ./no_panic.sh "$1" && echo "none can be reached"; }
+planted() { ./no_panic.sh --self-test && echo found; }
+
+# response PROGRAM [INSTRUCTIONS AT THE MOST]
+response() {
+    local median
+    ./response.sh "$1" >"$folder/response_$1" || return
+    median=$(cut -d' ' -f2 "$folder/response_$1")
+    echo "$median instructions, $(micros "$median") µs"
+    [ "$median" -le "${2:-$median}" ]
+}
+
+micros() { awk -v n="$1" 'BEGIN { printf "%.1f", n * 1.5 / 168 }'; }
+
+# Bytes in the sections $2 of an image.
+bytes() {
+    local total=0 size
+    for size in $(readelf -SW "$1" | sed 's/^ *\[ *[0-9]*\] *//' | awk -v s="^($2)\$" '$1 ~ s { print $5 }'); do
+        total=$((total + 0x$size))
+    done
+    echo $total
+}
+
+figures() {
+    local program median
+    echo '| program | flash | static RAM | stack | last byte of a request to first of the answer |'
+    echo '|---|---|---|---|---|'
+    for program in "${programs[@]}"; do
+        read -r _ median _ 2>/dev/null <"$folder/response_$program" || median=
+        echo "| \`$program\` | $(bytes "$(image "$program")" '\\.vector_table|\\.text|\\.rodata|\\.data')" \
+            "| $(bytes "$(image "$program")" '\\.data|\\.bss|\\.uninit') | $(cat "$folder/stack_$program")" \
+            "| $([ -n "$median" ] && echo "$median instructions, $(micros "$median") µs" || echo -) |"
+    done
+}
+
+check "images" build
+check "end to end" end_to_end
+for program in "${programs[@]}"; do check "stack of $program" stack "$program"; done
+check "response of ikeya_slave, within 50 us" response ikeya_slave $budget
+check "response of ucp_robot" response ucp_robot
+for program in "${programs[@]}"; do check "no panic in $program" no_panic "$program"; done
+check "no panic in the crate" no_panic no_panic
+check "a planted panic" planted
+echo
+figures
+echo
+echo "$passed passed, $failed failed"
+[ $failed = 0 ]

@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Proves that no panic can be reached in a program, or says where one can.
+#
+#   examples/firmware/no_panic.sh PROGRAM ...   builds each so that it links only without a panic
+#   examples/firmware/no_panic.sh --self-test   a panic that was planted is found
+#
+# PROGRAM is ikeya_slave, ikeya_master, ucp_robot, or no_panic, which calls everything in the crate.
+# Optimized as shipped: what the compiler cannot rule out there counts as reachable.
+set -euo pipefail
+cd "$(dirname "$0")"
+[ $# -gt 0 ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
+. ./toolchain.sh
+
+# link FEATURE PROGRAM [ARGUMENT OF THE LINKER]
+link() {
+    "${cargo[0]}" rustc "${cargo[@]:2}" --quiet --locked --release --features "$1" --bin "$2" -- ${3:+-C link-arg="$3"}
+}
+
+# Links a program with the panics in it, and prints which functions call one.
+where_in() {
+    local objdump
+    objdump=$(command -v llvm-objdump || command -v arm-none-eabi-objdump) || return 0
+    link no-panic "$1" --defsym=a_panic_can_be_reached=0 || return 0
+    "$objdump" -d --demangle "$out/$target/release/$1" | awk '
+        /^[0-9a-f]+ <[^$].*>:$/ { caller = substr($0, index($0, "<")) }
+        /[ \t](bl|b|b\.w|b\.n)[ \t].*<core::[a-z_:]*(panic|fail)/ && caller !~ /^<core::/ {
+            sub(/.*<core/, "<core"); sub(/>.*/, ">"); print "  " caller " " $0
+        }
+    ' | sort -u
+}
+
+if [ "$1" = --self-test ]; then
+    if said=$(link planted-panic no_panic 2>&1); then
+        echo "a planted panic was linked" >&2
+        exit 1
+    fi
+    # Failed because of the panic, and not of something else.
+    grep -q 'undefined.*a_panic_can_be_reached' <<<"$said" || { echo "$said" >&2; exit 1; }
+    exit
+fi
+
+failed=0
+for program in "$@"; do
+    said=$(link no-panic "$program" 2>&1) && continue
+    failed=1
+    if grep -q 'undefined.*a_panic_can_be_reached' <<<"$said"; then
+        echo "$program can panic:" >&2
+        where_in "$program" >&2
+    else
+        echo "$said" >&2
+    fi
+done
+exit $failed

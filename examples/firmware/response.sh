@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# How many instructions a program needs from the interrupt of a request's last byte until it writes the
+# first byte of the answer into the data register: prints `least median most`.
+#
+#   examples/firmware/response.sh ikeya_slave   READ, answered by a velocity response
+#   examples/firmware/response.sh ucp_robot     ping, answered by a pong
+#
+# The image as shipped, in QEMU, which runs one instruction at a time and logs each, along with every
+# interrupt and every access to a register. The most is more than on a board: QEMU's USART takes a whole
+# line of text at once, in one interrupt. Fails where requests stay unanswered.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+# Answers that are counted.
+count=25
+case ${1:-} in
+ikeya_slave) request='\xAA \x01 \xBE \xD0' answer=55010000000031de ;;
+ucp_robot) request='\xFD \xFF \x04 \x00 \x01 \x00 \x01 \x42' answer=fdff050001 ;;
+*) sed -n '5,6s/^# \?//p' "$0" >&2; exit 2 ;;
+esac
+read -ra request <<<"$request"
+image=$(./run.sh --build "$1")
+version=$(qemu-system-arm --version | grep -o '[0-9]*' | head -1)
+one_by_one=(-singlestep)
+[ "$version" -lt 8 ] || one_by_one=(-accel tcg,one-insn-per-tb=on)
+
+folder=$(mktemp -d)
+qemu= counter=
+# With QEMU its log and its port end, and so do those who read them; but the log may not have begun.
+trap 'for id in $qemu $counter; do kill -KILL "$id" || true; done 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
+trap 'exit 130' INT TERM
+mkfifo "$folder/log"
+
+# 0x40011004 is the data register of USART1; exception 53 is its interrupt.
+awk -v len=${#request[@]} '
+    /^Trace / { steps++; next }
+    /nvic_acknowledge_irq .*IRQ: 53 / { entered = steps; next }
+    /memory_region_ops_read .* addr 0x40011004 / { if (++received % len == 0) { begun = entered; is_asked = 1 }; next }
+    /memory_region_ops_write .* addr 0x40011004 / && is_asked { print steps - begun; is_asked = 0 }
+' "$folder/log" >"$folder/counts" &
+counter=$!
+exec {lines}< <(
+    exec qemu-system-arm -M netduinoplus2 -display none -monitor none -serial pty -serial stdio -kernel "$image" \
+        "${one_by_one[@]}" -d exec,nochain -D "$folder/log" -trace nvic_acknowledge_irq \
+        -trace memory_region_ops_read -trace memory_region_ops_write </dev/null 2>&1
+)
+qemu=$!
+port=
+while [ -z "$port" ] && read -r -t 20 -u "$lines" line; do
+    port=$(grep -o '/dev/[^ ]*' <<<"$line" || echo "$line" >&2)
+done
+[ -n "$port" ] || { echo "QEMU did not start" >&2; exit 1; }
+exec {bus}<>"$port"
+stty -F "$port" raw -echo
+cat <&"$bus" >"$folder/answers" 2>/dev/null &
+
+# A first line tells that it runs; QEMU sees the open port after a second, and then comes another.
+for _ in 1 2 3; do
+    read -r -t 20 -u "$lines" line || { echo "the firmware says nothing" >&2; exit 1; }
+done
+answered() { od -An -v -tx1 "$folder/answers" | tr -d ' \n' | { grep -o "$answer" || true; } | wc -l; }
+have=0
+# A request whose bytes this machine holds back for too long is none: twice as many may be needed.
+for ((i = 0; have < count && i < 2 * count; i++)); do
+    for byte in "${request[@]}"; do
+        printf '%b' "$byte" >&"$bus"
+        # The byte has been dealt with before the next one comes, as on a line.
+        sleep 0.002
+    done
+    for ((wait = 0, before = have; have == before && wait < 50; wait++)); do
+        sleep 0.005
+        have=$(answered)
+    done
+done
+[ "$have" -ge "$count" ] || { echo "$have of $i requests were answered" >&2; exit 1; }
+kill -KILL "$qemu"
+wait "$counter"
+sort -n "$folder/counts" | awk '
+    { all[NR] = $1 }
+    END { if (!NR) exit 1; print all[1], all[int((NR + 1) / 2)], all[NR] }
+' || { echo "nothing was counted" >&2; exit 1; }

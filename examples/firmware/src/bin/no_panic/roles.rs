@@ -1,0 +1,124 @@
+//! The four roles, bare: called in any order, with any settings.
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Board, DipSwitch, IdReading, Master, MasterConfig, Mode, NodeId, OneMotor, Position, Rps,
+        Slave, SlaveConfig, ThreeMotors,
+    },
+    ucp::{
+        BiasStore, CalibrationKind, Host, HostConfig, ImuBias, MagBias, MemoryStore, MotorControl,
+        NetworkState, NoStore, OtaStatus, Robot, RobotConfig, Telemetry,
+    },
+};
+
+use crate::{any, input, keep, now};
+
+pub fn all() {
+    master::<OneMotor>(Rps::ZERO, Position::default());
+    master::<ThreeMotors>([Rps::ZERO; 3], [Position::default(); 3]);
+    slave::<OneMotor>(Rps::ZERO, Position::default());
+    slave::<ThreeMotors>([Rps::ZERO; 3], [Position::default(); 3]);
+    host(NoStore);
+    host(MemoryStore::default());
+    robot();
+}
+
+#[inline(never)]
+fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
+    let mut master = any(Master::<B>::new(any(MasterConfig::usb_adapter())));
+    while any(true) {
+        let node = any(NodeId::N1);
+        match any(0) {
+            0 => master.discover(),
+            1 => keep(master.set_velocity(node, any(velocity))),
+            2 => keep(master.set_position(node, any(position))),
+            3 => keep(master.stop(node)),
+            4 => keep(master.stop_all()),
+            5 => master.release(node),
+            6 => keep(master.confirm(node)),
+            7 => keep(master.read(node)),
+            8 => keep((master.health(node), master.mode(node), master.status(node))),
+            9 => keep((master.has_unsent_targets(), master.is_discovering(), master.read_bound())),
+            10 => {
+                let statistics = master.node_statistics(node);
+                keep((statistics.latency_min(), statistics.latency_max()));
+                keep((statistics.latency_mean(), master.statistics()));
+            }
+            _ => turn(&mut master),
+        }
+    }
+}
+
+#[inline(never)]
+fn slave<B: Board>(velocity: B::Velocity, position: B::Position) {
+    let config = any(SlaveConfig::at(any(0)));
+    if let Ok(dip) = DipSwitch::from_bits(any(0)) {
+        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config));
+    }
+    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config));
+    while any(true) {
+        match any(0) {
+            0 => slave.set_velocity(any(velocity)),
+            1 => slave.set_position(any(position)),
+            2 => slave.set_mode(any(Mode::Position)),
+            3 => keep((slave.node(), slave.mode(), slave.command())),
+            4 => keep((slave.statistics(), slave.counters())),
+            _ => turn(&mut slave),
+        }
+    }
+}
+
+#[inline(never)]
+fn host<S: BiasStore>(store: S) {
+    let mut host = any(Host::with_store(any(HostConfig::default()), any(store), now()));
+    while any(true) {
+        let (now, kind) = (now(), any(CalibrationKind::Imu));
+        match any(0) {
+            0 => keep(host.drive(any(MotorControl::STOP), now)),
+            1 => host.stop(now),
+            2 => keep(host.set_network_state(any(NetworkState::Connected), now)),
+            3 => keep(host.start_calibration(kind, now)),
+            4 => keep(host.end_calibration(kind, now)),
+            5 => keep(host.start_firmware_update(any(0), now)),
+            6 => host.end_firmware_update(),
+            7 => keep((host.link(), host.last_report(), host.command(), host.lost_events())),
+            8 => {
+                let round_trip = host.statistics().round_trip;
+                keep((round_trip.min(), round_trip.mean(), round_trip.max()));
+            }
+            9 => keep((host.statistics(), host.counters(), host.config().calibration_bound())),
+            10 => keep(host.store().load()),
+            _ => turn(&mut host),
+        }
+    }
+}
+
+#[inline(never)]
+fn robot() {
+    let mut robot = any(Robot::new(any(RobotConfig::default()), now()));
+    while any(true) {
+        let now = now();
+        match any(0) {
+            0 => keep(robot.command(now)),
+            1 => robot.set_telemetry(&any(Telemetry::default()), now),
+            2 => robot.calibration_result_imu(ImuBias::new(any([0; 3]), any([0; 3])), now),
+            3 => robot.calibration_result_mag(MagBias::new(any([0; 3])), now),
+            4 => keep(robot.answer_update(any(OtaStatus::Forbidden), now)),
+            5 => keep((robot.calibrating(), robot.lost_events())),
+            6 => keep((robot.statistics(), robot.counters())),
+            _ => turn(&mut robot),
+        }
+    }
+}
+
+/// What every role does.
+fn turn(role: &mut impl Endpoint) {
+    match any(0) {
+        0 => role.handle_input(input(), now()),
+        1 => role.handle_timeout(now()),
+        2 => keep(role.poll_event()),
+        3 => keep(role.poll_transmit(now())),
+        _ => keep(role.poll_timeout()),
+    }
+}
