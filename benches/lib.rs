@@ -7,6 +7,7 @@
 pub mod oracle;
 pub mod ours;
 pub mod peers;
+pub mod race;
 pub mod reference;
 pub mod streams;
 

@@ -6,11 +6,13 @@
 //! does meets both sides alike. It ends with an error when an answer is wrong, never because a
 //! figure is slow.
 
-use std::{env, hint::black_box, time::Instant};
+use std::{env, hint::black_box};
 
-use axlewire::crc16;
+use axlewire::{crc16, ucp::Ucp};
 use axlewire_benches::{
-    Tally, peers, reference,
+    Tally, ours, peers,
+    race::{Contender, race},
+    reference,
     streams::{self, Rng, Stream},
 };
 use crc::{CRC_16_MODBUS, Crc, Table};
@@ -101,6 +103,7 @@ fn main() {
         let name = pattern.name.to_lowercase().replace(' ', "_");
         print(&format!("hostile_{name}_over_c"), pattern.over_c, None);
     }
+    caps(&effort);
     for (name, make) in STREAMS {
         with_bit_errors(name, &make(effort.damaged_len), &effort);
     }
@@ -120,41 +123,6 @@ const STREAMS: [(&str, Make); 3] = [
 fn print(name: &str, value: f64, goal: impl Into<Option<f64>>) {
     let goal = goal.into().map_or("-".into(), |goal| goal.to_string());
     println!("{name} {value:.3} {goal}");
-}
-
-/// One side of a comparison.
-struct Contender<'a> {
-    name: String,
-    work: Box<dyn Fn() -> Tally + 'a>,
-    /// What it must answer, every time.
-    expected: Tally,
-}
-
-impl<'a> Contender<'a> {
-    fn new(name: &str, expected: Tally, work: impl Fn() -> Tally + 'a) -> Self {
-        Self { name: name.into(), work: Box::new(work), expected }
-    }
-}
-
-/// Lets all take turns; the median of the times that each one took, seconds.
-fn race<const N: usize>(rounds: usize, contenders: [Contender<'_>; N]) -> [f64; N] {
-    let mut times = [const { Vec::new() }; N];
-    // The first round fills the caches and is not counted.
-    for round in 0..=rounds {
-        for (contender, times) in contenders.iter().zip(&mut times) {
-            let start = Instant::now();
-            let found = black_box((contender.work)());
-            let seconds = start.elapsed().as_secs_f64();
-            assert_eq!(found, contender.expected, "{}", contender.name);
-            if round > 0 {
-                times.push(seconds);
-            }
-        }
-    }
-    times.map(|mut times| {
-        times.sort_by(f64::total_cmp);
-        times[times.len() / 2]
-    })
 }
 
 /// The times for one clean stream, seconds.
@@ -255,6 +223,29 @@ fn hostile(effort: &Effort) -> Vec<Pattern> {
         Pattern { name, over_c: c / frames }
     };
     streams::hostile(effort.hostile_len).into_iter().map(measure).collect()
+}
+
+type Decode = fn(&[u8]) -> Tally;
+
+/// Caps of the length field, and `Frames` with each.
+const CAPS: [(u8, Decode); 5] = [
+    (24, ours::frames::<Ucp<24>>),
+    (40, ours::frames::<Ucp<40>>),
+    (60, ours::frames::<Ucp<60>>),
+    (124, ours::frames::<Ucp<124>>),
+    (252, ours::frames::<Ucp<252>>),
+];
+
+/// What a cap may cost: every fourth byte begins a candidate as long as it allows, and each has to be
+/// checked whole.
+fn caps(effort: &Effort) {
+    for (cap, decode) in CAPS {
+        let bytes = [0xFD, 0xFF, cap, 0].repeat(effort.hostile_len / 4);
+        let contender = Contender::new("a cap", Tally::default(), || decode(&bytes));
+        let [seconds] = race(effort.rounds, [contender]);
+        let mb_per_s = bytes.len() as f64 / seconds / 1e6;
+        println!("mb_per_s_candidates_of_{} {mb_per_s:.0} -", u32::from(cap) + 4);
+    }
 }
 
 type Compute = fn(&[u8]) -> u16;

@@ -15,7 +15,9 @@ case $mode in '' | --check | --record) ;; *) sed -n '2,6s/^# \?//p' "$0" >&2; ex
 . ./toolchain.sh
 command -v readelf >/dev/null || need binutils
 "${cargo[@]}" --quiet --locked --release --bins
-"${cargo[@]}" --quiet --locked --profile fast --bin size_empty --bin size_crc --bin size_both
+fast=(--bin size_empty --bin size_crc --bin size_both)
+for role in master slave host robot; do fast+=(--bin "size_$role"); done
+"${cargo[@]}" --quiet --locked --profile fast "${fast[@]}"
 
 # Bytes in the sections whose names match $2 of the program $1, e.g. release/size_crc.
 bytes() {
@@ -46,6 +48,9 @@ figures=$(
     # All constants together, so that no table can hide among them.
     over_empty constants_crc_opt3 fast/size_crc '\\.rodata' 64
     over_empty constants_both_opt3 fast/size_both '\\.rodata' 64
+    for role in master slave host robot; do
+        over_empty "constants_${role}_opt3" "fast/size_$role" '\\.rodata' 64
+    done
 )
 echo "# $compiler"
 echo "$figures"
