@@ -218,29 +218,13 @@ mod narrow {
 
     #[inline(always)]
     pub(super) const fn check(frame: &[u8]) -> bool {
-        let (mut state, mut parity, mut tail) = whole_words(frame);
-        if !tail.is_empty() {
-            // A multiple of the polynomial stays one with zeros behind it: they make it a whole word.
-            let mut word = 0;
-            while let [rest @ .., byte] = tail {
-                word = (word << 8) | *byte as u32;
-                tail = rest;
-            }
-            parity ^= word;
-            state = fold(word ^ times_x32(state));
-        }
+        let (state, parity) = residue(frame);
         frame.len() >= 2 && fold(state) == 0 && !is_odd(parity)
     }
 
     #[inline(always)]
     pub(super) const fn compute(bytes: &[u8]) -> u16 {
-        let (mut state, mut parity, mut tail) = whole_words(bytes);
-        while let [byte, rest @ ..] = tail {
-            let word = (*byte as u32) << 24;
-            parity ^= word;
-            state = fold(word ^ times_x8(state));
-            tail = rest;
-        }
+        let (state, parity) = residue(bytes);
         // As above: the 15 bits of the remainder, and the parity for the 16th.
         let remainder = fold(fold(times_x16(state)));
         let crc = (remainder >> 16) as u16;
@@ -250,10 +234,9 @@ mod narrow {
     /// The state before the first byte, as in the wide form.
     const INITIAL: u32 = 0xD556_0000;
 
-    /// The whole words of a message modulo the trinomial, folded but not fully reduced, their XOR, and
-    /// the bytes behind them.
+    /// The message modulo the trinomial, folded but not fully reduced, and the XOR of its words.
     #[inline(always)]
-    const fn whole_words(mut bytes: &[u8]) -> (u32, u32, &[u8]) {
+    const fn residue(mut bytes: &[u8]) -> (u32, u32) {
         let mut state = INITIAL;
         let mut parity = 0;
         while let Some((word, rest)) = bytes.split_first_chunk::<4>() {
@@ -262,7 +245,13 @@ mod narrow {
             state = fold(word ^ times_x32(state));
             bytes = rest;
         }
-        (state, parity, bytes)
+        while let [byte, rest @ ..] = bytes {
+            let word = (*byte as u32) << 24;
+            parity ^= word;
+            state = fold(word ^ times_x8(state));
+            bytes = rest;
+        }
+        (state, parity)
     }
 
     /// One reduction by `x^15 = x + 1`: the first 14 bits become zero. Twice, and 15 bits at the end

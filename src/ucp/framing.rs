@@ -37,13 +37,11 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
         if !(LEN_WITHOUT_BODY..=CAP).contains(&len) {
             return Verdict::Reject { reason: Reason::Length, more: 0 };
         }
-        if start.is_none() {
-            return Verdict::Partial { need: bytes.len() + 1 };
-        }
         let len = len + OUTSIDE_LEN;
         match bytes.get(..len) {
             Some(frame) if crc16::check(frame) => Verdict::Frame { len },
             Some(_) => Verdict::Reject { reason: Reason::Crc, more: 0 },
+            None if start.is_none() => Verdict::Partial { need: bytes.len() + 1 },
             None => Verdict::Partial { need: len },
         }
     }
@@ -56,6 +54,7 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
 
 /// Less than a sync and a length field, with those of the shortest frame where bytes are missing:
 /// what is there is wrong exactly when the whole is.
+#[cold]
 fn fill_up(bytes: &[u8]) -> [u8; 4] {
     let mut start = [SYNC[0], SYNC[1], LEN_WITHOUT_BODY as u8, 0];
     start.iter_mut().zip(bytes).for_each(|(filled, byte)| *filled = *byte);
