@@ -119,6 +119,16 @@ pub mod error;
 pub mod ikeya;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
+// A page, not code. Its examples use the features named here.
+#[cfg(all(
+    any(doc, doctest),
+    feature = "embedded-hal",
+    feature = "embedded-io",
+    feature = "ikeya",
+    feature = "ucp"
+))]
+#[doc = include_str!("porting.md")]
+pub mod porting {}
 #[cfg(feature = "sim")]
 pub mod sim;
 pub mod stream;

@@ -11,7 +11,7 @@ pub type Located<T> = (usize, Event<T>);
 /// byte, and the account.
 ///
 /// Nothing follows a capture, so a candidate that its end cuts off is refused as
-/// [`Reason::Idle`], and whole frames inside it are found. Needs feature `alloc`.
+/// [`Reason::Idle`](super::Reason::Idle), and whole frames inside it are found. Needs feature `alloc`.
 ///
 /// ```
 /// # #[cfg(feature = "ucp")] {

@@ -107,7 +107,8 @@ impl Frame {
             return Err(ParseError::Length { expected: smallest, found });
         }
         let frame = Self::try_ref_from_bytes(bytes).map_err(|_| ParseError::Field)?;
-        let expected = usize::from(frame.header.len()) + OUTSIDE_LEN;
+        // Where usize has 16 bits, a length field may leave no room for the rest.
+        let expected = usize::from(frame.header.len()).saturating_add(OUTSIDE_LEN);
         if found != expected {
             return Err(ParseError::Length { expected, found });
         }
