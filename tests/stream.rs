@@ -527,6 +527,22 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
 }
 
 #[test]
+fn a_copy_of_a_decoder_goes_on_by_itself() {
+    let response = response();
+    let (start, end) = response.split_at(5);
+    let mut decoder = Decoder::<ikeya::ToMaster, 8>::new();
+    assert!(decoder.decode(&mut { start }).is_none());
+    let mut copy = decoder.clone();
+    for decoder in [&mut decoder, &mut copy] {
+        assert!(matches!(decoder.decode(&mut { end }), Some(Event::Frame(_))));
+        assert_eq!(decoder.counters().frames, 1);
+    }
+    let mut frames = Frames::<ikeya::ToMaster>::new(&response);
+    assert_eq!(frames.clone().count(), 1);
+    assert_eq!(frames.by_ref().count(), 1);
+}
+
+#[test]
 fn a_byte_pushed_into_a_full_buffer_is_not_taken() {
     let mut decoder = Decoder::<ikeya::ToMaster, 8>::new();
     let answers: Vec<_> = (0..10).map(|_| decoder.push(0)).collect();

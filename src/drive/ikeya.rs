@@ -37,7 +37,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
             return None;
         }
         let online = NodeId::ALL.into_iter().filter(|&node| self.is_online(node));
-        Some(online.filter_map(|node| Some((node, self.role.mode(node)?))).collect())
+        Some(gathered(online.filter_map(|node| Some((node, self.role.mode(node)?)))))
     }
 
     /// Has every set-point been sent?
@@ -69,12 +69,12 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     fn known(&self) -> Vec<NodeId, 8> {
-        NodeId::ALL.into_iter().filter(|&node| self.role.mode(node).is_some()).collect()
+        gathered(NodeId::ALL.into_iter().filter(|&node| self.role.mode(node).is_some()))
     }
 
     /// Gives every node that is online its stop; those for which there is none.
     fn begin_stop(&mut self, nodes: &[NodeId]) -> Vec<NodeId, 8> {
-        nodes.iter().copied().filter(|&node| self.role.stop(node).is_err()).collect()
+        gathered(nodes.iter().copied().filter(|&node| self.role.stop(node).is_err()))
     }
 
     /// Adds the nodes that are not online, and may not have heard their stop.
@@ -87,6 +87,16 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         }
         failed
     }
+}
+
+/// As many as there are nodes, at the most. Not by `collect`: the compiler does not see that it
+/// cannot panic here.
+fn gathered<T>(items: impl Iterator<Item = T>) -> Vec<T, 8> {
+    let mut gathered = Vec::new();
+    for item in items {
+        let _ = gathered.push(item);
+    }
+    gathered
 }
 
 /// Readings are left out of what is kept: the master has the latest of each node.

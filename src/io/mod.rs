@@ -45,7 +45,7 @@ mod blocking;
 ///   [`idle`](Self::idle) until [`pending`](Self::pending) is 0.
 /// * A cancelled `read_event_async` has lost nothing, as long as the port's own `read` loses
 ///   nothing when it is cancelled: what was read is in the decoder before the next await.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct FrameReader<R, F, const N: usize> {
     port: R,
     decoder: Decoder<F, N>,
@@ -84,6 +84,13 @@ impl<R, F: Framing, const N: usize> FrameReader<R, F, N> {
     #[must_use]
     pub fn into_parts(self) -> (R, Decoder<F, N>) {
         (self.port, self.decoder)
+    }
+}
+
+/// Whatever `F` is: there is none of it in here.
+impl<R: Clone, F, const N: usize> Clone for FrameReader<R, F, N> {
+    fn clone(&self) -> Self {
+        Self { port: self.port.clone(), decoder: self.decoder.clone() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Frames of a stream.
 
-use core::{fmt, marker::PhantomData};
+use core::{cell::Cell, fmt, marker::PhantomData};
 
 use super::{Counters, Event, Framing, Front, Gap, ledger::Ledger, search};
 
@@ -36,7 +36,6 @@ use super::{Counters, Event, Framing, Front, Gap, ledger::Ledger, search};
 /// assert_eq!((frames, decoder.pending()), (2, 0));
 /// # }
 /// ```
-#[derive(Clone)]
 pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
     buffer: [u8; N],
@@ -379,14 +378,24 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
 
     /// Moves the held bytes to the front of the buffer.
     fn compact(&mut self) {
-        let end = self.end.min(N);
-        let at = self.at.min(end);
+        let (at, end) = (self.at, self.end);
         if at > 0 {
-            self.buffer.copy_within(at..end, 0);
+            // Not by `copy_within`: the compiler does not see that it cannot panic here.
+            let cells = Cell::from_mut(self.buffer.as_mut_slice()).as_slice_of_cells();
+            for (to, from) in cells.iter().zip(cells.get(at..end).unwrap_or_default()) {
+                to.set(from.get());
+            }
             self.wake = self.wake.saturating_sub(at);
             self.quiet_end = self.quiet_end.saturating_sub(at);
             (self.at, self.end) = (0, end - at);
         }
+    }
+}
+
+/// Whatever `F` is: there is none of it in here.
+impl<F, const N: usize> Clone for Decoder<F, N> {
+    fn clone(&self) -> Self {
+        Self { ledger: self.ledger.clone(), ..*self }
     }
 }
 

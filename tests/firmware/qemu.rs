@@ -34,6 +34,15 @@ impl Program {
             Self::Robot => "ucp_robot",
         }
     }
+
+    /// How much stack it may use, bytes: what was measured and half of it on top.
+    const fn stack_limit(self) -> i64 {
+        match self {
+            Self::Slave => 2560,
+            Self::Master => 5120,
+            Self::Robot => 4096,
+        }
+    }
 }
 
 /// The folder with the images, or why there is none. They are built once per run.
@@ -85,6 +94,7 @@ fn find_images() -> Result<PathBuf, String> {
 
 /// A board that runs a program. It ends, and its sockets go, when this is dropped.
 pub(crate) struct Board {
+    program: Program,
     qemu: Child,
     folder: PathBuf,
     text: UnixStream,
@@ -124,7 +134,7 @@ impl Board {
                 sink.lock().unwrap().push(line.trim_end().to_owned());
             }
         });
-        let mut board = Self { qemu, folder, text, lines, bus: Some(bus) };
+        let mut board = Self { program, qemu, folder, text, lines, bus: Some(bus) };
         board.await_first_line();
         Some(board)
     }
@@ -159,12 +169,20 @@ impl Board {
             let lines = self.lines();
             for report in lines[seen..].iter().filter_map(|line| Report::parse(line)) {
                 if done(&report) {
+                    self.assert_stack(&report);
                     return report;
                 }
             }
             seen = lines.len();
             assert!(Instant::now() < end, "never {what}; the last lines: {:#?}", tail(&lines));
         }
+    }
+
+    /// The stack stays within its limit. Printed as well: `check.sh` shows it.
+    fn assert_stack(&self, report: &Report) {
+        let (used, limit) = (report.at("stack"), self.program.stack_limit());
+        println!("stack {} {used}", self.program.name());
+        assert!((1..=limit).contains(&used), "{:?} uses {used} bytes of stack", self.program);
     }
 
     /// Has the firmware written these lines in this order, whatever lies between?
