@@ -6,12 +6,19 @@
 //!
 //! # How it works
 //!
-//! The polynomial is a product, `x^16 + x^15 + x^2 + 1 = (x + 1)(x^15 + x + 1)`, so a frame is
-//! good exactly when both factors divide it:
+//! The polynomial is a product, `x^16 + x^15 + x^2 + 1 = (x + 1)(x^15 + x + 1)`, and its factors have
+//! no common divisor, so a frame is good exactly when both divide it:
 //!
-//! * `x + 1` divides it when it has an even number of ones: XOR all words, count bits once.
-//! * `x^15 + x + 1` has only three terms, hence `x^(15·2^k) = x^(2^k) + 1`, and reducing a whole
-//!   word is a handful of shifts and XORs instead of a step per bit or a table look-up per byte.
+//! * `x + 1` divides it when it has an even number of ones, because the remainder is its value at
+//!   `x = 1`: XOR all words, count bits once.
+//! * `x^15 + x + 1` has only three terms: `x^15` may be replaced by `x + 1`. Squaring doubles every
+//!   exponent and adds nothing between, as `2ab = 0`; hence `x^30 = x^2 + 1`, and in general
+//!   `x^(15·2^k) = x^(2^k) + 1`. One replacement lowers all high powers of a word at the same time: a
+//!   shift for each of the two terms and an XOR, instead of a step per bit or a table look-up per byte.
+//!
+//! To *make* a CRC, the remainder modulo `x^15 + x + 1` is not enough: two 16-bit values share it, and
+//! they differ by `x^15 + x + 1` itself. That has three ones, so one of the two has even parity and the
+//! other odd, and the parity of the message says which one is right.
 //!
 //! The words are the machine's own: 64 bits on a host, 32 bits on a microcontroller, where a shift of
 //! 64 bits would take four instructions. Both forms are below, each complete: a state is multiplied up
