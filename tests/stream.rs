@@ -526,6 +526,55 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
     assert_eq!(places, [(0, 24), (24, 24), (48, 24)]);
 }
 
+/// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs nothing,
+/// a refusal of more than there is.
+struct Liar<const LIE: u8>;
+
+impl<const LIE: u8> Framing for Liar<LIE> {
+    type Frame<'a> = &'a [u8];
+    const MIN_LEN: usize = 1;
+    const MAX_LEN: usize = 4;
+
+    fn judge(bytes: &[u8]) -> Verdict {
+        match LIE {
+            _ if bytes.is_empty() => Verdict::Partial { need: 1 },
+            0 => Verdict::Frame { len: bytes.len() + 1 },
+            1 => Verdict::Partial { need: 0 },
+            _ => Verdict::Reject { reason: Reason::Crc, more: bytes.len() + 5 },
+        }
+    }
+
+    fn view(frame: &[u8]) -> Option<&[u8]> {
+        Some(frame)
+    }
+}
+
+#[test]
+fn a_framing_that_lies_hangs_nothing() {
+    fn feed<const LIE: u8>() {
+        let mut decoder = Decoder::<Liar<LIE>, 4>::new();
+        let mut most = 1000;
+        let mut drain = |decoder: &mut Decoder<Liar<LIE>, 4>, mut input: &[u8]| {
+            while decoder.decode(&mut input).is_some() || decoder.poll().is_some() {
+                most -= 1;
+                assert!(most > 0, "lie {LIE} is told for ever");
+            }
+        };
+        drain(&mut decoder, &[1; 10]);
+        decoder.push(2);
+        drain(&mut decoder, &[]);
+        decoder.spare().fill(3);
+        decoder.commit(4);
+        drain(&mut decoder, &[4; 3]);
+        decoder.idle();
+        drain(&mut decoder, &[5; 9]);
+        assert!(Frames::<Liar<LIE>>::new(&[6; 9]).take(10).count() <= 1);
+    }
+    feed::<0>();
+    feed::<1>();
+    feed::<2>();
+}
+
 #[test]
 fn a_copy_of_a_decoder_goes_on_by_itself() {
     let response = response();

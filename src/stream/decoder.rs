@@ -290,6 +290,10 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 self.clear();
                 return None;
             }
+            if self.end >= self.wake {
+                // Only a framing that asks for what it has been given comes here.
+                return None;
+            }
         }
     }
 
@@ -302,7 +306,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
             let (found, front) = search::<F>(held, &mut self.ledger, Ledger::refuse_apart);
-            self.at = end - found.len();
+            let left = found.len();
+            self.at = end - left;
             if taken > 0 && self.pending() <= taken {
                 return None;
             }
@@ -312,8 +317,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     if let Some(gap) = self.ledger.take_gap() {
                         return Some(Held::Gap(gap));
                     }
+                    let (at, len) = (self.at, len.min(left));
                     self.ledger.frame(len);
-                    let at = self.at;
                     self.at += len;
                     if self.at == self.end && self.line == Line::Busy {
                         self.clear();
