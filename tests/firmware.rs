@@ -11,6 +11,8 @@
 
 #[path = "firmware/master.rs"]
 mod master;
+#[path = "firmware/noise.rs"]
+mod noise;
 #[path = "firmware/qemu.rs"]
 mod qemu;
 #[path = "firmware/robot.rs"]

@@ -1,12 +1,15 @@
 //! The firmware master against slaves on this machine, and against the firmware slave.
 
-use std::{io, os::unix::net::UnixStream, thread};
+use std::{collections::HashSet, io, os::unix::net::UnixStream, thread};
 
 use axlewire::{
     drive::Driver,
     endpoint::Endpoint,
-    ikeya::{Mode, NodeId, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+    ikeya::{
+        Mode, NodeId, Position, Response, Rps, Slave, SlaveConfig, SlaveEvent, Target, ToMaster,
+    },
     sim::{Motor, MotorNode},
+    stream::Frames,
     time::{Duration, Instant},
 };
 
@@ -16,20 +19,22 @@ use crate::{
 };
 
 /// Two nodes that hear everything. One of them can lose its voice and its ears.
-struct Nodes {
-    nodes: [MotorNode; 2],
+pub(crate) struct Nodes {
+    pub(crate) nodes: [MotorNode; 2],
     is_mute: bool,
+    /// Where the position node said that it was.
+    pub(crate) told: HashSet<i32>,
 }
 
 impl Nodes {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         // As on a USB adapter: bytes come when this machine has time for them.
         let node = |id, mode| {
             let slave = Slave::new(id, mode, SlaveConfig::usb_adapter());
             MotorNode::from_parts(slave, Motor::new())
         };
         let nodes = [node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position)];
-        Self { nodes, is_mute: false }
+        Self { nodes, is_mute: false, told: HashSet::new() }
     }
 
     fn alive(&mut self) -> &mut [MotorNode] {
@@ -53,7 +58,12 @@ impl Endpoint for Nodes {
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        self.alive().iter_mut().find_map(|node| node.poll_transmit(now))
+        let alive = &mut self.nodes[usize::from(self.is_mute)..];
+        let answer = alive.iter_mut().find_map(|node| node.poll_transmit(now))?;
+        if let Some(Response::Position(at)) = Frames::<ToMaster>::new(answer).next() {
+            self.told.insert(at.position().counts());
+        }
+        Some(answer)
     }
 
     fn poll_event(&mut self) -> Option<SlaveEvent> {

@@ -154,6 +154,16 @@ impl Board {
         self.bus.take().unwrap_or_else(|| connect(&self.folder.join("bus"), &mut self.qemu))
     }
 
+    /// Asks for a report and does not wait for it: a role that is under way goes on.
+    pub(crate) fn ask(&mut self) {
+        self.text.write_all(b"?").unwrap();
+    }
+
+    /// All reports so far.
+    pub(crate) fn reports(&self) -> Vec<Report> {
+        self.lines().iter().filter_map(|line| Report::parse(line)).collect()
+    }
+
     /// Everything that the firmware has written.
     pub(crate) fn lines(&self) -> Vec<String> {
         self.lines.lock().unwrap().clone()
@@ -164,7 +174,7 @@ impl Board {
         let end = Instant::now() + PATIENCE;
         let mut seen = self.lines().len();
         loop {
-            self.text.write_all(b"?").unwrap();
+            self.ask();
             thread::sleep(Duration::from_millis(10));
             let lines = self.lines();
             for report in lines[seen..].iter().filter_map(|line| Report::parse(line)) {

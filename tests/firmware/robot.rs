@@ -1,5 +1,7 @@
 //! The firmware robot against a host on this machine.
 
+use std::os::unix::net::UnixStream;
+
 use axlewire::{
     drive::Driver,
     time::Duration,
@@ -14,24 +16,36 @@ use crate::{
     wire::{Wire, WireClock},
 };
 
-type Rover = Driver<Host<MemoryStore>, Wire, WireClock>;
+pub(crate) type Rover = Driver<Host<MemoryStore>, Wire, WireClock>;
 
 fn linked() -> Option<(Board, Rover)> {
-    let mut board = Board::start(Program::Robot)?;
-    let wire = Wire::new(board.bus());
-    let mut clock = wire.clock();
+    linked_by(Wire::new, patient())
+}
+
+/// QEMU answers when this machine has time for it.
+pub(crate) fn patient() -> HostConfig {
     let mut config = HostConfig::default();
-    // QEMU answers when this machine has time for it.
     config.ack_timeout = Duration::from_millis(3000);
     config.ping_timeout = Duration::from_millis(10_000);
     config.link_timeout = Duration::from_millis(10_000);
     config.quiet_margin = Duration::from_millis(200);
+    config
+}
+
+/// A board, and a host at the other end of the wire that is made for it.
+pub(crate) fn linked_by(
+    wire: impl FnOnce(UnixStream) -> Wire,
+    config: HostConfig,
+) -> Option<(Board, Rover)> {
+    let mut board = Board::start(Program::Robot)?;
+    let wire = wire(board.bus());
+    let mut clock = wire.clock();
     let now = axlewire::drive::Clock::now(&mut clock);
     let host = Host::with_store(config, MemoryStore::default(), now);
     Some((board, Driver::new(host, wire, clock)))
 }
 
-fn end_of(rover: &mut Rover) -> axlewire::time::Instant {
+pub(crate) fn end_of(rover: &mut Rover) -> axlewire::time::Instant {
     rover.now() + Duration::from_millis(PATIENCE.as_millis() as u32)
 }
 
@@ -56,7 +70,7 @@ fn event_when(
     }
 }
 
-fn wheels_turn_at(event: &HostEvent, wanted: [i16; 2]) -> bool {
+pub(crate) fn wheels_turn_at(event: &HostEvent, wanted: [i16; 2]) -> bool {
     let HostEvent::Report(report) = event else { return false };
     let [left, right, ..] = report.telemetry.rpm;
     [left, right] == wanted
@@ -142,14 +156,18 @@ fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
 }
 
 /// Lets the host talk until the robot's report is as it should be.
-fn board_shows(board: &mut Board, rover: &mut Rover, done: impl Fn(&Report) -> bool) {
+pub(crate) fn board_shows(
+    board: &mut Board,
+    rover: &mut Rover,
+    done: impl Fn(&Report) -> bool,
+) -> Report {
     let end = end_of(rover);
     loop {
         let pause = rover.now() + Duration::from_millis(20);
         rover.run_until(pause, |_, _| {}).unwrap();
         let told = board.report_when("told", |_| true);
         if done(&told) {
-            return;
+            return told;
         }
         assert!(rover.now() < end, "{told:?}");
     }

@@ -1,4 +1,4 @@
-//! The wire between a role on this machine and a board: a port, a clock, and a loose plug.
+//! The wire between a role on this machine and a board: a port, a clock, noise, and a loose plug.
 
 use std::{
     collections::VecDeque,
@@ -10,7 +10,45 @@ use std::{
     time::{Duration, Instant as Clock},
 };
 
-use axlewire::{drive, time::Instant};
+use axlewire::{drive, sim::Rng, time::Instant};
+
+/// What disturbs the bytes of one direction: about one in 60 has a bit turned, and in front of about
+/// one in 100 stands a stray byte, half of the time one that begins a packet.
+#[derive(Debug)]
+pub(crate) struct Noise {
+    rng: Rng,
+    headers: &'static [u8],
+}
+
+impl Noise {
+    /// With the headers of a motor bus among the strays.
+    pub(crate) const fn ikeya(seed: u64) -> Self {
+        Self { rng: Rng::new(seed), headers: &[0xAA, 0xBB, 0x55, 0x56] }
+    }
+
+    /// With the header of a rover link among the strays.
+    pub(crate) const fn ucp(seed: u64) -> Self {
+        Self { rng: Rng::new(seed), headers: &[0xFD, 0xFF] }
+    }
+
+    /// The same for the other direction.
+    const fn fork(&mut self) -> Self {
+        Self { rng: Rng::new(self.rng.next_u64()), headers: self.headers }
+    }
+
+    fn disturb(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let mut disturbed = Vec::with_capacity(bytes.len() + 8);
+        for &byte in bytes {
+            if self.rng.below(100) == 0 {
+                let choice = self.rng.below(2 * self.headers.len() as u64) as usize;
+                disturbed.push(self.headers.get(choice).copied().unwrap_or(self.rng.byte()));
+            }
+            let is_turned = self.rng.below(60) == 0;
+            disturbed.push(byte ^ (u8::from(is_turned) << self.rng.below(8)));
+        }
+        disturbed
+    }
+}
 
 /// Received bytes, and who waits for them.
 #[derive(Debug, Default)]
@@ -24,12 +62,22 @@ struct Inbox {
 pub(crate) struct Wire {
     stream: Option<UnixStream>,
     inbox: Arc<Inbox>,
+    noise: Option<Noise>,
 }
 
 impl Wire {
     /// A wire to a board.
     pub(crate) fn new(stream: UnixStream) -> Self {
-        let mut wire = Self { stream: None, inbox: Arc::default() };
+        Self::disturbed(stream, None)
+    }
+
+    /// A wire that is disturbed in both directions.
+    pub(crate) fn noisy(stream: UnixStream, noise: Noise) -> Self {
+        Self::disturbed(stream, Some(noise))
+    }
+
+    fn disturbed(stream: UnixStream, noise: Option<Noise>) -> Self {
+        let mut wire = Self { stream: None, inbox: Arc::default(), noise };
         wire.plug(stream);
         wire
     }
@@ -37,11 +85,16 @@ impl Wire {
     /// Plugs it in again.
     pub(crate) fn plug(&mut self, stream: UnixStream) {
         let (mut reader, inbox) = (stream.try_clone().unwrap(), self.inbox.clone());
+        let mut noise = self.noise.as_mut().map(Noise::fork);
         self.stream = Some(stream);
         thread::spawn(move || {
             let mut chunk = [0; 1024];
             while let Ok(count @ 1..) = reader.read(&mut chunk) {
-                inbox.bytes.lock().unwrap().extend(&chunk[..count]);
+                let heard = &chunk[..count];
+                match &mut noise {
+                    None => inbox.bytes.lock().unwrap().extend(heard),
+                    Some(noise) => inbox.bytes.lock().unwrap().extend(noise.disturb(heard)),
+                }
                 inbox.arrived.notify_all();
             }
         });
@@ -61,8 +114,10 @@ impl Wire {
 
     /// Sends bytes.
     pub(crate) fn send(&mut self, bytes: &[u8]) {
-        if let Some(stream) = &mut self.stream {
-            stream.write_all(bytes).unwrap();
+        let Some(stream) = &mut self.stream else { return };
+        match &mut self.noise {
+            None => stream.write_all(bytes).unwrap(),
+            Some(noise) => stream.write_all(&noise.disturb(bytes)).unwrap(),
         }
     }
 

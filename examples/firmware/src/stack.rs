@@ -22,7 +22,7 @@ pub struct Stack {
 
 impl Stack {
     /// Nothing is known yet.
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self { deepest: (&raw const _stack_start).addr() }
     }
 
@@ -40,6 +40,12 @@ impl Stack {
             self.deepest = at;
         }
         ((&raw const _stack_start).addr() - self.deepest) as u32
+    }
+}
+
+impl Default for Stack {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

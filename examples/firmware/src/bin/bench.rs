@@ -19,6 +19,8 @@ use axlewire::{
     time::Instant,
     ucp::{Body, FirmwareReport, Host, Robot, Telemetry, Ucp},
 };
+#[cfg(feature = "board")]
+use axlewire_firmware::stack::Stack;
 use axlewire_firmware::work;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_semihosting::{debug, hprintln};
@@ -43,6 +45,8 @@ fn main() -> ! {
     checksums(answer.as_bytes(), report.as_bytes());
     read_to_answer();
     ram();
+    #[cfg(feature = "board")]
+    print("stack", Stack::new().used(), 0);
     debug::exit(debug::EXIT_SUCCESS);
     loop {}
 }
