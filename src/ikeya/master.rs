@@ -16,7 +16,7 @@ use self::node::{Confirm, Node};
 use super::{Board, Mode, NodeId, OneMotor, ReadRequest, Status, Target};
 use crate::{
     endpoint::Endpoint,
-    stream::Decoder,
+    stream::{Counters, Decoder},
     time::{Duration, Instant, wire_time},
 };
 
@@ -258,6 +258,12 @@ impl<B: Board> Master<B> {
     #[must_use]
     pub const fn statistics(&self) -> &MasterStatistics {
         &self.statistics
+    }
+
+    /// Where every byte went.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.decoder.counters()
     }
 
     /// Is there a set-point that has not been sent once yet?

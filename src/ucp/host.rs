@@ -29,8 +29,9 @@ use state::{State, Update};
 /// * **Link (U10).** Pings go out every 200 ms. The link goes up with the first valid frame that
 ///   comes from a robot, and down after 500 ms without one.
 /// * **Reports (U9).** Every one is an event and the [latest](Self::last_report) is kept. Missing
-///   ones are counted by their index. Counting starts anew after a lost link and when the robot says
-///   that it has booted; a robot that restarts without either counts as up to 255 lost reports.
+///   ones are counted by their index. Counting starts anew after a lost link and when the robot asks
+///   for its biases, as it does at boot and then once a second until it has them: reports lost around
+///   such a request are not counted. A robot that restarts without either counts as up to 255.
 /// * **Calibration (U11).** Requests are acknowledged, repeated or given up, within
 ///   [`HostConfig::calibration_bound`]. Results go to the [`BiasStore`] and are acknowledged once it
 ///   has them. The robot's request at boot is answered only if *both* results are stored: a made-up

@@ -5,7 +5,10 @@ use std::{
     io::{self, Read as _, Write as _},
     net::Shutdown,
     os::unix::net::UnixStream,
-    sync::{Arc, Condvar, Mutex},
+    sync::{
+        Arc, Condvar, Mutex,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
     thread,
     time::{Duration, Instant as Clock},
 };
@@ -63,6 +66,7 @@ pub(crate) struct Wire {
     stream: Option<UnixStream>,
     inbox: Arc<Inbox>,
     noise: Option<Noise>,
+    is_noisy: Arc<AtomicBool>,
 }
 
 impl Wire {
@@ -73,27 +77,38 @@ impl Wire {
 
     /// A wire that is disturbed in both directions.
     pub(crate) fn noisy(stream: UnixStream, noise: Noise) -> Self {
-        Self::disturbed(stream, Some(noise))
+        let mut wire = Self::disturbed(stream, Some(noise));
+        wire.disturb();
+        wire
     }
 
-    fn disturbed(stream: UnixStream, noise: Option<Noise>) -> Self {
-        let mut wire = Self { stream: None, inbox: Arc::default(), noise };
+    /// A wire that is disturbed from [`disturb`](Self::disturb) on, if there is noise.
+    pub(crate) fn disturbed(stream: UnixStream, noise: Option<Noise>) -> Self {
+        let (inbox, is_noisy) = (Arc::default(), Arc::default());
+        let mut wire = Self { stream: None, inbox, noise, is_noisy };
         wire.plug(stream);
         wire
+    }
+
+    /// From now on there is noise.
+    pub(crate) fn disturb(&mut self) {
+        self.is_noisy.store(true, Relaxed);
     }
 
     /// Plugs it in again.
     pub(crate) fn plug(&mut self, stream: UnixStream) {
         let (mut reader, inbox) = (stream.try_clone().unwrap(), self.inbox.clone());
-        let mut noise = self.noise.as_mut().map(Noise::fork);
+        let (mut noise, is_noisy) = (self.noise.as_mut().map(Noise::fork), self.is_noisy.clone());
         self.stream = Some(stream);
         thread::spawn(move || {
             let mut chunk = [0; 1024];
             while let Ok(count @ 1..) = reader.read(&mut chunk) {
                 let heard = &chunk[..count];
                 match &mut noise {
-                    None => inbox.bytes.lock().unwrap().extend(heard),
-                    Some(noise) => inbox.bytes.lock().unwrap().extend(noise.disturb(heard)),
+                    Some(noise) if is_noisy.load(Relaxed) => {
+                        inbox.bytes.lock().unwrap().extend(noise.disturb(heard));
+                    }
+                    _ => inbox.bytes.lock().unwrap().extend(heard),
                 }
                 inbox.arrived.notify_all();
             }
@@ -116,8 +131,10 @@ impl Wire {
     pub(crate) fn send(&mut self, bytes: &[u8]) {
         let Some(stream) = &mut self.stream else { return };
         match &mut self.noise {
-            None => stream.write_all(bytes).unwrap(),
-            Some(noise) => stream.write_all(&noise.disturb(bytes)).unwrap(),
+            Some(noise) if self.is_noisy.load(Relaxed) => {
+                stream.write_all(&noise.disturb(bytes)).unwrap();
+            }
+            _ => stream.write_all(bytes).unwrap(),
         }
     }
 
