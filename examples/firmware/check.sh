@@ -32,14 +32,14 @@ check() {
 build() { ./run.sh --build "${programs[@]}" bench >"$folder/images" && [ "$(wc -l <"$folder/images")" = $((${#programs[@]} + 1)) ]; }
 image() { grep "/$1\$" "$folder/images"; }
 
-# Fails as well where the tests have been compiled out.
+# Fails as well where the tests have been compiled out. They mostly wait, so more run than there are cores.
 end_to_end() {
     local images
     images=$(dirname "$(image ikeya_slave)")
     # From the top, where cargo is not told to build for a board.
     (
         cd ../.. && AXLEWIRE_FIRMWARE=required AXLEWIRE_FIRMWARE_IMAGES=$images \
-            cargo test --quiet --test firmware -- --nocapture
+            cargo test --quiet --test firmware -- --nocapture --test-threads=4
     ) >"$folder/tests" 2>&1
     local status=$?
     [ $status = 0 ] || cat "$folder/tests" >&2
