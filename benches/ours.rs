@@ -91,11 +91,7 @@ where
     let mut decoder = Decoder::<F, N>::new();
     for &byte in bytes {
         if decoder.push(byte) {
-            while let Some(event) = decoder.poll() {
-                if let Event::Frame(frame) = event {
-                    frame.add_to(&mut tally);
-                }
-            }
+            drain(&mut decoder, &mut tally);
         }
     }
     finish(decoder, &mut tally);
@@ -110,10 +106,20 @@ where
 {
     while decoder.pending() > 0 {
         decoder.idle();
-        while let Some(event) = decoder.poll() {
-            if let Event::Frame(frame) = event {
-                frame.add_to(tally);
-            }
+        drain(&mut decoder, tally);
+    }
+}
+
+/// Takes what the decoder has. Inlined, as a loop that a user writes is.
+#[inline(always)]
+fn drain<F, const N: usize>(decoder: &mut Decoder<F, N>, tally: &mut Tally)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    while let Some(event) = decoder.poll() {
+        if let Event::Frame(frame) = event {
+            frame.add_to(tally);
         }
     }
 }

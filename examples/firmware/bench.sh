@@ -19,19 +19,12 @@ fast=(--bin size_empty --bin size_crc --bin size_both)
 for role in master slave host robot; do fast+=(--bin "size_$role"); done
 "${cargo[@]}" --quiet --locked --profile fast "${fast[@]}"
 
-# Bytes in the sections whose names match $2 of the program $1, e.g. release/size_crc.
-bytes() {
-    local total=0 size
-    for size in $(readelf -SW "$out/$target/$1" | sed 's/^ *\[ *[0-9]*\] *//' | awk -v s="^($2)\$" '$1 ~ s { print $5 }'); do
-        total=$((total + 0x$size))
-    done
-    echo "$total"
-}
+. ./sections.sh
 
 # name program sections goal: what the program has more than the empty one.
 over_empty() {
-    local profile=${2%/*}
-    echo "$1 $(($(bytes "$2" "$3") - $(bytes "$profile/size_empty" "$3"))) $4"
+    local image=$out/$target/$2
+    echo "$1 $(($(bytes "$image" "$3") - $(bytes "${image%/*}/size_empty" "$3"))) $4"
 }
 
 figures=$(

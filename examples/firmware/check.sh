@@ -74,14 +74,7 @@ response() {
 
 micros() { awk -v n="$1" 'BEGIN { printf "%.1f", n * 1.5 / 168 }'; }
 
-# Bytes in the sections $2 of an image.
-bytes() {
-    local total=0 size
-    for size in $(readelf -SW "$1" | sed 's/^ *\[ *[0-9]*\] *//' | awk -v s="^($2)\$" '$1 ~ s { print $5 }'); do
-        total=$((total + 0x$size))
-    done
-    echo $total
-}
+. ./sections.sh
 
 figures() {
     local program median

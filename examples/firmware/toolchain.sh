@@ -10,17 +10,7 @@ target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}
 export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
 
-# Installs Debian packages that are missing.
-need() {
-    local missing=()
-    for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package"); done
-    [ ${#missing[@]} -gt 0 ] || return 0
-    [ "${INSTALL:-}" != no ] || { echo "missing Debian packages: ${missing[*]}" >&2; exit 1; }
-    local sudo
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update -qq
-    DEBIAN_FRONTEND=noninteractive $sudo apt-get install -qq -y --no-install-recommends "${missing[@]}" >/dev/null
-}
+need() { bash ../../.ci/need "$@" || exit; }
 
 command -v qemu-system-arm >/dev/null || need qemu-system-arm
 if [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then

@@ -49,6 +49,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// the search can go on inside it (ruling B3).
     ///
     /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
+    // Rare: not to be compiled into the loop that takes the frames.
     #[inline(never)]
     pub fn idle(&mut self) {
         if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {

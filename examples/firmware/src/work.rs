@@ -3,7 +3,7 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{Response, ToMaster},
-    stream::{Decoder, Event, Frames},
+    stream::{Decoder, Event, Frames, Framing},
     time::Instant,
     ucp::{Frame, Ucp},
 };
@@ -20,32 +20,27 @@ pub fn ucp_slice(bytes: &[u8]) -> u32 {
 
 /// Hands one byte to a decoder of the bus, as a receive interrupt does.
 pub fn ikeya_byte(decoder: &mut Decoder<ToMaster, 8>, byte: u8) -> u32 {
-    #[inline(never)]
-    fn read(decoder: &mut Decoder<ToMaster, 8>) -> u32 {
-        let mut sum = 0;
-        while let Some(event) = decoder.poll() {
-            if let Event::Frame(response) = event {
-                sum += read_response(response);
-            }
-        }
-        sum
-    }
-    if decoder.push(byte) { read(decoder) } else { 0 }
+    if decoder.push(byte) { read_all(decoder, read_response) } else { 0 }
 }
 
 /// Hands one byte to a UCP decoder, as a receive interrupt does.
 pub fn ucp_byte(decoder: &mut Decoder<Ucp, 64>, byte: u8) -> u32 {
-    #[inline(never)]
-    fn read(decoder: &mut Decoder<Ucp, 64>) -> u32 {
-        let mut sum = 0;
-        while let Some(event) = decoder.poll() {
-            if let Event::Frame(frame) = event {
-                sum += read_frame(frame);
-            }
+    if decoder.push(byte) { read_all(decoder, read_frame) } else { 0 }
+}
+
+/// What the main loop does then: apart from the interrupt, whose registers it would take.
+#[inline(never)]
+fn read_all<F: Framing, const N: usize>(
+    decoder: &mut Decoder<F, N>,
+    read: impl Fn(F::Frame<'_>) -> u32,
+) -> u32 {
+    let mut sum = 0;
+    while let Some(event) = decoder.poll() {
+        if let Event::Frame(frame) = event {
+            sum += read(frame);
         }
-        sum
     }
-    if decoder.push(byte) { read(decoder) } else { 0 }
+    sum
 }
 
 /// Drives a role as its loop does; the size of everything that hangs on it.
