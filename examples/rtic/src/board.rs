@@ -30,7 +30,8 @@ impl Board {
 /// 168 MHz from the internal oscillator, timers and UART at 84. Without the PLL, which QEMU does not
 /// have either, all of them stay at 16 MHz: right on the bus, but too slow for answers in 50 µs.
 fn is_fast(rcc: &RCC) -> bool {
-    // 16 MHz / 8 * 168 / 2. The fields are as wide as the numbers of the reference manual.
+    // 16 MHz / 8 * 168 / 2.
+    // SAFETY: M, N and Q may hold values that the PLL cannot run with; these are within its limits.
     rcc.pllcfgr().write(|w| unsafe { w.pllm().bits(8).plln().bits(168).pllq().bits(7) });
     rcc.cr().modify(|_, w| w.pllon().set_bit());
     if !(0..100_000).any(|_| rcc.cr().read().pllrdy().bit_is_set()) {
