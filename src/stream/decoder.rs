@@ -2,7 +2,7 @@
 
 use core::{cell::Cell, fmt, marker::PhantomData};
 
-use super::{Counters, Event, Framing, Front, Gap, ledger::Ledger, search};
+use super::{Counters, Event, Framing, Front, Gap, Verdict, ledger::Ledger, search};
 
 /// Frames of a stream that arrives in pieces of any size.
 ///
@@ -36,6 +36,7 @@ use super::{Counters, Event, Framing, Front, Gap, ledger::Ledger, search};
 /// assert_eq!((frames, decoder.pending()), (2, 0));
 /// # }
 /// ```
+#[repr(C)]
 pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
     buffer: [u8; N],
@@ -156,11 +157,12 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// ```
     #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
-        let end = self.end;
+        // Both are read in front of the store, which could change them for all that the compiler knows.
+        let (end, wake) = (self.end, self.wake);
         let Some(room) = self.buffer.get_mut(end) else { return true };
         *room = byte;
         self.end = end + 1;
-        end + 1 >= self.wake
+        end + 1 >= wake
     }
 
     /// The line went quiet: what is pending will not be completed (ruling B3).
@@ -305,36 +307,39 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             // What came behind a silence does not complete what was pending before it.
             let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
-            let (found, front) = search::<F>(held, &mut self.ledger, Ledger::refuse_apart);
-            let left = found.len();
-            self.at = end - left;
-            if taken > 0 && self.pending() <= taken {
-                return None;
-            }
-            match (front, self.line) {
-                (Front::Frame { len }, _) => {
+            match (F::judge(held), self.line) {
+                (Verdict::Reject { reason, more }, _) => {
+                    let len = held.len().min(1 + more);
+                    self.ledger.refuse_apart(reason, len);
+                    self.ledger.skip(len);
+                    self.at += len;
+                    if taken > 0 && self.pending() <= taken {
+                        return None;
+                    }
+                }
+                (Verdict::Frame { len }, line) => {
                     self.wake = 0;
                     if let Some(gap) = self.ledger.take_gap() {
                         return Some(Held::Gap(gap));
                     }
-                    let (at, len) = (self.at, len.min(left));
+                    let (at, len) = (self.at, held.len().min(len));
                     self.ledger.frame(len);
-                    self.at += len;
-                    if self.at == self.end && self.line == Line::Busy {
+                    self.at = at + len;
+                    if self.at == self.end && line == Line::Busy {
                         self.clear();
                     }
                     return Some(Held::Frame { at, len });
                 }
-                (Front::Partial { need }, Line::Busy) => {
+                (Verdict::Partial { need }, Line::Busy) => {
                     self.wait_for(need);
                     return None;
                 }
-                (Front::Partial { .. }, Line::Quiet) if self.at < self.quiet_end => {
+                (Verdict::Partial { .. }, Line::Quiet) if self.at < end => {
                     self.line = Line::Settling;
                     self.ledger.refuse_idle();
                     self.at += 1;
                 }
-                (Front::Partial { .. }, Line::Quiet | Line::Settling) => {
+                (Verdict::Partial { .. }, Line::Quiet | Line::Settling) => {
                     self.line = Line::Busy;
                     if self.at == self.end {
                         self.clear();
