@@ -87,6 +87,11 @@ fn play(body: fn(&[u8])) {
 }
 
 #[test]
+fn any_bytes_have_the_crc_that_one_bit_after_the_other_gives() {
+    play(bodies::crc16);
+}
+
+#[test]
 fn a_master_survives_any_calls_bytes_and_times() {
     play(roles::ikeya_master);
 }

@@ -11,6 +11,7 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
+    crc16,
     error::EncodeError,
     ikeya::{self, NodeId, Position, Rps, three},
     stream::{Encode, Frames, Framing},
@@ -153,6 +154,25 @@ impl Repair {
                 }
             }
         }
+    }
+}
+
+/// The CRC of any bytes, made and checked, against one bit after the other.
+pub fn crc16(data: &[u8]) {
+    let crc = oracle::crc(data);
+    assert_eq!(crc16::compute(data), crc);
+
+    let mut frame = [data, &crc.to_le_bytes()].concat();
+    assert!(crc16::check(&frame));
+    // Two values have the same remainder modulo one factor of the polynomial, and two the same parity.
+    for other in [0xC001, 0x0003, 0xFFFF] {
+        let [.., low, high] = &mut frame[..] else { return };
+        [*low, *high] = (crc ^ other).to_le_bytes();
+        assert!(!crc16::check(&frame));
+    }
+
+    if let Some((body, found)) = data.split_last_chunk() {
+        assert_eq!(crc16::check(data), oracle::crc(body) == u16::from_le_bytes(*found));
     }
 }
 

@@ -186,7 +186,7 @@ pub(crate) fn seal(frame: &mut [u8]) {
 }
 
 /// CRC-16/MODBUS, one bit after the other (B1).
-fn crc(bytes: &[u8]) -> u16 {
+pub(crate) fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0xFFFF;
     for &byte in bytes {
         crc ^= u16::from(byte);
