@@ -57,6 +57,15 @@ pub enum Verdict {
     },
 }
 
+/// What [`Framing::sweep`] has refused.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub struct Swept {
+    /// Bytes at the front that start no frame.
+    pub len: usize,
+    /// How many of them are for [`Reason::Crc`]; the others are for [`Reason::Header`].
+    pub crc: usize,
+}
+
 /// One protocol's rule for finding frames.
 pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
@@ -73,6 +82,14 @@ pub trait Framing {
     /// More bytes behind the same ones may turn `Partial` into anything, but change neither
     /// `Frame` nor `Reject`, other than that a `Reject` may cover more bytes.
     fn judge(bytes: &[u8]) -> Verdict;
+
+    /// Refuses bytes at the front, as many as are cheaper to refuse together than one by one.
+    ///
+    /// Each of them is what `judge` would refuse there. There may be more of the kind behind them.
+    #[inline]
+    fn sweep(_bytes: &[u8]) -> Swept {
+        Swept::default()
+    }
 
     /// The view of one whole frame, exactly the bytes that `judge` called a frame.
     ///
@@ -144,6 +161,11 @@ fn search_through<'b, F: Framing>(
                     break Front::Partial { need: 1 };
                 };
                 rest = behind;
+                if cfg!(target_pointer_width = "64") && reason == Reason::Crc {
+                    let swept = F::sweep(rest);
+                    ledger.refuse(Reason::Crc, swept.crc);
+                    rest = rest.get(swept.len..).unwrap_or_default();
+                }
             }
         }
     };

@@ -3,12 +3,12 @@
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
-    PositionResponse, ReadRequest, VelocityResponse, WriteRequest, three,
+    PositionResponse, ReadRequest, VelocityResponse, WriteRequest, sweep::sweep, three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
 use crate::{
     crc16,
-    stream::{Framing, Reason, Verdict},
+    stream::{Framing, Reason, Swept, Verdict},
 };
 
 /// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
@@ -63,6 +63,12 @@ impl Framing for ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, false>(bytes)
+    }
+
     #[inline]
     fn view(frame: &[u8]) -> Option<Request<'_>> {
         match frame.first()? {
@@ -80,6 +86,12 @@ impl Framing for ToMaster {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
+    }
+
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, false, true>(bytes)
     }
 
     #[inline]
@@ -101,6 +113,12 @@ impl Framing for Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, true>(bytes)
+    }
+
     #[inline]
     fn view(frame: &[u8]) -> Option<Packet<'_>> {
         match frame.first()? {
@@ -118,6 +136,12 @@ impl Framing for three::ToSlave {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
+    }
+
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, false>(bytes)
     }
 
     #[inline]
@@ -139,6 +163,12 @@ impl Framing for three::ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, false, true>(bytes)
+    }
+
     #[inline]
     fn view(frame: &[u8]) -> Option<three::Response<'_>> {
         match frame.first()? {
@@ -156,6 +186,12 @@ impl Framing for three::Either {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
+    }
+
+    #[cfg(target_pointer_width = "64")]
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, true>(bytes)
     }
 
     #[inline]
