@@ -3,7 +3,9 @@
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
-    PositionResponse, ReadRequest, VelocityResponse, WriteRequest, sweep::sweep, three,
+    PositionResponse, ReadRequest, VelocityResponse, WriteRequest,
+    sweep::sweep,
+    three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
 use crate::{
