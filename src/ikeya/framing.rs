@@ -65,7 +65,6 @@ impl Framing for ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, false>(bytes)
@@ -90,7 +89,6 @@ impl Framing for ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, false, true>(bytes)
@@ -115,7 +113,6 @@ impl Framing for Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, true>(bytes)
@@ -140,7 +137,6 @@ impl Framing for three::ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, false>(bytes)
@@ -165,7 +161,6 @@ impl Framing for three::ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, false, true>(bytes)
@@ -190,7 +185,6 @@ impl Framing for three::Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
-    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, true>(bytes)

@@ -3,7 +3,7 @@
 //! One look after the other costs two or three mispredicted branches a byte there. Here all places of
 //! a block are judged together, header or not, and the processor has to foresee one thing of a block:
 //! that nothing is in it. The loops are plain ones over arrays, which a compiler for a host turns
-//! into vector instructions; elsewhere nobody calls this.
+//! into vector instructions; on other machines nobody calls them.
 //!
 //! # What is computed
 //!
