@@ -62,7 +62,9 @@ pub enum Verdict {
 pub struct Swept {
     /// Bytes at the front that start no frame.
     pub len: usize,
-    /// How many of them are for [`Reason::Crc`]; the others are for [`Reason::Header`].
+    /// How many of them are for [`Reason::Length`].
+    pub length: usize,
+    /// How many of them are for [`Reason::Crc`]; what remains is for [`Reason::Header`].
     pub crc: usize,
 }
 
@@ -151,8 +153,7 @@ fn search_through<'b, F: Framing>(
     refuse: impl Fn(&mut Ledger, Reason, usize),
 ) -> (&'b [u8], Front) {
     let mut rest = bytes;
-    // Candidates with a wrong CRC.
-    let mut failed = 0_u32;
+    let mut patience = Patience::new::<F>();
     let front = loop {
         match F::judge(rest) {
             Verdict::Frame { len } => break Front::Frame { len },
@@ -165,11 +166,8 @@ fn search_through<'b, F: Framing>(
                     break Front::Partial { need: 1 };
                 };
                 rest = behind;
-                if cfg!(target_pointer_width = "64") && reason == Reason::Crc {
-                    failed += 1;
-                    if failed >= CROWD {
-                        rest = sweep::<F>(rest, ledger);
-                    }
+                if cfg!(target_pointer_width = "64") {
+                    rest = patience.sweep::<F>(rest, ledger);
                 }
             }
         }
@@ -180,20 +178,47 @@ fn search_through<'b, F: Framing>(
     (rest, front)
 }
 
-/// Wrong CRCs in one gap that make a crowd. A damaged frame brings one, seldom two, and the good one
-/// behind it is found sooner by looking at one place after the other.
-const CROWD: u32 = 3;
+/// How many refusals to wait for until bytes are refused together.
+///
+/// That pays where refusals come in crowds. It costs where it finds a frame at once, and where it
+/// stops at candidates all the time: then it is tried ever more seldom.
+struct Patience {
+    /// Refusals to wait for yet.
+    left: u32,
+    /// The last time it was so many.
+    begun: u32,
+}
 
-/// Books what the framing can refuse together; returns the bytes behind it.
-#[inline(always)]
-fn sweep<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
-    let swept = F::sweep(bytes);
-    match bytes.get(swept.len..) {
-        Some(behind) if swept.len > 0 => {
-            ledger.refuse(Reason::Crc, swept.crc.min(swept.len));
-            behind
+impl Patience {
+    /// Behind a long frame that was damaged, the rest of it is a crowd. Behind a short one, the next
+    /// frame is found sooner by looking at one place after the other.
+    const fn new<F: Framing>() -> Self {
+        let begun = if F::MAX_LEN > 32 { 1 } else { 4 };
+        Self { left: begun, begun }
+    }
+
+    /// Counts one refusal; books what the framing then refuses of `bytes`, and returns the others.
+    #[inline(always)]
+    fn sweep<'b, F: Framing>(&mut self, bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
+        self.left -= 1;
+        if self.left > 0 {
+            return bytes;
         }
-        _ => bytes,
+        let Swept { len, length, crc } = F::sweep(bytes);
+        if len > F::MAX_LEN {
+            *self = Self::new::<F>();
+        } else {
+            self.begun = (2 * self.begun).min(256);
+            self.left = self.begun;
+        }
+        match bytes.get(len..) {
+            Some(behind) if len > 0 => {
+                ledger.refuse(Reason::Length, length);
+                ledger.refuse(Reason::Crc, crc);
+                behind
+            }
+            _ => bytes,
+        }
     }
 }
 

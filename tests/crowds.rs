@@ -148,7 +148,7 @@ fn check_slice<F: Known>(stream: &[u8]) {
 
 /// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.
 fn check_sweep<F: Framing>(bytes: &[u8]) {
-    let Swept { len, crc } = F::sweep(bytes);
+    let Swept { len, length, crc } = F::sweep(bytes);
     let mut failed = 0;
     for at in 0..len {
         match F::judge(&bytes[at..]) {
