@@ -88,8 +88,8 @@ pub trait Framing {
     /// Refuses bytes at the front that are cheaper to refuse together than one by one: `judge` would
     /// refuse each of them, for the same reasons, and may go on to refuse what follows.
     ///
-    /// Asked on 64-bit machines where candidates with a wrong CRC stand thick. No answer but the
-    /// default one is ever needed.
+    /// Asked on 64-bit machines where refusals come in crowds, about what lies behind one of them. Only
+    /// speed is lost where it always refuses nothing, as by default.
     #[inline]
     fn sweep(_bytes: &[u8]) -> Swept {
         Swept::default()
@@ -153,7 +153,7 @@ fn search_through<'b, F: Framing>(
     refuse: impl Fn(&mut Ledger, Reason, usize),
 ) -> (&'b [u8], Front) {
     let mut rest = bytes;
-    let mut patience = Patience::new::<F>();
+    let mut patience = Patience::new();
     let front = loop {
         match F::judge(rest) {
             Verdict::Frame { len } => break Front::Frame { len },
@@ -180,46 +180,51 @@ fn search_through<'b, F: Framing>(
 
 /// How many refusals to wait for until bytes are refused together.
 ///
-/// That pays where refusals come in crowds. It costs where it finds a frame at once, and where it
-/// stops at candidates all the time: then it is tried ever more seldom.
+/// That pays where refusals come in crowds. A damaged frame brings two or three, and the good one
+/// behind it is found sooner by looking at one place after the other. Nor does it pay where candidates
+/// that have to be looked at stand too close: there it is tried ever more seldom.
 struct Patience {
     /// Refusals to wait for yet.
     left: u32,
-    /// The last time it was so many.
+    /// How many there were to wait for this time.
     begun: u32,
 }
 
 impl Patience {
-    /// Behind a long frame that was damaged, the rest of it is a crowd. Behind a short one, the next
-    /// frame is found sooner by looking at one place after the other.
-    const fn new<F: Framing>() -> Self {
-        let begun = if F::MAX_LEN > 32 { 1 } else { 4 };
-        Self { left: begun, begun }
+    const fn new() -> Self {
+        Self { left: Self::LEAST, begun: Self::LEAST }
     }
 
-    /// Counts one refusal; books what the framing then refuses of `bytes`, and returns the others.
+    const LEAST: u32 = 6;
+    const MOST: u32 = 256;
+
+    /// Counts one refusal, of what stands in front of `bytes`; returns what is left of them.
     #[inline(always)]
     fn sweep<'b, F: Framing>(&mut self, bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
         self.left -= 1;
         if self.left > 0 {
             return bytes;
         }
-        let Swept { len, length, crc } = F::sweep(bytes);
-        if len > F::MAX_LEN {
-            *self = Self::new::<F>();
+        let behind = sweep::<F>(bytes, ledger);
+        if bytes.len() - behind.len() > F::MAX_LEN {
+            *self = Self::new();
         } else {
-            self.begun = (2 * self.begun).min(256);
+            self.begun = (2 * self.begun).min(Self::MOST);
             self.left = self.begun;
         }
-        match bytes.get(len..) {
-            Some(behind) if len > 0 => {
-                ledger.refuse(Reason::Length, length);
-                ledger.refuse(Reason::Crc, crc);
-                behind
-            }
-            _ => bytes,
-        }
+        behind
     }
+}
+
+/// Books what the framing refuses together, behind a refusal; returns the bytes behind it.
+#[cold]
+#[inline(never)]
+fn sweep<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
+    let Swept { len, length, crc } = F::sweep(bytes);
+    let Some(behind) = bytes.get(len..) else { return bytes };
+    ledger.refuse(Reason::Length, length);
+    ledger.refuse(Reason::Crc, crc);
+    behind
 }
 
 /// A whole frame that can be sent: it knows its bytes, CRC included.

@@ -3,6 +3,8 @@
 //! A plain loop over arrays, which a compiler for a host turns into vector instructions; on other
 //! machines nobody calls it.
 
+use zerocopy::transmute;
+
 use super::{LEN_WITHOUT_BODY, SYNC};
 use crate::stream::Swept;
 
@@ -35,13 +37,24 @@ pub(super) fn sweep<const CAP: usize>(bytes: &[u8]) -> Swept {
             swept.length += usize::from(count);
             continue;
         }
-        for (start, sync) in starts.into_iter().zip(syncs) {
-            if start != 0 {
-                return swept;
-            }
-            swept.len += 1;
-            swept.length += usize::from(sync);
+        let first = first(starts);
+        swept.len += first;
+        if count > 1 {
+            let in_front = syncs.into_iter().take(first);
+            swept.length += in_front.map(usize::from).sum::<usize>();
         }
+        break;
     }
     swept
+}
+
+/// Where the first flag is set; at the end if none is.
+#[inline(always)]
+fn first(flags: [u8; PLACES]) -> usize {
+    let [low, high]: [u128; 2] = transmute!(flags);
+    let zeros = match low {
+        0 => 128 + u128::from_le(high).trailing_zeros(),
+        _ => u128::from_le(low).trailing_zeros(),
+    };
+    zeros as usize / 8
 }
