@@ -17,7 +17,8 @@
 //!   every skipped byte is counted under its own reason in [`Counters`].
 //! * **Chunks do not matter.** Any cutting of the same bytes gives the same events.
 //! * **Bounded work.** A byte is looked at once for each candidate it may belong to, at most
-//!   `MAX_LEN` times. Nothing allocates, nothing panics.
+//!   `MAX_LEN` times; a host that refuses many bytes together looks a bounded number of times more
+//!   often. Nothing allocates, nothing panics.
 
 #[cfg(feature = "alloc")]
 mod capture;

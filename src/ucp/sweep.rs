@@ -39,6 +39,7 @@ pub(super) fn sweep<const CAP: usize>(bytes: &[u8]) -> Swept {
         }
         let first = first(starts);
         swept.len += first;
+        // One of the syncs is that of the place it ends at.
         if count > 1 {
             let in_front = syncs.into_iter().take(first);
             swept.length += in_front.map(usize::from).sum::<usize>();
