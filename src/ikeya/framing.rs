@@ -3,12 +3,14 @@
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
-    PositionResponse, ReadRequest, VelocityResponse, WriteRequest, three,
+    PositionResponse, ReadRequest, VelocityResponse, WriteRequest,
+    sweep::sweep,
+    three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
 use crate::{
     crc16,
-    stream::{Framing, Reason, Verdict},
+    stream::{Framing, Reason, Swept, Verdict},
 };
 
 /// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
@@ -64,6 +66,11 @@ impl Framing for ToSlave {
     }
 
     #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, false>(bytes)
+    }
+
+    #[inline]
     fn view(frame: &[u8]) -> Option<Request<'_>> {
         match frame.first()? {
             &READ => view(frame).map(Request::Read),
@@ -80,6 +87,11 @@ impl Framing for ToMaster {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
+    }
+
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, false, true>(bytes)
     }
 
     #[inline]
@@ -102,6 +114,11 @@ impl Framing for Either {
     }
 
     #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, true>(bytes)
+    }
+
+    #[inline]
     fn view(frame: &[u8]) -> Option<Packet<'_>> {
         match frame.first()? {
             &READ | &WRITE => ToSlave::view(frame).map(Packet::Request),
@@ -118,6 +135,11 @@ impl Framing for three::ToSlave {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
+    }
+
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, false>(bytes)
     }
 
     #[inline]
@@ -140,6 +162,11 @@ impl Framing for three::ToMaster {
     }
 
     #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, false, true>(bytes)
+    }
+
+    #[inline]
     fn view(frame: &[u8]) -> Option<three::Response<'_>> {
         match frame.first()? {
             &VELOCITY => view(frame).map(three::Response::Velocity),
@@ -156,6 +183,11 @@ impl Framing for three::Either {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
+    }
+
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<Self, true, true>(bytes)
     }
 
     #[inline]

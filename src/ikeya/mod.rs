@@ -76,6 +76,7 @@ mod framing;
 mod master;
 mod schedule;
 pub(crate) mod slave;
+mod sweep;
 pub mod three;
 mod units;
 mod wire;

@@ -2,11 +2,11 @@
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
-use super::{Body, Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, Message, MessageId, SYNC};
+use super::{Body, Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, Message, MessageId, SYNC, sweep::sweep};
 use crate::{
     crc16,
     error::{EncodeError, ParseError},
-    stream::{Encode, Framing, Reason, Verdict, encode_bytes},
+    stream::{Encode, Framing, Reason, Swept, Verdict, encode_bytes},
 };
 
 /// Finds UCP frames whose length field is 4..=`CAP` (ruling U2).
@@ -44,6 +44,11 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
             None if start.is_none() => Verdict::Partial { need: bytes.len() + 1 },
             None => Verdict::Partial { need: len },
         }
+    }
+
+    #[inline]
+    fn sweep(bytes: &[u8]) -> Swept {
+        sweep::<CAP>(bytes)
     }
 
     #[inline]

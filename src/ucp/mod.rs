@@ -81,6 +81,7 @@ mod message;
 mod report;
 mod robot;
 mod role;
+mod sweep;
 
 pub use bias::{BiasStore, MemoryStore, NoStore, NotStored};
 pub use codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};

@@ -1,0 +1,61 @@
+//! Refuses many bytes at once: all places of a block are judged together, by sync and length alone.
+//!
+//! A plain loop over arrays, which a compiler for a host turns into vector instructions; on other
+//! machines nobody calls it.
+
+use zerocopy::transmute;
+
+use super::{LEN_WITHOUT_BODY, SYNC};
+use crate::stream::Swept;
+
+/// Places that are judged together.
+const PLACES: usize = 32;
+
+/// What a block can see, bytes: the last place may begin a sync and a length field.
+const BLOCK: usize = PLACES + 3;
+
+/// How many bytes at the front start no frame. Ends in front of a length that a frame may have, or
+/// where less than a block is left.
+#[inline(always)]
+pub(super) fn sweep<const CAP: usize>(bytes: &[u8]) -> Swept {
+    let mut swept = Swept::default();
+    while let Some(block) = bytes.get(swept.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
+        let (mut syncs, mut starts) = ([0; PLACES], [0; PLACES]);
+        let (mut count, mut any) = (0, 0);
+        for at in 0..PLACES {
+            let is_sync = (block[at] == SYNC[0]) & (block[at + 1] == SYNC[1]);
+            let [least, most] = [LEN_WITHOUT_BODY as u8, CAP as u8];
+            let low = block[at + 2];
+            let has_length = (low >= least) & (low <= most) & (block[at + 3] == 0);
+            syncs[at] = u8::from(is_sync);
+            starts[at] = u8::from(is_sync & has_length);
+            count += syncs[at];
+            any |= starts[at];
+        }
+        if any == 0 {
+            swept.len += PLACES;
+            swept.length += usize::from(count);
+            continue;
+        }
+        let first = first(starts);
+        swept.len += first;
+        // One of the syncs is that of the place it ends at.
+        if count > 1 {
+            let in_front = syncs.into_iter().take(first);
+            swept.length += in_front.map(usize::from).sum::<usize>();
+        }
+        break;
+    }
+    swept
+}
+
+/// Where the first flag is set; at the end if none is.
+#[inline(always)]
+fn first(flags: [u8; PLACES]) -> usize {
+    let [low, high]: [u128; 2] = transmute!(flags);
+    let zeros = match low {
+        0 => 128 + u128::from_le(high).trailing_zeros(),
+        _ => u128::from_le(low).trailing_zeros(),
+    };
+    zeros as usize / 8
+}

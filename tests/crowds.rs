@@ -1,0 +1,207 @@
+//! Crowds of headers, where candidates are refused many at a time, against the slow oracle.
+#![cfg(all(feature = "ikeya", feature = "ucp"))]
+
+#[path = "support/line.rs"]
+#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
+mod line;
+#[path = "support/oracle.rs"]
+#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
+mod oracle;
+
+use axlewire::{
+    ikeya::{Either, ToMaster, ToSlave, three},
+    stream::{Frames, Framing, Reason, Swept, Verdict, decode_capture},
+    ucp::Ucp,
+};
+use line::{Known, Line, Op};
+use oracle::Rules;
+use proptest::{collection::vec, prelude::*, sample::select};
+
+/// `x^15 + x + 1`: added to a good CRC it leaves a multiple of it, of odd parity.
+const TRINOMIAL: u16 = 0xC001;
+
+macro_rules! properties {
+    ($($name:ident: $framing:ty, $max_len:literal;)+) => {$(
+        mod $name {
+            use super::*;
+
+            type F = $framing;
+
+            #[test]
+            fn a_packet_is_found_at_every_place_of_a_crowd() {
+                check_every_place::<F>();
+            }
+
+            #[test]
+            fn a_crowd_may_be_cut_anywhere() {
+                check_every_cut::<F, $max_len>();
+            }
+
+            #[cfg(target_pointer_width = "64")]
+            #[test]
+            fn a_crowd_is_swept_up_to_its_last_places() {
+                let crowd = crowd(F::RULES, 200);
+                let swept = <F as Framing>::sweep(&crowd).len;
+                assert!((150..200).contains(&swept), "{swept}");
+                check_sweep::<F>(&crowd);
+            }
+
+            proptest! {
+                #[test]
+                fn a_sweep_refuses_what_single_looks_refuse(stream in stream(F::RULES)) {
+                    (0..stream.len().min(12)).for_each(|at| check_sweep::<F>(&stream[at..]));
+                }
+
+                #[test]
+                fn a_crowd_gives_what_the_oracle_says(stream in stream(F::RULES)) {
+                    check_slice::<F>(&stream);
+                }
+
+                #[test]
+                fn chunks_of_a_crowd_do_not_matter(
+                    stream in stream(F::RULES),
+                    chunks in vec(0..150_usize, 1..6),
+                ) {
+                    let ops = |op: fn(usize) -> Op| chunks.iter().copied().map(op).collect::<Vec<_>>();
+                    Line::<F, $max_len>::new().play(&stream, &ops(Op::Slice));
+                    Line::<F, 300>::new().play(&stream, &ops(Op::Slice));
+                    let filled: Vec<_> = ops(Op::Commit).into_iter().chain([Op::Idle]).collect();
+                    Line::<F, 300>::new().play(&stream, &filled);
+                }
+            }
+        }
+    )+};
+}
+
+properties! {
+    to_slave: ToSlave, 8;
+    to_master: ToMaster, 8;
+    either: Either, 8;
+    three_to_slave: three::ToSlave, 16;
+    three_to_master: three::ToMaster, 16;
+    three_either: three::Either, 16;
+    ucp_by_default: Ucp, 64;
+    ucp_with_the_smallest_cap: Ucp<4>, 8;
+    ucp_with_the_largest_cap: Ucp<252>, 256;
+}
+
+/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame has, of
+/// odd parity, plainly damaged.
+fn packets(rules: Rules) -> Vec<Vec<u8>> {
+    let mut starts: Vec<(Vec<u8>, usize)> = Vec::new();
+    match rules {
+        Rules::Ikeya { long, .. } => {
+            for (header, len) in [(0xAA, 4), (0xBB, long), (0x55, long), (0x56, long)] {
+                starts.extend([0, 1, 8, 9].map(|id| (vec![header, id], len)));
+            }
+        }
+        Rules::Ucp { .. } => {
+            let lens = [0, 3, 4, 5, 40, 60, 61, 252, 253].map(|len| (len, 0));
+            for (low, high) in lens.into_iter().chain([(4, 1), (40, 0xFF)]) {
+                starts.push((vec![0xFD, 0xFF, low, high], usize::from(low.max(4)) + 4));
+            }
+        }
+    }
+    let mut packets = Vec::new();
+    for (mut packet, len) in starts {
+        packet.resize(len, 0xAA);
+        oracle::seal(&mut packet);
+        for change in [0, TRINOMIAL, 0x0100] {
+            let [low, high] = u16::to_le_bytes(change);
+            packets.push(packet.clone());
+            let [.., first, second] = packets.last_mut().unwrap().as_mut_slice() else { continue };
+            (*first, *second) = (*first ^ low, *second ^ high);
+        }
+    }
+    packets
+}
+
+/// What a frame may begin with.
+fn headers(rules: Rules) -> Vec<u8> {
+    match rules {
+        Rules::Ikeya { .. } => vec![0xAA, 0xBB, 0x55, 0x56],
+        Rules::Ucp { .. } => vec![0xFD, 0xFF],
+    }
+}
+
+/// So many bytes of them in no order.
+fn crowd(rules: Rules, len: usize) -> Vec<u8> {
+    let headers = headers(rules);
+    let mut state = 1_u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        headers[(state >> 16) as usize % headers.len()]
+    };
+    (0..len).map(|_| next()).collect()
+}
+
+/// Crowds with packets in them and with thinner places, 0 to some 400 bytes.
+fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
+    let header = select(headers(rules));
+    let byte = prop_oneof![3 => header.clone(), 1 => select(vec![0, 1, 2, 4, 9, 0x28, 0xFC])];
+    let piece = prop_oneof![
+        3 => vec(header, 0..60),
+        3 => vec(byte, 0..60),
+        1 => vec(any::<u8>(), 0..60),
+        4 => select(packets(rules)),
+    ];
+    vec(piece, 0..12).prop_map(|pieces| pieces.concat())
+}
+
+/// Frames, gaps and counters of a slice.
+fn check_slice<F: Known>(stream: &[u8]) {
+    let told = oracle::answer(F::RULES, stream, &[]);
+    let mut frames = Frames::<F>::new(stream);
+    for (offset, len) in told.frames() {
+        let frame = frames.next().expect("one frame less than the oracle has");
+        assert_eq!(F::bytes(&frame).as_ptr_range(), stream[offset..offset + len].as_ptr_range());
+    }
+    assert!(frames.next().is_none(), "one frame more than the oracle has");
+    assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
+    line::check_counters(&frames.counters(), &told, stream.len());
+
+    // A capture ends with a silence, as often as there is something left.
+    let idles = vec![stream.len(); stream.len() + 1];
+    let mut told = oracle::answer(F::RULES, stream, &idles);
+    told.join_gaps();
+    let (events, counters) = decode_capture::<F>(stream);
+    let events: Vec<_> = events.into_iter().map(|located| line::located::<F>(located)).collect();
+    assert_eq!(events, told.events);
+    line::check_counters(&counters, &told, stream.len());
+}
+
+/// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.
+fn check_sweep<F: Framing>(bytes: &[u8]) {
+    let swept = F::sweep(bytes);
+    let mut told = Swept { len: swept.len, ..Swept::default() };
+    for at in 0..swept.len {
+        match F::judge(&bytes[at..]) {
+            Verdict::Reject { reason: Reason::Crc, more: 0 } => told.crc += 1,
+            Verdict::Reject { reason: Reason::Length, more: 0 } => told.length += 1,
+            Verdict::Reject { reason: Reason::Header, .. } => {}
+            verdict => panic!("{verdict:?} at {at} of {}", swept.len),
+        }
+    }
+    assert_eq!(swept, told);
+}
+
+fn check_every_place<F: Known>() {
+    let crowd = crowd(F::RULES, 110);
+    for packet in packets(F::RULES) {
+        for at in 0..40 {
+            let stream = [&crowd[..at], &packet, &crowd[at..]].concat();
+            check_slice::<F>(&stream);
+        }
+    }
+}
+
+fn check_every_cut<F: Known, const N: usize>() {
+    let crowd = crowd(F::RULES, 60);
+    for packet in packets(F::RULES) {
+        let stream = [&crowd[..], &packet, &crowd].concat();
+        for len in 40..stream.len() {
+            check_slice::<F>(&stream[..len]);
+        }
+        Line::<F, N>::new().play(&stream, &[Op::Slice(70), Op::Slice(stream.len())]);
+    }
+}
