@@ -24,12 +24,16 @@ mod capture;
 mod decoder;
 mod frames;
 mod ledger;
+#[cfg(feature = "simd")]
+mod simd;
 
 #[cfg(feature = "alloc")]
 pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
 pub use frames::Frames;
 pub use ledger::{Counters, Gap, Reason};
+#[cfg(feature = "simd")]
+pub use simd::{Ahead, Portable, Swept};
 
 use ledger::Ledger;
 
@@ -73,6 +77,32 @@ pub trait Framing {
     /// More bytes behind the same ones may turn `Partial` into anything, but change neither
     /// `Frame` nor `Reject`, other than that a `Reject` may cover more bytes.
     fn judge(bytes: &[u8]) -> Verdict;
+
+    /// Does [`look_ahead`](Self::look_ahead) ever see anything? Without, it is not asked.
+    #[cfg(feature = "simd")]
+    const LOOKS_AHEAD: bool = false;
+
+    /// Which frames stand near the front, as far as it is cheaper to judge them together than one by
+    /// one. Needs feature `simd`.
+    ///
+    /// A place is marked only where `judge` would say [`Verdict::Frame`] of that length; one that is
+    /// not marked may begin a frame all the same. What is marked is handed out without being judged.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    fn look_ahead(_bytes: &[u8]) -> Ahead {
+        Ahead::default()
+    }
+
+    /// Refuses bytes at the front, as far as it is cheaper to refuse them together than one by one.
+    /// Needs feature `simd`.
+    ///
+    /// Each of them is what `judge` would refuse there, one byte after the other; never a packet that
+    /// is skipped whole. What stands behind them may be anything.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    fn sweep(_bytes: &[u8]) -> Swept {
+        Swept::default()
+    }
 
     /// The view of one whole frame, exactly the bytes that `judge` called a frame.
     ///
@@ -144,6 +174,10 @@ fn search_through<'b, F: Framing>(
                     break Front::Partial { need: 1 };
                 };
                 rest = behind;
+                #[cfg(feature = "simd")]
+                {
+                    rest = ledger.sweep(F::sweep(rest), rest);
+                }
             }
         }
     };

@@ -2,10 +2,14 @@
 
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+use super::lanes;
 use super::{
     PositionResponse, ReadRequest, VelocityResponse, WriteRequest, three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+use crate::stream::{Ahead, Swept};
 use crate::{
     crc16,
     stream::{Framing, Reason, Verdict},
@@ -63,6 +67,21 @@ impl Framing for ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const LOOKS_AHEAD: bool = true;
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn look_ahead(bytes: &[u8]) -> Ahead {
+        lanes::look_ahead::<true, false>(bytes)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn sweep(bytes: &[u8]) -> Swept {
+        lanes::sweep::<Self, true, false>(bytes)
+    }
+
     #[inline]
     fn view(frame: &[u8]) -> Option<Request<'_>> {
         match frame.first()? {
@@ -82,6 +101,21 @@ impl Framing for ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const LOOKS_AHEAD: bool = true;
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn look_ahead(bytes: &[u8]) -> Ahead {
+        lanes::look_ahead::<false, true>(bytes)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn sweep(bytes: &[u8]) -> Swept {
+        lanes::sweep::<Self, false, true>(bytes)
+    }
+
     #[inline]
     fn view(frame: &[u8]) -> Option<Response<'_>> {
         match frame.first()? {
@@ -99,6 +133,21 @@ impl Framing for Either {
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const LOOKS_AHEAD: bool = true;
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn look_ahead(bytes: &[u8]) -> Ahead {
+        lanes::look_ahead::<true, true>(bytes)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn sweep(bytes: &[u8]) -> Swept {
+        lanes::sweep::<Self, true, true>(bytes)
     }
 
     #[inline]

@@ -73,6 +73,8 @@
 
 mod board;
 mod framing;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod lanes;
 mod master;
 mod schedule;
 pub(crate) mod slave;

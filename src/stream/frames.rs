@@ -2,6 +2,8 @@
 
 use core::marker::PhantomData;
 
+#[cfg(feature = "simd")]
+use super::simd::Lookout;
 use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
 
 /// Frames of a slice that is already in memory, borrowed from it.
@@ -28,6 +30,8 @@ use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
 pub struct Frames<'a, F> {
     rest: &'a [u8],
     ledger: Ledger,
+    #[cfg(feature = "simd")]
+    lookout: Lookout,
     framing: PhantomData<fn() -> F>,
 }
 
@@ -35,7 +39,13 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// Frames of `bytes`, from the first byte on.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, ledger: Ledger::new(), framing: PhantomData }
+        Self {
+            rest: bytes,
+            ledger: Ledger::new(),
+            #[cfg(feature = "simd")]
+            lookout: Lookout::new(),
+            framing: PhantomData,
+        }
     }
 
     /// What has not been judged yet; once the iterator has ended, the candidate that the slice
@@ -77,6 +87,14 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
+        #[cfg(feature = "simd")]
+        if let Some(len) = self.lookout.next::<F>(self.rest)
+            && let Some((frame, rest)) = self.rest.split_at_checked(len)
+        {
+            self.rest = rest;
+            self.ledger.frame(len);
+            return F::view(frame);
+        }
         let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
         let Front::Frame { len } = front else {
             self.rest = found;

@@ -171,6 +171,16 @@ impl Ledger {
         self.refuse(reason, len);
     }
 
+    /// Bytes at the front of `rest` are refused, in a gap that is open; `skip` counts them. Returns
+    /// what is behind.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    pub(super) fn sweep<'b>(&mut self, swept: super::Swept, rest: &'b [u8]) -> &'b [u8] {
+        self.length = self.length.wrapping_add(swept.length as u64);
+        self.crc = self.crc.wrapping_add(swept.crc as u64);
+        rest.get(swept.len..).unwrap_or_default()
+    }
+
     /// The first byte of a candidate that a quiet line cuts off.
     pub(super) fn refuse_idle(&mut self) {
         self.refuse(Reason::Idle, 1);

@@ -2,7 +2,11 @@
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+use super::lanes;
 use super::{Body, Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, Message, MessageId, SYNC};
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+use crate::stream::Swept;
 use crate::{
     crc16,
     error::{EncodeError, ParseError},
@@ -44,6 +48,12 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
             None if start.is_none() => Verdict::Partial { need: bytes.len() + 1 },
             None => Verdict::Partial { need: len },
         }
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn sweep(bytes: &[u8]) -> Swept {
+        lanes::sweep::<Self, CAP>(bytes)
     }
 
     #[inline]

@@ -77,6 +77,8 @@ mod codes;
 mod framing;
 mod header;
 mod host;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod lanes;
 mod message;
 mod report;
 mod robot;
