@@ -87,6 +87,13 @@ impl Avx2 {
         self.0.avx2._mm256_xor_si256(a, b)
     }
 
+    /// The low half of each word of `a`, and that of `b` as the high half.
+    #[inline(always)]
+    pub(crate) fn low_halves(self, a: Lanes, b: Lanes) -> Lanes {
+        let b = self.0.avx2._mm256_slli_epi64::<32>(b);
+        self.0.avx2._mm256_blend_epi32::<0b1010_1010>(a, b)
+    }
+
     /// Shifts each of four words right.
     #[inline(always)]
     pub(crate) fn shr<const BITS: i32>(self, lanes: Lanes) -> Lanes {

@@ -33,7 +33,7 @@ pub use decoder::Decoder;
 pub use frames::Frames;
 pub use ledger::{Counters, Gap, Reason};
 #[cfg(feature = "simd")]
-pub use simd::{Ahead, Portable, Swept};
+pub use simd::{GoodRun, Portable, Swept};
 
 use ledger::Ledger;
 
@@ -78,20 +78,33 @@ pub trait Framing {
     /// `Frame` nor `Reject`, other than that a `Reject` may cover more bytes.
     fn judge(bytes: &[u8]) -> Verdict;
 
-    /// Does [`look_ahead`](Self::look_ahead) ever see anything? Without, it is not asked.
+    /// Does [`good_run`](Self::good_run) ever see one? Without, it is not asked.
     #[cfg(feature = "simd")]
-    const LOOKS_AHEAD: bool = false;
+    const HAS_RUNS: bool = false;
 
-    /// Which frames stand near the front, as far as it is cheaper to judge them together than one by
-    /// one. Needs feature `simd`.
+    /// Which frames stand at the front, one behind the other, as far as it is cheaper to judge them
+    /// together than one by one. Needs feature `simd`.
     ///
-    /// A place is marked only where `judge` would say [`Verdict::Frame`] of that length; one that is
-    /// not marked may begin a frame all the same. What is marked is handed out without being judged.
+    /// All of [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and never more than `judge` would find: they are handed out without being judged again. It may be
+    /// fewer.
     #[cfg(feature = "simd")]
     #[inline(always)]
-    fn look_ahead(_bytes: &[u8]) -> Ahead {
-        Ahead::default()
+    fn good_run(_bytes: &[u8]) -> GoodRun {
+        GoodRun::default()
     }
+
+    /// Does the frame at the front, one of a [`good_run`](Self::good_run), have [`MIN_LEN`](Self::MIN_LEN)
+    /// bytes? Otherwise it has [`MAX_LEN`](Self::MAX_LEN). Needs feature `simd`.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    fn is_short(_bytes: &[u8]) -> bool {
+        false
+    }
+
+    /// How many bytes of a gap are refused one by one before [`sweep`](Self::sweep) is asked: behind a
+    /// damaged frame the next one is near. `usize::MAX`: it never is.
+    #[cfg(feature = "simd")]
+    const SWEEPS_BEHIND: usize = usize::MAX;
 
     /// Refuses bytes at the front, as far as it is cheaper to refuse them together than one by one.
     /// Needs feature `simd`.
@@ -175,7 +188,7 @@ fn search_through<'b, F: Framing>(
                 };
                 rest = behind;
                 #[cfg(feature = "simd")]
-                {
+                if bytes.len() - rest.len() > F::SWEEPS_BEHIND {
                     rest = ledger.sweep(F::sweep(rest), rest);
                 }
             }

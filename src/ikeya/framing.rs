@@ -9,7 +9,7 @@ use super::{
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-use crate::stream::{Ahead, Swept};
+use crate::stream::{GoodRun, Swept};
 use crate::{
     crc16,
     stream::{Framing, Reason, Verdict},
@@ -68,13 +68,22 @@ impl Framing for ToSlave {
     }
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    const LOOKS_AHEAD: bool = true;
+    const HAS_RUNS: bool = true;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
-    fn look_ahead(bytes: &[u8]) -> Ahead {
-        lanes::look_ahead::<true, false>(bytes)
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        lanes::good_run::<true, false>(bytes)
     }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn is_short(bytes: &[u8]) -> bool {
+        bytes.first() == Some(&READ)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const SWEEPS_BEHIND: usize = Self::MAX_LEN;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
@@ -102,13 +111,16 @@ impl Framing for ToMaster {
     }
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    const LOOKS_AHEAD: bool = true;
+    const HAS_RUNS: bool = true;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
-    fn look_ahead(bytes: &[u8]) -> Ahead {
-        lanes::look_ahead::<false, true>(bytes)
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        lanes::good_run::<false, true>(bytes)
     }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const SWEEPS_BEHIND: usize = Self::MAX_LEN;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
@@ -136,13 +148,22 @@ impl Framing for Either {
     }
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-    const LOOKS_AHEAD: bool = true;
+    const HAS_RUNS: bool = true;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
-    fn look_ahead(bytes: &[u8]) -> Ahead {
-        lanes::look_ahead::<true, true>(bytes)
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        lanes::good_run::<true, true>(bytes)
     }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    #[inline(always)]
+    fn is_short(bytes: &[u8]) -> bool {
+        bytes.first() == Some(&READ)
+    }
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const SWEEPS_BEHIND: usize = Self::MAX_LEN;
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     crc16,
     simd::{Avx2, Lanes, with_avx2},
-    stream::{Ahead, Framing, Reason, Swept, Verdict},
+    stream::{Framing, GoodRun, Reason, Swept, Verdict},
 };
 
 /// Places that are judged together, a bit in a word for each.
@@ -20,59 +20,112 @@ const LONG: usize = 8;
 const BLOCK: usize = PLACES + LONG - 1;
 
 /// The packets at the front that are whole and right, one behind the other.
-#[inline(never)]
-pub(super) fn look_ahead<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> Ahead {
-    let Some(block) = bytes.first_chunk::<BLOCK>() else { return Ahead::default() };
+#[inline(always)]
+pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> GoodRun {
+    if bytes.len() < BLOCK {
+        return GoodRun::default();
+    }
     with_avx2(
         #[inline(always)]
-        |simd| ahead_in::<TO_SLAVE, TO_MASTER>(simd, block),
+        |simd| run_in::<TO_SLAVE, TO_MASTER>(simd, bytes),
     )
     .unwrap_or_default()
 }
 
+/// Blocks that are looked at together. More would bring little, and what a user has not taken when he
+/// asks for the counters has to be counted again.
+const BLOCKS: usize = 4;
+
 #[inline(always)]
-fn ahead_in<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, block: &[u8; BLOCK]) -> Ahead {
+fn run_in<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, bytes: &[u8]) -> GoodRun {
     /// Every eighth place.
     const ALL: u64 = 0x0101_0101_0101_0101;
-    let [first, second] = [0, 32].map(|at| simd.load(block, at));
-    let right = [first, second].map(|lanes| right_long::<TO_SLAVE, TO_MASTER>(simd, lanes));
-    let long = simd.places(right);
-    if long == ALL || !TO_SLAVE {
-        return Ahead { long, short: 0 };
+    let mut run = GoodRun::default();
+    // Blocks lie where they lie, whatever was found in the one before: no look waits for another.
+    for number in 0..BLOCKS {
+        let start = number * PLACES;
+        let Some(block) = bytes.get(start..).and_then(<[u8]>::first_chunk) else { break };
+        let at = run.len - start;
+        let mut long = right_long_at::<TO_SLAVE, TO_MASTER>(simd, block, 0);
+        if at == 0 && long == ALL {
+            run.frames += PLACES / LONG;
+            run.len += PLACES;
+            continue;
+        }
+        let mut short = 0;
+        let first_other = (long ^ ALL).trailing_zeros() as usize;
+        if TO_SLAVE && (at != 0 || block.get(first_other) == Some(&READ)) {
+            // Packets of four bytes are among them: then every fourth place counts.
+            long |= right_long_at::<TO_SLAVE, TO_MASTER>(simd, block, 4) << 4;
+            let first = right_short(simd, simd.load(block, 0));
+            short = simd.places([first, right_short(simd, simd.load(block, 32))]);
+        }
+        // Whatever no packet in front of it leads to is behind damage, or inside a packet.
+        let led_to = 1 << at | long << LONG | short << ReadRequest::LEN;
+        let loose = (long | short) & !led_to;
+        let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
+        let longs = (long & in_front).count_ones() as usize;
+        let shorts = (short & in_front).count_ones() as usize;
+        run.frames += longs + shorts;
+        run.len += longs * LONG + shorts * ReadRequest::LEN;
+        if run.len < start + PLACES {
+            break;
+        }
     }
-    // There are READs of four bytes among them: every fourth place.
-    let between = [4, 36].map(|at| right_long::<TO_SLAVE, TO_MASTER>(simd, simd.load(block, at)));
-    let long = long | simd.places(between) << 4;
-    let reads = [first, second].map(|lanes| {
-        let reads = READS.map(|read| simd.is_equal_u32(lanes, simd.each(read)));
-        let is_read = reads.into_iter().reduce(|a, b| simd.or(a, b));
-        simd.and(is_read.unwrap_or(lanes), simd.each(0xFF_0000_00FF))
-    });
-    Ahead { long, short: simd.places(reads) }
+    run
 }
 
-/// All READs that there are, twice in a word.
-const READS: [u64; NodeId::ALL.len()] = {
-    let mut reads = [0; NodeId::ALL.len()];
-    let mut at = 0;
-    while at < reads.len() {
-        let [id, _] = (at as u16 + 1).to_le_bytes();
-        let [low, high] = crc16::compute(&[READ, id]).to_le_bytes();
-        let read = u32::from_le_bytes([READ, id, low, high]) as u64;
-        reads[at] = read << 32 | read;
-        at += 1;
-    }
-    reads
-};
-
-/// Marks the first byte of each word that is a whole packet of 8 bytes.
+/// The places among every eighth one, from `at` on, where a packet of 8 bytes begins.
+///
+/// Header and id of all eight packets share a register, and so do what is left of the divisions.
 #[inline(always)]
-fn right_long<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, packets: Lanes) -> Lanes {
-    let is_id = simd.is_in(packets, 1, 8);
-    let is_header = is_long_header::<TO_SLAVE, TO_MASTER>(simd, packets);
-    let is_right = simd.is_zero_u16(quotient(simd, simd.xor(packets, simd.each(0xFFFF))));
+fn right_long_at<const TO_SLAVE: bool, const TO_MASTER: bool>(
+    simd: Avx2,
+    block: &[u8; BLOCK],
+    at: usize,
+) -> u64 {
+    let (first, second) = (simd.load(block, at), simd.load(block, at + 32));
+    let starts = simd.low_halves(first, second);
+    let is_id = simd.is_in(starts, 1, 8);
+    let is_header = is_long_header::<TO_SLAVE, TO_MASTER>(simd, starts);
+
+    let initial = simd.each(0xFFFF);
+    let first = quotient(simd, simd.xor(first, initial));
+    let second = quotient(simd, simd.xor(second, initial));
+    let is_right = end_is_zero(simd, simd.low_halves(first, second));
+
     let is_packet = simd.and(simd.and(is_header, simd.shr::<8>(is_id)), is_right);
-    simd.and(is_packet, simd.each(0xFF))
+    let marks = u64::from(simd.mask(is_packet));
+    marks & 0x0101_0101 | (marks >> 4 & 0x0101_0101) << 32
+}
+
+/// Marks the first byte of each half of a word that is a READ.
+#[inline(always)]
+fn right_short(simd: Avx2, lanes: Lanes) -> Lanes {
+    /// All READs that there are, twice in a word.
+    const READS: [u64; NodeId::ALL.len()] = {
+        let mut reads = [0; NodeId::ALL.len()];
+        let mut at = 0;
+        while at < reads.len() {
+            let id = at as u8 + 1;
+            let [low, high] = crc16::compute(&[READ, id]).to_le_bytes();
+            let read = u32::from_le_bytes([READ, id, low, high]) as u64;
+            reads[at] = read << 32 | read;
+            at += 1;
+        }
+        reads
+    };
+    let mut is_read = simd.each(0);
+    for read in READS {
+        is_read = simd.or(is_read, simd.is_equal_u32(lanes, simd.each(read)));
+    }
+    simd.and(is_read, simd.each(0x0000_00FF_0000_00FF))
+}
+
+#[inline(always)]
+fn is_header<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, lanes: Lanes) -> Lanes {
+    let is_long = is_long_header::<TO_SLAVE, TO_MASTER>(simd, lanes);
+    if TO_SLAVE { simd.or(is_long, simd.is(lanes, READ)) } else { is_long }
 }
 
 /// The headers of packets of 8 bytes.
@@ -87,11 +140,12 @@ fn is_long_header<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, lanes
     }
 }
 
-/// The message divided by the polynomial as a power series, up to `x^63`: 16 zeros at the end, its
-/// low bits, say that the division leaves nothing.
+/// The message divided by the polynomial as a power series, up to `x^63`, but for the last steps: what
+/// they need is in the low half of a word, and [`end_is_zero`] takes them.
 ///
 /// `1 / P = (1 + x^2 + x^15 + x^16) · (1 + x^4 + x^30 + x^32) · …`, as squaring doubles every exponent
-/// and `P · P^-1 = 1`; powers above 63 are left out. Multiplying by `x` is a shift to the right.
+/// and the products approach `P · P^-1 = 1`; powers above 63 are left out. Multiplying by `x` is a shift
+/// to the right.
 #[inline(always)]
 fn quotient(simd: Avx2, message: Lanes) -> Lanes {
     let add = |sum, more| simd.xor(sum, more);
@@ -99,8 +153,14 @@ fn quotient(simd: Avx2, message: Lanes) -> Lanes {
     q = add(add(q, simd.shr::<2>(q)), add(simd.shr::<15>(q), simd.shr::<16>(q)));
     q = add(add(q, simd.shr::<4>(q)), add(simd.shr::<30>(q), simd.shr::<32>(q)));
     q = add(add(q, simd.shr::<8>(q)), simd.shr::<60>(q));
-    q = add(q, simd.shr::<16>(q));
     add(q, simd.shr::<32>(q))
+}
+
+/// 0xFFFF in the low 16 bits of each half of a word where those of the quotient are zero: nothing is
+/// left of the division. Other bits say nothing.
+#[inline(always)]
+fn end_is_zero(simd: Avx2, quotient: Lanes) -> Lanes {
+    simd.is_zero_u16(simd.xor(quotient, simd.shr::<16>(quotient)))
 }
 
 /// Refuses bytes at the front until a packet with a right CRC stands there, or few are left.
@@ -166,11 +226,8 @@ fn sweep_in<F: Framing, const TO_SLAVE: bool, const TO_MASTER: bool>(
 /// The places where a header stands.
 #[inline(always)]
 fn headers<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, block: &[u8; BLOCK]) -> u64 {
-    simd.places([0, 32].map(|at| {
-        let lanes = simd.load(block, at);
-        let is_long = is_long_header::<TO_SLAVE, TO_MASTER>(simd, lanes);
-        if TO_SLAVE { simd.or(is_long, simd.is(lanes, READ)) } else { is_long }
-    }))
+    let first = is_header::<TO_SLAVE, TO_MASTER>(simd, simd.load(block, 0));
+    simd.places([first, is_header::<TO_SLAVE, TO_MASTER>(simd, simd.load(block, 32))])
 }
 
 /// The eight bytes from a place on.
@@ -191,6 +248,5 @@ fn are_right<const TO_SLAVE: bool>(simd: Avx2, words: [u64; 4]) -> u32 {
         let bits = simd.and(simd.is(packets, READ), simd.each(half));
         message = simd.shl_by(message, bits);
     }
-    let is_right = simd.is_zero_u16(quotient(simd, message));
-    simd.mask(is_right) & 0x0101_0101
+    simd.mask(end_is_zero(simd, quotient(simd, message))) & 0x0101_0101
 }

@@ -3,7 +3,7 @@
 use core::marker::PhantomData;
 
 #[cfg(feature = "simd")]
-use super::simd::Lookout;
+use super::simd::{GoodRun, Run};
 use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
 
 /// Frames of a slice that is already in memory, borrowed from it.
@@ -31,7 +31,7 @@ pub struct Frames<'a, F> {
     rest: &'a [u8],
     ledger: Ledger,
     #[cfg(feature = "simd")]
-    lookout: Lookout,
+    run: Run,
     framing: PhantomData<fn() -> F>,
 }
 
@@ -43,7 +43,7 @@ impl<'a, F: Framing> Frames<'a, F> {
             rest: bytes,
             ledger: Ledger::new(),
             #[cfg(feature = "simd")]
-            lookout: Lookout::new(),
+            run: Run::new(),
             framing: PhantomData,
         }
     }
@@ -60,6 +60,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     ///
     /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
     // Rare: not to be compiled into the loop that takes the frames.
+    #[cold]
     #[inline(never)]
     pub fn idle(&mut self) {
         if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {
@@ -68,10 +69,30 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
+    /// A frame of so many bytes that is booked.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    fn take(&mut self, len: usize) -> Option<F::Frame<'a>> {
+        let (frame, rest) = self.rest.split_at_checked(len)?;
+        self.rest = rest;
+        F::view(frame)
+    }
+
     /// Where every byte went so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        self.ledger.counters(self.rest.len())
+        let counters = self.ledger.counters(self.rest.len());
+        #[cfg(feature = "simd")]
+        let counters = {
+            let GoodRun { frames, len } = self.run.unclaimed::<F>(self.rest);
+            Counters {
+                received: counters.received.wrapping_sub(len as u64),
+                framed: counters.framed.wrapping_sub(len as u64),
+                frames: counters.frames.wrapping_sub(frames as u64),
+                ..counters
+            }
+        };
+        counters
     }
 }
 
@@ -88,12 +109,13 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
     #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
         #[cfg(feature = "simd")]
-        if let Some(len) = self.lookout.next::<F>(self.rest)
-            && let Some((frame, rest)) = self.rest.split_at_checked(len)
-        {
-            self.rest = rest;
-            self.ledger.frame(len);
-            return F::view(frame);
+        if self.run.goes_on::<F>(self.rest, &mut self.ledger) {
+            // A branch: a length that is looked up would have to be waited for.
+            return if F::is_short(self.rest) {
+                self.take(F::MIN_LEN)
+            } else {
+                self.take(F::MAX_LEN)
+            };
         }
         let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
         let Front::Frame { len } = front else {

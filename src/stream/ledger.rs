@@ -110,13 +110,13 @@ impl Counters {
 #[derive(Clone, Debug)]
 pub(super) struct Ledger {
     framed: u64,
-    frames: u64,
     /// Bytes in all gaps; those that no other count claims are [`Reason::Header`].
     skipped: u64,
     length: u64,
     id: u64,
     crc: u64,
     idle: u64,
+    frames: u64,
     gaps: u64,
     /// Why the gap that is open began.
     gap: Option<Reason>,
@@ -145,6 +145,15 @@ impl Ledger {
     pub(super) fn frame(&mut self, len: usize) {
         self.framed = self.framed.wrapping_add(len as u64);
         self.frames = self.frames.wrapping_add(1);
+        self.gap = None;
+    }
+
+    /// So many frames of so many bytes together, booked before they are handed out.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    pub(super) fn frames(&mut self, frames: usize, len: usize) {
+        self.framed = self.framed.wrapping_add(len as u64);
+        self.frames = self.frames.wrapping_add(frames as u64);
         self.gap = None;
     }
 

@@ -2,15 +2,15 @@
 
 use core::marker::PhantomData;
 
-use super::{Framing, Verdict};
+use super::{Framing, Verdict, ledger::Ledger};
 
-/// Frames that [`Framing::look_ahead`] sees: bit `n` stands for the place `n` bytes behind the front.
+/// Good frames at the front, one behind the other, as [`Framing::good_run`] sees them.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-pub struct Ahead {
-    /// Where a frame of [`Framing::MAX_LEN`] bytes begins.
-    pub long: u64,
-    /// Where a frame of [`Framing::MIN_LEN`] bytes begins.
-    pub short: u64,
+pub struct GoodRun {
+    /// How many.
+    pub frames: usize,
+    /// All of them together, bytes.
+    pub len: usize,
 }
 
 /// What [`Framing::sweep`] has refused.
@@ -55,58 +55,68 @@ impl<F: Framing> Framing for Portable<F> {
     }
 }
 
-/// Frames known to be good that have not been handed out, and when to look for more.
+/// A run of frames known to be good, booked before they are handed out, and when to look for the next.
+///
+/// Nothing here is written in one turn of a loop and read in the next: turns would wait for each
+/// other.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lookout {
-    ahead: Ahead,
-    /// Frames to judge one by one before looking ahead is worth a try.
-    wait: u32,
+pub(super) struct Run {
+    /// The run goes on while more bytes than this follow.
+    end: usize,
+    /// To look again when no more than this follow.
+    next_look: usize,
+    /// From a vain look to the next one, bytes.
+    wait: usize,
 }
 
-/// A look is worth its price where it shows so many frames.
-const WORTH: u32 = 3;
+/// So few frames are judged one by one.
+const WORTH: usize = 4;
 
-/// After one that was not, so many frames are judged one by one.
-const WAIT: u32 = 8;
+/// A look was worth its price if it showed so many.
+const MANY: usize = 24;
 
-impl Lookout {
-    #[inline(always)]
-    pub(super) fn new() -> Self {
-        Self { ahead: Ahead::default(), wait: 0 }
+/// The longest wait, bytes: what is lost when good frames come at last.
+const LONGEST_WAIT: usize = 4096;
+
+impl Run {
+    pub(super) const fn new() -> Self {
+        Self { end: usize::MAX, next_look: usize::MAX, wait: 1 }
     }
 
-    /// The length of the frame at the front of `rest`, if it is known to be one.
+    /// Is a good frame known to be at the front of `rest`?
     #[inline(always)]
-    pub(super) fn next<F: Framing>(&mut self, rest: &[u8]) -> Option<usize> {
-        if !F::LOOKS_AHEAD {
-            return None;
-        }
-        if let Some(len) = self.take::<F>() {
-            return Some(len);
-        }
-        if self.wait > 0 {
-            self.wait -= 1;
-            return None;
-        }
-        self.ahead = F::look_ahead(rest);
-        if (self.ahead.long | self.ahead.short).count_ones() < WORTH {
-            self.wait = WAIT;
-        }
-        self.take::<F>()
+    pub(super) fn goes_on<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> bool {
+        F::HAS_RUNS
+            && (rest.len() > self.end
+                || rest.len() <= self.next_look && self.begins::<F>(rest, ledger))
     }
 
-    #[inline(always)]
-    fn take<F: Framing>(&mut self) -> Option<usize> {
-        let len = if self.ahead.long & 1 == 1 {
-            F::MAX_LEN
-        } else if self.ahead.short & 1 == 1 {
-            F::MIN_LEN
-        } else {
-            return None;
-        };
-        let shifted = |places: u64| u32::try_from(len).ok().and_then(|len| places.checked_shr(len));
-        self.ahead.long = shifted(self.ahead.long).unwrap_or(0);
-        self.ahead.short = shifted(self.ahead.short).unwrap_or(0);
-        Some(len)
+    /// Cold, so that the loop around it keeps its registers.
+    #[cold]
+    #[inline(never)]
+    fn begins<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> bool {
+        let GoodRun { frames, len } = F::good_run(rest);
+        // Where damage is dense, looks cost more than they save.
+        self.wait = if frames >= MANY { 1 } else { (4 * self.wait).min(LONGEST_WAIT) };
+        let is_known = frames >= WORTH && len <= rest.len();
+        let behind = if is_known { rest.len() - len } else { rest.len() };
+        self.end = if is_known { behind } else { usize::MAX };
+        // What ends a run is judged first: often it is damaged.
+        self.next_look = behind.saturating_sub(self.wait);
+        if is_known {
+            ledger.frames(frames, len);
+        }
+        is_known
+    }
+
+    /// What is booked and not handed out.
+    pub(super) fn unclaimed<F: Framing>(&self, mut rest: &[u8]) -> GoodRun {
+        let mut unclaimed = GoodRun { frames: 0, len: rest.len().saturating_sub(self.end) };
+        while rest.len() > self.end {
+            unclaimed.frames += 1;
+            let len = if F::is_short(rest) { F::MIN_LEN } else { F::MAX_LEN };
+            rest = rest.get(len..).unwrap_or_default();
+        }
+        unclaimed
     }
 }

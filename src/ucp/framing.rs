@@ -51,6 +51,9 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
     }
 
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
+    const SWEEPS_BEHIND: usize = 0;
+
+    #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         lanes::sweep::<Self, CAP>(bytes)
