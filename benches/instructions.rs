@@ -28,10 +28,7 @@ enum Kind {
 }
 
 #[rustfmt::skip]
-const KINDS: [(&str, Kind); 19] = [
-    ("ikeya8_simd", Kind::Stream(streams::responses, IKEYA.frames_simd)),
-    ("mixed_simd", Kind::Stream(streams::requests_and_responses, IKEYA.frames_simd)),
-    ("ucp_simd", Kind::Stream(streams::reports, UCP.frames_simd)),
+const KINDS: [(&str, Kind); 16] = [
     ("ikeya8_frames", Kind::Stream(streams::responses, IKEYA.frames)),
     ("ikeya_mixed_frames", Kind::Stream(streams::requests_and_responses, IKEYA.frames)),
     ("ucp44_frames", Kind::Stream(streams::reports, UCP.frames)),

@@ -68,7 +68,8 @@ fn run_in<const TO_SLAVE: bool, const TO_MASTER: bool>(simd: Avx2, bytes: &[u8])
         let shorts = (short & in_front).count_ones() as usize;
         run.frames += longs + shorts;
         run.len += longs * LONG + shorts * ReadRequest::LEN;
-        if run.len < start + PLACES {
+        run.is_cut = run.len < start + PLACES;
+        if run.is_cut {
             break;
         }
     }

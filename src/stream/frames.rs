@@ -84,7 +84,7 @@ impl<'a, F: Framing> Frames<'a, F> {
         let counters = self.ledger.counters(self.rest.len());
         #[cfg(feature = "simd")]
         let counters = {
-            let GoodRun { frames, len } = self.run.unclaimed::<F>(self.rest);
+            let GoodRun { frames, len, .. } = self.run.unclaimed::<F>(self.rest);
             Counters {
                 received: counters.received.wrapping_sub(len as u64),
                 framed: counters.framed.wrapping_sub(len as u64),

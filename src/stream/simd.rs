@@ -11,6 +11,8 @@ pub struct GoodRun {
     pub frames: usize,
     /// All of them together, bytes.
     pub len: usize,
+    /// None stands behind them, or none of these lengths.
+    pub is_cut: bool,
 }
 
 /// What [`Framing::sweep`] has refused.
@@ -73,10 +75,10 @@ pub(super) struct Run {
 const WORTH: usize = 4;
 
 /// A look was worth its price if it showed so many.
-const MANY: usize = 24;
+const MANY: usize = 28;
 
 /// The longest wait, bytes: what is lost when good frames come at last.
-const LONGEST_WAIT: usize = 4096;
+const LONGEST_WAIT: usize = 1 << 14;
 
 impl Run {
     pub(super) const fn new() -> Self {
@@ -95,14 +97,14 @@ impl Run {
     #[cold]
     #[inline(never)]
     fn begins<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> bool {
-        let GoodRun { frames, len } = F::good_run(rest);
+        let GoodRun { frames, len, is_cut } = F::good_run(rest);
         // Where damage is dense, looks cost more than they save.
-        self.wait = if frames >= MANY { 1 } else { (4 * self.wait).min(LONGEST_WAIT) };
+        self.wait =
+            if frames < MANY { (4 * self.wait).min(LONGEST_WAIT) } else { (self.wait / 4).max(1) };
         let is_known = frames >= WORTH && len <= rest.len();
         let behind = if is_known { rest.len() - len } else { rest.len() };
         self.end = if is_known { behind } else { usize::MAX };
-        // What ends a run is judged first: often it is damaged.
-        self.next_look = behind.saturating_sub(self.wait);
+        self.next_look = behind - if frames < MANY || is_cut { self.wait.min(behind) } else { 0 };
         if is_known {
             ledger.frames(frames, len);
         }
@@ -111,7 +113,7 @@ impl Run {
 
     /// What is booked and not handed out.
     pub(super) fn unclaimed<F: Framing>(&self, mut rest: &[u8]) -> GoodRun {
-        let mut unclaimed = GoodRun { frames: 0, len: rest.len().saturating_sub(self.end) };
+        let mut unclaimed = GoodRun { len: rest.len().saturating_sub(self.end), ..GoodRun::default() };
         while rest.len() > self.end {
             unclaimed.frames += 1;
             let len = if F::is_short(rest) { F::MIN_LEN } else { F::MAX_LEN };
