@@ -13,7 +13,7 @@ use arbitrary::{Result, Unstructured};
 use axlewire::{
     error::EncodeError,
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Encode, Frames, Framing},
+    stream::{Encode, Frames, Framing, Portable},
     ucp::{self, Body, Message, RawFrame, Report, Telemetry},
 };
 
@@ -96,6 +96,9 @@ impl<'a> Script<'a> {
         self.repair.repair::<F>(&mut stream);
         Line::<F, N>::new().play(&stream, &self.ops);
         iterate::<F>(&stream);
+        iterate::<Portable<F>>(&stream);
+        // Feature `simd` looks at 64 places at once: more than most inputs have.
+        iterate::<F>(&stream.repeat(8));
     }
 }
 

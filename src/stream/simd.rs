@@ -113,7 +113,8 @@ impl Run {
 
     /// What is booked and not handed out.
     pub(super) fn unclaimed<F: Framing>(&self, mut rest: &[u8]) -> GoodRun {
-        let mut unclaimed = GoodRun { len: rest.len().saturating_sub(self.end), ..GoodRun::default() };
+        let mut unclaimed =
+            GoodRun { len: rest.len().saturating_sub(self.end), ..GoodRun::default() };
         while rest.len() > self.end {
             unclaimed.frames += 1;
             let len = if F::is_short(rest) { F::MIN_LEN } else { F::MAX_LEN };
