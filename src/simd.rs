@@ -26,6 +26,7 @@ pub(crate) fn with_avx2<R>(work: impl FnOnce(Avx2) -> R) -> Option<R> {
     ))
 }
 
+#[cfg_attr(not(feature = "ikeya"), allow(dead_code, reason = "UCP needs few of them"))]
 impl Avx2 {
     /// 32 bytes from `at` on; zeros where the block has less.
     #[inline(always)]

@@ -85,8 +85,8 @@ pub trait Framing {
     /// Which frames stand at the front, one behind the other, as far as it is cheaper to judge them
     /// together than one by one. Needs feature `simd`.
     ///
-    /// All of [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and never more than `judge` would find: they are handed out without being judged again. It may be
-    /// fewer.
+    /// All have [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and each is one that
+    /// `judge` would find there: they are handed out without being judged again. There may be more.
     #[cfg(feature = "simd")]
     #[inline(always)]
     fn good_run(_bytes: &[u8]) -> GoodRun {

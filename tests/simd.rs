@@ -183,10 +183,10 @@ fn a_decoder_that_sweeps_gives_what_one_that_does_not_gives() {
     }
 }
 
-fn events<F: Known>(
-    stream: &[u8],
-    chunk: usize,
-) -> (Vec<Result<Vec<u8>, (u64, Reason)>>, Counters) {
+/// The bytes of a frame, or length and reason of a gap.
+type Seen = Result<Vec<u8>, (u64, Reason)>;
+
+fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
     let mut decoder = Decoder::<F, 8>::new();
     let mut events = Vec::new();
     for mut piece in stream.chunks(chunk) {
@@ -254,7 +254,10 @@ fn a_framing_that_lies_about_runs_hangs_nothing() {
             let mut frames = Frames::<Liar<LIE>>::new(&bytes);
             assert!(frames.by_ref().take(len + 1).count() <= len / 2, "lie {LIE} is told for ever");
             frames.idle();
-            assert_eq!(frames.counters().received, frames.counters().framed + frames.counters().skipped() + frames.rest().len() as u64);
+            assert_eq!(
+                frames.counters().received,
+                frames.counters().framed + frames.counters().skipped() + frames.rest().len() as u64
+            );
             let mut decoder = Decoder::<Liar<LIE>, 4>::new();
             let mut input = &bytes[..];
             let events = std::iter::from_fn(|| decoder.decode(&mut input).map(drop));

@@ -60,7 +60,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     ///
     /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
     // Rare: not to be compiled into the loop that takes the frames.
-    #[cold]
+    #[cfg_attr(feature = "simd", cold)]
     #[inline(never)]
     pub fn idle(&mut self) {
         if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {

@@ -11,7 +11,7 @@ pub struct GoodRun {
     pub frames: usize,
     /// All of them together, bytes.
     pub len: usize,
-    /// None stands behind them, or none of these lengths.
+    /// What stands behind them is no such frame: not worth a second look.
     pub is_cut: bool,
 }
 
@@ -71,10 +71,11 @@ pub(super) struct Run {
     wait: usize,
 }
 
-/// So few frames are judged one by one.
+/// Fewer frames than this are judged one by one: a run that ends at once costs a branch that the
+/// processor did not foresee.
 const WORTH: usize = 4;
 
-/// A look was worth its price if it showed so many.
+/// A look pays where it shows so many frames: all that Ikeya's can, or nearly.
 const MANY: usize = 28;
 
 /// The longest wait, bytes: what is lost when good frames come at last.
