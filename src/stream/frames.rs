@@ -2,9 +2,11 @@
 
 use core::marker::PhantomData;
 
+#[cfg(not(feature = "simd"))]
+use super::search;
 #[cfg(feature = "simd")]
 use super::simd::{GoodRun, Run};
-use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
+use super::{Counters, Framing, Front, Verdict, ledger::Ledger};
 
 /// Frames of a slice that is already in memory, borrowed from it.
 ///
@@ -109,7 +111,7 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
     #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
         #[cfg(feature = "simd")]
-        if self.run.goes_on::<F>(self.rest, &mut self.ledger) {
+        if self.run.goes_on::<F>(self.rest) {
             // A branch: a length that is looked up would have to be waited for.
             return if F::is_short(self.rest) {
                 self.take(F::MIN_LEN)
@@ -117,6 +119,9 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
                 self.take(F::MAX_LEN)
             };
         }
+        #[cfg(feature = "simd")]
+        let (found, front) = self.run.search::<F>(self.rest, &mut self.ledger);
+        #[cfg(not(feature = "simd"))]
         let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
         let Front::Frame { len } = front else {
             self.rest = found;

@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use super::{Framing, Verdict, ledger::Ledger};
+use super::{Framing, Front, Verdict, ledger::Ledger, search, search_through};
 
 /// Good frames at the front, one behind the other, as [`Framing::good_run`] sees them.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -88,16 +88,48 @@ impl Run {
 
     /// Is a good frame known to be at the front of `rest`?
     #[inline(always)]
-    pub(super) fn goes_on<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> bool {
-        F::HAS_RUNS
-            && (rest.len() > self.end
-                || rest.len() <= self.next_look && self.begins::<F>(rest, ledger))
+    pub(super) fn goes_on<F: Framing>(&self, rest: &[u8]) -> bool {
+        F::HAS_RUNS && rest.len() > self.end
+    }
+
+    /// [`search`], which may begin a run.
+    #[inline(always)]
+    pub(super) fn search<'b, F: Framing>(
+        &mut self,
+        bytes: &'b [u8],
+        ledger: &mut Ledger,
+    ) -> (&'b [u8], Front) {
+        if !F::HAS_RUNS {
+            return search::<F>(bytes, ledger, Ledger::refuse);
+        }
+        if bytes.len() > self.next_look {
+            match F::judge(bytes) {
+                Verdict::Frame { len } => return (bytes, Front::Frame { len }),
+                Verdict::Partial { need } => return (bytes, Front::Partial { need }),
+                Verdict::Reject { .. } => {}
+            }
+        }
+        self.look_or_search::<F>(bytes, ledger)
     }
 
     /// Cold, so that the loop around it keeps its registers.
     #[cold]
     #[inline(never)]
-    fn begins<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> bool {
+    fn look_or_search<'b, F: Framing>(
+        &mut self,
+        bytes: &'b [u8],
+        ledger: &mut Ledger,
+    ) -> (&'b [u8], Front) {
+        if bytes.len() <= self.next_look
+            && let Some(len) = self.begin::<F>(bytes, ledger)
+        {
+            return (bytes, Front::Frame { len });
+        }
+        search_through::<F>(bytes, ledger, Ledger::refuse)
+    }
+
+    /// Looks for a run; the length of its first frame, which is not booked yet.
+    fn begin<F: Framing>(&mut self, rest: &[u8], ledger: &mut Ledger) -> Option<usize> {
         let GoodRun { frames, len, is_cut } = F::good_run(rest);
         // Where damage is dense, looks cost more than they save.
         self.wait =
@@ -106,10 +138,11 @@ impl Run {
         let behind = if is_known { rest.len() - len } else { rest.len() };
         self.end = if is_known { behind } else { usize::MAX };
         self.next_look = behind - if frames < MANY || is_cut { self.wait.min(behind) } else { 0 };
-        if is_known {
-            ledger.frames(frames, len);
-        }
-        is_known
+        is_known.then(|| {
+            let first = front_len::<F>(rest);
+            ledger.frames(frames - 1, len.saturating_sub(first));
+            first
+        })
     }
 
     /// What is booked and not handed out.
@@ -118,9 +151,12 @@ impl Run {
             GoodRun { len: rest.len().saturating_sub(self.end), ..GoodRun::default() };
         while rest.len() > self.end {
             unclaimed.frames += 1;
-            let len = if F::is_short(rest) { F::MIN_LEN } else { F::MAX_LEN };
-            rest = rest.get(len..).unwrap_or_default();
+            rest = rest.get(front_len::<F>(rest)..).unwrap_or_default();
         }
         unclaimed
     }
+}
+
+fn front_len<F: Framing>(rest: &[u8]) -> usize {
+    if F::is_short(rest) { F::MIN_LEN } else { F::MAX_LEN }
 }
