@@ -120,12 +120,11 @@ impl Run {
         bytes: &'b [u8],
         ledger: &mut Ledger,
     ) -> (&'b [u8], Front) {
-        if bytes.len() <= self.next_look
-            && let Some(len) = self.begin::<F>(bytes, ledger)
-        {
-            return (bytes, Front::Frame { len });
+        let is_due = bytes.len() <= self.next_look;
+        match if is_due { self.begin::<F>(bytes, ledger) } else { None } {
+            Some(len) => (bytes, Front::Frame { len }),
+            None => search_through::<F>(bytes, ledger, Ledger::refuse),
         }
-        search_through::<F>(bytes, ledger, Ledger::refuse)
     }
 
     /// Looks for a run; the length of its first frame, which is not booked yet.
