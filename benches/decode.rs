@@ -38,6 +38,7 @@ fn sent(criterion: &mut Criterion, stream: &Stream) {
     let expected = (protocol.oracle)(bytes);
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
+    bench(&mut group, "axlewire Frames, SIMD", bytes, expected, protocol.frames_simd);
     for chunk in [4096, 512, 64, 7, 1] {
         let decode = |bytes: &[u8]| (protocol.decoder)(bytes, chunk);
         bench(&mut group, &format!("axlewire Decoder by {chunk}"), bytes, expected, decode);
@@ -52,6 +53,7 @@ fn hostile(criterion: &mut Criterion, stream: &Stream) {
     let expected = (protocol.oracle)(bytes);
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
+    bench(&mut group, "axlewire Frames, SIMD", bytes, expected, protocol.frames_simd);
     let decode = |bytes: &[u8]| (protocol.decoder)(bytes, 4096);
     bench(&mut group, "axlewire Decoder by 4096", bytes, expected, decode);
     bench_c(&mut group, stream);

@@ -11,6 +11,8 @@ pub mod race;
 pub mod reference;
 pub mod streams;
 
+use axlewire::{ikeya, stream::Portable, ucp};
+
 /// What a decoder found. All decoders of the same bytes can be compared by it.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[repr(C)]
@@ -39,6 +41,8 @@ pub struct Protocol {
     pub name: &'static str,
     /// `axlewire::stream::Frames` over the whole slice.
     pub frames: fn(&[u8]) -> Tally,
+    /// The same with feature `simd`; everything else here is as without.
+    pub frames_simd: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Decoder`, fed with pieces of so many bytes.
     pub decoder: fn(&[u8], usize) -> Tally,
     /// The same, with each byte pushed as a receive interrupt does.
@@ -51,28 +55,34 @@ pub struct Protocol {
     pub oracle: fn(&[u8]) -> Tally,
     /// Where the frames end that axlewire finds.
     pub frame_ends: fn(&[u8]) -> Vec<usize>,
+    /// The same with feature `simd`.
+    pub frame_ends_simd: fn(&[u8]) -> Vec<usize>,
 }
 
 /// Ikeya MD, both directions on one line.
 pub const IKEYA: Protocol = Protocol {
     name: "Ikeya",
-    frames: ours::frames::<axlewire::ikeya::Either>,
-    decoder: ours::decoder::<axlewire::ikeya::Either, { axlewire::ikeya::MAX_LEN }>,
-    pushed: ours::pushed::<axlewire::ikeya::Either, { axlewire::ikeya::MAX_LEN }>,
+    frames: ours::frames::<Portable<ikeya::Either>>,
+    frames_simd: ours::frames::<ikeya::Either>,
+    decoder: ours::decoder::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
+    pushed: ours::pushed::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
     c_table: reference::ikeya_table,
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
-    frame_ends: ours::frame_ends::<axlewire::ikeya::Either>,
+    frame_ends: ours::frame_ends::<Portable<ikeya::Either>>,
+    frame_ends_simd: ours::frame_ends::<ikeya::Either>,
 };
 
 /// UCP with the default cap of 64-byte frames.
 pub const UCP: Protocol = Protocol {
     name: "UCP",
-    frames: ours::frames::<axlewire::ucp::Ucp>,
-    decoder: ours::decoder::<axlewire::ucp::Ucp, { axlewire::ucp::MAX_LEN }>,
-    pushed: ours::pushed::<axlewire::ucp::Ucp, { axlewire::ucp::MAX_LEN }>,
+    frames: ours::frames::<Portable<ucp::Ucp>>,
+    frames_simd: ours::frames::<ucp::Ucp>,
+    decoder: ours::decoder::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
+    pushed: ours::pushed::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
     c_table: reference::ucp_table,
     c_bitwise: reference::ucp_bitwise,
     oracle: oracle::ucp,
-    frame_ends: ours::frame_ends::<axlewire::ucp::Ucp>,
+    frame_ends: ours::frame_ends::<Portable<ucp::Ucp>>,
+    frame_ends_simd: ours::frame_ends::<ucp::Ucp>,
 };

@@ -8,7 +8,7 @@
 
 use std::{env, hint::black_box};
 
-use axlewire::{crc16, ucp::Ucp};
+use axlewire::{crc16, stream::Portable, ucp::Ucp};
 use axlewire_benches::{
     Tally, ours, peers,
     race::{Contender, race},
@@ -67,16 +67,23 @@ fn main() {
     let peers = PeerTimes::measure(&effort);
 
     let of = |name: &str| hostile.iter().find(|pattern| pattern.name == name).expect("is listed");
-    let worst = hostile
-        .iter()
-        .filter(|pattern| !pattern.name.ends_with("noise") && pattern.name != LONGEST_CANDIDATES)
-        .map(|pattern| pattern.over_c)
-        .fold(f64::INFINITY, f64::min);
+    let worst = |over_c: fn(&Pattern) -> f64| {
+        hostile
+            .iter()
+            .filter(|pattern| {
+                !pattern.name.ends_with("noise") && pattern.name != LONGEST_CANDIDATES
+            })
+            .map(over_c)
+            .fold(f64::INFINITY, f64::min)
+    };
 
     let [ikeya8, mixed, ucp44] = &clean;
     print("ikeya8_frames_over_c", ikeya8.c / ikeya8.frames, 4.2);
+    print("ikeya8_frames_over_c_simd", ikeya8.c / ikeya8.frames_simd, 9.5);
     print("ikeya_mixed_over_c", mixed.c / mixed.frames, 4.2);
+    print("ikeya_mixed_over_c_simd", mixed.c / mixed.frames_simd, 5.0);
     print("ucp44_frames_over_c", ucp44.c / ucp44.frames, 8.5);
+    print("ucp44_frames_over_c_simd", ucp44.c / ucp44.frames_simd, 12.5);
     print("ikeya8_decoder4096_over_frames", ikeya8.frames / ikeya8.decoder_4096, 0.85);
     print("ucp44_decoder4096_over_frames", ucp44.frames / ucp44.decoder_4096, 0.85);
     print("ikeya8_decoder1_over_c", ikeya8.c / ikeya8.decoder_1, 1.0);
@@ -85,8 +92,11 @@ fn main() {
     print("crc6_over_best_crate", crc_6.best_crate() / crc_6.ours, 1.0);
     print("crc42_over_best_crate", crc_42.best_crate() / crc_42.ours, 1.0);
     print("noise_ikeya_over_c", of("Ikeya noise").over_c, 1.0);
+    print("noise_ikeya_over_c_simd", of("Ikeya noise").over_c_simd, 12.0);
     print("noise_ucp_over_c", of("UCP noise").over_c, 1.0);
-    print("hostile_worst_over_c", worst, 0.45);
+    print("noise_ucp_over_c_simd", of("UCP noise").over_c_simd, 12.0);
+    print("hostile_worst_over_c", worst(|pattern| pattern.over_c), 0.45);
+    print("hostile_worst_over_c_simd", worst(|pattern| pattern.over_c_simd), 0.45);
     print("ucp44_over_mavlink", peers.mavlink / peers.ucp_44, 8.0);
     print("ucp44_over_modbus_core", peers.modbus_core_43 / peers.ucp_44, 6.5);
     print("ucp44_over_ublox", peers.ublox / peers.ucp_44, 1.8);
@@ -102,6 +112,7 @@ fn main() {
     for pattern in &hostile {
         let name = pattern.name.to_lowercase().replace(' ', "_");
         print(&format!("hostile_{name}_over_c"), pattern.over_c, None);
+        print(&format!("hostile_{name}_over_c_simd"), pattern.over_c_simd, None);
     }
     caps(&effort);
     for (name, make) in STREAMS {
@@ -131,6 +142,7 @@ struct StreamTimes {
     len: usize,
     c: f64,
     frames: f64,
+    frames_simd: f64,
     decoder_4096: f64,
     decoder_1: f64,
 }
@@ -141,16 +153,17 @@ impl StreamTimes {
         let bytes = &bytes[..];
         let all = (protocol.oracle)(bytes);
         assert_eq!(all.frames, intact.len() as u64, "{name}: the oracle");
-        let [c, frames, decoder_4096, decoder_1] = race(
+        let [c, frames, frames_simd, decoder_4096, decoder_1] = race(
             effort.rounds,
             [
                 Contender::new("C", all, || (protocol.c_table)(bytes)),
                 Contender::new("Frames", all, || (protocol.frames)(bytes)),
+                Contender::new("Frames, SIMD", all, || (protocol.frames_simd)(bytes)),
                 Contender::new("Decoder by 4096", all, || (protocol.decoder)(bytes, 4096)),
                 Contender::new("Decoder, pushed", all, || (protocol.pushed)(bytes)),
             ],
         );
-        Self { len: bytes.len(), c, frames, decoder_4096, decoder_1 }
+        Self { len: bytes.len(), c, frames, frames_simd, decoder_4096, decoder_1 }
     }
 
     /// Of all figures the ones that depend most on the machine.
@@ -158,6 +171,7 @@ impl StreamTimes {
         for (decoder, seconds) in [
             ("c", self.c),
             ("frames", self.frames),
+            ("frames_simd", self.frames_simd),
             ("decoder4096", self.decoder_4096),
             ("decoder1", self.decoder_1),
         ] {
@@ -171,12 +185,15 @@ impl StreamTimes {
 fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
     let protocol = clean.protocol;
     let sent = (protocol.oracle)(&clean.bytes);
-    for (one_in, rate, goal) in
-        [(100_000, "1e-5", None), (10_000, "1e-4", Some(0.85)), (1000, "1e-3", Some(0.5))]
-    {
+    for (one_in, rate, goal, goal_simd) in [
+        (100_000, "1e-5", None, None),
+        (10_000, "1e-4", Some(0.85), Some(0.7)),
+        (1000, "1e-3", Some(0.5), Some(0.4)),
+    ] {
         let damaged = clean.with_bit_errors(one_in);
         let intact = &damaged.intact;
         let ends = (protocol.frame_ends)(&damaged.bytes);
+        assert!(ends == (protocol.frame_ends_simd)(&damaged.bytes), "{}: SIMD", damaged.name);
         let found = intact.iter().filter(|end| ends.binary_search(end).is_ok()).count();
         assert_eq!(found, intact.len(), "{}: intact frames were lost", damaged.name);
 
@@ -188,14 +205,19 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
         println!("recovered_{name}_{rate}_c_percent {:.4} -", percent(by_c as f64));
 
         let expected = (protocol.oracle)(&damaged.bytes);
-        let [clean_time, damaged_time] = race(
+        let times = race(
             effort.rounds,
             [
                 Contender::new(&clean.name, sent, || (protocol.frames)(&clean.bytes)),
                 Contender::new(&damaged.name, expected, || (protocol.frames)(&damaged.bytes)),
+                Contender::new(&clean.name, sent, || (protocol.frames_simd)(&clean.bytes)),
+                Contender::new(&damaged.name, expected, || (protocol.frames_simd)(&damaged.bytes)),
             ],
         );
-        print(&format!("speed_{name}_{rate}_over_clean"), clean_time / damaged_time, goal);
+        let [clean_time, damaged_time, clean_simd, damaged_simd] = times;
+        let speed = format!("speed_{name}_{rate}_over_clean");
+        print(&speed, clean_time / damaged_time, goal);
+        print(&format!("{speed}_simd"), clean_simd / damaged_simd, goal_simd);
     }
 }
 
@@ -203,6 +225,7 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
 struct Pattern {
     name: String,
     over_c: f64,
+    over_c_simd: f64,
 }
 
 /// Its candidates have 64 bytes, the cap. The goal is for at most 44.
@@ -213,14 +236,15 @@ fn hostile(effort: &Effort) -> Vec<Pattern> {
         let expected = (protocol.oracle)(&bytes);
         // C loses frames that chance made, always the same ones.
         let by_c = (protocol.c_table)(&bytes);
-        let [c, frames] = race(
+        let [c, frames, frames_simd] = race(
             effort.rounds,
             [
                 Contender::new("C", by_c, || (protocol.c_table)(&bytes)),
                 Contender::new(&name, expected, || (protocol.frames)(&bytes)),
+                Contender::new(&name, expected, || (protocol.frames_simd)(&bytes)),
             ],
         );
-        Pattern { name, over_c: c / frames }
+        Pattern { name, over_c: c / frames, over_c_simd: c / frames_simd }
     };
     streams::hostile(effort.hostile_len).into_iter().map(measure).collect()
 }
@@ -229,11 +253,11 @@ type Decode = fn(&[u8]) -> Tally;
 
 /// Caps of the length field, and `Frames` with each.
 const CAPS: [(u8, Decode); 5] = [
-    (24, ours::frames::<Ucp<24>>),
-    (40, ours::frames::<Ucp<40>>),
-    (60, ours::frames::<Ucp<60>>),
-    (124, ours::frames::<Ucp<124>>),
-    (252, ours::frames::<Ucp<252>>),
+    (24, ours::frames::<Portable<Ucp<24>>>),
+    (40, ours::frames::<Portable<Ucp<40>>>),
+    (60, ours::frames::<Portable<Ucp<60>>>),
+    (124, ours::frames::<Portable<Ucp<124>>>),
+    (252, ours::frames::<Portable<Ucp<252>>>),
 ];
 
 /// What a cap may cost: every fourth byte begins a candidate as long as it allows, and each has to be

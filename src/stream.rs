@@ -25,12 +25,18 @@ mod capture;
 mod decoder;
 mod frames;
 mod ledger;
+#[cfg(feature = "simd")]
+mod portable;
+#[cfg(feature = "simd")]
+mod run;
 
 #[cfg(feature = "alloc")]
 pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
 pub use frames::Frames;
 pub use ledger::{Counters, Gap, Reason};
+#[cfg(feature = "simd")]
+pub use portable::Portable;
 
 use ledger::Ledger;
 
@@ -69,6 +75,17 @@ pub struct Swept {
     pub crc: usize,
 }
 
+/// Good frames at the front, one behind the other, as [`Framing::good_run`] sees them.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub struct GoodRun {
+    /// How many.
+    pub frames: usize,
+    /// All of them together, bytes.
+    pub len: usize,
+    /// What stands behind them is no such frame: not worth a second look.
+    pub is_cut: bool,
+}
+
 /// One protocol's rule for finding frames.
 pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
@@ -86,20 +103,45 @@ pub trait Framing {
     /// `Frame` nor `Reject`, other than that a `Reject` may cover more bytes.
     fn judge(bytes: &[u8]) -> Verdict;
 
+    /// The view of one whole frame, exactly the bytes that `judge` called a frame.
+    ///
+    /// `None` when they are something else, which never follows a [`Verdict::Frame`].
+    fn view(frame: &[u8]) -> Option<Self::Frame<'_>>;
+
     /// Refuses bytes at the front that are cheaper to refuse together than one by one: `judge` would
     /// refuse each of them, for the same reasons, and may go on to refuse what follows.
     ///
     /// Asked on 64-bit machines where refusals come in crowds, about what lies behind one of them. Only
     /// speed is lost where it always refuses nothing, as by default.
-    #[inline]
+    #[inline(always)]
     fn sweep(_bytes: &[u8]) -> Swept {
         Swept::default()
     }
 
-    /// The view of one whole frame, exactly the bytes that `judge` called a frame.
+    /// Does [`good_run`](Self::good_run) ever see one? Without, it is not asked.
+    const HAS_RUNS: bool = false;
+
+    /// Which frames stand at the front, one behind the other, as far as it is cheaper to judge them
+    /// together than one by one.
     ///
-    /// `None` when they are something else, which never follows a [`Verdict::Frame`].
-    fn view(frame: &[u8]) -> Option<Self::Frame<'_>>;
+    /// All have [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and each is one that
+    /// `judge` would find there: [`Frames`] hands them out without judging them again. There may be more.
+    /// Asked with feature `simd` alone.
+    #[inline(always)]
+    fn good_run(_bytes: &[u8]) -> GoodRun {
+        GoodRun::default()
+    }
+
+    /// Does the frame at the front, one of a [`good_run`](Self::good_run), have [`MIN_LEN`](Self::MIN_LEN)
+    /// bytes? Otherwise it has [`MAX_LEN`](Self::MAX_LEN).
+    #[inline(always)]
+    fn is_short(_bytes: &[u8]) -> bool {
+        false
+    }
+
+    /// May `sweep` and `good_run` be compiled for all that the processor can do? With feature `simd`
+    /// alone; see `Portable`.
+    const SIMD: bool = true;
 }
 
 /// What a stream brings: frames, and the gaps between them.
@@ -221,11 +263,23 @@ impl Patience {
 #[cold]
 #[inline(never)]
 fn sweep<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
-    let Swept { len, length, crc } = F::sweep(bytes);
+    let Swept { len, length, crc } = swept::<F>(bytes);
     let Some(behind) = bytes.get(len..) else { return bytes };
     ledger.refuse(Reason::Length, length);
     ledger.refuse(Reason::Crc, crc);
     behind
+}
+
+/// What the framing refuses together; with feature `simd` compiled for all that the processor can do.
+#[inline(always)]
+fn swept<F: Framing>(bytes: &[u8]) -> Swept {
+    #[cfg(feature = "simd")]
+    if F::SIMD {
+        if let Some(swept) = crate::simd::in_avx2(|| F::sweep(bytes)) {
+            return swept;
+        }
+    }
+    F::sweep(bytes)
 }
 
 /// A whole frame that can be sent: it knows its bytes, CRC included.

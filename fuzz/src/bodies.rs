@@ -14,7 +14,7 @@ use axlewire::{
     crc16,
     error::EncodeError,
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Encode, Frames, Framing},
+    stream::{Encode, Frames, Framing, Portable},
     ucp::{self, Body, Message, RawFrame, Report, Telemetry},
 };
 
@@ -97,6 +97,9 @@ impl<'a> Script<'a> {
         self.repair.repair::<F>(&mut stream);
         Line::<F, N>::new().play(&stream, &self.ops);
         iterate::<F>(&stream);
+        iterate::<Portable<F>>(&stream);
+        // Feature `simd` looks at 64 places at once: more than most inputs have.
+        iterate::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
     }
 }
 

@@ -4,13 +4,14 @@ use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
     PositionResponse, ReadRequest, VelocityResponse, WriteRequest,
+    runs::good_run,
     sweep::sweep,
     three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
 use crate::{
     crc16,
-    stream::{Framing, Reason, Swept, Verdict},
+    stream::{Framing, GoodRun, Reason, Swept, Verdict},
 };
 
 /// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
@@ -65,7 +66,19 @@ impl Framing for ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
-    #[inline]
+    const HAS_RUNS: bool = true;
+
+    #[inline(always)]
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        good_run::<true, false>(bytes)
+    }
+
+    #[inline(always)]
+    fn is_short(bytes: &[u8]) -> bool {
+        bytes.first() == Some(&READ)
+    }
+
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, false>(bytes)
     }
@@ -89,15 +102,22 @@ impl Framing for ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
-    #[inline]
+    const HAS_RUNS: bool = true;
+
+    #[inline(always)]
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        good_run::<false, true>(bytes)
+    }
+
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, false, true>(bytes)
     }
 
     #[inline]
     fn view(frame: &[u8]) -> Option<Response<'_>> {
-        match frame.first()? {
-            &VELOCITY => view(frame).map(Response::Velocity),
+        match *frame.first()? {
+            VELOCITY => view(frame).map(Response::Velocity),
             _ => view(frame).map(Response::Position),
         }
     }
@@ -113,16 +133,30 @@ impl Framing for Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
-    #[inline]
+    const HAS_RUNS: bool = true;
+
+    #[inline(always)]
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        good_run::<true, true>(bytes)
+    }
+
+    #[inline(always)]
+    fn is_short(bytes: &[u8]) -> bool {
+        bytes.first() == Some(&READ)
+    }
+
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, true>(bytes)
     }
 
     #[inline]
     fn view(frame: &[u8]) -> Option<Packet<'_>> {
-        match frame.first()? {
-            &READ | &WRITE => ToSlave::view(frame).map(Packet::Request),
-            _ => ToMaster::view(frame).map(Packet::Response),
+        match *frame.first()? {
+            VELOCITY => view(frame).map(Response::Velocity).map(Packet::Response),
+            POSITION => view(frame).map(Response::Position).map(Packet::Response),
+            READ => view(frame).map(Request::Read).map(Packet::Request),
+            _ => view(frame).map(Request::Write).map(Packet::Request),
         }
     }
 }
@@ -137,7 +171,7 @@ impl Framing for three::ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, false>(bytes)
     }
@@ -161,15 +195,15 @@ impl Framing for three::ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, false, true>(bytes)
     }
 
     #[inline]
     fn view(frame: &[u8]) -> Option<three::Response<'_>> {
-        match frame.first()? {
-            &VELOCITY => view(frame).map(three::Response::Velocity),
+        match *frame.first()? {
+            VELOCITY => view(frame).map(three::Response::Velocity),
             _ => view(frame).map(three::Response::Position),
         }
     }
@@ -185,16 +219,18 @@ impl Framing for three::Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
-    #[inline]
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<Self, true, true>(bytes)
     }
 
     #[inline]
     fn view(frame: &[u8]) -> Option<three::Packet<'_>> {
-        match frame.first()? {
-            &READ | &WRITE => three::ToSlave::view(frame).map(three::Packet::Request),
-            _ => three::ToMaster::view(frame).map(three::Packet::Response),
+        match *frame.first()? {
+            VELOCITY => view(frame).map(three::Response::Velocity).map(three::Packet::Response),
+            POSITION => view(frame).map(three::Response::Position).map(three::Packet::Response),
+            READ => view(frame).map(three::Request::Read).map(three::Packet::Request),
+            _ => view(frame).map(three::Request::Write).map(three::Packet::Request),
         }
     }
 }

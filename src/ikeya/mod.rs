@@ -74,6 +74,7 @@
 mod board;
 mod framing;
 mod master;
+mod runs;
 mod schedule;
 pub(crate) mod slave;
 mod sweep;

@@ -10,15 +10,16 @@
 //! As in [`crc16`](crate::crc16), a frame is a multiple of `T = x^15 + x + 1` with an even number of
 //! ones, bit 0 of a word belongs to its highest power, and multiplying by `x` is a shift to the right.
 //! The remainder modulo `T` of the bytes behind a place grows by a word at a time: times `x^16`, plus
-//! the word. Two values of 16 bits share a remainder of 15, and they differ by `T` itself.
+//! the word.
 //!
 //! `x^16 = x^2 + x`: two shifts. They lose bit 0, which ought to become `x^16` and `x^17`, and bit 1,
 //! which ought to become `x^16`: together `(x^2 + x)(b0 x + b0 + b1)`. So adding `b0 x + b0 + b1` to
 //! the word beforehand makes up for it, and that is `(w << 14) + (w << 15)`.
 //!
 //! The initial value 0xFFFF, added to the first word, adds the same remainder to all windows of a
-//! length; each is compared with that instead of with zero. Parity is left out: an odd multiple, one
-//! of 32768 windows by chance, is refused by a single look.
+//! length; each is compared with that instead of with zero. Two values of 16 bits share a remainder of
+//! 15, and they differ by `T`, which has three ones: those bits are left out of the comparison, and so is
+//! parity. What passes without being right, 1 of 8192 windows by chance, is refused by a single look.
 
 use zerocopy::{little_endian::U16, transmute_ref};
 
@@ -96,8 +97,8 @@ fn find_headers<const TO_SLAVE: bool, const TO_MASTER: bool>(
     count
 }
 
-/// Finds the places of a half where a window as long as a packet is a multiple of `T`, 0xFFFF for
-/// yes; all of them ORed.
+/// Finds the places of a half where a window as long as a packet may be a multiple of `T`, 0xFFFF
+/// for yes; all of them ORed.
 #[inline(always)]
 fn find_multiples<F: Framing, const TO_SLAVE: bool>(
     bytes: &[u8; 2 * WORDS],
@@ -114,7 +115,7 @@ fn find_multiples<F: Framing, const TO_SLAVE: bool>(
             initial = times_x16(initial);
             let len = 2 * next + 2;
             if len == F::MAX_LEN || (TO_SLAVE && len == ReadRequest::LEN) {
-                multiple |= flag(remainder == initial) | flag(remainder == initial ^ TRINOMIAL);
+                multiple |= flag((remainder ^ initial) & !TRINOMIAL == 0);
             }
         }
         found[lane] = multiple;

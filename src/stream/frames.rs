@@ -2,7 +2,11 @@
 
 use core::marker::PhantomData;
 
-use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
+#[cfg(not(feature = "simd"))]
+use super::search;
+use super::{Counters, Framing, Front, Verdict, ledger::Ledger};
+#[cfg(feature = "simd")]
+use super::{GoodRun, run::Run};
 
 /// Frames of a slice that is already in memory, borrowed from it.
 ///
@@ -28,6 +32,8 @@ use super::{Counters, Framing, Front, Verdict, ledger::Ledger, search};
 pub struct Frames<'a, F> {
     rest: &'a [u8],
     ledger: Ledger,
+    #[cfg(feature = "simd")]
+    run: Run,
     framing: PhantomData<fn() -> F>,
 }
 
@@ -35,7 +41,13 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// Frames of `bytes`, from the first byte on.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes, ledger: Ledger::new(), framing: PhantomData }
+        Self {
+            rest: bytes,
+            ledger: Ledger::new(),
+            #[cfg(feature = "simd")]
+            run: Run::new(),
+            framing: PhantomData,
+        }
     }
 
     /// What has not been judged yet; once the iterator has ended, the candidate that the slice
@@ -58,10 +70,30 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
+    /// A frame of so many bytes that is booked.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    fn take(&mut self, len: usize) -> Option<F::Frame<'a>> {
+        let (frame, rest) = self.rest.split_at_checked(len)?;
+        self.rest = rest;
+        F::view(frame)
+    }
+
     /// Where every byte went so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        self.ledger.counters(self.rest.len())
+        let counters = self.ledger.counters(self.rest.len());
+        #[cfg(feature = "simd")]
+        let counters = {
+            let GoodRun { frames, len, .. } = self.run.unclaimed::<F>(self.rest);
+            Counters {
+                received: counters.received.wrapping_sub(len as u64),
+                framed: counters.framed.wrapping_sub(len as u64),
+                frames: counters.frames.wrapping_sub(frames as u64),
+                ..counters
+            }
+        };
+        counters
     }
 }
 
@@ -77,6 +109,18 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
+        #[cfg(feature = "simd")]
+        if self.run.goes_on::<F>(self.rest) {
+            // A branch: a length that is looked up would have to be waited for.
+            return if F::is_short(self.rest) {
+                self.take(F::MIN_LEN)
+            } else {
+                self.take(F::MAX_LEN)
+            };
+        }
+        #[cfg(feature = "simd")]
+        let (found, front) = self.run.search::<F>(self.rest, &mut self.ledger);
+        #[cfg(not(feature = "simd"))]
         let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
         let Front::Frame { len } = front else {
             self.rest = found;

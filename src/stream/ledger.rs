@@ -110,6 +110,7 @@ impl Counters {
 #[derive(Clone, Debug)]
 pub(super) struct Ledger {
     framed: u64,
+    #[cfg(not(target_pointer_width = "64"))]
     frames: u64,
     /// Bytes in all gaps; those that no other count claims are [`Reason::Header`].
     skipped: u64,
@@ -117,6 +118,10 @@ pub(super) struct Ledger {
     id: u64,
     crc: u64,
     idle: u64,
+    /// On a host not beside `framed`: the compiler would count both in one register of 128 bits, and
+    /// each frame would wait for the store of the one before.
+    #[cfg(target_pointer_width = "64")]
+    frames: u64,
     gaps: u64,
     /// Why the gap that is open began.
     gap: Option<Reason>,
@@ -145,6 +150,15 @@ impl Ledger {
     pub(super) fn frame(&mut self, len: usize) {
         self.framed = self.framed.wrapping_add(len as u64);
         self.frames = self.frames.wrapping_add(1);
+        self.gap = None;
+    }
+
+    /// So many frames of so many bytes together, booked before they are handed out.
+    #[cfg(feature = "simd")]
+    #[inline(always)]
+    pub(super) fn frames(&mut self, frames: usize, len: usize) {
+        self.framed = self.framed.wrapping_add(len as u64);
+        self.frames = self.frames.wrapping_add(frames as u64);
         self.gap = None;
     }
 

@@ -46,7 +46,7 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn sweep(bytes: &[u8]) -> Swept {
         sweep::<CAP>(bytes)
     }

@@ -4,7 +4,7 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{self, Counters, Decoder, Framing},
+    stream::{self, Counters, Decoder, Framing, Portable},
     ucp,
 };
 
@@ -106,6 +106,14 @@ impl<const CAP: usize> Known for ucp::Ucp<CAP> {
 
     fn bytes<'a: 'a>(frame: &&'a ucp::Frame) -> &'a [u8] {
         frame.as_bytes()
+    }
+}
+
+impl<F: Known> Known for Portable<F> {
+    const RULES: Rules = F::RULES;
+
+    fn bytes<'a: 'a>(frame: &F::Frame<'a>) -> &'a [u8] {
+        F::bytes(frame)
     }
 }
 

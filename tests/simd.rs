@@ -1,0 +1,302 @@
+//! Feature `simd` against the slow oracle and against the portable path: streams long enough for
+//! lanes, damaged everywhere.
+#![cfg(all(feature = "ikeya", feature = "ucp"))]
+
+#[path = "support/generate.rs"]
+#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+mod generate;
+#[path = "support/line.rs"]
+#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+mod line;
+#[path = "support/oracle.rs"]
+#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+mod oracle;
+
+use axlewire::{
+    ikeya::{
+        self, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
+        three,
+    },
+    stream::{
+        Counters, Decoder, Event, Frames, Framing, GoodRun, Portable, Reason, Swept, Verdict,
+    },
+    ucp::{self, Body, Ucp},
+};
+use line::Known;
+use proptest::{collection::vec, prelude::*};
+
+/// Frames by SIMD and frames one by one are those of the oracle, and so are the counters after each.
+fn check<F: Known>(stream: &[u8]) {
+    let told = oracle::answer(F::RULES, stream, &[]);
+    let mut frames = Frames::<F>::new(stream);
+    let mut portable = Frames::<Portable<F>>::new(stream);
+    for (offset, len) in told.frames() {
+        let found = frames.next().map(|frame| F::bytes(&frame).as_ptr_range());
+        assert_eq!(found, Some(stream[offset..offset + len].as_ptr_range()));
+        assert_eq!(portable.next().map(|frame| F::bytes(&frame).as_ptr_range()), found);
+        assert_eq!(frames.counters(), portable.counters());
+        assert_eq!(frames.rest().as_ptr_range(), portable.rest().as_ptr_range());
+    }
+    assert!(frames.next().is_none() && portable.next().is_none());
+    for rest in [frames.rest(), portable.rest()] {
+        assert_eq!(rest.len(), told.pending);
+    }
+    line::check_counters(&frames.counters(), &told, stream.len());
+    assert_eq!(finished(frames), finished(portable));
+}
+
+/// What a quiet line brings out, and the account.
+fn finished<F: Framing>(mut frames: Frames<'_, F>) -> (usize, Counters) {
+    let mut found = 0;
+    while !frames.rest().is_empty() {
+        frames.idle();
+        found += frames.by_ref().count();
+    }
+    (found, frames.counters())
+}
+
+/// Every framing that has something in lanes, and one that has nothing.
+fn check_all(stream: &[u8]) {
+    check::<ikeya::ToSlave>(stream);
+    check::<ikeya::ToMaster>(stream);
+    check::<ikeya::Either>(stream);
+    check::<three::Either>(stream);
+    check::<Ucp>(stream);
+    check::<Ucp<252>>(stream);
+}
+
+fn response(number: u8) -> [u8; 8] {
+    let id = NodeId::ALL[usize::from(number % 8)];
+    if number.is_multiple_of(2) {
+        let position = Position::new(i16::from(number) * 257, -i16::from(number));
+        *PositionResponse::new(id, position).as_bytes()
+    } else {
+        *VelocityResponse::new(id, Rps::new(f32::from(number) / 3.0).unwrap()).as_bytes()
+    }
+}
+
+fn responses(count: u8) -> Vec<u8> {
+    (0..count).flat_map(response).collect()
+}
+
+/// READ, answer, WRITE, and so on.
+fn exchanges(count: u8) -> Vec<u8> {
+    let exchange = |number: u8| {
+        let id = NodeId::ALL[usize::from(number % 8)];
+        let write = WriteRequest::velocity(id, Rps::new(f32::from(number)).unwrap());
+        [ReadRequest::new(id).as_bytes(), &response(number)[..], write.as_bytes()].concat()
+    };
+    (0..count).flat_map(exchange).collect()
+}
+
+fn pings(count: u8) -> Vec<u8> {
+    (0..count).flat_map(|index| ucp::Ping {}.frame(index).as_bytes().to_vec()).collect()
+}
+
+#[test]
+fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
+    for clean in [responses(50), exchanges(20), pings(50)] {
+        let mut stream = clean.clone();
+        for at in 0..clean.len() {
+            // One bit, a header in the wrong place, a header of another kind.
+            for byte in [clean[at] ^ 0x10, 0xAA, 0xBB, 0x55, 0xFD] {
+                stream[at] = byte;
+                check::<ikeya::Either>(&stream);
+                check::<Ucp>(&stream);
+            }
+            stream[at] = clean[at];
+        }
+    }
+}
+
+#[test]
+fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_what_it_costs_without_simd() {
+    for clean in [responses(40), exchanges(16)] {
+        for at in 0..clean.len() {
+            let (head, tail) = clean.split_at(at);
+            check::<ikeya::Either>(&[head, &tail[1..]].concat());
+            check::<ikeya::ToMaster>(&[head, &tail[..1], tail].concat());
+        }
+    }
+}
+
+#[test]
+fn a_bad_id_with_a_good_crc_is_skipped_whole_anywhere_in_a_run() {
+    let clean = responses(40);
+    for at in (0..clean.len()).step_by(8) {
+        for id in [0, 9, 128, 255] {
+            for header in [0x55, 0x56, 0xBB, 0xAA] {
+                let payload = [1, 2, 3, 4];
+                let payload = if header == 0xAA { &[][..] } else { &payload };
+                let packet = generate::ikeya_packet_around(header, id, payload);
+                let stream = [&clean[..at], &packet, &clean[at..]].concat();
+                check::<ikeya::Either>(&stream);
+                check::<ikeya::ToSlave>(&stream);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stream_may_end_anywhere() {
+    for clean in [responses(50), exchanges(20)] {
+        for end in 0..=clean.len() {
+            check::<ikeya::Either>(&clean[..end]);
+            check::<ikeya::ToMaster>(&clean[..end]);
+        }
+    }
+}
+
+#[test]
+fn a_frame_behind_noise_of_any_length_is_found() {
+    // Bytes that are headers, that are none, and that are half a sync.
+    for noise in [&[0xAA][..], &[0xBB, 1], &[0x55, 0x56, 0xAA, 0xBB], &[0], &[0xFD], &[0xFD, 0xFF]]
+    {
+        for len in 0..300 {
+            let mut stream: Vec<u8> = noise.iter().copied().cycle().take(len).collect();
+            stream.extend(responses(2));
+            stream.extend(pings(2));
+            stream.extend(responses(12));
+            check::<ikeya::Either>(&stream);
+            check::<Ucp>(&stream);
+        }
+    }
+}
+
+#[test]
+fn false_lengths_are_counted_as_such() {
+    for cap_and_more in [[3, 0], [4, 0], [60, 0], [61, 0], [252, 0], [253, 0], [4, 1], [0, 4]] {
+        let start = [&[0xFD, 0xFF][..], &cap_and_more].concat();
+        check_all(&[start.repeat(200), pings(3)].concat());
+    }
+}
+
+#[test]
+fn a_decoder_that_sweeps_gives_what_one_that_does_not_gives() {
+    let noise = [0xAA, 0x55, 0x00, 0xBB, 0x12].repeat(100);
+    let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
+    for chunk in [1, 64, 200, 5000] {
+        assert_eq!(
+            events::<ikeya::Either>(&stream, chunk),
+            events::<Portable<ikeya::Either>>(&stream, chunk)
+        );
+    }
+}
+
+/// The bytes of a frame, or length and reason of a gap.
+type Seen = Result<Vec<u8>, (u64, Reason)>;
+
+fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
+    let mut decoder = Decoder::<F, 8>::new();
+    let mut events = Vec::new();
+    for mut piece in stream.chunks(chunk) {
+        while let Some(event) = decoder.decode(&mut piece) {
+            events.push(match event {
+                Event::Frame(frame) => Ok(F::bytes(&frame).to_vec()),
+                Event::Skipped(gap) => Err((gap.len, gap.reason)),
+            });
+        }
+    }
+    (events, decoder.counters())
+}
+
+/// A framing whose runs and sweeps are made up.
+struct Liar<const LIE: u8>;
+
+impl<const LIE: u8> Framing for Liar<LIE> {
+    type Frame<'a> = &'a [u8];
+    const MIN_LEN: usize = 2;
+    const MAX_LEN: usize = 4;
+    const HAS_RUNS: bool = true;
+
+    fn judge(bytes: &[u8]) -> Verdict {
+        match bytes.len() {
+            0..4 => Verdict::Partial { need: 4 },
+            _ if LIE.is_multiple_of(2) => Verdict::Reject { reason: Reason::Crc, more: 0 },
+            _ => Verdict::Frame { len: 4 },
+        }
+    }
+
+    fn view(frame: &[u8]) -> Option<&[u8]> {
+        Some(frame)
+    }
+
+    fn good_run(bytes: &[u8]) -> GoodRun {
+        let (frames, len) = match LIE / 2 {
+            0 => (usize::MAX, bytes.len()),
+            1 => (10, bytes.len() + 1),
+            2 => (10, 0),
+            3 => (0, 10),
+            _ => (1000, bytes.len() / 2 + 1),
+        };
+        GoodRun { frames, len, is_cut: LIE.is_multiple_of(3) }
+    }
+
+    fn is_short(bytes: &[u8]) -> bool {
+        bytes.len().is_multiple_of(3)
+    }
+
+    fn sweep(bytes: &[u8]) -> Swept {
+        match LIE / 2 {
+            0 => Swept { len: bytes.len() + 1, length: usize::MAX, crc: usize::MAX },
+            1 => Swept { len: 0, length: 1, crc: 1 },
+            _ => Swept { len: 3, length: 7, crc: 7 },
+        }
+    }
+}
+
+#[test]
+fn a_framing_that_lies_about_runs_hangs_nothing() {
+    fn feed<const LIE: u8>() {
+        for len in 0..100 {
+            let bytes = vec![LIE; len];
+            let mut frames = Frames::<Liar<LIE>>::new(&bytes);
+            assert!(frames.by_ref().take(len + 1).count() <= len / 2, "lie {LIE} is told for ever");
+            frames.idle();
+            // What was booked for frames that do not exist is wrong; asking for it ends all the same.
+            assert!(frames.counters().frames > 0 || len < 4 || LIE.is_multiple_of(2));
+            let mut decoder = Decoder::<Liar<LIE>, 4>::new();
+            let mut input = &bytes[..];
+            let events = std::iter::from_fn(|| decoder.decode(&mut input).map(drop));
+            assert!(events.take(2 * len + 1).count() <= 2 * len, "lie {LIE} is told for ever");
+        }
+    }
+    feed::<0>();
+    feed::<1>();
+    feed::<2>();
+    feed::<3>();
+    feed::<4>();
+    feed::<5>();
+    feed::<6>();
+    feed::<7>();
+    feed::<8>();
+    feed::<9>();
+}
+
+/// Long streams of everything, long runs of good frames among them.
+fn long_stream(rules: oracle::Rules) -> impl Strategy<Value = Vec<u8>> {
+    let run = vec(generate::frame(rules), 0..60).prop_map(|frames| frames.concat());
+    let noise = vec(any::<u8>(), 0..200);
+    vec(prop_oneof![4 => generate::stream(rules), 3 => run, 1 => noise], 1..8)
+        .prop_map(|pieces| pieces.concat())
+}
+
+macro_rules! properties {
+    ($($name:ident: $framing:ty;)+) => {$(
+        proptest! {
+            #[test]
+            fn $name(stream in long_stream(<$framing as Known>::RULES)) {
+                check::<$framing>(&stream);
+            }
+        }
+    )+};
+}
+
+properties! {
+    a_long_stream_to_slaves_gives_what_the_oracle_says: ikeya::ToSlave;
+    a_long_stream_to_the_master_gives_what_the_oracle_says: ikeya::ToMaster;
+    a_long_stream_of_both_gives_what_the_oracle_says: ikeya::Either;
+    a_long_stream_of_three_motors_gives_what_the_oracle_says: three::Either;
+    a_long_stream_of_ucp_gives_what_the_oracle_says: Ucp;
+    a_long_stream_of_long_ucp_frames_gives_what_the_oracle_says: Ucp<252>;
+}
