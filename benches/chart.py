@@ -18,6 +18,7 @@ STREAMS = [
     ("ucp44", "UCP, 44-byte reports"),
 ]
 DECODERS = [
+    ("frames_simd", "Frames, SIMD", "#0d3b4c"),
     ("frames", "Frames", "#1f6f8b"),
     ("decoder4096", "Decoder by 4096", "#63a8bd"),
     ("decoder1", "Decoder by 1", "#b9d8e1"),
