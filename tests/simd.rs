@@ -246,6 +246,20 @@ impl<const LIE: u8> Framing for Liar<LIE> {
 }
 
 #[test]
+fn a_packet_that_begins_inside_another_one_is_none() {
+    // The second begins in the middle of the first, whose CRC is part of its payload.
+    let mut both = [0x55, 3, 0x12, 0x34, 0x55, 5, 0, 0, 0x56, 0x78, 0, 0];
+    oracle::seal(&mut both[..8]);
+    oracle::seal(&mut both[4..]);
+    for reads in 0..3 {
+        for count in 0..70 {
+            let reads = ReadRequest::new(NodeId::N1).as_bytes().repeat(reads);
+            check_all(&[reads, responses(count), both.to_vec(), responses(70)].concat());
+        }
+    }
+}
+
+#[test]
 fn a_framing_that_lies_about_runs_hangs_nothing() {
     fn feed<const LIE: u8>() {
         for len in 0..100 {
