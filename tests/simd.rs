@@ -43,6 +43,19 @@ fn check<F: Known>(stream: &[u8]) {
     }
     line::check_counters(&frames.counters(), &told, stream.len());
     assert_eq!(finished(frames), finished(portable));
+    check_run::<F>(stream);
+}
+
+/// A run is what `judge` finds one by one, on a processor without AVX2 as well.
+fn check_run<F: Framing>(stream: &[u8]) {
+    let run = F::good_run(stream);
+    let (mut frames, mut at) = (0, 0);
+    while at < run.len {
+        let Verdict::Frame { len } = F::judge(&stream[at..]) else { panic!("no frame at {at}") };
+        assert_eq!(len, if F::is_short(&stream[at..]) { F::MIN_LEN } else { F::MAX_LEN });
+        (frames, at) = (frames + 1, at + len);
+    }
+    assert_eq!((frames, at), (run.frames, run.len));
 }
 
 /// What a quiet line brings out, and the account.
