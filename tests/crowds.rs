@@ -10,7 +10,7 @@ mod oracle;
 
 use axlewire::{
     ikeya::{Either, ToMaster, ToSlave, three},
-    stream::{Frames, Framing, Reason, Swept, Verdict, decode_capture},
+    stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
 use line::{Known, Line, Op};
@@ -150,24 +150,8 @@ fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
 
 /// Frames, gaps and counters of a slice.
 fn check_slice<F: Known>(stream: &[u8]) {
-    let told = oracle::answer(F::RULES, stream, &[]);
-    let mut frames = Frames::<F>::new(stream);
-    for (offset, len) in told.frames() {
-        let frame = frames.next().expect("one frame less than the oracle has");
-        assert_eq!(F::bytes(&frame).as_ptr_range(), stream[offset..offset + len].as_ptr_range());
-    }
-    assert!(frames.next().is_none(), "one frame more than the oracle has");
-    assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
-    line::check_counters(&frames.counters(), &told, stream.len());
-
-    // A capture ends with a silence, as often as there is something left.
-    let idles = vec![stream.len(); stream.len() + 1];
-    let mut told = oracle::answer(F::RULES, stream, &idles);
-    told.join_gaps();
-    let (events, counters) = decode_capture::<F>(stream);
-    let events: Vec<_> = events.into_iter().map(|located| line::located::<F>(located)).collect();
-    assert_eq!(events, told.events);
-    line::check_counters(&counters, &told, stream.len());
+    line::check_slice::<F>(stream);
+    line::check_finished_slice::<F>(stream);
 }
 
 /// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.

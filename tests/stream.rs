@@ -12,7 +12,7 @@ use std::cell::Cell;
 
 use axlewire::{
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict, decode_capture},
+    stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
     ucp::{self, Body, MotorControl, Ucp},
 };
 use line::{Known, Line, Op};
@@ -41,12 +41,12 @@ macro_rules! properties {
             proptest! {
                 #[test]
                 fn a_slice_gives_what_the_oracle_says(stream in stream()) {
-                    check_slice::<F>(&stream);
+                    line::check_slice::<F>(&stream);
                 }
 
                 #[test]
                 fn a_finished_slice_gives_what_the_oracle_says(stream in stream()) {
-                    check_finished_slice::<F>(&stream);
+                    line::check_finished_slice::<F>(&stream);
                 }
 
                 #[test]
@@ -145,51 +145,6 @@ properties! {
     three_either: three::Either, 16;
     ucp_by_default: Ucp, 64;
     ucp_with_the_largest_cap: Ucp<252>, 256;
-}
-
-/// The slice iterator gives the oracle's frames, borrowed, and leaves its rest.
-fn check_slice<F: Known>(stream: &[u8]) {
-    let told = oracle::answer(F::RULES, stream, &[]);
-    let mut frames = Frames::<F>::new(stream);
-    let mut found = Vec::new();
-    while let Some(frame) = frames.next() {
-        found.push(place_in(stream, F::bytes(&frame)));
-        let counters = frames.counters();
-        let booked = counters.framed + counters.skipped() + frames.rest().len() as u64;
-        assert_eq!(counters.received, booked);
-    }
-    assert_eq!(found, told.frames());
-    assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
-    line::check_counters(&frames.counters(), &told, stream.len());
-}
-
-/// With `idle` as often as there is a rest, the slice iterator gives all frames there are, and a
-/// capture all events: its end is one silence, so gaps do not end before the next frame.
-fn check_finished_slice<F: Known>(stream: &[u8]) {
-    let mut frames = Frames::<F>::new(stream);
-    let (mut found, mut idles) = (Vec::new(), Vec::new());
-    loop {
-        found.extend(frames.by_ref().map(|frame| place_in(stream, F::bytes(&frame))));
-        if frames.rest().is_empty() {
-            break;
-        }
-        frames.idle();
-        idles.push(stream.len());
-    }
-    let mut told = oracle::answer(F::RULES, stream, &[&idles[..], &[stream.len()]].concat());
-    told.join_gaps();
-    assert_eq!((found, told.pending), (told.frames(), 0));
-    line::check_counters(&frames.counters(), &told, stream.len());
-
-    let (events, counters) = decode_capture::<F>(stream);
-    let events: Vec<_> = events.into_iter().map(|located| line::located::<F>(located)).collect();
-    assert_eq!(events, told.events);
-    line::check_counters(&counters, &told, stream.len());
-}
-
-fn place_in(stream: &[u8], frame: &[u8]) -> (usize, usize) {
-    assert!(stream.as_ptr_range().contains(&frame.as_ptr()), "the frame is not borrowed");
-    (frame.as_ptr().addr() - stream.as_ptr().addr(), frame.len())
 }
 
 /// B3: whatever came before, less than a longest frame is held back, and a quiet line ends that;
@@ -519,7 +474,7 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
     for mut input in [&[0xFD, 0xFF, 60, 0], chunk.as_slice()] {
         while let Some(event) = decoder.decode(&mut input) {
             if let Event::Frame(frame) = event {
-                places.push(place_in(&chunk, frame.as_bytes()));
+                places.push(line::place_in(&chunk, frame.as_bytes()));
             }
         }
     }

@@ -4,7 +4,7 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{self, Counters, Decoder, Framing, Portable},
+    stream::{self, Counters, Decoder, Frames, Framing, Portable, decode_capture},
     ucp,
 };
 
@@ -353,6 +353,51 @@ pub(crate) fn located<F: Known>((offset, event): stream::Located<F::Frame<'_>>) 
             Event::Skipped { offset, len, reason }
         }
     }
+}
+
+/// The slice iterator gives the oracle's frames, borrowed, and leaves its rest.
+pub(crate) fn check_slice<F: Known>(stream: &[u8]) {
+    let told = oracle::answer(F::RULES, stream, &[]);
+    let mut frames = Frames::<F>::new(stream);
+    let mut found = Vec::new();
+    while let Some(frame) = frames.next() {
+        found.push(place_in(stream, F::bytes(&frame)));
+        let counters = frames.counters();
+        let booked = counters.framed + counters.skipped() + frames.rest().len() as u64;
+        assert_eq!(counters.received, booked);
+    }
+    assert_eq!(found, told.frames());
+    assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
+    check_counters(&frames.counters(), &told, stream.len());
+}
+
+/// With `idle` as often as there is a rest, the slice iterator gives all frames there are, and a
+/// capture all events: its end is one silence, so gaps do not end before the next frame.
+pub(crate) fn check_finished_slice<F: Known>(stream: &[u8]) {
+    let mut frames = Frames::<F>::new(stream);
+    let (mut found, mut idles) = (Vec::new(), Vec::new());
+    loop {
+        found.extend(frames.by_ref().map(|frame| place_in(stream, F::bytes(&frame))));
+        if frames.rest().is_empty() {
+            break;
+        }
+        frames.idle();
+        idles.push(stream.len());
+    }
+    let mut told = oracle::answer(F::RULES, stream, &[&idles[..], &[stream.len()]].concat());
+    told.join_gaps();
+    assert_eq!((found, told.pending), (told.frames(), 0));
+    check_counters(&frames.counters(), &told, stream.len());
+
+    let (events, counters) = decode_capture::<F>(stream);
+    let events: Vec<_> = events.into_iter().map(|event| located::<F>(event)).collect();
+    assert_eq!(events, told.events);
+    check_counters(&counters, &told, stream.len());
+}
+
+pub(crate) fn place_in(stream: &[u8], frame: &[u8]) -> (usize, usize) {
+    assert!(stream.as_ptr_range().contains(&frame.as_ptr()), "the frame is not borrowed");
+    (frame.as_ptr().addr() - stream.as_ptr().addr(), frame.len())
 }
 
 /// The counters are those of the oracle's answer, and the sums of its events.
