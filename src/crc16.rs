@@ -101,6 +101,10 @@ pub(crate) fn seal(frame: &[u8]) -> [u8; 2] {
     compute(body).to_le_bytes()
 }
 
+/// `x^15 + x + 1`, a factor of the polynomial.
+#[cfg(any(test, target_pointer_width = "64", feature = "ikeya"))]
+pub(crate) const TRINOMIAL: u16 = 0xC001;
+
 #[cfg(not(target_pointer_width = "64"))]
 use narrow as machine;
 #[cfg(target_pointer_width = "64")]
@@ -109,6 +113,8 @@ use wide as machine;
 /// In words of 64 bits.
 #[cfg(any(test, target_pointer_width = "64"))]
 mod wide {
+    use super::TRINOMIAL;
+
     #[inline(always)]
     pub(super) const fn check(frame: &[u8]) -> bool {
         // The packets of the bus are one word, or half of one with zeros behind it, which change nothing.
@@ -214,9 +220,6 @@ mod wide {
     const fn with_parity(remainder: u16, parity: u64) -> u16 {
         remainder ^ if is_odd(parity) { TRINOMIAL } else { 0 }
     }
-
-    /// `x^15 + x + 1`.
-    const TRINOMIAL: u16 = 0xC001;
 
     /// The state before the first byte: `0xFFFF · x^-16` modulo the trinomial. Multiplied up to the
     /// first two bytes of a message of any length it is the initial value 0xFFFF.
@@ -356,7 +359,7 @@ mod narrow {
 mod tests {
     extern crate alloc;
 
-    use super::{narrow, wide};
+    use super::{TRINOMIAL, narrow, wide};
     use alloc::vec;
     use crc::{CRC_16_MODBUS, Crc, Table};
     use proptest::prelude::*;
@@ -368,7 +371,7 @@ mod tests {
         assert_eq!(wide::compute(message), crc, "{message:02x?}");
         assert_eq!(narrow::compute(message), crc, "{message:02x?}");
         // The good frame, the one that differs by `x^15 + x + 1`, and a damaged one.
-        for (end, is_good) in [(crc, true), (crc ^ 0xC001, false), (crc ^ 0x0100, false)] {
+        for (end, is_good) in [(crc, true), (crc ^ TRINOMIAL, false), (crc ^ 0x0100, false)] {
             let mut frame = message.to_vec();
             frame.extend(end.to_le_bytes());
             assert_eq!(wide::check(&frame), is_good, "{frame:02x?}");

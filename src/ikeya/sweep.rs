@@ -27,7 +27,10 @@ use super::{
     ReadRequest, three,
     wire::header::{POSITION, READ, VELOCITY, WRITE},
 };
-use crate::stream::{Framing, Reason, Swept, Verdict};
+use crate::{
+    crc16::TRINOMIAL,
+    stream::{Framing, Reason, Swept, Verdict},
+};
 
 /// Places that are judged together: one half of them even, one odd.
 const PLACES: usize = 32;
@@ -128,9 +131,6 @@ fn find_multiples<F: Framing, const TO_SLAVE: bool>(
 const fn flag(is_set: bool) -> u16 {
     if is_set { 0xFFFF } else { 0 }
 }
-
-/// `T` as a reflected 16-bit value.
-const TRINOMIAL: u16 = 0xC001;
 
 /// `x^16 = x^2 + x`, for any word.
 #[inline(always)]

@@ -36,6 +36,7 @@ use super::{Counters, Event, Framing, Front, Gap, Verdict, ledger::Ledger, searc
 /// assert_eq!((frames, decoder.pending()), (2, 0));
 /// # }
 /// ```
+// The buffer in front: a pushed byte is stored without an addition.
 #[repr(C)]
 pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.

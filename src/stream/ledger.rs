@@ -148,13 +148,10 @@ impl Ledger {
     /// A frame of `len` bytes. Ends the gap, which is to be reported before or not at all.
     #[inline(always)]
     pub(super) fn frame(&mut self, len: usize) {
-        self.framed = self.framed.wrapping_add(len as u64);
-        self.frames = self.frames.wrapping_add(1);
-        self.gap = None;
+        self.frames(1, len);
     }
 
-    /// So many frames of so many bytes together, booked before they are handed out.
-    #[cfg(feature = "simd")]
+    /// The same for so many frames of so many bytes together.
     #[inline(always)]
     pub(super) fn frames(&mut self, frames: usize, len: usize) {
         self.framed = self.framed.wrapping_add(len as u64);
