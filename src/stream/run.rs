@@ -58,7 +58,8 @@ impl Run {
         self.look_or_search::<F>(bytes, ledger)
     }
 
-    /// Cold, so that the loop around it keeps its registers.
+    /// Cold, so that the loop around it keeps its registers; one call for both, because a second one in
+    /// that loop was slower than judging the first byte of a gap twice.
     #[cold]
     #[inline(never)]
     fn look_or_search<'b, F: Framing>(
