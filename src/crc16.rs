@@ -55,6 +55,13 @@ pub const fn check(frame: &[u8]) -> bool {
     machine::check(frame)
 }
 
+/// [`check`] of a packet whose length is known when it is compiled.
+#[cfg(feature = "ikeya")]
+#[inline(always)]
+pub(crate) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
+    machine::check_packet(packet)
+}
+
 /// The CRC of `bytes`, to be sent low byte first behind them.
 ///
 /// ```
@@ -126,6 +133,11 @@ mod wide {
         }
         let (state, parity) = residue(frame, 0);
         frame.len() >= 2 && !is_odd(parity) && reduce(fold(state)) == 0
+    }
+
+    #[inline(always)]
+    pub(super) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
+        check(packet)
     }
 
     #[inline(always)]
@@ -286,6 +298,19 @@ mod narrow {
     #[inline(always)]
     pub(super) const fn check(frame: &[u8]) -> bool {
         frame.len() >= 2 && flaws(residue(frame)) == 0
+    }
+
+    /// Packets of one and two words without a loop.
+    #[inline(always)]
+    pub(super) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
+        let Some((&first, rest)) = packet.split_first_chunk() else { return check(packet) };
+        let first = u32::from_le_bytes(first) ^ 0xFFFF;
+        let word = match rest {
+            [] => first,
+            &[a, b, c, d] => times_x32(first) ^ u32::from_le_bytes([a, b, c, d]),
+            _ => return check(packet),
+        };
+        flaws(word) == 0
     }
 
     #[inline(always)]

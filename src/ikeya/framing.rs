@@ -268,7 +268,7 @@ fn judge_packet<const LEN: usize>(bytes: &[u8]) -> Verdict {
     let Some(packet) = bytes.first_chunk::<LEN>() else {
         return Verdict::Partial { need: LEN };
     };
-    if !crc16::check(packet) {
+    if !crc16::check_packet(packet) {
         Verdict::Reject { reason: Reason::Crc, more: 0 }
     } else if !matches!(packet.get(1), Some(1..=8)) {
         Verdict::Reject { reason: Reason::Id, more: LEN - 1 }

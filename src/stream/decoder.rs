@@ -158,12 +158,22 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// ```
     #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
-        // Both are read in front of the store, which could change them for all that the compiler knows.
-        let (end, wake) = (self.end, self.wake);
-        let Some(room) = self.buffer.get_mut(end) else { return true };
-        *room = byte;
-        self.end = end + 1;
-        end + 1 >= wake
+        // A wait for more ends in the buffer: short of it there is room, which a mask tells the compiler
+        // for less than a comparison.
+        let (at, end) = (self.end, self.end + 1);
+        if end < self.wake {
+            let index = if N.is_power_of_two() { at % N } else { at };
+            if let Some(room) = self.buffer.get_mut(index) {
+                *room = byte;
+                self.end = end;
+            }
+            return false;
+        }
+        if let Some(room) = self.buffer.get_mut(at) {
+            *room = byte;
+            self.end = end;
+        }
+        true
     }
 
     /// The line went quiet: what is pending will not be completed (ruling B3).
