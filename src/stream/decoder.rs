@@ -106,7 +106,24 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// The next event in what is held: [`decode`](Self::decode) with nothing new.
     #[inline]
     pub fn poll(&mut self) -> Option<Event<F::Frame<'_>>> {
-        let held = self.advance_held()?;
+        if self.end < self.wake {
+            return None;
+        }
+        if self.at == 0 && self.line == Line::Busy && !self.ledger.has_gap() {
+            match F::judge(self.buffer.get(..self.end)?) {
+                Verdict::Frame { len } if len == self.end => {
+                    self.ledger.frame(len);
+                    self.clear();
+                    return F::view(self.buffer.get(..len)?).map(Event::Frame);
+                }
+                Verdict::Partial { need } => {
+                    self.wake = need;
+                    return None;
+                }
+                _ => {}
+            }
+        }
+        let held = self.judge_held(0)?;
         self.held_event(held)
     }
 

@@ -194,6 +194,12 @@ impl Ledger {
         self.skipped = self.skipped.wrapping_add(len as u64);
     }
 
+    /// Is a gap open, or to be reported?
+    #[inline(always)]
+    pub(super) const fn has_gap(&self) -> bool {
+        self.gap.is_some()
+    }
+
     /// The gap that has ended, if there is one.
     #[inline(always)]
     pub(super) fn take_gap(&mut self) -> Option<Gap> {
