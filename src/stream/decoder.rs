@@ -109,15 +109,17 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         if self.end < self.wake {
             return None;
         }
-        if self.at == 0 && self.line == Line::Busy && !self.ledger.has_gap() {
+        // What has been waited for is at the front, and mostly it is there alone and whole.
+        if self.wake != 0 {
             match F::judge(self.buffer.get(..self.end)?) {
-                Verdict::Frame { len } if len == self.end => {
+                Verdict::Frame { len } if len == self.end && !self.ledger.has_gap() => {
+                    let frame = F::view(self.buffer.get(..len)?)?;
                     self.ledger.frame(len);
-                    self.clear();
-                    return F::view(self.buffer.get(..len)?).map(Event::Frame);
+                    (self.end, self.wake) = (0, F::MIN_LEN);
+                    return Some(Event::Frame(frame));
                 }
                 Verdict::Partial { need } => {
-                    self.wake = need;
+                    self.wake = need.min(N);
                     return None;
                 }
                 _ => {}
@@ -291,7 +293,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 *input = found;
                 if !found.is_empty() {
                     self.hold(input, found.len());
-                    self.wake = need;
+                    self.wake = need.min(N);
                 }
                 None
             }
@@ -386,10 +388,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         if self.at == self.end {
             return self.clear();
         }
-        if self.at + need > N {
-            self.compact();
-        }
-        self.wake = self.at + need;
+        self.compact();
+        self.wake = need.min(N);
     }
 
     /// Moves up to `most` bytes from the input behind the held ones.
@@ -423,7 +423,6 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             for (to, from) in cells.iter().zip(cells.get(at..end).unwrap_or_default()) {
                 to.set(from.get());
             }
-            self.wake = self.wake.saturating_sub(at);
             self.quiet_end = self.quiet_end.saturating_sub(at);
             (self.at, self.end) = (0, end - at);
         }
