@@ -75,7 +75,7 @@ pub const fn compute(bytes: &[u8]) -> u16 {
     machine::compute(bytes)
 }
 
-/// Zero for a good frame of 4 bytes, a word. Without branches: to be done in lanes.
+/// Zero for a good frame of 4 bytes, a word. Without branches: can be done in lanes.
 #[cfg(feature = "ikeya")]
 #[inline(always)]
 pub(crate) const fn flaws_of_4(word: u32) -> u32 {
@@ -135,6 +135,7 @@ mod wide {
         frame.len() >= 2 && !is_odd(parity) && reduce(fold(state)) == 0
     }
 
+    #[cfg(feature = "ikeya")]
     #[inline(always)]
     pub(super) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
         check(packet)
@@ -300,17 +301,17 @@ mod narrow {
         frame.len() >= 2 && flaws(residue(frame)) == 0
     }
 
-    /// Packets of one and two words without a loop.
+    /// One word or two without a loop.
+    #[cfg(feature = "ikeya")]
     #[inline(always)]
     pub(super) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
-        let Some((&first, rest)) = packet.split_first_chunk() else { return check(packet) };
-        let first = u32::from_le_bytes(first) ^ 0xFFFF;
-        let word = match rest {
-            [] => first,
-            &[a, b, c, d] => times_x32(first) ^ u32::from_le_bytes([a, b, c, d]),
-            _ => return check(packet),
-        };
-        flaws(word) == 0
+        let Some((first, rest)) = packet.split_first_chunk() else { return check(packet) };
+        let first = u32::from_le_bytes(*first);
+        match rest {
+            [] => super::flaws_of_4(first) == 0,
+            &[a, b, c, d] => super::flaws_of_8(first, u32::from_le_bytes([a, b, c, d])) == 0,
+            _ => check(packet),
+        }
     }
 
     #[inline(always)]
@@ -320,15 +321,18 @@ mod narrow {
 
     /// The message modulo the polynomial, not fully reduced.
     #[inline(always)]
-    const fn residue(mut bytes: &[u8]) -> u32 {
+    const fn residue(bytes: &[u8]) -> u32 {
         let mut state = INITIAL;
-        while let Some((word, rest)) = bytes.split_first_chunk::<4>() {
+        // Counted first: the loop then has one comparison less.
+        let whole = bytes.len() & !3;
+        let Some((mut words, mut tail)) = bytes.split_at_checked(whole) else { return state };
+        while let Some((word, rest)) = words.split_first_chunk::<4>() {
             state = u32::from_le_bytes(*word) ^ times_x32(state);
-            bytes = rest;
+            words = rest;
         }
-        while let [byte, rest @ ..] = bytes {
+        while let [byte, rest @ ..] = tail {
             state = (*byte as u32) << 24 ^ times_x8(state);
-            bytes = rest;
+            tail = rest;
         }
         state
     }
@@ -417,6 +421,29 @@ mod tests {
                 message[at] = 0;
             }
         }
+    }
+
+    #[cfg(feature = "ikeya")]
+    #[test]
+    fn a_packet_whose_length_is_known_is_judged_as_any_other() {
+        fn assert_alike<const LEN: usize>() {
+            let mut packet = [0xA5; LEN];
+            for _ in 0..2 {
+                let (body, crc) = packet.split_last_chunk_mut::<2>().unwrap();
+                *crc = ORACLE.checksum(body).to_le_bytes();
+                assert!(narrow::check_packet(&packet) && wide::check_packet(&packet));
+                for bit in 0..8 * LEN {
+                    packet[bit / 8] ^= 1 << (bit % 8);
+                    assert!(!narrow::check_packet(&packet) && !wide::check_packet(&packet));
+                    packet[bit / 8] ^= 1 << (bit % 8);
+                }
+                packet.reverse();
+            }
+        }
+        assert_alike::<4>();
+        assert_alike::<7>();
+        assert_alike::<8>();
+        assert_alike::<9>();
     }
 
     #[test]

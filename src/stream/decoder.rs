@@ -42,7 +42,8 @@ pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
     buffer: [u8; N],
     end: usize,
-    /// While `end` is less, nothing can be said about the held bytes, and there is room for more.
+    /// While `end` is less, nothing can be said about the held bytes, and there is room for more. Not 0
+    /// only where they are waited for: the line is busy, and they begin at the front.
     wake: usize,
     at: usize,
     line: Line,
@@ -109,7 +110,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         if self.end < self.wake {
             return None;
         }
-        // What has been waited for is at the front, and mostly it is there alone and whole.
+        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`.
         if self.wake != 0 {
             match F::judge(self.buffer.get(..self.end)?) {
                 Verdict::Frame { len } if len == self.end && !self.ledger.has_gap() => {
@@ -177,12 +178,11 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// ```
     #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
-        // A wait for more ends in the buffer: short of it there is room, which a mask tells the compiler
-        // for less than a comparison.
         let (at, end) = (self.end, self.end + 1);
         if end < self.wake {
-            let index = if N.is_power_of_two() { at % N } else { at };
-            if let Some(room) = self.buffer.get_mut(index) {
+            // There is room. Where a mask can tell the compiler so, it is cheaper than a comparison.
+            let at = if N.is_power_of_two() { at % N } else { at };
+            if let Some(room) = self.buffer.get_mut(at) {
                 *room = byte;
                 self.end = end;
             }
@@ -245,6 +245,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     }
 
     /// Finds and books the next event in what is held.
+    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     #[inline]
     pub(crate) fn advance_held(&mut self) -> Option<Held> {
         if self.end < self.wake { None } else { self.judge_held(0) }

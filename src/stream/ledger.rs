@@ -194,7 +194,7 @@ impl Ledger {
         self.skipped = self.skipped.wrapping_add(len as u64);
     }
 
-    /// Is a gap open, or to be reported?
+    /// Is there a gap that is to be reported before the next frame?
     #[inline(always)]
     pub(super) const fn has_gap(&self) -> bool {
         self.gap.is_some()
