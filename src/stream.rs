@@ -17,8 +17,8 @@
 //!   every skipped byte is counted under its own reason in [`Counters`].
 //! * **Chunks do not matter.** Any cutting of the same bytes gives the same events.
 //! * **Bounded work.** A byte is looked at once for each candidate it may belong to, at most
-//!   `MAX_LEN` times; a host that refuses many bytes together looks a bounded number of times more
-//!   often. Nothing allocates, nothing panics.
+//!   `MAX_LEN` times; a host that judges many frames or refuses many bytes together looks a bounded
+//!   number of times more often. Nothing allocates, nothing panics.
 
 #[cfg(feature = "alloc")]
 mod capture;
@@ -27,7 +27,6 @@ mod frames;
 mod ledger;
 #[cfg(feature = "simd")]
 mod portable;
-#[cfg(feature = "simd")]
 mod run;
 
 #[cfg(feature = "alloc")]
@@ -82,8 +81,6 @@ pub struct GoodRun {
     pub frames: usize,
     /// All of them together, bytes.
     pub len: usize,
-    /// What stands behind them is no such frame: not worth a second look.
-    pub is_cut: bool,
 }
 
 /// One protocol's rule for finding frames.
@@ -118,17 +115,15 @@ pub trait Framing {
         Swept::default()
     }
 
-    /// Does [`good_run`](Self::good_run) ever see one? Without, it is not asked.
-    const HAS_RUNS: bool = false;
-
     /// Which frames stand at the front, one behind the other, as far as it is cheaper to judge them
-    /// together than one by one.
+    /// together than one by one. There may be more.
     ///
     /// All have [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and each is one that
-    /// `judge` would find there: [`Frames`] hands them out without judging them again. There may be more.
-    /// Asked with feature `simd` alone.
+    /// `judge` would find there: [`Frames::each`] hands them out without judging them again. It alone
+    /// asks, on 64-bit machines; `wide` says that what is compiled has registers of 256 bits, for which more
+    /// is cheaper. Only speed is lost where no run is ever seen, as by default.
     #[inline(always)]
-    fn good_run(_bytes: &[u8]) -> GoodRun {
+    fn good_run(_bytes: &[u8], _wide: bool) -> GoodRun {
         GoodRun::default()
     }
 

@@ -66,11 +66,9 @@ impl Framing for ToSlave {
         judge::<{ Self::MAX_LEN }, true, false>(bytes)
     }
 
-    const HAS_RUNS: bool = true;
-
     #[inline(always)]
-    fn good_run(bytes: &[u8]) -> GoodRun {
-        good_run::<true, false>(bytes)
+    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
+        good_run::<true, false>(bytes, wide)
     }
 
     #[inline(always)]
@@ -102,11 +100,9 @@ impl Framing for ToMaster {
         judge::<{ Self::MAX_LEN }, false, true>(bytes)
     }
 
-    const HAS_RUNS: bool = true;
-
     #[inline(always)]
-    fn good_run(bytes: &[u8]) -> GoodRun {
-        good_run::<false, true>(bytes)
+    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
+        good_run::<false, true>(bytes, wide)
     }
 
     #[inline(always)]
@@ -133,11 +129,9 @@ impl Framing for Either {
         judge::<{ Self::MAX_LEN }, true, true>(bytes)
     }
 
-    const HAS_RUNS: bool = true;
-
     #[inline(always)]
-    fn good_run(bytes: &[u8]) -> GoodRun {
-        good_run::<true, true>(bytes)
+    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
+        good_run::<true, true>(bytes, wide)
     }
 
     #[inline(always)]

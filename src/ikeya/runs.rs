@@ -23,13 +23,19 @@ type Block = [U32; PLACES + 1];
 /// How long a block is, bytes.
 const BLOCK: usize = 4 * PLACES;
 
-/// Blocks that are looked at together. More would bring little: what has not been taken when somebody
-/// asks for the counters has to be counted again.
+/// Blocks that are looked at together.
 const BLOCKS: usize = 2;
 
-/// The packets at the front that are whole and right, one behind the other.
+/// So many packets of 8 bytes at the front are a run of their own, whatever follows.
+const WORTH: usize = 3;
+
+/// The packets at the front that are whole and right, one behind the other. Without `wide` registers only
+/// those of 8 bytes: one that is no packet costs as much as one that is, and every place may begin some.
 #[inline(always)]
-pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> GoodRun {
+pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(
+    bytes: &[u8],
+    wide: bool,
+) -> GoodRun {
     let mut run = GoodRun::default();
     // Blocks lie where they lie, whatever was found in the one before: no look waits for another.
     for start in (0..BLOCKS).map(|number| number * BLOCK) {
@@ -37,31 +43,44 @@ pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]
             break;
         };
         let block: &Block = transmute_ref!(bytes);
-        let mut longs = longs::<TO_SLAVE, TO_MASTER>(block, 0);
-        if run.len == start && longs == EVEN {
-            run.frames += PLACES / 2;
-            run.len += BLOCK;
-            continue;
+        let longs = longs::<TO_SLAVE, TO_MASTER>(block, 0);
+        let in_line = ((longs | !EVEN).trailing_ones() / 2) as usize;
+        if run.len == start && (in_line >= WORTH || !wide) {
+            run.frames += in_line;
+            run.len += in_line * VelocityResponse::LEN;
+        } else if wide {
+            run = any::<TO_SLAVE, TO_MASTER>(block, longs, start, run);
         }
-        let mut shorts = 0;
-        if TO_SLAVE {
-            longs |= self::longs::<TO_SLAVE, TO_MASTER>(block, 1);
-            shorts = self::shorts(block);
-        }
-        // Whatever no packet in front of it leads to is behind damage, or inside a packet.
-        let led_to = 1 << ((run.len - start) / 4) | longs << 2 | shorts << 1;
-        let loose = (longs | shorts) & !led_to;
-        let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
-        let longs = (longs & in_front).count_ones() as usize;
-        let shorts = (shorts & in_front).count_ones() as usize;
-        run.frames += longs + shorts;
-        run.len += longs * VelocityResponse::LEN + shorts * ReadRequest::LEN;
-        run.is_cut = run.len < start + BLOCK;
-        if run.is_cut {
+        if run.len < start + BLOCK {
             break;
         }
     }
     run
+}
+
+/// Goes on with the run in a block of packets of both lengths, of which those in `longs` are known.
+#[inline(always)]
+fn any<const TO_SLAVE: bool, const TO_MASTER: bool>(
+    block: &Block,
+    mut longs: u32,
+    start: usize,
+    run: GoodRun,
+) -> GoodRun {
+    let mut shorts = 0;
+    if TO_SLAVE {
+        longs |= self::longs::<TO_SLAVE, TO_MASTER>(block, 1);
+        shorts = self::shorts(block);
+    }
+    // Whatever no packet in front of it leads to is behind damage, or inside a packet.
+    let led_to = 1 << ((run.len - start) / 4) | longs << 2 | shorts << 1;
+    let loose = (longs | shorts) & !led_to;
+    let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
+    let longs = (longs & in_front).count_ones() as usize;
+    let shorts = (shorts & in_front).count_ones() as usize;
+    GoodRun {
+        frames: run.frames + longs + shorts,
+        len: run.len + longs * VelocityResponse::LEN + shorts * ReadRequest::LEN,
+    }
 }
 
 /// The even places, or, from 1 on, the odd ones, where a packet of 8 bytes begins.

@@ -2,11 +2,7 @@
 
 use core::marker::PhantomData;
 
-#[cfg(not(feature = "simd"))]
-use super::search;
-use super::{Counters, Framing, Front, Verdict, ledger::Ledger};
-#[cfg(feature = "simd")]
-use super::{GoodRun, run::Run};
+use super::{Counters, Framing, Front, GoodRun, Verdict, ledger::Ledger, run::Looks, search};
 
 /// Frames of a slice that is already in memory, borrowed from it.
 ///
@@ -32,8 +28,6 @@ use super::{GoodRun, run::Run};
 pub struct Frames<'a, F> {
     rest: &'a [u8],
     ledger: Ledger,
-    #[cfg(feature = "simd")]
-    run: Run,
     framing: PhantomData<fn() -> F>,
 }
 
@@ -41,13 +35,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// Frames of `bytes`, from the first byte on.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            rest: bytes,
-            ledger: Ledger::new(),
-            #[cfg(feature = "simd")]
-            run: Run::new(),
-            framing: PhantomData,
-        }
+        Self { rest: bytes, ledger: Ledger::new(), framing: PhantomData }
     }
 
     /// What has not been judged yet; once the iterator has ended, the candidate that the slice
@@ -70,30 +58,89 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
-    /// A frame of so many bytes that is booked.
-    #[cfg(feature = "simd")]
+    /// Hands every frame that is left to `take`: the ones that [`next`](Self::next) would give, in the same
+    /// order, and the iterator has then ended.
+    ///
+    /// Faster than a `for` loop where frames of one length follow each other, as on a motor bus: many of
+    /// them are judged together, and with feature `simd` more, and quicker. What the iterator's own methods
+    /// do with all frames, such as [`fold`](Iterator::fold), [`for_each`](Iterator::for_each) and
+    /// [`count`](Iterator::count), is as fast, but leaves nothing to ask for [`counters`](Self::counters).
+    ///
+    /// ```
+    /// # #[cfg(feature = "ikeya")] {
+    /// use axlewire::{ikeya, stream::Frames};
+    ///
+    /// // The answers of node 2, at 1.0 rps, as they lie in a capture.
+    /// let bytes = [0x55, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x54, 0x0E].repeat(1000);
+    /// let mut sum = 0.0;
+    /// let mut frames = Frames::<ikeya::ToMaster>::new(&bytes);
+    /// frames.each(|response| {
+    ///     if let ikeya::Response::Velocity(velocity) = response {
+    ///         sum += velocity.rps();
+    ///     }
+    /// });
+    /// assert_eq!((sum, frames.counters().frames), (1000.0, 1000));
+    /// # }
+    /// ```
+    #[inline]
+    pub fn each(&mut self, mut take: impl FnMut(F::Frame<'a>)) {
+        self.fold_rest((), |(), frame| take(frame));
+    }
+
+    #[inline]
+    fn fold_rest<B>(&mut self, init: B, mut fold: impl FnMut(B, F::Frame<'a>) -> B) -> B {
+        let (mut folded, mut looks) = (init, Looks::new());
+        loop {
+            while let Some(run) = looks.run::<F>(self.rest) {
+                folded = self.fold_run(run, folded, &mut fold);
+            }
+            match self.next() {
+                Some(frame) => folded = fold(folded, frame),
+                None => return folded,
+            }
+        }
+    }
+
+    /// Books a run, and hands out its frames.
     #[inline(always)]
-    fn take(&mut self, len: usize) -> Option<F::Frame<'a>> {
-        let (frame, rest) = self.rest.split_at_checked(len)?;
+    fn fold_run<B>(
+        &mut self,
+        GoodRun { frames, len }: GoodRun,
+        init: B,
+        fold: &mut impl FnMut(B, F::Frame<'a>) -> B,
+    ) -> B {
+        let mut folded = init;
+        let Some((mut run, rest)) = self.rest.split_at_checked(len) else { return folded };
         self.rest = rest;
-        F::view(frame)
+        self.ledger.frames(frames, len);
+        if frames.checked_mul(F::MAX_LEN) == Some(len) {
+            for frame in run.chunks_exact(F::MAX_LEN) {
+                if let Some(frame) = F::view(frame) {
+                    folded = fold(folded, frame);
+                }
+            }
+            return folded;
+        }
+        loop {
+            // A branch: a length that is looked up would have to be waited for.
+            let (frame, behind) = if F::is_short(run) {
+                let Some(cut) = run.split_at_checked(F::MIN_LEN) else { return folded };
+                cut
+            } else {
+                let Some(cut) = run.split_at_checked(F::MAX_LEN) else { return folded };
+                cut
+            };
+            run = behind;
+            if let Some(frame) = F::view(frame) {
+                folded = fold(folded, frame);
+            }
+        }
     }
 
     /// Where every byte went so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        let counters = self.ledger.counters(self.rest.len());
-        #[cfg(feature = "simd")]
-        let counters = {
-            let GoodRun { frames, len, .. } = self.run.unclaimed::<F>(self.rest);
-            Counters {
-                received: counters.received.wrapping_sub(len as u64),
-                framed: counters.framed.wrapping_sub(len as u64),
-                frames: counters.frames.wrapping_sub(frames as u64),
-                ..counters
-            }
-        };
-        counters
+        self.ledger.counters(self.rest.len())
     }
 }
 
@@ -109,18 +156,6 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<F::Frame<'a>> {
-        #[cfg(feature = "simd")]
-        if self.run.goes_on::<F>(self.rest) {
-            // A branch: a length that is looked up would have to be waited for.
-            return if F::is_short(self.rest) {
-                self.take(F::MIN_LEN)
-            } else {
-                self.take(F::MAX_LEN)
-            };
-        }
-        #[cfg(feature = "simd")]
-        let (found, front) = self.run.search::<F>(self.rest, &mut self.ledger);
-        #[cfg(not(feature = "simd"))]
         let (found, front) = search::<F>(self.rest, &mut self.ledger, Ledger::refuse);
         let Front::Frame { len } = front else {
             self.rest = found;
@@ -130,5 +165,10 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
         self.rest = rest;
         self.ledger.frame(len);
         F::view(frame)
+    }
+
+    #[inline]
+    fn fold<B, G: FnMut(B, F::Frame<'a>) -> B>(mut self, init: B, fold: G) -> B {
+        self.fold_rest(init, fold)
     }
 }

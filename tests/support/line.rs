@@ -369,6 +369,25 @@ pub(crate) fn check_slice<F: Known>(stream: &[u8]) {
     assert_eq!(found, told.frames());
     assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
     check_counters(&frames.counters(), &told, stream.len());
+    check_each::<F>(stream, &told);
+}
+
+/// Taken all together they are the same, whatever was taken one by one before.
+fn check_each<F: Known>(stream: &[u8], told: &oracle::Answer) {
+    let place = |frame| place_in(stream, F::bytes(&frame));
+    for before in [0, 1, told.frames().len() / 3] {
+        let mut frames = Frames::<F>::new(stream);
+        let mut found: Vec<_> = frames.by_ref().take(before).map(place).collect();
+        frames.each(|frame| found.push(place(frame)));
+        assert_eq!(found, told.frames());
+        assert_eq!(frames.rest(), &stream[stream.len() - told.pending..]);
+        check_counters(&frames.counters(), told, stream.len());
+    }
+    let folded = Frames::<F>::new(stream).fold(Vec::new(), |mut found, frame| {
+        found.push(place(frame));
+        found
+    });
+    assert_eq!(folded, told.frames());
 }
 
 /// With `idle` as often as there is a rest, the slice iterator gives all frames there are, and a
@@ -377,7 +396,7 @@ pub(crate) fn check_finished_slice<F: Known>(stream: &[u8]) {
     let mut frames = Frames::<F>::new(stream);
     let (mut found, mut idles) = (Vec::new(), Vec::new());
     loop {
-        found.extend(frames.by_ref().map(|frame| place_in(stream, F::bytes(&frame))));
+        frames.each(|frame| found.push(place_in(stream, F::bytes(&frame))));
         if frames.rest().is_empty() {
             break;
         }
