@@ -18,8 +18,9 @@ STREAMS = [
     ("ucp44", "UCP, 44-byte reports"),
 ]
 DECODERS = [
-    ("frames_simd", "Frames, SIMD", "#0d3b4c"),
-    ("frames", "Frames", "#1f6f8b"),
+    ("each_simd", "each, SIMD", "#0d3b4c"),
+    ("each", "Frames::each", "#155a73"),
+    ("frames", "Frames", "#1f7f9f"),
     ("decoder4096", "Decoder by 4096", "#63a8bd"),
     ("decoder1", "Decoder by 1", "#b9d8e1"),
     ("c", "C reference", "#8a8a8a"),

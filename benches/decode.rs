@@ -38,7 +38,8 @@ fn sent(criterion: &mut Criterion, stream: &Stream) {
     let expected = (protocol.oracle)(bytes);
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
-    bench(&mut group, "axlewire Frames, SIMD", bytes, expected, protocol.frames_simd);
+    bench(&mut group, "axlewire Frames::each", bytes, expected, protocol.each);
+    bench(&mut group, "axlewire Frames::each, SIMD", bytes, expected, protocol.each_simd);
     for chunk in [4096, 512, 64, 7, 1] {
         let decode = |bytes: &[u8]| (protocol.decoder)(bytes, chunk);
         bench(&mut group, &format!("axlewire Decoder by {chunk}"), bytes, expected, decode);
@@ -53,7 +54,8 @@ fn hostile(criterion: &mut Criterion, stream: &Stream) {
     let expected = (protocol.oracle)(bytes);
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
-    bench(&mut group, "axlewire Frames, SIMD", bytes, expected, protocol.frames_simd);
+    bench(&mut group, "axlewire Frames::each", bytes, expected, protocol.each);
+    bench(&mut group, "axlewire Frames::each, SIMD", bytes, expected, protocol.each_simd);
     let decode = |bytes: &[u8]| (protocol.decoder)(bytes, 4096);
     bench(&mut group, "axlewire Decoder by 4096", bytes, expected, decode);
     bench_c(&mut group, stream);
@@ -90,6 +92,7 @@ fn frames_of_8_bytes(criterion: &mut Criterion) {
     let count = LEN / peers::MODBUS_REQUEST_LEN;
     let mut group = criterion.benchmark_group("peers, 8 bytes");
     bench_peer(&mut group, "axlewire Frames", &ours.bytes, ours.sent, ours.protocol.frames);
+    bench_peer(&mut group, "axlewire Frames::each", &ours.bytes, ours.sent, ours.protocol.each);
     let requests = peers::modbus_requests(count);
     bench_peer(&mut group, "modbus-core", &requests, count, peers::modbus_read_requests);
 }

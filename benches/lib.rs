@@ -39,10 +39,12 @@ impl Tally {
 pub struct Protocol {
     /// For reports.
     pub name: &'static str,
-    /// `axlewire::stream::Frames` over the whole slice.
+    /// `axlewire::stream::Frames` over the whole slice, in a loop.
     pub frames: fn(&[u8]) -> Tally,
+    /// `axlewire::stream::Frames::each`.
+    pub each: fn(&[u8]) -> Tally,
     /// The same with feature `simd`; everything else here is as without.
-    pub frames_simd: fn(&[u8]) -> Tally,
+    pub each_simd: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Decoder`, fed with pieces of so many bytes.
     pub decoder: fn(&[u8], usize) -> Tally,
     /// The same, with each byte pushed as a receive interrupt does.
@@ -55,34 +57,32 @@ pub struct Protocol {
     pub oracle: fn(&[u8]) -> Tally,
     /// Where the frames end that axlewire finds.
     pub frame_ends: fn(&[u8]) -> Vec<usize>,
-    /// The same with feature `simd`.
-    pub frame_ends_simd: fn(&[u8]) -> Vec<usize>,
 }
 
 /// Ikeya MD, both directions on one line.
 pub const IKEYA: Protocol = Protocol {
     name: "Ikeya",
     frames: ours::frames::<Portable<ikeya::Either>>,
-    frames_simd: ours::frames::<ikeya::Either>,
+    each: ours::each::<Portable<ikeya::Either>>,
+    each_simd: ours::each::<ikeya::Either>,
     decoder: ours::decoder::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
     pushed: ours::pushed::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
     c_table: reference::ikeya_table,
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
     frame_ends: ours::frame_ends::<Portable<ikeya::Either>>,
-    frame_ends_simd: ours::frame_ends::<ikeya::Either>,
 };
 
 /// UCP with the default cap of 64-byte frames.
 pub const UCP: Protocol = Protocol {
     name: "UCP",
     frames: ours::frames::<Portable<ucp::Ucp>>,
-    frames_simd: ours::frames::<ucp::Ucp>,
+    each: ours::each::<Portable<ucp::Ucp>>,
+    each_simd: ours::each::<ucp::Ucp>,
     decoder: ours::decoder::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
     pushed: ours::pushed::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
     c_table: reference::ucp_table,
     c_bitwise: reference::ucp_bitwise,
     oracle: oracle::ucp,
     frame_ends: ours::frame_ends::<Portable<ucp::Ucp>>,
-    frame_ends_simd: ours::frame_ends::<ucp::Ucp>,
 };

@@ -62,6 +62,23 @@ where
     }
 }
 
+/// The same, all frames taken together.
+pub fn each<F>(bytes: &[u8]) -> Tally
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Sample,
+{
+    let mut tally = Tally::default();
+    let mut frames = Frames::<F>::new(bytes);
+    loop {
+        frames.each(|frame| frame.add_to(&mut tally));
+        if frames.rest().is_empty() {
+            return tally;
+        }
+        frames.idle();
+    }
+}
+
 /// Decodes a stream that arrives in pieces of `chunk` bytes and then ends.
 pub fn decoder<F, const N: usize>(bytes: &[u8], chunk: usize) -> Tally
 where
