@@ -26,7 +26,8 @@ const BLOCK: usize = 4 * PLACES;
 /// Blocks that are looked at together.
 const BLOCKS: usize = 2;
 
-/// So many packets of 8 bytes at the front are a run of their own, whatever follows.
+/// So many packets of 8 bytes at the front are a run of their own, whatever follows. Of those only the CRC
+/// is known to be right: the rest is looked at when they are handed out.
 const WORTH: usize = 3;
 
 /// The packets at the front that are whole and right, one behind the other. Without `wide` registers only
@@ -43,13 +44,13 @@ pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(
             break;
         };
         let block: &Block = transmute_ref!(bytes);
-        let longs = longs::<TO_SLAVE, TO_MASTER>(block, 0);
-        let in_line = ((longs | !EVEN).trailing_ones() / 2) as usize;
+        let evens = right_longs(block, 0);
+        let in_line = ((evens | !EVEN).trailing_ones() / 2) as usize;
         if run.len == start && (in_line >= WORTH || !wide) {
             run.frames += in_line;
             run.len += in_line * VelocityResponse::LEN;
         } else if wide {
-            run = any::<TO_SLAVE, TO_MASTER>(block, longs, start, run);
+            run = any::<TO_SLAVE, TO_MASTER>(block, evens, start, run);
         }
         if run.len < start + BLOCK {
             break;
@@ -58,19 +59,22 @@ pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(
     run
 }
 
-/// Goes on with the run in a block of packets of both lengths, of which those in `longs` are known.
+/// Goes on with the run in a block of packets of both lengths; of the even places it is known where a
+/// CRC is right.
 #[inline(always)]
 fn any<const TO_SLAVE: bool, const TO_MASTER: bool>(
     block: &Block,
-    mut longs: u32,
+    evens: u32,
     start: usize,
     run: GoodRun,
 ) -> GoodRun {
-    let mut shorts = 0;
-    if TO_SLAVE {
-        longs |= self::longs::<TO_SLAVE, TO_MASTER>(block, 1);
-        shorts = self::shorts(block);
-    }
+    let is_long = |word: &U32| u32::from(starts_long::<TO_SLAVE, TO_MASTER>(word.get()));
+    let (longs, shorts) = if TO_SLAVE {
+        let is_short = |word: &U32| u32::from(flaws_of_short(word.get()) == 0);
+        ((evens | right_longs(block, 1)) & mask(block, is_long), mask(block, is_short))
+    } else {
+        (evens & mask(block, is_long), 0)
+    };
     // Whatever no packet in front of it leads to is behind damage, or inside a packet.
     let led_to = 1 << ((run.len - start) / 4) | longs << 2 | shorts << 1;
     let loose = (longs | shorts) & !led_to;
@@ -83,35 +87,33 @@ fn any<const TO_SLAVE: bool, const TO_MASTER: bool>(
     }
 }
 
-/// The even places, or, from 1 on, the odd ones, where a packet of 8 bytes begins.
+/// The even places, or, from 1 on, the odd ones, where 8 bytes end in their CRC.
 #[inline(always)]
-fn longs<const TO_SLAVE: bool, const TO_MASTER: bool>(block: &Block, from: usize) -> u32 {
+fn right_longs(block: &Block, from: usize) -> u32 {
     let mut found = 0;
     for pair in 0..PLACES / 2 {
         let place = 2 * pair + from;
-        let (first, second) = (block[place].get(), block[place + 1].get());
-        let flaws = flaws_of_long::<TO_SLAVE, TO_MASTER>(first, second);
+        let flaws = crc16::flaws_of_8(block[place].get(), block[place + 1].get());
         found |= if flaws == 0 { 1 << place } else { 0 };
     }
     found
 }
 
-/// The places where a READ begins.
+/// The places whose word is one of these: 1, not 0.
 #[inline(always)]
-fn shorts(block: &Block) -> u32 {
+fn mask(block: &Block, is_one: impl Fn(&U32) -> u32) -> u32 {
     let mut found = 0;
     for (place, word) in block.iter().take(PLACES).enumerate() {
-        found |= if flaws_of_short(word.get()) == 0 { 1 << place } else { 0 };
+        found |= is_one(word) << place;
     }
     found
 }
 
-/// Zero for a packet of 8 bytes.
+/// Does a packet of 8 bytes start like this?
 #[inline(always)]
-fn flaws_of_long<const TO_SLAVE: bool, const TO_MASTER: bool>(first: u32, second: u32) -> u32 {
-    let is = |header| flaws_of_start(first, header) == 0;
-    let is_known = (TO_SLAVE & is(WRITE)) | (TO_MASTER & (is(VELOCITY) | is(POSITION)));
-    crc16::flaws_of_8(first, second) | if is_known { 0 } else { 1 }
+fn starts_long<const TO_SLAVE: bool, const TO_MASTER: bool>(word: u32) -> bool {
+    let is = |header| flaws_of_start(word, header) == 0;
+    (TO_SLAVE & is(WRITE)) | (TO_MASTER & (is(VELOCITY) | is(POSITION)))
 }
 
 /// Zero for a READ.

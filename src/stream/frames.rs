@@ -101,40 +101,45 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
-    /// Books a run, and hands out its frames.
+    /// Hands out the frames of a run, and books them.
     #[inline(always)]
     fn fold_run<B>(
         &mut self,
-        GoodRun { frames, len }: GoodRun,
+        run: GoodRun,
         init: B,
         fold: &mut impl FnMut(B, F::Frame<'a>) -> B,
     ) -> B {
-        let mut folded = init;
-        let Some((mut run, rest)) = self.rest.split_at_checked(len) else { return folded };
-        self.rest = rest;
-        self.ledger.frames(frames, len);
-        if frames.checked_mul(F::MAX_LEN) == Some(len) {
-            for frame in run.chunks_exact(F::MAX_LEN) {
-                if let Some(frame) = F::view(frame) {
-                    folded = fold(folded, frame);
-                }
-            }
-            return folded;
-        }
-        loop {
-            // A branch: a length that is looked up would have to be waited for.
-            let (frame, behind) = if F::is_short(run) {
-                let Some(cut) = run.split_at_checked(F::MIN_LEN) else { return folded };
-                cut
-            } else {
-                let Some(cut) = run.split_at_checked(F::MAX_LEN) else { return folded };
-                cut
-            };
-            run = behind;
-            if let Some(frame) = F::view(frame) {
+        let (mut folded, mut taken) = (init, GoodRun::default());
+        let Some(mut bytes) = self.rest.get(..run.len) else { return folded };
+        if run.frames.checked_mul(F::MAX_LEN) == Some(run.len) {
+            for frame in bytes.chunks_exact(F::MAX_LEN) {
+                let Some(frame) = F::view(frame) else { break };
                 folded = fold(folded, frame);
+                taken.frames += 1;
             }
+            taken.len = taken.frames * F::MAX_LEN;
+        } else {
+            loop {
+                // A branch: a length that is looked up would have to be waited for.
+                let (frame, behind) = if F::is_short(bytes) {
+                    let Some(cut) = bytes.split_at_checked(F::MIN_LEN) else { break };
+                    cut
+                } else {
+                    let Some(cut) = bytes.split_at_checked(F::MAX_LEN) else { break };
+                    cut
+                };
+                let Some(view) = F::view(frame) else { break };
+                folded = fold(folded, view);
+                taken.frames += 1;
+                bytes = behind;
+            }
+            taken.len = run.len - bytes.len();
         }
+        if taken.frames > 0 {
+            self.ledger.frames(taken.frames, taken.len);
+            self.rest = self.rest.get(taken.len..).unwrap_or_default();
+        }
+        folded
     }
 
     /// Where every byte went so far.
