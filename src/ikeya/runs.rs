@@ -23,67 +23,42 @@ type Block = [U32; PLACES + 1];
 /// How long a block is, bytes.
 const BLOCK: usize = 4 * PLACES;
 
-/// Blocks that are looked at together.
-const BLOCKS: usize = 2;
-
-/// So many packets of 8 bytes at the front are a run of their own, whatever follows. Of those only the CRC
-/// is known to be right: the rest is looked at when they are handed out.
+/// So many packets of 8 bytes at the front are a run of their own, whatever follows.
 const WORTH: usize = 3;
 
-/// The packets at the front that are whole and right, one behind the other. Without `wide` registers only
-/// those of 8 bytes: one that is no packet costs as much as one that is, and every place may begin some.
+/// The packets at the front, one behind the other: of 8 bytes with a right CRC, all else is looked at when
+/// they are handed out, or, with `wide` registers, whole and right ones of both lengths. Without, those would
+/// cost more than they bring: every place may begin some, and one that is no packet costs as much as one.
 #[inline(always)]
 pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
     wide: bool,
 ) -> GoodRun {
-    let mut run = GoodRun::default();
-    // Blocks lie where they lie, whatever was found in the one before: no look waits for another.
-    for start in (0..BLOCKS).map(|number| number * BLOCK) {
-        let Some(bytes) = bytes.get(start..).and_then(<[u8]>::first_chunk::<{ BLOCK + 4 }>) else {
-            break;
-        };
-        let block: &Block = transmute_ref!(bytes);
-        let evens = right_longs(block, 0);
-        let in_line = ((evens | !EVEN).trailing_ones() / 2) as usize;
-        if run.len == start && (in_line >= WORTH || !wide) {
-            run.frames += in_line;
-            run.len += in_line * VelocityResponse::LEN;
-        } else if wide {
-            run = any::<TO_SLAVE, TO_MASTER>(block, evens, start, run);
-        }
-        if run.len < start + BLOCK {
-            break;
-        }
+    let Some(bytes) = bytes.first_chunk::<{ BLOCK + 4 }>() else { return GoodRun::default() };
+    let block: &Block = transmute_ref!(bytes);
+    let evens = right_longs(block, 0);
+    let frames = ((evens | !EVEN).trailing_ones() / 2) as usize;
+    if TO_SLAVE && wide && frames < WORTH {
+        return both_lengths::<TO_MASTER>(block, evens);
     }
-    run
+    GoodRun { frames, len: frames * VelocityResponse::LEN }
 }
 
-/// Goes on with the run in a block of packets of both lengths; of the even places it is known where a
-/// CRC is right.
+/// The same of packets of both lengths; of the even places it is known where a CRC is right.
 #[inline(always)]
-fn any<const TO_SLAVE: bool, const TO_MASTER: bool>(
-    block: &Block,
-    evens: u32,
-    start: usize,
-    run: GoodRun,
-) -> GoodRun {
-    let is_long = |word: &U32| u32::from(starts_long::<TO_SLAVE, TO_MASTER>(word.get()));
-    let (longs, shorts) = if TO_SLAVE {
-        let is_short = |word: &U32| u32::from(flaws_of_short(word.get()) == 0);
-        ((evens | right_longs(block, 1)) & mask(block, is_long), mask(block, is_short))
-    } else {
-        (evens & mask(block, is_long), 0)
-    };
+fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> GoodRun {
+    let right = evens | right_longs(block, 1);
+    let longs = right & mask(block, starts_long::<TO_MASTER>);
+    let shorts = mask(block, |word| flaws_of_short(word) == 0);
     // Whatever no packet in front of it leads to is behind damage, or inside a packet.
-    let led_to = 1 << ((run.len - start) / 4) | longs << 2 | shorts << 1;
+    let led_to = 1 | longs << 2 | shorts << 1;
     let loose = (longs | shorts) & !led_to;
     let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
     let longs = (longs & in_front).count_ones() as usize;
     let shorts = (shorts & in_front).count_ones() as usize;
     GoodRun {
-        frames: run.frames + longs + shorts,
-        len: run.len + longs * VelocityResponse::LEN + shorts * ReadRequest::LEN,
+        frames: longs + shorts,
+        len: longs * VelocityResponse::LEN + shorts * ReadRequest::LEN,
     }
 }
 
@@ -99,21 +74,21 @@ fn right_longs(block: &Block, from: usize) -> u32 {
     found
 }
 
-/// The places whose word is one of these: 1, not 0.
+/// The places whose word is one of these.
 #[inline(always)]
-fn mask(block: &Block, is_one: impl Fn(&U32) -> u32) -> u32 {
+fn mask(block: &Block, is_one: impl Fn(u32) -> bool) -> u32 {
     let mut found = 0;
     for (place, word) in block.iter().take(PLACES).enumerate() {
-        found |= is_one(word) << place;
+        found |= if is_one(word.get()) { 1 << place } else { 0 };
     }
     found
 }
 
 /// Does a packet of 8 bytes start like this?
 #[inline(always)]
-fn starts_long<const TO_SLAVE: bool, const TO_MASTER: bool>(word: u32) -> bool {
+fn starts_long<const TO_MASTER: bool>(word: u32) -> bool {
     let is = |header| flaws_of_start(word, header) == 0;
-    (TO_SLAVE & is(WRITE)) | (TO_MASTER & (is(VELOCITY) | is(POSITION)))
+    is(WRITE) | (TO_MASTER & (is(VELOCITY) | is(POSITION)))
 }
 
 /// Zero for a READ.

@@ -16,7 +16,7 @@ pub(super) struct Looks {
 }
 
 /// A look pays where it shows so many frames: all that Ikeya's can, or nearly.
-const MANY: usize = 28;
+const MANY: usize = 14;
 
 /// Two packets.
 const FIRST_WAIT: usize = 16;
