@@ -189,11 +189,9 @@ impl StreamTimes {
 fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
     let protocol = clean.protocol;
     let sent = (protocol.oracle)(&clean.bytes);
-    for (one_in, rate, goal, goal_simd) in [
-        (100_000, "1e-5", None, None),
-        (10_000, "1e-4", Some(0.85), Some(0.7)),
-        (1000, "1e-3", Some(0.5), Some(0.4)),
-    ] {
+    for (one_in, rate, goal) in
+        [(100_000, "1e-5", None), (10_000, "1e-4", Some(0.85)), (1000, "1e-3", Some(0.5))]
+    {
         let damaged = clean.with_bit_errors(one_in);
         let intact = &damaged.intact;
         let ends = (protocol.frame_ends)(&damaged.bytes);
@@ -220,7 +218,7 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
         let [clean_time, damaged_time, clean_simd, damaged_simd] = times;
         let speed = format!("speed_{name}_{rate}_over_clean");
         print(&speed, clean_time / damaged_time, goal);
-        print(&format!("{speed}_simd"), clean_simd / damaged_simd, goal_simd);
+        print(&format!("{speed}_simd"), clean_simd / damaged_simd, None);
     }
 }
 

@@ -76,6 +76,26 @@ fn byte_by_byte(answer: &[u8], report: &[u8]) {
     let mut decoder = Decoder::<Ucp, 64>::new();
     let spent = of_bytes(work::ucp_byte, &mut decoder, report, 5 + 87);
     print("ucp44_bytes", spent, 500);
+    print("push", of_pushes(), 0);
+}
+
+/// Instructions of a pushed byte that completes nothing, as most do.
+fn of_pushes() -> u32 {
+    const PUSHES: u32 = 52;
+    let ticks_of = |work: fn(&mut Decoder<Ucp, 64>, u8) -> u32| {
+        let mut decoder = Decoder::new();
+        for byte in [0xFD, 0xFF, 60, 0, 1, 0, 0, 0] {
+            expect(work::ucp_byte(&mut decoder, byte), 0);
+        }
+        let work = black_box(work);
+        let start = SYST::get_current();
+        for _ in 0..PUSHES {
+            expect(work(&mut decoder, 0), 0);
+        }
+        ticks_since(start)
+    };
+    let empty = ticks_of(|_, _| 0);
+    (instructions(ticks_of(work::ucp_byte) - empty) + PUSHES / 2) / PUSHES
 }
 
 fn checksums(answer: &[u8], report: &[u8]) {
