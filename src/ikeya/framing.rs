@@ -56,177 +56,100 @@ pub enum Packet<'a> {
     Response(Response<'a>),
 }
 
-impl Framing for ToSlave {
-    type Frame<'a> = Request<'a>;
-    const MIN_LEN: usize = ReadRequest::LEN;
-    const MAX_LEN: usize = WriteRequest::LEN;
+/// A framing of the bus: who sends what it finds, how long everything but a READ is, and the view of a
+/// packet for each header.
+macro_rules! framing {
+    (
+        $framing:ty: $($frame:ident)::+,
+        to_slave: $to_slave:literal, to_master: $to_master:literal,
+        min_len: $min_len:expr, max_len: $max_len:expr,
+        $($header:pat => $view:expr,)+
+    ) => {
+        impl Framing for $framing {
+            type Frame<'a> = $($frame)::+<'a>;
+            const MIN_LEN: usize = $min_len;
+            const MAX_LEN: usize = $max_len;
 
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, true, false>(bytes)
-    }
+            #[inline(always)]
+            fn judge(bytes: &[u8]) -> Verdict {
+                judge::<{ Self::MAX_LEN }, $to_slave, $to_master>(bytes)
+            }
 
-    #[inline(always)]
-    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
-        good_run::<true, false>(bytes, wide)
-    }
+            #[inline]
+            fn view(frame: &[u8]) -> Option<Self::Frame<'_>> {
+                match *frame.first()? {
+                    $($header => view(frame).map($view),)+
+                }
+            }
 
-    #[inline(always)]
-    fn is_short(bytes: &[u8]) -> bool {
-        bytes.first() == Some(&READ)
-    }
+            #[inline(always)]
+            fn sweep(bytes: &[u8]) -> Swept {
+                sweep::<Self, $to_slave, $to_master>(bytes)
+            }
 
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, true, false>(bytes)
-    }
+            #[inline(always)]
+            fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
+                good_run::<{ Self::MAX_LEN }, $to_slave, $to_master>(bytes, wide)
+            }
 
-    #[inline]
-    fn view(frame: &[u8]) -> Option<Request<'_>> {
-        match frame.first()? {
-            &READ => view(frame).map(Request::Read),
-            _ => view(frame).map(Request::Write),
+            #[inline(always)]
+            fn is_short(bytes: &[u8]) -> bool {
+                bytes.first() == Some(&READ)
+            }
         }
-    }
+    };
 }
 
-impl Framing for ToMaster {
-    type Frame<'a> = Response<'a>;
-    const MIN_LEN: usize = VelocityResponse::LEN;
-    const MAX_LEN: usize = VelocityResponse::LEN;
-
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, false, true>(bytes)
-    }
-
-    #[inline(always)]
-    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
-        good_run::<false, true>(bytes, wide)
-    }
-
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, false, true>(bytes)
-    }
-
-    #[inline]
-    fn view(frame: &[u8]) -> Option<Response<'_>> {
-        match *frame.first()? {
-            VELOCITY => view(frame).map(Response::Velocity),
-            _ => view(frame).map(Response::Position),
-        }
-    }
+framing! {
+    ToSlave: Request,
+    to_slave: true, to_master: false,
+    min_len: ReadRequest::LEN, max_len: WriteRequest::LEN,
+    READ => Request::Read,
+    _ => Request::Write,
 }
 
-impl Framing for Either {
-    type Frame<'a> = Packet<'a>;
-    const MIN_LEN: usize = ReadRequest::LEN;
-    const MAX_LEN: usize = WriteRequest::LEN;
-
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, true, true>(bytes)
-    }
-
-    #[inline(always)]
-    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
-        good_run::<true, true>(bytes, wide)
-    }
-
-    #[inline(always)]
-    fn is_short(bytes: &[u8]) -> bool {
-        bytes.first() == Some(&READ)
-    }
-
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, true, true>(bytes)
-    }
-
-    #[inline]
-    fn view(frame: &[u8]) -> Option<Packet<'_>> {
-        match *frame.first()? {
-            VELOCITY => view(frame).map(Response::Velocity).map(Packet::Response),
-            POSITION => view(frame).map(Response::Position).map(Packet::Response),
-            READ => view(frame).map(Request::Read).map(Packet::Request),
-            _ => view(frame).map(Request::Write).map(Packet::Request),
-        }
-    }
+framing! {
+    ToMaster: Response,
+    to_slave: false, to_master: true,
+    min_len: VelocityResponse::LEN, max_len: VelocityResponse::LEN,
+    VELOCITY => Response::Velocity,
+    _ => Response::Position,
 }
 
-impl Framing for three::ToSlave {
-    type Frame<'a> = three::Request<'a>;
-    const MIN_LEN: usize = ReadRequest::LEN;
-    const MAX_LEN: usize = three::WriteRequest::LEN;
-
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, true, false>(bytes)
-    }
-
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, true, false>(bytes)
-    }
-
-    #[inline]
-    fn view(frame: &[u8]) -> Option<three::Request<'_>> {
-        match frame.first()? {
-            &READ => view(frame).map(three::Request::Read),
-            _ => view(frame).map(three::Request::Write),
-        }
-    }
+framing! {
+    Either: Packet,
+    to_slave: true, to_master: true,
+    min_len: ReadRequest::LEN, max_len: WriteRequest::LEN,
+    VELOCITY => |velocity| Packet::Response(Response::Velocity(velocity)),
+    POSITION => |position| Packet::Response(Response::Position(position)),
+    READ => |read| Packet::Request(Request::Read(read)),
+    _ => |write| Packet::Request(Request::Write(write)),
 }
 
-impl Framing for three::ToMaster {
-    type Frame<'a> = three::Response<'a>;
-    const MIN_LEN: usize = three::VelocityResponse::LEN;
-    const MAX_LEN: usize = three::VelocityResponse::LEN;
-
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, false, true>(bytes)
-    }
-
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, false, true>(bytes)
-    }
-
-    #[inline]
-    fn view(frame: &[u8]) -> Option<three::Response<'_>> {
-        match *frame.first()? {
-            VELOCITY => view(frame).map(three::Response::Velocity),
-            _ => view(frame).map(three::Response::Position),
-        }
-    }
+framing! {
+    three::ToSlave: three::Request,
+    to_slave: true, to_master: false,
+    min_len: ReadRequest::LEN, max_len: three::WriteRequest::LEN,
+    READ => three::Request::Read,
+    _ => three::Request::Write,
 }
 
-impl Framing for three::Either {
-    type Frame<'a> = three::Packet<'a>;
-    const MIN_LEN: usize = ReadRequest::LEN;
-    const MAX_LEN: usize = three::WriteRequest::LEN;
+framing! {
+    three::ToMaster: three::Response,
+    to_slave: false, to_master: true,
+    min_len: three::VelocityResponse::LEN, max_len: three::VelocityResponse::LEN,
+    VELOCITY => three::Response::Velocity,
+    _ => three::Response::Position,
+}
 
-    #[inline(always)]
-    fn judge(bytes: &[u8]) -> Verdict {
-        judge::<{ Self::MAX_LEN }, true, true>(bytes)
-    }
-
-    #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        sweep::<Self, true, true>(bytes)
-    }
-
-    #[inline]
-    fn view(frame: &[u8]) -> Option<three::Packet<'_>> {
-        match *frame.first()? {
-            VELOCITY => view(frame).map(three::Response::Velocity).map(three::Packet::Response),
-            POSITION => view(frame).map(three::Response::Position).map(three::Packet::Response),
-            READ => view(frame).map(three::Request::Read).map(three::Packet::Request),
-            _ => view(frame).map(three::Request::Write).map(three::Packet::Request),
-        }
-    }
+framing! {
+    three::Either: three::Packet,
+    to_slave: true, to_master: true,
+    min_len: ReadRequest::LEN, max_len: three::WriteRequest::LEN,
+    VELOCITY => |velocity| three::Packet::Response(three::Response::Velocity(velocity)),
+    POSITION => |position| three::Packet::Response(three::Response::Position(position)),
+    READ => |read| three::Packet::Request(three::Request::Read(read)),
+    _ => |write| three::Packet::Request(three::Request::Write(write)),
 }
 
 /// The rule of all six framings: the header gives the length, the CRC decides, then the id.

@@ -29,11 +29,16 @@ const WORTH: usize = 3;
 /// The packets at the front, one behind the other: of 8 bytes with a right CRC, all else is looked at when
 /// they are handed out, or, with `wide` registers, whole and right ones of both lengths. Without, those would
 /// cost more than they bring: every place may begin some, and one that is no packet costs as much as one.
+///
+/// None where `LONG`, the length of everything but a READ, is another: nobody needs it there.
 #[inline(always)]
-pub(super) fn good_run<const TO_SLAVE: bool, const TO_MASTER: bool>(
+pub(super) fn good_run<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
     wide: bool,
 ) -> GoodRun {
+    if LONG != VelocityResponse::LEN {
+        return GoodRun::default();
+    }
     let Some(bytes) = bytes.first_chunk::<{ BLOCK + 4 }>() else { return GoodRun::default() };
     let block: &Block = transmute_ref!(bytes);
     let evens = right_longs(block, 0);
