@@ -10,9 +10,12 @@ mod bus;
 mod contract;
 #[path = "drivers/direction.rs"]
 mod direction;
+#[path = "support/port.rs"]
+#[allow(dead_code, reason = "io.rs uses more of it")]
+mod port;
+#[path = "drivers/recorder.rs"]
+mod recorder;
 #[path = "drivers/rover.rs"]
 mod rover;
-#[path = "drivers/script.rs"]
-mod script;
 #[path = "support/world.rs"]
 mod world;

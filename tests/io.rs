@@ -3,12 +3,11 @@
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
 
-use std::{
-    collections::VecDeque,
-    future::{Future, pending},
-    pin::pin,
-    task::{Context, Poll, Waker},
-};
+#[path = "support/port.rs"]
+#[allow(dead_code, reason = "the drivers use more of it")]
+mod port;
+
+use std::{future::Future, pin::pin, task::Poll};
 
 use axlewire::{
     error::EncodeError,
@@ -17,131 +16,11 @@ use axlewire::{
     stream::{Event, Framing, Gap, Reason},
     ucp::{Body, ErrorCode, Ping, Pong, RawFrame, Ucp},
 };
-
-/// What the port does at one call.
-#[derive(Clone, Debug)]
-enum Step {
-    /// Gives these bytes, or takes as many as there are.
-    Bytes(Vec<u8>),
-    /// Fails.
-    Error,
-    /// Says that the file has ended, or that it takes nothing.
-    Zero,
-    /// Never answers: the future has to be dropped. Then goes on with the next step.
-    Stall,
-}
-
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-struct Unplugged;
-
-impl core::fmt::Display for Unplugged {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("unplugged")
-    }
-}
-
-impl core::error::Error for Unplugged {}
-
-impl embedded_io::Error for Unplugged {
-    fn kind(&self) -> embedded_io::ErrorKind {
-        embedded_io::ErrorKind::NotConnected
-    }
-}
-
-/// A port that follows a script, and takes all that is written once the script is over.
-#[derive(Debug, Default)]
-struct Script {
-    steps: VecDeque<Step>,
-    written: Vec<u8>,
-    flushed: usize,
-}
-
-impl Script {
-    fn new(steps: impl IntoIterator<Item = Step>) -> Self {
-        Self { steps: steps.into_iter().collect(), ..Self::default() }
-    }
-
-    fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        assert!(!buffer.is_empty(), "an empty buffer would look like an end of file");
-        match self.steps.pop_front() {
-            Some(Step::Bytes(mut bytes)) => {
-                let rest = bytes.split_off(bytes.len().min(buffer.len()));
-                if !rest.is_empty() {
-                    self.steps.push_front(Step::Bytes(rest));
-                }
-                buffer[..bytes.len()].copy_from_slice(&bytes);
-                Ok(bytes.len())
-            }
-            Some(Step::Error) => Err(Unplugged),
-            Some(Step::Zero) | None => Ok(0),
-            Some(Step::Stall) => panic!("a blocking port cannot stall"),
-        }
-    }
-
-    fn take(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
-        let count = match self.steps.pop_front() {
-            Some(Step::Bytes(bytes)) => bytes.len().min(buffer.len()),
-            Some(Step::Error) => return Err(Unplugged),
-            Some(Step::Zero) => 0,
-            Some(Step::Stall) => panic!("a blocking port cannot stall"),
-            None => buffer.len(),
-        };
-        self.written.extend(&buffer[..count]);
-        Ok(count)
-    }
-
-    /// Stays in this call for ever if the script says so; its next call goes on.
-    async fn stall(&mut self) {
-        if matches!(self.steps.front(), Some(Step::Stall)) {
-            self.steps.pop_front();
-            pending::<()>().await;
-        }
-    }
-}
-
-impl embedded_io::ErrorType for Script {
-    type Error = Unplugged;
-}
-
-impl embedded_io::Read for Script {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        self.give(buffer)
-    }
-}
-
-impl embedded_io::Write for Script {
-    fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
-        self.take(buffer)
-    }
-
-    fn flush(&mut self) -> Result<(), Unplugged> {
-        self.flushed += 1;
-        Ok(())
-    }
-}
-
-impl embedded_io_async::Read for Script {
-    async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        self.stall().await;
-        self.give(buffer)
-    }
-}
-
-impl embedded_io_async::Write for Script {
-    async fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
-        self.stall().await;
-        self.take(buffer)
-    }
-
-    async fn flush(&mut self) -> Result<(), Unplugged> {
-        self.flushed += 1;
-        Ok(())
-    }
-}
+use port::{Script, Step, Unplugged, poll};
 
 /// Polls once, and drops the future if it is not ready: what a timeout does.
 fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
-    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+    match poll(pin!(future)) {
         Poll::Ready(output) => Some(output),
         Poll::Pending => None,
     }
@@ -201,7 +80,7 @@ fn short_reads_of_every_size_deliver_every_frame() {
     for size in 1..=line.len() {
         for next in CALLS {
             let chunks = line.chunks(size).map(|chunk| Step::Bytes(chunk.to_vec()));
-            let mut reader = FrameReader::new(Script::new(chunks));
+            let mut reader = FrameReader::new(Script::file(chunks));
             for index in 0..20 {
                 if index > 0 {
                     let gap = Gap { len: 1, reason: Reason::Header };
@@ -221,7 +100,7 @@ fn a_read_error_in_the_middle_of_a_frame_loses_nothing() {
         for next in CALLS {
             let (head, tail) = (ping(9)[..cut].to_vec(), ping(9)[cut..].to_vec());
             let steps = [Step::Bytes(head), Step::Error, Step::Error, Step::Bytes(tail)];
-            let mut reader = FrameReader::new(Script::new(steps));
+            let mut reader = FrameReader::new(Script::file(steps));
             assert_eq!(next(&mut reader), Owned::Error);
             assert_eq!(reader.pending(), cut);
             assert_eq!(next(&mut reader), Owned::Error);
@@ -236,7 +115,7 @@ fn an_end_of_file_in_the_middle_of_a_frame_loses_nothing_when_the_file_grows() {
         for next in CALLS {
             let (head, tail) = (ping(9)[..cut].to_vec(), ping(9)[cut..].to_vec());
             let steps = [Step::Bytes(head), Step::Zero, Step::Zero, Step::Bytes(tail)];
-            let mut reader = FrameReader::new(Script::new(steps));
+            let mut reader = FrameReader::new(Script::file(steps));
             assert_eq!((next(&mut reader), reader.pending()), (Owned::End, cut));
             assert_eq!((next(&mut reader), reader.pending()), (Owned::End, cut));
             assert_eq!((next(&mut reader), reader.pending()), (Owned::Frame(ping(9)), 0));
@@ -250,7 +129,7 @@ fn at_a_final_end_of_file_idle_frees_what_a_false_header_hides() {
         // Two nested promises of 64 bytes, and a whole ping behind them.
         let mut line = vec![0xFD, 0xFF, 60, 0, 0xFD, 0xFF, 60, 0];
         line.extend(ping(1));
-        let mut reader = FrameReader::new(Script::new([Step::Bytes(line)]));
+        let mut reader = FrameReader::new(Script::file([Step::Bytes(line)]));
         assert_eq!((next(&mut reader), reader.pending()), (Owned::End, 16));
         reader.idle();
         let gap = Gap { len: 4, reason: Reason::Idle };
@@ -273,7 +152,7 @@ fn a_cancelled_read_loses_nothing_wherever_it_is_cancelled() {
         let steps = [Step::Bytes(head), Step::Stall, Step::Stall, Step::Bytes(tail)];
         let steps =
             steps.into_iter().filter(|step| !matches!(step, Step::Bytes(b) if b.is_empty()));
-        let mut reader = FrameReader::new(Script::new(steps));
+        let mut reader = FrameReader::new(Script::file(steps));
         let (mut frames, mut cancelled) = (vec![], 0);
         loop {
             match next_async(&mut reader) {
@@ -291,7 +170,7 @@ fn a_cancelled_read_loses_nothing_wherever_it_is_cancelled() {
 fn the_reader_serves_the_motor_bus_with_the_smallest_buffer() {
     let response = VelocityResponse::new(NodeId::N4, Rps::ZERO);
     let line = [&[0xAA][..], response.as_bytes(), response.as_bytes()].concat();
-    let mut reader = FrameReader::<_, ToMaster, 8>::new(Script::new([Step::Bytes(line)]));
+    let mut reader = FrameReader::<_, ToMaster, 8>::new(Script::file([Step::Bytes(line)]));
     assert!(matches!(reader.read_event(), Ok(Some(Event::Skipped(Gap { len: 1, .. })))));
     for _ in 0..2 {
         let Ok(Some(Event::Frame(Response::Velocity(found)))) = reader.read_event() else {
@@ -322,7 +201,7 @@ fn short_writes_of_every_size_send_every_byte_once() {
     for size in 1..=8 {
         for write in WRITES {
             let steps = (0..100).map(|_| Step::Bytes(vec![0; size]));
-            let mut writer = Writer::new(Script::new(steps));
+            let mut writer = Writer::new(Script::writing(steps));
             for index in 0..10 {
                 write(&mut writer, index).unwrap();
                 assert!(writer.unsent().is_empty());
@@ -341,7 +220,7 @@ fn a_write_error_in_the_middle_of_a_frame_leaves_the_rest_for_the_next_call() {
         for cut in 1..8 {
             for write in WRITES {
                 let steps = [Step::Bytes(vec![0; cut]), failure.clone(), failure.clone()];
-                let mut writer = Writer::new(Script::new(steps));
+                let mut writer = Writer::new(Script::writing(steps));
                 assert_eq!(write(&mut writer, 1), Err(error));
                 assert_eq!(writer.unsent(), &ping(1)[cut..]);
                 // The second frame is refused as long as the first cannot be finished.
@@ -357,7 +236,7 @@ fn a_write_error_in_the_middle_of_a_frame_leaves_the_rest_for_the_next_call() {
 #[test]
 fn a_cancelled_write_is_finished_by_the_next_call() {
     let steps = [Step::Bytes(vec![0; 3]), Step::Stall];
-    let mut writer = Writer::new(Script::new(steps));
+    let mut writer = Writer::new(Script::writing(steps));
     assert_eq!(poll_once(writer.write_async(&Ping {}.frame(1))), None);
     assert_eq!(writer.unsent(), &ping(1)[3..]);
     assert_eq!(poll_once(writer.flush_async()), Some(Ok(())));

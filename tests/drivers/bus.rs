@@ -11,7 +11,10 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use crate::world::{End, Unplugged, VirtualClock, World};
+use crate::{
+    port::Unplugged,
+    world::{End, VirtualClock, World},
+};
 
 type Bus = Driver<Master, End, VirtualClock>;
 type Node = Rc<RefCell<Driver<Slave, End, VirtualClock>>>;

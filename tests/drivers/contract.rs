@@ -9,8 +9,9 @@ use axlewire::{
 };
 
 use crate::{
-    script::{ASYNC, Call, ROUNDS, Recorder, Script, Step, scripted},
-    world::{End, Unplugged, VirtualClock, World},
+    port::{Script, Step, Unplugged},
+    recorder::{ASYNC, Call, ROUNDS, Recorder, scripted},
+    world::{End, VirtualClock, World},
 };
 
 fn bytes(count: usize) -> Step {

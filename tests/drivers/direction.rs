@@ -9,8 +9,9 @@ use axlewire::{
 use embedded_io::Error as _;
 
 use crate::{
-    script::{Log, Recorder, Script, Step},
-    world::{Unplugged, VirtualClock, World, poll},
+    port::{Script, Step, Unplugged, poll},
+    recorder::{Log, Recorder},
+    world::{VirtualClock, World},
 };
 
 /// A part that writes down what it does.

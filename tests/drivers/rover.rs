@@ -11,7 +11,10 @@ use axlewire::{
     },
 };
 
-use crate::world::{End, Unplugged, VirtualClock, World};
+use crate::{
+    port::Unplugged,
+    world::{End, VirtualClock, World},
+};
 
 type Rover = Driver<Host, End, VirtualClock>;
 type Far = Rc<RefCell<Driver<Robot, End, VirtualClock>>>;

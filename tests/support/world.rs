@@ -4,30 +4,14 @@ use std::{
     cell::{Cell, RefCell},
     collections::VecDeque,
     future::{Future, poll_fn},
-    pin::{Pin, pin},
+    pin::pin,
     rc::Rc,
-    task::{Context, Poll, Waker},
+    task::Poll,
 };
 
 use axlewire::{drive::Clock, time::Instant};
 
-/// The port was pulled out.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(crate) struct Unplugged;
-
-impl core::fmt::Display for Unplugged {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("unplugged")
-    }
-}
-
-impl core::error::Error for Unplugged {}
-
-impl embedded_io::Error for Unplugged {
-    fn kind(&self) -> embedded_io::ErrorKind {
-        embedded_io::ErrorKind::NotConnected
-    }
-}
+use crate::port::{Unplugged, poll};
 
 type Actor = Box<dyn FnMut()>;
 
@@ -78,10 +62,6 @@ impl World {
         }
         None
     }
-}
-
-pub(crate) fn poll<T>(future: Pin<&mut impl Future<Output = T>>) -> Poll<T> {
-    future.poll(&mut Context::from_waker(Waker::noop()))
 }
 
 /// Whoever idles by this clock lets the others act.

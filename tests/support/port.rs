@@ -1,14 +1,29 @@
-//! A port that does what a test says, and a role that writes down what is done to it.
+//! A port that does what a test says.
 
-use std::{cell::RefCell, collections::VecDeque, future::pending, rc::Rc};
-
-use axlewire::{
-    drive::{DriveError, Driver},
-    endpoint::Endpoint,
-    time::Instant,
+use std::{
+    collections::VecDeque,
+    future::{Future, pending},
+    pin::Pin,
+    task::{Context, Poll, Waker},
 };
 
-use crate::world::{Unplugged, VirtualClock, World, poll};
+/// The port was pulled out.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) struct Unplugged;
+
+impl core::fmt::Display for Unplugged {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("unplugged")
+    }
+}
+
+impl core::error::Error for Unplugged {}
+
+impl embedded_io::Error for Unplugged {
+    fn kind(&self) -> embedded_io::ErrorKind {
+        embedded_io::ErrorKind::NotConnected
+    }
+}
 
 /// What the port does at one call.
 #[derive(Clone, Debug)]
@@ -27,6 +42,8 @@ pub(crate) enum Step {
 #[derive(Debug, Default)]
 pub(crate) struct Script {
     pub(crate) reads: VecDeque<Step>,
+    /// Having nothing to give is the end of a file.
+    pub(crate) is_file: bool,
     pub(crate) writes: VecDeque<Step>,
     pub(crate) flushes: VecDeque<Step>,
     pub(crate) written: Vec<u8>,
@@ -38,12 +55,19 @@ impl Script {
         Self { reads: steps.into_iter().collect(), ..Self::default() }
     }
 
+    pub(crate) fn file(steps: impl IntoIterator<Item = Step>) -> Self {
+        Self { is_file: true, ..Self::reading(steps) }
+    }
+
     pub(crate) fn writing(steps: impl IntoIterator<Item = Step>) -> Self {
         Self { writes: steps.into_iter().collect(), ..Self::default() }
     }
 
     fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        match self.reads.pop_front().expect("a read without a byte would block for ever") {
+        assert!(!buffer.is_empty(), "an empty buffer would look like an end of file");
+        let end = self.is_file.then_some(Step::Zero);
+        let step = self.reads.pop_front().or(end);
+        match step.expect("a read without a byte would block for ever") {
             Step::Bytes(mut bytes) => {
                 let rest = bytes.split_off(bytes.len().min(buffer.len()));
                 if !rest.is_empty() {
@@ -119,7 +143,7 @@ impl embedded_io::Write for Script {
 impl embedded_io_async::Read for Script {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
         stall(&mut self.reads).await;
-        if self.reads.is_empty() {
+        if self.reads.is_empty() && !self.is_file {
             pending::<()>().await;
         }
         self.give(buffer)
@@ -138,100 +162,6 @@ impl embedded_io_async::Write for Script {
     }
 }
 
-/// What was done to a role.
-#[derive(Clone, Debug, Eq, PartialEq)]
-pub(crate) enum Call {
-    Input(Vec<u8>),
-    Timeout,
-    Transmit(Option<Vec<u8>>),
+pub(crate) fn poll<T>(future: Pin<&mut impl Future<Output = T>>) -> Poll<T> {
+    future.poll(&mut Context::from_waker(Waker::noop()))
 }
-
-/// Sends what it is told to, and writes down every call. Each byte received is an event.
-#[derive(Default)]
-pub(crate) struct Recorder {
-    pub(crate) frames: VecDeque<Vec<u8>>,
-    pub(crate) timeout: Option<Instant>,
-    pub(crate) calls: Vec<Call>,
-    pub(crate) received: Vec<u8>,
-    pub(crate) events: VecDeque<u8>,
-    last: Instant,
-    packet: Vec<u8>,
-    /// Looked at before each transmission: nothing may wait to be taken in.
-    pub(crate) nothing_waits: Option<Rc<dyn Fn() -> bool>>,
-}
-
-impl Recorder {
-    pub(crate) fn sending(frames: &[&[u8]]) -> Self {
-        Self { frames: frames.iter().map(|frame| frame.to_vec()).collect(), ..Self::default() }
-    }
-
-    fn at(&mut self, now: Instant) {
-        assert!(now >= self.last, "time went backwards");
-        self.last = now;
-    }
-}
-
-impl Endpoint for Recorder {
-    type Event = u8;
-
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.at(now);
-        self.calls.push(Call::Input(bytes.to_vec()));
-        self.received.extend(bytes);
-        self.events.extend(bytes);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        self.at(now);
-        if self.timeout.is_some_and(|at| now >= at) {
-            self.timeout = None;
-        }
-        self.calls.push(Call::Timeout);
-    }
-
-    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        self.at(now);
-        if let Some(nothing_waits) = &self.nothing_waits {
-            assert!(nothing_waits(), "received bytes come before the next transmission");
-        }
-        let frame = self.frames.pop_front();
-        self.calls.push(Call::Transmit(frame.clone()));
-        self.packet = frame?;
-        Some(&self.packet)
-    }
-
-    fn poll_event(&mut self) -> Option<u8> {
-        self.events.pop_front()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.timeout
-    }
-}
-
-pub(crate) type Scripted = Driver<Recorder, Script, VirtualClock>;
-
-pub(crate) fn scripted(role: Recorder, port: Script) -> Scripted {
-    Driver::new(role, port, VirtualClock(World::default()))
-}
-
-/// A round, blocking or async; `None` for an async one that was dropped because it stalled.
-pub(crate) type Round = fn(&mut Scripted) -> Option<Result<(), DriveError<Unplugged>>>;
-
-fn round_blocking(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
-    Some(driver.service())
-}
-
-fn round_async(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
-    match poll(std::pin::pin!(driver.service_async())) {
-        std::task::Poll::Ready(result) => Some(result),
-        std::task::Poll::Pending => None,
-    }
-}
-
-/// Both kinds of call, for the stories that hold for both.
-pub(crate) const ROUNDS: [Round; 2] = [round_blocking, round_async];
-pub(crate) const ASYNC: Round = round_async;
-
-/// A log that several parts write to.
-pub(crate) type Log = Rc<RefCell<Vec<String>>>;

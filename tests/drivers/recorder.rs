@@ -1,0 +1,112 @@
+//! A role that writes down what is done to it.
+
+use std::{cell::RefCell, collections::VecDeque, rc::Rc};
+
+use axlewire::{
+    drive::{DriveError, Driver},
+    endpoint::Endpoint,
+    time::Instant,
+};
+
+use crate::{
+    port::{Script, Unplugged, poll},
+    world::{VirtualClock, World},
+};
+
+/// What was done to a role.
+#[derive(Clone, Debug, Eq, PartialEq)]
+pub(crate) enum Call {
+    Input(Vec<u8>),
+    Timeout,
+    Transmit(Option<Vec<u8>>),
+}
+
+/// Sends what it is told to, and writes down every call. Each byte received is an event.
+#[derive(Default)]
+pub(crate) struct Recorder {
+    pub(crate) frames: VecDeque<Vec<u8>>,
+    pub(crate) timeout: Option<Instant>,
+    pub(crate) calls: Vec<Call>,
+    pub(crate) received: Vec<u8>,
+    pub(crate) events: VecDeque<u8>,
+    last: Instant,
+    packet: Vec<u8>,
+    /// Looked at before each transmission: nothing may wait to be taken in.
+    pub(crate) nothing_waits: Option<Rc<dyn Fn() -> bool>>,
+}
+
+impl Recorder {
+    pub(crate) fn sending(frames: &[&[u8]]) -> Self {
+        Self { frames: frames.iter().map(|frame| frame.to_vec()).collect(), ..Self::default() }
+    }
+
+    fn at(&mut self, now: Instant) {
+        assert!(now >= self.last, "time went backwards");
+        self.last = now;
+    }
+}
+
+impl Endpoint for Recorder {
+    type Event = u8;
+
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.at(now);
+        self.calls.push(Call::Input(bytes.to_vec()));
+        self.received.extend(bytes);
+        self.events.extend(bytes);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        self.at(now);
+        if self.timeout.is_some_and(|at| now >= at) {
+            self.timeout = None;
+        }
+        self.calls.push(Call::Timeout);
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
+        self.at(now);
+        if let Some(nothing_waits) = &self.nothing_waits {
+            assert!(nothing_waits(), "received bytes come before the next transmission");
+        }
+        let frame = self.frames.pop_front();
+        self.calls.push(Call::Transmit(frame.clone()));
+        self.packet = frame?;
+        Some(&self.packet)
+    }
+
+    fn poll_event(&mut self) -> Option<u8> {
+        self.events.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.timeout
+    }
+}
+
+pub(crate) type Scripted = Driver<Recorder, Script, VirtualClock>;
+
+pub(crate) fn scripted(role: Recorder, port: Script) -> Scripted {
+    Driver::new(role, port, VirtualClock(World::default()))
+}
+
+/// A round, blocking or async; `None` for an async one that was dropped because it stalled.
+pub(crate) type Round = fn(&mut Scripted) -> Option<Result<(), DriveError<Unplugged>>>;
+
+fn round_blocking(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
+    Some(driver.service())
+}
+
+fn round_async(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
+    match poll(std::pin::pin!(driver.service_async())) {
+        std::task::Poll::Ready(result) => Some(result),
+        std::task::Poll::Pending => None,
+    }
+}
+
+/// Both kinds of call, for the stories that hold for both.
+pub(crate) const ROUNDS: [Round; 2] = [round_blocking, round_async];
+pub(crate) const ASYNC: Round = round_async;
+
+/// A log that several parts write to.
+pub(crate) type Log = Rc<RefCell<Vec<String>>>;
