@@ -110,8 +110,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         if self.end < self.wake {
             return None;
         }
-        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`. That
-        // saves instructions everywhere; hosts, which have other things to wait for, get no faster by it.
+        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`. Saves
+        // instructions everywhere, but a 64-bit host was a fifth slower with it.
         if cfg!(not(target_pointer_width = "64")) && self.wake != 0 {
             match F::judge(self.buffer.get(..self.end)?) {
                 Verdict::Frame { len } if len == self.end && !self.ledger.has_gap() => {
