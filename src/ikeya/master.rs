@@ -123,7 +123,7 @@ impl<B: Board> Master<B> {
     pub fn new(config: MasterConfig) -> Self {
         Self {
             config,
-            nodes: [const { Node::NEW }; 8],
+            nodes: core::array::from_fn(|_| Node::new()),
             state: State::Idle,
             now: Instant::from_micros(0),
             line_free: None,

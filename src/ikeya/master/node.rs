@@ -136,36 +136,38 @@ pub(super) struct Node<B: Board> {
 }
 
 impl<B: Board> Node<B> {
-    pub(super) const NEW: Self = Self {
-        health: None,
-        mode: None,
-        other_mode: false,
-        target: None,
-        fresh: false,
-        is_stop: false,
-        jumped: false,
-        written: false,
-        confirm: Confirm::Unasked,
-        status: None,
-        strikes: 0,
-        attempt: 0,
-        asked: false,
-        guarded_until: None,
-        read_due: None,
-        scans: 0,
-        statistics: NodeStatistics {
-            requests: 0,
-            replies: 0,
-            timeouts: 0,
-            crc_errors: 0,
-            late: 0,
-            other_mode: 0,
-            retries: 0,
-            latency_min_us: 0,
-            latency_max_us: 0,
-            latency_sum_us: 0,
-        },
-    };
+    pub(super) fn new() -> Self {
+        Self {
+            health: None,
+            mode: None,
+            other_mode: false,
+            target: None,
+            fresh: false,
+            is_stop: false,
+            jumped: false,
+            written: false,
+            confirm: Confirm::Unasked,
+            status: None,
+            strikes: 0,
+            attempt: 0,
+            asked: false,
+            guarded_until: None,
+            read_due: None,
+            scans: 0,
+            statistics: NodeStatistics {
+                requests: 0,
+                replies: 0,
+                timeouts: 0,
+                crc_errors: 0,
+                late: 0,
+                other_mode: 0,
+                retries: 0,
+                latency_min_us: 0,
+                latency_max_us: 0,
+                latency_sum_us: 0,
+            },
+        }
+    }
 
     pub(super) fn is_online(&self) -> bool {
         matches!(self.health, Some(Health::Online | Health::Suspect(_)))
