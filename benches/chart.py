@@ -69,7 +69,7 @@ def throughput(values):
             out.append(
                 f'<rect x="{x:.1f}" y="{y:.1f}" width="{bar - 4:.1f}" height="{BOTTOM - y:.1f}" fill="{colour}"/>'
             )
-            out.append(text(x + bar / 2 - 2, y - 4, f"{ratio:.2g}" if ratio < 9.5 else f"{ratio:.1f}", "middle"))
+            out.append(text(x + bar / 2 - 2, y - 4, f"{ratio:.1f}" if ratio < 9.5 else f"{ratio:.0f}", "middle"))
         out.append(text(left + (i + 0.5) * group, BOTTOM + 18, title, "middle"))
     return out + legend(left, [(name, colour) for _, name, colour in DECODERS])
 
@@ -130,10 +130,10 @@ def line(places, values, limit, colour):
     return [f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2"/>', *dots]
 
 
-def legend(left, entries, per_row=4):
+def legend(left, entries, per_row=3):
     out = []
     for i, (name, colour) in enumerate(entries):
-        x, y = left + i % per_row * (125 if per_row == 4 else 165), BOTTOM + 38 + i // per_row * 18
+        x, y = left + i % per_row * (145 if per_row == 3 else 165), BOTTOM + 38 + i // per_row * 18
         out.append(f'<rect x="{x}" y="{y - 10}" width="11" height="11" fill="{colour}"/>')
         out.append(text(x + 16, y, name))
     return out
