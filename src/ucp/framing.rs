@@ -28,20 +28,17 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
 
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
-        let start = bytes.first_chunk().copied();
-        let [sync @ .., low, high] = start.unwrap_or_else(|| fill_up(bytes));
-        if sync != SYNC {
-            return Verdict::Reject { reason: Reason::Header, more: noise(bytes) };
-        }
-        let len = usize::from(u16::from_le_bytes([low, high]));
-        if !(LEN_WITHOUT_BODY..=CAP).contains(&len) {
-            return Verdict::Reject { reason: Reason::Length, more: 0 };
-        }
-        let len = len + OUTSIDE_LEN;
+        let Some(start) = bytes.first_chunk() else { return judge_start::<CAP>(bytes) };
+        let len = match len_of::<CAP>(*start) {
+            Ok(len) => len,
+            Err(reason) => {
+                let more = if reason == Reason::Header { noise(bytes) } else { 0 };
+                return Verdict::Reject { reason, more };
+            }
+        };
         match bytes.get(..len) {
             Some(frame) if crc16::check(frame) => Verdict::Frame { len },
             Some(_) => Verdict::Reject { reason: Reason::Crc, more: 0 },
-            None if start.is_none() => Verdict::Partial { need: bytes.len() + 1 },
             None => Verdict::Partial { need: len },
         }
     }
@@ -57,8 +54,31 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
     }
 }
 
-/// Less than a sync and a length field, with those of the shortest frame where bytes are missing:
-/// what is there is wrong exactly when the whole is.
+/// Judges less than a sync and a length field.
+#[inline(always)]
+fn judge_start<const CAP: usize>(bytes: &[u8]) -> Verdict {
+    match len_of::<CAP>(fill_up(bytes)) {
+        Ok(_) => Verdict::Partial { need: bytes.len() + 1 },
+        Err(reason) => Verdict::Reject { reason, more: 0 },
+    }
+}
+
+/// The length of the whole frame, or what is wrong.
+#[inline(always)]
+fn len_of<const CAP: usize>([first, second, low, high]: [u8; 4]) -> Result<usize, Reason> {
+    if [first, second] != SYNC {
+        return Err(Reason::Header);
+    }
+    let len = usize::from(u16::from_le_bytes([low, high]));
+    if (LEN_WITHOUT_BODY..=CAP).contains(&len) {
+        Ok(len + OUTSIDE_LEN)
+    } else {
+        Err(Reason::Length)
+    }
+}
+
+/// With a sync and the length of the shortest frame where bytes are missing: what is there is wrong
+/// exactly when the whole is.
 #[cold]
 fn fill_up(bytes: &[u8]) -> [u8; 4] {
     let mut start = [SYNC[0], SYNC[1], LEN_WITHOUT_BODY as u8, 0];
