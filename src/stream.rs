@@ -120,8 +120,10 @@ pub trait Framing {
     ///
     /// All have [`MIN_LEN`](Self::MIN_LEN) or [`MAX_LEN`](Self::MAX_LEN) bytes, and each is one that
     /// `judge` would find there, or one that `view` refuses: [`Frames::each`] hands them out without
-    /// judging them again, up to the first that it gets no view of. It alone asks, on 64-bit machines; `wide` says that what is compiled has registers of 256 bits, for which more
-    /// is cheaper. Only speed is lost where no run is ever seen, as by default.
+    /// judging them again, up to the first that it gets no view of.
+    ///
+    /// It alone asks, on 64-bit machines; `wide` says that what is compiled has registers of 256 bits, for
+    /// which more is cheaper. Only speed is lost where no run is ever seen, as by default.
     #[inline(always)]
     fn good_run(_bytes: &[u8], _wide: bool) -> GoodRun {
         GoodRun::default()
