@@ -26,9 +26,11 @@ const BLOCK: usize = 4 * PLACES;
 /// So many packets of 8 bytes at the front are a run of their own, whatever follows.
 const WORTH: usize = 3;
 
-/// The packets at the front, one behind the other: of 8 bytes with a right CRC, all else is looked at when
-/// they are handed out, or, with `wide` registers, whole and right ones of both lengths. Without, those would
-/// cost more than they bring: every place may begin some, and one that is no packet costs as much as one.
+/// The packets at the front, one behind the other.
+///
+/// Packets of 8 bytes whose CRC is right: header and id are looked at when they are handed out. If there
+/// are hardly any, and registers are `wide`, whole and right packets of both lengths. In narrower ones those
+/// cost more than they bring, since every place may begin one.
 ///
 /// None where `LONG`, the length of everything but a READ, is another: nobody needs it there.
 #[inline(always)]
@@ -49,7 +51,7 @@ pub(super) fn good_run<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER:
     GoodRun { frames, len: frames * VelocityResponse::LEN }
 }
 
-/// The same of packets of both lengths; of the even places it is known where a CRC is right.
+/// The packets of both lengths at the front; of the even places it is known where a CRC is right.
 #[inline(always)]
 fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> GoodRun {
     let right = evens | right_longs(block, 1);
