@@ -43,23 +43,17 @@ impl Sample for &ucp::Frame {
     }
 }
 
-/// Decodes a slice that is in memory; nothing follows it.
+/// Decodes a slice that is in memory, in a loop; nothing follows it.
 pub fn frames<F>(bytes: &[u8]) -> Tally
 where
     F: Framing,
     for<'a> F::Frame<'a>: Sample,
 {
-    let mut tally = Tally::default();
-    let mut frames = Frames::<F>::new(bytes);
-    loop {
-        for frame in frames.by_ref() {
-            frame.add_to(&mut tally);
+    whole::<F>(bytes, |frames, tally| {
+        for frame in frames {
+            frame.add_to(tally);
         }
-        if frames.rest().is_empty() {
-            return tally;
-        }
-        frames.idle();
-    }
+    })
 }
 
 /// The same, all frames taken together.
@@ -68,10 +62,16 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Sample,
 {
+    whole::<F>(bytes, |frames, tally| frames.each(|frame| frame.add_to(tally)))
+}
+
+/// Takes all frames, also those behind candidates that the end cuts off.
+#[inline(always)]
+fn whole<F: Framing>(bytes: &[u8], take: impl Fn(&mut Frames<'_, F>, &mut Tally)) -> Tally {
     let mut tally = Tally::default();
     let mut frames = Frames::<F>::new(bytes);
     loop {
-        frames.each(|frame| frame.add_to(&mut tally));
+        take(&mut frames, &mut tally);
         if frames.rest().is_empty() {
             return tally;
         }

@@ -90,7 +90,7 @@
 //! | `bytemuck` | | `CheckedBitPattern` and `NoUninit` for packets, `Pod` for bodies |
 //! | `defmt` | | `Format` for everything |
 //! | `serde` | | values as data |
-//! | `simd` | | AVX2 in [`stream::Frames`] and in the search, on an x86-64 processor that has it; brings `std` |
+//! | `simd` | | AVX2 in [`Frames::each`](stream::Frames::each) and in the search, on an x86-64 processor that has it; brings `std` |
 //! | `sim` | | [`sim`]: a line with faults in virtual time, a motor, a rover; brings `std` |
 //!
 //! All are additive, and every combination builds.
