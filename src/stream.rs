@@ -1,8 +1,8 @@
 //! Finds frames in a byte stream and accounts for every byte.
 //!
 //! A [`Framing`] knows how one protocol's frames look; [`Frames`] walks a slice that is already in
-//! memory, [`Decoder`] a stream that arrives in pieces. Both ask the same function what stands at
-//! the front of the bytes, so they cannot disagree.
+//! memory, in a loop or, sooner done, with [`each`](Frames::each); [`Decoder`] a stream that arrives in
+//! pieces. Both ask the same function what stands at the front of the bytes, so they cannot disagree.
 //!
 //! # What holds
 //!
