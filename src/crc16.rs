@@ -322,7 +322,11 @@ mod narrow {
     /// The message modulo the polynomial, not fully reduced.
     #[inline(always)]
     const fn residue(bytes: &[u8]) -> u32 {
-        let mut state = INITIAL;
+        // With a whole word the initial value needs no multiplication.
+        let (mut state, bytes) = match bytes.split_first_chunk() {
+            Some((first, rest)) => (u32::from_le_bytes(*first) ^ 0xFFFF, rest),
+            None => (INITIAL, bytes),
+        };
         // Counted first: the loop then has one comparison less.
         let whole = bytes.len() & !3;
         let Some((mut words, mut tail)) = bytes.split_at_checked(whole) else { return state };
@@ -337,8 +341,8 @@ mod narrow {
         state
     }
 
-    /// The state before the first byte: `0xFFFF · x^-16`. Multiplied up to the first two bytes of a
-    /// message of any length it is the initial value 0xFFFF.
+    /// The state before the first byte of less than a word: `0xFFFF · x^-16`. Multiplied up to the first
+    /// two bytes it is the initial value 0xFFFF.
     const INITIAL: u32 = 0x1557_0000;
 
     /// `x^32 = x^16 + x^4 + x`.
