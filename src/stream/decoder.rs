@@ -121,7 +121,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     return Some(Event::Frame(frame));
                 }
                 Verdict::Partial { need } => {
-                    self.wake = need.min(N);
+                    self.wake_at(need);
                     return None;
                 }
                 _ => {}
@@ -295,7 +295,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 *input = found;
                 if !found.is_empty() {
                     self.hold(input, found.len());
-                    self.wake = need.min(N);
+                    self.wake_at(need);
                 }
                 None
             }
@@ -391,6 +391,12 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             return self.clear();
         }
         self.compact();
+        self.wake_at(need);
+    }
+
+    /// What is held begins at the front, and nothing can be said before there are `need` bytes of it.
+    #[inline]
+    fn wake_at(&mut self, need: usize) {
         self.wake = need.min(N);
     }
 
