@@ -322,28 +322,43 @@ mod narrow {
     /// The message modulo the polynomial, not fully reduced.
     #[inline(always)]
     const fn residue(bytes: &[u8]) -> u32 {
-        // With a whole word the initial value needs no multiplication.
-        let (mut state, bytes) = match bytes.split_first_chunk() {
-            Some((first, rest)) => (u32::from_le_bytes(*first) ^ 0xFFFF, rest),
-            None => (INITIAL, bytes),
+        let (Some(first), [_, rest @ ..]) = (bytes.first_chunk(), bytes) else {
+            return residue_short(bytes);
         };
-        // Counted first: the loop then has one comparison less.
-        let whole = bytes.len() & !3;
-        let Some((mut words, mut tail)) = bytes.split_at_checked(whole) else { return state };
-        while let Some((word, rest)) = words.split_first_chunk::<4>() {
+        // Zeros in front change nothing: as many as leave whole words behind one byte and the odd ones.
+        let (whole, odd) = (rest.len() & !3, rest.len() % 4);
+        let mut state = (u32::from_le_bytes(*first) ^ 0xFFFF) << (24 - 8 * odd);
+        if odd == 0 {
+            // Half of the initial value belongs to the second byte, which is in the next word.
+            state ^= LATE;
+        }
+        let Some((_, mut words)) = bytes.split_at_checked(bytes.len() - whole) else {
+            return state;
+        };
+        while let Some((word, rest)) = words.split_first_chunk() {
             state = u32::from_le_bytes(*word) ^ times_x32(state);
             words = rest;
-        }
-        while let [byte, rest @ ..] = tail {
-            state = (*byte as u32) << 24 ^ times_x8(state);
-            tail = rest;
         }
         state
     }
 
-    /// The state before the first byte of less than a word: `0xFFFF · x^-16`. Multiplied up to the first
-    /// two bytes it is the initial value 0xFFFF.
+    /// The same of less than a word.
+    #[inline(never)]
+    const fn residue_short(mut bytes: &[u8]) -> u32 {
+        let mut state = INITIAL;
+        while let [byte, rest @ ..] = bytes {
+            state = (*byte as u32) << 24 ^ times_x8(state);
+            bytes = rest;
+        }
+        state
+    }
+
+    /// The state before the first byte: `0xFFFF · x^-16`. Multiplied up to the first two bytes of a message
+    /// of any length it is the initial value 0xFFFF.
     const INITIAL: u32 = 0x1557_0000;
+
+    /// What the initial value adds behind one byte, of which its first half has been added.
+    const LATE: u32 = times_x8(INITIAL) ^ 0xFF << 24;
 
     /// `x^32 = x^16 + x^4 + x`.
     #[inline(always)]

@@ -23,6 +23,7 @@
 #[cfg(feature = "alloc")]
 mod capture;
 mod decoder;
+mod fill;
 mod frames;
 mod ledger;
 #[cfg(feature = "simd")]

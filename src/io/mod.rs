@@ -37,7 +37,7 @@ mod blocking;
 /// Events of a stream that comes from a port.
 ///
 /// The port writes straight into the decoder's buffer of `N` bytes: at least [`Framing::MAX_LEN`],
-/// and more where a read call is expensive.
+/// more where a read call is expensive, and at most what a [`Decoder`] can have.
 ///
 /// * A read error is passed on and changes nothing: call again.
 /// * At an end of file the answer is `None`, and what may still become a frame is kept, because a

@@ -2,12 +2,12 @@
 
 use core::{cell::Cell, fmt, marker::PhantomData};
 
-use super::{Counters, Event, Framing, Front, Gap, Verdict, ledger::Ledger, search};
+use super::{Counters, Event, Framing, Front, Gap, Verdict, fill::Fill, ledger::Ledger, search};
 
 /// Frames of a stream that arrives in pieces of any size.
 ///
-/// `N` is the size of its buffer, bytes, at least [`Framing::MAX_LEN`]: that is checked when it is
-/// compiled. A frame lying whole in the input is borrowed from the input; only one that is split
+/// `N` is the size of its buffer, bytes: at least [`Framing::MAX_LEN`] and at most 16,383 (2^30 - 1 on a
+/// 64-bit machine), which is checked when it is compiled. A frame lying whole in the input is borrowed from the input; only one that is split
 /// over two inputs goes through the buffer.
 ///
 /// Feed it in one of three ways, or all in turn:
@@ -36,15 +36,21 @@ use super::{Counters, Event, Framing, Front, Gap, Verdict, ledger::Ledger, searc
 /// assert_eq!((frames, decoder.pending()), (2, 0));
 /// # }
 /// ```
+///
+/// A buffer too short for the longest packet does not compile:
+///
+/// ```compile_fail,E0080
+/// let decoder = axlewire::stream::Decoder::<axlewire::ikeya::ToSlave, 7>::new();
+/// ```
 // The buffer in front: a pushed byte is stored without an addition.
 #[repr(C)]
 pub struct Decoder<F, const N: usize> {
     /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
     buffer: [u8; N],
-    end: usize,
-    /// While `end` is less, nothing can be said about the held bytes, and there is room for more. Not 0
-    /// only where they are waited for: the line is busy, and they begin at the front.
-    wake: usize,
+    /// Where `end` is, and when to look. As long as it is too early, nothing can be said about the held bytes,
+    /// and there is room for more. More are waited for only where the line is busy and the held ones begin at
+    /// the front.
+    fill: Fill,
     at: usize,
     line: Line,
     /// Where the held bytes ended when the line went quiet: what lies behind came later.
@@ -77,15 +83,18 @@ pub(crate) enum Held {
 }
 
 impl<F: Framing, const N: usize> Decoder<F, N> {
+    /// Nothing is held, and the line is busy.
+    const EMPTY: Fill = Fill::until(F::MIN_LEN, 0);
+
     /// An empty decoder.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N >= F::MAX_LEN, "the buffer is shorter than the longest frame") }
+        const { assert!(N <= Fill::MAX, "the buffer is longer than a decoder counts") }
         const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "no such lengths") }
         Self {
             buffer: [0; N],
-            end: 0,
-            wake: F::MIN_LEN,
+            fill: Self::EMPTY,
             at: 0,
             line: Line::Busy,
             quiet_end: 0,
@@ -107,17 +116,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// The next event in what is held: [`decode`](Self::decode) with nothing new.
     #[inline]
     pub fn poll(&mut self) -> Option<Event<F::Frame<'_>>> {
-        if self.end < self.wake {
-            return None;
-        }
-        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`. Saves
-        // instructions everywhere, but a 64-bit host was a fifth slower with it.
-        if cfg!(not(target_pointer_width = "64")) && self.wake != 0 {
-            match F::judge(self.buffer.get(..self.end)?) {
-                Verdict::Frame { len } if len == self.end && !self.ledger.has_gap() => {
+        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`.
+        if self.fill.is_just(F::MIN_LEN..=N) {
+            let end = self.fill.end();
+            match F::judge(self.buffer.get(..end)?) {
+                Verdict::Frame { len } if len == end && !self.ledger.has_gap() => {
                     let frame = F::view(self.buffer.get(..len)?)?;
                     self.ledger.frame(len);
-                    (self.end, self.wake) = (0, F::MIN_LEN);
+                    self.fill = Self::EMPTY;
                     return Some(Event::Frame(frame));
                 }
                 Verdict::Partial { need } => {
@@ -126,6 +132,9 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 }
                 _ => {}
             }
+        }
+        if self.fill.is_early() {
+            return None;
         }
         let held = self.judge_held(0)?;
         self.held_event(held)
@@ -138,7 +147,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[must_use]
     pub fn spare(&mut self) -> &mut [u8] {
         self.compact();
-        self.buffer.get_mut(self.end..).unwrap_or_default()
+        self.buffer.get_mut(self.fill.end()..).unwrap_or_default()
     }
 
     /// The first `len` bytes of [`spare`](Self::spare) have been written.
@@ -146,9 +155,9 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// No more than `spare` has are taken.
     pub fn commit(&mut self, len: usize) {
         if self.pending() == 0 {
-            self.wake = 0;
+            self.wake_now();
         }
-        self.end += len.min(N - self.end);
+        self.fill = self.fill.plus(len.min(N - self.fill.end()));
     }
 
     /// Takes in one byte, as a receive interrupt brings it; says whether [`poll`](Self::poll) may
@@ -179,19 +188,19 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// ```
     #[inline]
     pub fn push(&mut self, byte: u8) -> bool {
-        let (at, end) = (self.end, self.end + 1);
-        if end < self.wake {
+        let (at, fill) = (self.fill.end(), self.fill.plus(1));
+        if fill.is_early() {
             // There is room. Where a mask can tell the compiler so, it is cheaper than a comparison.
             let at = if N.is_power_of_two() { at % N } else { at };
             if let Some(room) = self.buffer.get_mut(at) {
                 *room = byte;
-                self.end = end;
+                self.fill = fill;
             }
             return false;
         }
         if let Some(room) = self.buffer.get_mut(at) {
             *room = byte;
-            self.end = end;
+            self.fill = fill;
         }
         true
     }
@@ -205,13 +214,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
     /// one may then follow right behind the first.
     pub fn idle(&mut self) {
-        (self.line, self.quiet_end, self.wake) = (Line::Quiet, self.end, 0);
+        (self.line, self.quiet_end) = (Line::Quiet, self.fill.end());
+        self.wake_now();
     }
 
     /// Bytes received and neither framed nor skipped yet.
     #[must_use]
     pub const fn pending(&self) -> usize {
-        self.end - self.at
+        self.fill.end() - self.at
     }
 
     /// Where every byte went so far.
@@ -230,15 +240,15 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// can go on reading from its port where there is none.
     #[inline]
     pub(crate) fn advance<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
-        if self.end != 0 || self.line != Line::Busy {
-            if input.len() < self.wake.saturating_sub(self.end) {
+        if self.fill != Self::EMPTY {
+            if input.len() < self.fill.missing() {
                 self.hold(input, input.len());
                 return None;
             }
             if let Some(held) = self.complete(input) {
                 return Some(Found::Held(held));
             }
-            if self.end != 0 {
+            if self.fill != Self::EMPTY {
                 return None;
             }
         }
@@ -249,7 +259,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     #[inline]
     pub(crate) fn advance_held(&mut self) -> Option<Held> {
-        if self.end < self.wake { None } else { self.judge_held(0) }
+        if self.fill.is_early() { None } else { self.judge_held(0) }
     }
 
     /// Makes an event of what `advance` has found.
@@ -308,10 +318,10 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     fn complete(&mut self, input: &mut &[u8]) -> Option<Held> {
         let start = *input;
         loop {
-            if self.end < self.wake {
-                self.hold(input, self.wake - self.end);
+            if self.fill.is_early() {
+                self.hold(input, self.fill.missing());
             }
-            if self.end < self.wake {
+            if self.fill.is_early() {
                 return None;
             }
             let taken = start.len() - input.len();
@@ -324,7 +334,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 self.clear();
                 return None;
             }
-            if self.end >= self.wake {
+            if !self.fill.is_early() {
                 // Only a framing that asks for what it has been given comes here.
                 return None;
             }
@@ -337,7 +347,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     fn judge_held(&mut self, taken: usize) -> Option<Held> {
         loop {
             // What came behind a silence does not complete what was pending before it.
-            let end = if self.line == Line::Busy { self.end } else { self.quiet_end };
+            let end = if self.line == Line::Busy { self.fill.end() } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
             match (F::judge(held), self.line) {
                 (Verdict::Reject { reason, more }, _) => {
@@ -350,14 +360,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     }
                 }
                 (Verdict::Frame { len }, line) => {
-                    self.wake = 0;
+                    let (at, len) = (self.at, held.len().min(len));
+                    self.wake_now();
                     if let Some(gap) = self.ledger.take_gap() {
                         return Some(Held::Gap(gap));
                     }
-                    let (at, len) = (self.at, held.len().min(len));
                     self.ledger.frame(len);
                     self.at = at + len;
-                    if self.at == self.end && line == Line::Busy {
+                    if self.at == self.fill.end() && line == Line::Busy {
                         self.clear();
                     }
                     return Some(Held::Frame { at, len });
@@ -373,7 +383,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 }
                 (Verdict::Partial { .. }, Line::Quiet | Line::Settling) => {
                     self.line = Line::Busy;
-                    if self.at == self.end {
+                    if self.at == self.fill.end() {
                         self.clear();
                     }
                     if let Some(gap) = self.ledger.take_gap() {
@@ -387,7 +397,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// Nothing can be said before the held bytes are `need`; sees to it that there is room for them.
     #[inline]
     fn wait_for(&mut self, need: usize) {
-        if self.at == self.end {
+        if self.at == self.fill.end() {
             return self.clear();
         }
         self.compact();
@@ -397,15 +407,22 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// What is held begins at the front, and nothing can be said before there are `need` bytes of it.
     #[inline]
     fn wake_at(&mut self, need: usize) {
-        self.wake = need.min(N);
+        self.fill = Fill::until(need.min(N), self.fill.end());
+    }
+
+    /// Whatever is held is to be looked at.
+    #[inline]
+    fn wake_now(&mut self) {
+        self.fill = Fill::now(self.fill.end());
     }
 
     /// Moves up to `most` bytes from the input behind the held ones.
     #[inline]
     fn hold(&mut self, input: &mut &[u8], most: usize) {
         let count = most.min(input.len());
+        let end = self.fill.end();
         if let (Some((taken, rest)), Some(room)) =
-            (input.split_at_checked(count), self.buffer.get_mut(self.end..self.end + count))
+            (input.split_at_checked(count), self.buffer.get_mut(end..end + count))
         {
             match (room, taken) {
                 // A single byte is not worth a call to copy it.
@@ -413,18 +430,18 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 (room, taken) => room.copy_from_slice(taken),
             }
             *input = rest;
-            self.end += count;
+            self.fill = self.fill.plus(count);
         }
     }
 
     /// Nothing is held.
     fn clear(&mut self) {
-        (self.at, self.end, self.wake) = (0, 0, F::MIN_LEN);
+        (self.at, self.fill) = (0, Self::EMPTY);
     }
 
     /// Moves the held bytes to the front of the buffer.
     fn compact(&mut self) {
-        let (at, end) = (self.at, self.end);
+        let (at, end) = (self.at, self.fill.end());
         if at > 0 {
             // Not by `copy_within`: the compiler does not see that it cannot panic here.
             let cells = Cell::from_mut(self.buffer.as_mut_slice()).as_slice_of_cells();
@@ -432,7 +449,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 to.set(from.get());
             }
             self.quiet_end = self.quiet_end.saturating_sub(at);
-            (self.at, self.end) = (0, end - at);
+            (self.at, self.fill) = (0, Fill::now(end - at));
         }
     }
 }
@@ -453,7 +470,7 @@ impl<F: Framing, const N: usize> Default for Decoder<F, N> {
 impl<F, const N: usize> fmt::Debug for Decoder<F, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Decoder")
-            .field("held", &self.buffer.get(self.at..self.end).unwrap_or_default())
+            .field("held", &self.buffer.get(self.at..self.fill.end()).unwrap_or_default())
             .field("line", &self.line)
             .field("ledger", &self.ledger)
             .finish_non_exhaustive()

@@ -136,6 +136,7 @@ impl<'a, F: Framing> Frames<'a, F> {
             taken.len = run.len - bytes.len();
         }
         if taken.frames > 0 {
+            self.ledger.end_gap();
             self.ledger.frames(taken.frames, taken.len);
             self.rest = self.rest.get(taken.len..).unwrap_or_default();
         }
@@ -168,6 +169,7 @@ impl<'a, F: Framing> Iterator for Frames<'a, F> {
         };
         let (frame, rest) = found.split_at_checked(len)?;
         self.rest = rest;
+        self.ledger.end_gap();
         self.ledger.frame(len);
         F::view(frame)
     }

@@ -145,7 +145,7 @@ impl Ledger {
         }
     }
 
-    /// A frame of `len` bytes. Ends the gap, which is to be reported before or not at all.
+    /// A frame of `len` bytes, where no gap is open: it has been taken, or ended without a report.
     #[inline(always)]
     pub(super) fn frame(&mut self, len: usize) {
         self.frames(1, len);
@@ -156,7 +156,6 @@ impl Ledger {
     pub(super) fn frames(&mut self, frames: usize, len: usize) {
         self.framed = self.framed.wrapping_add(len as u64);
         self.frames = self.frames.wrapping_add(frames as u64);
-        self.gap = None;
     }
 
     /// So many bytes are refused for this reason; `skip` counts them.
@@ -198,6 +197,12 @@ impl Ledger {
     #[inline(always)]
     pub(super) const fn has_gap(&self) -> bool {
         self.gap.is_some()
+    }
+
+    /// A frame ends the gap, and nobody wants a report.
+    #[inline(always)]
+    pub(super) fn end_gap(&mut self) {
+        self.gap = None;
     }
 
     /// The gap that has ended, if there is one.
