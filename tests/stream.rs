@@ -534,6 +534,81 @@ fn a_framing_that_lies_hangs_nothing() {
     feed::<3>();
 }
 
+/// Frames of three bytes that begin with F, but judged only when eight bytes are there.
+struct Patient;
+
+impl Framing for Patient {
+    type Frame<'a> = &'a [u8];
+    const MIN_LEN: usize = 3;
+    const MAX_LEN: usize = 8;
+
+    fn judge(bytes: &[u8]) -> Verdict {
+        match bytes {
+            [b'F', ..] | [] if bytes.len() < 8 => Verdict::Partial { need: 8 },
+            [b'F', ..] => Verdict::Frame { len: 3 },
+            _ => Verdict::Reject { reason: Reason::Header, more: 0 },
+        }
+    }
+
+    fn view(frame: &[u8]) -> Option<&[u8]> {
+        Some(frame)
+    }
+}
+
+#[test]
+fn a_framing_that_asks_for_more_than_it_needs_loses_nothing() {
+    let stream = b"F12F34-F56F78F90--------";
+    let wanted: [&[u8]; 5] = [b"F12", b"F34", b"F56", b"F78", b"F90"];
+    let (mut pushed, mut decoded) = (Vec::new(), Vec::new());
+    let mut decoder = Decoder::<Patient, 8>::new();
+    for &byte in stream {
+        decoder.push(byte);
+        while let Some(event) = decoder.poll() {
+            pushed.extend(frame_of(event).map(<[u8]>::to_vec));
+        }
+    }
+    assert_eq!(decoder.counters().header, 9);
+    let mut decoder = Decoder::<Patient, 8>::new();
+    for mut piece in stream.chunks(5) {
+        while let Some(event) = decoder.decode(&mut piece) {
+            decoded.extend(frame_of(event).map(<[u8]>::to_vec));
+        }
+    }
+    assert_eq!(decoder.counters().header, 9);
+    assert_eq!(
+        (pushed, decoded),
+        (wanted.map(<[u8]>::to_vec).into(), wanted.map(<[u8]>::to_vec).into())
+    );
+}
+
+fn frame_of<T>(event: Event<T>) -> Option<T> {
+    match event {
+        Event::Frame(frame) => Some(frame),
+        Event::Skipped(_) => None,
+    }
+}
+
+#[test]
+fn room_for_a_port_hides_no_silence() {
+    let mut decoder = Decoder::<ikeya::ToMaster, 16>::new();
+    let mut bytes = response().to_vec();
+    bytes.extend([0x56, 0x01, 0x02]);
+    decoder.spare()[..11].copy_from_slice(&bytes);
+    decoder.commit(11);
+    assert!(matches!(decoder.poll(), Some(Event::Frame(_))));
+    decoder.idle();
+    assert_eq!(decoder.spare().len(), 13);
+    let gap = Gap { len: 3, reason: Reason::Idle };
+    assert_eq!(decoder.poll().and_then(gap_of), Some(gap));
+}
+
+fn gap_of<T>(event: Event<T>) -> Option<Gap> {
+    match event {
+        Event::Frame(_) => None,
+        Event::Skipped(gap) => Some(gap),
+    }
+}
+
 #[test]
 fn a_copy_of_a_decoder_goes_on_by_itself() {
     let response = response();

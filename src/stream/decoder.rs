@@ -6,9 +6,9 @@ use super::{Counters, Event, Framing, Front, Gap, Verdict, fill::Fill, ledger::L
 
 /// Frames of a stream that arrives in pieces of any size.
 ///
-/// `N` is the size of its buffer, bytes: at least [`Framing::MAX_LEN`] and at most 16,383 (2^30 - 1 on a
-/// 64-bit machine), which is checked when it is compiled. A frame lying whole in the input is borrowed from the input; only one that is split
-/// over two inputs goes through the buffer.
+/// `N` is the size of its buffer, bytes: at least [`Framing::MAX_LEN`] and, except on 64-bit machines, at
+/// most 32,766. That is checked when it is compiled. A frame lying whole in the input is borrowed from the
+/// input; only one that is split over two inputs goes through the buffer.
 ///
 /// Feed it in one of three ways, or all in turn:
 ///

@@ -136,7 +136,6 @@ impl<'a, F: Framing> Frames<'a, F> {
             taken.len = run.len - bytes.len();
         }
         if taken.frames > 0 {
-            self.ledger.end_gap();
             self.ledger.frames(taken.frames, taken.len);
             self.rest = self.rest.get(taken.len..).unwrap_or_default();
         }
