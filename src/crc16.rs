@@ -34,6 +34,9 @@
 //! remainder modulo `x^15 + x + 1` comes by `x^15 = x + 1`, and squared `x^30 = x^2 + 1`, which lowers
 //! all high powers at once; the parity then says which of the two 16-bit values that share it is the CRC.
 //!
+//! **Any length.** A message that does not fill its words gets zeros in front, which change nothing. The
+//! initial value is added to its first two bytes, wherever these then are.
+//!
 //! The words are the machine's own: 64 bits on a host, 32 on a microcontroller, where a shift of 64
 //! bits takes four instructions. Both forms are below, each complete.
 
