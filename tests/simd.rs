@@ -161,6 +161,18 @@ fn a_frame_behind_noise_of_any_length_is_found() {
 }
 
 #[test]
+fn half_a_sync_is_found_beside_bytes_of_any_value() {
+    for value in 0..=u8::MAX {
+        for len in 0..20 {
+            // What stands behind the first FD looks like one where eight bytes are judged together.
+            let half =
+                [&vec![value; len][..], &[0xFD], &[value ^ 1; 3], &[0xFD, 0xFC, 0xFD]].concat();
+            check::<Ucp>(&[&half[..], &pings(2)].concat());
+        }
+    }
+}
+
+#[test]
 fn false_lengths_are_counted_as_such() {
     for cap_and_more in [[3, 0], [4, 0], [60, 0], [61, 0], [252, 0], [253, 0], [4, 1], [0, 4]] {
         let start = [&[0xFD, 0xFF][..], &cap_and_more].concat();
