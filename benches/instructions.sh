@@ -57,6 +57,7 @@ case ${1:-} in
     awk '
         /^#/ { next }
         NR == FNR { recorded[$1] = $2; next }
+        $2 !~ /^[0-9.]+$/ || $2 <= 0 { print $1 ": not counted"; bad = 1 }
         { counted[$1] = $2; print $1, $2, "recorded", ($1 in recorded) ? recorded[$1] : "nothing" }
         END {
             for (name in counted) if (!(name in recorded)) { print name ": not recorded"; bad = 1 }

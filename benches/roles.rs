@@ -20,16 +20,16 @@ struct Bus {
 impl Bus {
     fn new() -> Self {
         let mut bus = Self {
-            master: Master::new(MasterConfig::direct()),
+            master: Master::new(MasterConfig::direct(), Instant::from_micros(0)),
             slave: Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct()),
             now: Instant::from_micros(0),
         };
-        bus.master.discover();
+        bus.master.discover(bus.now);
         while bus.master.is_discovering() {
             bus.step();
         }
         let target = Rps::new(1.0).expect("finite");
-        bus.master.set_velocity(NodeId::N1, target).expect("node 1 is online");
+        bus.master.set_velocity(NodeId::N1, target, bus.now).expect("node 1 is online");
         bus
     }
 

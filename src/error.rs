@@ -103,6 +103,19 @@ pub enum EncodeError {
         /// The id.
         id: u8,
     },
+    /// A motor command whose version field starts a firmware update in shipped robots (rulings U7,
+    /// U13).
+    StartsUpdate {
+        /// Its version field.
+        version: u16,
+    },
+    /// A frame, cast from bytes, whose header does not belong to its body (ruling U13).
+    Header {
+        /// Id in its header.
+        id: u8,
+        /// Length field of its header.
+        len: u16,
+    },
 }
 
 impl fmt::Display for EncodeError {
@@ -123,6 +136,12 @@ impl fmt::Display for EncodeError {
             }
             Self::KnownId { id } => {
                 write!(f, "id {id:#04x} has a message type of its own and is not sent raw")
+            }
+            Self::StartsUpdate { version } => {
+                write!(f, "motor command with version {version} would start a firmware update")
+            }
+            Self::Header { id, len } => {
+                write!(f, "header with id {id:#04x} and length {len} is not that of its body")
             }
         }
     }

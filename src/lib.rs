@@ -22,6 +22,9 @@
 //! port, `drive` asks the clock that it is given, and [`stream::decode_capture`](stream) collects into
 //! a `Vec`. There is no `unsafe` in this crate.
 //!
+//! **Before a motor is connected, read [`safety`]**: what can move or fail to stop, what this crate does
+//! about it, and what is left to you.
+//!
 //! # A motor bus
 //!
 //! ```
@@ -87,7 +90,7 @@
 //! | `alloc` | | [`stream::decode_capture`](stream): a whole capture at once |
 //! | `std` | | `alloc`, `std::io` errors in the port traits, [`drive::StdClock`](drive) |
 //! | `arbitrary` | | value types made from fuzz input; brings `std` |
-//! | `bytemuck` | | `CheckedBitPattern` and `NoUninit` for packets, `Pod` for bodies |
+//! | `bytemuck` | | `CheckedBitPattern` and `NoUninit` for packets, `Pod` for bodies but `MotorControl` |
 //! | `defmt` | | `Format` for everything |
 //! | `serde` | | values as data |
 //! | `simd` | | AVX2 in [`Frames::each`](stream::Frames::each) and in the search, on an x86-64 processor that has it; brings `std` |
@@ -98,7 +101,7 @@
 //! # Rulings
 //!
 //! Where a protocol document is silent, unclear or wrong, a numbered ruling decides. B1 to B6 hold
-//! for both protocols, I1 to I10 for [`ikeya`], U1 to U13 for [`ucp`]; they stand on those pages and,
+//! for both protocols, I1 to I14 for [`ikeya`], U1 to U16 for [`ucp`]; they are on those pages and,
 //! for B2 to B4, in [`stream`]. B1: the CRC is CRC-16/MODBUS over every byte in front of it, low
 //! byte first. B5: the wire is little-endian on every machine. B6: a byte takes 10 bit times.
 
@@ -116,6 +119,8 @@ pub mod crc16;
 pub mod drive;
 pub mod endpoint;
 pub mod error;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod events;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
@@ -130,6 +135,10 @@ pub mod io;
 ))]
 #[doc = include_str!("porting.md")]
 pub mod porting {}
+// A page, not code.
+#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+#[doc = include_str!("safety.md")]
+pub mod safety {}
 #[cfg(feature = "sim")]
 pub mod sim;
 #[cfg(feature = "simd")]

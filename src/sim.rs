@@ -14,16 +14,17 @@
 //! use axlewire::{
 //!     ikeya::{Health, Master, MasterConfig, Mode, NodeId},
 //!     sim::{Direction, Faults, Line, MotorNode},
-//!     time::Duration,
+//!     time::{Duration, Instant},
 //! };
 //!
-//! let master: Master = Master::new(MasterConfig::direct());
+//! let start = Instant::from_micros(0); // a line begins at 0
+//! let mut master: Master = Master::new(MasterConfig::direct(), start);
+//! master.discover(start);
 //! let mut line = Line::new(500_000, 42, master);
 //! for node in [NodeId::N1, NodeId::N2] {
 //!     line.add(MotorNode::new(node, Mode::Position));
 //! }
 //! *line.pair_mut(Direction::ToHead) = Faults::noise(1e-3); // every 1000th bit is wrong
-//! line.head_mut().discover();
 //! line.run_for(Duration::from_millis(1000))?;
 //! assert_ne!(line.head().health(NodeId::N2), None);
 //! assert!(line.statistics(Direction::ToHead).bit_errors > 0);

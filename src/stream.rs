@@ -20,6 +20,8 @@
 //!   `MAX_LEN` times; a host that judges many frames or refuses many bytes together looks a bounded
 //!   number of times more often. Nothing allocates, nothing panics.
 
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod buffered;
 #[cfg(feature = "alloc")]
 mod capture;
 mod decoder;
@@ -59,7 +61,8 @@ pub enum Verdict {
     Reject {
         /// Why not.
         reason: Reason,
-        /// Nor does one, for the same reason, at any of so many bytes behind it.
+        /// Nor does one, for the same reason, at any of so many bytes behind it, as far as there are
+        /// any.
         more: usize,
     },
 }
@@ -200,9 +203,13 @@ fn search_through<'b, F: Framing>(
             Verdict::Frame { len } => break Front::Frame { len },
             Verdict::Partial { need } => break Front::Partial { need },
             Verdict::Reject { reason, more } => {
-                let len = 1 + more;
+                let (len, behind) = match rest.get(more..) {
+                    Some([_, behind @ ..]) => (1 + more, Some(behind)),
+                    // There are not so many bytes.
+                    _ => (rest.len(), None),
+                };
                 refuse(ledger, reason, len);
-                let Some(behind) = rest.get(len..) else {
+                let Some(behind) = behind else {
                     rest = &[];
                     break Front::Partial { need: 1 };
                 };

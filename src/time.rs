@@ -171,6 +171,19 @@ impl Wrapping32 {
     }
 }
 
+/// The earliest of these deadlines, if there is one.
+// One copy for all roles and their drivers: flash counts more than the call.
+#[cfg(any(
+    feature = "ikeya",
+    feature = "ucp",
+    feature = "embedded-io",
+    feature = "embedded-io-async"
+))]
+#[inline(never)]
+pub(crate) fn earliest(deadlines: &[Option<Instant>]) -> Option<Instant> {
+    deadlines.iter().flatten().copied().reduce(Instant::min)
+}
+
 /// How long `bytes` bytes take on a line: 10 bit times each, rounded up (ruling B6).
 ///
 /// A `baud` of 0 is a line that never gets done: the longest span there is.
@@ -182,11 +195,18 @@ impl Wrapping32 {
 /// assert_eq!(wire_time(44, 115_200).as_micros(), 3820); // a report
 /// ```
 #[must_use]
+#[inline]
 pub const fn wire_time(bytes: usize, baud: u32) -> Duration {
+    const BYTE_BIT_MICROS: u32 = 10 * 1_000_000;
     if baud == 0 {
         return Duration::from_micros(u32::MAX);
     }
-    let bit_micros = (bytes as u64).saturating_mul(10 * 1_000_000);
+    // A division of 64 bits is half a kilobyte of flash, and a frame needs none.
+    if bytes <= (u32::MAX / BYTE_BIT_MICROS) as usize {
+        let bit_micros = bytes as u32 * BYTE_BIT_MICROS;
+        return Duration::from_micros(bit_micros.div_ceil(baud));
+    }
+    let bit_micros = (bytes as u64).saturating_mul(BYTE_BIT_MICROS as u64);
     let micros = bit_micros.div_ceil(baud as u64);
     Duration::from_micros(if micros > u32::MAX as u64 { u32::MAX } else { micros as u32 })
 }

@@ -1,7 +1,7 @@
 //! Drivers over ports that fail, end, stall and stutter, in virtual time: nothing is lost, nothing
 //! hangs, every error says what it is.
 
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "std"))]
+#![cfg(all(feature = "ikeya", feature = "std"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
 #[path = "drivers/bus.rs"]
@@ -15,7 +15,14 @@ mod direction;
 mod port;
 #[path = "drivers/recorder.rs"]
 mod recorder;
+#[cfg(feature = "ucp")]
 #[path = "drivers/rover.rs"]
 mod rover;
+#[path = "drivers/stops.rs"]
+mod stops;
+#[path = "drivers/story.rs"]
+mod story;
+#[path = "drivers/unsent.rs"]
+mod unsent;
 #[path = "support/world.rs"]
 mod world;

@@ -2,7 +2,9 @@
 //! machine and against each other, over sockets and in real time.
 //!
 //! Order and content are asserted, never how long something takes: QEMU runs beside whatever else this
-//! machine does. Waits end after 30 s.
+//! machine does. Waits end after 30 s. Where the machine halts QEMU for 100 ms inside a packet, the
+//! packet is lost, as on a real line; so one test runs at a time, and one that fails while the machine
+//! was busy is run again.
 //!
 //! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Where they are missing
 //! the tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
@@ -13,11 +15,17 @@
 mod master;
 #[path = "firmware/noise.rs"]
 mod noise;
+#[path = "firmware/pin.rs"]
+mod pin;
 #[path = "firmware/qemu.rs"]
 mod qemu;
+#[path = "support/quiet.rs"]
+mod quiet;
 #[path = "firmware/robot.rs"]
 mod robot;
 #[path = "firmware/slave.rs"]
 mod slave;
+#[path = "firmware/uart.rs"]
+mod uart;
 #[path = "firmware/wire.rs"]
 mod wire;

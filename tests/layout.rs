@@ -38,6 +38,7 @@ fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
         ucp::Ping: 0,
         ucp::Pong: 1,
         ucp::MotorControl: 16,
+        ucp::RawMotorControl: 16,
         ucp::CalibrationStart: 1,
         ucp::CalibrationStartAck: 2,
         ucp::CalibrationEnd: 1,
@@ -51,6 +52,7 @@ fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
         ucp::BiasRequest: 0,
         ucp::Biases: 19,
         ucp::OtaRequest: 2,
+        ucp::RawOtaRequest: 2,
         ucp::OtaAck: 1,
         ucp::SetNetworkState: 1,
         ucp::SetNetworkStateWide: 4,
@@ -169,5 +171,5 @@ fn bytemuck_and_zerocopy_agree_on_what_is_a_packet() {
         }
     }
     let body = [7; 16];
-    assert_eq!(bytemuck::from_bytes::<ucp::MotorControl>(&body).speed(), 0x0707);
+    assert_eq!(bytemuck::from_bytes::<ucp::RawMotorControl>(&body).speed(), 0x0707);
 }

@@ -428,7 +428,7 @@ mod motor_bus {
 
     /// A bus with these nodes, odd ones in velocity mode, answering after 50 µs.
     fn bus(nodes: &[NodeId], config: MasterConfig) -> Line<Master, MotorNode> {
-        let mut line = Line::new(config.baud, 1, Master::new(config));
+        let mut line = Line::new(config.baud, 1, Master::new(config, at(0)));
         for &node in nodes {
             let mut slave = SlaveConfig::direct();
             slave.idle = wire_time(5, config.baud);
@@ -440,7 +440,8 @@ mod motor_bus {
     }
 
     fn discovered(line: &mut Line<Master, MotorNode>) -> (Vec<(NodeId, Mode)>, Option<u8>) {
-        line.head_mut().discover();
+        let now = line.now();
+        line.head_mut().discover(now);
         while line.head().is_discovering() {
             assert!(line.step().unwrap().is_some());
         }
@@ -470,8 +471,9 @@ mod motor_bus {
         let mut line = bus(&[NodeId::N1, NodeId::N2], MasterConfig::direct());
         discovered(&mut line);
         let target = Position::from_revolutions(-1.25).unwrap();
-        line.head_mut().set_velocity(NodeId::N1, Rps::new(3.0).unwrap()).unwrap();
-        line.head_mut().set_position(NodeId::N2, target).unwrap();
+        let now = line.now();
+        line.head_mut().set_velocity(NodeId::N1, Rps::new(3.0).unwrap(), now).unwrap();
+        line.head_mut().set_position(NodeId::N2, target, now).unwrap();
         line.run_for(Duration::from_millis(2000)).unwrap();
         assert!((line.tail(0).motor().velocity().get() - 3.0).abs() < 1e-3);
         assert_eq!(line.tail(1).motor().position(), target);
@@ -486,10 +488,13 @@ mod motor_bus {
     fn visits(config: MasterConfig, span: Duration) -> (u32, u64) {
         let mut line = bus(&NodeId::ALL, config);
         discovered(&mut line);
+        let now = line.now();
         for node in NodeId::ALL {
             match mode_of(node) {
-                Mode::Velocity => line.head_mut().set_velocity(node, Rps::ZERO).unwrap(),
-                Mode::Position => line.head_mut().set_position(node, Position::new(1, 1)).unwrap(),
+                Mode::Velocity => line.head_mut().set_velocity(node, Rps::ZERO, now).unwrap(),
+                Mode::Position => {
+                    line.head_mut().set_position(node, Position::new(1, 1), now).unwrap();
+                }
             }
         }
         line.run_for(Duration::from_millis(100)).unwrap(); // the new set-points go first
@@ -596,12 +601,14 @@ mod motor_bus {
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(100));
         let slave = Slave::new(NodeId::N1, Mode::Velocity, config);
-        let master: Master = Master::new(MasterConfig::direct());
+        let master: Master = Master::new(MasterConfig::direct(), at(0));
         let mut line = Line::new(500_000, 0, master);
         line.add(MotorNode::from_parts(slave, Motor::new()));
-        line.head_mut().discover();
+        let now = line.now();
+        line.head_mut().discover(now);
         line.run_for(Duration::from_millis(100)).unwrap();
-        line.head_mut().set_velocity(NodeId::N1, Rps::new(1.0).unwrap()).unwrap();
+        let now = line.now();
+        line.head_mut().set_velocity(NodeId::N1, Rps::new(1.0).unwrap(), now).unwrap();
         line.run_for(Duration::from_millis(1000)).unwrap();
         assert!(line.tail(0).motor().velocity().get() > 0.99);
         line.head_mut().release(NodeId::N1);
@@ -635,18 +642,72 @@ mod rover {
     #[test]
     fn a_positive_turn_is_to_the_right() {
         let mut rover = Rover::new();
-        rover.command(&MotorControl::turn_right(0, 10).unwrap());
+        rover.command(&MotorControl::turn_right(0, 20).unwrap());
         rover.step(SECOND);
         let telemetry = rover.telemetry();
-        assert_eq!(telemetry.rpm, [12, -12, 12, -12]);
+        assert_eq!(telemetry.rpm, [17, -17, 17, -17]);
         assert!((1..180).contains(&telemetry.heading_deg), "{telemetry:?}");
         assert!(telemetry.gyro[2] < 0 && telemetry.mag[1] > 0, "{telemetry:?}");
         let turned = rover.heading_deg();
-        rover.command(&MotorControl::turn_left(0, 10).unwrap());
+        rover.command(&MotorControl::turn_left(0, 20).unwrap());
         rover.step(SECOND);
         rover.step(SECOND);
         let back = rover.heading_deg();
         assert!(back < turned || back > 180.0, "{back}");
+    }
+
+    /// What the wheels do once they have reached their speed, percent: left, right.
+    fn wheels(commands: &[(i16, i16)]) -> (i16, i16) {
+        let mut rover = Rover::new();
+        for &(speed, angular) in commands {
+            rover.command(&MotorControl::new(speed, angular).unwrap());
+            (0..10).for_each(|_| rover.step(SECOND));
+        }
+        let percent = |rpm: i16| (f64::from(rpm) / Rover::FULL_RPM * 100.0).round() as i16;
+        let [left, right, ..] = rover.telemetry().rpm;
+        (percent(left), percent(right))
+    }
+
+    #[test]
+    fn a_rover_mixes_as_the_vendors_motor_c_does() {
+        assert_eq!(wheels(&[(60, 50)]), (81, 39));
+        assert_eq!(wheels(&[(60, -50)]), (39, 81));
+        assert_eq!(wheels(&[(-60, 50)]), (-81, -39), "in reverse the nose swings left");
+        assert_eq!(wheels(&[(-60, -50)]), (-39, -81));
+        assert_eq!(wheels(&[(100, 100)]), (100, 30), "limited");
+        assert_eq!(wheels(&[(0, 50)]), (35, -35), "on the spot");
+        assert_eq!(wheels(&[(0, -50)]), (-35, 35));
+    }
+
+    #[test]
+    fn a_yaw_to_the_right_swings_the_nose_right_in_reverse_too() {
+        for speed in [-100, -60, -6, -5, 0, 5, 6, 60, 100] {
+            for (yaw, expected) in [
+                (MotorControl::yaw_right(speed, 50).unwrap(), 1.0),
+                (MotorControl::yaw_left(speed, 50).unwrap(), -1.0),
+            ] {
+                let mut rover = Rover::new();
+                rover.command(&yaw);
+                rover.step(Duration::from_millis(100));
+                let turned = (rover.heading_deg() + 180.0).rem_euclid(360.0) - 180.0;
+                assert!(turned * expected > 0.0, "{yaw:?}: {turned}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rover_has_the_dead_bands_of_the_vendors_motor_c() {
+        assert_eq!(wheels(&[(0, 10)]), (0, 0), "turning on the spot needs more than 10");
+        assert_eq!(wheels(&[(0, 11)]), (7, -7));
+        assert_eq!(wheels(&[(5, 0)]), (0, 0), "a duty of 5 % moves nothing");
+        assert_eq!(wheels(&[(6, 0)]), (6, 6));
+        assert_eq!(wheels(&[(94, 0)]), (94, 94));
+        assert_eq!(wheels(&[(95, 0)]), (100, 100), "and from 95 % on it is full speed");
+        assert_eq!(wheels(&[(60, 5)]), (63, 63), "little steering does not steer");
+        // Below both thresholds the direction of the command before stays selected.
+        assert_eq!(wheels(&[(-50, 0), (5, 5)]), (-8, -8));
+        assert_eq!(wheels(&[(50, 0), (-5, 5)]), (8, 8));
+        assert_eq!(wheels(&[(50, 0), (0, 0)]), (0, 0));
     }
 
     #[test]

@@ -20,7 +20,8 @@ const BIT_ERRORS: f64 = 1e-4;
 
 pub(crate) fn run() -> Result<(), Box<dyn Error>> {
     title("Ikeya MD: eight motors, a noisy line, a loose plug (two seconds in virtual time)");
-    let mut bus: Bus = Line::new(500_000, 2026, Master::new(MasterConfig::direct()));
+    let mut bus: Bus =
+        Line::new(500_000, 2026, Master::new(MasterConfig::direct(), Instant::from_micros(0)));
     for node in NodeId::ALL {
         let mode = if node <= NodeId::N4 { Mode::Velocity } else { Mode::Position };
         let mut config = SlaveConfig::direct();
@@ -33,7 +34,8 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
     *bus.pair_mut(Direction::ToTails) = Faults::noise(BIT_ERRORS);
     *bus.pair_mut(Direction::ToHead) = Faults::noise(BIT_ERRORS);
 
-    bus.head_mut().discover();
+    let now = bus.now();
+    bus.head_mut().discover(now);
     let loose = Who::Tail(2);
     // When the commands were given, and how many answers there had been.
     let (mut commanded, mut abnormal) = (None, None);
@@ -45,7 +47,8 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
         }
         if commanded.is_none() && !bus.head().is_discovering() {
             commanded = Some((bus.now(), answers(&bus)));
-            command(bus.head_mut())?;
+            let now = bus.now();
+            command(bus.head_mut(), now)?;
         }
     }
     table(&bus);
@@ -56,11 +59,13 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
 }
 
 /// Sets every node going.
-fn command(master: &mut Master) -> Result<(), Box<dyn Error>> {
+fn command(master: &mut Master, now: Instant) -> Result<(), Box<dyn Error>> {
     for node in NodeId::ALL {
         match master.mode(node) {
-            Some(Mode::Velocity) => master.set_velocity(node, Rps::from_rpm(60.0)?)?,
-            Some(Mode::Position) => master.set_position(node, Position::from_revolutions(1.25)?)?,
+            Some(Mode::Velocity) => master.set_velocity(node, Rps::from_rpm(60.0)?, now)?,
+            Some(Mode::Position) => {
+                master.set_position(node, Position::from_revolutions(1.25)?, now)?;
+            }
             None => println!("node {node} was not found"),
         }
     }
@@ -85,6 +90,12 @@ fn tell(at: Instant, event: MasterEvent, abnormal: &mut Option<NodeId>) {
         MasterEvent::Health { node, health: Health::Online } if *abnormal == Some(node) => {
             *abnormal = None;
             println!("{seconds:9.3} s  node {node} answers again");
+        }
+        MasterEvent::Stopped { node } => {
+            println!("{seconds:9.3} s  node {node} has confirmed its stop twice");
+        }
+        MasterEvent::StandingStill { node } => {
+            println!("{seconds:9.3} s  node {node} stands still");
         }
         MasterEvent::ModeChanged { node, mode } => {
             println!("{seconds:9.3} s  node {node} is now in {mode} mode");
@@ -130,8 +141,9 @@ fn rates(bus: &Bus, begin: Instant, before: u32) {
     let errors = [Direction::ToTails, Direction::ToHead].map(|way| bus.statistics(way).bit_errors);
     println!(
         "\n{:.0} answers a second; a clean line with eight commanded nodes, each answering after {} us, \
-         allows {}.\n{} bits were wrong. Node 3 stopped by its own watchdog and came back \
-         without its set-point:\nit stands still until somebody says so.",
+         allows {}.\n{} bits were wrong. Node 3 stopped by its own watchdog. It was lost under a \
+         set-point, so the\nmaster stopped it when it came back: it stands still until there is a new \
+         command.",
         f64::from(answers(bus) - before) / seconds,
         plan.response_time.as_micros(),
         plan.cycles_per_second() * 8,

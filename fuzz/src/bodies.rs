@@ -286,14 +286,16 @@ fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
     let in_range = |percent| (-100..=100).contains(&percent);
     match ucp::MotorControl::new(speed, angular) {
         Ok(command) => message(index, command.with_front_led(lamp), |said, body| {
-            let harmless = (body.back_led(), body.version(), body.reserve1(), body.reserve2());
+            let raw = ucp::RawMotorControl::from(*body);
+            let harmless = (raw.back_led(), raw.version(), raw.reserve1(), raw.reserve2());
             in_range(speed)
                 && in_range(angular)
                 && (body.speed(), body.angular()) == (speed, angular)
                 && body.front_led() == if lamp { 100 } else { 0 }
                 && harmless == (0, 0, 0, 0)
-                && !body.starts_update()
-                && said == Message::MotorControl(body)
+                && !raw.starts_update()
+                && said == Message::MotorControl(&raw)
+                && ucp::MotorControl::try_from(raw) == Ok(*body)
         }),
         Err(error) => {
             assert!(matches!(error, EncodeError::Percent { value, .. } if !in_range(value)));
@@ -302,7 +304,7 @@ fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
 
     let version = u.arbitrary()?;
     message(index, ucp::OtaRequest::start_firmware_update(version), |said, body| {
-        body.version() == version && said == Message::OtaRequest(body)
+        body.version() == version && said == Message::OtaRequest(&ucp::RawOtaRequest::from(*body))
     });
     let status = value::ota(u)?;
     message(index, ucp::OtaAck::new(status), |said, body| {

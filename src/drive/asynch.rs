@@ -9,8 +9,11 @@ use core::{
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
 
-use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, READS};
+use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS};
 use crate::{endpoint::Endpoint, time::Instant};
+
+/// Longest time in which a port may take no byte, or not be flushed, microseconds.
+const STALL_US: u32 = 1_000_000;
 
 /// Longest delay asked for at once, microseconds: what a delay is off by does not add up.
 const NAP_US: u32 = 1_000_000;
@@ -23,22 +26,44 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     ///
     /// # Errors
     ///
-    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero);
-    /// what was received is taken in, what is unsent waits for the next call.
+    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero),
+    /// the first of several. What is due has been sent and flushed all the same, as far as the port
+    /// could. A call that fails has yielded once, so that a loop that ignores errors does not starve
+    /// the other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        let result = self.round_async().await;
+        if result.is_err() {
+            yield_once().await;
+        }
+        result
+    }
+
+    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.reclaim();
+        let mut result = Ok(());
         for _ in 0..FRAMES {
-            self.receive_async().await?;
+            result = result.and(self.receive_async().await);
             self.expire();
-            if !self.load()? {
+            match self.load() {
+                Ok(false) => break,
+                Ok(true) => {}
+                Err(error) => {
+                    result = result.and(Err(error));
+                    break;
+                }
+            }
+            let sent = self.send_async().await;
+            let has_failed = sent.is_err();
+            result = result.and(sent);
+            if has_failed {
                 break;
             }
-            self.send_async().await?;
         }
-        if self.unflushed {
-            self.port.flush().await.map_err(DriveError::Port)?;
-            self.unflushed = false;
+        if self.outbox.needs_flush() {
+            let flushed = self.flush_async().await;
+            result = result.and(flushed);
         }
-        Ok(())
+        result
     }
 
     /// The next event; waits for it until `deadline`, and is then `None`. At least one round is
@@ -54,7 +79,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         self.until_async(deadline, Self::poll_event).await
     }
 
-    /// Goes on until `deadline`, with every event handed to `on_event`, which may command the role.
+    /// Goes on until `deadline`. Every event is handed to `on_event`, with the role, to be commanded, and
+    /// the time.
     ///
     /// # Errors
     ///
@@ -62,28 +88,42 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     pub async fn run_until_async(
         &mut self,
         deadline: Instant,
-        mut on_event: impl FnMut(&mut R, R::Event),
+        mut on_event: impl FnMut(&mut R, R::Event, Instant),
     ) -> Result<(), DriveError<P::Error>> {
         while let Some(event) = self.next_event_async(deadline).await? {
-            on_event(&mut self.role, event);
-            if self.now() >= deadline {
+            let now = self.now();
+            on_event(&mut self.role, event, now);
+            if now >= deadline {
                 break;
             }
         }
         Ok(())
     }
 
-    /// Goes on until `done` says so; `None` at `deadline`.
+    /// Goes on until `done` says so; `None` at `deadline`. A port that fails ends it.
     pub(super) async fn until_async<T>(
         &mut self,
         deadline: Instant,
+        done: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<Option<T>, DriveError<P::Error>> {
+        self.until_with_async(deadline, Needs::WholePort, done).await
+    }
+
+    /// The same; says whether `done` is asked after a failure as well.
+    pub(super) async fn until_with_async<T>(
+        &mut self,
+        deadline: Instant,
+        needs: Needs,
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            self.service_async().await?;
-            if let Some(found) = done(self) {
-                return Ok(Some(found));
+            let result = self.service_async().await;
+            if result.is_ok() || needs != Needs::WholePort {
+                if let Some(found) = done(self) {
+                    return Ok(Some(found));
+                }
             }
+            result?;
             if self.now() >= deadline {
                 return Ok(None);
             }
@@ -94,31 +134,66 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Takes in what is there: each read is asked once, and not waited for.
     async fn receive_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
+        self.look();
         for _ in 0..READS {
             match first(self.port.read(&mut chunk), ready(())).await {
-                Some(count) => self.take(&chunk, count.map_err(DriveError::Port)?)?,
-                None => break,
+                Some(count) => {
+                    self.receive_chunk(&chunk, count.map_err(DriveError::Port)?)?;
+                }
+                None => {
+                    self.saw_empty();
+                    break;
+                }
             }
         }
         Ok(())
     }
 
     async fn send_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        while !self.unsent.is_empty() {
-            match self.port.write(&self.unsent).await.map_err(DriveError::Port)? {
-                0 => return Err(DriveError::WriteZero),
-                count => self.sent(count),
-            }
+        while !self.outbox.rest().is_empty() {
+            self.before_write();
+            let writing = self.port.write(self.outbox.rest());
+            let Some(written) = first(writing, self.clock.delay_us(STALL_US)).await else {
+                self.reclaim();
+                return self.stalled_async().await;
+            };
+            self.after_write(written)?;
+        }
+        if self.outbox.is_in_doubt() {
+            self.flush_async().await?;
         }
         Ok(())
     }
 
+    async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        match first(self.port.flush(), self.clock.delay_us(STALL_US)).await {
+            Some(flushed) => self.after_flush(flushed),
+            None => self.stalled_async().await,
+        }
+    }
+
+    /// The port has stalled. A write of no bytes, which takes no time, lets a
+    /// [`Directed`](super::Directed) port put its pin off, with bytes still in it, perhaps.
+    async fn stalled_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.unflushed();
+        let _ = first(self.port.write(&[]), ready(())).await;
+        Err(DriveError::Stalled)
+    }
+
     /// Waits for bytes, for the role's next deadline or for `deadline`, whichever is first.
     async fn wait_async(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
-        let nap = (self.wake_at(deadline) - self.now()).as_micros().min(NAP_US);
+        let wake_at = self.wake_at(deadline);
+        let nap = (wake_at - self.now()).as_micros().min(NAP_US);
         let mut chunk = [0; CHUNK_LEN];
         match first(self.port.read(&mut chunk), self.clock.delay_us(nap)).await {
-            Some(count) => self.take(&chunk, count.map_err(DriveError::Port)?),
+            Some(count) => {
+                let result = count.map_err(DriveError::Port);
+                let result = result.and_then(|count| self.receive_chunk(&chunk, count));
+                if result.is_err() {
+                    yield_once().await;
+                }
+                result
+            }
             None => Ok(()),
         }
     }
@@ -132,4 +207,17 @@ async fn first<T>(read: impl Future<Output = T>, wait: impl Future<Output = ()>)
         Poll::Pending => wait.as_mut().poll(context).map(|()| None),
     })
     .await
+}
+
+/// Lets other tasks run.
+async fn yield_once() {
+    let mut has_yielded = false;
+    poll_fn(|context| {
+        if core::mem::replace(&mut has_yielded, true) {
+            return Poll::Ready(());
+        }
+        context.waker().wake_by_ref();
+        Poll::Pending
+    })
+    .await;
 }

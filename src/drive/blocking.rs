@@ -2,7 +2,7 @@
 
 use embedded_io::{Read, ReadReady, Write};
 
-use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, READS};
+use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS};
 use crate::{endpoint::Endpoint, time::Instant};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
@@ -14,22 +14,34 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     ///
     /// # Errors
     ///
-    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero);
-    /// what was received is taken in, what is unsent waits for the next call.
+    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero),
+    /// the first of several. What is due has been sent and flushed all the same, as far as the port
+    /// could.
     pub fn service(&mut self) -> Result<(), DriveError<P::Error>> {
-        self.receive()?;
+        self.reclaim();
+        let mut result = self.receive();
         for _ in 0..FRAMES {
             self.expire();
-            if !self.load()? {
+            match self.load() {
+                Ok(false) => break,
+                Ok(true) => {}
+                Err(error) => {
+                    result = result.and(Err(error));
+                    break;
+                }
+            }
+            let (received, sent) = self.send();
+            let has_failed = sent.is_err();
+            result = result.and(received).and(sent);
+            if has_failed {
                 break;
             }
-            self.send()?;
         }
-        if self.unflushed {
-            self.port.flush().map_err(DriveError::Port)?;
-            self.unflushed = false;
+        if self.outbox.needs_flush() {
+            let flushed = self.port.flush();
+            result = result.and(self.after_flush(flushed));
         }
-        Ok(())
+        result
     }
 
     /// The next event; waits for it until `deadline`, and is then `None`. At least one round is
@@ -45,7 +57,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         self.until(deadline, Self::poll_event)
     }
 
-    /// Goes on until `deadline`, with every event handed to `on_event`, which may command the role.
+    /// Goes on until `deadline`. Every event is handed to `on_event`, with the role, to be commanded, and
+    /// the time.
     ///
     /// # Errors
     ///
@@ -53,58 +66,85 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     pub fn run_until(
         &mut self,
         deadline: Instant,
-        mut on_event: impl FnMut(&mut R, R::Event),
+        mut on_event: impl FnMut(&mut R, R::Event, Instant),
     ) -> Result<(), DriveError<P::Error>> {
         while let Some(event) = self.next_event(deadline)? {
-            on_event(&mut self.role, event);
-            if self.now() >= deadline {
+            let now = self.now();
+            on_event(&mut self.role, event, now);
+            if now >= deadline {
                 break;
             }
         }
         Ok(())
     }
 
-    /// Goes on until `done` says so; `None` at `deadline`.
+    /// Goes on until `done` says so; `None` at `deadline`. A port that fails ends it.
     pub(super) fn until<T>(
         &mut self,
         deadline: Instant,
+        done: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<Option<T>, DriveError<P::Error>> {
+        self.until_with(deadline, Needs::WholePort, done)
+    }
+
+    /// The same; says whether `done` is asked after a failure as well.
+    pub(super) fn until_with<T>(
+        &mut self,
+        deadline: Instant,
+        needs: Needs,
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            self.service()?;
-            if let Some(found) = done(self) {
-                return Ok(Some(found));
+            let result = self.service();
+            if result.is_ok() || needs != Needs::WholePort {
+                if let Some(found) = done(self) {
+                    return Ok(Some(found));
+                }
             }
+            result?;
             if self.now() >= deadline {
                 return Ok(None);
             }
-            self.clock.idle_until(self.wake_at(deadline));
+            let until = self.on_clock(self.wake_at(deadline));
+            self.clock.idle_until(until);
         }
     }
 
     /// Takes in what is there.
     fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
+        self.look();
         for _ in 0..READS {
             if !self.port.read_ready().map_err(DriveError::Port)? {
+                self.saw_empty();
                 break;
             }
             let count = self.port.read(&mut chunk).map_err(DriveError::Port)?;
-            self.take(&chunk, count)?;
+            self.receive_chunk(&chunk, count)?;
         }
         Ok(())
     }
 
     /// Sends what is unsent, and takes in what has come meanwhile: it belongs in front of the next
-    /// frame, and a receiver without a buffer would lose it.
-    fn send(&mut self) -> Result<(), DriveError<P::Error>> {
-        while !self.unsent.is_empty() {
-            match self.port.write(&self.unsent).map_err(DriveError::Port)? {
-                0 => return Err(DriveError::WriteZero),
-                count => self.sent(count),
+    /// frame, and a receiver without a buffer would lose it. A receiver that fails does not end the
+    /// sending.
+    fn send(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
+        let mut received = Ok(());
+        while !self.outbox.rest().is_empty() {
+            self.before_write();
+            let written = self.port.write(self.outbox.rest());
+            if let Err(error) = self.after_write(written) {
+                return (received, Err(error));
             }
-            self.receive()?;
+            received = received.and(self.receive());
         }
-        Ok(())
+        if self.outbox.is_in_doubt() {
+            let flushed = self.port.flush();
+            return (received, self.after_flush(flushed));
+        }
+        (received, Ok(()))
     }
 }
+
+type Received<E> = Result<(), DriveError<E>>;
+type Sent<E> = Result<(), DriveError<E>>;

@@ -11,7 +11,8 @@ pub trait Clock {
     fn now(&mut self) -> Instant;
 
     /// Passes the time until `until`, or a part of it: bytes may come in meanwhile, and whoever
-    /// calls this looks for them when it returns.
+    /// calls this looks for them when it returns. Return in time: a slave or a robot whose driver
+    /// comes late takes what it finds for old ([module](super#when-a-driver-is-held-up)).
     ///
     /// Only the blocking calls use it. As provided it returns at once, so that they spin, which is
     /// right for a processor with nothing else to do.

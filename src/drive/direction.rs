@@ -13,13 +13,19 @@ use crate::time::Duration;
 /// A port whose transceiver has a driver-enable pin (DE, often joined with /RE).
 ///
 /// The pin goes on before the first byte that is written and off once the port's `flush` says that
-/// the last is out, or as soon as writing or flushing fails. So *flush after each packet*, as a
+/// the last is out, or when writing or flushing fails. So *flush after each packet*, as a
 /// [`Driver`](super::Driver) does: until then nobody else can speak. The port's `flush` has to wait
 /// for the last stop bit, and not only for a buffer to be empty; where it does not, the delay behind
 /// makes up for it.
 ///
+/// A `write` that fails flushes what the port has taken before, so that it reaches the line, and only
+/// then puts the pin off. Where that flush fails as well, the next `flush` is
+/// [`DirectedError::Lost`].
+///
 /// A cancelled async `write` or `flush` leaves the pin as it is, because a part of the packet may be
-/// on the line: go on with the packet, or give it up with [`release`](Self::release).
+/// on the line: go on with the packet, or give it up with [`release`](Self::release) or with a `write`
+/// of no bytes, which puts the pin off at once. A [`Driver`](super::Driver) does the latter when an
+/// async `write` or `flush` has stalled for a second.
 ///
 /// High is on. For a transceiver that is enabled by low, hand in an inverted pin.
 #[derive(Debug)]
@@ -30,6 +36,8 @@ pub struct Directed<P, O, D = NoDelay> {
     before: Duration,
     after: Duration,
     state: State,
+    /// The pin went off, and bytes may have been in the transmitter.
+    is_lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -66,7 +74,7 @@ impl<P, O: OutputPin, D> Directed<P, O, D> {
         after: Duration,
     ) -> Result<Self, O::Error> {
         pin.set_low()?;
-        Ok(Self { port, pin, delay, before, after, state: State::Off })
+        Ok(Self { port, pin, delay, before, after, state: State::Off, is_lost: false })
     }
 
     /// Puts the pin off, whatever is still being sent.
@@ -115,10 +123,36 @@ impl<P, O: OutputPin, D> Directed<P, O, D> {
         Ok(self.before)
     }
 
+    /// Puts the pin off for a write of no bytes.
+    fn give_up<E>(&mut self) -> Result<usize, DirectedError<E, O::Error>> {
+        if self.is_on() {
+            self.release().map_err(DirectedError::Pin)?;
+        }
+        Ok(0)
+    }
+
+    /// The end of a flush: says once whether bytes were lost before.
+    fn all_out<E>(&mut self) -> Result<(), DirectedError<E, O::Error>> {
+        if core::mem::take(&mut self.is_lost) { Err(DirectedError::Lost) } else { Ok(()) }
+    }
+
     /// Puts the pin off because of `error`, which is the one to tell.
     fn fail<T, E>(&mut self, error: E) -> Result<T, DirectedError<E, O::Error>> {
         let _ = self.release();
         Err(DirectedError::Port(error))
+    }
+
+    /// Puts the pin off after a write that took nothing. What was taken before is out, or may be lost.
+    fn end<E>(
+        &mut self,
+        written: Result<usize, E>,
+        is_flushed: bool,
+    ) -> Result<usize, DirectedError<E, O::Error>> {
+        self.is_lost |= !is_flushed;
+        match written {
+            Err(error) => self.fail(error),
+            Ok(_) => self.give_up(),
+        }
     }
 }
 
@@ -143,6 +177,9 @@ pub enum DirectedError<E, F> {
     Port(E),
     /// The driver-enable pin failed.
     Pin(F),
+    /// Bytes may not have reached the line: the port failed while it sent them, and could not be
+    /// flushed before the pin went off. Told once, by the `flush` behind.
+    Lost,
 }
 
 impl<E: fmt::Display, F: fmt::Debug> fmt::Display for DirectedError<E, F> {
@@ -150,6 +187,9 @@ impl<E: fmt::Display, F: fmt::Debug> fmt::Display for DirectedError<E, F> {
         match self {
             Self::Port(error) => error.fmt(f),
             Self::Pin(error) => write!(f, "driver-enable pin failed: {error:?}"),
+            Self::Lost => {
+                f.write_str("bytes may have been lost: the port failed while it sent them")
+            }
         }
     }
 }
@@ -158,7 +198,7 @@ impl<E: Error + 'static, F: fmt::Debug> Error for DirectedError<E, F> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             Self::Port(error) => Some(error),
-            Self::Pin(_) => None,
+            Self::Pin(_) | Self::Lost => None,
         }
     }
 }
@@ -168,7 +208,7 @@ impl<E: io::Error + 'static, F: fmt::Debug> io::Error for DirectedError<E, F> {
         match self {
             Self::Port(error) => error.kind(),
             // Pins know no other kind.
-            Self::Pin(_) => io::ErrorKind::Other,
+            Self::Pin(_) | Self::Lost => io::ErrorKind::Other,
         }
     }
 }
@@ -207,32 +247,32 @@ where
 {
     fn write(&mut self, buf: &[u8]) -> Result<usize, Self::Error> {
         if buf.is_empty() {
-            return Ok(0);
+            return self.give_up();
         }
         let before = self.engage().map_err(DirectedError::Pin)?;
         if before > Duration::ZERO {
             self.delay.delay_us(before.as_micros());
         }
         self.state = State::On;
-        match self.port.write(buf) {
-            Ok(0) => {
-                self.release().map_err(DirectedError::Pin)?;
-                Ok(0)
-            }
-            Ok(count) => Ok(count),
-            Err(error) => self.fail(error),
+        let written = self.port.write(buf);
+        if let Ok(1..) = written {
+            return written.map_err(DirectedError::Port);
         }
+        let is_flushed = self.port.flush().is_ok();
+        self.delay.delay_us(self.after.as_micros());
+        self.end(written, is_flushed)
     }
 
     fn flush(&mut self) -> Result<(), Self::Error> {
         if let Err(error) = self.port.flush() {
+            self.is_lost = false;
             return self.fail(error);
         }
         if self.is_on() {
             self.delay.delay_us(self.after.as_micros());
             self.release().map_err(DirectedError::Pin)?;
         }
-        Ok(())
+        self.all_out()
     }
 }
 
@@ -256,31 +296,31 @@ where
 {
     async fn write(&mut self, buf: &[u8]) -> Result<usize, Self::Error> {
         if buf.is_empty() {
-            return Ok(0);
+            return self.give_up();
         }
         let before = self.engage().map_err(DirectedError::Pin)?;
         if before > Duration::ZERO {
             self.delay.delay_us(before.as_micros()).await;
         }
         self.state = State::On;
-        match self.port.write(buf).await {
-            Ok(0) => {
-                self.release().map_err(DirectedError::Pin)?;
-                Ok(0)
-            }
-            Ok(count) => Ok(count),
-            Err(error) => self.fail(error),
+        let written = self.port.write(buf).await;
+        if let Ok(1..) = written {
+            return written.map_err(DirectedError::Port);
         }
+        let is_flushed = self.port.flush().await.is_ok();
+        self.delay.delay_us(self.after.as_micros()).await;
+        self.end(written, is_flushed)
     }
 
     async fn flush(&mut self) -> Result<(), Self::Error> {
         if let Err(error) = self.port.flush().await {
+            self.is_lost = false;
             return self.fail(error);
         }
         if self.is_on() {
             self.delay.delay_us(self.after.as_micros()).await;
             self.release().map_err(DirectedError::Pin)?;
         }
-        Ok(())
+        self.all_out()
     }
 }

@@ -22,6 +22,8 @@ pub enum DriveError<E> {
     Closed,
     /// The port took no bytes, which the traits forbid.
     WriteZero,
+    /// The port took no byte, or was not flushed, for a second. Only the async calls can tell.
+    Stalled,
     /// A role has handed out a frame that the driver has no room for. No role of this crate does.
     FrameTooLong {
         /// Length of the frame, bytes.
@@ -29,11 +31,15 @@ pub enum DriveError<E> {
         /// Longest frame that can be sent, bytes.
         limit: usize,
     },
-    /// The call was not fulfilled in its time.
-    Timeout(Wish),
+    /// The operation was not done in its time.
+    Timeout(Operation),
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
     Bus(ikeya::CommandError),
+    /// The stops of these nodes are not paid (ruling I12): they have not answered twice after a stop
+    /// WRITE, or have never answered at all. **Their motors may be running.** The stops stay owed.
+    #[cfg(feature = "ikeya")]
+    StopsOwed(ikeya::NodeSet),
     /// A node could not be read, all attempts included.
     #[cfg(feature = "ikeya")]
     ReadFailed {
@@ -50,27 +56,30 @@ pub enum DriveError<E> {
     Calibration(ucp::CalibrationFailure),
 }
 
-/// What was not fulfilled in its time.
+/// The operation that timed out.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Wish {
-    /// To have asked every id.
+pub enum Operation {
+    /// Asking every id.
     #[cfg(feature = "ikeya")]
     Discovery,
-    /// To have sent a set-point.
+    /// Sending a set-point.
     #[cfg(feature = "ikeya")]
     SetPoint,
-    /// To have read a node.
+    /// Reading a node.
     #[cfg(feature = "ikeya")]
     Read {
         /// Which.
         node: ikeya::NodeId,
     },
-    /// To have a ping answered.
+    /// Having a stop written and flushed.
+    #[cfg(feature = "ucp")]
+    Stop,
+    /// Having a ping answered.
     #[cfg(feature = "ucp")]
     Ping,
-    /// To have a calibration request answered.
+    /// Having a calibration request answered.
     #[cfg(feature = "ucp")]
     Calibration,
 }
@@ -81,18 +90,24 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::Port(error) => write!(f, "port failed: {error}"),
             Self::Closed => f.write_str("port is closed: its other end has gone"),
             Self::WriteZero => f.write_str("port took no bytes"),
+            Self::Stalled => f.write_str("port has taken nothing for a second"),
             Self::FrameTooLong { length, limit } => {
                 write!(f, "frame of {length} bytes is longer than {limit}")
             }
-            Self::Timeout(wish) => wish.fmt(f),
+            Self::Timeout(operation) => operation.fmt(f),
             #[cfg(feature = "ikeya")]
             Self::Bus(error) => error.fmt(f),
+            #[cfg(feature = "ikeya")]
+            Self::StopsOwed(nodes) => {
+                write!(f, "no confirmed stop of node {nodes}: a motor may be running")
+            }
             #[cfg(feature = "ikeya")]
             Self::ReadFailed { node, cause } => {
                 let heard = match cause {
                     ikeya::Cause::Silent => "nothing was heard",
                     ikeya::Cause::Damaged => "only damaged bytes were heard",
                     ikeya::Cause::Unexpected => "only other answers were heard",
+                    ikeya::Cause::Dropped => "its set-point was dropped",
                 };
                 write!(f, "node {node} did not answer: {heard}")
             }
@@ -117,9 +132,9 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
     }
 }
 
-impl fmt::Display for Wish {
+impl fmt::Display for Operation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Without either protocol there is nothing to wish for.
+        // Without either protocol there is no operation.
         #[cfg(not(any(feature = "ikeya", feature = "ucp")))]
         let _ = f;
         match *self {
@@ -129,6 +144,8 @@ impl fmt::Display for Wish {
             Self::SetPoint => f.write_str("the set-point was not sent in time"),
             #[cfg(feature = "ikeya")]
             Self::Read { node } => write!(f, "node {node} was not read in time"),
+            #[cfg(feature = "ucp")]
+            Self::Stop => f.write_str("the stop was not sent in time: the robot may be driving"),
             #[cfg(feature = "ucp")]
             Self::Ping => f.write_str("the robot did not answer a ping in time"),
             #[cfg(feature = "ucp")]

@@ -1,21 +1,33 @@
-//! What a user of a motor bus wants first.
+//! High-level motor-bus calls: what the blocking and the async ones have in common.
 
 use heapless::Vec;
 
-use super::{Clock, DriveError, Driver, Step, Wish};
+use super::{Clock, DriveError, Driver};
 use crate::{
     endpoint::Endpoint,
     ikeya::{
-        Board, CommandError, Health, Master, MasterEvent, Mode, NodeId, Slave, SlaveEvent, Status,
-        Target,
+        Board, CommandError, Health, Master, MasterEvent, Mode, NodeId, NodeSet, Polling, Slave,
+        SlaveEvent, Status, StopProgress, Target,
     },
-    time::Instant,
+    time::{Duration, Instant},
 };
+
+#[cfg(feature = "embedded-io-async")]
+mod asynch;
+#[cfg(feature = "embedded-io")]
+mod blocking;
 
 /// The nodes that are online, in the order of their ids, and their modes.
 pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
 
-/// What the blocking and the async calls have in common.
+/// The READs of a node that were over when a call began.
+#[derive(Clone, Copy)]
+struct ReadMark {
+    node: NodeId,
+    replies: u32,
+    failures: u32,
+}
+
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// When a call has taken too long: a discovery may be under way in front of it, each takes no
     /// longer than a read may, and a driver on a host comes late now and then.
@@ -23,332 +35,162 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.now() + self.role.read_bound().saturating_mul(4)
     }
 
+    fn stop_deadline(&mut self) -> Instant {
+        self.now() + self.role.stop_bound()
+    }
+
     fn is_online(&self, node: NodeId) -> bool {
         matches!(self.role.health(node), Some(Health::Online | Health::Suspect(_)))
     }
 
-    /// Takes out what a discovery tells; the nodes that are online once it is over.
+    fn begin_discovery(&mut self) {
+        let now = self.now();
+        self.role.discover(now);
+    }
+
+    /// The nodes that are online, once the discovery is over; takes out what it has told.
     fn discovered(&mut self) -> Option<OnlineNodes> {
-        let _: Option<()> = self.sift(|event| match event {
-            MasterEvent::Discovered { .. } | MasterEvent::DiscoveryDone { .. } => Step::Drop,
-            event => unread(event),
+        self.role.retain_events(|event| {
+            !matches!(
+                event,
+                MasterEvent::Discovered { .. }
+                    | MasterEvent::DiscoveryDone { .. }
+                    | MasterEvent::Status { .. }
+            )
         });
         if self.role.is_discovering() {
             return None;
         }
-        let online = NodeId::ALL.into_iter().filter(|&node| self.is_online(node));
-        Some(gathered(online.filter_map(|node| Some((node, self.role.mode(node)?)))))
+        // Not by `collect`: the compiler does not see that it cannot panic here.
+        let mut found = Vec::new();
+        for node in NodeId::ALL.into_iter().filter(|&node| self.is_online(node)) {
+            if let Some(mode) = self.role.mode(node) {
+                let _ = found.push((node, mode));
+            }
+        }
+        Some(found)
     }
 
-    /// Has every set-point been sent?
-    fn is_all_sent(&self) -> bool {
-        !self.role.has_unsent_targets() && self.unsent.is_empty()
+    /// The role has the latest reading of each node.
+    fn drop_readings(&mut self) {
+        self.role.retain_events(|event| !matches!(event, MasterEvent::Status { .. }));
     }
 
-    /// A set-point is dropped when its node turns out to be abnormal while it waits to be sent.
-    fn was_sent(&self, node: NodeId) -> Result<(), CommandError> {
-        self.is_online(node).then_some(()).ok_or(CommandError::NotOnline { node })
+    fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
+        let now = self.now();
+        match target {
+            Target::Velocity(velocity) => self.role.set_velocity(node, velocity, now),
+            Target::Position(position) => self.role.set_position(node, position, now),
+        }
+    }
+
+    /// Whether the set-point has left, once that is settled: it may be dropped while it waits.
+    fn aimed(&mut self, node: NodeId, target: Target<B>) -> Option<Result<(), CommandError>> {
+        self.drop_readings();
+        if let Err(error) = self.still_aimed(node, target) {
+            return Some(Err(error));
+        }
+        (self.role.is_set_point_sent(node) && self.is_sent()).then_some(Ok(()))
+    }
+
+    /// A call that fails leaves no set-point behind, nor the rest of a packet, which would make a cut
+    /// set-point whole. The node may have heard it all the same, and its order before is gone: it is
+    /// owed a stop.
+    fn withdraw(&mut self, node: NodeId) {
+        let cut_off = self.outbox.give_up();
+        self.tell_unsent(cut_off);
+        if self.role.set_point(node).is_some() {
+            self.begin_stop(node);
+        }
+    }
+
+    /// Whether a node still has this set-point, and why not.
+    fn still_aimed(&self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
+        if self.role.set_point(node) == Some(target) {
+            return Ok(());
+        }
+        self.role.check(node, &target)?;
+        Err(CommandError::NoSetPoint { node })
     }
 
     /// Asks for a READ; what was heard before is not its answer.
-    fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
-        self.was_sent(node)?;
-        let _: Option<()> = self.sift(unread);
-        self.role.read(node)
+    fn begin_read(&mut self, node: NodeId) -> Result<ReadMark, CommandError> {
+        let now = self.now();
+        self.drop_readings();
+        self.role.read(node, now)?;
+        let statistics = self.role.node_statistics(node);
+        let (replies, failures) = (statistics.replies, statistics.failures);
+        Ok(ReadMark { node, replies, failures })
     }
 
     /// The answer of a node, or why there is none.
-    fn answer<E>(&mut self, asked: NodeId) -> Option<Result<Status<B>, DriveError<E>>> {
-        self.sift(|event| match event {
-            MasterEvent::Status { node, status } if node == asked => Step::Found(Ok(status)),
-            MasterEvent::ReadFailed { node, cause } if node == asked => {
-                Step::Found(Err(DriveError::ReadFailed { node, cause }))
-            }
-            event => unread(event),
-        })
+    fn answer<E>(&mut self, mark: ReadMark) -> Option<Result<Status<B>, DriveError<E>>> {
+        let ReadMark { node, .. } = mark;
+        self.drop_readings();
+        let statistics = self.role.node_statistics(node);
+        if statistics.replies != mark.replies {
+            return self.role.status(node).map(|(status, _)| Ok(status));
+        }
+        if statistics.failures == mark.failures {
+            return None;
+        }
+        let cause = self.role.last_failure(node)?;
+        self.role.retain_events(
+            |event| !matches!(event, MasterEvent::ReadFailed { node: failed, .. } if *failed == node),
+        );
+        Some(Err(DriveError::ReadFailed { node, cause }))
     }
 
-    fn known(&self) -> Vec<NodeId, 8> {
-        gathered(NodeId::ALL.into_iter().filter(|&node| self.role.mode(node).is_some()))
+    fn begin_stop(&mut self, node: NodeId) {
+        let now = self.now();
+        self.role.stop(node, now);
     }
 
-    /// Gives every node that is online its stop; those for which there is none.
-    fn begin_stop(&mut self, nodes: &[NodeId]) -> Vec<NodeId, 8> {
-        gathered(nodes.iter().copied().filter(|&node| self.role.stop(node).is_err()))
+    fn begin_stop_all(&mut self) {
+        let now = self.now();
+        self.role.stop_all(now);
     }
 
-    /// Adds the nodes that are not online, and may not have heard their stop.
-    fn not_stopped(&self, nodes: &[NodeId], mut failed: Vec<NodeId, 8>) -> Vec<NodeId, 8> {
-        for &node in nodes {
-            if !self.is_online(node) && !failed.contains(&node) {
-                // There is room: no node is in it twice.
-                let _ = failed.push(node);
+    /// Of these nodes, those whose stop is still owed.
+    fn owed(&mut self, nodes: NodeSet) -> NodeSet {
+        self.drop_readings();
+        self.role.stops_owed().and(nodes)
+    }
+
+    /// Of these nodes, those that have not been measured standing still.
+    fn moving(&mut self, nodes: NodeSet) -> NodeSet {
+        self.drop_readings();
+        let mut moving = nodes;
+        for node in nodes.iter() {
+            if self.role.stop_progress(node) == StopProgress::StandingStill {
+                moving.remove(node);
+            } else if self.role.config().polling == Polling::Manual {
+                let now = self.now();
+                // One that is not online is looked for all the same.
+                let _ = self.role.read(node, now);
             }
         }
-        failed
+        moving
     }
-}
 
-/// As many as there are nodes, at the most. Not by `collect`: the compiler does not see that it
-/// cannot panic here.
-fn gathered<T>(items: impl Iterator<Item = T>) -> Vec<T, 8> {
-    let mut gathered = Vec::new();
-    for item in items {
-        let _ = gathered.push(item);
-    }
-    gathered
-}
-
-/// Readings are left out of what is kept: the master has the latest of each node.
-fn unread<B: Board, T>(event: MasterEvent<B>) -> Step<T, MasterEvent<B>> {
-    match event {
-        MasterEvent::Status { .. } => Step::Drop,
-        event => Step::Keep(event),
+    /// A sign of life; says when to give the next one, well before the dead-man.
+    fn keep_alive(&mut self) -> Instant {
+        let now = self.now();
+        self.role.keep_alive(now);
+        let limit = self.role.config().dead_man.map_or(u32::MAX, |limit| limit.as_micros() / 2);
+        now + Duration::from_micros(limit.max(1))
     }
 }
 
 impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
     /// A command; or its absence, whose event stays to be taken out.
     fn command(&mut self) -> Option<Option<Target<B>>> {
-        match self.role.poll_event()? {
-            SlaveEvent::Command(target) => Some(Some(target)),
-            event => {
-                self.keep(event);
-                Some(None)
+        match *self.role.peek_event()? {
+            SlaveEvent::Command(target) => {
+                self.role.poll_event();
+                Some(Some(target))
             }
+            SlaveEvent::Watchdog => Some(None),
         }
-    }
-}
-
-/// The blocking calls of a master.
-///
-/// Each ends within four times [`Master::read_bound`]. Readings that come in meanwhile are not
-/// kept as events, because [`Master::status`] has the latest; all other events are.
-#[cfg(feature = "embedded-io")]
-impl<B: Board, P, C: Clock> Driver<Master<B>, P, C>
-where
-    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
-{
-    /// Asks every id from 1 to 8 and says who is online. The events of the discovery itself are
-    /// taken out.
-    ///
-    /// # Errors
-    ///
-    /// Those of the port. That nobody is there is no error.
-    pub fn discover(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
-        self.role.discover();
-        let bound = self.bound();
-        self.until(bound, Self::discovered)?.ok_or(DriveError::Timeout(Wish::Discovery))
-    }
-
-    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub fn set_velocity(
-        &mut self,
-        node: NodeId,
-        target: B::Velocity,
-    ) -> Result<(), DriveError<P::Error>> {
-        self.role.set_velocity(node, target)?;
-        self.send_set_points()?;
-        Ok(self.was_sent(node)?)
-    }
-
-    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub fn set_position(
-        &mut self,
-        node: NodeId,
-        target: B::Position,
-    ) -> Result<(), DriveError<P::Error>> {
-        self.role.set_position(node, target)?;
-        self.send_set_points()?;
-        Ok(self.was_sent(node)?)
-    }
-
-    /// Stops a node as [`Master::stop`] does, and returns when the command is on the line.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
-        self.role.stop(node)?;
-        self.send_set_points()
-    }
-
-    /// Stops every node that has ever answered, and returns when the commands are on the line; says
-    /// which nodes are not online and may not have heard theirs, or have told no position to hold.
-    ///
-    /// # Errors
-    ///
-    /// Those of the port: then nothing is known to have stopped.
-    pub fn stop_all(&mut self) -> Result<Vec<NodeId, 8>, DriveError<P::Error>> {
-        let nodes = self.known();
-        let failed = self.begin_stop(&nodes);
-        self.send_set_points()?;
-        Ok(self.not_stopped(&nodes, failed))
-    }
-
-    /// What a node measures, heard after this call was made.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
-    /// online, and those of the port.
-    pub fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
-        self.begin_read(node)?;
-        let bound = self.bound();
-        self.until(bound, |driver| driver.answer(node))?
-            .ok_or(DriveError::Timeout(Wish::Read { node }))?
-    }
-
-    fn send_set_points(&mut self) -> Result<(), DriveError<P::Error>> {
-        let bound = self.bound();
-        self.until(bound, |driver| driver.is_all_sent().then_some(()))?
-            .ok_or(DriveError::Timeout(Wish::SetPoint))
-    }
-}
-
-/// The blocking calls of a slave.
-#[cfg(feature = "embedded-io")]
-impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C>
-where
-    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
-{
-    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
-    /// barked: its event is then the next of [`poll_event`](Self::poll_event).
-    ///
-    /// # Errors
-    ///
-    /// Those of the port.
-    pub fn next_command(
-        &mut self,
-        deadline: Instant,
-    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
-        self.until(deadline, Self::command).map(Option::flatten)
-    }
-}
-
-/// The async calls of a master: the same, and as cancel safe as the [module](super) says. A cancelled
-/// command has been taken and will be sent; a cancelled discovery or read is asked for anew.
-#[cfg(feature = "embedded-io-async")]
-impl<B: Board, P, C> Driver<Master<B>, P, C>
-where
-    P: embedded_io_async::Read + embedded_io_async::Write,
-    C: Clock + embedded_hal_async::delay::DelayNs,
-{
-    /// Asks every id from 1 to 8 and says who is online. The events of the discovery itself are
-    /// taken out.
-    ///
-    /// # Errors
-    ///
-    /// Those of the port. That nobody is there is no error.
-    pub async fn discover_async(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
-        self.role.discover();
-        let bound = self.bound();
-        let found = self.until_async(bound, Self::discovered).await?;
-        found.ok_or(DriveError::Timeout(Wish::Discovery))
-    }
-
-    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub async fn set_velocity_async(
-        &mut self,
-        node: NodeId,
-        target: B::Velocity,
-    ) -> Result<(), DriveError<P::Error>> {
-        self.role.set_velocity(node, target)?;
-        self.send_set_points_async().await?;
-        Ok(self.was_sent(node)?)
-    }
-
-    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub async fn set_position_async(
-        &mut self,
-        node: NodeId,
-        target: B::Position,
-    ) -> Result<(), DriveError<P::Error>> {
-        self.role.set_position(node, target)?;
-        self.send_set_points_async().await?;
-        Ok(self.was_sent(node)?)
-    }
-
-    /// Stops a node as [`Master::stop`] does, and returns when the command is on the line.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::Bus`], and those of the port.
-    pub async fn stop_async(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
-        self.role.stop(node)?;
-        self.send_set_points_async().await
-    }
-
-    /// Stops every node that has ever answered, and returns when the commands are on the line; says
-    /// which nodes are not online and may not have heard theirs, or have told no position to hold.
-    ///
-    /// # Errors
-    ///
-    /// Those of the port: then nothing is known to have stopped.
-    pub async fn stop_all_async(&mut self) -> Result<Vec<NodeId, 8>, DriveError<P::Error>> {
-        let nodes = self.known();
-        let failed = self.begin_stop(&nodes);
-        self.send_set_points_async().await?;
-        Ok(self.not_stopped(&nodes, failed))
-    }
-
-    /// What a node measures, heard after this call was made.
-    ///
-    /// # Errors
-    ///
-    /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
-    /// online, and those of the port.
-    pub async fn read_async(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
-        self.begin_read(node)?;
-        let bound = self.bound();
-        let answer = self.until_async(bound, |driver| driver.answer(node)).await?;
-        answer.ok_or(DriveError::Timeout(Wish::Read { node }))?
-    }
-
-    async fn send_set_points_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        let bound = self.bound();
-        let sent = self.until_async(bound, |driver| driver.is_all_sent().then_some(())).await?;
-        sent.ok_or(DriveError::Timeout(Wish::SetPoint))
-    }
-}
-
-/// The async calls of a slave.
-#[cfg(feature = "embedded-io-async")]
-impl<B: Board, P, C> Driver<Slave<B>, P, C>
-where
-    P: embedded_io_async::Read + embedded_io_async::Write,
-    C: Clock + embedded_hal_async::delay::DelayNs,
-{
-    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
-    /// barked: its event is then the next of [`poll_event`](Self::poll_event).
-    ///
-    /// # Errors
-    ///
-    /// Those of the port.
-    pub async fn next_command_async(
-        &mut self,
-        deadline: Instant,
-    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
-        self.until_async(deadline, Self::command).await.map(Option::flatten)
     }
 }

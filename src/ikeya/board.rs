@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::{Mode, NodeId, Position, Request, Response, Rps, WriteRequest, three};
+use super::{Mode, NodeId, Packet, Position, Request, Response, Rps, WriteRequest, three};
 use crate::stream::{Encode, Framing};
 
 /// What a kind of board sends and understands (rulings I3, I10).
@@ -22,9 +22,11 @@ pub trait Board: sealed::Sealed + Copy + fmt::Debug + PartialEq + 'static {
     /// A position response.
     type PositionResponse: Encode;
     /// What slaves hear.
-    type ToSlave: Framing;
+    type ToSlave: Framing + Clone + fmt::Debug;
     /// What the master hears.
-    type ToMaster: Framing;
+    type ToMaster: Framing + Clone + fmt::Debug;
+    /// What a slave on two wires hears.
+    type Either: Framing + Clone + fmt::Debug;
 
     /// Standing still.
     const ZERO: Self::Velocity;
@@ -47,18 +49,44 @@ pub trait Board: sealed::Sealed + Copy + fmt::Debug + PartialEq + 'static {
     /// The speed that was meant; `None` where it is no number.
     fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
 
+    /// Below 0.05 rps: standing still (I12). What is no number is not.
+    fn is_still(speed: Self::RawVelocity) -> bool;
+
+    /// Within 8 counts of each other (I12).
+    fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
+
+    /// Would a velocity node read a WRITE of this position as standing still: as 0 to 5e-10 rps (I11)?
+    fn is_still_as_velocity(position: Self::Position) -> bool;
+
     /// Who is asked, and what is commanded in either reading.
-    fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> (NodeId, Option<Command<Self>>);
+    fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
+
+    /// The same on two wires; `None` for an answer of another node.
+    fn packet(frame: <Self::Either as Framing>::Frame<'_>) -> Option<Heard<Self>>;
 
     /// Who answers, and what.
     fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>);
 }
+
+/// A request as a slave hears it: the node that is asked and, in a WRITE, what is commanded.
+pub type Heard<B> = (NodeId, Option<Command<B>>);
 
 mod sealed {
     /// Keeps `Board` to this crate.
     pub trait Sealed {}
     impl Sealed for super::OneMotor {}
     impl Sealed for super::ThreeMotors {}
+}
+
+/// Speed below which a motor stands still, rps (I12).
+const STILL_RPS: f32 = 0.05;
+
+/// Difference of two positions up to which a motor stands still, counts (I12).
+const STILL_COUNTS: u32 = 8;
+
+/// Do these four bytes say 0 to 5e-10 rps? Bit patterns of positive numbers are in their order.
+const fn is_still_on_wire(payload: [u8; 4]) -> bool {
+    u32::from_le_bytes(payload) >> 16 <= 12_287
 }
 
 /// The payload of a WRITE in its two readings: its bytes do not say which was meant (ruling I3).
@@ -77,6 +105,29 @@ pub enum Target<B: Board = OneMotor> {
     Velocity(B::Velocity),
     /// Go there.
     Position(B::Position),
+}
+
+impl<B: Board> Target<B> {
+    /// The command by which a velocity node stops.
+    pub(crate) const STANDSTILL: Self = Self::Velocity(B::ZERO);
+
+    /// The mode that such a command is for.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        match self {
+            Self::Velocity(_) => Mode::Velocity,
+            Self::Position(_) => Mode::Position,
+        }
+    }
+
+    /// The position, if it is one.
+    #[must_use]
+    pub const fn position(&self) -> Option<B::Position> {
+        match self {
+            Self::Velocity(_) => None,
+            Self::Position(position) => Some(*position),
+        }
+    }
 }
 
 /// What a node measures.
@@ -116,6 +167,7 @@ impl Board for OneMotor {
     type PositionResponse = super::PositionResponse;
     type ToSlave = super::ToSlave;
     type ToMaster = super::ToMaster;
+    type Either = super::Either;
 
     const ZERO: Rps = Rps::ZERO;
     const ANSWERS_WRITE: bool = false;
@@ -140,13 +192,32 @@ impl Board for OneMotor {
         Rps::new(raw).ok()
     }
 
-    fn request(frame: Request<'_>) -> (NodeId, Option<Command<Self>>) {
+    fn is_still(speed: f32) -> bool {
+        speed.abs() < STILL_RPS
+    }
+
+    fn is_same_place(here: Position, there: Position) -> bool {
+        here.counts().abs_diff(there.counts()) <= STILL_COUNTS
+    }
+
+    fn is_still_as_velocity(position: Position) -> bool {
+        is_still_on_wire(position.to_le_bytes())
+    }
+
+    fn request(frame: Request<'_>) -> Heard<Self> {
         match frame {
             Request::Read(read) => (read.id(), None),
             Request::Write(write) => {
                 let (velocity, position) = (write.as_velocity(), write.as_position());
                 (write.id(), Some(Command { velocity, position }))
             }
+        }
+    }
+
+    fn packet(frame: Packet<'_>) -> Option<Heard<Self>> {
+        match frame {
+            Packet::Request(request) => Some(Self::request(request)),
+            Packet::Response(_) => None,
         }
     }
 
@@ -167,6 +238,7 @@ impl Board for ThreeMotors {
     type PositionResponse = three::PositionResponse;
     type ToSlave = three::ToSlave;
     type ToMaster = three::ToMaster;
+    type Either = three::Either;
 
     const ZERO: [Rps; 3] = [Rps::ZERO; 3];
     const ANSWERS_WRITE: bool = true;
@@ -191,13 +263,34 @@ impl Board for ThreeMotors {
         Some([Rps::new(a).ok()?, Rps::new(b).ok()?, Rps::new(c).ok()?])
     }
 
-    fn request(frame: three::Request<'_>) -> (NodeId, Option<Command<Self>>) {
+    fn is_still(speeds: [f32; 3]) -> bool {
+        speeds.into_iter().all(OneMotor::is_still)
+    }
+
+    fn is_same_place(here: [Position; 3], there: [Position; 3]) -> bool {
+        here.into_iter().zip(there).all(|(here, there)| OneMotor::is_same_place(here, there))
+    }
+
+    fn is_still_as_velocity(positions: [Position; 3]) -> bool {
+        // The speed of a motor takes the bytes of several positions: the packet tells.
+        let write = three::WriteRequest::position(NodeId::N1, positions);
+        write.as_velocity().into_iter().all(|speed| is_still_on_wire(speed.to_le_bytes()))
+    }
+
+    fn request(frame: three::Request<'_>) -> Heard<Self> {
         match frame {
             three::Request::Read(read) => (read.id(), None),
             three::Request::Write(write) => {
                 let (velocity, position) = (write.as_velocity(), write.as_position());
                 (write.id(), Some(Command { velocity, position }))
             }
+        }
+    }
+
+    fn packet(frame: three::Packet<'_>) -> Option<Heard<Self>> {
+        match frame {
+            three::Packet::Request(request) => Some(Self::request(request)),
+            three::Packet::Response(_) => None,
         }
     }
 

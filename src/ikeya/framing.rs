@@ -15,15 +15,15 @@ use crate::{
 };
 
 /// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum ToSlave {}
 
 /// What slaves send, as the master sees it: velocity and position responses (8 bytes).
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum ToMaster {}
 
 /// Everything on the bus, as a monitor or a capture of both pairs sees it.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum Either {}
 
 /// A packet for a slave.

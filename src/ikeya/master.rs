@@ -1,27 +1,42 @@
-//! The master of a motor bus: who is asked when, what an answer is, and who is well.
+//! Polling order, reply matching, node health and stops of a motor bus.
 
 mod config;
+mod discovery;
+mod echo;
 mod event;
-mod hear;
+mod health;
+mod mode;
 mod node;
-mod send;
+mod queue;
+mod set_point;
+mod statistics;
+mod stop;
+mod view;
+mod window;
 
 pub use config::{MasterConfig, Polling};
-pub use event::{Cause, CommandError, MasterEvent, MasterStatistics};
-pub use node::{Health, NodeStatistics};
+pub use event::{Cause, CommandError, MasterEvent};
+pub use node::Health;
+pub use statistics::{MasterStatistics, NodeStatistics};
+pub use stop::StopProgress;
 
-use heapless::{Deque, Vec};
-
-use self::node::{Confirm, Node};
+use self::{
+    discovery::Discovery,
+    echo::Echo,
+    health::Search,
+    node::{DOUBT_EXCHANGES, Node},
+    queue::{Sent, Turns},
+    set_point::Confirm,
+    stop::{Standstill, Stop},
+    window::Window,
+};
 use super::{Board, Mode, NodeId, OneMotor, ReadRequest, Status, Target};
 use crate::{
-    endpoint::Endpoint,
-    stream::{Counters, Decoder},
+    endpoint::{Endpoint, Unsent},
+    events::Events,
+    stream::{Decoder, Framing},
     time::{Duration, Instant, wire_time},
 };
-
-/// Strikes after which a node is abnormal (ruling I7).
-const STRIKES: u8 = 3;
 
 /// Events that wait for the application at the most.
 const EVENTS: usize = 16;
@@ -29,270 +44,293 @@ const EVENTS: usize = 16;
 /// Longest packet of either kind of board, bytes.
 const PACKET_LEN: usize = 16;
 
-/// Bytes of its own that a master on a 2-wire line waits to hear again at the most.
-const ECHO_LEN: usize = 64;
-
-/// The master: discovers nodes, repeats the latest set-points, reads every node in turn, and never
-/// takes for an answer what is none.
+/// The master: discovers nodes, repeats the latest set-points, reads every node in turn, pays the
+/// stops that it owes, and accepts only genuine replies.
 ///
-/// It knows neither clock nor port; see [`Endpoint`] for who calls what when. A cycle visits every
-/// node that is online: a WRITE if it has a set-point, then a READ (I8). With
+/// It has no clock and no port; see [`Endpoint`] for what to call when. A cycle visits every node
+/// that is online: a WRITE if it has a set-point, then a READ (I8). With
 /// [`ThreeMotors`](super::ThreeMotors) the WRITE is answered and is the READ as well (I10).
+///
+/// # Stops
+///
+/// A stop is a debt (I12). From the call of [`stop`](Self::stop) on the set-point is gone, new ones
+/// are refused, and the stop is written and repeated until two of its WRITEs have each been
+/// followed by an answer of the node, whatever happens on the line, in the port or in the event
+/// queue. Then comes [`MasterEvent::Stopped`], and [`MasterEvent::StandingStill`] once the node was
+/// measured to be so.
+///
+/// * A velocity node is told 0 rps.
+/// * A position node is read, and told to hold the position of that answer (I6). It may return by as
+///   much as it ran on since the measurement: the speed times the time from the answer to the
+///   WRITE, which is sent next, so some 0.2 ms on a line of its own. Behind a USB adapter that holds
+///   answers back, that time is added.
+/// * An abnormal node gets an attempt at once and then one at the pace of the search, a velocity node
+///   blindly.
+/// * A node that becomes abnormal under a set-point is owed a stop, and so is every node under one
+///   after [`MasterConfig::dead_man`].
 ///
 /// # Answers
 ///
 /// A READ opens a window that ends [`MasterConfig::reply_timeout`] plus the answer's wire time after
-/// the request has left the line (I7). What is heard outside, or from another node, is counted as
-/// late and dropped. An answer in another mode than the node's is believed the second time in a
-/// row, and then ends the set-point: it was meant for the other mode.
+/// the request has left the line (I7). What is heard outside, or from another node, is counted and
+/// dropped. A node that did not answer is not asked again for [`MasterConfig::late_guard`], so that a
+/// late answer meets a closed window. An answer later than that cannot be told from the next one:
+/// the protocol has no numbers.
 ///
-/// A node that did not answer is not asked again for [`MasterConfig::late_guard`], so that a late
-/// answer meets a closed window. An answer later than that cannot be told from the next one: the
-/// protocol has no numbers.
+/// # Modes
+///
+/// An answer in another mode than the one on record, even a late one, puts the mode in doubt (I11).
+/// The node is read again at once, and the next answer decides; if the mode has changed, that ends
+/// the set-point, and the node is owed a stop if it had any order: a WRITE that was on its way has
+/// been read in the new mode. While in doubt the node gets no WRITE, with one exception: a stop may write a
+/// position that a velocity node would read as standstill. A switch moved while a command is on
+/// its way cannot be detected: move it on a machine that is not moving.
 ///
 /// # Health
 ///
 /// A window without the answer is a strike, whatever else was heard in it. Three in a row and the
 /// node is abnormal, one answer and it is online again; a WRITE changes nothing (I7). The set-point
-/// of a node that becomes abnormal is dropped: a board that comes back after an unknown while shall
-/// not move until somebody says so.
-///
-/// Nobody can help a switch that is moved while a command is on its way: the node reads it in its
-/// new mode. Move it on a machine that stands still.
+/// of a node that becomes abnormal is dropped.
 ///
 /// ```
 /// use axlewire::{endpoint::Endpoint, ikeya::{Master, MasterConfig}, time::Instant};
 ///
-/// let mut master: Master = Master::new(MasterConfig::direct());
-/// master.discover();
 /// let now = Instant::from_micros(0);
+/// let mut master: Master = Master::new(MasterConfig::direct(), now);
+/// master.discover(now);
 /// assert_eq!(master.poll_transmit(now), Some(&[0xAA, 0x01, 0xBE, 0xD0][..])); // READ 1
 /// assert_eq!(master.poll_transmit(now), None); // until the window closes
 /// assert_eq!(master.poll_timeout(), Some(Instant::from_micros(80 + 500 + 160)));
 /// ```
-#[derive(Debug)]
+// What is used most in front: there it takes short instructions.
+#[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Master<B: Board = OneMotor> {
     config: MasterConfig,
-    nodes: [Node<B>; 8],
-    state: State,
+    answer_wire_time: Duration,
+    /// The last packet was a WRITE that is not answered: a READ may follow without a pause.
+    is_behind_write: bool,
+    discovery: Option<Discovery>,
+    turns: Turns,
     /// Time of the last call.
     now: Instant,
     /// When the bytes handed out for sending have left, and the gap behind them is over.
     line_free: Option<Instant>,
-    /// The last packet was a WRITE that is not answered: a READ may follow without a pause.
-    is_behind_write: bool,
-    /// The node whose turn it is, as an index.
-    turn: usize,
-    /// The id to be asked next, while ids are looked for.
-    discovery: Option<Discovery>,
-    /// Not before then is another abnormal node asked.
-    probe_at: Option<Instant>,
-    probe_turn: usize,
-    decoder: Decoder<B::ToMaster, PACKET_LEN>,
-    packet: Vec<u8, PACKET_LEN>,
-    echo: Deque<u8, ECHO_LEN>,
-    events: Deque<MasterEvent<B>, EVENTS>,
+    /// The node that may answer now.
+    window: Option<Window>,
+    search: Search,
+    /// The last sign of life of the application.
+    alive_at: Instant,
     statistics: MasterStatistics,
+    packet: [u8; PACKET_LEN],
+    /// What `packet` is.
+    sent: Option<Sent<B>>,
+    decoder: Decoder<B::ToMaster, PACKET_LEN>,
+    echo: Echo,
+    nodes: [Node<B>; 8],
+    events: Events<MasterEvent<B>, EVENTS>,
 }
 
-#[derive(Clone, Copy, Debug)]
-enum State {
-    /// Nobody has been asked.
-    Idle,
-    /// A node has been asked and may answer until `deadline`.
-    Awaiting { node: NodeId, request_end: Instant, deadline: Instant, heard: Heard },
-}
-
-/// What has been heard in the window that is open.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-enum Heard {
-    Nothing,
-    Bytes,
-    Others,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Discovery {
-    pass: u8,
-    next: usize,
-}
-
+/// Commands.
 impl<B: Board> Master<B> {
     /// A master that knows no nodes yet: [`discover`](Self::discover) them.
     #[must_use]
-    pub fn new(config: MasterConfig) -> Self {
+    pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
             config,
+            answer_wire_time: wire_time(<B::ToMaster as Framing>::MAX_LEN, config.baud),
             nodes: core::array::from_fn(|_| Node::new()),
-            state: State::Idle,
-            now: Instant::from_micros(0),
+            window: None,
+            now,
             line_free: None,
             is_behind_write: false,
-            turn: 0,
+            turns: Turns::default(),
             discovery: None,
-            probe_at: None,
-            probe_turn: 0,
+            search: Search::default(),
+            alive_at: now,
             decoder: Decoder::new(),
-            packet: Vec::new(),
-            echo: Deque::new(),
-            events: Deque::new(),
+            packet: [0; PACKET_LEN],
+            sent: None,
+            echo: Echo::new(),
+            events: Events::new(),
             statistics: MasterStatistics::default(),
         }
     }
 
-    /// Asks every id from 1 to 8 that is not online: one READ each, silent ids again until
-    /// [`MasterConfig::attempts`]. Ends with [`MasterEvent::DiscoveryDone`].
-    pub fn discover(&mut self) {
-        for node in &mut self.nodes {
-            node.scans = 0;
-        }
-        self.discovery = Some(Discovery { pass: 0, next: 0 });
-        self.settle_discovery();
+    /// Asks every id of [`MasterConfig::nodes`] that is not online: one READ each, silent ids again
+    /// until [`MasterConfig::attempts`]. Ends with [`MasterEvent::DiscoveryDone`].
+    ///
+    /// A call during a discovery joins it. After every second one each node that is online has its turn
+    /// in the cycle before the next begins, so an application may call this as often as it likes.
+    pub fn discover(&mut self, now: Instant) {
+        self.now = now;
+        self.begin_discovery();
     }
 
     /// Turns a velocity node at `target` from the next cycle on. The latest set-point wins.
     ///
     /// # Errors
     ///
-    /// [`CommandError`]: the node is not online or not in velocity mode.
-    pub fn set_velocity(&mut self, node: NodeId, target: B::Velocity) -> Result<(), CommandError> {
-        self.online(node, Mode::Velocity)?.aim(Target::Velocity(target));
-        Ok(())
+    /// [`CommandError`]: the node is not online, is not in velocity mode, has its mode in doubt, or
+    /// is owed a stop. The command is then not kept.
+    pub fn set_velocity(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+        now: Instant,
+    ) -> Result<(), CommandError> {
+        self.aim(node, Target::Velocity(target), now)
     }
 
     /// Moves a position node to `target` from the next cycle on. The latest set-point wins.
     ///
     /// # Errors
     ///
-    /// [`CommandError`]: the node is not online or not in position mode.
-    pub fn set_position(&mut self, node: NodeId, target: B::Position) -> Result<(), CommandError> {
-        self.online(node, Mode::Position)?.aim(Target::Position(target));
-        Ok(())
+    /// [`CommandError`]: the node is not online, is not in position mode, has its mode in doubt, or
+    /// is owed a stop. The command is then not kept.
+    pub fn set_position(
+        &mut self,
+        node: NodeId,
+        target: B::Position,
+        now: Instant,
+    ) -> Result<(), CommandError> {
+        self.aim(node, Target::Position(target), now)
     }
 
-    /// Stops a node: 0 rps, or *hold at the last measured position*, never "go to 0" (ruling I6).
+    /// Stops a node: 0 rps, or *hold where you are*, never "go to 0" (I6). The stop is owed until
+    /// [`MasterEvent::Stopped`] (I12).
     ///
-    /// Goes to an abnormal node as well, once: it may still hear what it can no longer answer.
-    ///
-    /// # Errors
-    ///
-    /// [`CommandError`]: the node has never answered, or has not told a position yet.
-    pub fn stop(&mut self, node: NodeId) -> Result<(), CommandError> {
-        let target = match (self.mode(node), self.status(node)) {
-            (None, _) => return Err(CommandError::NotOnline { node }),
-            (Some(Mode::Velocity), _) => Target::Velocity(B::ZERO),
-            (_, Some((Status::Position(held), _))) => Target::Position(held),
-            _ => return Err(CommandError::NoPosition { node }),
-        };
-        let node = self.node_mut(node);
-        node.aim(target);
-        node.is_stop = true;
-        Ok(())
+    /// A node that has never answered is read first. A repeated call joins the stop that is owed;
+    /// one after the stop is paid has it confirmed again, with the same position to hold.
+    pub fn stop(&mut self, node: NodeId, now: Instant) {
+        self.sign_of_life(now);
+        self.owe_stop(node);
     }
 
-    /// Stops every node that has ever answered; says how many could not be stopped.
-    pub fn stop_all(&mut self) -> usize {
-        let failed = |node: &NodeId| self.mode(*node).is_some() && self.stop(*node).is_err();
-        NodeId::ALL.into_iter().filter(failed).count()
+    /// Stops every node of [`MasterConfig::nodes`] and every node that has ever answered. Ids that
+    /// have never answered are read first; they stay owed a stop, which goes to whatever answers.
+    pub fn stop_all(&mut self, now: Instant) {
+        self.sign_of_life(now);
+        for id in NodeId::ALL {
+            if self.config.nodes.contains(id) || self.node(id).health.is_some() {
+                self.owe_stop(id);
+            }
+        }
     }
 
-    /// Sends no more set-points to a node. It keeps the last one that it has received.
+    /// Says that the application is alive, for [`MasterConfig::dead_man`].
+    pub fn keep_alive(&mut self, now: Instant) {
+        self.sign_of_life(now);
+    }
+
+    /// Sends no more set-points to a node. It keeps the last one that it has received. A stop that is
+    /// owed stays owed.
     pub fn release(&mut self, node: NodeId) {
-        self.node_mut(node).forget_target();
+        self.drop_set_point(node);
     }
 
     /// Asks for [`MasterEvent::Confirmed`] once the node has answered a READ that followed the next
-    /// WRITE to it (ruling I8).
+    /// WRITE of its set-point (I8). It ends with [`MasterEvent::NotConfirmed`] if that READ fails or
+    /// the set-point is dropped first.
     ///
     /// # Errors
     ///
-    /// [`CommandError::NotOnline`].
-    pub fn confirm(&mut self, node: NodeId) -> Result<(), CommandError> {
-        if !self.node(node).is_online() {
+    /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] where there is none to confirm.
+    pub fn confirm(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
+        self.now = now;
+        let it = self.node_mut(node);
+        if !it.is_online() {
             return Err(CommandError::NotOnline { node });
         }
-        self.node_mut(node).confirm = Confirm::AfterWrite;
+        if it.set_point.is_none() {
+            return Err(CommandError::NoSetPoint { node });
+        }
+        it.confirm = Confirm::AfterWrite;
         Ok(())
     }
 
     /// Reads a node once more than the polling does: the way to read with [`Polling::Manual`].
     ///
-    /// Comes to [`MasterEvent::Status`] or [`MasterEvent::ReadFailed`].
+    /// Ends with [`MasterEvent::Status`] or [`MasterEvent::ReadFailed`].
     ///
     /// # Errors
     ///
     /// [`CommandError::NotOnline`].
-    pub fn read(&mut self, node: NodeId) -> Result<(), CommandError> {
-        if !self.node(node).is_online() {
+    pub fn read(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
+        self.now = now;
+        let it = self.node_mut(node);
+        if !it.is_online() {
             return Err(CommandError::NotOnline { node });
         }
-        self.node_mut(node).asked = true;
+        it.is_asked = true;
         Ok(())
     }
 
-    /// How a node is; `None` if it has never answered.
-    #[must_use]
-    pub fn health(&self, node: NodeId) -> Option<Health> {
-        self.node(node).health
+    fn aim(&mut self, id: NodeId, target: Target<B>, now: Instant) -> Result<(), CommandError> {
+        self.now = now;
+        self.expire_commands(now);
+        self.node_mut(id).aim(id, target)?;
+        self.alive_at = now;
+        Ok(())
     }
 
-    /// The mode of a node; `None` if it has never answered.
-    #[must_use]
-    pub fn mode(&self, node: NodeId) -> Option<Mode> {
-        self.node(node).mode
+    /// The application is alive, which does not revive a command that is too old already.
+    fn sign_of_life(&mut self, now: Instant) {
+        self.now = now;
+        self.expire_commands(now);
+        self.alive_at = now;
     }
 
-    /// What a node measured last, and when that was heard.
-    #[must_use]
-    pub fn status(&self, node: NodeId) -> Option<(Status<B>, Instant)> {
-        self.node(node).status
+    /// Drops the set-point, and says so to whoever waits for its confirmation.
+    fn drop_set_point(&mut self, node: NodeId) {
+        if self.node_mut(node).drop_set_point() {
+            self.tell(MasterEvent::NotConfirmed { node, cause: Cause::Dropped });
+        }
     }
 
-    /// The counts of a node.
-    #[must_use]
-    pub fn node_statistics(&self, node: NodeId) -> &NodeStatistics {
-        &self.node(node).statistics
+    /// The node is owed a stop from now on, if it is not already.
+    fn owe_stop(&mut self, id: NodeId) {
+        let (now, hold_age) = (self.now, self.config.hold_age);
+        let node = self.node_mut(id);
+        if node.stop.is_none() {
+            let held = node.set_point.filter(|set_point| set_point.is_stop);
+            let measured = node.status.filter(|&(_, at)| now - at < hold_age);
+            let hold = match (held, measured) {
+                _ if node.doubt.is_some() || !node.is_online() => None,
+                (Some(held), _) => held.target.position(),
+                (None, Some((Status::Position(position), _))) => Some(position),
+                _ => None,
+            };
+            node.stop = Some(Stop::new(hold));
+            if node.doubt == Some(DOUBT_EXCHANGES) {
+                self.tell_undecided(id);
+            }
+        }
+        let node = self.node_mut(id);
+        (node.is_under_order, node.standstill) = (false, Standstill::Unwatched);
+        self.drop_set_point(id);
     }
 
-    /// The counts of the line.
-    #[must_use]
-    pub const fn statistics(&self) -> &MasterStatistics {
-        &self.statistics
+    /// When the dead-man stops the nodes.
+    fn dead_man_at(&self) -> Option<Instant> {
+        let is_armed = self.nodes.iter().any(|node| node.is_under_order);
+        self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
     }
 
-    /// Where every byte went.
-    #[must_use]
-    pub const fn counters(&self) -> Counters {
-        self.decoder.counters()
+    fn expire_commands(&mut self, now: Instant) {
+        if self.dead_man_at().is_some_and(|at| now >= at) {
+            self.statistics.dead_man = self.statistics.dead_man.wrapping_add(1);
+            self.tell(MasterEvent::DeadMan);
+            for id in NodeId::ALL {
+                if self.node(id).is_under_order {
+                    self.owe_stop(id);
+                }
+            }
+        }
     }
+}
 
-    /// Is there a set-point that has not been sent once yet?
-    #[must_use]
-    pub fn has_unsent_targets(&self) -> bool {
-        self.nodes.iter().any(|node| node.fresh)
-    }
-
-    /// Is a discovery under way?
-    #[must_use]
-    pub const fn is_discovering(&self) -> bool {
-        self.discovery.is_some()
-    }
-
-    /// Longest time from the first request of a READ to its answer or its
-    /// [failure](MasterEvent::ReadFailed), on any line, where the driver is called in time and no
-    /// discovery is under way, which goes first.
-    ///
-    /// Between two attempts lie the guard, one exchange with each other node, the search for an
-    /// abnormal one, and a new set-point for every node.
-    #[must_use]
-    pub fn read_bound(&self) -> Duration {
-        let gap = self.config.turnaround_gap;
-        let write = wire_time(PACKET_LEN, self.config.baud) + gap;
-        let exchange = write + self.window() + gap;
-        let attempt = self.config.late_guard + exchange.saturating_mul(9) + write.saturating_mul(8);
-        attempt.saturating_mul(self.config.attempts.max(1).into())
-    }
-
+impl<B: Board> Master<B> {
     fn node(&self, node: NodeId) -> &Node<B> {
         &self.nodes[index_of(node)]
     }
@@ -301,20 +339,15 @@ impl<B: Board> Master<B> {
         &mut self.nodes[index_of(node)]
     }
 
-    /// The node, if it may be commanded in this mode.
-    fn online(&mut self, id: NodeId, wanted: Mode) -> Result<&mut Node<B>, CommandError> {
-        let node = self.node_mut(id);
-        match node.mode {
-            _ if !node.is_online() => Err(CommandError::NotOnline { node: id }),
-            Some(mode) if mode != wanted => Err(CommandError::WrongMode { node: id, mode }),
-            _ => Ok(node),
-        }
+    /// Takes out the events that are not to stay.
+    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+    pub(crate) fn retain_events(&mut self, stays: impl FnMut(&MasterEvent<B>) -> bool) {
+        self.events.retain(stays);
     }
 
+    #[inline(never)]
     fn tell(&mut self, event: MasterEvent<B>) {
-        if self.events.push_back(event).is_err() {
-            self.statistics.lost_events = self.statistics.lost_events.wrapping_add(1);
-        }
+        self.events.push(event);
     }
 }
 
@@ -323,21 +356,18 @@ const fn index_of(node: NodeId) -> usize {
     (node.get() as usize - 1) & 7
 }
 
-/// What is sent.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-enum Request {
-    Read,
-    Write,
-}
-
 impl<B: Board> Endpoint for Master<B> {
     type Event = MasterEvent<B>;
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
-        let mut bytes = self.without_echo(bytes);
-        if let State::Awaiting { heard: heard @ Heard::Nothing, .. } = &mut self.state {
-            *heard = if bytes.is_empty() { Heard::Nothing } else { Heard::Bytes };
+        let mut bytes = bytes;
+        let removed = self.echo.remove(&mut bytes);
+        let statistics = &mut self.statistics;
+        statistics.echo_bytes = statistics.echo_bytes.wrapping_add(removed.bytes);
+        statistics.echo_errors = statistics.echo_errors.wrapping_add(removed.is_wrong.into());
+        if let Some(window) = self.window.as_mut().filter(|_| !bytes.is_empty()) {
+            window.hear_bytes();
         }
         while let Some((node, status)) = self.next_response(&mut bytes) {
             self.hear(node, status, now);
@@ -346,53 +376,45 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_timeout(&mut self, now: Instant) {
         self.now = now;
-        let State::Awaiting { node, deadline, heard, .. } = self.state else { return };
-        if now >= deadline {
-            let cause = match heard {
-                Heard::Nothing => Cause::Silent,
-                Heard::Bytes => Cause::Damaged,
-                Heard::Others => Cause::Unexpected,
-            };
-            self.state = State::Idle;
-            self.strike(node, cause, deadline);
-            self.settle_discovery();
-        }
+        self.expire_window(now);
+        self.expire_commands(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
         self.now = now;
-        if matches!(self.state, State::Awaiting { .. }) {
+        // A set-point must not outlive its application because a driver is late.
+        self.expire_commands(now);
+        if self.window.is_some() {
             return None;
         }
-        let (node, request) = self.next_request(now)?;
-        self.encode(node, request)?;
-        let request_end = self.line_free.map_or(now, |free| free.max(now))
-            + wire_time(self.packet.len(), self.config.baud);
-        self.line_free = Some(request_end + self.config.turnaround_gap);
-        let count = match request {
-            Request::Read => &mut self.statistics.reads,
-            Request::Write => &mut self.statistics.writes,
-        };
-        *count = count.wrapping_add(1);
-        let is_answered = request == Request::Read || B::ANSWERS_WRITE;
-        self.is_behind_write = !is_answered && self.config.turnaround_gap == Duration::ZERO;
-        if is_answered {
-            self.open(node, request_end);
-        }
-        self.expect_echo();
-        Some(&self.packet)
+        self.send_next(now)
+    }
+
+    /// As long as a slave on a UART waits for the rest of a packet: five byte times.
+    fn frame_pause(&self) -> Duration {
+        wire_time(5, self.config.baud)
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        wire_time(bytes, self.config.baud)
+    }
+
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.now = now;
+        self.take_back(unsent, now);
     }
 
     fn poll_event(&mut self) -> Option<MasterEvent<B>> {
-        self.events.pop_front()
+        self.events.pop()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        if let State::Awaiting { deadline, .. } = self.state {
-            return Some(deadline);
-        }
-        let due = self.due()?;
-        let free = self.line_free.unwrap_or(due);
-        Some(due.max(free))
+        let work = match &self.window {
+            Some(window) => Some(window.deadline),
+            // Not before the line is free.
+            None => self.due().map(|due| self.line_free.unwrap_or(due).max(due)),
+        };
+        let dead_man = self.dead_man_at();
+        work.map_or(dead_man, |at| Some(dead_man.unwrap_or(at).min(at)))
     }
 }

@@ -21,7 +21,7 @@
 //!
 //! * **B5, B6** Little-endian on every machine. A byte takes 10 bit times, not 8: the document's 64
 //!   and 128 µs are 80 and 160 µs.
-//! * **I1** Wire ids are 1..=8. Id 0, the master's, stands in no packet. A whole packet with a good
+//! * **I1** Wire ids are 1..=8. Id 0 is the master's and never appears on the wire. A whole packet with a good
 //!   CRC and any other id is refused as [`Reason::Id`](crate::stream::Reason::Id) and skipped whole.
 //! * **I2** The document's two DIP switch examples contradict each other: [`DipSwitch`] takes the
 //!   reading from you. Scan ids 1..=8 with READ to find the truth.
@@ -31,8 +31,10 @@
 //!   a slave refuses them on receipt as well. The document's ±32767 is a slip: -32768 is legal.
 //! * **I5** A [`Position`] is `rotation · 8192 + count` counts, an `i32`. From counts the split
 //!   truncates unless asked otherwise; out of range is an error, never a wrap or a clamp.
-//! * **I6** There is no stop in position mode: stopping such a node means holding the last measured
-//!   position, never going to 0.
+//! * **I6** There is no stop in position mode: a stop reads the node and then writes the position of
+//!   that answer, never "go to 0". An older position is used only as far as
+//!   [`MasterConfig::hold_age`] allows. The position is then the set-point, and is measured anew only
+//!   after the node was abnormal or its mode in doubt.
 //! * **I7** The reply timeout, 500 µs unless set otherwise, runs from the end of the request on the
 //!   wire, and the answer's own wire time is added. Bytes left from before the request are dropped;
 //!   answers of another node or another kind, or after the deadline, are counted and never taken.
@@ -45,6 +47,23 @@
 //!   first of the answer it should not take longer than 50 µs.
 //! * **I10** Boards with three motors use the 16-byte packets of [`three`], with the same headers.
 //!   They are another framing, chosen by you.
+//! * **I11** A good answer in another mode than the one on record, even a late one, puts the mode in
+//!   doubt. The node is read again at once, and the mode changes when the next answer says the same;
+//!   that ends the set-point. While in doubt there is no WRITE and no confirmation, set-points are
+//!   refused, and a stop waits, unless it holds a position, measured after the stop was asked for,
+//!   that a velocity node would read as standstill (rotation 0..=12287). After six exchanges without
+//!   a decision comes an event, and the node is read at the pace of the search.
+//! * **I12** A stop is owed from the call on until two stop WRITEs have each been followed by an
+//!   answer of the node in its mode. Until then it is repeated, whatever the polling; it survives
+//!   abnormal nodes, errors of the port and a full queue of events, and a release does not cancel
+//!   it; set-points are refused. Standing still (below 0.05 rps, or two positions within 8 counts) is
+//!   a second event. Ids that have never answered are read first. A node that becomes abnormal under
+//!   a set-point is owed a stop, because slaves keep their last command.
+//! * **I13** Stops of nodes that answer go first: velocity WRITEs, then position nodes in turn. An
+//!   abnormal node gets one attempt at once and then one at the pace of the search. Then come new
+//!   set-points, in turn, then a discovery, then the cycle. A master can have a dead-man.
+//! * **I14** A slave drops an answer when more bytes arrived before it was sent, or when it is too
+//!   late for it. On two wires it follows the answers of other nodes as well.
 //!
 //! # Roles
 //!
@@ -74,6 +93,7 @@
 mod board;
 mod framing;
 mod master;
+mod nodes;
 mod runs;
 mod schedule;
 pub(crate) mod slave;
@@ -82,12 +102,13 @@ pub mod three;
 mod units;
 mod wire;
 
-pub use board::{Board, Command, OneMotor, Status, Target, ThreeMotors};
+pub use board::{Board, Command, Heard, OneMotor, Status, Target, ThreeMotors};
 pub use framing::{Either, Packet, Request, Response, ToMaster, ToSlave};
 pub use master::{
     Cause, CommandError, Health, Master, MasterConfig, MasterEvent, MasterStatistics,
-    NodeStatistics, Polling,
+    NodeStatistics, Polling, StopProgress,
 };
+pub use nodes::NodeSet;
 pub use schedule::Schedule;
 pub use slave::{Slave, SlaveConfig, SlaveEvent, SlaveStatistics};
 pub use units::{DipSwitch, IdReading, Mode, NodeId, Position, Rps};

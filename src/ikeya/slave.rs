@@ -1,61 +1,25 @@
-//! A slave of a motor bus: hears all, answers only what it is asked, keeps the last good command.
+//! A slave of a motor bus: follows all traffic, answers only its own READs, keeps the last command.
+
+mod config;
+mod event;
+mod inbox;
+
+pub use config::SlaveConfig;
+pub use event::{SlaveEvent, SlaveStatistics};
 
 use heapless::Vec;
 
-use super::{BAUD, Board, DipSwitch, IdReading, Mode, NodeId, OneMotor, ReadRequest, Target};
+use super::{Board, Command, DipSwitch, IdReading, Mode, NodeId, OneMotor, Target};
 use crate::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     error::EncodeError,
-    stream::{Counters, Decoder, Encode, Event, Framing},
-    time::{Duration, Instant, wire_time},
+    stream::{Counters, Encode},
+    time::{Duration, Instant, earliest, wire_time},
 };
+use inbox::{Found, Inbox};
 
 /// Longest packet of either kind of board, bytes.
 const PACKET_LEN: usize = 16;
-
-/// Settings of a [`Slave`]: start from [`direct`](Self::direct) or
-/// [`usb_adapter`](Self::usb_adapter) and change what differs.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct SlaveConfig {
-    /// How long to go on without a command before [`SlaveEvent::Watchdog`]. The protocol document has
-    /// no such time, hence `None`: a motor then keeps its last command for ever.
-    pub watchdog: Option<Duration>,
-    /// Silence kept between a request and its answer, for transceivers that need it. Together with
-    /// the processor's own time it should stay below 50 µs (ruling I9).
-    pub turnaround_gap: Duration,
-    /// Silence after which the start of a packet is given up (ruling B3). Longer than the longest
-    /// pause that the port makes inside a packet.
-    pub idle: Duration,
-}
-
-impl SlaveConfig {
-    /// For a UART of the processor itself at 500 kbit/s: a pause of five bytes ends a packet.
-    #[must_use]
-    pub const fn direct() -> Self {
-        Self::at(BAUD)
-    }
-
-    /// For a UART of the processor itself at another speed, bit/s.
-    #[must_use]
-    pub const fn at(baud: u32) -> Self {
-        Self { watchdog: None, turnaround_gap: Duration::ZERO, idle: wire_time(5, baud) }
-    }
-
-    /// For a slave on a host: a USB adapter makes pauses of up to 16 ms.
-    #[must_use]
-    pub const fn usb_adapter() -> Self {
-        Self { idle: Duration::from_millis(20), ..Self::direct() }
-    }
-}
-
-/// [`direct`](SlaveConfig::direct).
-impl Default for SlaveConfig {
-    fn default() -> Self {
-        Self::direct()
-    }
-}
 
 /// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that the
 /// application has set, and hands on the commands for it (ruling I9).
@@ -63,8 +27,9 @@ impl Default for SlaveConfig {
 /// * A WRITE is answered only by [`ThreeMotors`](super::ThreeMotors) boards (I3, I10).
 /// * On any error the previous command stays: a damaged packet is no packet, and a speed that is no
 ///   number is counted and refused (I4).
-/// * A request that is followed by another packet is not answered any more: its master has moved
-///   on, and an answer would meet the next node's.
+/// * A request that is followed by another byte is not answered any more, nor one that was not
+///   answered in time (I14): its master has moved on, and an answer would meet the next node's.
+/// * On two wires it follows the answers of other nodes, so that it finds no request in them (I14).
 ///
 /// ```
 /// use axlewire::{
@@ -82,7 +47,7 @@ impl Default for SlaveConfig {
 /// assert_eq!(slave.poll_transmit(now), Some(&answer.as_bytes()[..]));
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Slave<B: Board = OneMotor> {
     node: NodeId,
     mode: Mode,
@@ -91,51 +56,37 @@ pub struct Slave<B: Board = OneMotor> {
     position: Option<B::Position>,
     command: Option<Target<B>>,
     commanded_at: Option<Instant>,
-    /// When the answer to the request that was heard last may be sent.
-    answer_at: Option<Instant>,
+    /// The answer to the request that was heard last.
+    answer: Option<Answer>,
+    /// The same, handed out, until more bytes are received.
+    sent: Option<Answer>,
+    /// When the newest byte may have arrived first.
     heard_at: Option<Instant>,
-    /// How many of the received bytes the decoder has reported, in packets and gaps.
-    reported: u64,
-    decoder: Decoder<B::ToSlave, PACKET_LEN>,
+    /// When it was handed in: the rest of its packet may come from then on.
+    read_at: Option<Instant>,
+    inbox: Inbox<B>,
     packet: Vec<u8, PACKET_LEN>,
     event: Option<SlaveEvent<B>>,
     statistics: SlaveStatistics,
 }
 
-/// What the slave tells its application.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SlaveEvent<B: Board = OneMotor> {
-    /// A command for this node, in its mode. Repeated as often as the master repeats it.
-    Command(Target<B>),
-    /// No command for [`SlaveConfig::watchdog`]: stop what moves.
-    Watchdog,
+/// When an answer may be sent.
+#[derive(Clone, Copy, Debug)]
+struct Answer {
+    from: Instant,
+    until: Instant,
 }
 
-/// What a slave has heard. All counts wrap.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub struct SlaveStatistics {
-    /// READ packets for this node.
-    pub reads: u32,
-    /// WRITE packets for this node.
-    pub writes: u32,
-    /// Of these, refused because the speed was no number (ruling I4).
-    pub refused: u32,
-    /// Packets for other nodes.
-    pub foreign: u32,
-    /// Answers sent.
-    pub replies: u32,
-    /// Requests not answered, because another packet followed at once.
-    pub overtaken: u32,
-    /// Events that nobody had taken when the next one replaced them.
-    pub lost_events: u32,
+impl Answer {
+    /// To a request that ended then.
+    fn new(request_end: Instant, config: &SlaveConfig) -> Self {
+        let from = request_end + config.turnaround_gap;
+        Self { from, until: from + config.answer_within }
+    }
 }
 
 impl<B: Board> Slave<B> {
-    /// A slave that stands still and has heard nothing yet.
+    /// A slave that is not moving and has heard nothing yet.
     #[must_use]
     pub fn new(node: NodeId, mode: Mode, config: SlaveConfig) -> Self {
         Self {
@@ -146,10 +97,11 @@ impl<B: Board> Slave<B> {
             position: None,
             command: None,
             commanded_at: None,
-            answer_at: None,
+            answer: None,
+            sent: None,
             heard_at: None,
-            reported: 0,
-            decoder: Decoder::new(),
+            read_at: None,
+            inbox: Inbox::new(config.two_wire),
             packet: Vec::new(),
             event: None,
             statistics: SlaveStatistics::default(),
@@ -186,6 +138,9 @@ impl<B: Board> Slave<B> {
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
+            if let Some(SlaveEvent::Command(_)) = self.event {
+                self.event = None;
+            }
         }
     }
 
@@ -216,30 +171,24 @@ impl<B: Board> Slave<B> {
     /// Where every byte went.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        self.decoder.counters()
+        self.inbox.counters()
     }
 
-    /// Takes in bytes and what they complete.
-    ///
-    /// A READ whose bytes had all been received before, and that new ones have freed from behind a
-    /// false header, is overtaken by them. (A WRITE is never held back whole: it is as long as any
-    /// false header can promise.)
-    fn take(&mut self, mut bytes: &[u8], now: Instant) {
-        let (before, is_input) = (self.decoder.received(), !bytes.is_empty());
-        while let Some((node, command)) = self.next_request(&mut bytes) {
-            self.hear(node, command, now);
-            let is_old = is_input && self.reported <= before;
-            if is_old && self.answer_at.take().is_some() {
-                count(&mut self.statistics.overtaken);
+    /// Takes in bytes and what they complete, which had arrived at `at`.
+    fn receive(&mut self, mut bytes: &[u8], at: Instant) {
+        while let Some(found) = self.inbox.next(&mut bytes) {
+            match found {
+                Found::Answer => count(&mut self.statistics.answers),
+                Found::Request { request: (node, command), is_last } => {
+                    self.hear(node, command, is_last, at);
+                }
             }
         }
     }
 
-    /// Takes one whole packet, whoever it is for.
-    fn hear(&mut self, node: NodeId, command: Option<super::Command<B>>, now: Instant) {
-        if self.answer_at.take().is_some() {
-            count(&mut self.statistics.overtaken);
-        }
+    /// Takes one whole request, whichever node it is for.
+    fn hear(&mut self, node: NodeId, command: Option<Command<B>>, is_last: bool, at: Instant) {
+        self.overtake();
         if node != self.node {
             return count(&mut self.statistics.foreign);
         }
@@ -247,22 +196,32 @@ impl<B: Board> Slave<B> {
             None => count(&mut self.statistics.reads),
             Some(command) => {
                 count(&mut self.statistics.writes);
-                self.obey(command, now);
+                self.obey(command, at);
             }
         }
         if command.is_none() || B::ANSWERS_WRITE {
-            self.answer_at = Some(now + self.config.turnaround_gap);
+            self.answer = Some(Answer::new(at, &self.config));
+            if !is_last {
+                self.overtake();
+            }
+        }
+    }
+
+    /// More bytes have been received: an answer would meet them.
+    fn overtake(&mut self) {
+        if self.answer.take().is_some() {
+            count(&mut self.statistics.overtaken);
         }
     }
 
     /// Reads a WRITE in the node's own mode.
-    fn obey(&mut self, command: super::Command<B>, now: Instant) {
+    fn obey(&mut self, command: Command<B>, at: Instant) {
         let target = match self.mode {
             Mode::Velocity => B::finite(command.velocity).map(Target::Velocity),
             Mode::Position => Some(Target::Position(command.position)),
         };
         let Some(target) = target else { return count(&mut self.statistics.refused) };
-        (self.command, self.commanded_at) = (Some(target), Some(now));
+        (self.command, self.commanded_at) = (Some(target), Some(at));
         self.tell(SlaveEvent::Command(target));
     }
 
@@ -273,20 +232,10 @@ impl<B: Board> Slave<B> {
         }
     }
 
-    /// The next whole request in the input.
-    fn next_request(&mut self, bytes: &mut &[u8]) -> Option<(NodeId, Option<super::Command<B>>)> {
-        loop {
-            match self.decoder.decode(bytes)? {
-                Event::Frame(frame) => {
-                    let (node, command) = B::request(frame);
-                    let len =
-                        if command.is_some() { B::ToSlave::MAX_LEN } else { ReadRequest::LEN };
-                    self.reported = self.reported.wrapping_add(len as u64);
-                    return Some((node, command));
-                }
-                Event::Skipped(gap) => self.reported = self.reported.wrapping_add(gap.len),
-            }
-        }
+    /// The next event, left in its place.
+    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+    pub(crate) const fn peek_event(&self) -> Option<&SlaveEvent<B>> {
+        self.event.as_ref()
     }
 
     fn watchdog_at(&self) -> Option<Instant> {
@@ -295,8 +244,8 @@ impl<B: Board> Slave<B> {
 
     /// When the start of a packet that is pending is given up.
     fn idle_at(&self) -> Option<Instant> {
-        let pending = self.decoder.pending() > 0;
-        self.heard_at.filter(|_| pending).map(|heard| heard + self.config.idle)
+        let pending = self.inbox.pending() > 0;
+        self.read_at.filter(|_| pending).map(|read| read + self.config.idle)
     }
 }
 
@@ -308,18 +257,15 @@ impl<B: Board> Endpoint for Slave<B> {
     type Event = SlaveEvent<B>;
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        if !bytes.is_empty() {
-            self.heard_at = Some(now);
-            self.take(bytes, now);
-        }
+        self.handle_old_input(bytes, now, now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         if self.idle_at().is_some_and(|at| now >= at) {
-            self.decoder.idle();
-            self.take(&[], now);
+            self.inbox.idle();
+            self.receive(&[], self.heard_at.unwrap_or(now));
             // What is left may be the start of a packet again, with the same patience.
-            self.heard_at = Some(now);
+            self.read_at = Some(now);
         }
         if self.watchdog_at().is_some_and(|at| now >= at) {
             (self.command, self.commanded_at) = (None, None);
@@ -328,10 +274,12 @@ impl<B: Board> Endpoint for Slave<B> {
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        if self.answer_at.is_none_or(|at| now < at) {
+        let answer = self.answer.filter(|answer| now >= answer.from)?;
+        self.answer = None;
+        if now > answer.until {
+            count(&mut self.statistics.expired);
             return None;
         }
-        self.answer_at = None;
         let mut buffer = [0; PACKET_LEN];
         let packet = match (self.mode, self.position) {
             (Mode::Velocity, _) => {
@@ -343,7 +291,40 @@ impl<B: Board> Endpoint for Slave<B> {
         self.packet.clear();
         self.packet.extend_from_slice(packet.ok()?).ok()?;
         count(&mut self.statistics.replies);
+        self.sent = Some(answer);
         Some(&self.packet)
+    }
+
+    fn frame_pause(&self) -> Duration {
+        self.config.idle
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        wire_time(bytes, self.config.baud)
+    }
+
+    /// [`SlaveConfig::answer_within`], but at least 4 ms, for timers of 1 ms, and at most 20 ms.
+    fn held_up_after(&self) -> Option<Duration> {
+        const SHORTEST: Duration = Duration::from_millis(4);
+        Some(self.config.answer_within.clamp(SHORTEST, Duration::from_millis(20)))
+    }
+
+    /// A command, and the request for an answer, is as old as it can be.
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        if !bytes.is_empty() {
+            (self.heard_at, self.read_at, self.sent) = (Some(since), Some(now), None);
+            self.overtake();
+            self.receive(bytes, since);
+        }
+    }
+
+    /// An answer of which no byte has left is still due, within its time. One that was cut off is
+    /// not repeated: the master asks again.
+    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
+        if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
+            self.statistics.replies = self.statistics.replies.wrapping_sub(1);
+            self.answer = Some(answer);
+        }
     }
 
     fn poll_event(&mut self) -> Option<SlaveEvent<B>> {
@@ -351,6 +332,7 @@ impl<B: Board> Endpoint for Slave<B> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        [self.answer_at, self.idle_at(), self.watchdog_at()].into_iter().flatten().min()
+        let answer_at = self.answer.map(|answer| answer.from);
+        earliest(&[answer_at, self.idle_at(), self.watchdog_at()])
     }
 }

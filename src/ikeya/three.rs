@@ -26,15 +26,15 @@ pub const MAX_LEN: usize = WriteRequest::LEN;
 pub type Decoder<F = ToMaster> = crate::stream::Decoder<F, MAX_LEN>;
 
 /// What a master sends to three-motor boards.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum ToSlave {}
 
 /// What three-motor boards send.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum ToMaster {}
 
 /// Everything on a bus of three-motor boards.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum Either {}
 
 /// A packet for a three-motor board.

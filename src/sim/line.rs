@@ -96,18 +96,20 @@ impl Error for Stuck {}
 /// use axlewire::{
 ///     ikeya::{Master, MasterConfig, MasterEvent, Mode, NodeId, Rps},
 ///     sim::{Line, MotorNode, Who},
-///     time::Duration,
+///     time::{Duration, Instant},
 /// };
 ///
-/// let master: Master = Master::new(MasterConfig::direct());
+/// let start = Instant::from_micros(0);
+/// let mut master: Master = Master::new(MasterConfig::direct(), start);
+/// master.discover(start);
 /// let mut line = Line::new(500_000, 1, master);
 /// line.add(MotorNode::new(NodeId::N3, Mode::Velocity));
 ///
-/// line.head_mut().discover();
 /// line.run_for(Duration::from_millis(50))?;
 /// assert_eq!(line.head().mode(NodeId::N3), Some(Mode::Velocity));
 ///
-/// line.head_mut().set_velocity(NodeId::N3, Rps::new(2.0)?)?;
+/// let now = line.now();
+/// line.head_mut().set_velocity(NodeId::N3, Rps::new(2.0)?, now)?;
 /// line.run_for(Duration::from_millis(500))?;
 /// assert!((line.tail(0).motor().velocity().get() - 2.0).abs() < 0.01);
 ///

@@ -2,7 +2,7 @@
 
 use super::lag::{Lag, seconds};
 use crate::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     ikeya::{Mode, NodeId, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
     time::{Duration, Instant},
 };
@@ -231,6 +231,10 @@ impl Endpoint for MotorNode {
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
         self.run(now);
         self.slave.poll_transmit(now)
+    }
+
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.slave.handle_unsent(unsent, now);
     }
 
     fn poll_event(&mut self) -> Option<SlaveEvent> {

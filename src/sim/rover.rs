@@ -8,8 +8,15 @@ use crate::{
 
 /// A rover on flat ground: motor commands and time go in, telemetry comes out.
 ///
-/// A positive `angular` turns it right, as the vendor firmware does (ruling U6): the left wheels then
-/// run faster. At full speed a wheel makes 120 rpm, and 63 % of a new speed is reached in 150 ms.
+/// It steers as the vendor's `motor.c` does (ruling U6), by a steering wheel and in whole percent.
+/// The left wheels get `speed * (100 + 0.7 * angular) / 100`, the right ones the same with minus: a
+/// positive `angular` turns right forward, and in reverse the nose swings *left*. A speed of ±5 or
+/// less counts as none: beyond ±10 `angular` then turns it on the spot, at 0.7 of its value. An
+/// `angular` of ±5 or less does not steer, and adds 0.7 of its value to both sides. Where neither
+/// selects a direction, that of the command before stays selected. Of the result, 5 % or less is no
+/// motion, and 95 % or more is full speed.
+///
+/// At full speed a wheel makes 120 rpm, and 63 % of a new speed is reached in 150 ms.
 /// The heading is a compass's, growing to the right. The battery gives 40 Wh, at 12.6 V full and
 /// 9.6 V empty; an empty one turns no wheel.
 ///
@@ -19,10 +26,10 @@ use crate::{
 /// use axlewire::{sim::Rover, time::Duration, ucp::MotorControl};
 ///
 /// let mut rover = Rover::new();
-/// rover.command(&MotorControl::turn_right(50, 20)?);
+/// rover.command(&MotorControl::turn_right(60, 50)?);
 /// rover.step(Duration::from_millis(1000));
 /// let [front_left, front_right, ..] = rover.telemetry().rpm;
-/// assert_eq!((front_left, front_right), (84, 36)); // 50 % + 20 %, 50 % - 20 %
+/// assert_eq!((front_left, front_right), (97, 47)); // 81 % and 39 % of 120 rpm
 /// assert!(rover.heading_deg() > 0.0);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
@@ -31,6 +38,8 @@ pub struct Rover {
     /// Speeds of the wheels as parts of the full one.
     left: Lag,
     right: Lag,
+    /// What the latest command that selects a direction has selected.
+    direction: Direction,
     heading_deg: f64,
     turn_deg_per_s: f64,
     forward_acc_g: f64,
@@ -62,6 +71,7 @@ impl Rover {
         Self {
             left: wheel,
             right: wheel,
+            direction: Direction::None,
             heading_deg: 0.0,
             turn_deg_per_s: 0.0,
             forward_acc_g: 0.0,
@@ -78,11 +88,16 @@ impl Rover {
         self
     }
 
-    /// Drives as commanded from now on. Beyond ±100 % a wheel does not go.
+    /// Drives as commanded from now on.
     pub fn command(&mut self, command: &MotorControl) {
-        let (speed, turn) = (f64::from(command.speed()), f64::from(command.angular()));
-        self.left.target = ((speed + turn) / 100.0).clamp(-1.0, 1.0);
-        self.right.target = ((speed - turn) / 100.0).clamp(-1.0, 1.0);
+        let (speed, angular) = (i32::from(command.speed()), i32::from(command.angular()));
+        if let Some(selected) = Direction::selected(speed, angular) {
+            self.direction = selected;
+        }
+        let (left_sign, right_sign) = self.direction.signs();
+        let (left, right) = duties(speed, angular);
+        self.left.target = f64::from(left_sign * limited(left)) / 100.0;
+        self.right.target = f64::from(right_sign * limited(right)) / 100.0;
     }
 
     /// Lets `dt` pass.
@@ -128,8 +143,8 @@ impl Rover {
         self.battery_wh / Self::BATTERY_WH * 100.0
     }
 
-    /// What its sensors say: x is ahead, y is to the left, z is up. Accelerations and turns are means
-    /// over the last step.
+    /// What its sensors say: x is ahead, y is to the left, z is up. Accelerations and turns are
+    /// means over the last step.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         let volts = Self::EMPTY_V + (Self::FULL_V - Self::EMPTY_V) * self.battery() / 100.0;
@@ -151,6 +166,62 @@ impl Rover {
             voltage_dv: (volts * 10.0) as u8,
             current_ca: (self.power_w / volts * 100.0) as u16,
         }
+    }
+}
+
+/// Which way the wheels turn; how fast is another matter.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Direction {
+    None,
+    Forward,
+    Backward,
+    SpotRight,
+    SpotLeft,
+}
+
+impl Direction {
+    /// What a command selects; `None` where that of the command before stays selected.
+    const fn selected(speed: i32, angular: i32) -> Option<Self> {
+        Some(match (speed, angular) {
+            (6.., _) => Self::Forward,
+            (..=-6, _) => Self::Backward,
+            (_, 11..) => Self::SpotRight,
+            (_, ..=-11) => Self::SpotLeft,
+            _ => return None,
+        })
+    }
+
+    /// Signs of the left and the right wheels.
+    const fn signs(self) -> (i32, i32) {
+        match self {
+            Self::None => (0, 0),
+            Self::Forward => (1, 1),
+            Self::Backward => (-1, -1),
+            Self::SpotRight => (1, -1),
+            Self::SpotLeft => (-1, 1),
+        }
+    }
+}
+
+/// Magnitudes for the left and the right wheels, percent, truncated as the vendor's are.
+const fn duties(speed: i32, angular: i32) -> (i32, i32) {
+    let magnitude = speed.abs();
+    match (speed, angular) {
+        (-5..=5, 11.. | ..=-11) => (7 * angular.abs() / 10, 7 * angular.abs() / 10),
+        (_, -5..=5) => {
+            let both = magnitude + 7 * angular.abs() / 10;
+            (both, both)
+        }
+        _ => (magnitude * (1000 + 7 * angular) / 1000, magnitude * (1000 - 7 * angular) / 1000),
+    }
+}
+
+/// Too little moves no wheel, and nearly all is all.
+const fn limited(duty: i32) -> i32 {
+    match duty {
+        ..=5 => 0,
+        95.. => 100,
+        duty => duty,
     }
 }
 

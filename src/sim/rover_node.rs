@@ -2,13 +2,13 @@
 
 use super::Rover;
 use crate::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
     ucp::{Robot, RobotConfig, RobotEvent},
 };
 
-/// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports are
-/// what the rover does at that moment.
+/// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports
+/// are what the rover does at that moment.
 ///
 /// ```
 /// use axlewire::{
@@ -25,7 +25,7 @@ use crate::{
 /// assert!(node.rover().distance_m() > 0.05);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct RoverNode {
     robot: Robot,
     rover: Rover,
@@ -95,6 +95,10 @@ impl Endpoint for RoverNode {
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
         self.run(now);
         self.robot.poll_transmit(now)
+    }
+
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.robot.handle_unsent(unsent, now);
     }
 
     fn poll_event(&mut self) -> Option<RobotEvent> {

@@ -50,7 +50,7 @@ pub struct Decoder<F, const N: usize> {
     /// Where `end` is, and when to look. As long as it is too early, nothing can be said about the held bytes,
     /// and there is room for more. More are waited for only where the line is busy and the held ones begin at
     /// the front.
-    fill: Fill,
+    pub(super) fill: Fill,
     at: usize,
     line: Line,
     /// Where the held bytes ended when the line went quiet: what lies behind came later.
@@ -84,7 +84,7 @@ pub(crate) enum Held {
 
 impl<F: Framing, const N: usize> Decoder<F, N> {
     /// Nothing is held, and the line is busy.
-    const EMPTY: Fill = Fill::until(F::MIN_LEN, 0);
+    pub(super) const EMPTY: Fill = Fill::until(F::MIN_LEN, 0);
 
     /// An empty decoder.
     #[must_use]
@@ -344,14 +344,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// Finds and books the next event in what is held, of which something can be said; but none in
     /// the last `taken` bytes, if nothing in front of them is left.
     #[inline(never)]
-    fn judge_held(&mut self, taken: usize) -> Option<Held> {
+    pub(super) fn judge_held(&mut self, taken: usize) -> Option<Held> {
         loop {
             // What came behind a silence does not complete what was pending before it.
             let end = if self.line == Line::Busy { self.fill.end() } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
             match (F::judge(held), self.line) {
                 (Verdict::Reject { reason, more }, _) => {
-                    let len = held.len().min(1 + more);
+                    let len = held.len().min(more.saturating_add(1));
                     self.ledger.refuse_apart(reason, len);
                     self.ledger.skip(len);
                     self.at += len;
@@ -412,13 +412,13 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
 
     /// Whatever is held is to be looked at.
     #[inline]
-    fn wake_now(&mut self) {
+    pub(super) fn wake_now(&mut self) {
         self.fill = Fill::now(self.fill.end());
     }
 
     /// Moves up to `most` bytes from the input behind the held ones.
     #[inline]
-    fn hold(&mut self, input: &mut &[u8], most: usize) {
+    pub(super) fn hold(&mut self, input: &mut &[u8], most: usize) {
         let count = most.min(input.len());
         let end = self.fill.end();
         if let (Some((taken, rest)), Some(room)) =

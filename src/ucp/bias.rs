@@ -8,9 +8,19 @@ use super::{ImuBias, MagBias};
 ///
 /// The robot asks at every boot (id 8) and sends new values after a calibration (ids 6 and 7). The
 /// calls are made from [`handle_input`](crate::endpoint::Endpoint::handle_input), at most one per
-/// received frame: a store that takes its time is better filled from a copy in memory.
+/// received frame, and [`load`](Self::load) from
+/// [`poll_transmit`](crate::endpoint::Endpoint::poll_transmit): a store that takes its time is
+/// better filled from a copy in memory.
 pub trait BiasStore {
-    /// What is kept of each kind; `None` if there is nothing, or it cannot be read.
+    /// Does a result that was taken without an error stay here? `false` if it is only passed on:
+    /// then it is acknowledged only when its event has found room, because the application will
+    /// find it nowhere else (ruling U15). As provided, `true`.
+    fn keeps(&self) -> bool {
+        true
+    }
+
+    /// What is kept of each kind; `None` if there is nothing, or it cannot be read. Read at the
+    /// moment at which biases are sent, so that they are never superseded ones.
     fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>);
 
     /// Keeps the result of an IMU calibration in place of the one before.
@@ -72,13 +82,17 @@ impl BiasStore for MemoryStore {
     }
 }
 
-/// Keeps nothing: results are acknowledged and reach the application as events alone, and the
-/// robot's request at boot stays unanswered.
+/// Keeps nothing: results reach the application as events alone, are acknowledged when these have
+/// found room, and the robot's request at boot stays unanswered.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoStore;
 
 impl BiasStore for NoStore {
+    fn keeps(&self) -> bool {
+        false
+    }
+
     fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
         (None, None)
     }
@@ -93,6 +107,10 @@ impl BiasStore for NoStore {
 }
 
 impl<S: BiasStore + ?Sized> BiasStore for &mut S {
+    fn keeps(&self) -> bool {
+        (**self).keeps()
+    }
+
     fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
         (**self).load()
     }

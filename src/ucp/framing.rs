@@ -93,8 +93,8 @@ fn noise(bytes: &[u8]) -> usize {
     if cfg!(not(target_pointer_width = "64")) {
         return noise_by_bytes(behind);
     }
-    // In a crowd of false headers the next FD is a few bytes away: a branch that is foreseen is then sooner
-    // done than arithmetic.
+    // In a crowd of false headers the next FD is a few bytes away: a branch that is foreseen is
+    // then sooner done than arithmetic.
     let few = noise_by_bytes(behind.first_chunk::<3>().map_or(behind, |near| near));
     match behind.get(3..) {
         Some(far) if few == 3 => few + noise_by_words(far),
@@ -114,7 +114,8 @@ fn noise_by_words(bytes: &[u8]) -> usize {
     let every = |byte| u64::from_ne_bytes([byte; 8]);
     let mut rest = bytes;
     while let Some((word, behind)) = rest.split_first_chunk() {
-        // FD becomes zero, and the first zero has the first borrow: in front of it no high bit is set.
+        // FD becomes zero, and the first zero has the first borrow: in front of it no high bit is
+        // set.
         let word = u64::from_le_bytes(*word) ^ every(SYNC[0]);
         let zeros = word.wrapping_sub(every(1)) & !word & every(0x80);
         if zeros != 0 {
@@ -212,6 +213,17 @@ impl Frame {
     pub fn as_bytes(&self) -> &[u8] {
         IntoBytes::as_bytes(self)
     }
+
+    /// Passes the frame on byte for byte, **whatever it does to its receiver**: no rule of this
+    /// crate is applied (rulings U2, U7, U13).
+    ///
+    /// The frame may start a firmware update, be out of range, or hang or corrupt a shipped robot:
+    /// a relay is as dangerous as its source. To pass on only harmless motor commands, make a
+    /// [`MotorControl`](super::MotorControl) of a received one by `try_from`.
+    #[must_use]
+    pub const fn relay_unchecked(&self) -> RelayedFrame<'_> {
+        RelayedFrame(self)
+    }
 }
 
 #[cfg(feature = "defmt")]
@@ -221,18 +233,25 @@ impl defmt::Format for Frame {
     }
 }
 
-/// Sends what was received, byte for byte: a relay is as dangerous as its source.
-impl Encode for Frame {
+/// A received frame to be sent on byte for byte; see [`Frame::relay_unchecked`].
+#[derive(Clone, Copy, Debug)]
+pub struct RelayedFrame<'a>(&'a Frame);
+
+impl Encode for RelayedFrame<'_> {
     fn encoded_len(&self) -> usize {
-        self.as_bytes().len()
+        self.0.as_bytes().len()
     }
 
     fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
-        encode_bytes(self.as_bytes(), buffer)
+        encode_bytes(self.0.as_bytes(), buffer)
     }
 }
 
 /// A whole frame with a body of known type, as a value.
+///
+/// [`Body::frame`] builds one. A value that was cast from bytes may say anything in its header and
+/// its CRC: [`encode`](Encode::encode) refuses an id or length that is not the body's, and a
+/// damaged CRC is refused by every receiver.
 ///
 /// ```
 /// use axlewire::ucp::{Body, Ping};
@@ -269,12 +288,23 @@ impl<B: Body> FrameOf<B> {
     /// The frame with the sender's counter `index` and its right CRC.
     #[must_use]
     pub fn new(index: u8, body: B) -> Self {
-        let header =
-            Header::new(B::ID as u8, index, (Self::LEN - LEN_WITHOUT_BODY - OUTSIDE_LEN) as u8);
-        let frame = Self { header, body, crc: [0; 2] };
+        let frame = Self { header: Self::header(index), body, crc: [0; 2] };
         Self { crc: crc16::seal(IntoBytes::as_bytes(&frame)), ..frame }
     }
 
+    /// The frame as it goes over the wire.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        IntoBytes::as_bytes(self)
+    }
+
+    /// Header of this frame with the sender's counter `index`.
+    const fn header(index: u8) -> Header {
+        Header::new(B::ID as u8, index, (Self::LEN - LEN_WITHOUT_BODY - OUTSIDE_LEN) as u8)
+    }
+}
+
+impl<B> FrameOf<B> {
     /// The sender's counter.
     #[must_use]
     pub const fn index(&self) -> u8 {
@@ -286,20 +316,20 @@ impl<B: Body> FrameOf<B> {
     pub const fn body(&self) -> &B {
         &self.body
     }
-
-    /// The frame as it goes over the wire.
-    #[must_use]
-    pub fn as_bytes(&self) -> &[u8] {
-        IntoBytes::as_bytes(self)
-    }
 }
 
+/// Refuses with [`EncodeError::Header`] a frame that was cast from bytes and has another id or
+/// length than its body: a report's id, for one, hangs shipped robots (ruling U13).
 impl<B: Body> Encode for FrameOf<B> {
     fn encoded_len(&self) -> usize {
         Self::LEN
     }
 
     fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError> {
+        if self.header != Self::header(self.index()) {
+            let (id, len) = (self.header.id(), self.header.len());
+            return Err(EncodeError::Header { id, len });
+        }
         encode_bytes(self.as_bytes(), buffer)
     }
 }
@@ -326,8 +356,8 @@ pub struct RawFrame<'a> {
     pub body: &'a [u8],
 }
 
-/// Built in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what hangs
-/// or corrupts shipped robots (ruling U13).
+/// Built in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what
+/// hangs or corrupts shipped robots (ruling U13).
 impl Encode for RawFrame<'_> {
     fn encoded_len(&self) -> usize {
         self.body.len() + LEN_WITHOUT_BODY + OUTSIDE_LEN

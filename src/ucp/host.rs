@@ -5,6 +5,8 @@ mod config;
 mod event;
 mod motor;
 mod ping;
+mod results;
+mod send;
 mod state;
 
 pub use config::HostConfig;
@@ -14,31 +16,54 @@ pub use event::{
 };
 
 use super::{
-    BiasStore, CalibrationKind, MAX_LEN, MotorControl, NetworkState, NoStore, SetNetworkState,
-    role::{Inbox, halted, lamp_is_on, stands_still},
+    BiasStore, CalibrationKind, MAX_LEN, MotorControl, NetworkState, NoStore,
+    role::{FRAME_PAUSE, Inbox},
 };
-use crate::{endpoint::Endpoint, stream::Counters, time::Instant};
+use crate::{
+    endpoint::{Endpoint, Unsent},
+    stream::Counters,
+    time::{Duration, Instant, earliest, wire_time},
+};
 use state::{State, Update};
 
 /// The host of a rover: a pure state machine, driven as [`Endpoint`] says.
 ///
+/// * **First frame (U16).** A zero motor command, before any ping or answer, and again first if it
+///   did not leave or its flush failed. If the application drives at once, its command follows
+///   right behind. The zero command is repeated every 100 ms until the first call, in case it was
+///   damaged: a vendor robot keeps driving while any byte arrives, and a host that was restarted
+///   has to tell it to stand still.
+///   [`HostConfig::sends_first_stop`] switches this off for hosts that only listen.
 /// * **Motor commands (U10).** The latest of [`drive`](Self::drive) and [`stop`](Self::stop) wins
 ///   and is repeated every 100 ms. When the application has called neither for 500 ms with the
-///   robot on the move, speed and turn 0 are sent, and sent on, until the next call; the lamp stays.
-///   No motor command goes out before the first call.
+///   robot on the move, speed and turn 0 are sent, and sent on, until the next call; the lamp
+///   stays.
+/// * **Stops (U16).** Motor frames are never answered. So a stop counts as done when
+///   [`is_stop_sent`](Self::is_stop_sent) says so and the port has been flushed since.
+///   [`handle_unsent`](Endpoint::handle_unsent) makes every motor command due again, twice behind a
+///   frame that was cut off, because the robot may take the first for the rest of that frame.
 /// * **Link (U10).** Pings go out every 200 ms. The link goes up with the first valid frame that
 ///   comes from a robot, and down after 500 ms without one.
 /// * **Reports (U9).** Every one is an event and the [latest](Self::last_report) is kept. Missing
-///   ones are counted by their index. Counting starts anew after a lost link and when the robot asks
-///   for its biases, as it does at boot and then once a second until it has them: reports lost around
-///   such a request are not counted. A robot that restarts without either counts as up to 255.
-/// * **Calibration (U11).** Requests are acknowledged, repeated or given up, within
-///   [`HostConfig::calibration_bound`]. Results go to the [`BiasStore`] and are acknowledged once it
-///   has them. The robot's request at boot is answered only if *both* results are stored: a made-up
-///   zero is a wrong bias, would overwrite what the robot has found since, and would end its
-///   asking. Who wants zeros puts them into the store.
+///   ones are counted by their index. Counting starts anew after a lost link and when the robot
+///   asks for its biases, as it does at boot and then once a second until it has them: reports lost
+///   around such a request are not counted. A robot that restarts without either counts as up to
+///   255.
+/// * **Calibration (U11, U15).** Requests are acknowledged, repeated or given up, within
+///   [`HostConfig::calibration_bound`]. Results go to the [`BiasStore`] and are acknowledged once
+///   it has them; a store that does not [keep](BiasStore::keeps) them passes them on as events, and
+///   they are acknowledged once the event has found room. One that is refused withdraws an
+///   acknowledgement that has not left: the robot would take it for its latest.
+/// * **Biases (U11).** The robot's request at boot is answered only if *both* results are stored,
+///   with those that are stored at the moment of sending: a made-up zero is a wrong bias, would
+///   overwrite what the robot has found since, and would end its asking. To send zeros, store
+///   zeros.
 /// * **Firmware update (U7, U13).** Starts by
-///   [`start_firmware_update`](Self::start_firmware_update) and by nothing else.
+///   [`start_firmware_update`](Self::start_firmware_update) and by nothing else, behind a stop that
+///   has been sent.
+/// * **Builds that hang (U14)** on ids 5..=0x0A are spared them by [`HostConfig::low_ids_only`].
+/// * **Events (U15).** There is room for 16. Reports, pongs and what comes again by itself take at
+///   most half of it, so that they never refuse what happens once.
 ///
 /// What goes out first: motor commands, then answers, requests, the lamp's network state, pings.
 /// Every frame takes the next `index`.
@@ -48,14 +73,17 @@ use state::{State, Update};
 ///
 /// let now = Instant::from_millis(0);
 /// let mut host = Host::new(HostConfig::default(), now);
-/// host.drive(MotorControl::turn_right(50, 10)?, now)?;
-/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // the command
+/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // stand still
 /// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(8)); // a ping
 /// assert_eq!(host.poll_transmit(now), None);
-/// assert_eq!(host.poll_timeout(), Some(Instant::from_millis(100))); // the command again
+///
+/// let now = Instant::from_millis(50);
+/// host.drive(MotorControl::turn_right(50, 10)?, now)?;
+/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // the command
+/// assert_eq!(host.poll_timeout(), Some(Instant::from_millis(150))); // the command again
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Host<S = NoStore> {
     inbox: Inbox,
     outgoing: [u8; MAX_LEN],
@@ -98,33 +126,37 @@ impl<S: BiasStore> Host<S> {
     /// 100 ms. To be called at least every 500 ms, be it with the same command: see
     /// [`HostEvent::DeadMan`].
     ///
-    /// Only speed, turn and lamp are taken from `command`: all other fields are sent as 0 (U7).
+    /// A received command becomes one of these by [`MotorControl::try_from`] (U7).
     ///
     /// # Errors
     ///
-    /// [`CommandError::StartsUpdate`] and [`CommandError::Value`] for what only a copy of a received
-    /// command can be; [`CommandError::Updating`] during a firmware update.
+    /// [`CommandError::Updating`] during a firmware update.
     pub fn drive(&mut self, command: MotorControl, now: Instant) -> Result<(), CommandError> {
-        if command.starts_update() {
-            return Err(CommandError::StartsUpdate { version: command.version() });
-        }
         if self.state.update != Update::None {
             return Err(CommandError::Updating);
         }
-        let plain = MotorControl::new(command.speed(), command.angular())
-            .map_err(CommandError::Value)?
-            .with_front_led(lamp_is_on(&command));
-        self.state.motor.command(plain, now, &self.state.config);
+        self.state.motor.command(command, now, &self.state.config);
         Ok(())
     }
 
     /// Stands still: speed and turn 0 go out at once, the lamp stays.
     ///
-    /// Always possible; it ends the silence of a firmware update.
+    /// Always possible; it ends the silence of a firmware update. Done when
+    /// [`is_stop_sent`](Self::is_stop_sent) and the port has been flushed since (U16).
     pub fn stop(&mut self, now: Instant) {
-        self.state.update = Update::None;
-        let command = self.state.motor.latest().as_ref().map_or(MotorControl::STOP, halted);
+        self.state.end_update(now);
+        let command = self.state.motor.latest().map_or(MotorControl::STOP, |it| it.halted());
         self.state.motor.command(command, now, &self.state.config);
+    }
+
+    /// Has the robot been told to stand still, and nothing else since (ruling U16)?
+    ///
+    /// `true` if the latest command is to stand still and has been handed out, twice where that is
+    /// needed, and [`handle_unsent`](Endpoint::handle_unsent) has not taken it back. When the port
+    /// has then been flushed, the stop is done; motor frames are never answered.
+    #[must_use]
+    pub fn is_stop_sent(&self) -> bool {
+        self.state.motor.is_stop_sent()
     }
 
     /// The settings.
@@ -133,41 +165,39 @@ impl<S: BiasStore> Host<S> {
         &self.state.config
     }
 
-    /// The motor command that is being repeated, the dead-man's if he has spoken.
+    /// The motor command that is being repeated: the latest, or the stop once the dead-man has
+    /// fired.
     #[must_use]
     pub const fn command(&self) -> Option<MotorControl> {
         self.state.motor.latest()
     }
 
-    /// Shows the state of the network on the robot's lamp: sent when it changes, when the link comes
-    /// up and when the robot has booted (U8).
+    /// Shows the state of the network on the robot's lamp: sent when it changes, when the link
+    /// comes up and when the robot has booted (U8).
     ///
     /// # Errors
     ///
-    /// [`CommandError::NetworkState`] for a state above 255.
+    /// [`CommandError::NetworkState`] for a state above 255, [`CommandError::LowIdsOnly`] with
+    /// [`HostConfig::low_ids_only`].
     pub fn set_network_state(
         &mut self,
         network: NetworkState,
         now: Instant,
     ) -> Result<(), CommandError> {
-        let body = SetNetworkState::new(network)
-            .ok_or(CommandError::NetworkState { state: network.into() })?;
-        if self.state.network.replace(body) != Some(body) {
-            self.state.network_due = Some(now);
-        }
-        Ok(())
+        self.state.show(network, now)
     }
 
     /// Asks the robot to begin a calibration.
     ///
-    /// Comes to [`HostEvent::CalibrationStarted`] or [`HostEvent::CalibrationFailed`]. The robot does
-    /// not move by itself: for the magnetometer the application turns it, for the IMU it keeps it
-    /// still.
+    /// Comes to [`HostEvent::CalibrationStarted`] or [`HostEvent::CalibrationFailed`]. The robot
+    /// does not move by itself: for the magnetometer the application turns it, for the IMU it keeps
+    /// it still.
     ///
     /// # Errors
     ///
-    /// [`CommandError::Calibrating`] while a request is unanswered, [`CommandError::CalibrationKind`]
-    /// for a kind that no robot knows, [`CommandError::Updating`] during a firmware update.
+    /// [`CommandError::Calibrating`] while a request is unanswered,
+    /// [`CommandError::CalibrationKind`] for a kind that no robot knows, [`CommandError::Updating`]
+    /// during a firmware update.
     pub fn start_calibration(
         &mut self,
         kind: CalibrationKind,
@@ -199,33 +229,28 @@ impl<S: BiasStore> Host<S> {
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
+    /// During an update it hears no stop either. So one more stop goes in front of the request, and
+    /// the request waits for a stop that did not leave. When the two may have been lost together
+    /// ([`handle_unsent`](Endpoint::handle_unsent)), both are sent again.
+    ///
     /// # Errors
     ///
-    /// [`CommandError::Moving`] unless the robot has been told to stand still,
+    /// [`CommandError::Moving`] unless [`is_stop_sent`](Self::is_stop_sent); without
+    /// [`HostConfig::sends_first_stop`] it is taken before the first motor command, too.
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
-    /// [`CommandError::Updating`] during a firmware update.
+    /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
+    /// [`HostConfig::low_ids_only`].
     pub fn start_firmware_update(
         &mut self,
         version: i16,
         now: Instant,
     ) -> Result<(), CommandError> {
-        let state = &mut self.state;
-        if state.update != Update::None {
-            return Err(CommandError::Updating);
-        }
-        if state.calibration.is_some() {
-            return Err(CommandError::Calibrating);
-        }
-        if state.motor.latest().is_some_and(|command| !stands_still(&command)) {
-            return Err(CommandError::Moving);
-        }
-        state.update = Update::Asked { version, at: now };
-        Ok(())
+        self.state.start_update(version, now)
     }
 
-    /// The firmware update is over: pings go out again, motor commands from the next call on.
-    pub fn end_firmware_update(&mut self) {
-        self.state.update = Update::None;
+    /// The firmware update is over: pings and the zero motor command go out again.
+    pub fn end_firmware_update(&mut self, now: Instant) {
+        self.state.end_update(now);
     }
 
     /// What is known about the robot.
@@ -238,6 +263,19 @@ impl<S: BiasStore> Host<S> {
     #[must_use]
     pub const fn last_report(&self) -> Option<&ReceivedReport> {
         self.state.last_report.as_ref()
+    }
+
+    /// The latest report, if no call of this has returned it yet.
+    pub fn take_report(&mut self) -> Option<ReceivedReport> {
+        let is_new = core::mem::take(&mut self.state.is_report_new);
+        self.state.last_report.filter(|_| is_new)
+    }
+
+    /// What the latest calibration request has come to; `None` while it is unanswered, and before
+    /// the first.
+    #[must_use]
+    pub const fn calibration_outcome(&self) -> Option<Result<(), CalibrationFailure>> {
+        self.state.settled
     }
 
     /// What the host has seen.
@@ -258,6 +296,12 @@ impl<S: BiasStore> Host<S> {
         self.state.events.lost()
     }
 
+    /// Takes out the events that are not to stay, a calibration's that waits for room included.
+    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+    pub(crate) fn retain_events(&mut self, stays: impl FnMut(&HostEvent) -> bool) {
+        self.state.retain_events(stays);
+    }
+
     /// The store of biases.
     pub const fn store(&mut self) -> &mut S {
         &mut self.state.store
@@ -269,7 +313,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         let Self { inbox, state, .. } = self;
-        inbox.take(bytes, now, |frame, at| state.receive(frame, at));
+        inbox.take(bytes, now, now, |frame, at| state.receive(frame, at));
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -282,15 +326,56 @@ impl<S: BiasStore> Endpoint for Host<S> {
         // A command must not outlive its application because a driver is late.
         self.state.expire_command(now);
         let len = self.state.fill(&mut self.outgoing, now)?;
-        self.state.index = self.state.index.wrapping_add(1);
         self.outgoing.get(..len)
     }
 
+    fn frame_pause(&self) -> Duration {
+        FRAME_PAUSE
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        wire_time(bytes, self.state.config.baud)
+    }
+
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.state.unsent(unsent, now);
+    }
+
     fn poll_event(&mut self) -> Option<HostEvent> {
-        self.state.events.pop()
+        self.state.pop_event()
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        [self.inbox.deadline(), self.state.deadline()].into_iter().flatten().min()
+        earliest(&[self.inbox.deadline(), self.state.deadline()])
+    }
+}
+
+#[cfg(all(test, any(feature = "embedded-io", feature = "embedded-io-async")))]
+mod tests {
+    use super::*;
+    use crate::ucp::{Body, CalibrationStartAck, ErrorCode, MagBias};
+
+    #[test]
+    fn an_outcome_that_waits_for_room_can_be_taken_out_like_one_in_the_queue() {
+        let now = Instant::from_millis(0);
+        let kind = CalibrationKind::Imu;
+        let ack = CalibrationStartAck::new(kind, ErrorCode::Fine).frame(0);
+        let mut host = Host::new(HostConfig::default(), now);
+        for value in 0..20 {
+            host.handle_input(MagBias::new([value; 3]).frame(0).as_bytes(), now);
+        }
+        for _ in 0..3 {
+            assert_eq!(host.start_calibration(kind, now), Ok(()));
+            while host.poll_transmit(now).is_some() {}
+            host.handle_input(ack.as_bytes(), now);
+            assert_eq!(host.calibration_outcome(), Some(Ok(())));
+            assert_eq!(host.start_calibration(kind, now), Err(CommandError::Calibrating));
+            // What stays is told as before.
+            host.retain_events(|_| true);
+            assert_eq!(host.start_calibration(kind, now), Err(CommandError::Calibrating));
+            host.retain_events(|event| !matches!(event, HostEvent::CalibrationStarted(_)));
+        }
+        let events = core::iter::from_fn(|| host.poll_event());
+        assert_eq!(events.filter(|event| matches!(event, HostEvent::MagBias(_))).count(), 15);
     }
 }

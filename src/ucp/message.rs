@@ -4,17 +4,17 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
 
 use super::{
     CalibrationKind, ErrorCode, Frame, FrameOf, MessageId, NetworkState, OtaStatus, RawFrame,
-    Report,
+    RawMotorControl, RawOtaRequest, Report,
 };
-use crate::error::EncodeError;
 
-/// The body of a known message: a struct of bytes that knows its id.
+/// The body of a known message that may be sent: a struct of bytes that knows its id.
 ///
 /// Which message a frame holds follows from its id and the length of its body, so no two bodies
-/// share both. Implemented by this crate's bodies and by nothing else.
-pub trait Body:
-    FromBytes + IntoBytes + Immutable + KnownLayout + Unaligned + Copy + sealed::Sealed
-{
+/// share both. Implemented by this crate's bodies and by nothing else. [`RawMotorControl`] and
+/// [`RawOtaRequest`] are none (ruling U7): a motor command is sent as a
+/// [`MotorControl`](super::MotorControl), which is always harmless, and a request to update as an
+/// [`OtaRequest`](super::OtaRequest), which has one constructor.
+pub trait Body: IntoBytes + Immutable + KnownLayout + Unaligned + Copy + sealed::Sealed {
     /// The id under which it travels.
     const ID: MessageId;
 
@@ -62,27 +62,6 @@ body! {
     /// Robot to host, answers a ping: `err`, 1 byte.
     pub struct Pong(Ping) { err: u8 }
 
-    /// Host to robot, speed, turn and lamp: eight fields, 16 bytes.
-    ///
-    /// `speed: i16 | angular: i16 | front_led: i16 | back_led: i16 | version: u16 | reserve1: u16 |
-    /// reserve2: u32`
-    ///
-    /// A constructor leaves everything behind `front_led` at 0, because a `version` above 38
-    /// starts a firmware update in a shipped robot (ruling U7). A *received* command keeps all its
-    /// fields, and so does a copy of it: ask [`starts_update`](Self::starts_update) before
-    /// relaying one.
-    ///
-    /// The robot stops after 500 ms without a valid command, so repeat it every 100 ms (U10).
-    pub struct MotorControl(MotorControl) {
-        speed: [u8; 2],
-        angular: [u8; 2],
-        front_led: [u8; 2],
-        back_led: [u8; 2],
-        version: [u8; 2],
-        reserve1: [u8; 2],
-        reserve2: [u8; 4]
-    }
-
     /// Host to robot, begins a calibration: `type`, 1 byte (ruling U11).
     pub struct CalibrationStart(CalibrationStart) { kind: u8 }
 
@@ -125,11 +104,8 @@ body! {
         mag: [[u8; 2]; 3]
     }
 
-    /// Host to robot, **starts a firmware update** where `version: i16` is above the robot's own,
-    /// 2 bytes. The robot then leaves this protocol and waits for YMODEM on the same line.
-    pub struct OtaRequest(Ota) { version: [u8; 2] }
-
-    /// Robot to host, answers an [`OtaRequest`]: `err`, 1 byte. Shipped robots never send it.
+    /// Robot to host, answers an [`OtaRequest`](super::OtaRequest): `err`, 1 byte. Shipped robots
+    /// never send it.
     pub struct OtaAck(Ota) { status: u8 }
 
     /// Host to robot, state of the host's network: 1 byte, what a host should send (ruling U8).
@@ -151,136 +127,6 @@ impl Pong {
     #[must_use]
     pub fn err(&self) -> ErrorCode {
         self.err.into()
-    }
-}
-
-impl MotorControl {
-    /// Stand still, lamp off.
-    pub const STOP: Self = Self {
-        speed: [0; 2],
-        angular: [0; 2],
-        front_led: [0; 2],
-        back_led: [0; 2],
-        version: [0; 2],
-        reserve1: [0; 2],
-        reserve2: [0; 4],
-    };
-
-    /// Largest magnitude of `speed` and `angular`.
-    pub const LIMIT: i16 = 100;
-
-    /// Value of `front_led` that means on.
-    const LAMP_ON: i16 = 100;
-
-    /// Newest firmware version that a command can carry without starting an update.
-    const LAST_HARMLESS_VERSION: i16 = 38;
-
-    /// Drives at `speed`, positive forward, with the wire's own `angular`; both -100..=100.
-    ///
-    /// The document says that a positive `angular` turns left; the vendor firmware and three host
-    /// programs turn right (ruling U6). [`turn_right`](Self::turn_right) and
-    /// [`turn_left`](Self::turn_left) do as the firmware does.
-    ///
-    /// # Errors
-    ///
-    /// [`EncodeError::Percent`] out of range: nothing is clamped.
-    ///
-    /// ```
-    /// use axlewire::ucp::{Body, MotorControl};
-    /// let frame = MotorControl::new(60, 0)?.with_front_led(true).frame(0);
-    /// assert_eq!(frame.as_bytes()[..10], [0xFD, 0xFF, 0x14, 0x00, 0x02, 0x00, 60, 0, 0, 0]);
-    /// assert!(MotorControl::new(101, 0).is_err());
-    /// # Ok::<(), axlewire::error::EncodeError>(())
-    /// ```
-    pub const fn new(speed: i16, angular: i16) -> Result<Self, EncodeError> {
-        let (min, max) = (-Self::LIMIT, Self::LIMIT);
-        if speed < min || speed > max {
-            return Err(EncodeError::Percent { value: speed, min, max });
-        }
-        if angular < min || angular > max {
-            return Err(EncodeError::Percent { value: angular, min, max });
-        }
-        Ok(Self { speed: speed.to_le_bytes(), angular: angular.to_le_bytes(), ..Self::STOP })
-    }
-
-    /// Drives at `speed` and turns right by `turn`, 0..=100: a positive `angular` (ruling U6).
-    ///
-    /// # Errors
-    ///
-    /// [`EncodeError::Percent`] for a speed outside -100..=100 or a turn outside 0..=100.
-    pub const fn turn_right(speed: i16, turn: i16) -> Result<Self, EncodeError> {
-        let (min, max) = (0, Self::LIMIT);
-        if turn < min || turn > max {
-            return Err(EncodeError::Percent { value: turn, min, max });
-        }
-        Self::new(speed, turn)
-    }
-
-    /// Drives at `speed` and turns left by `turn`, 0..=100: a negative `angular` (ruling U6).
-    ///
-    /// # Errors
-    ///
-    /// [`EncodeError::Percent`] for a speed outside -100..=100 or a turn outside 0..=100.
-    pub const fn turn_left(speed: i16, turn: i16) -> Result<Self, EncodeError> {
-        match Self::turn_right(speed, turn) {
-            Ok(_) => Self::new(speed, -turn),
-            Err(error) => Err(error),
-        }
-    }
-
-    /// The same command with the front lamp on (100) or off (0).
-    #[must_use]
-    pub const fn with_front_led(self, on: bool) -> Self {
-        let front_led = if on { Self::LAMP_ON } else { 0 };
-        Self { front_led: front_led.to_le_bytes(), ..self }
-    }
-
-    /// Speed, positive forward; -100..=100 unless the sender was careless.
-    #[must_use]
-    pub const fn speed(&self) -> i16 {
-        i16::from_le_bytes(self.speed)
-    }
-
-    /// Turn, positive to the right in the vendor firmware (ruling U6).
-    #[must_use]
-    pub const fn angular(&self) -> i16 {
-        i16::from_le_bytes(self.angular)
-    }
-
-    /// Lamp field: 100 on, 0 off.
-    #[must_use]
-    pub const fn front_led(&self) -> i16 {
-        i16::from_le_bytes(self.front_led)
-    }
-
-    /// Reserved by the document.
-    #[must_use]
-    pub const fn back_led(&self) -> i16 {
-        i16::from_le_bytes(self.back_led)
-    }
-
-    /// Reserved by the document; see [`starts_update`](Self::starts_update).
-    #[must_use]
-    pub const fn version(&self) -> u16 {
-        u16::from_le_bytes(self.version)
-    }
-
-    /// Reserved by the document.
-    #[must_use]
-    pub const fn reserve1(&self) -> u16 {
-        u16::from_le_bytes(self.reserve1)
-    }
-
-    /// Reserved by the document.
-    #[must_use]
-    pub const fn reserve2(&self) -> u32 {
-        u32::from_le_bytes(self.reserve2)
-    }
-
-    /// Would this command start a firmware update in a shipped robot (ruling U7)?
-    #[must_use]
-    pub const fn starts_update(&self) -> bool {
-        i16::from_le_bytes(self.version) > Self::LAST_HARMLESS_VERSION
     }
 }
 
@@ -446,22 +292,8 @@ impl Biases {
     }
 }
 
-impl OtaRequest {
-    /// **Starts a firmware update** in a robot whose firmware is older than `version`.
-    #[must_use]
-    pub const fn start_firmware_update(version: i16) -> Self {
-        Self { version: version.to_le_bytes() }
-    }
-
-    /// The version on offer.
-    #[must_use]
-    pub const fn version(&self) -> i16 {
-        i16::from_le_bytes(self.version)
-    }
-}
-
 impl OtaAck {
-    /// Answers an [`OtaRequest`].
+    /// Answers an [`OtaRequest`](super::OtaRequest).
     #[must_use]
     pub fn new(status: OtaStatus) -> Self {
         Self { status: status.into() }
@@ -500,12 +332,12 @@ impl SetNetworkStateWide {
 /// What a frame says, borrowed from its body.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[expect(missing_docs, reason = "each variant is the body it holds")]
+#[expect(missing_docs, reason = "each variant is the body it holds, as it was received")]
 #[non_exhaustive]
 pub enum Message<'a> {
     Ping(&'a Ping),
     Pong(&'a Pong),
-    MotorControl(&'a MotorControl),
+    MotorControl(&'a RawMotorControl),
     CalibrationStart(&'a CalibrationStart),
     CalibrationStartAck(&'a CalibrationStartAck),
     CalibrationEnd(&'a CalibrationEnd),
@@ -517,7 +349,7 @@ pub enum Message<'a> {
     MagBiasAck(&'a MagBiasAck),
     BiasRequest(&'a BiasRequest),
     Biases(&'a Biases),
-    OtaRequest(&'a OtaRequest),
+    OtaRequest(&'a RawOtaRequest),
     OtaAck(&'a OtaAck),
     SetNetworkState(&'a SetNetworkState),
     SetNetworkStateWide(&'a SetNetworkStateWide),
@@ -561,6 +393,9 @@ impl<'a> Message<'a> {
 }
 
 /// The body as a `B` if it has the length of one.
-fn cast<'a, B: Body + 'a, T>(body: &'a [u8], variant: impl FnOnce(&'a B) -> T) -> Option<T> {
+fn cast<'a, B, T>(body: &'a [u8], variant: impl FnOnce(&'a B) -> T) -> Option<T>
+where
+    B: FromBytes + Immutable + KnownLayout + 'a,
+{
     B::ref_from_bytes(body).ok().map(variant)
 }

@@ -32,25 +32,50 @@
 //!
 //! * **B1, U1** The CRC covers every byte in front of it, FD FF included, and is sent low byte
 //!   first. `len` is 4 + body length, which is the frame length minus 4.
-//! * **U2** `len` 4..=60 is accepted unless a larger cap is chosen, at most 252; never sent above 60.
-//! * **U3** A good frame with an unknown id, or with a body length that no message has, is delivered
-//!   as [`Message::Unknown`]: never dropped, never misread.
+//! * **U2** `len` 4..=60 is accepted unless a larger cap is chosen, at most 252; never sent above
+//!   60.
+//! * **U3** A good frame with an unknown id, or with a body length that no message has, is
+//!   delivered as [`Message::Unknown`]: never dropped, never misread.
 //! * **U4** The table above.
-//! * **U5** Two report layouts, told apart by their length; [`Telemetry`] is what both have, raw and
-//!   in SI units. A battery above 100 % is kept raw and flagged.
+//! * **U5** Two report layouts, told apart by their length; [`Telemetry`] is what both have, raw
+//!   and in SI units. A battery above 100 % is kept raw and flagged.
 //! * **U6** The document says that a positive `angular` turns left, the vendor firmware and three
 //!   host programs turn right. The wire value passes through; [`MotorControl::turn_right`] and
-//!   [`MotorControl::turn_left`] follow the firmware.
-//! * **U7** `speed` and `angular` are -100..=100, out of range is an error. `front_led` is 100 or 0.
-//!   `version` and the reserved fields are 0, because a `version` above 38 starts a firmware update.
+//!   [`MotorControl::turn_left`] follow the firmware. It is a steering wheel and not a yaw rate: in
+//!   reverse the nose swings the other way. [`MotorControl::yaw_right`] and
+//!   [`MotorControl::yaw_left`] name the side to which the nose swings.
+//! * **U7** `speed` and `angular` are -100..=100, out of range is an error. `front_led` is 100 or
+//!   0. `version` and the reserved fields are 0, because a `version` above 38 starts a firmware
+//!   update. So a command to be sent is a [`MotorControl`], which can be nothing else, and one that
+//!   was received is a [`RawMotorControl`], which cannot be framed. Likewise an [`OtaRequest`]
+//!   comes from [`OtaRequest::start_firmware_update`] alone, and one that was received is a
+//!   [`RawOtaRequest`].
 //! * **U8** Network states 0 to 4, one byte sent, one or four read, unknown values kept.
 //! * **U9** `index` is a wrapping counter per sender; a gap in it is never an error.
-//! * **U10, U11** say who repeats what and when each side gives up. [`Host`] and [`Robot`] keep them:
-//!   motor commands every 100 ms and a dead-man at 500 ms, a watchdog of 500 ms on valid commands,
-//!   reports every 20 ms, results and the request for biases every 1000 ms until answered.
+//! * **U10** [`Host`] repeats the latest motor command every 100 ms, and sends zero when its
+//!   application has been silent for 500 ms. [`Robot`] stands still 500 ms after the last *valid*
+//!   motor command; the vendor firmware is content with any byte. Reports come every 20 ms, and the
+//!   link is lost after 500 ms without a valid frame.
+//! * **U11** A calibration's start and end are acknowledged at once. Its result and the robot's
+//!   request for biases at boot are repeated every 1000 ms until answered; the host keeps the
+//!   results in a [`BiasStore`] and sends those that are stored at the moment of sending.
 //! * **U12** Pong 0 means fine, 1 that the ping arrived damaged.
 //! * **U13** Never sent: a report by a host, a body shorter than its message, `len` above 60. Each
-//!   hangs or corrupts shipped robots, so no constructor makes one.
+//!   hangs or corrupts shipped robots, so no constructor makes one, and a frame cast from bytes
+//!   with the id or length of another is not encoded. [`Frame::relay_unchecked`] alone passes on
+//!   whatever was received.
+//! * **U14** Firmware built from the vendor's main branch hangs for ever on any frame with an id in
+//!   5..=0x0A, the answer to its own boot request included. v6.38, which ships, does not.
+//!   [`HostConfig::low_ids_only`] is the switch for such builds. To recognise one: the first ping
+//!   after the biases is never answered.
+//! * **U15** A result, a start or end of a calibration, or a set of biases is acknowledged, and a
+//!   request repeated no more, only after it is where the application will find it: in the store,
+//!   or in an event queue that had room. Half of each queue is reserved for what happens once.
+//! * **U16** Motor frames are never answered, so a stop is done when it has been flushed:
+//!   [`Host::is_stop_sent`]. A frame that did not reach the line makes the motor command due again,
+//!   twice if it was cut off. The first frame of a host is a zero motor command, because a vendor
+//!   robot keeps driving while any byte arrives: a host that was restarted and only pings would
+//!   keep it moving. Hosts that only listen switch it off by [`HostConfig::sends_first_stop`].
 //!
 //! # Layers
 //!
@@ -78,14 +103,16 @@ mod framing;
 mod header;
 mod host;
 mod message;
+mod motor;
 mod report;
 mod robot;
 mod role;
 mod sweep;
+mod update;
 
 pub use bias::{BiasStore, MemoryStore, NoStore, NotStored};
 pub use codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
-pub use framing::{Frame, FrameOf, RawFrame, Ucp};
+pub use framing::{Frame, FrameOf, RawFrame, RelayedFrame, Ucp};
 pub use header::{Header, MessageId, SYNC};
 pub use host::{
     CalibrationFailure, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
@@ -93,11 +120,13 @@ pub use host::{
 };
 pub use message::{
     BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationStart,
-    CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, MotorControl, OtaAck,
-    OtaRequest, Ping, Pong, SetNetworkState, SetNetworkStateWide,
+    CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, OtaAck, Ping, Pong,
+    SetNetworkState, SetNetworkStateWide,
 };
+pub use motor::{MotorControl, RawMotorControl};
 pub use report::{DocumentReport, FirmwareReport, Report, Telemetry};
 pub use robot::{ReportLayout, Robot, RobotConfig, RobotEvent, RobotStatistics, UpdateSource};
+pub use update::{OtaRequest, RawOtaRequest};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;

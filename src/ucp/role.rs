@@ -1,8 +1,6 @@
-//! What both roles are made of: received bytes, queued events, the frame going out.
+//! What both roles are made of: received bytes and the frame going out.
 
-use heapless::Deque;
-
-use super::{Body, Decoder, Frame, MAX_LEN, Message, MotorControl};
+use super::{Body, Decoder, Frame, MAX_LEN, Message};
 use crate::{
     stream::{Counters, Encode, Event},
     time::{Duration, Instant, wire_time},
@@ -11,12 +9,18 @@ use crate::{
 /// Shortest period or timeout that a role keeps: a shorter one would make its driver spin.
 pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 
+/// Longest pause inside a frame that is sent: a robot of this crate gives one up soon after. Ruling U16
+/// has 20 ms.
+pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(5);
+
 /// Received bytes, made frames of.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Inbox {
     decoder: Decoder,
-    /// When the newest byte had arrived.
+    /// When the newest byte had arrived, at the earliest.
     last: Instant,
+    /// When it was handed in: the rest of its frame may come from then on.
+    read_at: Instant,
     /// When the oldest byte that the decoder holds had arrived.
     since: Instant,
     /// How many of the received bytes the decoder has reported, in frames and gaps.
@@ -30,22 +34,24 @@ impl Inbox {
     pub(super) fn new(baud: u32, margin: Duration) -> Self {
         const ZERO: Instant = Instant::from_micros(0);
         let quiet = (wire_time(2, baud) + margin).max(SHORTEST);
-        Self { decoder: Decoder::new(), last: ZERO, since: ZERO, reported: 0, quiet }
+        Self { decoder: Decoder::new(), last: ZERO, read_at: ZERO, since: ZERO, reported: 0, quiet }
     }
 
-    /// Hands on the frames that `bytes` complete, and when they had arrived.
+    /// Hands on the frames that `bytes` complete, and when they had arrived. The bytes have arrived
+    /// at any time from `at` to `now`.
     pub(super) fn take(
         &mut self,
         bytes: &[u8],
+        at: Instant,
         now: Instant,
         mut receive: impl FnMut(&Frame, Instant),
     ) {
         if !bytes.is_empty() {
             let received = self.decoder.received();
-            self.last = now;
+            (self.last, self.read_at) = (at, now);
             self.decode(bytes, received, &mut receive);
             if self.decoder.pending() <= bytes.len() {
-                self.since = now;
+                self.since = at;
             }
         }
     }
@@ -63,7 +69,7 @@ impl Inbox {
 
     /// When the line counts as quiet, if that matters.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        (self.decoder.pending() > 0).then(|| self.last + self.quiet)
+        (self.decoder.pending() > 0).then(|| self.read_at + self.quiet)
     }
 
     pub(super) fn counters(&self) -> Counters {
@@ -71,15 +77,15 @@ impl Inbox {
     }
 
     /// A frame whose bytes are all among the first `received` had arrived before, held back by a
-    /// false header: it is as old as the first byte that was held, for a command that comes to light
-    /// late is an old one.
+    /// false header: it is as old as the first byte that was held, for a command that comes to
+    /// light late is an old one.
     fn decode(
         &mut self,
         mut bytes: &[u8],
         received: u64,
         receive: &mut impl FnMut(&Frame, Instant),
     ) {
-        while let Some(event) = self.decoder.decode(&mut bytes) {
+        while let Some(event) = self.decoder.decode_buffered(&mut bytes) {
             match event {
                 // A gap is in the counters already.
                 Event::Skipped(gap) => self.reported = self.reported.wrapping_add(gap.len),
@@ -89,33 +95,6 @@ impl Inbox {
                 }
             }
         }
-    }
-}
-
-/// Events for the application: when there is no room, the newest is refused and counted.
-#[derive(Debug)]
-pub(super) struct Events<E, const N: usize> {
-    queue: Deque<E, N>,
-    lost: u32,
-}
-
-impl<E, const N: usize> Events<E, N> {
-    pub(super) const fn new() -> Self {
-        Self { queue: Deque::new(), lost: 0 }
-    }
-
-    pub(super) fn push(&mut self, event: E) {
-        if self.queue.push_back(event).is_err() {
-            bump(&mut self.lost);
-        }
-    }
-
-    pub(super) fn pop(&mut self) -> Option<E> {
-        self.queue.pop_front()
-    }
-
-    pub(super) const fn lost(&self) -> u32 {
-        self.lost
     }
 }
 
@@ -149,21 +128,6 @@ pub(super) const fn is_from_host(message: &Message<'_>) -> Option<bool> {
     })
 }
 
-/// Does the vendor firmware light the lamp? It looks at the low byte only.
-pub(super) const fn lamp_is_on(command: &MotorControl) -> bool {
-    !matches!(command.front_led().to_le_bytes()[0], 0x00 | 0xFF)
-}
-
-/// Neither driving nor turning.
-pub(super) const fn stands_still(command: &MotorControl) -> bool {
-    command.speed() == 0 && command.angular() == 0
-}
-
-/// Speed and turn 0, the lamp as it is: a stop does not make a robot harder to see.
-pub(super) const fn halted(command: &MotorControl) -> MotorControl {
-    MotorControl::STOP.with_front_led(lamp_is_on(command))
-}
-
 /// Has this deadline been reached?
 pub(super) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
     deadline.is_some_and(|at| at <= now)
@@ -172,4 +136,9 @@ pub(super) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
 /// Counts one more, up to the largest number there is.
 pub(super) const fn bump(counter: &mut u32) {
     *counter = counter.saturating_add(1);
+}
+
+/// Takes back one that was counted and did not happen.
+pub(super) const fn uncount(counter: &mut u32) {
+    *counter = counter.saturating_sub(1);
 }

@@ -1,11 +1,9 @@
 //! Master and slaves, each behind a driver, on one line.
 
-use std::{cell::RefCell, rc::Rc};
-
 use axlewire::{
-    drive::{DriveError, Driver, Wish},
+    drive::{DriveError, Driver, Operation},
     ikeya::{
-        Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling,
+        Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, OneMotor,
         Position, Rps, Slave, SlaveConfig, SlaveEvent, Status, Target,
     },
     time::{Duration, Instant},
@@ -13,65 +11,9 @@ use axlewire::{
 
 use crate::{
     port::Unplugged,
+    story::{FOUND, Story, manual, only_two_and_five, rps},
     world::{End, VirtualClock, World},
 };
-
-type Bus = Driver<Master, End, VirtualClock>;
-type Node = Rc<RefCell<Driver<Slave, End, VirtualClock>>>;
-
-/// Node 2 turns, node 5 goes to positions. They act whenever the world does.
-struct Story {
-    world: World,
-    bus: Bus,
-    two: Node,
-    five: Node,
-}
-
-impl Story {
-    fn new(config: MasterConfig) -> Self {
-        let world = World::default();
-        let mut master = End::new(&world, 20);
-        let mut node = |id, mode| {
-            let mut end = End::new(&world, 20);
-            end.outboxes.push(master.inbox.clone());
-            master.outboxes.push(end.inbox.clone());
-            let slave = Slave::new(id, mode, SlaveConfig::direct());
-            Rc::new(RefCell::new(Driver::new(slave, end, VirtualClock(world.clone()))))
-        };
-        let (two, five) = (node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position));
-        two.borrow_mut().role_mut().set_velocity(rps(0.5));
-        five.borrow_mut().role_mut().set_position(Position::new(7, 1));
-        for slave in [two.clone(), five.clone()] {
-            world.add(move || {
-                let mut slave = slave.borrow_mut();
-                if !slave.port().unplugged.get() {
-                    slave.service().unwrap();
-                } else {
-                    slave.port_mut().inbox.borrow_mut().clear();
-                }
-            });
-        }
-        let bus = Driver::new(Master::new(config), master, VirtualClock(world.clone()));
-        Self { world, bus, two, five }
-    }
-
-    fn discovered(mut self) -> Self {
-        assert_eq!(self.bus.discover().unwrap(), FOUND);
-        self
-    }
-}
-
-const FOUND: [(NodeId, Mode); 2] = [(NodeId::N2, Mode::Velocity), (NodeId::N5, Mode::Position)];
-
-fn rps(value: f32) -> Rps {
-    Rps::new(value).unwrap()
-}
-
-fn manual() -> MasterConfig {
-    let mut config = MasterConfig::direct();
-    (config.polling, config.attempts) = (Polling::Manual, 1);
-    config
-}
 
 #[test]
 fn discovery_finds_who_is_there_within_its_bound() {
@@ -92,10 +34,29 @@ fn discovery_finds_who_is_there_within_its_bound() {
 fn a_bus_with_nobody_on_it_is_discovered_as_empty() {
     for is_async in [false, true] {
         let world = World::default();
-        let master: Master = Master::new(MasterConfig::direct());
-        let mut bus = Driver::new(master, End::new(&world, 20), VirtualClock(world.clone()));
+        let master = |now| Master::<OneMotor>::new(MasterConfig::direct(), now);
+        let mut bus = Driver::with(master, End::new(&world, 20), VirtualClock(world.clone()));
         let found = if is_async { world.block_on(bus.discover_async()) } else { bus.discover() };
         assert!(found.unwrap().is_empty());
+    }
+}
+
+#[test]
+fn a_discovery_does_not_list_a_node_that_was_there_and_is_gone() {
+    for is_async in [false, true] {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        story.two.borrow().port().unplugged.set(true);
+        let gone = Some(Health::Abnormal);
+        while story.bus.role().health(NodeId::N2) != gone {
+            let soon = story.world.now() + Duration::from_millis(1);
+            story.bus.run_until(soon, |_, _, _| ()).unwrap();
+        }
+        assert_eq!(story.bus.role().mode(NodeId::N2), Some(Mode::Velocity));
+        let found = match is_async {
+            true => story.world.block_on(story.bus.discover_async()),
+            false => story.bus.discover(),
+        };
+        assert_eq!(found.unwrap(), [(NodeId::N5, Mode::Position)]);
     }
 }
 
@@ -133,7 +94,7 @@ fn a_read_gives_what_the_node_measures_now() {
                 story.five.borrow_mut().role_mut().set_position(place);
                 // What was on its way before this moment has arrived.
                 let pause = story.world.now() + Duration::from_millis(1);
-                story.bus.run_until(pause, |_, _| {}).unwrap();
+                story.bus.run_until(pause, |_, _, _| {}).unwrap();
                 let mut read = |node| match is_async {
                     true => story.world.block_on(story.bus.read_async(node)),
                     false => story.bus.read(node),
@@ -148,7 +109,7 @@ fn a_read_gives_what_the_node_measures_now() {
 #[test]
 fn a_read_does_not_take_an_old_reading_for_the_answer() {
     let mut story = Story::new(manual()).discovered();
-    story.bus.role_mut().read(NodeId::N2).unwrap();
+    story.ask(NodeId::N2);
     // The answer arrives and waits as an event.
     for _ in 0..50 {
         story.bus.service().unwrap();
@@ -159,17 +120,17 @@ fn a_read_does_not_take_an_old_reading_for_the_answer() {
 }
 
 #[test]
-fn stop_and_stop_all_are_on_the_line_when_they_return() {
+fn stop_and_stop_all_have_been_confirmed_when_they_return() {
     for is_async in [false, true] {
-        let mut story = Story::new(MasterConfig::direct()).discovered();
+        let mut story = Story::new(only_two_and_five()).discovered();
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
         story.bus.set_position(NodeId::N5, Position::new(0, 9)).unwrap();
-        let failed = if is_async {
+        let stopped = if is_async {
             story.world.block_on(story.bus.stop_all_async())
         } else {
             story.bus.stop_all()
         };
-        assert_eq!(failed.unwrap(), []);
+        assert_eq!(stopped, Ok(()));
         for _ in 0..50 {
             story.world.step(20);
         }
@@ -211,14 +172,16 @@ fn a_command_that_cannot_be_is_refused_with_the_node_and_the_reason() {
 fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
     for is_async in [false, true] {
         let lost = || {
-            let mut story = Story::new(manual()).discovered();
+            let mut config = manual();
+            config.nodes = only_two_and_five().nodes;
+            let mut story = Story::new(config).discovered();
             story.two.borrow().port().unplugged.set(true);
             for _ in 0..2 {
                 assert!(story.bus.read(NodeId::N2).is_err());
                 story.world.step(1000);
             }
             // The third READ is on the line, and nothing else can be until its window closes.
-            story.bus.role_mut().read(NodeId::N2).unwrap();
+            story.ask(NodeId::N2);
             story.bus.service().unwrap();
             assert_eq!(story.bus.role().health(NodeId::N2), Some(Health::Suspect(2)));
             story
@@ -232,7 +195,7 @@ fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
         };
         let error = DriveError::Bus(CommandError::NotOnline { node: NodeId::N2 });
         assert_eq!(turned, Err(error));
-        assert_eq!(not_stopped.unwrap(), [NodeId::N2]);
+        assert_eq!(not_stopped, Err(DriveError::StopsOwed(NodeId::N2.into())));
     }
 }
 
@@ -255,7 +218,7 @@ fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
         let told: Vec<_> = core::iter::from_fn(|| story.bus.poll_event()).collect();
         let health = |health| MasterEvent::Health { node: NodeId::N2, health };
         let expected = [Health::Suspect(1), Health::Suspect(2), Health::Abnormal].map(health);
-        assert_eq!((&told[..], story.bus.lost_events()), (&expected[..], 0));
+        assert_eq!((&told[..], story.bus.role().lost_events()), (&expected[..], 0));
     }
 }
 
@@ -293,27 +256,29 @@ fn events_that_find_no_room_are_counted() {
     let kept = core::iter::from_fn(|| story.bus.poll_event()).count();
     assert_eq!(kept, 16);
     // Three bad news and one good per turn; of the last turn some may still be in the role.
-    assert!(story.bus.lost_events() >= 40 - 16 - 1, "{}", story.bus.lost_events());
+    assert!(story.bus.role().lost_events() >= 40 - 16 - 1, "{}", story.bus.role().lost_events());
 }
 
 #[test]
 fn a_port_that_vanishes_is_an_error_of_every_call() {
     for is_async in [false, true] {
-        let mut story = Story::new(MasterConfig::direct()).discovered();
+        let mut story = Story::new(only_two_and_five()).discovered();
         let unplugged = story.bus.port().unplugged.clone();
         unplugged.set(true);
         let (world, bus) = (&story.world, &mut story.bus);
         let gone = DriveError::Port(Unplugged);
+        // A stop is not given up because of it.
+        let owed = DriveError::StopsOwed(only_two_and_five().nodes);
         if is_async {
             assert_eq!(world.block_on(bus.discover_async()), Err(gone));
             assert_eq!(world.block_on(bus.read_async(NodeId::N2)), Err(gone));
             assert_eq!(world.block_on(bus.set_velocity_async(NodeId::N2, rps(1.0))), Err(gone));
-            assert_eq!(world.block_on(bus.stop_all_async()), Err(gone));
+            assert_eq!(world.block_on(bus.stop_all_async()), Err(owed));
         } else {
             assert_eq!(bus.discover(), Err(gone));
             assert_eq!(bus.read(NodeId::N2), Err(gone));
             assert_eq!(bus.set_velocity(NodeId::N2, rps(1.0)), Err(gone));
-            assert_eq!(bus.stop_all(), Err(gone));
+            assert_eq!(bus.stop_all(), Err(owed));
         }
         // It comes back: the driver goes on, and the last command is the one that counts.
         unplugged.set(false);
@@ -404,6 +369,6 @@ fn a_slaves_next_command_comes_in_time_or_not_at_all() {
 
 #[test]
 fn what_was_not_done_in_time_says_which_node() {
-    let error = DriveError::<Unplugged>::Timeout(Wish::Read { node: NodeId::N3 });
+    let error = DriveError::<Unplugged>::Timeout(Operation::Read { node: NodeId::N3 });
     assert_eq!(error.to_string(), "node 3 was not read in time");
 }

@@ -1,12 +1,16 @@
 //! The loop of `Endpoint`, over any role.
 
-use std::error::Error;
+use std::{cell::RefCell, error::Error};
 
+#[cfg(feature = "ucp")]
+use axlewire::ucp;
 use axlewire::{
-    drive::{Clock, DriveError, Driver, StdClock},
+    drive::{Clock, DriveError, Driver, StdClock, WithDelay},
     endpoint::Endpoint,
+    ikeya::{self, NodeId},
     time::{Duration, Instant},
 };
+use embedded_hal_async::delay::DelayNs;
 
 use crate::{
     port::{Script, Step, Unplugged},
@@ -171,7 +175,7 @@ fn a_write_that_fails_inside_a_frame_leaves_the_rest_for_the_next_call() {
                 assert_eq!(round(&mut driver), Some(Ok(())));
                 assert_eq!(
                     (&driver.port().written[..], driver.port().flushed),
-                    (&b"1234567"[..], 1)
+                    (&b"1234567"[..], 3)
                 );
             }
         }
@@ -277,25 +281,45 @@ fn a_waiting_driver_wakes_for_its_role() {
 
 #[test]
 fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
-    struct Late;
-    impl Endpoint for Late {
-        type Event = ();
-        fn handle_input(&mut self, _: &[u8], _: Instant) {}
-        fn handle_timeout(&mut self, _: Instant) {}
-        fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
-            None
-        }
-        fn poll_event(&mut self) -> Option<()> {
-            None
-        }
-        fn poll_timeout(&self) -> Option<Instant> {
-            Some(Instant::from_micros(0))
-        }
-    }
+    let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
     let world = World::default();
-    let mut driver = Driver::new(Late, End::new(&world, 20), VirtualClock(world.clone()));
+    let mut driver = Driver::new(late, End::new(&world, 20), VirtualClock(world.clone()));
     assert_eq!(driver.next_event(at_ms(1)), Ok(None));
     assert_eq!(world.now(), at_ms(1));
+}
+
+/// A role with nothing but what it has to have.
+#[derive(Default)]
+struct Plain {
+    heard: Vec<(Vec<u8>, Instant)>,
+    timeout: Option<Instant>,
+}
+
+impl Endpoint for Plain {
+    type Event = ();
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.heard.push((bytes.to_vec(), now));
+    }
+    fn handle_timeout(&mut self, _: Instant) {}
+    fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
+        None
+    }
+    fn poll_event(&mut self) -> Option<()> {
+        None
+    }
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.timeout
+    }
+}
+
+#[test]
+fn as_provided_a_role_takes_old_bytes_for_new_ones_and_frames_may_pause_for_20_ms() {
+    let mut role = Plain::default();
+    role.handle_old_input(b"12", at_ms(1), at_ms(9));
+    assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);
+    assert_eq!(role.held_up_after(), None);
+    assert_eq!(role.frame_pause(), Duration::from_millis(20));
+    assert_eq!(role.wire_time(64), Duration::ZERO);
 }
 
 #[test]
@@ -305,10 +329,10 @@ fn every_event_is_handed_out_until_the_deadline() {
     embedded_io::Write::write(&mut far, b"abc").unwrap();
     let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
     let mut events = vec![];
-    driver.run_until(at_ms(1), |_, event| events.push(event)).unwrap();
+    driver.run_until(at_ms(1), |_, event, _| events.push(event)).unwrap();
     assert_eq!((&events[..], world.now()), (&b"abc"[..], at_ms(1)));
     embedded_io::Write::write(&mut far, b"def").unwrap();
-    let run = driver.run_until_async(at_ms(2), |role, event| {
+    let run = driver.run_until_async(at_ms(2), |role, event, _| {
         events.push(event);
         role.frames.push_back(vec![event]);
     });
@@ -328,7 +352,9 @@ fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_f
         let (mut near, mut far) = End::pair(&world, 20);
         (near.most, near.stutters) = (1, true);
         embedded_io::Write::write(&mut far, &incoming).unwrap();
-        let mut driver = Driver::new(Recorder::sending(&frames), near, VirtualClock(world.clone()));
+        let mut role = Recorder::sending(&frames);
+        role.repeats = true;
+        let mut driver = Driver::new(role, near, VirtualClock(world.clone()));
         let mut events = vec![];
         let mut dropped = 0;
         // Every call is dropped after so many polls, and again, and again.
@@ -368,7 +394,7 @@ fn a_stalled_write_or_flush_that_is_dropped_is_made_good_by_the_next_call() {
 }
 
 #[test]
-fn a_clock_that_goes_backwards_stands_still_for_the_role() {
+fn a_clock_that_goes_backwards_goes_on_for_the_role_from_where_it_was() {
     let mut readings = [100, 50, 70, 120].into_iter().cycle();
     let clock = move || Instant::from_micros(readings.next().unwrap());
     let flood = (0..100).map(|_| bytes(1));
@@ -376,7 +402,14 @@ fn a_clock_that_goes_backwards_stands_still_for_the_role() {
     let mut driver = Driver::new(Recorder::default(), Script::reading(flood), clock);
     driver.service().unwrap();
     assert_eq!(driver.role().received.len(), 64);
-    assert_eq!(driver.now().as_micros(), 120);
+
+    // One reading is an hour ahead: the steps before and after it count all the same.
+    let hour = 3_600_000_000;
+    let mut readings = [1000, hour + 1000, 1500, 2500, 2400, 2700].into_iter();
+    let clock = move || Instant::from_micros(readings.next().unwrap());
+    let mut driver = Driver::new(Recorder::default(), Script::default(), clock);
+    let times: Vec<u64> = (0..5).map(|_| driver.now().as_micros() - hour).collect();
+    assert_eq!(times, [1000, 1000, 2000, 2000, 2300]);
 }
 
 #[test]
@@ -385,9 +418,10 @@ fn the_clock_of_std_naps_for_less_than_a_deadline_and_never_past_one_that_is_ove
     let start = clock.now();
     clock.idle_until(start);
     let far = start + Duration::from_millis(60_000);
+    let begin = clock.now();
     clock.idle_until(far);
     let end = clock.now();
-    assert!(end > start && end < far);
+    assert!(end >= begin + Duration::from_micros(200) && end < far);
 }
 
 #[test]
@@ -401,4 +435,52 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
         "port is closed: its other end has gone"
     );
     assert_eq!(DriveError::<Unplugged>::WriteZero.to_string(), "port took no bytes");
+    let bus = ikeya::CommandError::NotOnline { node: NodeId::N2 };
+    let told = DriveError::<Unplugged>::from(bus).source().unwrap().to_string();
+    assert_eq!(told, bus.to_string());
+}
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_refused_value_is_the_source_of_the_refusal_and_that_of_the_error() {
+    let value = ucp::MotorControl::new(101, 0).unwrap_err();
+    let rover = ucp::CommandError::Value(value);
+    assert_eq!(rover.source().unwrap().to_string(), value.to_string());
+    let told = DriveError::<Unplugged>::from(rover).source().unwrap().to_string();
+    assert_eq!(told, rover.to_string());
+}
+
+#[test]
+fn a_clock_and_a_delay_are_joined_and_each_does_its_part() {
+    let said = RefCell::new(vec![]);
+    struct Says<'a>(&'a RefCell<Vec<String>>);
+    impl Clock for Says<'_> {
+        fn now(&mut self) -> Instant {
+            at_ms(7)
+        }
+        fn idle_until(&mut self, until: Instant) {
+            self.0.borrow_mut().push(format!("idle until {}", until.as_micros()));
+        }
+    }
+    impl DelayNs for Says<'_> {
+        async fn delay_ns(&mut self, ns: u32) {
+            self.0.borrow_mut().push(format!("{ns} ns"));
+        }
+        async fn delay_us(&mut self, us: u32) {
+            self.0.borrow_mut().push(format!("{us} us"));
+        }
+        async fn delay_ms(&mut self, ms: u32) {
+            self.0.borrow_mut().push(format!("{ms} ms"));
+        }
+    }
+    let mut both = WithDelay { clock: Says(&said), delay: Says(&said) };
+    assert_eq!(both.now(), at_ms(7));
+    both.idle_until(at_ms(9));
+    let world = World::default();
+    world.block_on(async {
+        both.delay_ns(1).await;
+        both.delay_us(2).await;
+        both.delay_ms(3).await;
+    });
+    assert_eq!(*said.borrow(), ["idle until 9000", "1 ns", "2 us", "3 ms"]);
 }

@@ -1,10 +1,10 @@
 //! A role that writes down what is done to it.
 
-use std::{cell::RefCell, collections::VecDeque, rc::Rc};
+use std::{cell::RefCell, collections::VecDeque, pin::pin, rc::Rc, task::Poll};
 
 use axlewire::{
     drive::{DriveError, Driver},
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     time::Instant,
 };
 
@@ -19,6 +19,7 @@ pub(crate) enum Call {
     Input(Vec<u8>),
     Timeout,
     Transmit(Option<Vec<u8>>),
+    Unsent(Unsent),
 }
 
 /// Sends what it is told to, and writes down every call. Each byte received is an event.
@@ -26,6 +27,8 @@ pub(crate) enum Call {
 pub(crate) struct Recorder {
     pub(crate) frames: VecDeque<Vec<u8>>,
     pub(crate) timeout: Option<Instant>,
+    /// A frame of which no byte has left is sent again.
+    pub(crate) repeats: bool,
     pub(crate) calls: Vec<Call>,
     pub(crate) received: Vec<u8>,
     pub(crate) events: VecDeque<u8>,
@@ -75,6 +78,14 @@ impl Endpoint for Recorder {
         Some(&self.packet)
     }
 
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.at(now);
+        self.calls.push(Call::Unsent(unsent));
+        if self.repeats && unsent == Unsent::Untouched {
+            self.frames.push_front(self.packet.clone());
+        }
+    }
+
     fn poll_event(&mut self) -> Option<u8> {
         self.events.pop_front()
     }
@@ -98,15 +109,30 @@ fn round_blocking(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugg
 }
 
 fn round_async(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
-    match poll(std::pin::pin!(driver.service_async())) {
-        std::task::Poll::Ready(result) => Some(result),
-        std::task::Poll::Pending => None,
+    let mut round = pin!(driver.service_async());
+    // A call that fails yields once.
+    for _ in 0..2 {
+        if let Poll::Ready(result) = poll(round.as_mut()) {
+            return Some(result);
+        }
     }
+    None
 }
 
 /// Both kinds of call, for the stories that hold for both.
 pub(crate) const ROUNDS: [Round; 2] = [round_blocking, round_async];
 pub(crate) const ASYNC: Round = round_async;
+
+impl Recorder {
+    /// What it was told about frames that did not leave.
+    pub(crate) fn unsent(&self) -> Vec<Unsent> {
+        let unsent = |call: &Call| match call {
+            Call::Unsent(unsent) => Some(*unsent),
+            _ => None,
+        };
+        self.calls.iter().filter_map(unsent).collect()
+    }
+}
 
 /// A log that several parts write to.
 pub(crate) type Log = Rc<RefCell<Vec<String>>>;

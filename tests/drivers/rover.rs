@@ -3,7 +3,7 @@
 use std::{cell::RefCell, rc::Rc};
 
 use axlewire::{
-    drive::{DriveError, Driver, Wish},
+    drive::{DriveError, Driver, Operation},
     time::{Duration, Instant},
     ucp::{
         CalibrationKind, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
@@ -81,7 +81,7 @@ fn a_pong_from_before_is_not_the_answer_to_a_ping() {
         } else {
             rover.ping(deadline)
         };
-        assert_eq!(pong, Err(DriveError::Timeout(Wish::Ping)));
+        assert_eq!(pong, Err(DriveError::Timeout(Operation::Ping)));
     }
 }
 
@@ -96,7 +96,7 @@ fn a_robot_that_never_answers_is_a_timeout_and_a_lost_link() {
         } else {
             rover.ping(deadline).unwrap_err()
         };
-        assert_eq!(error, DriveError::Timeout(Wish::Ping));
+        assert_eq!(error, DriveError::Timeout(Operation::Ping));
         assert_eq!(error.to_string(), "the robot did not answer a ping in time");
         assert_eq!(world.now(), deadline);
         assert_eq!(rover.poll_event(), Some(HostEvent::LinkDown));
@@ -113,7 +113,8 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
         } else {
             rover.drive(60, -20).unwrap();
         }
-        for _ in 0..200 {
+        // The host's first frame, which says zero, and the command: 48 bytes.
+        for _ in 0..400 {
             world.step(20);
         }
         assert_eq!((commanded().speed(), commanded().angular()), (60, -20));
@@ -222,7 +223,7 @@ fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
         } else {
             rover.end_calibration(kind, deadline).unwrap_err()
         };
-        assert_eq!((error, world.now()), (DriveError::Timeout(Wish::Calibration), deadline));
+        assert_eq!((error, world.now()), (DriveError::Timeout(Operation::Calibration), deadline));
     }
 }
 
@@ -231,7 +232,9 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
     for is_async in [false, true] {
         let world = World::default();
         let (near, far) = End::pair(&world, BYTE_US);
-        let mut host = Host::new(HostConfig::default(), world.now());
+        let mut config = HostConfig::default();
+        config.sends_first_stop = false;
+        let mut host = Host::new(config, world.now());
         let command = MotorControl::new(30, 5).unwrap();
         host.drive(command, world.now()).unwrap();
         let mut host = Driver::new(host, near, VirtualClock(world.clone()));
@@ -259,13 +262,16 @@ fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
     let deadline = after(&world, 1000);
     assert_eq!(rover.ping(deadline), Err(gone));
     assert_eq!(rover.drive(10, 0), Err(gone));
-    assert_eq!(rover.stop(), Err(gone));
     assert_eq!(rover.next_report(deadline), Err(gone));
     assert_eq!(world.block_on(rover.ping_async(deadline)), Err(gone));
     assert_eq!(world.block_on(rover.drive_async(10, 0)), Err(gone));
-    assert_eq!(world.block_on(rover.stop_async()), Err(gone));
     assert_eq!(world.block_on(rover.next_report_async(deadline)), Err(gone));
     assert_eq!(world.now(), Instant::from_micros(0));
+    // A stop is tried for 100 ms.
+    assert_eq!(rover.stop(), Err(gone));
+    assert!((100_000..102_000).contains(&world.now().as_micros()), "{:?}", world.now());
+    assert_eq!(world.block_on(rover.stop_async()), Err(gone));
+    assert!((200_000..204_000).contains(&world.now().as_micros()), "{:?}", world.now());
 }
 
 #[test]
@@ -287,4 +293,123 @@ fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
         polls += 1;
     }
     assert!(polls > 100, "{polls}");
+}
+
+#[test]
+fn a_stop_goes_through_errors_of_the_port_and_is_on_the_line_when_it_returns() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        rover.drive(60, 0).unwrap();
+        rover.port().unplugged.set(true);
+        let (plug, time) = (rover.port().unplugged.clone(), world.clone());
+        world.add(move || plug.set(time.now() < Instant::from_millis(70)));
+        if is_async {
+            world.block_on(rover.stop_async()).unwrap();
+        } else {
+            rover.stop().unwrap();
+        }
+        assert!(world.now() < Instant::from_millis(80), "{:?}", world.now());
+        // Without the driver being called again.
+        (0..500).for_each(|_| world.step(20));
+        assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
+    }
+}
+
+#[test]
+fn driving_for_a_while_keeps_the_command_alive_and_ends_with_a_stop() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        let (speeds, time) = (Rc::new(RefCell::new(vec![])), world.clone());
+        let (seen, actor) = (speeds.clone(), robot.clone());
+        world.add(move || {
+            if let Ok(robot) = actor.try_borrow() {
+                seen.borrow_mut().push((time.now(), robot.role().command(time.now()).speed()));
+            }
+        });
+        let span = Duration::from_millis(1200);
+        if is_async {
+            world.block_on(rover.drive_for_async(40, 0, span)).unwrap();
+        } else {
+            rover.drive_for(40, 0, span).unwrap();
+        }
+        assert!((1200..1210).contains(&(world.now().as_micros() / 1000)));
+        (0..500).for_each(|_| world.step(20));
+        assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
+        let is_driven =
+            |at: &Instant| (at.as_micros() / 1000).clamp(20, 1200) == at.as_micros() / 1000;
+        let speeds = speeds.borrow();
+        assert!(speeds.iter().filter(|(at, _)| is_driven(at)).all(|(_, speed)| *speed == 40));
+    }
+}
+
+#[test]
+fn a_drive_that_is_dropped_leaves_a_stop_that_the_next_call_sends() {
+    for polls in [1, 50, 5000] {
+        let (world, mut rover, robot) = story();
+        let span = Duration::from_millis(60_000);
+        let done = world.poll_times(polls, rover.drive_for_async(40, 0, span));
+        assert!(done.is_none(), "it was dropped");
+        assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
+        rover.service().unwrap();
+        (0..500).for_each(|_| world.step(20));
+        rover.service().unwrap();
+        (0..500).for_each(|_| world.step(20));
+        assert_eq!(robot.borrow().role().command(world.now()).speed(), 0, "{polls} polls");
+    }
+}
+
+#[test]
+fn a_stop_behind_a_cut_off_frame_goes_twice_although_the_port_refused_one_of_the_two() {
+    use crate::port::{Script, Step};
+    let world = World::default();
+    let port = Script::writing([Step::Bytes(vec![0]), Step::Error, Step::Error]);
+    let host = |now| Host::new(HostConfig::default(), now);
+    let mut driver = Driver::with(host, port, VirtualClock(world.clone()));
+    assert!(driver.service().is_err(), "one byte of the first stop leaves");
+    world.step(6_000);
+    assert!(driver.service().is_err(), "it is given up, and no byte of the next leaves");
+    driver.stop().unwrap();
+    let is_stop = |bytes: &&[u8]| bytes[..5] == [0xFD, 0xFF, 0x14, 0, 2];
+    assert_eq!(driver.port().written.windows(24).filter(is_stop).count(), 2);
+}
+
+#[test]
+fn calls_take_out_what_comes_all_the_time_and_what_they_return_and_nothing_else() {
+    for is_async in [false, true] {
+        let (world, mut rover, _) = story();
+        let kind = CalibrationKind::Imu;
+        for _ in 0..10 {
+            let deadline = after(&world, 700);
+            match is_async {
+                true => world.block_on(rover.ping_async(deadline)).unwrap(),
+                false => rover.ping(deadline).unwrap(),
+            };
+        }
+        let deadline = after(&world, 700);
+        match is_async {
+            true => {
+                world.block_on(rover.start_calibration_async(kind, deadline)).unwrap();
+                world.block_on(rover.end_calibration_async(kind, deadline)).unwrap();
+                world.block_on(rover.stop_async()).unwrap();
+            }
+            false => {
+                rover.start_calibration(kind, deadline).unwrap();
+                rover.end_calibration(kind, deadline).unwrap();
+                rover.stop().unwrap();
+            }
+        }
+        let kept: Vec<_> = core::iter::from_fn(|| rover.poll_event()).collect();
+        assert!(kept.contains(&HostEvent::LinkUp), "{kept:?}");
+        let is_out = |event: &HostEvent| {
+            matches!(
+                event,
+                HostEvent::Report(_)
+                    | HostEvent::Pong { .. }
+                    | HostEvent::CalibrationStarted(_)
+                    | HostEvent::CalibrationEnded(_)
+            )
+        };
+        assert!(!kept.iter().any(is_out), "{kept:?}");
+        assert_eq!(rover.role().lost_events(), 0);
+    }
 }

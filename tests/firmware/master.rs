@@ -7,6 +7,7 @@ use axlewire::{
     endpoint::Endpoint,
     ikeya::{
         Mode, NodeId, Position, Response, Rps, Slave, SlaveConfig, SlaveEvent, Target, ToMaster,
+        ToSlave,
     },
     sim::{Motor, MotorNode},
     stream::Frames,
@@ -14,7 +15,9 @@ use axlewire::{
 };
 
 use crate::{
+    pin,
     qemu::{Board, PATIENCE, Program},
+    quiet::undisturbed,
     wire::{Wire, WireClock},
 };
 
@@ -81,46 +84,82 @@ fn written(board: &Board, bus: &mut Driver<Nodes, Wire, WireClock>, wanted: &[&s
     let end = std::time::Instant::now() + PATIENCE;
     while !board.has_written(wanted) {
         let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |_, _| {}).unwrap();
+        bus.run_until(pause, |_, _, _| {}).unwrap();
         assert!(std::time::Instant::now() < end, "never {wanted:?}: {:#?}", board.lines());
     }
 }
 
 #[test]
-fn the_board_finds_two_nodes_commands_each_in_its_mode_and_takes_one_back() {
-    let Some(mut board) = Board::start(Program::Master) else { return };
-    let wire = Wire::new(board.bus());
-    let clock = wire.clock();
-    let mut bus = Driver::new(Nodes::new(), wire, clock);
-    let found = [
-        "event discovered node 2 velocity",
-        "event discovered node 5 position",
-        "event discovery done online 2",
-    ];
-    written(&board, &mut bus, &found);
-    // Half a revolution per second times the id; as many revolutions on as the id says.
-    let (turn, go) = (Rps::new(1.0).unwrap(), Position::from_revolutions(5.0).unwrap());
-    let wanted = [Some(Target::Velocity(turn)), Some(Target::Position(go))];
-    let end = std::time::Instant::now() + PATIENCE;
-    while [0, 1].map(|index| bus.role().command(index)) != wanted {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |_, _| {}).unwrap();
-        assert!(std::time::Instant::now() < end, "not commanded: {:#?}", board.lines());
-    }
+fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before_it_moves_again() {
+    undisturbed(|| {
+        let Some(mut board) = Board::start_logged(Program::Master) else { return };
+        let wire = Wire::new(board.bus());
+        let clock = wire.clock();
+        let mut bus = Driver::new(Nodes::new(), wire, clock);
+        let found = [
+            "event discovered node 2 velocity",
+            "event discovered node 5 position",
+            "event discovery done online 2",
+        ];
+        written(&board, &mut bus, &found);
+        // Half a revolution per second times the id; as many revolutions on as the id says.
+        let (turn, go) = (Rps::new(1.0).unwrap(), Position::from_revolutions(5.0).unwrap());
+        let wanted = [Some(Target::Velocity(turn)), Some(Target::Position(go))];
+        let end = std::time::Instant::now() + PATIENCE;
+        while [0, 1].map(|index| bus.role().command(index)) != wanted {
+            let pause = bus.now() + Duration::from_millis(20);
+            bus.run_until(pause, |_, _, _| {}).unwrap();
+            assert!(std::time::Instant::now() < end, "not commanded: {:#?}", board.lines());
+        }
 
-    bus.role_mut().is_mute = true;
-    written(&board, &mut bus, &["event health node 2 abnormal"]);
-    let writes = bus.role().nodes[0].slave().statistics().writes;
-    bus.role_mut().is_mute = false;
-    written(&board, &mut bus, &["event health node 2 abnormal", "event health node 2 online"]);
-    let end = std::time::Instant::now() + PATIENCE;
-    while bus.role().nodes[0].slave().statistics().writes == writes {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |_, _| {}).unwrap();
-        assert!(std::time::Instant::now() < end, "not commanded anew: {:#?}", board.lines());
-    }
-    assert_eq!(bus.role().command(0), wanted[0]);
-    board.report_when("told", |_| true).assert_nothing_lost();
+        bus.role_mut().is_mute = true;
+        written(&board, &mut bus, &["event health node 2 abnormal"]);
+        let answers_when_lost = bus.role().nodes[0].slave().statistics().replies;
+        bus.role_mut().is_mute = false;
+        // What node 2 is told from now on, and how often it had answered by then.
+        let mut heard: Vec<(Target, u32)> = Vec::new();
+        let end = std::time::Instant::now() + PATIENCE;
+        while heard.last().is_none_or(|&(target, _)| target != Target::Velocity(turn)) {
+            let pause = bus.now() + Duration::from_millis(20);
+            bus.run_until(pause, |nodes, event, _| {
+                if let SlaveEvent::Command(target @ Target::Velocity(_)) = event {
+                    heard.push((target, nodes.nodes[0].slave().statistics().replies));
+                }
+            })
+            .unwrap();
+            assert!(std::time::Instant::now() < end, "not commanded anew: {:#?}", board.lines());
+        }
+        // It is stopped first: two stops, each followed by an answer, and then its command.
+        let commanded =
+            heard.iter().position(|&(target, _)| target == Target::Velocity(turn)).unwrap();
+        let (stops, [(_, answers), ..]) = heard.split_at(commanded) else { unreachable!() };
+        assert!(stops.len() >= 2, "{heard:?}");
+        assert!(
+            stops.iter().all(|&(target, _)| target == Target::Velocity(Rps::ZERO)),
+            "{heard:?}"
+        );
+        assert!(*answers >= answers_when_lost + 2, "{answers_when_lost} {heard:?}");
+        let told = [
+            "event health node 2 abnormal",
+            "event health node 2 online",
+            "event stopped node 2 twice",
+        ];
+        written(&board, &mut bus, &told);
+        assert_eq!(bus.role().command(0), wanted[0]);
+        board.report_when("told", |_| true).assert_nothing_lost();
+        // The master's driver is on while it talks, and no longer.
+        let bursts = pin::bursts(&board.accesses());
+        assert!(bursts.len() > 20, "{}", bursts.len());
+        for burst in bursts {
+            let mut requests = Frames::<ToSlave>::new(&burst);
+            assert!(requests.by_ref().count() > 0, "{burst:02X?}");
+            assert_eq!(
+                (requests.counters().skipped(), requests.rest().len()),
+                (0, 0),
+                "{burst:02X?}"
+            );
+        }
+    });
 }
 
 /// Carries what one board says to the other, until either has gone.
@@ -130,22 +169,27 @@ fn relay(mut from: UnixStream, mut to: UnixStream) {
 
 #[test]
 fn two_boards_on_one_line_turn_a_motor() {
-    let Some(mut slave) = Board::start(Program::Slave) else { return };
-    let Some(mut master) = Board::start(Program::Master) else { return };
-    let (one, other) = (slave.bus(), master.bus());
-    relay(one.try_clone().unwrap(), other.try_clone().unwrap());
-    relay(other, one);
+    undisturbed(|| {
+        let Some(mut slave) = Board::start(Program::Slave) else { return };
+        let Some(mut master) = Board::start(Program::Master) else { return };
+        let (one, other) = (slave.bus(), master.bus());
+        relay(one.try_clone().unwrap(), other.try_clone().unwrap());
+        relay(other, one);
 
-    let turning = slave.report_when("turning", |report| {
-        report.get("target_mrps") == Some(500) && report.at("mrps") == 500
+        let turning = slave.report_when("turning", |report| {
+            report.get("target_mrps") == Some(500) && report.at("mrps") == 500
+        });
+        turning.assert_nothing_lost();
+        assert_eq!(turning.at("skipped"), 0, "{turning:?}");
+        let told = master.report_when("reading that", |report| report.get("mrps") == Some(500));
+        assert_eq!((told.at("node"), told.at("lost_events")), (1, 0));
+        assert!(told.at("exchanges") > 0, "{told:?}");
+        told.assert_nothing_lost();
+        assert!(
+            master.has_written(&[
+                "event discovered node 1 velocity",
+                "event discovery done online 1"
+            ])
+        );
     });
-    turning.assert_nothing_lost();
-    assert_eq!(turning.at("skipped"), 0, "{turning:?}");
-    let told = master.report_when("reading that", |report| report.get("mrps") == Some(500));
-    assert_eq!((told.at("node"), told.at("lost_events")), (1, 0));
-    assert!(told.at("exchanges") > 0, "{told:?}");
-    told.assert_nothing_lost();
-    assert!(
-        master.has_written(&["event discovered node 1 velocity", "event discovery done online 1"])
-    );
 }

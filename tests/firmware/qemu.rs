@@ -18,6 +18,9 @@ use std::{
 /// How long anything may take before it counts as never.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 
+/// The program that checks its own USART.
+const UART_CHECK: &str = "uart_check";
+
 /// The programs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Program {
@@ -75,7 +78,7 @@ fn find_images() -> Result<PathBuf, String> {
     }
     let programs = [Program::Slave, Program::Master, Program::Robot];
     let mut build = Command::new("bash");
-    build.arg(script).arg("--build").args(programs.map(Program::name));
+    build.arg(script).arg("--build").args(programs.map(Program::name)).arg(UART_CHECK);
     // Cargo sets these for this test; the other compiler is to find its own.
     for name in ["LD_LIBRARY_PATH", "RUSTC", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         build.env_remove(name);
@@ -90,6 +93,20 @@ fn find_images() -> Result<PathBuf, String> {
     let paths = String::from_utf8_lossy(&built.stdout).into_owned();
     let first = paths.lines().next().map(Path::new).and_then(Path::parent);
     first.map(Path::to_owned).ok_or("the build names no image".to_owned())
+}
+
+/// Runs the program that checks its own USART, and gives its status and what it says.
+pub(crate) fn check_uart() -> Option<(bool, String)> {
+    let image = images().as_ref().ok()?.join(UART_CHECK);
+    let run = Command::new("qemu-system-arm")
+        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-icount", "shift=0"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(image)
+        .stdin(Stdio::null())
+        .output()
+        .expect("qemu-system-arm starts");
+    let said = [run.stdout, run.stderr].concat();
+    Some((run.status.success(), String::from_utf8_lossy(&said).into_owned()))
 }
 
 /// A board that runs a program. It ends, and its sockets go, when this is dropped.
@@ -108,6 +125,37 @@ impl Board {
     ///
     /// It runs from the moment when both of its sockets are connected, so that nothing is missed.
     pub(crate) fn start(program: Program) -> Option<Self> {
+        Self::start_with(program, &[])
+    }
+
+    /// The same with a log of every access to a register, for [`accesses`](Self::accesses).
+    pub(crate) fn start_logged(program: Program) -> Option<Self> {
+        let kinds = ["-trace", "memory_region_ops_write", "-trace", "memory_region_ops_read"];
+        Self::start_with(program, &kinds)
+    }
+
+    /// Ends the board, and gives the log of every access to a register.
+    pub(crate) fn accesses(mut self) -> String {
+        // Asked to end, so that it writes out what it has logged.
+        self.signal("-TERM");
+        self.qemu.wait().unwrap();
+        fs::read_to_string(self.folder.join("accesses")).unwrap()
+    }
+
+    /// Halts the board, as an operating system does that has others to serve. Its time goes on.
+    pub(crate) fn halt(&self, span: Duration) {
+        self.signal("-STOP");
+        thread::sleep(span);
+        self.signal("-CONT");
+    }
+
+    fn signal(&self, signal: &str) {
+        let id = self.qemu.id().to_string();
+        let sent = Command::new("kill").args([signal, &id]).status().expect("kill starts");
+        assert!(sent.success());
+    }
+
+    fn start_with(program: Program, options: &[&str]) -> Option<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let image = images().as_ref().ok()?.join(program.name());
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
@@ -118,6 +166,9 @@ impl Board {
         let mut qemu = Command::new("qemu-system-arm")
             .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none"])
             .args(["-serial", &serial("bus"), "-serial", &serial("text")])
+            .args(options)
+            .arg("-D")
+            .arg(folder.join("accesses"))
             .arg("-kernel")
             .arg(image)
             .stdin(Stdio::null())

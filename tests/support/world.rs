@@ -6,12 +6,16 @@ use std::{
     future::{Future, poll_fn},
     pin::pin,
     rc::Rc,
-    task::Poll,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    task::{Context, Poll, Wake, Waker},
 };
 
 use axlewire::{drive::Clock, time::Instant};
 
-use crate::port::{Unplugged, poll};
+use crate::port::Unplugged;
 
 type Actor = Box<dyn FnMut()>;
 
@@ -20,6 +24,23 @@ type Actor = Box<dyn FnMut()>;
 pub(crate) struct World {
     micros: Rc<Cell<u64>>,
     actors: Rc<RefCell<Vec<Actor>>>,
+    sleepers: Rc<RefCell<Vec<Waker>>>,
+}
+
+/// Counts how often a task was woken.
+#[derive(Default)]
+pub(crate) struct Wakes(AtomicUsize);
+
+impl Wakes {
+    pub(crate) fn count(&self) -> usize {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl Wake for Wakes {
+    fn wake(self: Arc<Self>) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
 }
 
 impl World {
@@ -37,28 +58,40 @@ impl World {
         for actor in &mut *self.actors.borrow_mut() {
             actor();
         }
+        self.sleepers.borrow_mut().drain(..).for_each(Waker::wake);
+    }
+
+    /// The task is woken when time has passed.
+    fn sleep<T>(&self, context: &Context<'_>) -> Poll<T> {
+        self.sleepers.borrow_mut().push(context.waker().clone());
+        Poll::Pending
     }
 
     /// Runs a future to its end, which has to come within a minute of virtual time.
     pub(crate) fn block_on<T>(&self, future: impl Future<Output = T>) -> T {
-        let mut future = pin!(future);
-        for _ in 0..3_000_000 {
-            if let Poll::Ready(output) = poll(future.as_mut()) {
-                return output;
-            }
-            self.step(20);
-        }
-        panic!("hangs");
+        self.poll_times(usize::MAX, future).expect("hangs")
     }
 
-    /// Polls a future so many times, then drops it.
+    /// Polls a future this many times, then drops it. As a real executor it polls only what was
+    /// woken; while nothing is, time passes.
     pub(crate) fn poll_times<T>(&self, times: usize, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
-        for _ in 0..times {
-            if let Poll::Ready(output) = poll(future.as_mut()) {
+        let wakes = Arc::new(Wakes::default());
+        let waker = Waker::from(wakes.clone());
+        let (mut polls, mut seen) = (0, usize::MAX);
+        for _ in 0..6_000_000 {
+            if wakes.count() == seen {
+                self.step(20);
+                continue;
+            }
+            if polls == times {
+                return None;
+            }
+            seen = wakes.count();
+            if let Poll::Ready(output) = future.as_mut().poll(&mut Context::from_waker(&waker)) {
                 return Some(output);
             }
-            self.step(20);
+            polls += 1;
         }
         None
     }
@@ -83,7 +116,11 @@ impl embedded_hal_async::delay::DelayNs for VirtualClock {
     async fn delay_ns(&mut self, ns: u32) {
         let world = self.0.clone();
         let end = world.micros.get() + u64::from(ns).div_ceil(1000);
-        poll_fn(|_| if world.micros.get() >= end { Poll::Ready(()) } else { Poll::Pending }).await;
+        poll_fn(|context| match world.micros.get() >= end {
+            true => Poll::Ready(()),
+            false => world.sleep(context),
+        })
+        .await;
     }
 }
 
@@ -99,6 +136,12 @@ pub(crate) struct End {
     byte_us: u64,
     /// Bytes taken per write at the most.
     pub(crate) most: usize,
+    /// The port takes so many more bytes, and then fails once.
+    pub(crate) fails_after: Option<usize>,
+    /// The next flush fails, although the bytes leave.
+    pub(crate) fails_flush: bool,
+    /// The receiver fails once, at the next look for bytes.
+    pub(crate) fails_read: bool,
     /// Async writes and flushes are ready at the second poll only.
     pub(crate) stutters: bool,
     pub(crate) unplugged: Rc<Cell<bool>>,
@@ -112,6 +155,9 @@ impl End {
             outboxes: vec![],
             byte_us,
             most: usize::MAX,
+            fails_after: None,
+            fails_flush: false,
+            fails_read: false,
             stutters: false,
             unplugged: Rc::default(),
         }
@@ -149,7 +195,14 @@ impl End {
 
     fn take(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
         self.is_plugged()?;
-        let count = buffer.len().min(self.most);
+        let mut count = buffer.len().min(self.most);
+        if let Some(left) = self.fails_after {
+            count = count.min(left);
+            self.fails_after = (left > 0).then_some(left - count);
+            if left == 0 {
+                return Err(Unplugged);
+            }
+        }
         for outbox in &self.outboxes {
             let mut outbox = outbox.borrow_mut();
             for &byte in &buffer[..count] {
@@ -160,11 +213,17 @@ impl End {
         Ok(count)
     }
 
+    fn finish(&mut self) -> Result<(), Unplugged> {
+        self.is_plugged()?;
+        if core::mem::take(&mut self.fails_flush) { Err(Unplugged) } else { Ok(()) }
+    }
+
     async fn stutter(&self) {
         let mut ready = !self.stutters;
-        poll_fn(
-            |_| if core::mem::replace(&mut ready, true) { Poll::Ready(()) } else { Poll::Pending },
-        )
+        poll_fn(|context| match core::mem::replace(&mut ready, true) {
+            true => Poll::Ready(()),
+            false => self.world.sleep(context),
+        })
         .await;
     }
 }
@@ -176,7 +235,7 @@ impl embedded_io::ErrorType for End {
 impl embedded_io::ReadReady for End {
     fn read_ready(&mut self) -> Result<bool, Unplugged> {
         self.is_plugged()?;
-        Ok(self.has_arrived())
+        if core::mem::take(&mut self.fails_read) { Err(Unplugged) } else { Ok(self.has_arrived()) }
     }
 }
 
@@ -192,14 +251,17 @@ impl embedded_io::Write for End {
     }
 
     fn flush(&mut self) -> Result<(), Unplugged> {
-        self.is_plugged()
+        self.finish()
     }
 }
 
 impl embedded_io_async::Read for End {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        poll_fn(|_| match self.is_plugged() {
-            Ok(()) if !self.has_arrived() => Poll::Pending,
+        if core::mem::take(&mut self.fails_read) {
+            return Err(Unplugged);
+        }
+        poll_fn(|context| match self.is_plugged() {
+            Ok(()) if !self.has_arrived() => self.world.sleep(context),
             _ => Poll::Ready(self.give(buffer)),
         })
         .await
@@ -214,6 +276,6 @@ impl embedded_io_async::Write for End {
 
     async fn flush(&mut self) -> Result<(), Unplugged> {
         self.stutter().await;
-        self.is_plugged()
+        self.finish()
     }
 }

@@ -49,6 +49,12 @@ pub(crate) fn rps(text: &str) -> Result<Rps, String> {
     Rps::new(rps).map_err(|error| error.to_string())
 }
 
+/// A limit of speed: above 0.
+pub(crate) fn max_rps(text: &str) -> Result<Rps, String> {
+    let limit = rps(text)?;
+    if limit.get() > 0.0 { Ok(limit) } else { Err("a limit is above 0".to_owned()) }
+}
+
 /// A way that is a number and fits onto the wire (rulings I4, I5).
 pub(crate) fn revolutions(text: &str) -> Result<Position, String> {
     let revolutions: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;

@@ -1,22 +1,42 @@
-//! A motor bus on a port, with its master: what `scan` and `spin` share.
+//! A motor bus on a port, with its master: what `scan`, `spin` and `stop` share.
 
-use core::fmt;
+use std::{thread, time};
 
 use axlewire::{
-    ikeya::{self, Master, MasterConfig, Mode, NodeId, OneMotor, Polling, Status},
+    endpoint::Endpoint,
+    ikeya::{
+        self, Board, Cause, Health, Master, MasterConfig, Mode, NodeId, NodeSet, OneMotor, Polling,
+        Status, StopProgress, ThreeMotors,
+    },
     time::{Duration, Instant},
 };
 
 use crate::{
     args,
-    ctrl_c::CtrlC,
     failure::Failure,
     port::{Line, Port},
+    signals::{ABSENCE, Awake, Signals},
 };
 
 /// How often each node is read, and its set-point repeated: often enough for every motor, and a USB
 /// adapter keeps up with three nodes.
 const PERIOD: Duration = Duration::from_millis(20);
+
+/// Longest pause between two looks at the bus.
+const LOOK_PERIOD: Duration = Duration::from_millis(50);
+
+/// Least time in which nodes that answer have to confirm a stop. A slow line has more:
+/// [`Master::stop_bound`].
+const STOP_PATIENCE: Duration = Duration::from_millis(3000);
+
+/// Time that a motor may take to run out, once its node has confirmed the stop.
+const RUN_OUT: Duration = Duration::from_millis(3000);
+
+/// Time in which an id that has never answered has to be asked without an answer before it counts as silent.
+const SILENCE: Duration = Duration::from_millis(1000);
+
+/// Pause after a failure of the port in a stop, which goes on.
+const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 
 /// The arguments of a master.
 #[derive(Debug, clap::Args)]
@@ -31,58 +51,221 @@ pub(crate) struct MasterArgs {
 }
 
 /// A port and the master on it.
-pub(crate) struct Bus {
+pub(crate) struct Bus<B: Board = OneMotor> {
     pub(crate) port: Port,
-    pub(crate) master: Master,
+    pub(crate) master: Master<B>,
     pub(crate) baud: u32,
+}
+
+/// What is known of a node at the end of a stop.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Halt {
+    /// The stop is confirmed, and the motor was measured standing still (ruling I12).
+    Still,
+    /// The stop is confirmed, but the motor was not measured standing still.
+    Moving,
+    /// The stop is not confirmed.
+    Owed,
+    /// The stop is not confirmed, because it is in doubt which mode the node is in (ruling I11).
+    Doubtful,
+    /// Bytes came when the id was asked, but no undamaged answer ever.
+    Damaged,
+    /// Nothing has ever been heard of the id.
+    Silent,
 }
 
 impl Bus {
     pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
-        let mut config =
-            if args.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
-        config.baud = args.line.baud.unwrap_or(ikeya::BAUD);
-        config.polling = Polling::Every(PERIOD);
-        let port = Port::open(&args.line, ikeya::BAUD)?;
-        Ok(Self { port, master: Master::new(config), baud: config.baud })
+        let config = if args.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+        Self::open_with(&args.line, config)
     }
 
-    /// Asks all ids who is there; `false` if Ctrl-C came first.
-    pub(crate) fn discover(&mut self, ctrl_c: &CtrlC) -> Result<bool, Failure> {
-        self.master.discover();
-        while self.master.is_discovering() && !ctrl_c.is_pressed() {
-            self.round(self.port.now() + Duration::from_millis(1000))?;
+    /// Asks all ids for their status; `false` if a signal came first.
+    pub(crate) fn discover(&mut self, signals: &Signals) -> Result<bool, Failure> {
+        self.master.discover(self.port.now());
+        while self.master.is_discovering() && !signals.is_raised() {
+            self.look()?;
         }
-        Ok(!ctrl_c.is_pressed())
+        Ok(!signals.is_raised())
+    }
+
+    /// Reads a node now, so that nothing is decided by an old mode or position. `None` if it does
+    /// not answer, or a signal came first.
+    pub(crate) fn read(
+        &mut self,
+        node: NodeId,
+        signals: &Signals,
+    ) -> Result<Option<Status<OneMotor>>, Failure> {
+        let start = self.port.now();
+        let end = start + self.master.stop_bound();
+        if self.master.read(node, start).is_err() {
+            return Ok(None);
+        }
+        while !signals.is_raised() && self.is_online(node) && self.port.now() < end {
+            self.look()?;
+            match self.master.status(node) {
+                Some((status, at)) if at > start && !self.master.is_mode_in_doubt(node) => {
+                    return Ok(Some(status));
+                }
+                _ => {}
+            }
+        }
+        Ok(None)
+    }
+}
+
+impl<B: Boards> Bus<B> {
+    pub(crate) fn open_with(line: &args::Line, config: MasterConfig) -> Result<Self, Failure> {
+        let port = Port::open(line, ikeya::BAUD)?;
+        let mut config = config;
+        config.baud = line.baud.unwrap_or(ikeya::BAUD);
+        config.polling = Polling::Every(PERIOD);
+        config.accepts_early = port.is_pseudo_terminal();
+        config.dead_man = Some(ABSENCE);
+        let master = Master::new(config, port.now());
+        Ok(Self { port, master, baud: config.baud })
     }
 
     pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
         self.port.round(&mut self.master, until)
     }
 
+    /// One round whose events are not needed: everything is asked of the master.
+    fn look(&mut self) -> Result<(), Failure> {
+        let round = self.round(self.port.now() + LOOK_PERIOD);
+        while self.master.poll_event().is_some() {}
+        round
+    }
+
     /// What a node measured last.
-    pub(crate) fn status(&self, node: NodeId) -> Option<Status<OneMotor>> {
+    pub(crate) fn status(&self, node: NodeId) -> Option<Status<B>> {
         self.master.status(node).map(|(status, _)| status)
     }
 
-    /// Who has answered so far, and how.
-    pub(crate) fn nodes(&self) -> impl Iterator<Item = (NodeId, Mode, Status<OneMotor>)> {
+    /// The nodes that have answered so far, and how.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = (NodeId, Mode, Status<B>)> {
         NodeId::ALL.into_iter().filter_map(|node| {
             let status = self.status(node)?;
             Some((node, status.mode(), status))
         })
     }
+
+    /// Has an id never answered, though bytes came when it was asked?
+    pub(crate) fn is_damaged(&self, node: NodeId) -> bool {
+        self.status(node).is_none() && self.master.node_statistics(node).crc_errors > 0
+    }
+
+    pub(crate) fn is_online(&self, node: NodeId) -> bool {
+        matches!(self.master.health(node), Some(Health::Online | Health::Suspect(_)))
+    }
+
+    /// Stops these nodes, and waits until it is known of each what has become of it. Failures of the
+    /// port do not end it before its time; the last one is returned, unless the port has come back
+    /// since.
+    ///
+    /// It ends by itself, and no signal ends it earlier.
+    pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
+        let begin = self.port.now();
+        nodes.iter().for_each(|node| self.master.stop(node, begin));
+        let bound = self.master.stop_bound().max(STOP_PATIENCE);
+        let (mut awake, mut confirmed_at) = (Awake::new(begin), None);
+        loop {
+            let result = self.look();
+            let time = awake.time(self.port.now());
+            let is_any = |halt| nodes.iter().any(|node| self.halt(node) == halt);
+            let is_asking = time < SILENCE || nodes.iter().any(|node| self.is_unasked(node));
+            let deadline = if is_any(Halt::Owed) || is_any(Halt::Doubtful) {
+                bound
+            } else if is_any(Halt::Moving) {
+                *confirmed_at.get_or_insert(time) + RUN_OUT
+            } else if (is_any(Halt::Silent) || is_any(Halt::Damaged)) && is_asking {
+                bound
+            } else {
+                return result;
+            };
+            if time >= deadline {
+                return result;
+            }
+            if result.is_err() {
+                thread::sleep(FAILURE_PAUSE);
+            }
+        }
+    }
+
+    /// Has an id never answered, and not been asked often enough to call it silent?
+    fn is_unasked(&self, node: NodeId) -> bool {
+        let attempts = u32::from(self.master.config().attempts);
+        self.status(node).is_none() && self.master.node_statistics(node).requests < attempts
+    }
+
+    /// What is known of a node that was told to stop.
+    pub(crate) fn halt(&self, node: NodeId) -> Halt {
+        match self.master.stop_progress(node) {
+            StopProgress::StandingStill => Halt::Still,
+            StopProgress::Paid => Halt::Moving,
+            _ if self.is_damaged(node) => Halt::Damaged,
+            _ if self.status(node).is_none() => Halt::Silent,
+            _ if self.master.is_mode_in_doubt(node) => Halt::Doubtful,
+            _ => Halt::Owed,
+        }
+    }
+
+    /// The same in words; `None` if the node stands still.
+    pub(crate) fn complaint(&self, node: NodeId) -> Option<String> {
+        Some(match self.halt(node) {
+            Halt::Still => return None,
+            Halt::Moving => {
+                let seconds = RUN_OUT.as_micros() / 1_000_000;
+                let now = self.status(node).map(B::describe).unwrap_or_default();
+                format!(
+                    "node {node} has confirmed the stop, but still moves after {seconds} s: {now}"
+                )
+            }
+            Halt::Owed => {
+                let heard = match self.master.last_failure(node) {
+                    _ if self.is_online(node) => "",
+                    Some(Cause::Damaged) => " (damaged bytes are heard)",
+                    Some(Cause::Unexpected) => " (other answers are heard)",
+                    _ => " (nothing is heard)",
+                };
+                format!(
+                    "node {node} was told to stop and has not confirmed it{heard}: it may be moving"
+                )
+            }
+            Halt::Doubtful => format!(
+                "the mode of node {node} is in doubt, so that it cannot be stopped: it may be \
+                 moving"
+            ),
+            Halt::Damaged => {
+                format!("id {node} gives only damaged answers: what is there may be moving")
+            }
+            Halt::Silent => format!("node {node} does not answer"),
+        })
+    }
 }
 
-/// A status in its unit.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Measured(pub(crate) Status<OneMotor>);
+/// Boards whose status can be shown.
+pub(crate) trait Boards: Board {
+    fn describe(status: Status<Self>) -> String;
+}
 
-impl fmt::Display for Measured {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Status::Velocity(rps) => write!(f, "{rps:.2} rps"),
-            Status::Position(position) => write!(f, "{:.4} turns", position.revolutions()),
+impl Boards for OneMotor {
+    fn describe(status: Status<Self>) -> String {
+        match status {
+            Status::Velocity(rps) => format!("{rps:.2} rps"),
+            Status::Position(position) => format!("{:.4} turns", position.revolutions()),
+        }
+    }
+}
+
+impl Boards for ThreeMotors {
+    fn describe(status: Status<Self>) -> String {
+        match status {
+            Status::Velocity([a, b, c]) => format!("{a:.2} {b:.2} {c:.2} rps"),
+            Status::Position(positions) => {
+                let [a, b, c] = positions.map(|position| position.revolutions());
+                format!("{a:.4} {b:.4} {c:.4} turns")
+            }
         }
     }
 }

@@ -1,27 +1,30 @@
 //! `axle drive`: a rover drives, and stands still again before the tool ends.
 
-use std::io::{self, Write};
-
 use axlewire::{
-    endpoint::Endpoint,
     time::{Duration, Instant},
-    ucp::{self, Host, HostConfig, Link, MotorControl},
+    ucp::{Link, MotorControl},
 };
 
 use crate::{
-    EXIT_CODES, args,
-    ctrl_c::CtrlC,
+    MOTION_HELP, args,
     failure::Failure,
-    port::{Line, Port},
+    port::Line,
+    rover::{self, CALL_PERIOD, Rover},
+    signals::{Attendance, DEAD_MAN, Signals},
+    teller::{self, Teller},
 };
 
 /// Drive a rover for a while
 ///
-/// Waits until the robot is heard, repeats the command every 100 ms and prints what the robot
-/// reports. At the end, on Ctrl-C and on every error the rover is told to stand still, and the tool
-/// waits until its wheels do.
+/// Waits until the robot is heard and tells it to stand still meanwhile. Then repeats the command
+/// every 100 ms and prints what the robot reports. At the end, on every error and on every signal
+/// that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not those of a crash, nor 32 and
+/// 33, which belong to the C library), the rover is told to stand still, again and again, until its
+/// reports say that all wheels do; a second Ctrl-C does not end that earlier. If it is not heard any
+/// more it may be moving: the tool says so, and the exit code is 1. After Ctrl-Z and fg nothing
+/// moves again, and the exit code is 1.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXIT_CODES)]
+#[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     line: args::Line,
@@ -30,8 +33,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = percent())]
     speed: i16,
 
-    /// Turn, -100 to 100 percent; positive is to the right, as robots do it (the protocol document
-    /// says left)
+    /// Turn of the steering wheel, -100 to 100 percent; positive is to the right, as robots do it
+    /// (the protocol document says left). Forward and on the spot the nose then swings right; in
+    /// reverse, with a speed below -5, it swings left, as with a car
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = percent())]
     turn: i16,
 
@@ -48,41 +52,13 @@ fn percent() -> clap::builder::RangedI64ValueParser<i16> {
 /// How often a report is printed; the robot sends one every 20 ms.
 const PRINT_PERIOD: Duration = Duration::from_millis(250);
 
-/// How long the robot may take to be heard first.
-const LINK_PATIENCE: Duration = Duration::from_millis(2000);
-
-/// How long the wheels may take to stand still once they are told to.
-const STOP_PATIENCE: Duration = Duration::from_millis(3000);
-
-/// How often a stop is sent at least.
-const STOPS: u32 = 3;
-
-/// Longest pause between two calls of the host: well under its dead-man's 500 ms.
-const CALL_PERIOD: Duration = Duration::from_millis(50);
-
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let command = command(args).map_err(|error| Failure::Usage(error.to_string()))?;
-    let ctrl_c = CtrlC::listen()?;
-    let port = Port::open(&args.line, ucp::BAUD)?;
-    let mut config = HostConfig::default();
-    config.baud = args.line.baud.unwrap_or(ucp::BAUD);
-    let start = port.now();
-    let mut drive = Drive { host: Host::new(config, start), port, start, out: io::stdout() };
-    if !drive.find_robot(&ctrl_c)? {
-        return Err(Failure::Undone("interrupted before anything moved".to_owned()));
-    }
-
-    const CONSEQUENCE: &str = "the robot cannot be told to stop any more, and does so by itself \
-                               after 500 ms";
-    let driven = drive.drive(command, args.micros, &ctrl_c);
-    if let Err(failure @ Failure::PortLost { .. }) = driven {
-        return Err(failure.while_moving(CONSEQUENCE));
-    }
-    // Whatever else has happened: first the wheels, then the complaint. That they may still turn is
-    // the gravest of all.
-    drive.stop().map_err(|failure| failure.while_moving(CONSEQUENCE))?;
-    driven
+    let signals = Signals::listen_to_all()?;
+    let result = prepare_and_drive(args, command, &signals);
+    // The port is closed by now.
+    signals.suspend_if_wanted(result)
 }
 
 /// A turn by its direction's name, so that the sign is the one that robots mean (ruling U6).
@@ -93,124 +69,84 @@ fn command(args: &Args) -> Result<MotorControl, axlewire::error::EncodeError> {
     }
 }
 
+fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {
+    let mut rover = Rover::open(&args.line)?;
+    if !rover.find(|| signals.is_raised())? {
+        return signals.interrupted();
+    }
+    // Printed before anything moves: a terminal may suspend whoever prints in the background.
+    let announced = format!("to drive: {}", rover::describe(&command));
+    teller::print(&line(0.0, &announced)).map_err(Failure::Write)?;
+    let start = rover.port.now();
+    let mut drive = Drive { rover, start, teller: Teller::new() };
+
+    let driven = drive.drive(command, args.micros, signals);
+    // Whatever has happened: first the wheels, then the complaint. That they may still turn is the
+    // gravest of all.
+    let stopped = drive.stop();
+    let told = drive.teller.finish();
+    stopped?;
+    driven.map_err(|failure| failure.and("it was stopped and stands still"))?;
+    told
+}
+
 struct Drive {
-    host: Host,
-    port: Port,
+    rover: Rover,
     start: Instant,
-    out: io::Stdout,
+    teller: Teller,
 }
 
 impl Drive {
-    /// Waits for the first sign of life; `false` if Ctrl-C came first.
-    fn find_robot(&mut self, ctrl_c: &CtrlC) -> Result<bool, Failure> {
-        let end = self.start + LINK_PATIENCE;
-        while self.host.link() != Link::Up && !ctrl_c.is_pressed() {
-            if self.port.now() >= end {
-                let (path, seconds) = (self.port.path(), LINK_PATIENCE.as_micros() / 1_000_000);
-                let heard = match self.host.counters().received {
-                    0 => "nothing".to_owned(),
-                    bytes => format!("{bytes} bytes that are no message"),
-                };
-                return Err(Failure::Undone(format!(
-                    "no robot answers on {path:?}: {heard} in {seconds} s"
-                )));
-            }
-            self.round(end)?;
-        }
-        Ok(!ctrl_c.is_pressed())
-    }
-
-    /// Drives until the time is over.
-    fn drive(&mut self, command: MotorControl, micros: u64, ctrl_c: &CtrlC) -> Result<(), Failure> {
-        self.start = self.port.now();
-        let turn = command.angular();
-        let side = if turn < 0 {
-            " left"
-        } else if turn > 0 {
-            " right"
-        } else {
-            ""
-        };
-        let (speed, turn) = (command.speed(), turn.abs());
-        self.say(&format!("to drive: speed {speed} %, turn {turn} %{side}"))?;
-
+    /// Drives until the time is over or a signal comes.
+    fn drive(
+        &mut self,
+        command: MotorControl,
+        micros: u64,
+        signals: &Signals,
+    ) -> Result<(), Failure> {
         let end = Instant::from_micros(self.start.as_micros() + micros);
         let mut print_at = self.start + PRINT_PERIOD;
-        while self.port.now() < end && !ctrl_c.is_pressed() {
-            let now = self.port.now();
-            self.host.drive(command, now).map_err(|error| Failure::Undone(error.to_string()))?;
-            self.round((now + CALL_PERIOD).min(end).min(print_at))?;
-            if self.host.link() == Link::Down {
+        let mut attendance = Attendance::new(self.start);
+        while !signals.is_raised() {
+            let now = self.rover.port.now();
+            // An absence ends the drive. The host stops the robot after it, and would drive on with
+            // the next command.
+            attendance.check(now)?;
+            if now >= end {
+                break;
+            }
+            let driven = self.rover.host.drive(command, now);
+            driven.map_err(|error| Failure::Undone(error.to_string()))?;
+            self.rover.round((now + CALL_PERIOD).min(end).min(print_at))?;
+            attendance.check(self.rover.port.now())?;
+            if self.rover.has_dead_man_fired {
+                return Err(Failure::Undone(DEAD_MAN.to_owned()));
+            }
+            if self.rover.host.link() == Link::Down {
                 return Err(Failure::Undone("the robot is not heard any more".to_owned()));
             }
-            if self.port.now() >= print_at {
-                print_at = self.port.now() + PRINT_PERIOD;
+            if self.rover.port.now() >= print_at {
+                print_at = self.rover.port.now() + PRINT_PERIOD;
                 self.say_report("")?;
             }
         }
         Ok(())
     }
 
-    /// Sends the stop several times, and waits until the robot reports that it stands.
     fn stop(&mut self) -> Result<(), Failure> {
-        let (begin, sent) = (self.port.now(), self.host.statistics().commands);
-        let (end, mut reports) = (begin + STOP_PATIENCE, None);
-        self.host.stop(begin);
-        while self.port.now() < end {
-            self.round(end)?;
-            let stats = self.host.statistics();
-            if stats.commands.saturating_sub(sent) < STOPS {
-                continue;
-            }
-            // The report has to be younger than the last of the stops.
-            let told_at = *reports.get_or_insert(stats.reports);
-            if stats.reports > told_at && self.wheels_stand() {
-                // Where nobody reads that, they stand all the same.
-                drop(self.say_report(", stopped"));
-                return Ok(());
-            }
-            if self.host.link() == Link::Down {
-                break;
-            }
-        }
-        let sent = self.host.statistics().commands.saturating_sub(sent);
-        Err(Failure::Undone(match self.host.link() {
-            Link::Up => {
-                format!("the robot was told {sent} times to stop, and its wheels still turn")
-            }
-            _ => format!("the robot was told {sent} times to stop, and is not heard any more"),
-        }))
-    }
-
-    fn wheels_stand(&self) -> bool {
-        self.host.last_report().is_some_and(|report| report.telemetry.rpm == [0; 4])
-    }
-
-    /// One round; what the host has to tell is asked of it where it is needed.
-    fn round(&mut self, until: Instant) -> Result<(), Failure> {
-        self.port.round(&mut self.host, until)?;
-        while self.host.poll_event().is_some() {}
+        self.rover.stop()?;
+        // Where nobody reads that, it stands still all the same.
+        drop(self.say_report(", stopped"));
         Ok(())
     }
 
     fn say_report(&mut self, what: &str) -> Result<(), Failure> {
-        let Some(report) = self.host.last_report() else { return Ok(()) };
-        let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);
-        let [front_left, front_right, back_left, back_right] = now.rpm;
-        self.say(&format!(
-            "rpm {front_left:4} {front_right:4} {back_left:4} {back_right:4}  heading {:3} deg  \
-             {:.1} V  {:.2} A  battery {} %  lost reports {lost}{what}",
-            now.heading_deg,
-            now.volts(),
-            now.amperes(),
-            now.battery_pct,
-        ))
+        let Some(report) = self.rover.describe() else { return Ok(()) };
+        let seconds = (self.rover.port.now() - self.start).as_micros() as f64 / 1e6;
+        self.teller.say(line(seconds, &format!("{report}{what}")))
     }
+}
 
-    fn say(&mut self, what: &str) -> Result<(), Failure> {
-        let seconds = (self.port.now() - self.start).as_micros() as f64 / 1e6;
-        writeln!(self.out, "{seconds:7.2} s  {what}")
-            .and_then(|()| self.out.flush())
-            .map_err(Failure::Write)
-    }
+fn line(seconds: f64, what: &str) -> String {
+    format!("{seconds:7.2} s  {what}")
 }

@@ -48,6 +48,14 @@ impl Failure {
         }
     }
 
+    /// The same, where what was to be done did not come about, with what is known besides.
+    pub(crate) fn and(self, besides: &str) -> Self {
+        match self {
+            Self::Undone(line) => Self::Undone(format!("{line}; {besides}")),
+            other => other,
+        }
+    }
+
     /// Tells the user, and gives the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         match self {

@@ -5,18 +5,23 @@
 
 mod args;
 mod bus;
-mod ctrl_c;
 mod decode;
 mod drive;
 mod failure;
+#[cfg(all(test, unix))]
+mod flaky;
 mod human;
 mod input;
 mod port;
 mod record;
+mod rover;
 mod scan;
+mod signals;
 #[cfg(unix)]
 mod sim;
 mod spin;
+mod stop;
+mod teller;
 mod watch;
 
 use std::process::ExitCode;
@@ -25,11 +30,31 @@ use clap::{Parser, Subcommand};
 
 use failure::Failure;
 
-const EXIT_CODES: &str = "\
+/// A literal, so that other texts can contain it.
+macro_rules! exit_codes {
+    () => {
+        "\
 Exit codes:
   0  done; also when the reader of the output has closed it
-  1  the input, the output or the port failed, or what hangs on the port did not do as it was told
-  2  the command line is wrong";
+  1  the input, the output or the port failed, or what is on the line did not do as it was told
+  2  the command line is wrong"
+    };
+}
+
+const EXIT_CODES: &str = exit_codes!();
+
+/// For subcommands on lines where something may move.
+const MOTION_HELP: &str = concat!(
+    exit_codes!(),
+    "
+
+What a kill -9, a SIGSTOP or a power cut of this machine leaves behind (no program can prevent it):
+  motor bus  goes on turning, for ever, unless its slaves have watchdogs: the last command holds
+  rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts, also one
+             that another program sends, and noise
+  After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise use axle stop. A machine that
+  can hurt somebody needs an emergency stop that removes power."
+);
 
 /// Host tool for Ikeya MD and UCP lines
 #[derive(Debug, Parser)]
@@ -45,6 +70,7 @@ enum Command {
     Scan(scan::Args),
     Spin(spin::Args),
     Drive(drive::Args),
+    Stop(stop::Args),
     Watch(watch::Args),
     #[cfg(unix)]
     Sim(sim::Args),
@@ -69,6 +95,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),
         Command::Drive(args) => drive::run(args),
+        Command::Stop(args) => stop::run(args),
         Command::Watch(args) => watch::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),

@@ -2,24 +2,43 @@
 
 use std::{
     fs,
-    io::{ErrorKind, Read, Write},
+    io::{self, ErrorKind, Read, Write},
+    path::Path,
     time::{Duration, Instant as Clock},
 };
 
-use axlewire::{endpoint::Endpoint, time::Instant};
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    time::Instant,
+};
 use serialport::SerialPort;
 
 use crate::{args, failure::Failure};
 
-/// Longest wait for bytes, so that Ctrl-C is seen in time. Nothing spins: each round of a loop
-/// waits for bytes, for the role's next deadline, or for so long.
+/// Longest wait for bytes, so that a signal is seen in time. Nothing spins: each round of a loop
+/// waits for bytes, for the role's next deadline, or for this long.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// How long a port may take no byte at all before it has failed.
+/// Longest wait for the port to take more of a frame. After it the role decides anew what to send,
+/// so that no old command leaves late (ruling U16).
+const FRAME_PATIENCE: Duration = Duration::from_millis(20);
+
+/// Time in which a port takes no byte at all, after which it has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// How far from what was asked for a speed may be, percent: a UART still reads its bytes.
+/// Frames sent in one round at the most, so that no role keeps a signal from being seen.
+const FRAMES: usize = 8;
+
+/// Difference from the speed that was asked for at which a UART still reads the bytes, percent.
 const BAUD_TOLERANCE_PCT: u64 = 3;
+
+/// A frame that did not reach the line whole.
+#[derive(Debug)]
+pub(crate) struct NotSent {
+    unsent: Unsent,
+    /// `None` where the port may yet come back.
+    failure: Option<Failure>,
+}
 
 /// Bytes one way, bytes the other way, and time.
 pub(crate) trait Line {
@@ -27,26 +46,51 @@ pub(crate) trait Line {
     fn now(&self) -> Instant;
 
     /// Sends all of `bytes`.
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure>;
+    fn send(&mut self, bytes: &[u8]) -> Result<(), NotSent>;
 
     /// Waits for bytes, until `until` or a moment at the most; none is no failure.
     fn receive(&mut self, until: Instant) -> Result<&[u8], Failure>;
 
-    /// One round of the loop that [`Endpoint`] describes, from sending to the next deadline: sends,
-    /// waits until `until` at the most, and hands in what came. Events and commands are the
-    /// caller's, between two rounds.
+    /// One round of the loop that [`Endpoint`] describes: takes in what has been received, sends
+    /// what is due, waits until `until` at the most, and takes in what came. Events and commands are
+    /// the caller's, between two rounds.
+    ///
+    /// What is due is sent even if receiving fails, because it may be a stop; the failure is
+    /// returned afterwards.
     fn round<E: Endpoint>(&mut self, role: &mut E, until: Instant) -> Result<(), Failure> {
-        while let Some(frame) = role.poll_transmit(self.now()) {
-            self.send(frame)?;
+        let mut result = self.hand_in(role, self.now());
+        for _ in 0..FRAMES {
+            self.expire(role);
+            let Some(frame) = role.poll_transmit(self.now()) else { break };
+            if let Err(NotSent { unsent, failure }) = self.send(frame) {
+                role.handle_unsent(unsent, self.now());
+                result = result.and(failure.map_or(Ok(()), Err));
+                break;
+            }
+            // Bytes that have been received go in before the next frame goes out.
+            let received = self.hand_in(role, self.now());
+            result = result.and(received);
         }
+        result?;
         let until = role.poll_timeout().map_or(until, |deadline| deadline.min(until));
+        self.hand_in(role, until)?;
+        self.expire(role);
+        Ok(())
+    }
+
+    /// Hands in what comes until `until`.
+    fn hand_in<E: Endpoint>(&mut self, role: &mut E, until: Instant) -> Result<(), Failure> {
         let received = self.receive(until)?.to_vec();
+        role.handle_input(&received, self.now());
+        Ok(())
+    }
+
+    /// Lets time pass.
+    fn expire<E: Endpoint>(&self, role: &mut E) {
         let now = self.now();
-        role.handle_input(&received, now);
         if role.poll_timeout().is_some_and(|deadline| now >= deadline) {
             role.handle_timeout(now);
         }
-        Ok(())
     }
 }
 
@@ -55,6 +99,8 @@ pub(crate) struct Port {
     path: String,
     tty: Box<dyn SerialPort>,
     start: Clock,
+    /// Since when the port has taken no byte, if it takes none.
+    stuck_since: Option<Clock>,
     buffer: [u8; 4096],
 }
 
@@ -76,11 +122,17 @@ impl Port {
 
     /// A port that is open already.
     pub(crate) fn new(path: String, tty: Box<dyn SerialPort>) -> Self {
-        Self { path, tty, start: Clock::now(), buffer: [0; 4096] }
+        Self { path, tty, start: Clock::now(), stuck_since: None, buffer: [0; 4096] }
     }
 
     pub(crate) fn path(&self) -> &str {
         &self.path
+    }
+
+    /// Whether the port is a pseudo-terminal. It has no line speed: an answer may come before a
+    /// real line could have carried it.
+    pub(crate) fn is_pseudo_terminal(&self) -> bool {
+        is_pseudo_terminal(&self.path)
     }
 
     /// As [`Line::receive`], with bytes that may be changed.
@@ -99,6 +151,15 @@ impl Port {
         self.tty.set_timeout(timeout).map_err(|error| self.lost(&error.description))
     }
 
+    /// The failure behind an error of a write, unless the port may yet take the next frame.
+    fn write_failure(&mut self, error: &io::Error) -> Option<Failure> {
+        if !is_moment(error.kind()) {
+            return Some(self.lost(&format!("it has vanished ({error})")));
+        }
+        let since = *self.stuck_since.get_or_insert_with(Clock::now);
+        (since.elapsed() >= WRITE_TIMEOUT).then(|| self.lost("it takes no more bytes"))
+    }
+
     fn lost(&self, cause: &str) -> Failure {
         Failure::PortLost { path: self.path.clone(), cause: cause.to_owned(), moving: None }
     }
@@ -109,12 +170,17 @@ impl Line for Port {
         Instant::from_micros(self.start.elapsed().as_micros() as u64)
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure> {
-        self.set_timeout(WRITE_TIMEOUT)?;
-        self.tty.write_all(bytes).map_err(|error| match error.kind() {
-            ErrorKind::TimedOut => self.lost("it takes no more bytes"),
-            _ => self.lost(&format!("it has vanished ({error})")),
-        })
+    fn send(&mut self, bytes: &[u8]) -> Result<(), NotSent> {
+        let untouched = Unsent::Untouched;
+        self.set_timeout(FRAME_PATIENCE)
+            .map_err(|failure| NotSent { unsent: untouched, failure: Some(failure) })?;
+        match write_all(&mut self.tty, bytes) {
+            Ok(()) => {
+                self.stuck_since = None;
+                Ok(())
+            }
+            Err((unsent, error)) => Err(NotSent { unsent, failure: self.write_failure(&error) }),
+        }
     }
 
     fn receive(&mut self, until: Instant) -> Result<&[u8], Failure> {
@@ -122,9 +188,37 @@ impl Line for Port {
     }
 }
 
+/// Writes all of `bytes`, or says how much of them has left.
+fn write_all(port: &mut impl Write, bytes: &[u8]) -> Result<(), (Unsent, io::Error)> {
+    let mut rest = bytes;
+    while !rest.is_empty() {
+        let error = match port.write(rest) {
+            Ok(0) => ErrorKind::WriteZero.into(),
+            Ok(len) => {
+                rest = rest.get(len..).unwrap_or_default();
+                continue;
+            }
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => error,
+        };
+        let is_whole = rest.len() == bytes.len();
+        return Err((if is_whole { Unsent::Untouched } else { Unsent::CutOff }, error));
+    }
+    Ok(())
+}
+
 /// Nothing came, or a signal did.
 fn is_moment(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
+}
+
+/// Is this path, or what it is a link to, the name of a pseudo-terminal?
+fn is_pseudo_terminal(path: &str) -> bool {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| Path::new(path).to_owned());
+    // Linux has a folder of them; macOS numbers them, as in /dev/ttys003.
+    let number = target.to_str().and_then(|path| path.strip_prefix("/dev/ttys"));
+    target.starts_with("/dev/pts")
+        || number.is_some_and(|it| cfg!(target_os = "macos") && it.parse::<u32>().is_ok())
 }
 
 /// Does a port that runs at `actual` read bytes that are sent at `asked`?
@@ -150,12 +244,4 @@ fn explain(error: &serialport::Error, path: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::is_close;
-
-    #[test]
-    fn a_speed_that_a_uart_would_not_read_is_another_speed() {
-        assert!(is_close(500_000, 500_000) && is_close(115_200, 115_384));
-        assert!(!is_close(500_000, 9600) && !is_close(500_000, 460_800) && !is_close(1, 0));
-    }
-}
+mod tests;

@@ -1,16 +1,16 @@
-//! `axle scan`: who is on a motor bus.
+//! `axle scan`: which nodes are on a motor bus.
 
 use std::io::{self, Write};
 
-use axlewire::ikeya::{DipSwitch, IdReading, Mode, NodeId, Status};
+use axlewire::ikeya::{DipSwitch, IdReading, Mode, NodeId, OneMotor, Status};
 use serde::Serialize;
 
 use crate::{
     EXIT_CODES,
-    bus::{self, Bus, Measured},
-    ctrl_c::CtrlC,
+    bus::{self, Boards, Bus},
     failure::Failure,
     record::ikeya::{Fields, Motors, Positions, Rps},
+    signals::Signals,
 };
 
 /// List the nodes of a motor bus
@@ -67,9 +67,9 @@ impl Dip {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let ctrl_c = CtrlC::listen()?;
+    let signals = Signals::listen()?;
     let mut bus = Bus::open(&args.bus)?;
-    if !bus.discover(&ctrl_c)? {
+    if !bus.discover(&signals)? {
         return Err(Failure::Undone("interrupted before all ids were asked".to_owned()));
     }
     let print = if args.json { print_json } else { print_table };
@@ -78,10 +78,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 /// Ids that have not answered, though bytes came when they were asked.
 fn damaged(bus: &Bus) -> Vec<NodeId> {
-    let is_damaged = |node: &NodeId| {
-        bus.status(*node).is_none() && bus.master.node_statistics(*node).crc_errors > 0
-    };
-    NodeId::ALL.into_iter().filter(is_damaged).collect()
+    NodeId::ALL.into_iter().filter(|&node| bus.is_damaged(node)).collect()
 }
 
 fn print_json(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
@@ -110,7 +107,11 @@ fn print_table(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
     for (node, mode, status) in bus.nodes() {
         let Dip { value_plus_one, value } = Dip::of(node, mode);
         let [first, second] = [value_plus_one, value].map(|it| it.unwrap_or("none".to_owned()));
-        writeln!(out, "{node:>4}  {mode:<8}  {first:<19}  {second:<15}  {}", Measured(status))?;
+        writeln!(
+            out,
+            "{node:>4}  {mode:<8}  {first:<19}  {second:<15}  {}",
+            OneMotor::describe(status)
+        )?;
     }
     let damaged = damaged(bus);
     for node in &damaged {

@@ -1,29 +1,34 @@
 //! `axle spin`: one motor turns, and stands still again before the tool ends.
 
-use std::io::{self, Write};
-
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Cause, Health, MasterEvent, NodeId, OneMotor, Position, Rps, Status, WriteRequest},
-    stream::Encode,
+    ikeya::{MasterEvent, Mode, NodeId, OneMotor, Position, Rps, Status, Target},
     time::{Duration, Instant},
 };
 
 use crate::{
-    EXIT_CODES, args,
-    bus::{self, Bus, Measured},
-    ctrl_c::CtrlC,
+    MOTION_HELP, args,
+    bus::{self, Boards, Bus},
     failure::Failure,
     port::Line,
+    signals::{Attendance, DEAD_MAN, Signals},
+    teller::{self, Teller},
 };
 
 /// Turn one motor of a motor bus for a while
 ///
-/// Finds the node, commands it and prints what it measures. At the end, on Ctrl-C and on every error
-/// the motor is stopped: a velocity node gets 0 rps, a position node holds the position measured
-/// last. The tool waits until the motor stands still, and says so.
+/// Finds the node, reads it once more, commands it and prints what it measures. At the end, on every
+/// error and on every signal that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not those
+/// of a crash, nor 32 and 33, which belong to the C library), the motor is stopped: a velocity node
+/// gets 0 rps, a position node holds the position that is then read. The tool goes on until the node
+/// has confirmed the stop twice and stands still, or says what is known instead; a second Ctrl-C
+/// does not end that earlier. After Ctrl-Z and fg nothing moves again, and the exit code is 1.
+///
+/// The exit code is 1 as well if the target is not reached when the time is over: the last speed has
+/// to be within 10 % or 0.1 rps of it, whichever is more, but not further than half of it or, if
+/// that is more, 0.05 rps; the last position within 8 counts.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXIT_CODES)]
+#[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::MasterArgs,
@@ -34,6 +39,10 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     goal: GoalArgs,
+
+    /// Refuse an --rps faster than this, in either direction: a typing error is not to move a motor
+    #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
+    max_rps: Rps,
 
     /// How long, seconds
     #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
@@ -47,67 +56,86 @@ struct GoalArgs {
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::rps)]
     rps: Option<Rps>,
 
-    /// For a position node: go so many revolutions on from where it stands
+    /// For a position node: go this many revolutions on from where it is
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::revolutions)]
     revolutions: Option<Position>,
-}
-
-/// What the motor is to do.
-#[derive(Clone, Copy, Debug)]
-enum Goal {
-    Turn(Rps),
-    GoTo(Position),
 }
 
 /// How often the measured value is printed.
 const PRINT_PERIOD: Duration = Duration::from_millis(250);
 
-/// How long a motor may take to stand still once it is told to.
-const STOP_PATIENCE: Duration = Duration::from_millis(3000);
+/// Longest pause between two looks at the bus: well under the master's dead-man.
+const CALL_PERIOD: Duration = Duration::from_millis(50);
 
-/// Slower than this is standing still: 1/20 rps, and as much between two positions 20 ms apart.
-const STILL_RPS: f32 = 0.05;
-const STILL_COUNTS: u32 = 8;
+/// A measurement older than this says nothing about the motor now.
+const FRESH: Duration = Duration::from_millis(250);
 
-/// How often a stop is sent to a node that no longer answers.
-const BLIND_STOPS: u32 = 5;
+/// Largest difference between a position and its target.
+const TARGET_COUNTS: u32 = 8;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let ctrl_c = CtrlC::listen()?;
-    let mut bus = Bus::open(&args.bus)?;
-    if !bus.discover(&ctrl_c)? {
-        return Err(Failure::Undone("interrupted before anything moved".to_owned()));
+    if let Some(rps) = args.goal.rps
+        && rps.get().abs() > args.max_rps.get()
+    {
+        let (rps, limit) = (rps.get(), args.max_rps.get());
+        return Err(Failure::Usage(format!(
+            "--rps {rps} is faster than --max-rps {limit}: give a larger limit if you mean it"
+        )));
     }
-    let goal = choose(args, &bus)?;
-    let (node, start) = (args.node, bus.port.now());
-    let mut spin = Spin { bus, node, start, failure: None, out: io::stdout() };
-    let consequence = format!("node {node} cannot be told to stop any more");
-
-    let spun = spin.spin(goal, args.micros, &ctrl_c);
-    if let Err(failure @ Failure::PortLost { .. }) = spun {
-        return Err(failure.while_moving(&consequence));
-    }
-    // Whatever else has happened: first the motor, then the complaint. That it may still turn is the
-    // gravest of all.
-    spin.stop().map_err(|failure| failure.while_moving(&consequence))?;
-    spun
+    let signals = Signals::listen_to_all()?;
+    let result = prepare_and_spin(args, &signals);
+    // The port is closed by now.
+    signals.suspend_if_wanted(result)
 }
 
-/// What this node is to do, if it is there and in the right mode.
-fn choose(args: &Args, bus: &Bus) -> Result<Goal, Failure> {
+fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
+    let mut bus = Bus::open(&args.bus)?;
+    if !bus.discover(signals)? {
+        return signals.interrupted();
+    }
+    let node = args.node;
+    let found = choose(args, &bus, bus.status(node))?;
+    // Printed before anything moves: a terminal may suspend whoever prints in the background.
+    teller::print(&line(0.0, node, &announce(found))).map_err(Failure::Write)?;
+
+    // The discovery took a while, and so may the reader of that line: the mode may have changed.
+    let status = bus.read(node, signals)?;
+    if signals.is_raised() {
+        return signals.interrupted();
+    }
+    if bus.master.is_mode_in_doubt(node) {
+        return Err(Failure::Undone(format!("the mode of node {node} is in doubt")));
+    }
+    let target = choose(args, &bus, status)?;
+    let start = bus.port.now();
+    let mut spin = Spin { bus, node, start, teller: Teller::new() };
+
+    let spun = spin.spin(target, args.micros, signals);
+    // Whatever has happened: first the motor, then the complaint. That it may still turn is the
+    // gravest of all.
+    let stopped = spin.stop();
+    let told = spin.teller.finish();
+    stopped?;
+    spun.map_err(|failure| failure.and("it was stopped and stands still"))?;
+    told
+}
+
+/// What this node is to do, if it answers and is in the right mode.
+fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Target, Failure> {
     let node = args.node;
     let refuse = |line: String| Err(Failure::Undone(line));
-    match (bus.status(node), args.goal.rps, args.goal.revolutions) {
-        (Some(Status::Velocity(_)), Some(rps), _) => Ok(Goal::Turn(rps)),
+    match (status, args.goal.rps, args.goal.revolutions) {
+        (Some(Status::Velocity(_)), Some(rps), _) => Ok(Target::Velocity(rps)),
         (Some(Status::Position(at)), _, Some(way)) => {
             let goal = at.counts().checked_add(way.counts()).map(Position::from_counts);
             match goal {
-                Some(Ok(goal)) => Ok(Goal::GoTo(goal)),
+                Some(Ok(goal)) => Ok(Target::Position(goal)),
                 _ => refuse(format!(
-                    "node {node} is at {}: {} more are beyond what a position can tell",
-                    Measured(Status::Position(at)),
-                    Measured(Status::Position(way)),
+                    "node {node} is at {:.4} turns: {:.4} turns more are beyond what a position \
+                     can tell",
+                    at.revolutions(),
+                    way.revolutions(),
                 )),
             }
         }
@@ -118,44 +146,53 @@ fn choose(args: &Args, bus: &Bus) -> Result<Goal, Failure> {
             refuse(format!("node {node} is in position mode: use --revolutions"))
         }
         (None, ..) => {
-            let found: Vec<_> =
-                bus.nodes().map(|(node, mode, _)| format!("{node} ({mode})")).collect();
+            let found: Vec<_> = bus
+                .nodes()
+                .filter(|(other, ..)| *other != node)
+                .map(|(node, mode, _)| format!("{node} ({mode})"))
+                .collect();
             let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
             refuse(format!("node {node} does not answer; nodes that do: {found}"))
         }
     }
 }
 
+fn announce(target: Target) -> String {
+    match target {
+        Target::Velocity(rps) => format!("to turn at {:.2} rps", rps.get()),
+        Target::Position(position) => format!("to go to {:.4} turns", position.revolutions()),
+    }
+}
+
+fn line(seconds: f64, node: NodeId, what: &str) -> String {
+    format!("{seconds:7.2} s  node {node}: {what}")
+}
+
 struct Spin {
     bus: Bus,
     node: NodeId,
-    /// Since when the motor has been commanded.
+    /// When the motor was commanded.
     start: Instant,
-    /// What was heard instead of the last answer that failed.
-    failure: Option<Cause>,
-    out: io::Stdout,
+    teller: Teller,
 }
 
 impl Spin {
-    /// Commands the motor and watches it until the time is over.
-    fn spin(&mut self, goal: Goal, micros: u64, ctrl_c: &CtrlC) -> Result<(), Failure> {
-        let commanded = match goal {
-            Goal::Turn(rps) => self.bus.master.set_velocity(self.node, rps),
-            Goal::GoTo(position) => self.bus.master.set_position(self.node, position),
-        };
-        commanded.map_err(|error| Failure::Undone(error.to_string()))?;
-        self.say(&match goal {
-            Goal::Turn(rps) => format!("to turn at {:.2} rps", rps.get()),
-            Goal::GoTo(position) => format!("to go to {:.4} turns", position.revolutions()),
-        })?;
-
+    /// Commands the motor and watches it until the time is over or a signal comes.
+    fn spin(&mut self, target: Target, micros: u64, signals: &Signals) -> Result<(), Failure> {
+        self.command(target)?;
         let end = Instant::from_micros(self.start.as_micros() + micros);
         let mut print_at = self.start + PRINT_PERIOD;
-        while self.bus.port.now() < end && !ctrl_c.is_pressed() {
-            self.bus.round(end.min(print_at))?;
-            while let Some(event) = self.bus.master.poll_event() {
-                self.look_at(event)?;
+        let mut attendance = Attendance::new(self.start);
+        while !signals.is_raised() {
+            let now = self.bus.port.now();
+            attendance.check(now)?;
+            if now >= end {
+                return self.check_reached(target);
             }
+            self.bus.master.keep_alive(now);
+            self.bus.round(end.min(print_at).min(now + CALL_PERIOD))?;
+            attendance.check(self.bus.port.now())?;
+            self.check_follows(target)?;
             if self.bus.port.now() >= print_at {
                 print_at = self.bus.port.now() + PRINT_PERIOD;
                 self.say_status("")?;
@@ -164,129 +201,128 @@ impl Spin {
         Ok(())
     }
 
+    /// The master refuses what is meant for another mode than the last one heard.
+    fn command(&mut self, target: Target) -> Result<(), Failure> {
+        let (master, node) = (&mut self.bus.master, self.node);
+        match target {
+            Target::Velocity(rps) => master.set_velocity(node, rps, self.start),
+            Target::Position(position) => master.set_position(node, position, self.start),
+        }
+        .map_err(|error| Failure::Undone(error.to_string()))
+    }
+
     /// Ends the spin where the node no longer follows.
-    fn look_at(&mut self, event: MasterEvent) -> Result<(), Failure> {
-        let node = self.node;
-        match event {
-            MasterEvent::ReadFailed { node: failed, cause } if failed == node => {
-                self.failure = Some(cause);
-                if self.is_online() {
-                    return Ok(());
-                }
-                Err(Failure::Undone(format!("node {node} does not answer any more")))
+    fn check_follows(&mut self, target: Target) -> Result<(), Failure> {
+        let (bus, node) = (&mut self.bus, self.node);
+        let mut has_dead_man_fired = false;
+        while let Some(event) = bus.master.poll_event() {
+            has_dead_man_fired |= event == MasterEvent::DeadMan;
+        }
+        let refuse = |line: String| Err(Failure::Undone(line));
+        match bus.master.mode(node) {
+            _ if !bus.is_online(node) => refuse(format!("node {node} does not answer any more")),
+            Some(mode) if mode != target.mode() => {
+                refuse(format!("node {node} has changed to {mode} mode"))
             }
-            MasterEvent::ModeChanged { node: changed, mode } if changed == node => {
-                Err(Failure::Undone(format!("node {node} has changed to {mode} mode")))
+            _ if bus.master.is_mode_in_doubt(node) => {
+                let other = match target.mode() {
+                    Mode::Velocity => Mode::Position,
+                    Mode::Position => Mode::Velocity,
+                };
+                refuse(format!("node {node} has answered in {other} mode"))
+            }
+            _ if has_dead_man_fired => refuse(DEAD_MAN.to_owned()),
+            _ if bus.master.set_point(node) != Some(target) => {
+                refuse(format!("node {node} has lost its command"))
             }
             _ => Ok(()),
         }
     }
 
-    fn is_online(&self) -> bool {
-        matches!(self.bus.master.health(self.node), Some(Health::Online | Health::Suspect(_)))
+    /// At the end of the time: is the motor where it was to be, or as fast?
+    fn check_reached(&self, target: Target) -> Result<(), Failure> {
+        let (node, now) = (self.node, self.bus.port.now());
+        let measured = self.bus.master.status(node);
+        let fresh = measured.filter(|&(_, at)| at > self.start && now - at <= FRESH);
+        let line = match fresh {
+            Some((status, _)) if is_reached(target, status) => return Ok(()),
+            Some((status, _)) => {
+                let (now, target) = (OneMotor::describe(status), announce(target));
+                format!("node {node} was {target} and is at {now} when the time is over")
+            }
+            None => format!("node {node} was not measured when the time was over"),
+        };
+        Err(Failure::Undone(line))
     }
 
-    /// Stops the motor (ruling I6), and waits until it has answered that it stands still.
+    /// Stops the motor and waits until it stands still (rulings I6, I12).
     fn stop(&mut self) -> Result<(), Failure> {
-        let (node, end) = (self.node, self.bus.port.now() + STOP_PATIENCE);
-        let (mut confirmed, mut before) = (false, None);
-        if self.order_stop().is_err() {
-            return self.stop_blindly();
-        }
-        while self.bus.port.now() < end {
-            self.bus.round(end)?;
-            while let Some(event) = self.bus.master.poll_event() {
-                match event {
-                    MasterEvent::Confirmed { node: it } if it == node => confirmed = true,
-                    MasterEvent::NotConfirmed { node: it, cause } if it == node => {
-                        self.failure = Some(cause);
-                        // Refused where the node is abnormal, which ends this below.
-                        let _ = self.bus.master.confirm(node);
-                    }
-                    MasterEvent::ModeChanged { node: it, .. } if it == node => {
-                        let _ = self.order_stop();
-                    }
-                    MasterEvent::Status { node: it, status } if it == node && confirmed => {
-                        if stands_still(before, status) {
-                            // Where nobody reads that, it stands all the same.
-                            drop(self.say_status(", stopped and confirmed"));
-                            return Ok(());
-                        }
-                        before = Some(status);
-                    }
-                    _ => {}
-                }
-            }
-            if !self.is_online() {
-                return self.stop_blindly();
-            }
-        }
-        let patience = STOP_PATIENCE.as_micros() / 1_000_000;
-        Err(Failure::Undone(match self.bus.status(node) {
-            Some(status) if confirmed => {
-                let now = Measured(status);
-                format!("node {node} was told to stop and still moves after {patience} s: {now}")
-            }
-            _ => format!("node {node} was told to stop and has not confirmed it in {patience} s"),
-        }))
-    }
-
-    fn order_stop(&mut self) -> Result<(), axlewire::ikeya::CommandError> {
-        self.bus.master.stop(self.node)?;
-        self.bus.master.confirm(self.node)
-    }
-
-    /// The node does not answer, but may still hear: sends the stop without the master, which
-    /// commands only who answers.
-    fn stop_blindly(&mut self) -> Result<(), Failure> {
-        let node = self.node;
-        let packet = match self.bus.status(node) {
-            Some(Status::Position(held)) => WriteRequest::position(node, held),
-            _ => WriteRequest::velocity(node, Rps::ZERO),
+        let failure = self.bus.stop(self.node.into()).err();
+        let Some(complaint) = self.bus.complaint(self.node) else {
+            // Where nobody reads that, it stands still all the same.
+            drop(self.say_status(", stopped and confirmed"));
+            return Ok(());
         };
-        let mut buffer = [0; WriteRequest::LEN];
-        let bytes =
-            packet.encode(&mut buffer).map_err(|error| Failure::Undone(error.to_string()))?;
-        for _ in 0..BLIND_STOPS {
-            self.bus.port.send(bytes)?;
-            let pause = self.bus.port.now() + Duration::from_millis(20);
-            while self.bus.port.now() < pause {
-                self.bus.port.receive(pause)?;
-            }
-        }
-        let heard = match self.failure {
-            Some(Cause::Damaged) => "damaged bytes are heard",
-            Some(Cause::Unexpected) => "other answers are heard",
-            _ => "nothing is heard",
-        };
-        Err(Failure::Undone(format!(
-            "node {node} does not answer any more ({heard}): a stop was sent {BLIND_STOPS} times, \
-             unconfirmed"
-        )))
+        Err(match failure {
+            Some(failure) => failure.while_moving(&complaint),
+            None => Failure::Undone(complaint),
+        })
     }
 
     fn say_status(&mut self, what: &str) -> Result<(), Failure> {
-        match self.bus.status(self.node) {
-            Some(status) => self.say(&format!("{}{what}", Measured(status))),
-            None => Ok(()),
-        }
-    }
-
-    fn say(&mut self, what: &str) -> Result<(), Failure> {
+        let Some(status) = self.bus.status(self.node) else { return Ok(()) };
         let seconds = (self.bus.port.now() - self.start).as_micros() as f64 / 1e6;
-        writeln!(self.out, "{seconds:7.2} s  node {}: {what}", self.node)
-            .and_then(|()| self.out.flush())
-            .map_err(Failure::Write)
+        let what = format!("{}{what}", OneMotor::describe(status));
+        self.teller.say(line(seconds, self.node, &what))
     }
 }
 
-/// Does a motor that measures `now`, and measured `before`, stand still?
-fn stands_still(before: Option<Status<OneMotor>>, now: Status<OneMotor>) -> bool {
-    match (before, now) {
-        (_, Status::Velocity(rps)) => rps.abs() <= STILL_RPS,
-        (Some(Status::Position(before)), Status::Position(now)) => {
-            before.counts().abs_diff(now.counts()) <= STILL_COUNTS
+fn is_reached(target: Target, status: Status<OneMotor>) -> bool {
+    match (target, status) {
+        (Target::Velocity(target), Status::Velocity(now)) => {
+            (now - target.get()).abs() <= tolerance(target)
+        }
+        (Target::Position(target), Status::Position(now)) => {
+            now.counts().abs_diff(target.counts()) <= TARGET_COUNTS
         }
         _ => false,
+    }
+}
+
+/// Largest difference between a speed and its target, rps. A motor that stands still has not
+/// reached a slow speed, unless that counts as standing still itself.
+fn tolerance(target: Rps) -> f32 {
+    let target = target.get().abs();
+    (target * 0.1).max((target * 0.5).min(0.1)).max(0.05)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn velocity(target: f32, now: f32) -> bool {
+        is_reached(Target::Velocity(Rps::new(target).unwrap()), Status::Velocity(now))
+    }
+
+    #[test]
+    fn a_speed_is_reached_within_10_percent_or_a_tenth() {
+        assert!(velocity(10.0, 9.01) && velocity(10.0, 10.99) && velocity(-10.0, -9.01));
+        assert!(!velocity(10.0, 8.99) && !velocity(10.0, 11.01) && !velocity(-10.0, 10.0));
+        assert!(velocity(0.5, 0.41) && !velocity(0.5, 0.39));
+    }
+
+    #[test]
+    fn a_motor_that_stands_still_has_not_reached_a_slow_speed() {
+        assert!(!velocity(0.12, 0.0) && !velocity(-0.12, 0.0) && velocity(0.12, 0.08));
+        assert!(velocity(0.0, 0.04) && !velocity(0.0, 0.06) && !velocity(1.0, f32::NAN));
+    }
+
+    #[test]
+    fn a_position_is_reached_within_8_counts_and_no_speed_is_a_position() {
+        let target = Target::Position(Position::from_counts(8000).unwrap());
+        let at = |counts| Status::Position(Position::from_counts(counts).unwrap());
+        assert!(is_reached(target, at(8008)) && is_reached(target, at(7992)));
+        assert!(!is_reached(target, at(8009)) && !is_reached(target, at(7991)));
+        assert!(!is_reached(target, Status::Velocity(8000.0)));
     }
 }

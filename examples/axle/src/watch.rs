@@ -13,14 +13,14 @@ use axlewire::{
 };
 
 use crate::{
-    EXIT_CODES,
+    MOTION_HELP,
     args::{self, Protocol},
-    ctrl_c::CtrlC,
     decode::BUFFER_LEN,
     failure::Failure,
     human,
     port::{Line, Port},
     record::{Frame, Summary},
+    signals::Signals,
 };
 
 /// Watch a line without sending anything
@@ -32,7 +32,7 @@ use crate::{
 /// Nothing is asked, so only what is on the line anyway is seen: robots report by themselves, nodes
 /// of a motor bus answer only to a master, and on a four-wire bus an adapter hears one direction.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXIT_CODES)]
+#[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     line: args::Line,
@@ -55,15 +55,15 @@ const QUIET: Duration = Duration::from_millis(30);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let ctrl_c = CtrlC::listen()?;
+    let signals = Signals::listen()?;
     match args.protocol {
-        Protocol::Ucp => watch::<ucp::Ucp>(args, ucp::BAUD, &ctrl_c),
-        Protocol::Ikeya => watch::<ikeya::Either>(args, ikeya::BAUD, &ctrl_c),
-        Protocol::Ikeya3 => watch::<three::Either>(args, ikeya::BAUD, &ctrl_c),
+        Protocol::Ucp => watch::<ucp::Ucp>(args, ucp::BAUD, &signals),
+        Protocol::Ikeya => watch::<ikeya::Either>(args, ikeya::BAUD, &signals),
+        Protocol::Ikeya3 => watch::<three::Either>(args, ikeya::BAUD, &signals),
     }
 }
 
-fn watch<F>(args: &Args, baud: u32, ctrl_c: &CtrlC) -> Result<(), Failure>
+fn watch<F>(args: &Args, baud: u32, signals: &Signals) -> Result<(), Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Into<Frame<'a>>,
@@ -77,7 +77,7 @@ where
     let (mut print_at, mut heard_at) = (port.now() + period, port.now());
 
     let broken = loop {
-        if ctrl_c.is_pressed() {
+        if signals.is_raised() {
             break Ok(());
         }
         let received = match port.receive(print_at) {

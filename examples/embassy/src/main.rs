@@ -10,7 +10,7 @@
 use axlewire::{
     drive::{Driver, WithDelay},
     time::{Duration, Instant},
-    ucp::{BAUD, MotorControl, OtaStatus, Robot, RobotConfig, RobotEvent, Telemetry},
+    ucp::{BAUD, OtaStatus, Robot, RobotConfig, RobotEvent, Telemetry},
 };
 use embassy_executor::Spawner;
 use embassy_stm32::{
@@ -91,17 +91,11 @@ async fn main(_spawner: Spawner) {
         }
         let now = rover.now();
         let command = rover.role().command(now);
-        let (left_pct, right_pct) = wheels(&command);
+        let (left_pct, right_pct) = command.wheels_pct();
         left.turn(left_pct);
         right.turn(right_pct);
         lamp.set_level(if command.front_led() == 0 { Level::Low } else { Level::High });
     }
-}
-
-/// The speeds of the left and the right wheel, percent. Positive `angular` turns right (ruling U6).
-fn wheels(command: &MotorControl) -> (i16, i16) {
-    let mix = |turn: i16| command.speed().saturating_add(turn).clamp(-100, 100);
-    (mix(command.angular()), mix(command.angular().saturating_neg()))
 }
 
 /// What 12 bits of the converter say: 4095 is 13.2 V. Three cells are empty at 9.6 V, full at 12.6 V.

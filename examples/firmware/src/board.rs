@@ -90,6 +90,11 @@ impl Board {
         Some(Self { clock, bus, driver_enable, text, lamp, stack, is_emulated })
     }
 
+    /// Is this an emulator? Its line carries a byte in no time.
+    pub const fn is_emulated(&self) -> bool {
+        self.is_emulated
+    }
+
     /// How long to wait for what is due `on_board`: longer in an emulator, whose host is never in time.
     pub fn patience(&self, on_board: Duration) -> Duration {
         if self.is_emulated { on_board.max(EMULATOR_PATIENCE) } else { on_board }

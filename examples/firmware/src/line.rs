@@ -2,7 +2,12 @@
 //!
 //! Not by `core::fmt`, which would be the larger part of these programs.
 
+use core::ops::Deref;
+
 use heapless::String;
+use stm32f4::stm32f405::usart1::RegisterBlock;
+
+use crate::uart::Channel;
 
 /// Longest line, bytes, its end included. Shorter than the queue that it is sent through.
 const LEN: usize = 500;
@@ -40,6 +45,16 @@ impl Line {
     pub fn thousandths(&mut self, name: &str, value: f32) -> &mut Self {
         // `as` truncates and saturates, so half of one away from zero makes it round.
         self.number(name, (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i32)
+    }
+
+    /// Adds what a USART has lost or damaged.
+    pub fn losses<U: Deref<Target = RegisterBlock> + Send>(
+        &mut self,
+        channel: &Channel<U>,
+    ) -> &mut Self {
+        self.count("overruns", channel.overruns())
+            .count("lost", channel.lost())
+            .count("damaged", channel.damaged())
     }
 
     fn digits(&mut self, sign: &str, value: u32) -> &mut Self {

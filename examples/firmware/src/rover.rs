@@ -15,7 +15,7 @@ const TURN_PER_RPM: f32 = 4.0;
 
 /// A rover on flat ground with a battery that stays full: commands go in, telemetry comes out.
 ///
-/// A positive `angular` turns it right, as the vendor firmware does (ruling U6).
+/// It steers as the vendor's firmware does (ruling U6).
 #[derive(Debug)]
 pub struct Rover {
     left_rpm: Lag,
@@ -31,10 +31,10 @@ impl Rover {
 
     /// Drives as commanded from now on.
     pub fn command(&mut self, command: &MotorControl) {
-        let (speed, turn) = (f32::from(command.speed()), f32::from(command.angular()));
-        let rpm = |percent: f32| percent.clamp(-100.0, 100.0) / 100.0 * FULL_RPM;
-        self.left_rpm.target = rpm(speed + turn);
-        self.right_rpm.target = rpm(speed - turn);
+        let (left_pct, right_pct) = command.wheels_pct();
+        let rpm = |percent: i16| f32::from(percent) / 100.0 * FULL_RPM;
+        self.left_rpm.target = rpm(left_pct);
+        self.right_rpm.target = rpm(right_pct);
     }
 
     /// Lets `dt` pass, less than a second.

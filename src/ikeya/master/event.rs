@@ -1,4 +1,4 @@
-//! What a master tells: events, refusals, counts.
+//! Events of a master, and its refusals.
 
 use core::fmt;
 
@@ -42,19 +42,46 @@ pub enum MasterEvent<B: Board = OneMotor> {
         /// To what.
         health: Health,
     },
-    /// A node answers in another mode than before; its set-point is dropped.
+    /// A node has answered twice in another mode than before; its set-point is dropped (I11).
     ModeChanged {
         /// Which.
         node: NodeId,
         /// The new mode.
         mode: Mode,
     },
+    /// The mode of a node is in doubt, and six exchanges have not decided it (I11). It is read at the
+    /// pace of the search from now on.
+    ModeInDoubt {
+        /// Which.
+        node: NodeId,
+    },
+    /// The same of a node that is owed a stop: it cannot be written before the mode is known. **The
+    /// motor may be running.**
+    StopBlocked {
+        /// Which.
+        node: NodeId,
+    },
+    /// A stop is paid: two stop WRITEs have each been followed by an answer of the node (I12). The
+    /// motor may still be running out.
+    Stopped {
+        /// Which.
+        node: NodeId,
+    },
+    /// A node whose stop is paid was measured standing still: below 0.05 rps, or within 8 counts in
+    /// 20 ms or more (I12).
+    StandingStill {
+        /// Which.
+        node: NodeId,
+    },
+    /// The application has given no sign of life for [`MasterConfig::dead_man`](super::MasterConfig::dead_man):
+    /// every node under a set-point is owed a stop (I13).
+    DeadMan,
     /// A node has answered a READ that followed the WRITE to be confirmed.
     Confirmed {
         /// Which.
         node: NodeId,
     },
-    /// The READ that was to confirm a WRITE failed.
+    /// The READ that was to confirm a WRITE failed, or the set-point was dropped before.
     NotConfirmed {
         /// Which node.
         node: NodeId,
@@ -63,7 +90,7 @@ pub enum MasterEvent<B: Board = OneMotor> {
     },
 }
 
-/// Why a window closed without its answer.
+/// Why there is no answer, or no confirmation.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -74,6 +101,8 @@ pub enum Cause {
     Damaged,
     /// Only other nodes were heard, or the node in another mode.
     Unexpected,
+    /// The set-point to be confirmed was dropped: released, stopped, or meant for another mode.
+    Dropped,
 }
 
 /// Why a command is refused.
@@ -93,8 +122,18 @@ pub enum CommandError {
         /// The mode it is in.
         mode: Mode,
     },
-    /// The node has not told a position yet that could be held (ruling I6).
-    NoPosition {
+    /// An answer has put the node's mode in doubt (ruling I11). Try again after the next one.
+    ModeInDoubt {
+        /// Which.
+        node: NodeId,
+    },
+    /// The node is owed a stop (ruling I12). Wait for [`MasterEvent::Stopped`].
+    StopOwed {
+        /// Which.
+        node: NodeId,
+    },
+    /// The node has no set-point that could be confirmed.
+    NoSetPoint {
         /// Which.
         node: NodeId,
     },
@@ -105,29 +144,11 @@ impl fmt::Display for CommandError {
         match self {
             Self::NotOnline { node } => write!(f, "node {node} is not online"),
             Self::WrongMode { node, mode } => write!(f, "node {node} is in {mode} mode"),
-            Self::NoPosition { node } => write!(f, "node {node} has not told its position"),
+            Self::ModeInDoubt { node } => write!(f, "the mode of node {node} is in doubt"),
+            Self::StopOwed { node } => write!(f, "node {node} has not confirmed its stop yet"),
+            Self::NoSetPoint { node } => write!(f, "node {node} has no set-point"),
         }
     }
 }
 
 impl core::error::Error for CommandError {}
-
-/// What the master has seen of the line as a whole.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub struct MasterStatistics {
-    /// WRITE packets sent.
-    pub writes: u32,
-    /// READ packets sent.
-    pub reads: u32,
-    /// Bytes dropped because they stood on the line before a request, bytes.
-    pub stale_bytes: u32,
-    /// Own bytes heard again and removed, bytes.
-    pub echo_bytes: u32,
-    /// Times that the echo was not what had been sent.
-    pub echo_errors: u32,
-    /// Events refused because nobody took the older ones.
-    pub lost_events: u32,
-}

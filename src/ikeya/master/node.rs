@@ -1,10 +1,19 @@
-//! What a master keeps of one node.
+//! Everything that a master keeps of one node.
 
-use super::{MasterConfig, Mode, Polling, Status};
+use super::{
+    Cause, CommandError, MasterConfig, Mode, NodeId, NodeStatistics, Polling, Status, StopProgress,
+    queue::Reason,
+    set_point::{Confirm, SetPoint},
+    stop::{Standstill, Stop},
+};
 use crate::{
     ikeya::{Board, Target},
-    time::{Duration, Instant},
+    time::Instant,
 };
+
+/// Exchanges without a decision after which the application is told that a mode stays in doubt
+/// (I11). The node has been abnormal since the third, and is read at the pace of the search.
+pub(super) const DOUBT_EXCHANGES: u8 = 6;
 
 /// How a node is (ruling I7).
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -13,159 +22,68 @@ use crate::{
 pub enum Health {
     /// It answered the last time.
     Online,
-    /// It missed so many answers in a row, 1 or 2.
+    /// It missed this many answers in a row, 1 or 2.
     Suspect(u8),
-    /// It missed three in a row. It is no longer commanded, and asked now and then.
+    /// It missed three in a row. It gets no set-points, and is asked now and then.
     Abnormal,
 }
 
-/// The counts of one node. All wrap.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub struct NodeStatistics {
-    /// Requests that it was to answer.
-    pub requests: u32,
-    /// Answers in time.
-    pub replies: u32,
-    /// Windows that closed without its answer, for whatever reason.
-    pub timeouts: u32,
-    /// Of these, windows in which bytes were heard but no packet: damaged on the way.
-    pub crc_errors: u32,
-    /// Answers outside their window, or in another node's.
-    pub late: u32,
-    /// Answers in another mode than the node's, not believed the first time.
-    pub other_mode: u32,
-    /// Requests that repeated one without an answer.
-    pub retries: u32,
-    latency_min_us: u32,
-    latency_max_us: u32,
-    latency_sum_us: u64,
-}
-
-impl NodeStatistics {
-    /// Shortest time from the end of a request to the beginning of its answer.
-    #[must_use]
-    pub const fn latency_min(&self) -> Duration {
-        Duration::from_micros(self.latency_min_us)
-    }
-
-    /// Mean time from the end of a request to the beginning of its answer.
-    #[must_use]
-    pub const fn latency_mean(&self) -> Duration {
-        match self.latency_sum_us.checked_div(self.replies as u64) {
-            Some(mean) => Duration::from_micros(mean as u32),
-            None => Duration::ZERO,
-        }
-    }
-
-    /// Longest time from the end of a request to the beginning of its answer.
-    #[must_use]
-    pub const fn latency_max(&self) -> Duration {
-        Duration::from_micros(self.latency_max_us)
-    }
-
-    pub(super) fn reply(&mut self, latency: Duration) {
-        let micros = latency.as_micros();
-        let first = self.replies == 0;
-        self.latency_min_us = if first { micros } else { self.latency_min_us.min(micros) };
-        self.latency_max_us = self.latency_max_us.max(micros);
-        self.latency_sum_us = self.latency_sum_us.wrapping_add(micros.into());
-        self.replies = self.replies.wrapping_add(1);
-    }
-}
-
-/// How far the confirmation of a WRITE has come.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) enum Confirm {
-    Unasked,
-    AfterWrite,
-    AfterRead,
-}
-
-/// When a node is to be visited.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) enum Due {
-    Never,
-    Now,
-    At(Instant),
-}
-
-impl Due {
-    pub(super) fn is_reached(self, now: Instant) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Now => true,
-            Self::At(at) => now >= at,
-        }
-    }
-}
-
-#[derive(Debug)]
+// Flags in front: there they take short instructions.
+#[derive(Clone, Debug)]
+#[repr(C)]
 pub(super) struct Node<B: Board> {
     /// `None` until it has answered once.
     pub(super) health: Option<Health>,
+    /// The mode on record.
     pub(super) mode: Option<Mode>,
-    /// The last answer was in the other mode, and was not believed.
-    pub(super) other_mode: bool,
-    pub(super) target: Option<Target<B>>,
-    /// The set-point has not been sent yet.
-    pub(super) fresh: bool,
-    /// The set-point is a stop, which goes to abnormal nodes too.
-    pub(super) is_stop: bool,
-    /// A new set-point has been sent out of turn since the last exchange.
-    pub(super) jumped: bool,
-    /// The set-point has been sent in this cycle.
-    pub(super) written: bool,
+    /// The mode is in doubt: exchanges since then that decided nothing.
+    pub(super) doubt: Option<u8>,
+    /// The latest order, sent or not, is a set-point: not a stop, and not none at all.
+    pub(super) is_under_order: bool,
+    /// It has had a WRITE since it was asked last: it is read before its set-point is repeated.
+    pub(super) is_written: bool,
     pub(super) confirm: Confirm,
-    pub(super) status: Option<(Status<B>, Instant)>,
     /// Windows in a row that closed without its answer.
     pub(super) strikes: u8,
-    /// Attempts of the READ under way that have failed.
+    /// Failed attempts of the READ under way.
     pub(super) attempt: u8,
-    /// A READ has been asked for by hand.
-    pub(super) asked: bool,
+    /// The application, or a doubt, asks for a READ.
+    pub(super) is_asked: bool,
+    /// Requests in the discovery under way.
+    pub(super) scans: u8,
+    pub(super) last_failure: Option<Cause>,
+    pub(super) stop: Option<Stop<B>>,
+    pub(super) set_point: Option<SetPoint<B>>,
     /// Not to be asked before then: a late answer may be on its way.
     pub(super) guarded_until: Option<Instant>,
-    /// When the next READ is due, with [`Polling::Every`].
+    /// When the next READ is due; only set with [`Polling::Every`].
     pub(super) read_due: Option<Instant>,
-    /// How often it has been asked in the discovery under way.
-    pub(super) scans: u8,
+    pub(super) standstill: Standstill<B>,
+    pub(super) status: Option<(Status<B>, Instant)>,
     pub(super) statistics: NodeStatistics,
 }
 
 impl<B: Board> Node<B> {
-    pub(super) fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             health: None,
             mode: None,
-            other_mode: false,
-            target: None,
-            fresh: false,
-            is_stop: false,
-            jumped: false,
-            written: false,
+            doubt: None,
+            set_point: None,
+            is_under_order: false,
+            is_written: false,
             confirm: Confirm::Unasked,
+            stop: None,
+            standstill: Standstill::Unwatched,
             status: None,
+            last_failure: None,
             strikes: 0,
             attempt: 0,
-            asked: false,
+            is_asked: false,
             guarded_until: None,
             read_due: None,
             scans: 0,
-            statistics: NodeStatistics {
-                requests: 0,
-                replies: 0,
-                timeouts: 0,
-                crc_errors: 0,
-                late: 0,
-                other_mode: 0,
-                retries: 0,
-                latency_min_us: 0,
-                latency_max_us: 0,
-                latency_sum_us: 0,
-            },
+            statistics: NodeStatistics::NEW,
         }
     }
 
@@ -177,33 +95,144 @@ impl<B: Board> Node<B> {
         self.health == Some(Health::Abnormal)
     }
 
+    /// It has been told something, a stop that is paid included, or is to be.
+    pub(super) fn is_commanded(&self) -> bool {
+        self.set_point.is_some() || self.is_under_order
+    }
+
+    pub(super) fn stop_progress(&self) -> StopProgress {
+        match (&self.stop, &self.standstill) {
+            (Some(_), _) => StopProgress::Owed,
+            (None, Standstill::Unwatched) => StopProgress::NotAsked,
+            (None, Standstill::Watched(_)) => StopProgress::Paid,
+            (None, Standstill::Reached) => StopProgress::StandingStill,
+        }
+    }
+
     /// Takes a new set-point; the latest wins.
-    pub(super) fn aim(&mut self, target: Target<B>) {
-        (self.target, self.fresh, self.is_stop) = (Some(target), true, false);
+    ///
+    /// Refused, and not kept, unless the node is online, is owed no stop, and is in that mode
+    /// without a doubt.
+    pub(super) fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
+        self.check(node, &target)?;
+        self.set_point = Some(SetPoint::new(target));
+        (self.is_under_order, self.standstill) = (true, Standstill::Unwatched);
+        Ok(())
     }
 
-    pub(super) fn forget_target(&mut self) {
-        (self.target, self.fresh, self.is_stop) = (None, false, false);
+    pub(super) fn check(&self, node: NodeId, target: &Target<B>) -> Result<(), CommandError> {
+        let mode =
+            self.mode.filter(|_| self.is_online()).ok_or(CommandError::NotOnline { node })?;
+        if self.stop.is_some() {
+            return Err(CommandError::StopOwed { node });
+        }
+        if self.doubt.is_some() {
+            return Err(CommandError::ModeInDoubt { node });
+        }
+        if mode != target.mode() {
+            return Err(CommandError::WrongMode { node, mode });
+        }
+        Ok(())
     }
 
-    /// The set-point has been sent.
-    pub(super) fn sent_target(&mut self) {
-        (self.fresh, self.written) = (false, true);
-        if self.confirm == Confirm::AfterWrite {
-            self.confirm = Confirm::AfterRead;
+    /// Drops the set-point; says whether the application waits for its confirmation.
+    pub(super) fn drop_set_point(&mut self) -> bool {
+        self.set_point = None;
+        core::mem::replace(&mut self.confirm, Confirm::Unasked) != Confirm::Unasked
+    }
+
+    /// The stop WRITE to be sent next, if it may be.
+    ///
+    /// In doubt about the mode, only a position that means standstill to a velocity node (I11).
+    pub(super) fn stop_write(&self) -> Option<Target<B>> {
+        let stop = self.stop.as_ref().filter(|stop| !stop.is_written)?;
+        let hold = stop.hold.map(Target::Position);
+        match (self.mode?, self.doubt) {
+            (Mode::Velocity, None) => Some(Target::STANDSTILL),
+            (Mode::Position, None) => hold,
+            (_, Some(_)) => hold.filter(|_| stop.hold.is_some_and(B::is_still_as_velocity)),
         }
-        if !self.is_online() {
-            self.forget_target();
+    }
+
+    /// Whether it is due a request for this reason now.
+    pub(super) fn is_due(&self, reason: Reason, config: &MasterConfig, now: Instant) -> bool {
+        self.wants(reason, config) && self.earliest(reason).is_none_or(|at| now >= at)
+    }
+
+    /// Whether it is to be sent a request for this reason, at once or later.
+    #[inline(never)]
+    pub(super) fn wants(&self, reason: Reason, config: &MasterConfig) -> bool {
+        let is_online = self.is_online();
+        match reason {
+            Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::StopRead if !is_online => {
+                false
+            }
+            Reason::Hold => {
+                self.stop.as_ref().is_some_and(Stop::is_measured) && self.stop_write().is_some()
+            }
+            Reason::SpeedStop => matches!(self.stop_write(), Some(Target::Velocity(_))),
+            Reason::Stop => self.stop_write().is_some(),
+            Reason::StopRead => {
+                self.doubt.is_some() || (self.stop.is_some() && self.stop_write().is_none())
+            }
+            Reason::LostStop | Reason::Search if is_online => false,
+            Reason::LostStop => self.awaits_lost_stop(config),
+            Reason::SetPoint => {
+                self.doubt.is_none() && self.set_point.as_ref().is_some_and(|it| it.is_new)
+            }
+            Reason::Search => {
+                self.stop.is_some() || (self.is_abnormal() && config.recovery_share_pct > 0)
+            }
+            Reason::Cycle => is_online && self.is_in_cycle(config),
+            Reason::Discovery => true,
         }
+    }
+
+    /// No request for this reason before then.
+    #[inline(never)]
+    pub(super) fn earliest(&self, reason: Reason) -> Option<Instant> {
+        match reason {
+            // A WRITE that is answered waits, like a READ, for a late answer to be over.
+            Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::SetPoint
+                if !B::ANSWERS_WRITE =>
+            {
+                None
+            }
+            Reason::Cycle if !self.is_wanted() => self.read_due.max(self.guarded_until),
+            _ => self.guarded_until,
+        }
+    }
+
+    /// Whether it is owed a stop, and has not had the attempts that are made at once while it is not
+    /// online: one, or those of a READ where nothing has ever been heard of it.
+    fn awaits_lost_stop(&self, config: &MasterConfig) -> bool {
+        let limit = if self.health.is_none() { config.attempts.max(1) } else { 1 };
+        self.stop.as_ref().is_some_and(|stop| stop.lost_attempts < limit)
+    }
+
+    /// Whether it has turns in the cycle: to be read, or its set-point repeated.
+    fn is_in_cycle(&self, config: &MasterConfig) -> bool {
+        let is_polled = self.is_wanted() || config.polling != Polling::Manual;
+        is_polled && self.stop.is_none() && self.doubt.is_none()
+    }
+
+    /// Whether it is to be read whatever the polling is.
+    fn is_wanted(&self) -> bool {
+        self.attempt > 0 || self.is_asked || self.confirm != Confirm::Unasked
     }
 
     /// A request that it is to answer has been sent.
-    pub(super) fn sent_read(&mut self, config: &MasterConfig, now: Instant) {
+    pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
         self.statistics.requests = self.statistics.requests.wrapping_add(1);
         if self.attempt > 0 {
             self.statistics.retries = self.statistics.retries.wrapping_add(1);
         }
-        (self.written, self.asked) = (false, false);
+        (self.is_asked, self.is_written) = (false, false);
+        let is_lost = !self.is_online();
+        if let Some(stop) = &mut self.stop {
+            stop.is_asked = true;
+            stop.lost_attempts = stop.lost_attempts.saturating_add(is_lost.into());
+        }
         if let Polling::Every(period) = config.polling {
             // Without drift, and without a burst after a pause.
             match self.read_due {
@@ -211,41 +240,6 @@ impl<B: Board> Node<B> {
                 Some(due) if due + period > now => self.read_due = Some(due + period),
                 _ => self.read_due = Some(now + period),
             }
-        }
-    }
-
-    /// When it is to be read, or its set-point repeated.
-    pub(super) fn due(&self, config: &MasterConfig) -> Due {
-        let due = match config.polling {
-            _ if !self.is_online() => return Due::Never,
-            _ if self.attempt > 0 || self.asked || self.confirm == Confirm::AfterRead => Due::Now,
-            Polling::Fastest => Due::Now,
-            Polling::Every(_) => self.read_due.map_or(Due::Now, Due::At),
-            Polling::Manual => Due::Never,
-        };
-        self.guarded(due)
-    }
-
-    /// When a set-point that has not been sent yet may go.
-    pub(super) fn fresh_due(&self) -> Due {
-        match (self.fresh, B::ANSWERS_WRITE) {
-            (false, _) => Due::Never,
-            (true, false) => Due::Now,
-            (true, true) => self.askable(),
-        }
-    }
-
-    /// When it may be asked at all: a late answer of it has to be over.
-    pub(super) fn askable(&self) -> Due {
-        self.guarded(Due::Now)
-    }
-
-    /// Not before the guard is over.
-    fn guarded(&self, due: Due) -> Due {
-        match (due, self.guarded_until) {
-            (Due::Now, Some(until)) => Due::At(until),
-            (Due::At(at), Some(until)) => Due::At(at.max(until)),
-            (due, _) => due,
         }
     }
 }

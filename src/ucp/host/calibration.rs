@@ -7,10 +7,12 @@ use crate::{
 };
 
 /// A request that has not been settled.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Request {
     step: CalibrationStep,
     kind: CalibrationKind,
+    /// What the robot has been told to begin last, if that is known.
+    last_start: Option<CalibrationKind>,
     attempts: u8,
     /// What the latest attempt has come to so far.
     cause: FailureCause,
@@ -37,8 +39,14 @@ pub(super) enum Answer {
 }
 
 impl Request {
-    pub(super) const fn new(step: CalibrationStep, kind: CalibrationKind, now: Instant) -> Self {
-        Self { step, kind, attempts: 0, cause: FailureCause::NoAnswer, wait: Wait::Send(now) }
+    pub(super) const fn new(
+        step: CalibrationStep,
+        kind: CalibrationKind,
+        last_start: Option<CalibrationKind>,
+        now: Instant,
+    ) -> Self {
+        let (cause, wait) = (FailureCause::NoAnswer, Wait::Send(now));
+        Self { step, kind, last_start, attempts: 0, cause, wait }
     }
 
     /// What to send now, if anything, and whether it was sent before.
@@ -58,10 +66,18 @@ impl Request {
         Some((self.step, self.kind, again))
     }
 
+    /// The latest attempt did not reach the line: it does not count, and is due again.
+    pub(super) const fn unsent(&mut self, now: Instant) {
+        self.attempts = self.attempts.saturating_sub(1);
+        self.wait = Wait::Send(now);
+    }
+
     /// Takes in an acknowledgement.
     ///
-    /// Its kind is looked at only where the vendor firmware tells the truth: after a good start. It
-    /// tells the kind of the start before in a bad one, and that of the last start in an end.
+    /// After a good start its kind is the kind asked for. In a bad one the vendor firmware tells
+    /// the kind of the start before, so that is not looked at. After an end it tells the kind of
+    /// the last start, so that counts as well as the kind asked for, and any kind where the last
+    /// start is not known.
     pub(super) fn acknowledge(
         &mut self,
         step: CalibrationStep,
@@ -70,8 +86,12 @@ impl Request {
         now: Instant,
         config: &HostConfig,
     ) -> Answer {
-        let good_start = step == CalibrationStep::Start && err == ErrorCode::Fine;
-        if step != self.step || self.attempts == 0 || (good_start && kind != self.kind) {
+        let is_its_kind = kind == self.kind
+            || match step {
+                CalibrationStep::Start => err != ErrorCode::Fine,
+                CalibrationStep::End => self.last_start.is_none_or(|last| kind == last),
+            };
+        if step != self.step || self.attempts == 0 || !is_its_kind {
             return Answer::Unasked;
         }
         if err != ErrorCode::Fine {

@@ -1,11 +1,11 @@
-//! What a host can be told to do differently.
+//! Host settings.
 
 use crate::{
     time::{Duration, wire_time},
     ucp::{BAUD, CalibrationStart, FrameOf, role::SHORTEST},
 };
 
-/// Periods and timeouts of a [`Host`](super::Host).
+/// Settings of a [`Host`](super::Host): periods, timeouts, and what it may send.
 ///
 /// Take the default and change what has to be different. A period or timeout under 1 ms counts as
 /// 1 ms, because a driver would spin otherwise.
@@ -26,6 +26,13 @@ pub struct HostConfig {
     /// Shortest pause between two motor commands that differ; 20 ms, a tenth of the line. In
     /// between the latest wins. A command to stand still does not wait for it.
     pub command_gap: Duration,
+    /// Begins with a zero motor command, before any ping or answer (ruling U16); `true`.
+    ///
+    /// A vendor robot keeps driving while *any* byte arrives. A host that is restarted within 500
+    /// ms and only pings would keep it moving, so it is told to stand still at once, and again
+    /// every 100 ms until the application drives. `false` is for hosts that only listen: no motor
+    /// command goes out before the first call, and what another program has told the robot goes on.
+    pub sends_first_stop: bool,
     /// Dead-man: after this much silence of the application the robot is told to stand still
     /// (ruling U10); 500 ms.
     pub command_timeout: Duration,
@@ -44,6 +51,19 @@ pub struct HostConfig {
     /// A frame is cut off by a pause of two byte times and this; 20 ms, because USB adapters and
     /// operating systems hand in bytes up to 16 ms late. On a bare UART 1 ms will do.
     pub quiet_margin: Duration,
+    /// Never sends an id in 5..=0x0A, for robots that hang on them (ruling U14); `false`.
+    ///
+    /// Firmware built from the vendor's main branch hangs for ever on any such frame, the answer to
+    /// its own boot request included. v6.38, which ships, does not. To recognise such a build: the
+    /// first ping after the biases is never answered, and no report comes any more.
+    ///
+    /// With it set, calibration results are kept but not acknowledged, so the robot repeats them
+    /// every 1000 ms. Its request for biases is not answered, and each is a
+    /// [`HostEvent::BiasesNotAnswered`](super::HostEvent::BiasesNotAnswered): its measurements are
+    /// off. [`Host::set_network_state`](super::Host::set_network_state) and
+    /// [`Host::start_firmware_update`](super::Host::start_firmware_update) are refused with
+    /// [`CommandError::LowIdsOnly`](super::CommandError::LowIdsOnly).
+    pub low_ids_only: bool,
 }
 
 impl HostConfig {
@@ -62,7 +82,6 @@ impl HostConfig {
     /// The same with nothing shorter than a driver can keep.
     pub(super) fn sane(self) -> Self {
         Self {
-            baud: self.baud,
             command_period: self.command_period.max(SHORTEST),
             command_gap: self.command_gap.max(SHORTEST),
             command_timeout: self.command_timeout.max(SHORTEST),
@@ -70,8 +89,7 @@ impl HostConfig {
             ping_timeout: self.ping_timeout.max(SHORTEST),
             link_timeout: self.link_timeout.max(SHORTEST),
             ack_timeout: self.ack_timeout.max(SHORTEST),
-            attempts: self.attempts.max(1),
-            quiet_margin: self.quiet_margin,
+            ..self
         }
     }
 }
@@ -82,6 +100,7 @@ impl Default for HostConfig {
             baud: BAUD,
             command_period: Duration::from_millis(100),
             command_gap: Duration::from_millis(20),
+            sends_first_stop: true,
             command_timeout: Duration::from_millis(500),
             ping_period: Some(Duration::from_millis(200)),
             ping_timeout: Duration::from_millis(500),
@@ -89,6 +108,7 @@ impl Default for HostConfig {
             ack_timeout: Duration::from_millis(200),
             attempts: 3,
             quiet_margin: Duration::from_millis(20),
+            low_ids_only: false,
         }
     }
 }

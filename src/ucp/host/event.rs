@@ -20,7 +20,8 @@ use crate::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum HostEvent {
-    /// A valid frame of a robot has arrived, the first or the first after [`LinkDown`](Self::LinkDown).
+    /// A valid frame of a robot has arrived, the first or the first after
+    /// [`LinkDown`](Self::LinkDown).
     LinkUp,
     /// No valid frame of a robot has arrived for the link timeout: since the last one, or at all.
     LinkDown,
@@ -43,8 +44,11 @@ pub enum HostEvent {
     /// A calibration request has come to nothing.
     CalibrationFailed(CalibrationFailure),
     /// The result of an IMU calibration, which has been stored. A repetition is no event.
+    ///
+    /// Without a store that keeps it, this event is the only copy: it is acknowledged because it is
+    /// here, and the robot says it again if there was no room (ruling U15).
     ImuBias(ImuBias),
-    /// The result of a magnetometer calibration, which has been stored. A repetition is no event.
+    /// The result of a magnetometer calibration, likewise.
     MagBias(MagBias),
     /// The store has refused the result of this calibration; the robot will send it again.
     BiasNotStored(CalibrationKind),
@@ -58,6 +62,10 @@ pub enum HostEvent {
         /// Magnetometer biases are missing.
         mag: bool,
     },
+    /// The robot has booted and asks for biases, but
+    /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids the answer (ruling
+    /// U14). It asks again in a second.
+    BiasesNotAnswered,
     /// The robot has answered the request to update its firmware.
     UpdateAnswered(OtaStatus),
     /// A good frame that this crate has no message for (ruling U3).
@@ -160,12 +168,7 @@ pub enum FailureCause {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CommandError {
-    /// The motor command, a copy of a received one, would start a firmware update (rulings U7, U13).
-    StartsUpdate {
-        /// Its version field.
-        version: u16,
-    },
-    /// The motor command, a copy of a received one, is out of range (ruling U7).
+    /// A speed or turn out of range (ruling U7).
     Value(EncodeError),
     /// A network state above 255, which one byte cannot carry (ruling U8).
     NetworkState {
@@ -177,9 +180,17 @@ pub enum CommandError {
         /// What was asked for.
         kind: u8,
     },
-    /// A calibration request is still waiting for its acknowledgement.
+    /// A calibration request is still waiting for its acknowledgement, or its event for room in the
+    /// queue.
     Calibrating,
-    /// The robot has to stand still before its firmware is updated.
+    /// The frame would have an id in 5..=0x0A, and
+    /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids those (ruling U14).
+    LowIdsOnly {
+        /// The id.
+        id: u8,
+    },
+    /// The robot has to be told to stand still before its firmware is updated, and the stop has to
+    /// have been [sent](super::Host::is_stop_sent).
     Moving,
     /// The firmware is being updated: this frame would end up in it.
     Updating,
@@ -188,15 +199,15 @@ pub enum CommandError {
 impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::StartsUpdate { version } => {
-                write!(f, "motor command with version {version} would start a firmware update")
-            }
             Self::Value(_) => f.write_str("motor command is out of range"),
             Self::NetworkState { state } => {
                 write!(f, "network state {state} does not fit into one byte")
             }
             Self::CalibrationKind { kind } => write!(f, "no robot can calibrate {kind}"),
             Self::Calibrating => f.write_str("a calibration request is still unanswered"),
+            Self::LowIdsOnly { id } => {
+                write!(f, "frames with id {id:#04x} are switched off: this robot may hang on them")
+            }
             Self::Moving => f.write_str("the robot has to stand still for a firmware update"),
             Self::Updating => f.write_str("a firmware update is under way"),
         }
@@ -250,8 +261,13 @@ pub struct HostStatistics {
     pub results_repeated: u32,
     /// Calibration results that the store has refused.
     pub results_not_stored: u32,
+    /// Calibration results not acknowledged for want of room for their event: the robot repeats
+    /// them.
+    pub results_without_room: u32,
     /// Requests for biases received.
     pub bias_requests: u32,
+    /// Biases sent.
+    pub biases: u32,
     /// Good frames without a message.
     pub unknown: u32,
     /// Frames that only a host sends, such as our own on an echoing line: not looked at.
@@ -266,6 +282,7 @@ pub struct RoundTrip {
     min: u32,
     max: u32,
     sum: u64,
+    last: u32,
 }
 
 impl RoundTrip {
@@ -273,14 +290,24 @@ impl RoundTrip {
         let micros = round_trip.as_micros();
         self.min = if self.count == 0 { micros } else { self.min.min(micros) };
         self.max = self.max.max(micros);
-        self.sum = self.sum.saturating_add(micros.into());
-        self.count = self.count.saturating_add(1);
+        self.last = micros;
+        // 2^32 spans of 32 bits fit into 64; one more would let the mean drift.
+        if let Some(count) = self.count.checked_add(1) {
+            self.count = count;
+            self.sum += u64::from(micros);
+        }
     }
 
     /// How many were measured.
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.count
+    }
+
+    /// The latest; `None` before the first.
+    #[must_use]
+    pub const fn last(&self) -> Option<Duration> {
+        if self.count == 0 { None } else { Some(Duration::from_micros(self.last)) }
     }
 
     /// The fastest; `None` before the first.

@@ -45,6 +45,22 @@ impl Ping {
         late
     }
 
+    /// The ping did not reach the line and is due again; `false` if it has been given up by now.
+    pub(super) fn unsent(&mut self, now: Instant) -> bool {
+        let sent = matches!(self, Self::Sent { .. });
+        if sent {
+            *self = Self::Due(now);
+        }
+        sent
+    }
+
+    /// Ends a silence: what was due during it is due now.
+    pub(super) fn resume(&mut self, now: Instant) {
+        if let Self::Due(at) = self {
+            *at = now.max(*at);
+        }
+    }
+
     pub(super) const fn deadline(&self) -> Option<Instant> {
         match *self {
             Self::Off => None,

@@ -1,24 +1,26 @@
-//! What a host knows, is waiting for and has to send.
+//! What a host knows and is waiting for.
 
 use super::{
-    CalibrationStep, CommandError, HostConfig, HostEvent, HostStatistics, Link, ReceivedReport,
-    UnknownFrame,
+    CalibrationFailure, CalibrationStep, CommandError, HostConfig, HostEvent, HostStatistics, Link,
+    ReceivedReport, UnknownFrame,
     calibration::{Answer, Request},
     motor::Motor,
     ping::Ping,
+    results::Results,
+    send::Outgoing,
 };
 use crate::{
+    events::Events,
     time::Instant,
     ucp::{
-        self, BiasStore, Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode,
-        Frame, ImuBias, ImuBiasAck, MAX_LEN, MagBias, MagBiasAck, Message, OtaRequest, OtaStatus,
-        Pong, RawFrame, Report, SetNetworkState,
-        role::{Events, bump, is_from_host, reached, write},
+        BiasStore, CalibrationKind, ErrorCode, Frame, ImuBias, MagBias, Message, NetworkState,
+        OtaStatus, Pong, RawFrame, Report, SetNetworkState,
+        role::{bump, is_from_host, reached},
     },
 };
 
 /// Everything but the bytes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct State<S> {
     pub(super) config: HostConfig,
     pub(super) store: S,
@@ -28,30 +30,39 @@ pub(super) struct State<S> {
     pub(super) index: u8,
     pub(super) link: Link,
     /// When the link goes down.
-    link_until: Option<Instant>,
+    pub(super) link_until: Option<Instant>,
     pub(super) motor: Motor,
-    ping: Ping,
+    pub(super) ping: Ping,
     pub(super) calibration: Option<Request>,
+    /// What the robot has been told to begin last; `None` if this host does not know.
+    last_start: Option<CalibrationKind>,
+    /// What a calibration request has come to, while there is no room for the event.
+    outcome: Option<HostEvent>,
+    /// What the latest calibration request has come to.
+    pub(super) settled: Option<Result<(), CalibrationFailure>>,
     pub(super) update: Update,
     pub(super) network: Option<SetNetworkState>,
     pub(super) last_report: Option<ReceivedReport>,
+    /// The latest report has not been taken.
+    pub(super) is_report_new: bool,
     /// Index of the report before, where there is one to count from.
     last_index: Option<u8>,
-    /// Results taken since the calibration began, to know a repetition.
-    imu_taken: Option<ImuBias>,
-    mag_taken: Option<MagBias>,
+    pub(super) imu: Results<ImuBias>,
+    pub(super) mag: Results<MagBias>,
     /// What is to be sent, and since when.
-    imu_ack_due: Option<Instant>,
-    mag_ack_due: Option<Instant>,
-    biases_due: Option<(Instant, Biases)>,
+    pub(super) biases_due: Option<Instant>,
+    /// The application knows that the biases go out.
+    pub(super) biases_told: bool,
     pub(super) network_due: Option<Instant>,
+    /// The frame that was handed out last, as long as it may come back.
+    pub(super) last: Option<Outgoing>,
 }
 
 /// Where a firmware update is.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Update {
     None,
-    /// The request is to be sent.
+    /// The request is to be sent, once the robot has been told to stand still.
     Asked {
         version: i16,
         at: Instant,
@@ -70,19 +81,23 @@ impl<S: BiasStore> State<S> {
             index: 0,
             link: Link::Waiting,
             link_until: Some(now + config.link_timeout),
-            motor: Motor::default(),
+            motor: Motor::new(now, &config),
             ping: Ping::new(now, &config),
             calibration: None,
+            last_start: None,
+            outcome: None,
+            settled: None,
             update: Update::None,
             network: None,
             last_report: None,
+            is_report_new: false,
             last_index: None,
-            imu_taken: None,
-            mag_taken: None,
-            imu_ack_due: None,
-            mag_ack_due: None,
+            imu: Results::new(),
+            mag: Results::new(),
             biases_due: None,
+            biases_told: false,
             network_due: None,
+            last: None,
         }
     }
 
@@ -95,16 +110,94 @@ impl<S: BiasStore> State<S> {
         if self.update != Update::None {
             return Err(CommandError::Updating);
         }
-        if self.calibration.is_some() {
+        if self.is_calibrating() {
             return Err(CommandError::Calibrating);
         }
-        match kind {
-            CalibrationKind::Imu => self.imu_taken = None,
-            CalibrationKind::Magnetometer => self.mag_taken = None,
-            CalibrationKind::Other(kind) => return Err(CommandError::CalibrationKind { kind }),
+        match (kind, step) {
+            (CalibrationKind::Other(kind), _) => {
+                return Err(CommandError::CalibrationKind { kind });
+            }
+            (CalibrationKind::Imu, CalibrationStep::Start) => self.imu.begin(),
+            (CalibrationKind::Magnetometer, CalibrationStep::Start) => self.mag.begin(),
+            // A result that has come by now is the one that is told.
+            (_, CalibrationStep::End) => {}
         }
-        self.calibration = Some(Request::new(step, kind, now));
+        let request = Request::new(step, kind, self.last_start, now);
+        (self.calibration, self.settled) = (Some(request), None);
         Ok(())
+    }
+
+    /// Is a request unanswered, or its end untold?
+    pub(super) const fn is_calibrating(&self) -> bool {
+        self.calibration.is_some() || self.outcome.is_some()
+    }
+
+    pub(super) fn show(&mut self, network: NetworkState, now: Instant) -> Result<(), CommandError> {
+        let body = SetNetworkState::new(network)
+            .ok_or(CommandError::NetworkState { state: network.into() })?;
+        self.allow(0x0A)?;
+        if self.network.replace(body) != Some(body) {
+            self.network_due = Some(now);
+        }
+        Ok(())
+    }
+
+    pub(super) fn start_update(&mut self, version: i16, at: Instant) -> Result<(), CommandError> {
+        self.allow(9)?;
+        if self.update != Update::None {
+            return Err(CommandError::Updating);
+        }
+        if self.is_calibrating() {
+            return Err(CommandError::Calibrating);
+        }
+        if !self.motor.allows_update() {
+            return Err(CommandError::Moving);
+        }
+        // A robot whose firmware is being updated hears no stop any more, so one damaged stop must
+        // not be enough to update it while it drives.
+        self.motor.repeat(at);
+        self.update = Update::Asked { version, at };
+        Ok(())
+    }
+
+    /// The line is the host's again.
+    pub(super) fn end_update(&mut self, now: Instant) {
+        self.update = Update::None;
+        self.motor.resume(now);
+        self.ping.resume(now);
+        // What the robot has asked for during the silence is due now.
+        let dues = [
+            &mut self.imu.ack_due,
+            &mut self.mag.ack_due,
+            &mut self.biases_due,
+            &mut self.network_due,
+        ];
+        dues.into_iter().flatten().for_each(|at| *at = now.max(*at));
+    }
+
+    /// May a frame with this id, one of 5..=0x0A, be sent (ruling U14)?
+    const fn allow(&self, id: u8) -> Result<(), CommandError> {
+        if self.config.low_ids_only { Err(CommandError::LowIdsOnly { id }) } else { Ok(()) }
+    }
+
+    pub(super) fn pop_event(&mut self) -> Option<HostEvent> {
+        let event = self.events.pop();
+        self.use_room();
+        event
+    }
+
+    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+    pub(super) fn retain_events(&mut self, mut stays: impl FnMut(&HostEvent) -> bool) {
+        self.events.retain(&mut stays);
+        self.outcome = self.outcome.take().filter(stays);
+        self.use_room();
+    }
+
+    /// Tells what has been waiting for room.
+    fn use_room(&mut self) {
+        if let Some(outcome) = self.outcome.take() {
+            self.outcome = self.events.keep(outcome).err();
+        }
     }
 
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant) {
@@ -126,7 +219,7 @@ impl<S: BiasStore> State<S> {
             Message::ImuBias(bias) => self.imu_result(*bias, at),
             Message::MagBias(bias) => self.mag_result(*bias, at),
             Message::BiasRequest(_) => self.bias_request(at),
-            Message::OtaAck(ack) => self.update_answer(ack.status()),
+            Message::OtaAck(ack) => self.update_answer(ack.status(), at),
             Message::Unknown(raw) => self.unknown(&raw),
             // Commands of a host, which have been refused above.
             _ => {}
@@ -138,7 +231,7 @@ impl<S: BiasStore> State<S> {
         self.link_until = Some(at + self.config.link_timeout);
         if self.link != Link::Up {
             self.link = Link::Up;
-            self.events.push(HostEvent::LinkUp);
+            self.events.push_latest(HostEvent::LinkUp, is_link);
             self.network_due = self.network.map(|_| at);
         }
     }
@@ -153,7 +246,7 @@ impl<S: BiasStore> State<S> {
             bump(&mut self.stats.pings_damaged);
         }
         self.stats.round_trip.add(round_trip);
-        self.events.push(HostEvent::Pong { round_trip, err });
+        self.events.push_frequent(HostEvent::Pong { round_trip, err });
     }
 
     fn report(&mut self, report: &Report<'_>, index: u8) {
@@ -168,8 +261,8 @@ impl<S: BiasStore> State<S> {
         bump(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
-        self.last_report = Some(report);
-        self.events.push(HostEvent::Report(report));
+        (self.last_report, self.is_report_new) = (Some(report), true);
+        self.events.push_frequent(HostEvent::Report(report));
     }
 
     fn acknowledge(
@@ -192,39 +285,67 @@ impl<S: BiasStore> State<S> {
 
     fn settle_calibration(&mut self, event: HostEvent) {
         self.calibration = None;
-        if matches!(event, HostEvent::CalibrationFailed(_)) {
-            bump(&mut self.stats.calibration_failures);
-        }
-        self.events.push(event);
+        self.settled = Some(match event {
+            HostEvent::CalibrationFailed(failure) => {
+                bump(&mut self.stats.calibration_failures);
+                if failure.step == CalibrationStep::Start {
+                    // It may have arrived all the same.
+                    self.last_start = None;
+                }
+                Err(failure)
+            }
+            HostEvent::CalibrationStarted(kind) => {
+                self.last_start = Some(kind);
+                Ok(())
+            }
+            _ => Ok(()),
+        });
+        // Without room it waits, and until then there is no other request.
+        self.outcome = self.events.keep(event).err();
     }
 
     fn imu_result(&mut self, bias: ImuBias, at: Instant) {
-        if self.imu_taken == Some(bias) {
+        if self.imu.is_repetition(&bias) {
             bump(&mut self.stats.results_repeated);
-        } else if self.store.store_imu(bias).is_ok() {
-            self.imu_taken = Some(bias);
-            self.events.push(HostEvent::ImuBias(bias));
-        } else {
+        } else if self.store.store_imu(bias).is_err() {
+            self.imu.refuse();
             return self.not_stored(CalibrationKind::Imu);
+        } else if !self.is_kept(HostEvent::ImuBias(bias)) {
+            return self.imu.refuse();
         }
-        self.imu_ack_due = Some(at);
+        let ack_due = self.allow(6).is_ok().then_some(at);
+        self.imu.take(bias, ack_due);
     }
 
     fn mag_result(&mut self, bias: MagBias, at: Instant) {
-        if self.mag_taken == Some(bias) {
+        if self.mag.is_repetition(&bias) {
             bump(&mut self.stats.results_repeated);
-        } else if self.store.store_mag(bias).is_ok() {
-            self.mag_taken = Some(bias);
-            self.events.push(HostEvent::MagBias(bias));
-        } else {
+        } else if self.store.store_mag(bias).is_err() {
+            self.mag.refuse();
             return self.not_stored(CalibrationKind::Magnetometer);
+        } else if !self.is_kept(HostEvent::MagBias(bias)) {
+            return self.mag.refuse();
         }
-        self.mag_ack_due = Some(at);
+        let ack_due = self.allow(7).is_ok().then_some(at);
+        self.mag.take(bias, ack_due);
+    }
+
+    /// Tells of a result that the store has taken; will the application find it (ruling U15)?
+    fn is_kept(&mut self, event: HostEvent) -> bool {
+        if self.store.keeps() {
+            self.events.push(event);
+            return true;
+        }
+        let kept = self.events.keep(event).is_ok();
+        if !kept {
+            bump(&mut self.stats.results_without_room);
+        }
+        kept
     }
 
     fn not_stored(&mut self, kind: CalibrationKind) {
         bump(&mut self.stats.results_not_stored);
-        self.events.push(HostEvent::BiasNotStored(kind));
+        self.events.push_frequent(HostEvent::BiasNotStored(kind));
     }
 
     /// The robot has booted, not more than a second ago or unanswered since.
@@ -232,26 +353,27 @@ impl<S: BiasStore> State<S> {
         bump(&mut self.stats.bias_requests);
         self.last_index = None;
         self.network_due = self.network.map(|_| at);
-        match self.store.load() {
-            (Some(imu), Some(mag)) => self.biases_due = Some((at, Biases::new(imu, mag))),
-            (imu, mag) => {
-                let (imu, mag) = (imu.is_none(), mag.is_none());
-                self.events.push(HostEvent::BiasesMissing { imu, mag });
-            }
+        if self.allow(8).is_ok() {
+            // Which biases is decided when they are sent: better ones may be on their way.
+            self.biases_due = Some(at);
+            self.biases_told = false;
+        } else {
+            self.events.push_frequent(HostEvent::BiasesNotAnswered);
         }
     }
 
-    fn update_answer(&mut self, status: OtaStatus) {
+    fn update_answer(&mut self, status: OtaStatus, at: Instant) {
         if self.update == Update::Silent && status != OtaStatus::Accepted {
-            self.update = Update::None;
+            self.end_update(at);
         }
-        self.events.push(HostEvent::UpdateAnswered(status));
+        let is_answer = |event: &HostEvent| matches!(event, HostEvent::UpdateAnswered(_));
+        self.events.push_latest(HostEvent::UpdateAnswered(status), is_answer);
     }
 
     fn unknown(&mut self, frame: &RawFrame<'_>) {
         bump(&mut self.stats.unknown);
         if let Some(frame) = UnknownFrame::copy(frame) {
-            self.events.push(HostEvent::Unknown(frame));
+            self.events.push_frequent(HostEvent::Unknown(frame));
         }
     }
 
@@ -262,7 +384,7 @@ impl<S: BiasStore> State<S> {
             self.link = Link::Down;
             self.last_index = None;
             bump(&mut self.stats.links_lost);
-            self.events.push(HostEvent::LinkDown);
+            self.events.push_latest(HostEvent::LinkDown, is_link);
         }
         if self.ping.expire(now, &self.config) {
             bump(&mut self.stats.pings_lost);
@@ -279,75 +401,8 @@ impl<S: BiasStore> State<S> {
             self.events.push(HostEvent::DeadMan);
         }
     }
+}
 
-    /// Writes the most urgent frame that is due and says how long it is.
-    pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
-        let index = self.index;
-        if self.update == Update::Silent {
-            return None;
-        }
-        if let Some(command) = self.motor.take(now, &self.config) {
-            bump(&mut self.stats.commands);
-            return Some(write(command, index, buffer));
-        }
-        if self.imu_ack_due.take().is_some() {
-            return Some(write(ImuBiasAck::new(ErrorCode::Fine), index, buffer));
-        }
-        if self.mag_ack_due.take().is_some() {
-            return Some(write(MagBiasAck::new(ErrorCode::Fine), index, buffer));
-        }
-        if let Some((_, biases)) = self.biases_due.take() {
-            self.events.push(HostEvent::BiasesSent);
-            return Some(write(biases, index, buffer));
-        }
-        let request = self.calibration.as_mut();
-        if let Some((step, kind, again)) =
-            request.and_then(|request| request.take(now, &self.config))
-        {
-            if again {
-                bump(&mut self.stats.calibration_retries);
-            }
-            return Some(match step {
-                CalibrationStep::Start => write(CalibrationStart::new(kind), index, buffer),
-                CalibrationStep::End => write(CalibrationEnd::new(kind), index, buffer),
-            });
-        }
-        if let Some(body) = self.network.filter(|_| self.network_due.take().is_some()) {
-            return Some(write(body, index, buffer));
-        }
-        if let Update::Asked { version, .. } = self.update {
-            self.update = Update::Silent;
-            self.motor.pause();
-            return Some(write(OtaRequest::start_firmware_update(version), index, buffer));
-        }
-        if self.ping.take(now, &self.config) {
-            bump(&mut self.stats.pings);
-            return Some(write(ucp::Ping {}, index, buffer));
-        }
-        None
-    }
-
-    pub(super) fn deadline(&self) -> Option<Instant> {
-        if self.update == Update::Silent {
-            return self.link_until;
-        }
-        let asked = match self.update {
-            Update::Asked { at, .. } => Some(at),
-            _ => None,
-        };
-        [
-            self.link_until,
-            self.motor.deadline(),
-            self.ping.deadline(),
-            self.calibration.as_ref().map(Request::deadline),
-            self.imu_ack_due,
-            self.mag_ack_due,
-            self.biases_due.map(|(at, _)| at),
-            self.network_due,
-            asked,
-        ]
-        .into_iter()
-        .flatten()
-        .min()
-    }
+fn is_link(event: &HostEvent) -> bool {
+    matches!(event, HostEvent::LinkUp | HostEvent::LinkDown)
 }

@@ -1,11 +1,11 @@
-//! What a robot can be told to do differently.
+//! Robot settings.
 
 use crate::{
     time::Duration,
     ucp::{BAUD, role::SHORTEST},
 };
 
-/// Periods and timeouts of a [`Robot`](super::Robot).
+/// Settings of a [`Robot`](super::Robot).
 ///
 /// Take the default and change what has to be different. A period or timeout under 1 ms counts as
 /// 1 ms, because a driver would spin otherwise.

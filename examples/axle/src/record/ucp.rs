@@ -162,7 +162,7 @@ fn fields(frame: &ucp::Frame) -> (&'static str, Fields<'_>) {
     }
 }
 
-fn motor_control(body: &ucp::MotorControl) -> Fields<'static> {
+fn motor_control(body: &ucp::RawMotorControl) -> Fields<'static> {
     Fields::MotorControl(MotorControl {
         speed: body.speed(),
         angular: body.angular(),

@@ -8,7 +8,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, args, ctrl_c::CtrlC, failure::Failure, port::Line};
+use crate::{EXIT_CODES, args, failure::Failure, port::Line, signals::Signals};
 
 /// Motors on a bus: they answer, and turn as they are told
 #[derive(Debug, clap::Args)]
@@ -56,9 +56,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         }
         nodes.0.push(Node::new(node, mode, args.watchdog));
     }
-    let ctrl_c = CtrlC::listen()?;
+    let signals = Signals::listen()?;
     let mut pty = Pty::open(args.faults)?;
-    while !ctrl_c.is_pressed() {
+    while !signals.is_raised() {
         let until = pty.now() + STEP;
         pty.round(&mut nodes, until)?;
         let now = pty.now();

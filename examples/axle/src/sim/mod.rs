@@ -1,4 +1,4 @@
-//! `axle sim`: what hangs on a line, played on a pseudo-terminal.
+//! `axle sim`: motors or a rover, played on a pseudo-terminal.
 
 mod ikeya;
 mod pty;

@@ -11,7 +11,7 @@ use serialport::{ClearBuffer, SerialPort, TTYPort};
 use super::Faults;
 use crate::{
     failure::Failure,
-    port::{Line, Port},
+    port::{Line, NotSent, Port},
 };
 
 /// Bytes that may wait for a reader. On a wire, what nobody reads is gone; here it would wait for
@@ -67,7 +67,7 @@ impl Line for Pty {
         self.port.now()
     }
 
-    fn send(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), NotSent> {
         if self.held.bytes_to_read().is_ok_and(|unread| unread > UNREAD_LIMIT) {
             drop(self.held.clear(ClearBuffer::Input));
         }

@@ -8,7 +8,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, ctrl_c::CtrlC, failure::Failure, port::Line};
+use crate::{EXIT_CODES, failure::Failure, port::Line, signals::Signals};
 
 /// A rover: it reports, drives as it is told, and stops when it is told nothing
 #[derive(Debug, clap::Args)]
@@ -23,12 +23,12 @@ const STEP: Duration = Duration::from_millis(10);
 
 /// Runs the subcommand.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let ctrl_c = CtrlC::listen()?;
+    let signals = Signals::listen()?;
     let mut pty = Pty::open(args.faults)?;
     let mut last = pty.now();
     let (mut robot, mut rover) = (Robot::new(RobotConfig::default(), last), Rover::new());
     let mut is_moving = false;
-    while !ctrl_c.is_pressed() {
+    while !signals.is_raised() {
         let until = pty.now() + STEP;
         pty.round(&mut robot, until)?;
         let now = pty.now();
@@ -63,7 +63,9 @@ fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> 
     Some(match event {
         RobotEvent::Motor(command) => describe(&command),
         RobotEvent::WatchdogStop => "watchdog: no command for 500 ms".to_owned(),
-        RobotEvent::CalibrationStart(kind) => format!("calibration begins: {kind:?}"),
+        RobotEvent::CalibrationStart { kind, repeated: false } => {
+            format!("calibration begins: {kind:?}")
+        }
         RobotEvent::CalibrationEnd(kind) => {
             // A perfect sensor has no bias.
             match kind {

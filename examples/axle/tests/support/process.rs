@@ -64,6 +64,17 @@ impl Process {
         assert!(Command::new("sh").args(["-c", &command]).status().unwrap().success());
     }
 
+    /// The state of the process as the system shows it, such as `T` for suspended.
+    pub(crate) fn state(&self) -> char {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap();
+        stat.rsplit(") ").next().unwrap().chars().next().unwrap()
+    }
+
+    /// The complaints so far.
+    pub(crate) fn complaints(&self) -> Vec<String> {
+        self.stderr.all()
+    }
+
     /// As by a power cut.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();

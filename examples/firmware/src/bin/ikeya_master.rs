@@ -12,9 +12,9 @@ use axlewire::{
     drive::{Clock as _, Directed, Driver},
     ikeya::{
         self, Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId,
-        Polling, Position, Rps, Status,
+        NodeSet, Polling, Position, Rps, Status,
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use axlewire_firmware::{
     board::{BUS, Board},
@@ -46,19 +46,22 @@ fn main() -> ! {
 fn run(mut board: Board) {
     let mut config = MasterConfig::direct();
     config.reply_timeout = board.patience(config.reply_timeout);
+    config.accepts_early = board.is_emulated();
     config.polling = Polling::Every(CYCLE);
     let Ok(port) = Directed::new(board.bus, board.driver_enable);
     let mut report_at = board.clock.now();
-    let mut driver = Driver::new(Master::new(config), port, board.clock);
+    let mut driver = Driver::with(|now| Master::new(config, now), port, board.clock);
     let (mut program, mut exchanges) = (Program::default(), 0u32);
-    driver.role_mut().discover();
+    let now = driver.now();
+    driver.role_mut().discover(now);
     loop {
         // Neither the port nor the pin can fail.
         if let Ok(Some(event)) = driver.next_event(report_at) {
             if let MasterEvent::Status { .. } = event {
                 exchanges = exchanges.wrapping_add(1);
             }
-            program.react(driver.role_mut(), event);
+            let now = driver.now();
+            program.react(driver.role_mut(), event, now);
             let mut line = Line::new("event");
             if describe(&mut line, event) {
                 board.text.try_send(line.end());
@@ -77,7 +80,7 @@ fn run(mut board: Board) {
                 if !master.is_discovering()
                     && NodeId::ALL.iter().all(|&id| master.mode(id).is_none())
                 {
-                    master.discover();
+                    master.discover(now);
                 }
             }
         }
@@ -87,50 +90,44 @@ fn run(mut board: Board) {
 /// What the nodes do.
 #[derive(Default)]
 struct Program {
-    /// Nodes whose command the master has dropped, a bit for each: a board that comes back after an
-    /// unknown while shall not move by itself.
-    dropped: u8,
+    /// Nodes whose command the master has dropped: a board that comes back after an unknown while
+    /// does not move by itself, and is stopped first.
+    dropped: NodeSet,
 }
 
 impl Program {
-    /// Commands a node once it is there, or there again after it was abnormal.
-    fn react(&mut self, master: &mut Master, event: MasterEvent) {
+    /// Commands a node once it is there, or there again and stopped after it was abnormal.
+    fn react(&mut self, master: &mut Master, event: MasterEvent, now: Instant) {
         let (node, is_new) = match event {
             MasterEvent::Discovered { node, .. } | MasterEvent::ModeChanged { node, .. } => {
                 (node, true)
             }
             MasterEvent::Health { node, health: Health::Abnormal } => {
-                self.dropped |= bit_of(node);
+                self.dropped.insert(node);
                 return;
             }
-            MasterEvent::Health { node, health: Health::Online } => {
-                (node, self.dropped & bit_of(node) != 0)
-            }
+            MasterEvent::Stopped { node } => (node, self.dropped.contains(node)),
             _ => return,
         };
         if is_new {
-            self.dropped &= !bit_of(node);
+            self.dropped.remove(node);
             // Refused only where the node has gone again, and then it will come again, too.
-            let _ = command(master, node);
+            let _ = command(master, node, now);
         }
     }
 }
 
-fn bit_of(node: NodeId) -> u8 {
-    1u8.rotate_left(node.get().into())
-}
-
-fn command(master: &mut Master, node: NodeId) -> Result<(), CommandError> {
+fn command(master: &mut Master, node: NodeId, now: Instant) -> Result<(), CommandError> {
     let id = node.get();
     match (master.mode(node), master.status(node)) {
         (Some(Mode::Velocity), _) => {
             let half_turns = Rps::new(f32::from(id) * 0.5).unwrap_or(Rps::ZERO);
-            master.set_velocity(node, half_turns)
+            master.set_velocity(node, half_turns, now)
         }
         (Some(Mode::Position), Some((Status::Position(at), _))) => {
             let way = i32::from(id) * Position::COUNTS_PER_REVOLUTION;
             let goal = Position::from_counts(at.counts().saturating_add(way)).unwrap_or(at);
-            master.set_position(node, goal)
+            master.set_position(node, goal, now)
         }
         _ => Ok(()),
     }
@@ -149,6 +146,8 @@ fn describe(line: &mut Line, event: MasterEvent) -> bool {
             ("health", node, health)
         }
         MasterEvent::ModeChanged { node, mode } => ("mode", node, name_of(mode)),
+        MasterEvent::Stopped { node } => ("stopped", node, "twice"),
+        MasterEvent::StopBlocked { node } => ("blocked", node, "stop"),
         MasterEvent::ReadFailed { node, cause } => {
             let cause = match cause {
                 Cause::Silent => "silent",
@@ -181,10 +180,8 @@ fn report(line: &mut Line, master: &Master, exchanges: u32) {
     line.count("reads", statistics.reads)
         .count("writes", statistics.writes)
         .count("exchanges", exchanges)
-        .count("lost_events", statistics.lost_events)
-        .count("overruns", BUS.overruns())
-        .count("lost", BUS.lost())
-        .count("damaged", BUS.damaged());
+        .count("lost_events", master.lost_events())
+        .losses(&BUS);
     for node in NodeId::ALL {
         if let Some((status, _)) = master.status(node) {
             line.count("node", node.get().into());

@@ -151,7 +151,5 @@ fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Ins
         .count("biases", shown.biases)
         .count("updates_refused", shown.updates_refused)
         .count("skipped", robot.counters().skipped() as u32)
-        .count("overruns", BUS.overruns())
-        .count("lost", BUS.lost())
-        .count("damaged", BUS.damaged());
+        .losses(&BUS);
 }

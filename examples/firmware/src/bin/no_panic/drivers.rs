@@ -5,7 +5,7 @@ use axlewire::{
     drive::{Directed, Driver},
     endpoint::Endpoint,
     ikeya::{
-        self, Board, Master, MasterConfig, Mode, NodeId, OneMotor, Position, Rps, Slave,
+        self, Board, Master, MasterConfig, Mode, NodeId, NodeSet, OneMotor, Position, Rps, Slave,
         SlaveConfig, ThreeMotors,
     },
     io::{FrameReader, FrameWriter},
@@ -95,9 +95,9 @@ fn turn<R: Endpoint>(driver: &mut Driver<R, Port, fn() -> Instant>) {
     match any(0) {
         0 => keep(driver.service()),
         1 => keep(driver.next_event(now())),
-        2 => keep(driver.run_until(now(), |_, event| keep(event))),
+        2 => keep(driver.run_until(now(), |_, event, _| keep(event))),
         3 => keep(driver.poll_event()),
-        4 => keep((driver.poll_timeout(), driver.now(), driver.lost_events())),
+        4 => keep((driver.poll_timeout(), driver.now())),
         5 => keep(driver.unsent()),
         _ => keep(driver.discard()),
     }
@@ -109,7 +109,7 @@ fn driver<R: Endpoint>(role: R) -> Driver<R, Port, fn() -> Instant> {
 
 #[inline(never)]
 fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
-    let mut driver = driver(Master::<B>::new(any(MasterConfig::direct())));
+    let mut driver = driver(Master::<B>::new(any(MasterConfig::direct()), now()));
     while any(true) {
         let node = any(NodeId::N1);
         match any(0) {
@@ -119,6 +119,8 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
             3 => keep(driver.stop(node)),
             4 => keep(driver.stop_all()),
             5 => keep(driver.read(node)),
+            6 => keep(driver.drive_for(node, any(velocity), duration())),
+            7 => keep(driver.await_standstill(any(NodeSet::ALL), now())),
             _ => turn(&mut driver),
         }
     }
@@ -149,6 +151,7 @@ fn host() {
             3 => keep(driver.next_report(now())),
             4 => keep(driver.start_calibration(kind, now())),
             5 => keep(driver.end_calibration(kind, now())),
+            6 => keep(driver.drive_for(any(0), any(0), duration())),
             _ => turn(&mut driver),
         }
     }

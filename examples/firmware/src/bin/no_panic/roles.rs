@@ -1,10 +1,10 @@
 //! The four roles, bare: called in any order, with any settings.
 
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     ikeya::{
         Board, DipSwitch, IdReading, Master, MasterConfig, Mode, NodeId, OneMotor, Position, Rps,
-        Slave, SlaveConfig, ThreeMotors,
+        Slave, SlaveConfig, Target, ThreeMotors,
     },
     ucp::{
         BiasStore, CalibrationKind, Host, HostConfig, ImuBias, MagBias, MemoryStore, MotorControl,
@@ -26,20 +26,28 @@ pub fn all() {
 
 #[inline(never)]
 fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
-    let mut master = any(Master::<B>::new(any(MasterConfig::usb_adapter())));
+    let mut master = any(Master::<B>::new(any(MasterConfig::usb_adapter()), now()));
     while any(true) {
-        let node = any(NodeId::N1);
+        let (node, now) = (any(NodeId::N1), now());
         match any(0) {
-            0 => master.discover(),
-            1 => keep(master.set_velocity(node, any(velocity))),
-            2 => keep(master.set_position(node, any(position))),
-            3 => keep(master.stop(node)),
-            4 => keep(master.stop_all()),
+            0 => master.discover(now),
+            1 => keep(master.set_velocity(node, any(velocity), now)),
+            2 => keep(master.set_position(node, any(position), now)),
+            3 => master.stop(node, now),
+            4 => master.stop_all(now),
             5 => master.release(node),
-            6 => keep(master.confirm(node)),
-            7 => keep(master.read(node)),
+            6 => keep(master.confirm(node, now)),
+            7 => keep(master.read(node, now)),
             8 => keep((master.health(node), master.mode(node), master.status(node))),
-            9 => keep((master.has_unsent_targets(), master.is_discovering(), master.read_bound())),
+            9 => keep((master.set_point(node), master.is_discovering(), master.stop_bound())),
+            16 => keep(master.read_bound()),
+            11 => {
+                keep((master.stop_progress(node), master.stops_owed(), master.last_failure(node)))
+            }
+            12 => keep((master.is_set_point_sent(node), master.is_mode_in_doubt(node))),
+            13 => keep((master.check(node, &Target::Velocity(any(velocity))), master.config())),
+            14 => master.keep_alive(now),
+            15 => keep((master.lost_events(), master.counters())),
             10 => {
                 let statistics = master.node_statistics(node);
                 keep((statistics.latency_min(), statistics.latency_max()));
@@ -81,7 +89,7 @@ fn host<S: BiasStore>(store: S) {
             3 => keep(host.start_calibration(kind, now)),
             4 => keep(host.end_calibration(kind, now)),
             5 => keep(host.start_firmware_update(any(0), now)),
-            6 => host.end_firmware_update(),
+            6 => host.end_firmware_update(now),
             7 => keep((host.link(), host.last_report(), host.command(), host.lost_events())),
             8 => {
                 let round_trip = host.statistics().round_trip;
@@ -89,6 +97,7 @@ fn host<S: BiasStore>(store: S) {
             }
             9 => keep((host.statistics(), host.counters(), host.config().calibration_bound())),
             10 => keep(host.store().load()),
+            11 => keep((host.take_report(), host.is_stop_sent(), host.calibration_outcome())),
             _ => turn(&mut host),
         }
     }
@@ -105,7 +114,8 @@ fn robot() {
             2 => robot.calibration_result_imu(ImuBias::new(any([0; 3]), any([0; 3])), now),
             3 => robot.calibration_result_mag(MagBias::new(any([0; 3])), now),
             4 => keep(robot.answer_update(any(OtaStatus::Forbidden), now)),
-            5 => keep((robot.calibrating(), robot.lost_events())),
+            5 => keep((robot.calibrating(), robot.lost_events(), robot.network_state())),
+            7 => keep((robot.take_command(now), robot.abort_calibration())),
             6 => keep((robot.statistics(), robot.counters())),
             _ => turn(&mut robot),
         }
@@ -119,6 +129,7 @@ fn turn(role: &mut impl Endpoint) {
         1 => role.handle_timeout(now()),
         2 => keep(role.poll_event()),
         3 => keep(role.poll_transmit(now())),
+        4 => role.handle_unsent(any(Unsent::Untouched), now()),
         _ => keep(role.poll_timeout()),
     }
 }

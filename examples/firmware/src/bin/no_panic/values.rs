@@ -107,6 +107,8 @@ fn ucp_bodies() {
         MotorControl::new(any(0), any(0)),
         MotorControl::turn_left(any(0), any(0)),
         MotorControl::turn_right(any(0), any(0)),
+        MotorControl::yaw_left(any(0), any(0)),
+        MotorControl::yaw_right(any(0), any(0)),
     ] {
         keep(command.map(|command| send(command.with_front_led(any(true)))));
     }
@@ -132,7 +134,7 @@ fn ucp_frames() {
     encode(&raw);
     keep(MessageId::from_u8(any(0)));
     if let Ok(frame) = Frame::parse(input()) {
-        encode(frame);
+        encode(&frame.relay_unchecked());
         keep((frame.header().len(), frame.header().is_empty(), frame.id(), frame.index()));
         read(frame.message());
     }
@@ -146,6 +148,7 @@ fn read(message: Message<'_>) {
         Message::MotorControl(it) => {
             keep((it.speed(), it.angular(), it.front_led(), it.back_led()));
             keep((it.version(), it.reserve1(), it.reserve2(), it.starts_update()));
+            keep(MotorControl::try_from(*it));
         }
         Message::CalibrationStart(it) => keep(it.kind()),
         Message::CalibrationStartAck(it) => keep((it.kind(), it.err())),

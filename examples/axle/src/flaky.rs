@@ -1,0 +1,153 @@
+//! Stops over a port that fails for a while and then comes back.
+
+use std::{
+    io::{self, ErrorKind, Read, Write},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::{Duration, Instant as Clock},
+};
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{Master, MasterConfig, Mode, NodeId},
+    sim::MotorNode,
+    time::Instant,
+    ucp::{Host, HostConfig, Robot, RobotConfig, Telemetry},
+};
+use serialport::{
+    ClearBuffer, DataBits, FlowControl, Parity, Result, SerialPort, StopBits, TTYPort,
+};
+
+use crate::{
+    bus::{Bus, Halt},
+    port::{Line, Port},
+    rover::Rover,
+};
+
+/// A port that neither reads nor writes while it is broken.
+struct Flaky {
+    port: TTYPort,
+    is_broken: Arc<AtomicBool>,
+}
+
+impl Flaky {
+    fn check(&self) -> io::Result<()> {
+        let is_broken = self.is_broken.load(Ordering::SeqCst);
+        if is_broken { Err(ErrorKind::Other.into()) } else { Ok(()) }
+    }
+}
+
+impl Read for Flaky {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.check().and_then(|()| self.port.read(bytes))
+    }
+}
+
+impl Write for Flaky {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.check().and_then(|()| self.port.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.port.flush()
+    }
+}
+
+/// Hands these calls on as they are.
+macro_rules! hand_on {
+    ($(fn $name:ident(&$($this:ident)+ $(, $arg:ident: $kind:ty)*) -> $result:ty;)+) => {
+        $(fn $name(&$($this)+ $(, $arg: $kind)*) -> $result {
+            hand_on!(@ $($this)+).port.$name($($arg),*)
+        })+
+    };
+    (@ mut $this:ident) => { $this };
+    (@ $this:ident) => { $this };
+}
+
+impl SerialPort for Flaky {
+    hand_on! {
+        fn name(&self) -> Option<String>;
+        fn baud_rate(&self) -> Result<u32>;
+        fn data_bits(&self) -> Result<DataBits>;
+        fn flow_control(&self) -> Result<FlowControl>;
+        fn parity(&self) -> Result<Parity>;
+        fn stop_bits(&self) -> Result<StopBits>;
+        fn timeout(&self) -> Duration;
+        fn set_baud_rate(&mut self, baud: u32) -> Result<()>;
+        fn set_data_bits(&mut self, bits: DataBits) -> Result<()>;
+        fn set_flow_control(&mut self, control: FlowControl) -> Result<()>;
+        fn set_parity(&mut self, parity: Parity) -> Result<()>;
+        fn set_stop_bits(&mut self, bits: StopBits) -> Result<()>;
+        fn set_timeout(&mut self, timeout: Duration) -> Result<()>;
+        fn write_request_to_send(&mut self, level: bool) -> Result<()>;
+        fn write_data_terminal_ready(&mut self, level: bool) -> Result<()>;
+        fn read_clear_to_send(&mut self) -> Result<bool>;
+        fn read_data_set_ready(&mut self) -> Result<bool>;
+        fn read_ring_indicator(&mut self) -> Result<bool>;
+        fn read_carrier_detect(&mut self) -> Result<bool>;
+        fn bytes_to_read(&self) -> Result<u32>;
+        fn bytes_to_write(&self) -> Result<u32>;
+        fn clear(&self, buffer: ClearBuffer) -> Result<()>;
+        fn try_clone(&self) -> Result<Box<dyn SerialPort>>;
+        fn set_break(&self) -> Result<()>;
+        fn clear_break(&self) -> Result<()>;
+    }
+}
+
+/// A broken port that comes back after half a second, with this role at the other end.
+fn broken_for_a_while<E: Endpoint + Send + 'static>(
+    role: impl FnOnce(Instant) -> E,
+    mut react: impl FnMut(&mut E, Instant) + Send + 'static,
+) -> Port {
+    let (mut theirs, ours) = TTYPort::pair().unwrap();
+    let is_broken = Arc::new(AtomicBool::new(true));
+    let flaky = Flaky { port: ours, is_broken: Arc::clone(&is_broken) };
+    let start = Clock::now();
+    let now = move || Instant::from_micros(start.elapsed().as_micros() as u64);
+    let mut role = role(now());
+    theirs.set_timeout(Duration::from_millis(5)).unwrap();
+    thread::spawn(move || {
+        let mut buffer = [0; 256];
+        while start.elapsed() < Duration::from_secs(10) {
+            if start.elapsed() > Duration::from_millis(500) {
+                is_broken.store(false, Ordering::SeqCst);
+            }
+            let len = theirs.read(&mut buffer).unwrap_or(0);
+            role.handle_input(&buffer[..len], now());
+            role.handle_timeout(now());
+            while role.poll_event().is_some() {}
+            react(&mut role, now());
+            while let Some(frame) = role.poll_transmit(now()) {
+                let _ = theirs.write_all(frame);
+            }
+        }
+    });
+    Port::new("flaky".to_owned(), Box::new(flaky))
+}
+
+#[test]
+fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
+    let node = |_| MotorNode::new(NodeId::N1, Mode::Velocity);
+    let port = broken_for_a_while(node, |_, _| {});
+    let mut config = MasterConfig::usb_adapter();
+    config.accepts_early = true;
+    let master = Master::new(config, port.now());
+    let mut bus: Bus = Bus { port, master, baud: config.baud };
+    bus.stop(NodeId::N1.into()).unwrap();
+    assert_eq!(bus.halt(NodeId::N1), Halt::Still);
+}
+
+#[test]
+fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
+    let robot = |now| Robot::new(RobotConfig::default(), now);
+    let port = broken_for_a_while(robot, |robot, now| {
+        robot.set_telemetry(&Telemetry::default(), now);
+    });
+    let host = Host::new(HostConfig::default(), port.now());
+    let mut rover = Rover::new(port, host);
+    rover.stop().unwrap();
+    assert!(rover.host.is_stop_sent());
+}

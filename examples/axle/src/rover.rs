@@ -1,0 +1,169 @@
+//! A rover on a port, with its host: what `drive` and `stop` share.
+
+use std::{thread, time};
+
+use axlewire::{
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+    ucp::{self, Host, HostConfig, HostEvent, Link, MotorControl},
+};
+
+use crate::{
+    args,
+    failure::Failure,
+    port::{Line, Port},
+    signals::Awake,
+};
+
+/// Time in which a robot has to be heard first.
+const LINK_PATIENCE: Duration = Duration::from_millis(2000);
+
+/// Time that the wheels may take to stand still once they are told to.
+const STOP_PATIENCE: Duration = Duration::from_millis(3000);
+
+/// Stops sent before a report counts: motor frames are not answered (ruling U16), so each may be
+/// lost.
+const STOPS: u32 = 3;
+
+/// Reports in a row that say that all wheels stand still. One alone may be of a wheel that changes
+/// its direction.
+const STILL_REPORTS: u32 = 3;
+
+/// Longest pause between two calls of the host: well under its dead-man's 500 ms.
+pub(crate) const CALL_PERIOD: Duration = Duration::from_millis(50);
+
+/// Pause after a failure of the port in a stop, which goes on.
+const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
+
+/// What becomes of a robot that can no longer be told to stop.
+pub(crate) const OUT_OF_REACH: &str = "the robot cannot be told to stop any more: it may be moving, until 500 ms after the last byte \
+     on its line";
+
+/// A port and the host on it.
+pub(crate) struct Rover {
+    pub(crate) port: Port,
+    pub(crate) host: Host,
+    /// The host has stopped the robot by its dead-man.
+    pub(crate) has_dead_man_fired: bool,
+    /// Reports in a row with all wheels standing still.
+    still_reports: u32,
+}
+
+impl Rover {
+    pub(crate) fn open(line: &args::Line) -> Result<Self, Failure> {
+        let port = Port::open(line, ucp::BAUD)?;
+        let mut config = HostConfig::default();
+        config.baud = line.baud.unwrap_or(ucp::BAUD);
+        let host = Host::new(config, port.now());
+        Ok(Self::new(port, host))
+    }
+
+    pub(crate) const fn new(port: Port, host: Host) -> Self {
+        Self { port, host, has_dead_man_fired: false, still_reports: 0 }
+    }
+
+    /// Waits for the first sign of life; `false` if `is_over` says so first.
+    pub(crate) fn find(&mut self, is_over: impl Fn() -> bool) -> Result<bool, Failure> {
+        let end = self.port.now() + LINK_PATIENCE;
+        while self.host.link() != Link::Up && !is_over() {
+            if self.port.now() >= end {
+                let (path, seconds) = (self.port.path(), LINK_PATIENCE.as_micros() / 1_000_000);
+                let heard = match self.host.counters().received {
+                    0 => "nothing".to_owned(),
+                    bytes => format!("{bytes} bytes that are no message"),
+                };
+                return Err(Failure::Undone(format!(
+                    "no robot answers on {path:?}: {heard} in {seconds} s"
+                )));
+            }
+            self.round(end)?;
+        }
+        Ok(!is_over())
+    }
+
+    /// One round, and its events.
+    pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
+        let result = self.port.round(&mut self.host, until);
+        while let Some(event) = self.host.poll_event() {
+            match event {
+                // Turning on the spot is moving as well: every wheel counts.
+                HostEvent::Report(report) if report.telemetry.rpm == [0; 4] => {
+                    self.still_reports = self.still_reports.saturating_add(1);
+                }
+                HostEvent::Report(_) => self.still_reports = 0,
+                HostEvent::DeadMan => self.has_dead_man_fired = true,
+                _ => {}
+            }
+        }
+        result
+    }
+
+    /// Tells the robot to stand still, again and again, until its reports say that all wheels do.
+    /// Failures of the port and of the link do not end it before its time, and no signal does.
+    pub(crate) fn stop(&mut self) -> Result<(), Failure> {
+        let (begin, sent) = (self.port.now(), self.host.statistics().commands);
+        let (mut awake, mut has_told) = (Awake::new(begin), false);
+        self.host.stop(begin);
+        let failure = loop {
+            let result = self.round(self.port.now() + CALL_PERIOD);
+            let told = self.host.statistics().commands.saturating_sub(sent);
+            if !has_told && told >= STOPS {
+                // What was reported before does not count.
+                (has_told, self.still_reports) = (true, 0);
+            }
+            let is_told = has_told && self.host.is_stop_sent();
+            if result.is_ok() && is_told && self.still_reports >= STILL_REPORTS {
+                return Ok(());
+            }
+            if awake.time(self.port.now()) >= STOP_PATIENCE {
+                break result.err();
+            }
+            if result.is_err() {
+                thread::sleep(FAILURE_PAUSE);
+            }
+        };
+        if let Some(failure) = failure {
+            return Err(failure.while_moving(OUT_OF_REACH));
+        }
+        let sent = self.host.statistics().commands.saturating_sub(sent);
+        Err(Failure::Undone(match self.host.link() {
+            Link::Up => {
+                format!("the robot was told {sent} times to stop, and its wheels still turn")
+            }
+            _ => format!(
+                "the robot was told {sent} times to stop, and is not heard any more: it may be \
+                 moving"
+            ),
+        }))
+    }
+
+    /// The latest report in one line.
+    pub(crate) fn describe(&self) -> Option<String> {
+        let report = self.host.last_report()?;
+        let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);
+        let [front_left, front_right, back_left, back_right] = now.rpm;
+        Some(format!(
+            "rpm {front_left:4} {front_right:4} {back_left:4} {back_right:4}  heading {:3} deg  \
+             {:.1} V  {:.2} A  battery {} %  lost reports {lost}",
+            now.heading_deg,
+            now.volts(),
+            now.amperes(),
+            now.battery_pct,
+        ))
+    }
+}
+
+/// A motor command in words, with what the nose does where the steering wheel alone would mislead
+/// (ruling U6).
+pub(crate) fn describe(command: &MotorControl) -> String {
+    let (speed, turn) = (command.speed(), command.angular());
+    let (side, other) = if turn < 0 { (" left", "right") } else { (" right", "left") };
+    let side = if turn == 0 { "" } else { side };
+    let is_reverse = MotorControl::yaw_right(speed, turn.abs()).is_ok_and(|it| it.angular() < 0);
+    let nose = if is_reverse && turn != 0 {
+        format!(" (in reverse: the nose swings {other})")
+    } else {
+        String::new()
+    };
+    format!("speed {speed} %, turn {} %{side}{nose}", turn.abs())
+}

@@ -1,0 +1,334 @@
+//! Signals: what moves is stopped before the tool ends or is suspended.
+
+use std::{
+    sync::{Arc, Mutex},
+    thread,
+    time::Duration,
+};
+
+use super::{
+    Process,
+    played::{self, Node, Said, confirmable_stops, speeds},
+    sim, undisturbed, values, wait_until,
+};
+
+const SUSPENDED: &str =
+    "suspended by Ctrl-Z: what moved was told to stop first, and is not moved again";
+
+/// Longer than what leads to a stop.
+const LONG: Duration = Duration::from_millis(900);
+
+/// After its first stop a node was told nothing else. Before it there is what was sent until the
+/// signal had come, on a busy machine some of the set-points that are repeated every 20 ms.
+fn assert_stopped_for_good(said: &[Said]) {
+    let speeds = speeds(said);
+    let first = speeds.iter().position(|&rps| rps == 0.0).expect("a stop");
+    assert!(first <= 25, "driven on: {speeds:?}");
+    assert!(speeds[first..].iter().all(|&rps| rps == 0.0), "turned on again: {speeds:?}");
+}
+
+#[test]
+fn every_signal_that_can_be_caught_stops_the_motor_first() {
+    undisturbed(|| {
+        let (sim, port) = sim("ikeya --node 1:velocity --noise 1e-4");
+        let signals = [
+            ("INT", "3.00"),
+            ("TERM", "4.00"),
+            ("HUP", "5.00"),
+            ("QUIT", "6.00"),
+            ("USR1", "7.00"),
+            ("ALRM", "8.00"),
+            // A watchdog of a supervisor, limits, a failing power supply, real-time signals.
+            ("ABRT", "9.00"),
+            ("XFSZ", "10.00"),
+            ("PWR", "11.00"),
+            ("IO", "12.00"),
+            ("34", "13.00"),
+            ("64", "14.00"),
+        ];
+        for (signal, rps) in signals {
+            let spin =
+                Process::start(&format!("spin --port {port} --node 1 --rps {rps} --for 600"));
+            sim.line(&format!("node 1: command {rps} rps"));
+            spin.signal(signal);
+            let lines = spin.success();
+            assert!(
+                lines.last().unwrap().ends_with("stopped and confirmed"),
+                "{signal}: {lines:?}"
+            );
+            let commands: Vec<_> =
+                sim.lines().into_iter().filter(|line| line.contains("command")).collect();
+            assert!(commands.last().unwrap().contains("0.00 rps"), "{signal}: {commands:?}");
+        }
+    });
+}
+
+#[test]
+fn a_signal_of_the_terminal_suspends_no_tool_before_the_motor_is_stopped() {
+    undisturbed(|| {
+        for signal in ["TTIN", "TTOU"] {
+            let line = played::bus(&[Node::velocity(1)], |_, _| {});
+            let spin = played::spin(&line, 600.0);
+            spin.signal(signal);
+            wait_until("suspended", || spin.state() == 'T');
+            assert_eq!(line.lock().nodes[0].rps, 0.0, "{signal}");
+            spin.signal("CONT");
+            assert_eq!(spin.complaint(1), SUSPENDED);
+        }
+    });
+}
+
+#[test]
+fn every_signal_that_can_be_caught_stops_the_rover_first() {
+    undisturbed(|| {
+        for signal in ["INT", "TERM", "HUP", "QUIT"] {
+            let line = played::rover(None);
+            let drive = Process::start(&format!(
+                "drive --port {} --speed -30 --turn -10 --for 600",
+                line.path
+            ));
+            wait_until("the drive", || line.lock().commands.contains(&(-30, -10)));
+            drive.signal(signal);
+            assert!(drive.success().last().unwrap().ends_with("stopped"));
+            let commands = line.lock().commands.clone();
+            let stops = commands.iter().rev().take_while(|command| **command == (0, 0)).count();
+            assert!(stops >= 3, "{signal}: a stop may be lost, so it is repeated: {commands:?}");
+            assert_eq!(line.lock().strays, 0);
+        }
+    });
+}
+
+#[test]
+fn after_the_signal_only_stops_are_sent_each_followed_by_a_read() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let spin = played::spin(&line, 600.0);
+        let before = line.said().len();
+        spin.signal("INT");
+        spin.success();
+        let said = line.said();
+        assert_stopped_for_good(&said[before..]);
+        assert!(confirmable_stops(&said, 1) >= 2, "{:?}", speeds(&said[before..]));
+        assert_eq!(line.lock().strays, 0);
+    });
+}
+
+#[test]
+fn a_second_ctrl_c_does_not_abandon_the_stop() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let spin = played::spin(&line, 600.0);
+        // It runs out slowly.
+        line.change(|node| (node.rps, node.follows) = (2.0, false));
+        for _ in 0..4 {
+            spin.signal("INT");
+            thread::sleep(Duration::from_millis(200));
+        }
+        line.change(|node| node.rps = 0.0);
+        let lines = spin.success();
+        assert_eq!(values(&lines[lines.len() - 1..], "rps"), [0.0], "{lines:?}");
+        assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+    });
+}
+
+#[test]
+fn ctrl_z_stops_the_motor_before_the_tool_is_suspended_and_nothing_moves_after_it() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let spin = played::spin(&line, 600.0);
+        // It runs out for a while, and the tool waits for that.
+        line.change(|node| node.follows = false);
+        spin.signal("TSTP");
+        let before = line.said().len();
+        thread::sleep(Duration::from_millis(300));
+        assert_ne!(spin.state(), 'T', "suspended with the motor turning");
+        line.change(|node| node.rps = 0.0);
+        wait_until("suspended", || spin.state() == 'T');
+
+        let said = line.said();
+        assert_stopped_for_good(&said[before..]);
+        assert!(confirmable_stops(&said, 1) >= 2, "{:?}", speeds(&said[before..]));
+        // Others may use the line meanwhile.
+        let scan = Process::start(&format!("scan --port {}", line.path)).success();
+        assert_eq!(scan.last().unwrap(), "1 node answers.");
+
+        let said = line.said().len();
+        spin.signal("CONT");
+        assert_eq!(spin.complaint(1), SUSPENDED);
+        assert_eq!(line.said().len(), said, "nothing is sent after it");
+    });
+}
+
+#[test]
+fn ctrl_z_stops_the_rover_before_the_tool_is_suspended_and_nothing_moves_after_it() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        let drive = Process::start(&format!("drive --port {} --speed 0 --turn 40", line.path));
+        wait_until("the drive", || line.lock().commands.contains(&(0, 40)));
+        // It runs out for a while, turning on the spot.
+        line.lock().wheels = Some([20, -20, 20, -20]);
+        drive.signal("TSTP");
+        thread::sleep(Duration::from_millis(600));
+        assert_ne!(drive.state(), 'T', "suspended with the wheels turning");
+        line.lock().wheels = None;
+        wait_until("suspended", || drive.state() == 'T');
+        assert_eq!(line.lock().commands.last(), Some(&(0, 0)));
+
+        let bytes = line.lock().bytes;
+        drive.signal("CONT");
+        assert_eq!(drive.complaint(1), SUSPENDED);
+        assert_eq!(line.lock().bytes, bytes, "nothing is sent after it");
+    });
+}
+
+#[test]
+fn ctrl_z_complains_first_where_the_stop_is_not_confirmed() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let spin = played::spin(&line, 600.0);
+        line.change(|node| node.is_dumb = true);
+        spin.signal("TSTP");
+        wait_until("suspended", || spin.state() == 'T');
+        wait_until("the complaint", || !spin.complaints().is_empty());
+        let complaints = spin.complaints();
+        assert_eq!(complaints.len(), 1, "{complaints:?}");
+        assert!(complaints[0].contains("node 1 was told to stop and has not confirmed it"));
+        spin.signal("CONT");
+        let ended = spin.end();
+        assert_eq!((ended.code, ended.stderr.len()), (Some(1), 2), "{ended:?}");
+        assert_eq!(ended.stderr[1], format!("axle: {SUSPENDED}"));
+    });
+}
+
+#[test]
+fn ctrl_z_before_anything_moves_suspends_at_once() {
+    undisturbed(|| {
+        let line = played::bus(&[], |_, _| {});
+        let spin = Process::start(&format!("spin --port {} --node 1 --rps 2", line.path));
+        line.wait_for(Said::Read(1));
+        spin.signal("TSTP");
+        wait_until("suspended", || spin.state() == 'T');
+        assert!(spin.complaints().is_empty());
+        spin.signal("CONT");
+        assert_eq!(spin.complaint(1), SUSPENDED);
+        assert!(speeds(&line.said()).is_empty(), "nobody was commanded");
+    });
+}
+
+/// The tool notices its absence by itself, before a dead-man does.
+fn says_for_how_long(complaint: &str) -> bool {
+    let time = complaint.strip_prefix("the tool did not run for ");
+    time.is_some_and(|time| time.starts_with(|first: char| first.is_ascii_digit()))
+}
+
+#[test]
+fn after_a_stop_signal_that_cannot_be_caught_the_motor_is_stopped_and_not_turned_on() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let spin = played::spin(&line, 600.0);
+        spin.signal("STOP");
+        wait_until("suspended", || spin.state() == 'T');
+        thread::sleep(LONG);
+        let before = line.said().len();
+        spin.signal("CONT");
+        let complaint = spin.complaint(1);
+        assert!(says_for_how_long(&complaint), "{complaint}");
+        assert!(
+            complaint.ends_with("(suspended?); it was stopped and stands still"),
+            "{complaint}"
+        );
+        let said = line.said();
+        assert_stopped_for_good(&said[before..]);
+        assert_eq!(
+            speeds(&said[before..])[0],
+            0.0,
+            "not one more command: {:?}",
+            speeds(&said[before..])
+        );
+        assert!(confirmable_stops(&said[before..], 1) >= 2, "{:?}", speeds(&said[before..]));
+    });
+}
+
+#[test]
+fn after_a_stop_signal_that_cannot_be_caught_the_rover_is_stopped_and_not_driven_on() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        let drive =
+            Process::start(&format!("drive --port {} --speed 50 --turn 0 --for 600", line.path));
+        wait_until("the drive", || line.lock().commands.contains(&(50, 0)));
+        drive.signal("STOP");
+        wait_until("suspended", || drive.state() == 'T');
+        thread::sleep(LONG);
+        let before = line.lock().commands.len();
+        drive.signal("CONT");
+        let complaint = drive.complaint(1);
+        assert!(says_for_how_long(&complaint), "{complaint}");
+        let commands = line.lock().commands[before..].to_vec();
+        assert!(commands.len() >= 3, "{commands:?}");
+        assert!(commands.iter().all(|command| *command == (0, 0)), "driven on: {commands:?}");
+    });
+}
+
+#[test]
+fn a_position_node_holds_what_was_read_after_the_signal() {
+    undisturbed(|| {
+        let holds = Arc::new(Mutex::new(Vec::new()));
+        let seen = Arc::clone(&holds);
+        // Under way: 100 counts further with each answer, until it is told to hold.
+        let line =
+            played::bus(&[Node { follows: false, ..Node::position(1, 0) }], move |said, bus| {
+                let node = &mut bus.nodes[0];
+                match said {
+                    Said::Read(1) if seen.lock().unwrap().is_empty() => node.counts += 100,
+                    // The goal is 100 turns away.
+                    Said::Write(1, _, to) if to < 50 * 8192 => {
+                        seen.lock().unwrap().push((to, node.counts))
+                    }
+                    _ => {}
+                }
+            });
+        let args = format!("spin --port {} --node 1 --revolutions 100 --for 600", line.path);
+        let spin = Process::start(&args);
+        wait_until("the command", || {
+            line.said().iter().any(|said| matches!(said, Said::Write(..)))
+        });
+        spin.signal("INT");
+        let lines = spin.success();
+        assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+        let holds = holds.lock().unwrap();
+        let (held, measured) = holds[0];
+        assert_eq!(held, measured, "the position of the last answer");
+        assert!(holds.len() >= 2 && holds.iter().all(|hold| *hold == holds[0]), "{holds:?}");
+    });
+}
+
+#[test]
+fn a_stop_that_is_itself_suspended_has_all_of_its_time_afterwards() {
+    undisturbed(|| {
+        let bus = played::bus(&[Node::velocity(1)], |_, _| {});
+        let rover = played::rover(None);
+        let spin = played::spin(&bus, 600.0);
+        let drive =
+            Process::start(&format!("drive --port {} --speed 50 --turn 0 --for 600", rover.path));
+        wait_until("the drive", || rover.lock().commands.contains(&(50, 0)));
+        // Both run out for a while.
+        bus.change(|node| node.follows = false);
+        rover.lock().wheels = Some([9; 4]);
+        for tool in [&spin, &drive] {
+            tool.signal("INT");
+        }
+        thread::sleep(Duration::from_millis(300));
+        for tool in [&spin, &drive] {
+            tool.signal("STOP");
+        }
+        thread::sleep(Duration::from_millis(3500));
+        for tool in [&spin, &drive] {
+            tool.signal("CONT");
+        }
+        thread::sleep(Duration::from_millis(700));
+        bus.change(|node| node.rps = 0.0);
+        rover.lock().wheels = None;
+        assert!(spin.success().last().unwrap().ends_with("stopped and confirmed"));
+        assert!(drive.success().last().unwrap().ends_with("stopped"));
+    });
+}

@@ -1,0 +1,61 @@
+//! `axle sim`, and the help of all subcommands.
+
+use super::{Process, TWO_NODES, sim, undisturbed};
+
+#[test]
+fn a_simulation_ends_well_when_it_is_asked_to() {
+    undisturbed(|| {
+        for what in [TWO_NODES, "ucp"] {
+            for signal in ["INT", "TERM"] {
+                let (sim, _) = sim(what);
+                sim.signal(signal);
+                sim.success();
+            }
+        }
+    });
+}
+
+#[test]
+fn help_tells_of_units_signs_and_exit_codes() {
+    undisturbed(|| {
+        let cases = [
+            ("--help", "Commands:"),
+            ("scan --help", "--direct"),
+            ("spin --help", "revolutions per second"),
+            ("spin --help", "[default: 20]"),
+            ("drive --help", "positive is to the right"),
+            ("drive --help", "in reverse, with a speed below -5, it swings left"),
+            ("stop --help", "What is sent on the wire"),
+            ("stop --help", "at 500000 bit/s"),
+            ("watch --help", "without sending anything"),
+            ("sim --help", "pty: PATH"),
+            ("sim ikeya --help", "N:MODE"),
+            ("sim ucp --help", "--noise"),
+        ];
+        for (args, expected) in cases {
+            let help = Process::start(args).success().join("\n");
+            assert!(help.contains(expected), "{args}: {help}");
+            assert!(help.contains("1  the input, the output or the port failed"), "{args}: {help}");
+        }
+    });
+}
+
+#[test]
+fn help_tells_what_a_kill_leaves_behind() {
+    undisturbed(|| {
+        for subcommand in ["spin", "drive", "stop", "watch"] {
+            let help = Process::start(&format!("{subcommand} --help")).success().join("\n");
+            let words: Vec<_> = help.split_whitespace().collect();
+            let help = words.join(" ");
+            for expected in [
+                "kill -9, a SIGSTOP or a power cut",
+                "goes on turning, for ever, unless its slaves have watchdogs",
+                "a vendor robot stops 500 ms after the last byte on its line; any byte counts, also one \
+                 that another program sends",
+            ] {
+                assert!(help.contains(expected), "{subcommand}: {expected} is not in {help}");
+            }
+            assert!(!help.contains("stops by itself"), "{subcommand}: {help}");
+        }
+    });
+}

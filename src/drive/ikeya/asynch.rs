@@ -1,0 +1,235 @@
+//! The async motor-bus calls.
+
+use super::{DriveError, Driver, OnlineNodes};
+use crate::{
+    drive::{Clock, Needs, Operation},
+    ikeya::{Board, Master, NodeId, NodeSet, Slave, Status, Target},
+    time::{Duration, Instant},
+};
+
+/// The async calls of a master: the same as the blocking ones, and as cancel safe as the
+/// [module](crate::drive) says.
+///
+/// A cancelled set-point has been taken and will be sent; a cancelled stop is owed; a cancelled
+/// discovery or read is asked for anew.
+impl<B: Board, P, C> Driver<Master<B>, P, C>
+where
+    P: embedded_io_async::Read + embedded_io_async::Write,
+    C: Clock + embedded_hal_async::delay::DelayNs,
+{
+    /// Asks every id of the bus and returns the nodes that are online. The events of the discovery
+    /// itself are taken out.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port. That no node answers is no error.
+    pub async fn discover_async(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
+        self.begin_discovery();
+        let bound = self.bound();
+        let found = self.until_async(bound, Self::discovered).await?;
+        found.ok_or(DriveError::Timeout(Operation::Discovery))
+    }
+
+    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
+    /// the driver is called.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Bus`] where the master refuses the command, or drops it before it was sent;
+    /// [`DriveError::Timeout`] where it could not be sent within four times
+    /// [`Master::read_bound`]; and those of the port, also where only its receiver has failed. After
+    /// any of them but a refusal the command is withdrawn: neither it nor its rest is sent later, and
+    /// **the node is owed a stop** (ruling I12), because it may have heard the command. Keep calling
+    /// the driver, or call [`stop_async`](Self::stop_async), until the stop is paid: set-points are refused with
+    /// [`CommandError::StopOwed`](crate::ikeya::CommandError::StopOwed) meanwhile.
+    pub async fn set_velocity_async(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target_async(node, Target::Velocity(target)).await
+    }
+
+    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
+    /// the driver is called.
+    ///
+    /// # Errors
+    ///
+    /// As [`set_velocity_async`](Self::set_velocity_async).
+    pub async fn set_position_async(
+        &mut self,
+        node: NodeId,
+        target: B::Position,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target_async(node, Target::Position(target)).await
+    }
+
+    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. The set-point
+    /// is repeated, and counts as a sign of life, all the while.
+    ///
+    /// A future that is dropped leaves the stop owed: the next call sends it. **If there is no next
+    /// call, the motor runs on.**
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] where the stop is not paid, whatever came before. Otherwise as
+    /// [`set_velocity_async`](Self::set_velocity_async), at once where the node loses its set-point on the way.
+    pub async fn drive_for_async(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let target = Target::Velocity(target);
+        self.role.check(node, &target)?;
+        let guard = StopOnDrop { driver: self, node };
+        let moved = match guard.driver.send_target_async(node, target).await {
+            Ok(()) => guard.driver.hold_target_async(node, target, span).await,
+            failed => failed,
+        };
+        drop(guard);
+        self.pay_stops_async(node.into()).await?;
+        moved
+    }
+
+    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs have
+    /// each been followed by an answer (ruling I12). It goes on through errors of the port.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running**; the stop
+    /// is still owed, and pursued as long as the driver is called.
+    pub async fn stop_async(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop(node);
+        self.pay_stops_async(node.into()).await
+    }
+
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::MasterConfig::nodes), and every
+    /// other one that has ever answered, as [`stop_async`](Self::stop_async) does.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after [`Master::stop_bound`],
+    /// and with the ids that have never answered: only you know whether there is a motor behind
+    /// them. On a bus of fewer than eight nodes say so in the settings.
+    pub async fn stop_all_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop_all();
+        self.pay_stops_async(NodeSet::ALL).await
+    }
+
+    /// Waits until the stopped nodes among these were measured standing still, or until `deadline`;
+    /// returns the nodes that were not, those that are owed no stop among them.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn await_standstill_async(
+        &mut self,
+        nodes: NodeSet,
+        deadline: Instant,
+    ) -> Result<NodeSet, DriveError<P::Error>> {
+        let still = |driver: &mut Self| driver.moving(nodes).is_empty().then_some(());
+        self.until_async(deadline, still).await?;
+        Ok(self.moving(nodes))
+    }
+
+    /// What a node measures, heard after this call was made.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
+    /// online, and those of the port.
+    pub async fn read_async(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
+        let mark = self.begin_read(node)?;
+        let bound = self.bound();
+        let answer = self.until_async(bound, |driver| driver.answer(mark)).await?;
+        answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
+    }
+
+    async fn send_target_async(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.aim(node, target)?;
+        let bound = self.bound();
+        let sent = self.until_async(bound, |driver| driver.aimed(node, target)).await;
+        if !matches!(sent, Ok(Some(Ok(())))) {
+            self.withdraw(node);
+        }
+        Ok(sent?.ok_or(DriveError::Timeout(Operation::SetPoint))??)
+    }
+
+    /// Keeps a set-point alive for `span`, as long as the node has it.
+    async fn hold_target_async(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let lost = |driver: &mut Self| {
+            driver.drop_readings();
+            driver.still_aimed(node, target).err()
+        };
+        while self.now() < end {
+            let next = self.keep_alive().min(end);
+            if let Some(error) = self.until_async(next, lost).await? {
+                return Err(error.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on until the stops of these nodes are paid, through errors of the port.
+    async fn pay_stops_async(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.stop_deadline();
+        loop {
+            let paid = |driver: &mut Self| driver.owed(nodes).is_empty().then_some(());
+            let result = self.until_async(deadline, paid).await;
+            let owed = self.owed(nodes);
+            if owed.is_empty() {
+                return Ok(());
+            }
+            if self.now() >= deadline {
+                return Err(DriveError::StopsOwed(owed));
+            }
+            if result.is_err() {
+                // A port that fails at once is not asked again at once.
+                self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
+            }
+        }
+    }
+}
+
+/// Owes a node its stop when a call ends, however it ends.
+struct StopOnDrop<'a, B: Board, P, C: Clock> {
+    driver: &'a mut Driver<Master<B>, P, C>,
+    node: NodeId,
+}
+
+impl<B: Board, P, C: Clock> Drop for StopOnDrop<'_, B, P, C> {
+    fn drop(&mut self) {
+        self.driver.begin_stop(self.node);
+    }
+}
+
+/// The async calls of a slave.
+impl<B: Board, P, C> Driver<Slave<B>, P, C>
+where
+    P: embedded_io_async::Read + embedded_io_async::Write,
+    C: Clock + embedded_hal_async::delay::DelayNs,
+{
+    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
+    /// fired: its event is then the next of [`poll_event`](Self::poll_event).
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn next_command_async(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+        self.until_with_async(deadline, Needs::HalfPort, Self::command).await.map(Option::flatten)
+    }
+}

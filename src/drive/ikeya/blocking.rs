@@ -1,0 +1,214 @@
+//! The blocking motor-bus calls.
+
+use super::{DriveError, Driver, OnlineNodes};
+use crate::{
+    drive::{Clock, Needs, Operation},
+    ikeya::{Board, Master, NodeId, NodeSet, Slave, Status, Target},
+    time::{Duration, Instant},
+};
+
+/// The blocking calls of a master.
+///
+/// Each ends within four times [`Master::read_bound`], or at the deadline that it is given. Readings
+/// that come in meanwhile are not kept as events, because [`Master::status`] has the latest; all
+/// other events are.
+impl<B: Board, P, C: Clock> Driver<Master<B>, P, C>
+where
+    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
+{
+    /// Asks every id of the bus and returns the nodes that are online. The events of the discovery
+    /// itself are taken out.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port. That no node answers is no error.
+    pub fn discover(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
+        self.begin_discovery();
+        let bound = self.bound();
+        let found = self.until(bound, Self::discovered)?;
+        found.ok_or(DriveError::Timeout(Operation::Discovery))
+    }
+
+    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
+    /// the driver is called.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Bus`] where the master refuses the command, or drops it before it was sent;
+    /// [`DriveError::Timeout`] where it could not be sent within four times
+    /// [`Master::read_bound`]; and those of the port, also where only its receiver has failed. After
+    /// any of them but a refusal the command is withdrawn: neither it nor its rest is sent later, and
+    /// **the node is owed a stop** (ruling I12), because it may have heard the command. Keep calling
+    /// the driver, or call [`stop`](Self::stop), until the stop is paid: set-points are refused with
+    /// [`CommandError::StopOwed`](crate::ikeya::CommandError::StopOwed) meanwhile.
+    pub fn set_velocity(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target(node, Target::Velocity(target))
+    }
+
+    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
+    /// the driver is called.
+    ///
+    /// # Errors
+    ///
+    /// As [`set_velocity`](Self::set_velocity).
+    pub fn set_position(
+        &mut self,
+        node: NodeId,
+        target: B::Position,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target(node, Target::Position(target))
+    }
+
+    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. The set-point
+    /// is repeated, and counts as a sign of life, all the while.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] where the stop is not paid, whatever came before. Otherwise as
+    /// [`set_velocity`](Self::set_velocity), at once where the node loses its set-point on the way.
+    pub fn drive_for(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let target = Target::Velocity(target);
+        self.role.check(node, &target)?;
+        let moved = match self.send_target(node, target) {
+            Ok(()) => self.hold_target(node, target, span),
+            failed => failed,
+        };
+        self.stop(node)?;
+        moved
+    }
+
+    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs have
+    /// each been followed by an answer (ruling I12). It goes on through errors of the port.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running**; the stop
+    /// is still owed, and pursued as long as the driver is called.
+    pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop(node);
+        self.pay_stops(node.into())
+    }
+
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::MasterConfig::nodes), and every
+    /// other one that has ever answered, as [`stop`](Self::stop) does.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after [`Master::stop_bound`],
+    /// and with the ids that have never answered: only you know whether there is a motor behind
+    /// them. On a bus of fewer than eight nodes say so in the settings.
+    pub fn stop_all(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop_all();
+        self.pay_stops(NodeSet::ALL)
+    }
+
+    /// Waits until the stopped nodes among these were measured standing still, or until `deadline`;
+    /// returns the nodes that were not, those that are owed no stop among them.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub fn await_standstill(
+        &mut self,
+        nodes: NodeSet,
+        deadline: Instant,
+    ) -> Result<NodeSet, DriveError<P::Error>> {
+        let still = |driver: &mut Self| driver.moving(nodes).is_empty().then_some(());
+        self.until(deadline, still)?;
+        Ok(self.moving(nodes))
+    }
+
+    /// What a node measures, heard after this call was made.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
+    /// online, and those of the port.
+    pub fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
+        let mark = self.begin_read(node)?;
+        let bound = self.bound();
+        let answer = self.until(bound, |driver| driver.answer(mark))?;
+        answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
+    }
+
+    fn send_target(&mut self, node: NodeId, target: Target<B>) -> Result<(), DriveError<P::Error>> {
+        self.aim(node, target)?;
+        let bound = self.bound();
+        let sent = self.until(bound, |driver| driver.aimed(node, target));
+        if !matches!(sent, Ok(Some(Ok(())))) {
+            self.withdraw(node);
+        }
+        Ok(sent?.ok_or(DriveError::Timeout(Operation::SetPoint))??)
+    }
+
+    /// Keeps a set-point alive for `span`, as long as the node has it.
+    fn hold_target(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let lost = |driver: &mut Self| {
+            driver.drop_readings();
+            driver.still_aimed(node, target).err()
+        };
+        while self.now() < end {
+            let next = self.keep_alive().min(end);
+            if let Some(error) = self.until(next, lost)? {
+                return Err(error.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on until the stops of these nodes are paid, through errors of the port.
+    fn pay_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.stop_deadline();
+        loop {
+            let paid = |driver: &mut Self| driver.owed(nodes).is_empty().then_some(());
+            let result = self.until(deadline, paid);
+            let owed = self.owed(nodes);
+            if owed.is_empty() {
+                return Ok(());
+            }
+            if self.now() >= deadline {
+                return Err(DriveError::StopsOwed(owed));
+            }
+            if result.is_err() {
+                // A port that fails at once is not asked again at once.
+                let until = (self.now() + Self::ERROR_NAP).min(deadline);
+                let until = self.on_clock(until);
+                self.clock.idle_until(until);
+            }
+        }
+    }
+}
+
+/// The blocking calls of a slave.
+impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C>
+where
+    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
+{
+    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
+    /// fired: its event is then the next of [`poll_event`](Self::poll_event).
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub fn next_command(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+        self.until_with(deadline, Needs::HalfPort, Self::command).map(Option::flatten)
+    }
+}

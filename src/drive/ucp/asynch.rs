@@ -1,0 +1,197 @@
+//! The async rover-link calls.
+
+use super::{DriveError, Driver};
+use crate::{
+    drive::{Clock, Needs, Operation},
+    time::{Duration, Instant},
+    ucp::{BiasStore, CalibrationKind, CalibrationStep, Host, MotorControl, ReceivedReport, Robot},
+};
+
+/// The async calls of a host: the same as the blocking ones, and as cancel safe as the
+/// [module](crate::drive) says.
+///
+/// A cancelled command has been taken and will be sent; a cancelled stop is due; a calibration goes on
+/// and tells its end as an event.
+impl<S: BiasStore, P, C> Driver<Host<S>, P, C>
+where
+    P: embedded_io_async::Read + embedded_io_async::Write,
+    C: Clock + embedded_hal_async::delay::DelayNs,
+{
+    /// Waits for the robot to answer a ping, of which one is sent every
+    /// [`HostConfig::ping_period`](crate::ucp::HostConfig::ping_period); returns its round trip.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Timeout`] at `deadline`, and those of the port.
+    pub async fn ping_async(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Duration, DriveError<P::Error>> {
+        let before = self.pongs();
+        let pong = self.until_async(deadline, |driver| driver.pong(before)).await?;
+        pong.ok_or(DriveError::Timeout(Operation::Ping))
+    }
+
+    /// Drives with speed and turn in percent (ruling U6), the lamp as it is. Sent now or, right after
+    /// another command, within the next 20 ms, and repeated as long as the driver is called. Call it
+    /// again within 500 ms: see [`Host::drive`], and
+    /// [`drive_for_async`](Self::drive_for_async), which does.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Rover`], and those of the port.
+    pub async fn drive_async(
+        &mut self,
+        speed: i16,
+        angular: i16,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        self.service_async().await
+    }
+
+    /// Drives for `span`, then stops, and returns when the stop is on the line.
+    ///
+    /// A future that is dropped leaves the stop due: the next call sends it. **If there is no next
+    /// call, it is the robot's watchdog that stops it**, and that of a vendor robot waits for silence
+    /// on the line.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`stop_async`](Self::stop_async), otherwise [`DriveError::Rover`] and those of the port.
+    pub async fn drive_for_async(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        let guard = StopOnDrop(self);
+        let driven = guard.0.hold_command_async(speed, angular, span).await;
+        drop(guard);
+        self.send_stop_async().await?;
+        driven
+    }
+
+    /// Stops, and returns when the command has left the port: written and flushed (ruling U16). It
+    /// goes on through errors of the port for 100 ms. The stop is repeated as long as the driver is
+    /// called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port, or [`DriveError::Timeout`]. **The robot may be driving**; the stop stays
+    /// due, and the next call sends it.
+    pub async fn stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop();
+        self.send_stop_async().await
+    }
+
+    /// The latest report that no call of this has returned yet; waits for one until `deadline`, and
+    /// is then `None`. Reports in between are skipped: take events to see every one.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub async fn next_report_async(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<ReceivedReport>, DriveError<P::Error>> {
+        self.until_async(deadline, Self::report).await
+    }
+
+    /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
+    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::HostConfig::calibration_bound)
+    /// leaves room for all attempts.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
+    /// and those of the port.
+    pub async fn start_calibration_async(
+        &mut self,
+        kind: CalibrationKind,
+        deadline: Instant,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.begin_calibration(CalibrationStep::Start, kind)?;
+        let outcome = self.until_async(deadline, Self::calibration).await?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
+    }
+
+    /// Ends a calibration, and returns when the robot has agreed. Its result comes later, as an
+    /// event.
+    ///
+    /// # Errors
+    ///
+    /// As [`start_calibration_async`](Self::start_calibration_async).
+    pub async fn end_calibration_async(
+        &mut self,
+        kind: CalibrationKind,
+        deadline: Instant,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.begin_calibration(CalibrationStep::End, kind)?;
+        let outcome = self.until_async(deadline, Self::calibration).await?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
+    }
+
+    /// Keeps a command alive for `span`.
+    async fn hold_command_async(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let refused = |driver: &mut Self| {
+            driver.drop_routine();
+            driver.command(speed, angular).err()
+        };
+        match self.until_async(end, refused).await? {
+            Some(error) => Err(error.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Goes on until the stop has left, through errors of the port.
+    async fn send_stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.stop_deadline();
+        loop {
+            match self.until_with_async(deadline, Needs::HalfPort, Self::stopped).await {
+                Ok(Some(())) => return Ok(()),
+                Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
+                Err(error) if self.now() >= deadline => return Err(error),
+                // A port that fails at once is not asked again at once.
+                Err(_) => {
+                    self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
+                }
+            }
+        }
+    }
+}
+
+/// Makes a stop due when a call ends, however it ends.
+struct StopOnDrop<'a, S: BiasStore, P, C: Clock>(&'a mut Driver<Host<S>, P, C>);
+
+impl<S: BiasStore, P, C: Clock> Drop for StopOnDrop<'_, S, P, C> {
+    fn drop(&mut self) {
+        self.0.begin_stop();
+    }
+}
+
+/// The async calls of a robot.
+impl<P, C> Driver<Robot, P, C>
+where
+    P: embedded_io_async::Read + embedded_io_async::Write,
+    C: Clock + embedded_hal_async::delay::DelayNs,
+{
+    /// The command of this moment, once it has changed since the last call of this: standing still by
+    /// the watchdog included. Answers and reports meanwhile. `None` at `deadline`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port. The command holds until its watchdog ends it: ask [`Robot::command`].
+    pub async fn next_command_async(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<MotorControl>, DriveError<P::Error>> {
+        self.until_with_async(deadline, Needs::HalfPort, Self::new_command).await
+    }
+}

@@ -1,0 +1,174 @@
+//! The blocking rover-link calls.
+
+use super::{DriveError, Driver};
+use crate::{
+    drive::{Clock, Needs, Operation},
+    time::{Duration, Instant},
+    ucp::{BiasStore, CalibrationKind, CalibrationStep, Host, MotorControl, ReceivedReport, Robot},
+};
+
+/// The blocking calls of a host.
+///
+/// Reports and pongs that come in meanwhile are not kept as events, because [`Host::last_report`] and
+/// [`Host::statistics`] have what counts; all other events are.
+impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C>
+where
+    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
+{
+    /// Waits for the robot to answer a ping, of which one is sent every
+    /// [`HostConfig::ping_period`](crate::ucp::HostConfig::ping_period); returns its round trip.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Timeout`] at `deadline`, and those of the port.
+    pub fn ping(&mut self, deadline: Instant) -> Result<Duration, DriveError<P::Error>> {
+        let before = self.pongs();
+        let pong = self.until(deadline, |driver| driver.pong(before))?;
+        pong.ok_or(DriveError::Timeout(Operation::Ping))
+    }
+
+    /// Drives with speed and turn in percent (ruling U6), the lamp as it is. Sent now or, right after
+    /// another command, within the next 20 ms, and repeated as long as the driver is called. Call it
+    /// again within 500 ms: see [`Host::drive`], and
+    /// [`drive_for`](Self::drive_for), which does.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Rover`], and those of the port.
+    pub fn drive(&mut self, speed: i16, angular: i16) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        self.service()
+    }
+
+    /// Drives for `span`, then stops, and returns when the stop is on the line.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`stop`](Self::stop), otherwise [`DriveError::Rover`] and those of the port.
+    pub fn drive_for(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        let driven = self.hold_command(speed, angular, span);
+        self.stop()?;
+        driven
+    }
+
+    /// Stops, and returns when the command has left the port: written and flushed (ruling U16). It
+    /// goes on through errors of the port for 100 ms. The stop is repeated as long as the driver is
+    /// called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port, or [`DriveError::Timeout`]. **The robot may be driving**; the stop stays
+    /// due, and the next call sends it.
+    pub fn stop(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop();
+        self.send_stop()
+    }
+
+    /// The latest report that no call of this has returned yet; waits for one until `deadline`, and
+    /// is then `None`. Reports in between are skipped: take events to see every one.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port.
+    pub fn next_report(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<ReceivedReport>, DriveError<P::Error>> {
+        self.until(deadline, Self::report)
+    }
+
+    /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
+    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::HostConfig::calibration_bound)
+    /// leaves room for all attempts.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
+    /// and those of the port.
+    pub fn start_calibration(
+        &mut self,
+        kind: CalibrationKind,
+        deadline: Instant,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.begin_calibration(CalibrationStep::Start, kind)?;
+        let outcome = self.until(deadline, Self::calibration)?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
+    }
+
+    /// Ends a calibration, and returns when the robot has agreed. Its result comes later, as an
+    /// event.
+    ///
+    /// # Errors
+    ///
+    /// As [`start_calibration`](Self::start_calibration).
+    pub fn end_calibration(
+        &mut self,
+        kind: CalibrationKind,
+        deadline: Instant,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.begin_calibration(CalibrationStep::End, kind)?;
+        let outcome = self.until(deadline, Self::calibration)?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
+    }
+
+    /// Keeps a command alive for `span`.
+    fn hold_command(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let refused = |driver: &mut Self| {
+            driver.drop_routine();
+            driver.command(speed, angular).err()
+        };
+        match self.until(end, refused)? {
+            Some(error) => Err(error.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Goes on until the stop has left, through errors of the port.
+    fn send_stop(&mut self) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.stop_deadline();
+        loop {
+            match self.until_with(deadline, Needs::HalfPort, Self::stopped) {
+                Ok(Some(())) => return Ok(()),
+                Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
+                Err(error) if self.now() >= deadline => return Err(error),
+                // A port that fails at once is not asked again at once.
+                Err(_) => {
+                    let until = (self.now() + Self::ERROR_NAP).min(deadline);
+                    let until = self.on_clock(until);
+                    self.clock.idle_until(until);
+                }
+            }
+        }
+    }
+}
+
+/// The blocking calls of a robot.
+impl<P, C: Clock> Driver<Robot, P, C>
+where
+    P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
+{
+    /// The command of this moment, once it has changed since the last call of this: standing still by
+    /// the watchdog included. Answers and reports meanwhile. `None` at `deadline`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the port. The command holds until its watchdog ends it: ask [`Robot::command`].
+    pub fn next_command(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<Option<MotorControl>, DriveError<P::Error>> {
+        self.until_with(deadline, Needs::HalfPort, Self::new_command)
+    }
+}

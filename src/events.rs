@@ -1,0 +1,114 @@
+//! The queue in which a role keeps its events for the application.
+
+use heapless::Deque;
+
+/// A queue of at most `N` events, in their order.
+///
+/// Half of it is reserved (ruling U15): what comes all the time, and what comes again by itself, never takes the
+/// room of events that happen once. What finds no room is counted, unless the caller keeps it.
+#[derive(Clone, Debug)]
+pub(crate) struct Events<E, const N: usize> {
+    queue: Deque<E, N>,
+    lost: u32,
+}
+
+impl<E, const N: usize> Events<E, N> {
+    pub(crate) const fn new() -> Self {
+        Self { queue: Deque::new(), lost: 0 }
+    }
+
+    /// Queues a rare event, or gives it back when there is no room.
+    pub(crate) fn keep(&mut self, event: E) -> Result<(), E> {
+        self.queue.push_back(event)
+    }
+
+    /// Queues a rare event that nobody can keep or repeat.
+    pub(crate) fn push(&mut self, event: E) {
+        if self.keep(event).is_err() {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
+
+    /// Queues an event that comes all the time, or again by itself.
+    pub(crate) fn push_frequent(&mut self, event: E) {
+        if self.is_reserved() {
+            self.lost = self.lost.saturating_add(1);
+        } else {
+            self.push(event);
+        }
+    }
+
+    /// Queues an event of which only the latest of its sort matters: when room is short it takes
+    /// the place of the newest one of that sort, so that the last one in the queue is always the
+    /// latest.
+    #[cfg(feature = "ucp")]
+    pub(crate) fn push_latest(&mut self, event: E, is_of_its_sort: impl Fn(&E) -> bool) {
+        let is_reserved = self.is_reserved();
+        let newest = self.queue.iter_mut().rev().find(|queued| is_of_its_sort(queued));
+        match newest {
+            Some(newest) if is_reserved => {
+                *newest = event;
+                self.lost = self.lost.saturating_add(1);
+            }
+            _ => self.push(event),
+        }
+    }
+
+    /// The newest event of a sort that still waits.
+    #[cfg(feature = "ucp")]
+    pub(crate) fn newest(&self, is_of_its_sort: impl Fn(&E) -> bool) -> Option<&E> {
+        self.queue.iter().rev().find(|queued| is_of_its_sort(queued))
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<E> {
+        self.queue.pop_front()
+    }
+
+    /// Takes out every event that is not to stay; the others keep their order.
+    #[cfg(any(test, feature = "embedded-io", feature = "embedded-io-async"))]
+    pub(crate) fn retain(&mut self, mut stays: impl FnMut(&E) -> bool) {
+        for _ in 0..self.queue.len() {
+            match self.queue.pop_front() {
+                Some(event) if stays(&event) => {
+                    // It has just made the room that it takes.
+                    let _ = self.queue.push_back(event);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Number of events that were refused or replaced; stops at 2^32 - 1.
+    pub(crate) const fn lost(&self) -> u32 {
+        self.lost
+    }
+
+    /// Is the rest of the room for rare events only?
+    fn is_reserved(&self) -> bool {
+        self.queue.len() >= N / 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequent_events_leave_half_of_the_room_to_rare_ones() {
+        let mut events: Events<u8, 4> = Events::new();
+        (0..4).for_each(|event| events.push_frequent(event));
+        assert_eq!((events.keep(10), events.keep(11), events.keep(12)), (Ok(()), Ok(()), Err(12)));
+        assert_eq!(events.lost(), 2, "the caller has the last");
+        let all: heapless::Vec<u8, 8> = core::iter::from_fn(|| events.pop()).collect();
+        assert_eq!(all, [0, 1, 10, 11]);
+    }
+
+    #[test]
+    fn what_stays_keeps_its_order() {
+        let mut events: Events<u8, 8> = Events::new();
+        (0..8).for_each(|event| events.push(event));
+        events.retain(|event| event % 3 != 0);
+        let all: heapless::Vec<u8, 8> = core::iter::from_fn(|| events.pop()).collect();
+        assert_eq!(all, [1, 2, 4, 5, 7]);
+    }
+}

@@ -1,0 +1,54 @@
+//! Discovery: every id that is not online is asked, silent ones again.
+
+use super::{Master, MasterEvent};
+use crate::ikeya::{Board, NodeId};
+
+/// How far a discovery is: all ids once, then all again.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) struct Discovery {
+    step: u16,
+}
+
+impl Discovery {
+    /// The node to be asked next, as an index.
+    pub(super) const fn index(self) -> usize {
+        (self.step & 7) as usize
+    }
+
+    /// How often each id was asked before.
+    const fn pass(self) -> u16 {
+        self.step >> 3
+    }
+}
+
+impl<B: Board> Master<B> {
+    /// Begins a discovery, or joins the one that is under way.
+    pub(super) fn begin_discovery(&mut self) {
+        if self.discovery.is_some() {
+            return;
+        }
+        for node in &mut self.nodes {
+            node.scans = 0;
+        }
+        self.discovery = Some(Discovery { step: 0 });
+        self.settle_discovery();
+    }
+
+    /// Moves a discovery past the ids that need not be asked, and ends it after the last.
+    pub(super) fn settle_discovery(&mut self) {
+        let Some(mut discovery) = self.discovery else { return };
+        while discovery.pass() < self.config.attempts.max(1).into() {
+            let node = &self.nodes[discovery.index()];
+            let is_here = self.config.nodes.contains(NodeId::ALL[discovery.index()]);
+            if is_here && !node.is_online() && u16::from(node.scans) <= discovery.pass() {
+                self.discovery = Some(discovery);
+                return;
+            }
+            discovery.step += 1;
+        }
+        self.discovery = None;
+        self.turns.end_discovery();
+        let online = self.nodes.iter().filter(|node| node.is_online()).count();
+        self.tell(MasterEvent::DiscoveryDone { online: online as u8 });
+    }
+}

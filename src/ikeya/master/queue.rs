@@ -1,0 +1,414 @@
+//! The queue: who is next (I13).
+//!
+//! A request is silent, or it is an *exchange*: one that is answered. Stops, reads about a mode in
+//! doubt and new set-points are urgent. Each node has one urgent exchange for a stop and one new
+//! set-point in a round; a round ends with one regular exchange, if one is due: of the search for
+//! abnormal nodes, of a discovery, or of the cycle. The search is not due twice in a row, unless
+//! nothing else is. Reading a position and holding it is one turn: the WRITE goes right behind the
+//! answer, also where it is an exchange of its own (three motors). So no node can keep the others
+//! waiting:
+//!
+//! * a stop of an online velocity node is sent right after the exchange under way and at most seven
+//!   other stop WRITEs; one of a position node is read after at most 16 exchanges more, with three
+//!   motors 24, and written next;
+//! * a new set-point waits for at most 16 exchanges and 14 other WRITEs, with three motors for 24
+//!   exchanges, a stop not counted;
+//! * a node in the cycle waits for at most 8 rounds of 17 exchanges, with three motors 25, for as many
+//!   rounds of the search, and for two discoveries;
+//! * the search waits for one round, also while a discovery goes on.
+
+use super::{Master, NodeId, PACKET_LEN, ReadRequest, node::Node, set_point::Confirm};
+use crate::{
+    endpoint::{Endpoint as _, Unsent},
+    ikeya::{Board, Target},
+    stream::Encode,
+    time::{Duration, Instant, wire_time},
+};
+
+/// What is sent.
+#[derive(Clone, Copy, Debug)]
+enum Request<B: Board> {
+    Read,
+    Write(Target<B>),
+}
+
+impl<B: Board> Request<B> {
+    /// A silent request is not answered.
+    const fn is_exchange(&self) -> bool {
+        B::ANSWERS_WRITE || matches!(self, Self::Read)
+    }
+}
+
+/// Why it is sent.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Reason {
+    /// The WRITE of a position that has just been measured: the second half of an attempt.
+    Hold,
+    /// A stop WRITE for a velocity node that is online.
+    SpeedStop,
+    /// A stop WRITE for any node that is online.
+    Stop,
+    /// A READ that a stop or a mode in doubt waits for.
+    StopRead,
+    /// The first attempt for a node that is owed a stop and is not online.
+    LostStop,
+    SetPoint,
+    Discovery,
+    Search,
+    Cycle,
+}
+
+impl Reason {
+    /// What is urgent, in its order, and then the rest.
+    const ALL: [Self; 9] = [
+        Self::Hold,
+        Self::SpeedStop,
+        Self::Stop,
+        Self::StopRead,
+        Self::LostStop,
+        Self::SetPoint,
+        Self::Discovery,
+        Self::Search,
+        Self::Cycle,
+    ];
+
+    /// For a stop, or about a mode in doubt.
+    const fn is_stop(self) -> bool {
+        matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
+    }
+}
+
+/// One request.
+#[derive(Clone, Copy, Debug)]
+struct Choice<B: Board> {
+    index: usize,
+    request: Request<B>,
+    reason: Reason,
+    round: Round,
+}
+
+/// The round that a request belongs to: the one under way, or the next, in which each node has its
+/// turns again.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Round {
+    Same,
+    Next,
+}
+
+/// The request that was handed out last.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent<B: Board> {
+    choice: Choice<B>,
+    /// When its first byte could leave.
+    start: Instant,
+}
+
+/// Whose turn it is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turns {
+    /// The node that was served last with a stop, as an index.
+    stop: usize,
+    /// The same with a new set-point.
+    set_point: usize,
+    /// The node whose turn in the cycle it is.
+    cycle: usize,
+    /// Turns of the cycle that go in front of a discovery.
+    cycle_first: u8,
+    is_second_discovery: bool,
+    /// The last round ended with an exchange of the search.
+    was_search: bool,
+    /// The nodes that have had their exchange for a stop in this round, a bit for each.
+    had_stop: u8,
+    /// The same with their new set-point.
+    had_set_point: u8,
+}
+
+impl Turns {
+    /// A discovery has ended: after every second one each node has its turn in the cycle first.
+    pub(super) const fn end_discovery(&mut self) {
+        self.is_second_discovery = !self.is_second_discovery;
+        if !self.is_second_discovery {
+            self.cycle_first = 8;
+        }
+    }
+
+    /// Has this node its turn? A stop WRITE is followed by a READ before it is repeated, so it needs
+    /// no turn of its own unless it is answered.
+    fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
+        let had = match reason {
+            _ if round == Round::Next => 0,
+            Reason::SpeedStop | Reason::Stop if !B::ANSWERS_WRITE => 0,
+            Reason::SetPoint => self.had_set_point,
+            Reason::Hold | Reason::Discovery | Reason::Search | Reason::Cycle => 0,
+            _ => self.had_stop,
+        };
+        had >> index & 1 == 0
+    }
+}
+
+impl<B: Board> Master<B> {
+    /// When the next request is due, wherever the line may be.
+    pub(super) fn due(&self) -> Option<Instant> {
+        let mut earliest: Option<Instant> = None;
+        for (index, node) in self.nodes.iter().enumerate() {
+            for &reason in &Reason::ALL {
+                let is_on = match (reason, self.discovery) {
+                    (Reason::Discovery, Some(discovery)) => discovery.index() == index,
+                    (Reason::Discovery, None) => false,
+                    (Reason::Cycle, Some(_)) => self.turns.cycle_first > 0,
+                    _ => true,
+                };
+                if !is_on || !node.wants(reason, &self.config) {
+                    continue;
+                }
+                let mut at = node.earliest(reason).unwrap_or(self.now);
+                if reason == Reason::Search {
+                    at = self.search.next_at.unwrap_or(at).max(at);
+                }
+                earliest = Some(earliest.unwrap_or(at).min(at));
+            }
+        }
+        earliest
+    }
+
+    /// What to send now, if anything, the line aside.
+    fn choose(&self, now: Instant) -> Option<Choice<B>> {
+        self.urgent(now, Round::Same)
+            .or_else(|| self.regular(now))
+            // With nothing regular to do, the next round begins at once.
+            .or_else(|| self.urgent(now, Round::Next))
+    }
+
+    /// Stops, reads about a mode in doubt, new set-points.
+    fn urgent(&self, now: Instant, round: Round) -> Option<Choice<B>> {
+        Reason::ALL[..6].iter().find_map(|&reason| {
+            let last = if reason.is_stop() { self.turns.stop } else { self.turns.set_point };
+            self.next_for(reason, last + 1, now, round)
+        })
+    }
+
+    /// The next request that is not urgent; it ends the round.
+    fn regular(&self, now: Instant) -> Option<Choice<B>> {
+        let sought = self.sought(now);
+        if sought.is_some() && !self.turns.was_search {
+            return sought;
+        }
+        self.discovery_or_cycle(now).or(sought)
+    }
+
+    /// The next request of the search, at its pace.
+    fn sought(&self, now: Instant) -> Option<Choice<B>> {
+        let is_time = self.search.next_at.is_none_or(|at| now >= at);
+        let first = self.search.last + 1;
+        is_time.then(|| self.next_for(Reason::Search, first, now, Round::Next)).flatten()
+    }
+
+    fn discovery_or_cycle(&self, now: Instant) -> Option<Choice<B>> {
+        let round = Round::Next;
+        if self.discovery.is_none() || self.turns.cycle_first > 0 {
+            let turn = self.next_for(Reason::Cycle, self.turns.cycle, now, round);
+            if turn.is_some() {
+                return turn;
+            }
+        }
+        let (index, reason) = (self.discovery?.index(), Reason::Discovery);
+        let node = &self.nodes[index];
+        let is_due = node.is_due(reason, &self.config, now);
+        is_due.then(|| Choice { index, request: node.request(reason), reason, round })
+    }
+
+    /// The request for the first node, from this index on, that is due one for this reason.
+    fn next_for(
+        &self,
+        reason: Reason,
+        first: usize,
+        now: Instant,
+        round: Round,
+    ) -> Option<Choice<B>> {
+        for step in 0..8 {
+            let index = (first + step) & 7;
+            let node = &self.nodes[index];
+            let is_next = self.turns.has::<B>(index, reason, round);
+            if is_next && node.is_due(reason, &self.config, now) {
+                return Some(Choice { index, request: node.request(reason), reason, round });
+            }
+        }
+        None
+    }
+
+    /// Hands out the next request, if the line is free for it.
+    pub(super) fn send_next(&mut self, now: Instant) -> Option<&[u8]> {
+        let is_free = self.line_free.is_none_or(|free| now >= free);
+        if !is_free && !self.is_behind_write {
+            return None;
+        }
+        for node in &mut self.nodes {
+            if let Some(stop) = &mut node.stop {
+                stop.forget_old_hold(now, self.config.turnaround_gap);
+            }
+        }
+        let choice = self.choose(now)?;
+        // On the heels of a WRITE only what does not add up: a READ, or one stop for each node.
+        let is_set_point = !matches!(choice.request, Request::Read) && !choice.reason.is_stop();
+        if !is_free && is_set_point {
+            return None;
+        }
+        let len = self.encode(&choice)?;
+        let start = self.line_free.map_or(now, |free| free.max(now));
+        self.sent = Some(Sent { choice, start });
+        let request_end = start + wire_time(len, self.config.baud);
+        self.line_free = Some(request_end + self.config.turnaround_gap);
+        let is_exchange = choice.request.is_exchange();
+        self.is_behind_write = !is_exchange && self.config.turnaround_gap == Duration::ZERO;
+        self.book(&choice, now);
+        if is_exchange {
+            self.open_window(NodeId::ALL[choice.index & 7], request_end);
+        }
+        let packet = self.packet.get(..len)?;
+        if self.config.removes_echo {
+            self.echo.expect(packet);
+        }
+        Some(packet)
+    }
+
+    /// Puts the request into the buffer that is handed out, and says how long it is.
+    fn encode(&mut self, choice: &Choice<B>) -> Option<usize> {
+        let id = NodeId::ALL[choice.index & 7];
+        let buffer = &mut self.packet;
+        let bytes = match choice.request {
+            Request::Read => ReadRequest::new(id).encode(buffer),
+            Request::Write(Target::Velocity(to)) => B::write_velocity(id, to).encode(buffer),
+            Request::Write(Target::Position(to)) => B::write_position(id, to).encode(buffer),
+        };
+        bytes.ok().map(|bytes| bytes.len().min(PACKET_LEN))
+    }
+
+    /// Notes what has been handed out, and whose turn is next.
+    fn book(&mut self, choice: &Choice<B>, now: Instant) {
+        let Choice { index, request, reason, round } = *choice;
+        // A silent WRITE of the cycle is followed by its READ, and only that ends the round.
+        if round == Round::Next && request.is_exchange() {
+            (self.turns.had_stop, self.turns.had_set_point) = (0, 0);
+            self.turns.was_search = reason == Reason::Search;
+        }
+        let count = match request {
+            Request::Read => &mut self.statistics.reads,
+            Request::Write(_) => &mut self.statistics.writes,
+        };
+        *count = count.wrapping_add(1);
+        let index = index & 7;
+        if matches!(request, Request::Write(_)) {
+            self.nodes[index].wrote();
+        }
+        let is_exchange = request.is_exchange();
+        match reason {
+            Reason::SetPoint => {
+                self.turns.set_point = index;
+                self.turns.had_set_point |= 1 << index;
+            }
+            // The node is still to be read.
+            _ if !is_exchange => {}
+            Reason::Discovery => {}
+            Reason::Search => self.searched(index, now),
+            Reason::Cycle => {
+                self.turns.cycle = (index + 1) & 7;
+                self.turns.cycle_first = self.turns.cycle_first.saturating_sub(1);
+            }
+            _ => {
+                self.turns.stop = index;
+                self.turns.had_stop |= 1 << index;
+            }
+        }
+    }
+
+    /// The packet that was handed out last has not left: what it was for is to be sent again, or
+    /// what has come in its place.
+    pub(super) fn take_back(&mut self, unsent: Unsent, now: Instant) {
+        if unsent == Unsent::Unflushed {
+            // Which of the latest WRITEs have left is not known: once more for all, and an answer
+            // that comes now pays for none of them.
+            self.nodes.iter_mut().for_each(Node::take_back_write);
+            return;
+        }
+        let Some(Sent { choice, start }) = self.sent.take() else { return };
+        let Choice { index, request, reason, .. } = choice;
+        self.is_behind_write = false;
+        if unsent == Unsent::Untouched {
+            self.line_free = Some(start);
+            self.echo.forget_last();
+        } else {
+            // Twice the pause that ends a packet: a slave must not take the next one for the rest.
+            let silence = self.frame_pause().saturating_mul(2);
+            self.line_free = Some(now + self.config.turnaround_gap + silence);
+            self.echo.forget_all();
+        }
+        let count = match request {
+            Request::Read => &mut self.statistics.reads,
+            Request::Write(_) => &mut self.statistics.writes,
+        };
+        *count = count.wrapping_sub(1);
+        if reason == Reason::Search {
+            self.search.next_at = None;
+        }
+        let is_scan = self.discovery.is_some();
+        let is_open = request.is_exchange() && self.window.take().is_some();
+        let node = &mut self.nodes[index & 7];
+        if matches!(request, Request::Write(_)) {
+            node.take_back_write();
+        }
+        if is_open {
+            node.take_back_request(is_scan);
+        }
+    }
+}
+
+impl<B: Board> Node<B> {
+    /// What it is sent. A node that is not online gets its stop blind, then a READ; in the cycle its
+    /// set-point, then a READ.
+    fn request(&self, reason: Reason) -> Request<B> {
+        let target = match reason {
+            Reason::StopRead | Reason::Discovery => None,
+            Reason::Cycle if self.is_written => None,
+            Reason::SetPoint | Reason::Cycle => self.set_point.map(|it| it.target),
+            _ => self.stop_write(),
+        };
+        target.map_or(Request::Read, Request::Write)
+    }
+
+    /// Its stop or its set-point has been handed out.
+    fn wrote(&mut self) {
+        self.is_written = true;
+        if let Some(stop) = &mut self.stop {
+            stop.is_written = true;
+            stop.writes = stop.writes.saturating_add(1);
+        } else if let Some(set_point) = &mut self.set_point {
+            set_point.is_new = false;
+            if self.confirm == Confirm::AfterWrite {
+                self.confirm = Confirm::AfterAnswer;
+            }
+        }
+    }
+
+    fn take_back_write(&mut self) {
+        self.is_written = false;
+        if let Some(stop) = &mut self.stop {
+            let was_written = core::mem::replace(&mut stop.is_written, false);
+            stop.writes = stop.writes.saturating_sub(was_written.into());
+        } else if let Some(set_point) = &mut self.set_point {
+            set_point.is_new = true;
+            if self.confirm == Confirm::AfterAnswer {
+                self.confirm = Confirm::AfterWrite;
+            }
+        }
+    }
+
+    fn take_back_request(&mut self, is_scan: bool) {
+        self.statistics.requests = self.statistics.requests.wrapping_sub(1);
+        self.scans = self.scans.saturating_sub(is_scan.into());
+        self.is_asked = self.is_online();
+        let is_lost = !self.is_asked;
+        if let Some(stop) = &mut self.stop {
+            stop.lost_attempts = stop.lost_attempts.saturating_sub(is_lost.into());
+        }
+    }
+}

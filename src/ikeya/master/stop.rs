@@ -1,0 +1,128 @@
+//! Stops: debts that are paid by two WRITEs, each followed by an answer (I6, I12).
+
+use crate::{
+    ikeya::{Board, Status},
+    time::{Duration, Instant},
+};
+
+/// Stop WRITEs that have to be followed by a good answer before a stop is paid.
+const PAYMENTS: u8 = 2;
+
+/// Time in which a measured position has to be written, or it is measured anew.
+const HOLD_PATIENCE: Duration = Duration::from_millis(20);
+
+/// Time between two positions that are compared: 8 counts in this time are 0.05 rps.
+const STANDSTILL_TIME: Duration = Duration::from_millis(20);
+
+/// A stop that a node is owed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop<B: Board> {
+    /// Where a position node is to hold; `None` until it has been measured.
+    pub(super) hold: Option<B::Position>,
+    /// When that was measured.
+    measured_at: Option<Instant>,
+    /// A stop WRITE has been sent and waits for an answer.
+    pub(super) is_written: bool,
+    /// Stop WRITEs sent.
+    pub(super) writes: u8,
+    /// The window that is open, if any, was opened after the stop was asked for.
+    pub(super) is_asked: bool,
+    /// Stop WRITEs that were followed by a good answer.
+    paid: u8,
+    /// Attempts that the node has had while it was not online.
+    pub(super) lost_attempts: u8,
+}
+
+impl<B: Board> Stop<B> {
+    /// A new debt; `hold` is a position that may be held without measuring it again.
+    pub(super) const fn new(hold: Option<B::Position>) -> Self {
+        Self {
+            hold,
+            measured_at: None,
+            is_written: false,
+            writes: 0,
+            is_asked: false,
+            paid: 0,
+            lost_attempts: 0,
+        }
+    }
+
+    /// What was measured or paid before no longer counts: the node was abnormal, or its mode in
+    /// doubt.
+    pub(super) fn restart(&mut self) {
+        let Self { is_asked, lost_attempts, .. } = *self;
+        *self = Self { is_asked, lost_attempts, ..Self::new(None) };
+    }
+
+    /// Keeps the position of an answer to hold, if it was asked for after the stop was.
+    pub(super) fn measure(&mut self, status: &Status<B>, now: Instant) {
+        if let (Status::Position(position), None, true) = (status, self.hold, self.is_asked) {
+            (self.hold, self.measured_at, self.writes) = (Some(*position), Some(now), 0);
+        }
+    }
+
+    /// Has a position been measured that has not been written yet?
+    pub(super) const fn is_measured(&self) -> bool {
+        self.measured_at.is_some() && self.writes == 0
+    }
+
+    /// Gives up a position that could not be written at once, but for the `gap` behind each packet.
+    pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
+        let is_old = self.measured_at.is_some_and(|at| now - at > HOLD_PATIENCE + gap);
+        if is_old && self.is_measured() {
+            (self.hold, self.measured_at) = (None, None);
+        }
+    }
+
+    /// The node has given a good answer in its mode; says whether the stop is paid now.
+    pub(super) fn pay(&mut self) -> bool {
+        if core::mem::take(&mut self.is_written) {
+            self.paid += 1;
+        }
+        self.paid >= PAYMENTS
+    }
+}
+
+/// Progress of a stop, see [`Master::stop_progress`](super::Master::stop_progress).
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum StopProgress {
+    /// The latest order of the node, if it has had any, is not a stop.
+    NotAsked,
+    /// The stop is owed: it has not been confirmed twice yet.
+    Owed,
+    /// The node has confirmed the stop, and may still be running out.
+    Paid,
+    /// The node has confirmed the stop and was measured standing still.
+    StandingStill,
+}
+
+/// The watch for standstill after a stop is paid.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Standstill<B: Board> {
+    /// There is no paid stop.
+    Unwatched,
+    /// Watched, with a status to compare the next ones with.
+    Watched(Option<(Status<B>, Instant)>),
+    /// Reached.
+    Reached,
+}
+
+impl<B: Board> Standstill<B> {
+    /// Takes in a status; says whether the node has just been found standing still.
+    pub(super) fn watch(&mut self, status: Status<B>, now: Instant) -> bool {
+        let Self::Watched(before) = *self else { return false };
+        let is_still = match (status, before) {
+            (Status::Velocity(speed), _) => B::is_still(speed),
+            (Status::Position(here), Some((Status::Position(there), at))) => {
+                if now - at < STANDSTILL_TIME {
+                    return false;
+                }
+                B::is_same_place(here, there)
+            }
+            (Status::Position(_), _) => false,
+        };
+        *self = if is_still { Self::Reached } else { Self::Watched(Some((status, now))) };
+        is_still
+    }
+}

@@ -1,0 +1,153 @@
+//! What a master knows of its bus.
+
+use super::{
+    Cause, CommandError, Health, Master, MasterConfig, MasterStatistics, NodeStatistics,
+    PACKET_LEN, StopProgress,
+};
+use crate::{
+    ikeya::{Board, Mode, NodeId, NodeSet, Status, Target},
+    stream::Counters,
+    time::{Duration, Instant, wire_time},
+};
+
+impl<B: Board> Master<B> {
+    /// The settings.
+    #[must_use]
+    pub const fn config(&self) -> &MasterConfig {
+        &self.config
+    }
+
+    /// How a node is; `None` if it has never answered.
+    #[must_use]
+    pub fn health(&self, node: NodeId) -> Option<Health> {
+        self.node(node).health
+    }
+
+    /// The mode of a node on record; `None` if it has never answered.
+    #[must_use]
+    pub fn mode(&self, node: NodeId) -> Option<Mode> {
+        self.node(node).mode
+    }
+
+    /// Is the mode of a node in doubt (I11)?
+    #[must_use]
+    pub fn is_mode_in_doubt(&self, node: NodeId) -> bool {
+        self.node(node).doubt.is_some()
+    }
+
+    /// What a node measured last, and when that was heard.
+    #[must_use]
+    pub fn status(&self, node: NodeId) -> Option<(Status<B>, Instant)> {
+        self.node(node).status
+    }
+
+    /// Progress of the latest stop of a node.
+    #[must_use]
+    pub fn stop_progress(&self, node: NodeId) -> StopProgress {
+        self.node(node).stop_progress()
+    }
+
+    /// Nodes whose stop is owed, those among them that have never answered.
+    #[must_use]
+    pub fn stops_owed(&self) -> NodeSet {
+        NodeId::ALL.into_iter().filter(|&id| self.node(id).stop.is_some()).collect()
+    }
+
+    /// The counts of a node.
+    #[must_use]
+    pub fn node_statistics(&self, node: NodeId) -> &NodeStatistics {
+        &self.node(node).statistics
+    }
+
+    /// The counts of the line.
+    #[must_use]
+    pub const fn statistics(&self) -> &MasterStatistics {
+        &self.statistics
+    }
+
+    /// Number of events refused because the application had not taken the older ones; stops at
+    /// 2^32 - 1.
+    #[must_use]
+    pub const fn lost_events(&self) -> u32 {
+        self.events.lost()
+    }
+
+    /// Where every byte went.
+    #[must_use]
+    pub const fn counters(&self) -> Counters {
+        self.decoder.counters()
+    }
+
+    /// The set-point of a node that is repeated, or that of its paid stop; `None` where there is none
+    /// and while a stop is owed.
+    #[must_use]
+    pub fn set_point(&self, node: NodeId) -> Option<Target<B>> {
+        self.node(node).set_point.map(|set_point| set_point.target)
+    }
+
+    /// Has the set-point of a node been handed out for sending, and not been taken back?
+    #[must_use]
+    pub fn is_set_point_sent(&self, node: NodeId) -> bool {
+        self.node(node).set_point.is_some_and(|set_point| !set_point.is_new)
+    }
+
+    /// Why the last READ of a node that was given up has failed; `None` if none has.
+    #[must_use]
+    pub fn last_failure(&self, node: NodeId) -> Option<Cause> {
+        self.node(node).last_failure
+    }
+
+    /// Whether a command would be taken now.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`set_velocity`](Self::set_velocity) and [`set_position`](Self::set_position).
+    pub fn check(&self, node: NodeId, target: &Target<B>) -> Result<(), CommandError> {
+        self.node(node).check(node, target)
+    }
+
+    /// Is a discovery under way?
+    #[must_use]
+    pub const fn is_discovering(&self) -> bool {
+        self.discovery.is_some()
+    }
+
+    /// Longest time from the first request of a READ to its answer or its
+    /// [failure](crate::ikeya::MasterEvent::ReadFailed), on any line, where the driver is called in time and
+    /// neither a discovery nor stops are under way, which go first.
+    ///
+    /// Between two attempts lie the guard, one exchange with each other node and as many of the search
+    /// for abnormal ones, and before each of these a new set-point for every node.
+    #[must_use]
+    pub fn read_bound(&self) -> Duration {
+        let (write, exchange) = self.request_times();
+        let set_point = if B::ANSWERS_WRITE { exchange } else { write };
+        let round = exchange + set_point.saturating_mul(8);
+        self.attempts_bound(round.saturating_mul(16))
+    }
+
+    /// Time after which a stop of nodes that answer is paid, with room for lost packets. A call that
+    /// waits for stops gives up after it.
+    ///
+    /// It is four times [`MasterConfig::attempts`] of what goes between two reads of a node while
+    /// stops are owed: the guard, an exchange with every other node and with one that is searched
+    /// for, and a WRITE to each.
+    #[must_use]
+    pub fn stop_bound(&self) -> Duration {
+        let (write, exchange) = self.request_times();
+        let round = exchange.saturating_mul(9) + write.saturating_mul(8);
+        self.attempts_bound(round).saturating_mul(4)
+    }
+
+    /// Longest times for a WRITE without an answer, and for an exchange.
+    fn request_times(&self) -> (Duration, Duration) {
+        let gap = self.config.turnaround_gap;
+        let write = wire_time(PACKET_LEN, self.config.baud) + gap;
+        (write, write + self.window_time() + gap)
+    }
+
+    fn attempts_bound(&self, between: Duration) -> Duration {
+        let attempt = self.config.late_guard + between;
+        attempt.saturating_mul(self.config.attempts.max(1).into())
+    }
+}

@@ -1,0 +1,105 @@
+//! A set of nodes.
+
+use core::fmt;
+
+use super::NodeId;
+
+/// A set of node ids, one bit each.
+///
+/// ```
+/// use axlewire::ikeya::{NodeId, NodeSet};
+///
+/// let mut nodes: NodeSet = [NodeId::N1, NodeId::N3].into_iter().collect();
+/// nodes.insert(NodeId::N8);
+/// assert_eq!(nodes.to_string(), "1, 3 and 8");
+/// assert_eq!((nodes.len(), nodes.contains(NodeId::N2)), (3, false));
+/// ```
+#[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NodeSet {
+    bits: u8,
+}
+
+impl NodeSet {
+    /// No node.
+    pub const NONE: Self = Self { bits: 0 };
+
+    /// All eight.
+    pub const ALL: Self = Self { bits: 0xFF };
+
+    /// Adds a node.
+    pub const fn insert(&mut self, node: NodeId) {
+        self.bits |= bit(node);
+    }
+
+    /// Takes a node out.
+    pub const fn remove(&mut self, node: NodeId) {
+        self.bits &= !bit(node);
+    }
+
+    /// Is the node in it?
+    #[must_use]
+    pub const fn contains(self, node: NodeId) -> bool {
+        self.bits & bit(node) != 0
+    }
+
+    /// Number of nodes, 0 to 8.
+    #[must_use]
+    pub const fn len(self) -> usize {
+        self.bits.count_ones() as usize
+    }
+
+    /// Is no node in it?
+    #[must_use]
+    pub const fn is_empty(self) -> bool {
+        self.bits == 0
+    }
+
+    /// The nodes of this set that are in the other one as well.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self { bits: self.bits & other.bits }
+    }
+
+    /// The nodes in the order of their ids.
+    pub fn iter(self) -> impl Iterator<Item = NodeId> {
+        NodeId::ALL.into_iter().filter(move |&node| self.contains(node))
+    }
+}
+
+const fn bit(node: NodeId) -> u8 {
+    1 << ((node.get() - 1) & 7)
+}
+
+impl From<NodeId> for NodeSet {
+    fn from(node: NodeId) -> Self {
+        Self { bits: bit(node) }
+    }
+}
+
+impl FromIterator<NodeId> for NodeSet {
+    fn from_iter<I: IntoIterator<Item = NodeId>>(nodes: I) -> Self {
+        let mut set = Self::NONE;
+        nodes.into_iter().for_each(|node| set.insert(node));
+        set
+    }
+}
+
+impl fmt::Display for NodeSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let len = self.len();
+        if len == 0 {
+            return f.write_str("none");
+        }
+        for (index, node) in self.iter().enumerate() {
+            let between = match index {
+                0 => "",
+                _ if index + 1 == len => " and ",
+                _ => ", ",
+            };
+            write!(f, "{between}{node}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,70 @@
+//! Settings of a slave.
+
+use crate::{
+    ikeya::BAUD,
+    time::{Duration, wire_time},
+};
+
+/// Settings of a [`Slave`](super::Slave): start from [`direct`](Self::direct) or
+/// [`usb_adapter`](Self::usb_adapter) and change what differs.
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct SlaveConfig {
+    /// Speed of the line, bit/s.
+    pub baud: u32,
+    /// Time without a valid command before [`SlaveEvent::Watchdog`](super::SlaveEvent::Watchdog). The protocol document has no such
+    /// time, hence `None`: **a motor then keeps its last command for ever.**
+    pub watchdog: Option<Duration>,
+    /// Silence kept between a request and its answer, for transceivers that need it. Together with
+    /// the processor's own time it should stay below 50 µs (ruling I9).
+    pub turnaround_gap: Duration,
+    /// Silence after which the start of a packet is given up (ruling B3). Longer than the longest
+    /// pause that the port makes inside a packet.
+    pub idle: Duration,
+    /// Time after which an answer is no longer sent, from the end of the request and
+    /// [`turnaround_gap`](Self::turnaround_gap) on (ruling I14): its master has given up, and may be
+    /// asking another node.
+    ///
+    /// A driver that has not seen its port empty for this long, but at least 4 ms and at most
+    /// 20 ms, dates what it finds back to then.
+    pub answer_within: Duration,
+    /// Whether the slaves of this line hear each other, as on two wires (ruling I14): the slave then
+    /// follows answers as well, and finds no request inside one.
+    pub two_wire: bool,
+}
+
+impl SlaveConfig {
+    /// For a UART of the processor itself at 500 kbit/s: a pause of five bytes ends a packet.
+    #[must_use]
+    pub const fn direct() -> Self {
+        Self::at(BAUD)
+    }
+
+    /// For a UART of the processor itself at another speed, bit/s.
+    #[must_use]
+    pub const fn at(baud: u32) -> Self {
+        Self {
+            baud,
+            watchdog: None,
+            turnaround_gap: Duration::ZERO,
+            idle: wire_time(5, baud),
+            answer_within: Duration::from_micros(500),
+            two_wire: false,
+        }
+    }
+
+    /// For a slave on a host: a USB adapter makes pauses of up to 16 ms.
+    #[must_use]
+    pub const fn usb_adapter() -> Self {
+        let pause = Duration::from_millis(20);
+        Self { idle: pause, answer_within: pause, ..Self::direct() }
+    }
+}
+
+/// [`direct`](SlaveConfig::direct).
+impl Default for SlaveConfig {
+    fn default() -> Self {
+        Self::direct()
+    }
+}

@@ -1,0 +1,198 @@
+//! What a host sends next, and what comes back unsent.
+
+use super::{
+    CalibrationStep, HostEvent,
+    calibration::Request,
+    state::{State, Update},
+};
+use crate::{
+    endpoint::Unsent,
+    time::{Instant, earliest},
+    ucp::{
+        BiasStore, Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode,
+        ImuBiasAck, MAX_LEN, MagBiasAck, MotorControl, OtaRequest, Ping, SetNetworkState,
+        role::{bump, uncount, write},
+    },
+};
+
+/// What a frame carries.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Outgoing {
+    Motor(MotorControl),
+    ImuAck,
+    MagAck,
+    Biases(Biases),
+    /// The last says that it is a repetition.
+    Calibration(CalibrationStep, CalibrationKind, bool),
+    Network(SetNetworkState),
+    Update(i16),
+    Ping,
+}
+
+impl<S: BiasStore> State<S> {
+    /// Writes the most urgent frame that is due and says how long it is.
+    pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
+        let Some(outgoing) = self.next(now) else {
+            self.motor.end_round();
+            return None;
+        };
+        self.last = Some(outgoing);
+        let index = self.index;
+        self.index = index.wrapping_add(1);
+        Some(match outgoing {
+            Outgoing::Motor(command) => write(command, index, buffer),
+            Outgoing::ImuAck => write(ImuBiasAck::new(ErrorCode::Fine), index, buffer),
+            Outgoing::MagAck => write(MagBiasAck::new(ErrorCode::Fine), index, buffer),
+            Outgoing::Biases(biases) => write(biases, index, buffer),
+            Outgoing::Calibration(CalibrationStep::Start, kind, _) => {
+                write(CalibrationStart::new(kind), index, buffer)
+            }
+            Outgoing::Calibration(CalibrationStep::End, kind, _) => {
+                write(CalibrationEnd::new(kind), index, buffer)
+            }
+            Outgoing::Network(body) => write(body, index, buffer),
+            Outgoing::Update(version) => {
+                write(OtaRequest::start_firmware_update(version), index, buffer)
+            }
+            Outgoing::Ping => write(Ping {}, index, buffer),
+        })
+    }
+
+    /// The most urgent thing to send; it counts as sent.
+    fn next(&mut self, now: Instant) -> Option<Outgoing> {
+        if self.update == Update::Silent {
+            return None;
+        }
+        if let Some(command) = self.motor.take(now, &self.config) {
+            bump(&mut self.stats.commands);
+            return Some(Outgoing::Motor(command));
+        }
+        if self.imu.ack_due.take().is_some() {
+            return Some(Outgoing::ImuAck);
+        }
+        if self.mag.ack_due.take().is_some() {
+            return Some(Outgoing::MagAck);
+        }
+        if let Some(biases) = self.next_biases() {
+            return Some(Outgoing::Biases(biases));
+        }
+        let request = self.calibration.as_mut();
+        if let Some((step, kind, again)) =
+            request.and_then(|request| request.take(now, &self.config))
+        {
+            if again {
+                bump(&mut self.stats.calibration_retries);
+            }
+            return Some(Outgoing::Calibration(step, kind, again));
+        }
+        if let Some(body) = self.network.filter(|_| self.network_due.take().is_some()) {
+            return Some(Outgoing::Network(body));
+        }
+        match self.update {
+            Update::Asked { version, .. } if self.motor.allows_update() => {
+                self.update = Update::Silent;
+                self.motor.pause();
+                return Some(Outgoing::Update(version));
+            }
+            _ => {}
+        }
+        if self.ping.take(now, &self.config) {
+            bump(&mut self.stats.pings);
+            return Some(Outgoing::Ping);
+        }
+        None
+    }
+
+    /// The biases that are stored at this moment, if they were asked for.
+    fn next_biases(&mut self) -> Option<Biases> {
+        self.biases_due.take()?;
+        let stored = self.store.load();
+        let (Some(imu), Some(mag)) = stored else {
+            let (imu, mag) = (stored.0.is_none(), stored.1.is_none());
+            self.events.push_frequent(HostEvent::BiasesMissing { imu, mag });
+            return None;
+        };
+        bump(&mut self.stats.biases);
+        if !core::mem::replace(&mut self.biases_told, true) {
+            self.events.push_frequent(HostEvent::BiasesSent);
+        }
+        Some(Biases::new(imu, mag))
+    }
+
+    /// Takes back the frame that was handed out last: what it carried is decided anew.
+    ///
+    /// What the robot asks for again by itself is not repeated after a failed flush, behind which
+    /// it may have arrived: an acknowledgement that comes twice would count for the next result. An
+    /// update request is repeated with the stop that may have been lost with it.
+    pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
+        let last = self.last.take();
+        let was_motor = matches!(last, Some(Outgoing::Motor(_)));
+        if unsent == Unsent::Unflushed {
+            self.network_due = self.network.map(|_| now);
+        } else if let Some(outgoing) = last {
+            self.index = self.index.wrapping_sub(1);
+            self.take_back(outgoing, now);
+        }
+        self.motor.unsent(unsent, was_motor, now);
+        if let (Some(Outgoing::Update(version)), false) = (last, self.motor.allows_update()) {
+            self.ask_update_again(version, now);
+        }
+    }
+
+    /// The update request is due again, unless the application has ended the update.
+    fn ask_update_again(&mut self, version: i16, now: Instant) {
+        if self.update == Update::Silent {
+            self.end_update(now);
+            self.update = Update::Asked { version, at: now };
+        }
+    }
+
+    /// Nothing that the robot could act on has left.
+    fn take_back(&mut self, outgoing: Outgoing, now: Instant) {
+        match outgoing {
+            Outgoing::Motor(_) => uncount(&mut self.stats.commands),
+            Outgoing::ImuAck => self.imu.ack_unsent(now),
+            Outgoing::MagAck => self.mag.ack_unsent(now),
+            Outgoing::Biases(_) => {
+                uncount(&mut self.stats.biases);
+                self.biases_due = Some(now);
+            }
+            Outgoing::Calibration(_, _, again) => {
+                if again {
+                    uncount(&mut self.stats.calibration_retries);
+                }
+                if let Some(request) = &mut self.calibration {
+                    request.unsent(now);
+                }
+            }
+            Outgoing::Network(_) => self.network_due = self.network.map(|_| now),
+            Outgoing::Update(version) => self.ask_update_again(version, now),
+            Outgoing::Ping => {
+                if self.ping.unsent(now) {
+                    uncount(&mut self.stats.pings);
+                }
+            }
+        }
+    }
+
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        if self.update == Update::Silent {
+            return self.link_until;
+        }
+        let asked = match self.update {
+            Update::Asked { at, .. } if self.motor.allows_update() => Some(at),
+            _ => None,
+        };
+        earliest(&[
+            self.link_until,
+            self.motor.deadline(),
+            self.ping.deadline(),
+            self.calibration.as_ref().map(Request::deadline),
+            self.imu.ack_due,
+            self.mag.ack_due,
+            self.biases_due,
+            self.network_due,
+            asked,
+        ])
+    }
+}

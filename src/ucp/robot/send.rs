@@ -1,0 +1,189 @@
+//! What a robot sends next, and what comes back unsent.
+
+use super::{ReportLayout, repeat::Beat, state::State};
+use crate::{
+    endpoint::Unsent,
+    time::{Instant, earliest},
+    ucp::{
+        BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, DocumentReport,
+        ErrorCode, FirmwareReport, ImuBias, MAX_LEN, MagBias, OtaAck, OtaStatus, Pong,
+        role::{bump, uncount, write},
+    },
+};
+
+/// Answers to be sent: the latest of each sort, however often the host asks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Answers {
+    pub(super) pong: bool,
+    pub(super) calibration_start: Option<CalibrationKind>,
+    pub(super) calibration_end: Option<CalibrationKind>,
+    pub(super) update: Option<OtaStatus>,
+    /// When the oldest was asked for.
+    since: Option<Instant>,
+}
+
+impl Answers {
+    pub(super) fn ask(&mut self, at: Instant) {
+        self.since.get_or_insert(at);
+    }
+
+    /// The most urgent answer; it counts as sent.
+    fn next(&mut self) -> Option<Outgoing> {
+        if let Some(kind) = self.calibration_start.take() {
+            return Some(Outgoing::StartAck(kind));
+        }
+        if let Some(kind) = self.calibration_end.take() {
+            return Some(Outgoing::EndAck(kind));
+        }
+        if let Some(status) = self.update.take() {
+            return Some(Outgoing::UpdateAnswer(status));
+        }
+        if core::mem::take(&mut self.pong) {
+            return Some(Outgoing::Pong);
+        }
+        self.since = None;
+        None
+    }
+}
+
+/// What a frame carries.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Outgoing {
+    StartAck(CalibrationKind),
+    EndAck(CalibrationKind),
+    UpdateAnswer(OtaStatus),
+    Pong,
+    Imu(ImuBias),
+    Mag(MagBias),
+    BiasRequest(BiasRequest),
+    Report(Beat),
+}
+
+impl State {
+    /// Writes the most urgent frame that is due and says how long it is.
+    pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
+        let outgoing = self.next(now)?;
+        self.last = Some(outgoing);
+        Some(match outgoing {
+            Outgoing::StartAck(kind) => {
+                write(CalibrationStartAck::new(kind, ErrorCode::Fine), 0, buffer)
+            }
+            Outgoing::EndAck(kind) => {
+                write(CalibrationEndAck::new(kind, ErrorCode::Fine), 0, buffer)
+            }
+            Outgoing::UpdateAnswer(status) => write(OtaAck::new(status), 0, buffer),
+            Outgoing::Pong => write(Pong::new(ErrorCode::Fine), 0, buffer),
+            Outgoing::Imu(bias) => write(bias, 0, buffer),
+            Outgoing::Mag(bias) => write(bias, 0, buffer),
+            Outgoing::BiasRequest(request) => write(request, 0, buffer),
+            Outgoing::Report(_) => self.report(buffer),
+        })
+    }
+
+    /// The most urgent thing to send; it counts as sent.
+    fn next(&mut self, now: Instant) -> Option<Outgoing> {
+        if let Some(answer) = self.answers.next() {
+            if matches!(answer, Outgoing::Pong) {
+                bump(&mut self.stats.pongs);
+            }
+            return Some(answer);
+        }
+        if let Some(bias) = self.imu_result.take(now, self.config.result_period) {
+            bump(&mut self.stats.results);
+            return Some(Outgoing::Imu(bias));
+        }
+        if let Some(bias) = self.mag_result.take(now, self.config.result_period) {
+            bump(&mut self.stats.results);
+            return Some(Outgoing::Mag(bias));
+        }
+        let period = self.config.bias_request_period;
+        if let Some(request) = period.and_then(|period| self.bias_request.take(now, period)) {
+            bump(&mut self.stats.bias_requests);
+            return Some(Outgoing::BiasRequest(request));
+        }
+        let beat = self.reports.take(now, self.config.report_period)?;
+        self.stats.reports_skipped = self.stats.reports_skipped.saturating_add(beat.missed);
+        bump(&mut self.stats.reports);
+        Some(Outgoing::Report(beat))
+    }
+
+    fn report(&mut self, buffer: &mut [u8; MAX_LEN]) -> usize {
+        let index = self.index;
+        self.index = index.wrapping_add(1);
+        match self.config.layout {
+            ReportLayout::Firmware { version } => {
+                write(FirmwareReport::new(&self.telemetry, version), index, buffer)
+            }
+            ReportLayout::Document => write(DocumentReport::new(&self.telemetry), index, buffer),
+        }
+    }
+
+    /// Takes back the frame that was handed out last: what it carried is decided anew.
+    ///
+    /// What the host asks for again by itself is not repeated after a failed flush, behind which it
+    /// may have arrived. Results and requests are due at once: a host knows a repetition.
+    pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
+        let last = self.last.take();
+        if unsent == Unsent::Unflushed {
+            self.imu_result.again(now);
+            self.mag_result.again(now);
+            self.bias_request.again(now);
+        } else if let Some(outgoing) = last {
+            self.take_back(outgoing, now);
+        }
+        if let (Some(Outgoing::UpdateAnswer(status)), false) = (last, self.update_asked) {
+            self.answers.update.get_or_insert(status);
+            self.answers.ask(now);
+        }
+    }
+
+    /// Nothing that the host could act on has left.
+    fn take_back(&mut self, outgoing: Outgoing, now: Instant) {
+        match outgoing {
+            Outgoing::StartAck(kind) => {
+                self.answers.calibration_start.get_or_insert(kind);
+                self.answers.ask(now);
+            }
+            Outgoing::EndAck(kind) => {
+                self.answers.calibration_end.get_or_insert(kind);
+                self.answers.ask(now);
+            }
+            Outgoing::UpdateAnswer(_) => {}
+            Outgoing::Pong => {
+                uncount(&mut self.stats.pongs);
+                self.answers.pong = true;
+                self.answers.ask(now);
+            }
+            Outgoing::Imu(_) => {
+                uncount(&mut self.stats.results);
+                self.imu_result.take_back(now);
+            }
+            Outgoing::Mag(_) => {
+                uncount(&mut self.stats.results);
+                self.mag_result.take_back(now);
+            }
+            Outgoing::BiasRequest(_) => {
+                uncount(&mut self.stats.bias_requests);
+                self.bias_request.take_back(now);
+            }
+            Outgoing::Report(beat) => {
+                uncount(&mut self.stats.reports);
+                let skipped = &mut self.stats.reports_skipped;
+                *skipped = skipped.saturating_sub(beat.missed);
+                self.index = self.index.wrapping_sub(1);
+                self.reports.take_back(beat);
+            }
+        }
+    }
+
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        earliest(&[
+            self.command_until,
+            self.answers.since,
+            self.imu_result.deadline(),
+            self.mag_result.deadline(),
+            self.bias_request.deadline(),
+            self.reports.deadline(),
+        ])
+    }
+}

@@ -1,0 +1,296 @@
+//! What a robot knows and is waiting for.
+
+use super::{
+    RobotConfig, RobotEvent, RobotStatistics, UpdateSource,
+    repeat::{Cadence, Repeat},
+    send::{Answers, Outgoing},
+};
+use crate::{
+    events::Events,
+    time::Instant,
+    ucp::{
+        BiasRequest, Biases, CalibrationKind, ErrorCode, Frame, ImuBias, MagBias, Message,
+        MotorControl, NetworkState, OtaStatus, RawMotorControl, RawOtaRequest, Telemetry,
+        role::{bump, is_from_host, reached},
+    },
+};
+
+/// Everything but the bytes.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub(super) config: RobotConfig,
+    pub(super) events: Events<RobotEvent, 16>,
+    pub(super) stats: RobotStatistics,
+    pub(super) command: MotorControl,
+    /// The command has changed since it was taken.
+    pub(super) is_command_new: bool,
+    /// When the command is too old; `None` while the robot stands still for want of one.
+    pub(super) command_until: Option<Instant>,
+    pub(super) answers: Answers,
+    /// Counter of the next report.
+    pub(super) index: u8,
+    pub(super) telemetry: Telemetry,
+    pub(super) reports: Cadence,
+    calibration: Option<Calibration>,
+    pub(super) imu_result: Repeat<ImuBias>,
+    pub(super) mag_result: Repeat<MagBias>,
+    pub(super) bias_request: Repeat<BiasRequest>,
+    pub(super) network: Option<NetworkState>,
+    pub(super) update_asked: bool,
+    /// The frame that was handed out last, as long as it may come back.
+    pub(super) last: Option<Outgoing>,
+}
+
+/// A calibration that is running.
+#[derive(Clone, Copy, Debug)]
+struct Calibration {
+    kind: CalibrationKind,
+    /// Its result has been handed in: the acknowledgement of that ends it.
+    has_result: bool,
+}
+
+impl State {
+    pub(super) fn new(config: RobotConfig, now: Instant) -> Self {
+        Self {
+            config,
+            events: Events::new(),
+            stats: RobotStatistics::default(),
+            command: MotorControl::STOP,
+            is_command_new: false,
+            command_until: None,
+            answers: Answers::default(),
+            index: 0,
+            telemetry: Telemetry::default(),
+            reports: Cadence::default(),
+            calibration: None,
+            imu_result: Repeat::new(None),
+            mag_result: Repeat::new(None),
+            bias_request: Repeat::new(config.bias_request_period.map(|_| (BiasRequest {}, now))),
+            network: None,
+            update_asked: false,
+            last: None,
+        }
+    }
+
+    pub(super) fn calibrating(&self) -> Option<CalibrationKind> {
+        self.calibration.map(|calibration| calibration.kind)
+    }
+
+    pub(super) fn abort_calibration(&mut self) -> Option<CalibrationKind> {
+        self.calibration.take().map(|calibration| calibration.kind)
+    }
+
+    pub(super) fn begin_imu_result(&mut self, bias: ImuBias, now: Instant) {
+        self.imu_result.begin(bias, now);
+        self.has_result(CalibrationKind::Imu);
+    }
+
+    pub(super) fn begin_mag_result(&mut self, bias: MagBias, now: Instant) {
+        self.mag_result.begin(bias, now);
+        self.has_result(CalibrationKind::Magnetometer);
+    }
+
+    fn has_result(&mut self, kind: CalibrationKind) {
+        if let Some(calibration) = self.calibration.as_mut().filter(|it| it.kind == kind) {
+            calibration.has_result = true;
+        }
+    }
+
+    pub(super) fn answer_update(&mut self, status: OtaStatus, now: Instant) -> bool {
+        let asked = core::mem::take(&mut self.update_asked);
+        if asked {
+            self.answers.update = Some(status);
+            self.answers.ask(now);
+        }
+        asked
+    }
+
+    /// Takes in a frame that had arrived at `at`.
+    pub(super) fn receive(&mut self, frame: &Frame, at: Instant, now: Instant) {
+        let message = frame.message();
+        if is_from_host(&message) == Some(false) {
+            bump(&mut self.stats.misdirected);
+            return;
+        }
+        match message {
+            Message::Ping(_) => {
+                bump(&mut self.stats.pings);
+                self.answers.pong = true;
+                self.answers.ask(at);
+            }
+            Message::MotorControl(command) => self.motor(command, at, now),
+            Message::CalibrationStart(start) => self.calibration_start(start.kind(), at),
+            Message::CalibrationEnd(end) => self.calibration_end(end.kind(), at),
+            Message::ImuBiasAck(ack) => self.imu_ack(ack.err()),
+            Message::MagBiasAck(ack) => self.mag_ack(ack.err()),
+            Message::Biases(biases) => self.biases(*biases),
+            Message::OtaRequest(request) => self.update_request(request),
+            Message::SetNetworkState(body) => self.network_state(body.state()),
+            Message::SetNetworkStateWide(body) => self.network_state(body.state()),
+            Message::Unknown(_) => bump(&mut self.stats.unknown),
+            // Frames of a robot, which have been refused above.
+            _ => {}
+        }
+    }
+
+    fn motor(&mut self, received: &RawMotorControl, at: Instant, now: Instant) {
+        if received.starts_update() {
+            bump(&mut self.stats.commands_refused);
+            let (version, by) = (received.version().cast_signed(), UpdateSource::MotorCommand);
+            if !self.tell_update(RobotEvent::UpdateRequested { version, by }) {
+                bump(&mut self.stats.without_room);
+            }
+            return;
+        }
+        // A command that comes too late does not hide that the robot had to stop.
+        self.watch(at);
+        let mut command = clamped(received);
+        if (command.speed(), command.angular()) != (received.speed(), received.angular()) {
+            bump(&mut self.stats.commands_clamped);
+        }
+        bump(&mut self.stats.commands);
+        let resumed = self.command_until.is_none();
+        self.command_until = Some(at + self.config.command_timeout);
+        if reached(self.command_until, now) {
+            // Too old already: it moves nothing, and is not told as one that does.
+            command = command.halted();
+        }
+        if resumed || command != self.command {
+            (self.command, self.is_command_new) = (command, true);
+            self.events.push_latest(RobotEvent::Motor(command), is_motion);
+        }
+    }
+
+    /// Stops when the command has become too old.
+    pub(super) fn watch(&mut self, now: Instant) {
+        if reached(self.command_until, now) {
+            self.command_until = None;
+            (self.command, self.is_command_new) = (self.command.halted(), true);
+            bump(&mut self.stats.watchdog_stops);
+            self.events.push_latest(RobotEvent::WatchdogStop, is_motion);
+        }
+    }
+
+    fn calibration_start(&mut self, kind: CalibrationKind, at: Instant) {
+        if matches!(kind, CalibrationKind::Other(_)) {
+            bump(&mut self.stats.calibration_refused);
+        } else {
+            let repeated = self.calibrating() == Some(kind);
+            if !self.tell_start(kind, repeated) {
+                bump(&mut self.stats.without_room);
+                return;
+            }
+            if repeated {
+                bump(&mut self.stats.calibration_repeats);
+            }
+            self.calibration = Some(Calibration { kind, has_result: false });
+        }
+        self.answers.calibration_start = Some(kind);
+        self.answers.ask(at);
+    }
+
+    /// Tells of a start. A repetition of one that still waits in the queue is told by that one.
+    fn tell_start(&mut self, kind: CalibrationKind, repeated: bool) -> bool {
+        let waits = match self.events.newest(is_calibration) {
+            Some(RobotEvent::CalibrationStart { kind: waiting, .. }) => *waiting == kind,
+            _ => false,
+        };
+        let event = RobotEvent::CalibrationStart { kind, repeated };
+        (repeated && waits) || self.events.keep(event).is_ok()
+    }
+
+    fn calibration_end(&mut self, kind: CalibrationKind, at: Instant) {
+        if self.calibrating() != Some(kind) {
+            bump(&mut self.stats.calibration_refused);
+        } else if self.events.keep(RobotEvent::CalibrationEnd(kind)).is_ok() {
+            self.calibration = None;
+        } else {
+            bump(&mut self.stats.without_room);
+            return;
+        }
+        self.answers.calibration_end = Some(kind);
+        self.answers.ask(at);
+    }
+
+    fn imu_ack(&mut self, err: ErrorCode) {
+        let asked = self.imu_result.was_sent();
+        if self.is_taken(asked, err, RobotEvent::ImuBiasTaken, CalibrationKind::Imu) {
+            self.imu_result.end();
+        }
+    }
+
+    fn mag_ack(&mut self, err: ErrorCode) {
+        let asked = self.mag_result.was_sent();
+        if self.is_taken(asked, err, RobotEvent::MagBiasTaken, CalibrationKind::Magnetometer) {
+            self.mag_result.end();
+        }
+    }
+
+    /// The host says that it has a result: tells so, and ends the calibration that it came from.
+    fn is_taken(
+        &mut self,
+        asked: bool,
+        err: ErrorCode,
+        event: RobotEvent,
+        kind: CalibrationKind,
+    ) -> bool {
+        if !asked || err != ErrorCode::Fine {
+            bump(&mut self.stats.acks_refused);
+            return false;
+        }
+        if self.events.keep(event).is_err() {
+            bump(&mut self.stats.without_room);
+            return false;
+        }
+        self.calibration = self.calibration.filter(|it| it.kind != kind || !it.has_result);
+        true
+    }
+
+    fn biases(&mut self, biases: Biases) {
+        let event = RobotEvent::Biases(biases);
+        let waits = |event: &RobotEvent| matches!(event, RobotEvent::Biases(_));
+        if self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok() {
+            self.bias_request.end();
+        } else {
+            bump(&mut self.stats.without_room);
+        }
+    }
+
+    fn update_request(&mut self, request: &RawOtaRequest) {
+        let (version, by) = (request.version(), UpdateSource::Request);
+        if self.tell_update(RobotEvent::UpdateRequested { version, by }) {
+            self.update_asked = true;
+        } else {
+            bump(&mut self.stats.without_room);
+        }
+    }
+
+    /// Tells of a request to update. A repetition of one that still waits in the queue is told by
+    /// it.
+    fn tell_update(&mut self, event: RobotEvent) -> bool {
+        let waits = |event: &RobotEvent| matches!(event, RobotEvent::UpdateRequested { .. });
+        self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok()
+    }
+
+    fn network_state(&mut self, state: NetworkState) {
+        self.network = Some(state);
+        let is_network = |event: &RobotEvent| matches!(event, RobotEvent::NetworkState(_));
+        self.events.push_latest(RobotEvent::NetworkState(state), is_network);
+    }
+}
+
+const fn is_motion(event: &RobotEvent) -> bool {
+    matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop)
+}
+
+const fn is_calibration(event: &RobotEvent) -> bool {
+    matches!(event, RobotEvent::CalibrationStart { .. } | RobotEvent::CalibrationEnd(_))
+}
+
+/// The command within -100..=100, its lamp on or off as the vendor firmware reads it.
+fn clamped(command: &RawMotorControl) -> MotorControl {
+    let limit = MotorControl::LIMIT;
+    MotorControl::new(command.speed().clamp(-limit, limit), command.angular().clamp(-limit, limit))
+        .unwrap_or(MotorControl::STOP)
+        .with_front_led(command.lamp_is_on())
+}

@@ -1,0 +1,154 @@
+//! A master's stops and set-points when switches move, ports fail and applications fall silent.
+
+use axlewire::{
+    drive::DriveError,
+    endpoint::Endpoint,
+    ikeya::{
+        Master, MasterConfig, Mode, NodeId, Polling, Position, Rps, StopProgress, VelocityResponse,
+    },
+    time::{Duration, Instant},
+};
+
+use crate::{
+    motor::Motor,
+    port::Unplugged,
+    wire::{Bus, Wire, run},
+};
+
+const MS: fn(u32) -> Duration = Duration::from_millis;
+const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(MS_20)];
+const MS_20: Duration = Duration::from_millis(20);
+
+fn rps(value: f32) -> Rps {
+    Rps::new(value).unwrap()
+}
+
+/// A motor that has turned at 5 rps for four seconds, and its master.
+fn turned(polling: Polling) -> (Wire, Bus) {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|config| config.polling = polling);
+    bus.discover().unwrap();
+    bus.set_velocity(NodeId::N1, rps(5.0)).unwrap();
+    run(&mut bus, 4000);
+    assert!(wire.turns() > 19.0);
+    (wire, bus)
+}
+
+/// How far the motor turns when its switch is moved to positions, turns.
+fn way_after_switch(wire: &Wire, bus: &mut Bus) -> f64 {
+    let before = wire.turns();
+    let now_us = wire.world().now_us;
+    wire.world().motors[0].switch(Mode::Position, now_us);
+    run(bus, 5000);
+    assert_eq!(bus.role().mode(NodeId::N1), Some(Mode::Position));
+    (wire.turns() - before).abs()
+}
+
+#[test]
+fn a_mode_that_changes_under_a_paid_stop_owes_another_one() {
+    for polling in POLLINGS {
+        let (wire, mut bus) = turned(polling);
+        bus.stop(NodeId::N1).unwrap();
+        run(&mut bus, 500);
+        assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
+        // The repeat of 0 rps that is on its way is "go to 0" now.
+        let way = way_after_switch(&wire, &mut bus);
+        assert!(way < 1.0, "{polling:?}: a stopped motor turns {way} times");
+        assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
+    }
+}
+
+#[test]
+fn a_mode_that_changes_under_a_set_point_owes_a_stop() {
+    for polling in POLLINGS {
+        let (wire, mut bus) = turned(polling);
+        // 5 rps are a position far away.
+        let way = way_after_switch(&wire, &mut bus);
+        assert!(way < 1.0, "{polling:?}: the motor turns {way} times to nobody's position");
+        assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
+    }
+}
+
+#[test]
+fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
+    let mut bus = wire.master(|_| ());
+    bus.discover().unwrap();
+    bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
+    run(&mut bus, 1000);
+    // The stop's READ leaves, then the port takes nothing for five seconds.
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    let reads = wire.world().motors[0].reads;
+    while wire.world().motors[0].reads == reads {
+        bus.service().unwrap();
+    }
+    wire.write_only(0);
+    for _ in 0..1000 {
+        let _ = bus.service();
+        wire.pass(5);
+    }
+    run(&mut bus, 5000);
+    let before = wire.turns();
+    assert!(before > 100.0, "{before}: it is on its way");
+    wire.write_all();
+    bus.stop(NodeId::N1).unwrap();
+    run(&mut bus, 10_000);
+    let way = wire.turns() - before;
+    assert!(way.abs() < 1.0, "the stop drives the motor {way} turns");
+}
+
+#[test]
+fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
+    for is_async in [false, true] {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+        let mut bus = wire.master(|config| config.polling = Polling::Manual);
+        bus.discover().unwrap();
+        wire.pass(1000);
+        wire.write_only(0);
+        let failed = match is_async {
+            true => wire.block_on(bus.set_velocity_async(NodeId::N1, rps(10.0))),
+            false => bus.set_velocity(NodeId::N1, rps(10.0)),
+        };
+        assert_eq!(failed, Err(DriveError::Port(Unplugged)));
+        wire.pass(10_000_000);
+        wire.write_all();
+        bus.read(NodeId::N1).unwrap();
+        run(&mut bus, 100);
+        let world = wire.world();
+        let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
+        assert!(payloads.all(|payload| payload == [0; 4]), "sent ten seconds after it had failed");
+    }
+}
+
+/// How an application tells its master that it is alive.
+type Sign = fn(&mut Master, Instant);
+
+#[test]
+fn a_late_sign_of_life_does_not_revive_a_command_that_is_too_old() {
+    let signs: [Sign; 4] = [
+        |master, now| master.set_velocity(NodeId::N2, Rps::ZERO, now).unwrap(),
+        |master, now| master.stop(NodeId::N2, now),
+        |master, now| master.stop_all(now),
+        |master, now| master.keep_alive(now),
+    ];
+    for (index, sign) in signs.into_iter().enumerate() {
+        let mut config = MasterConfig::direct();
+        config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect();
+        (config.polling, config.dead_man) = (Polling::Manual, Some(MS(500)));
+        let mut now = Instant::from_millis(0);
+        let mut master: Master = Master::new(config, now);
+        master.discover(now);
+        for node in [NodeId::N1, NodeId::N2] {
+            assert!(master.poll_transmit(now).is_some());
+            now += Duration::from_micros(400);
+            master.handle_input(VelocityResponse::new(node, Rps::ZERO).as_bytes(), now);
+        }
+        master.set_velocity(NodeId::N1, rps(5.0), now).unwrap();
+        assert!(master.poll_transmit(now).is_some());
+        now += MS(3_600_000);
+        sign(&mut master, now);
+        assert!(master.stops_owed().contains(NodeId::N1), "sign {index}: an hour is forgiven");
+        assert_eq!(master.statistics().dead_man, 1, "sign {index}");
+    }
+}

@@ -1,0 +1,196 @@
+//! Packets of which a part has left when the port fails: what the node makes of the rest.
+
+use axlewire::{
+    drive::{Directed, Driver},
+    endpoint::Endpoint,
+    ikeya::{
+        Master, MasterConfig, Mode, NodeId, Polling, Position, PositionResponse, ReadRequest, Rps,
+        Slave, SlaveConfig, Target, WriteRequest,
+    },
+    time::Instant,
+};
+
+use crate::{
+    motor::Motor,
+    wire::{Bus, Wire, Write, run},
+};
+
+fn rps(value: f32) -> Rps {
+    Rps::new(value).unwrap()
+}
+
+/// A motor that stands still, with a set-point of 10 rps of which so many bytes have left. The node
+/// waits for the rest for 20 ms.
+fn cut_after(count: usize) -> (Wire, Bus) {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    wire.world().motors[0].idle_us = 20_000;
+    let mut bus = wire.master(|config| config.polling = Polling::Manual);
+    bus.discover().unwrap();
+    wire.pass(5000);
+    bus.service().unwrap();
+    wire.write_only(count);
+    let now = bus.now();
+    bus.role_mut().set_velocity(NodeId::N1, rps(10.0), now).unwrap();
+    assert!(bus.service().is_err());
+    assert_eq!(bus.unsent().len(), WriteRequest::LEN - count);
+    (wire, bus)
+}
+
+#[test]
+fn a_cut_off_set_point_that_is_released_is_not_completed() {
+    let (wire, mut bus) = cut_after(5);
+    bus.role_mut().release(NodeId::N1);
+    wire.pass(10_000);
+    wire.write_all();
+    run(&mut bus, 1000);
+    assert_eq!(wire.rps(), 0.0, "it runs on a set-point that was given up, for ever");
+}
+
+#[test]
+fn a_cut_off_set_point_is_not_completed_after_a_stop() {
+    let (wire, mut bus) = cut_after(5);
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    wire.pass(10_000);
+    // Room for the rest, then the port fails again.
+    wire.write_only(3);
+    run(&mut bus, 1000);
+    assert_eq!(wire.rps(), 0.0, "it stood still when it was stopped, and runs since");
+}
+
+#[test]
+fn a_cut_off_set_point_is_not_completed_while_the_mode_is_in_doubt() {
+    let (wire, mut bus) = cut_after(5);
+    let now_us = wire.world().now_us;
+    wire.world().motors[0].switch(Mode::Position, now_us);
+    wire.receive(PositionResponse::new(NodeId::N1, Position::new(0, 0)).as_bytes());
+    wire.pass(1000);
+    let _ = bus.service();
+    assert!(bus.role().is_mode_in_doubt(NodeId::N1));
+    wire.pass(9000);
+    wire.write_all();
+    run(&mut bus, 3000);
+    let world = wire.world();
+    let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
+    let is_completed = payloads.any(|payload| payload == 10.0_f32.to_le_bytes());
+    assert!(!is_completed, "10 rps are a position that nobody has asked for");
+}
+
+#[test]
+fn a_port_that_takes_a_byte_now_and_then_does_not_complete_a_set_point_after_a_stop() {
+    let (wire, mut bus) = cut_after(2);
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    for _ in 0..6 {
+        wire.pass(19_000);
+        wire.write_only(1);
+        let _ = bus.service();
+    }
+    assert_eq!(wire.world().motors[0].writes, [], "completed 114 ms after the stop");
+}
+
+#[test]
+fn a_set_point_that_was_given_up_is_not_completed_by_the_next_header() {
+    // The last byte of its CRC is the header of a READ.
+    let ends_like_header =
+        |&rps: &Rps| WriteRequest::velocity(NodeId::N1, rps).as_bytes()[7] == 0xAA;
+    let target = (1..100_000).map(|milli| rps(milli as f32 * 1e-3)).find(ends_like_header).unwrap();
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|_| ());
+    bus.discover().unwrap();
+    wire.pass(300);
+    let begin = wire.world().sent.len();
+    wire.write_only(7);
+    assert!(bus.set_velocity(NodeId::N1, target).is_err());
+    bus.discard();
+    bus.role_mut().release(NodeId::N1);
+    wire.write_all();
+    run(&mut bus, 1000);
+    let mut slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+    for &(at, byte) in &wire.world().sent[begin..] {
+        let now = Instant::from_micros(at);
+        if slave.poll_timeout().is_some_and(|due| now >= due) {
+            slave.handle_timeout(now);
+        }
+        slave.handle_input(&[byte], now);
+        let is_given_up = slave.command() == Some(Target::Velocity(target));
+        assert!(!is_given_up, "it has heard a set-point that was given up");
+    }
+    assert!(slave.statistics().reads > 100, "it hears the READs");
+    assert_eq!(wire.rps(), 0.0);
+}
+
+/// A port that cuts every WRITE in two: it takes a byte, fails, then takes the rest.
+fn cut_in_two() -> impl FnMut(&[u8]) -> Write {
+    let mut fails = false;
+    move |bytes| match (core::mem::take(&mut fails), bytes.len()) {
+        (true, _) => Write::Error,
+        (false, WriteRequest::LEN) => {
+            fails = true;
+            Write::Some(1)
+        }
+        (false, _) => Write::All,
+    }
+}
+
+#[test]
+fn a_stop_write_that_a_port_cut_in_two_pays_nothing() {
+    for polling in [Polling::Manual, Polling::Fastest] {
+        for is_async in [false, true] {
+            let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+            let mut bus = wire.master(|config| config.polling = polling);
+            bus.discover().unwrap();
+            bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
+            wire.pass(300_000);
+            let _ = bus.service();
+            wire.write_with(cut_in_two());
+            let stopped = match is_async {
+                true => wire.block_on(bus.stop_async(NodeId::N1)),
+                false => bus.stop(NodeId::N1),
+            };
+            let rps = wire.rps();
+            assert!(stopped.is_err() || rps == 0.0, "stopped, and turns at {rps} rps");
+            wire.write_all();
+            run(&mut bus, 100);
+            assert_eq!(wire.rps(), 0.0, "the stop stays owed");
+        }
+    }
+}
+
+#[test]
+fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_writes_fail() {
+    let half = |wire: &Wire| {
+        let mut steps = [Write::Some(4), Write::Error, Write::All].into_iter().cycle();
+        wire.write_with(move |bytes| match bytes.len() {
+            ReadRequest::LEN if bytes[0] == 0xAA => Write::All,
+            _ => steps.next().unwrap(),
+        });
+    };
+    type Fail = fn(&Wire);
+    let writers: [(Fail, bool); 3] = [
+        (|wire| wire.write_with(cut_in_two()), false),
+        (half, false),
+        (|wire| wire.write_with(|_| Write::OneAtATime), true),
+    ];
+    for ((fail, is_heard), is_async) in writers.into_iter().flat_map(|it| [(it, false), (it, true)])
+    {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+        let mut config = MasterConfig::direct();
+        config.nodes = NodeId::N1.into();
+        let Ok(port) = Directed::new(wire.clone(), wire.clone());
+        let mut bus = Driver::with(|now| <Master>::new(config, now), port, wire.clone());
+        bus.discover().unwrap();
+        bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
+        assert_eq!(wire.rps(), 10.0);
+        fail(&wire);
+        let stopped = match is_async {
+            true => wire.block_on(bus.stop_async(NodeId::N1)),
+            false => bus.stop(NodeId::N1),
+        };
+        let rps = wire.rps();
+        assert!(stopped.is_err() || rps == 0.0, "stopped, and turns at {rps} rps");
+        assert!(stopped.is_ok() || !is_heard, "{stopped:?}");
+        wire.write_all();
+        assert_eq!((bus.stop(NodeId::N1), wire.rps()), (Ok(()), 0.0));
+    }
+}

@@ -1,0 +1,224 @@
+//! What a master may tell its nodes, by the rulings alone: I6 (a stop holds what was measured after
+//! it), I11 (doubt), I12 (debts) and I13 (dead-man).
+
+use axlewire::{
+    ikeya::{Mode, NodeSet},
+    time::{Duration, Instant},
+};
+
+use crate::kit::Write;
+
+/// Time in which a measured position has to be written first.
+const HOLD_PATIENCE: Duration = Duration::from_millis(20);
+
+/// A set-point: a speed, or count and rotation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Aim {
+    Rps(f32),
+    Place((i16, i16)),
+}
+
+impl Aim {
+    pub(crate) const fn mode(self) -> Mode {
+        match self {
+            Self::Rps(_) => Mode::Velocity,
+            Self::Place(_) => Mode::Position,
+        }
+    }
+
+    fn is_in(self, write: &Write) -> bool {
+        match self {
+            Self::Rps(rps) => write.speed == rps.to_bits(),
+            Self::Place(place) => write.place == place,
+        }
+    }
+}
+
+/// A position that a node has answered with.
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    place: (i16, i16),
+    /// When the node measured it, and when the master heard of it.
+    at: Instant,
+    heard_at: Option<Instant>,
+}
+
+/// What the master says of a node: its own debts and doubts are followed, its packets judged.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) mode: Option<Mode>,
+    pub(crate) is_owed: bool,
+    pub(crate) is_in_doubt: bool,
+    pub(crate) is_abnormal: bool,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Node {
+    /// The set-point in force.
+    pub(crate) aim: Option<Aim>,
+    /// Since when its latest order is a stop.
+    stopped_at: Option<Instant>,
+    /// It is under an order that a change of its mode would turn into another one.
+    is_commanded: bool,
+    /// The mode of the latest answer.
+    heard: Option<Mode>,
+    measured: Vec<Measured>,
+    /// The position that it was last told to hold.
+    held: Option<(i16, i16)>,
+    /// Numbers of the packets of stop WRITEs that no answer has followed.
+    unanswered: Vec<u64>,
+    /// Stop WRITEs that an answer has followed.
+    answered: u32,
+    seen: Seen,
+}
+
+impl Node {
+    pub(crate) const fn is_stopped(&self) -> bool {
+        self.stopped_at.is_some()
+    }
+
+    fn owe(&mut self, now: Instant) {
+        if self.stopped_at.is_none() {
+            (self.stopped_at, self.held) = (Some(now), None);
+        }
+        (self.aim, self.is_commanded, self.seen.is_owed) = (None, true, true);
+        self.forget_payments();
+    }
+
+    fn forget_payments(&mut self) {
+        self.answered = 0;
+        self.unanswered.clear();
+    }
+
+    pub(crate) fn stop(&mut self, now: Instant) {
+        if !self.seen.is_owed {
+            self.owe(now);
+        }
+    }
+
+    /// The master has accepted a set-point.
+    pub(crate) fn accept(&mut self, aim: Aim) -> Result<(), String> {
+        if self.seen.is_owed {
+            return Err("a set-point is accepted while a stop is owed".into());
+        }
+        if self.heard != Some(aim.mode()) || self.seen.is_in_doubt {
+            return Err("a set-point is accepted for a mode that was not heard last".into());
+        }
+        (self.aim, self.stopped_at, self.is_commanded) = (Some(aim), None, true);
+        Ok(())
+    }
+
+    pub(crate) fn release(&mut self) {
+        self.aim = None;
+        // A stop that is owed stays in force.
+        self.is_commanded &= !self.is_stopped() || self.seen.is_owed;
+    }
+
+    /// The node answers a request that has ended at `at`.
+    pub(crate) fn measure(&mut self, place: (i16, i16), at: Instant) {
+        self.measured.push(Measured { place, at, heard_at: None });
+    }
+
+    /// The master hears the answer to the packet of this number.
+    pub(crate) fn hear(&mut self, mode: Mode, place: (i16, i16), number: u64, now: Instant) {
+        self.heard = Some(mode);
+        for measured in self.measured.iter_mut().filter(|measured| measured.place == place) {
+            measured.heard_at = Some(now);
+        }
+        let waiting = self.unanswered.len();
+        self.unanswered.retain(|&write| write > number);
+        // However many WRITEs came before: an answer pays once.
+        self.answered += u32::from(self.unanswered.len() < waiting);
+    }
+
+    /// Follows what the master says; it may not forget a debt.
+    pub(crate) fn follow(&mut self, seen: Seen, now: Instant) -> Result<(), String> {
+        let before = core::mem::replace(&mut self.seen, seen);
+        if before.is_owed && !seen.is_owed && self.answered < 2 {
+            return Err(format!("a stop is paid by {} answered WRITEs", self.answered));
+        }
+        if before.mode.is_some() && before.mode != seen.mode {
+            self.aim = None;
+            if self.is_commanded && !seen.is_owed {
+                return Err("the mode changes under an order, and no stop is owed".into());
+            }
+        }
+        if seen.is_owed && !before.is_owed {
+            self.owe(now);
+        }
+        if seen.is_in_doubt && !before.is_in_doubt || seen.is_abnormal && !before.is_abnormal {
+            self.forget_payments();
+        }
+        Ok(())
+    }
+
+    /// May this WRITE be sent?
+    pub(crate) fn judge(&self, write: &Write, is_three: bool, now: Instant) -> Result<(), String> {
+        let Seen { mode, is_in_doubt, is_owed, .. } = self.seen;
+        let Some(stopped_at) = self.stopped_at else {
+            let Some(aim) = self.aim.filter(|aim| aim.is_in(write)) else {
+                return Err(format!("a set-point that is not in force: {:?} is", self.aim));
+            };
+            let is_sure = self.heard == Some(aim.mode()) && mode == self.heard && !is_in_doubt;
+            return match is_sure && !is_owed {
+                true => Ok(()),
+                false => Err("a set-point in another mode or under a debt".into()),
+            };
+        };
+        let mut held = self.measured.iter().filter(|it| it.place == write.place);
+        let Some(held) = held.find(|it| it.at >= stopped_at) else {
+            let is_zero = write.speed == 0 && mode == Some(Mode::Velocity) && self.heard == mode;
+            return match is_zero && !is_in_doubt {
+                true => Ok(()),
+                false => Err("neither 0 rps nor a position measured after the stop".into()),
+            };
+        };
+        // Halves of 0 to 12,287 are less than 1e-9 rps.
+        let is_small = |half: i16| (0..=12_287).contains(&half);
+        let is_still = is_small(write.place.1) && (!is_three || is_small(write.place.0));
+        if is_in_doubt && !is_still {
+            return Err("a WRITE in doubt that may move the node".into());
+        }
+        let is_old = held.heard_at.is_none_or(|at| now > at + HOLD_PATIENCE);
+        match is_old && self.held != Some(write.place) {
+            true => Err("a position to hold that is too old".into()),
+            false => Ok(()),
+        }
+    }
+
+    /// The WRITE with this number has left whole.
+    pub(crate) fn sent(&mut self, write: &Write, number: u64) {
+        if self.is_stopped() {
+            self.unanswered.push(number);
+            self.held = Some(write.place);
+        }
+    }
+
+    /// What was sent may not have left.
+    pub(crate) fn unflushed(&mut self) {
+        self.unanswered.clear();
+    }
+}
+
+/// The dead-man of I13.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DeadMan {
+    pub(crate) limit: Option<Duration>,
+    pub(crate) alive_at: Instant,
+}
+
+impl DeadMan {
+    /// Stops the nodes whose set-points are too old; they have to be owed a stop from now on.
+    pub(crate) fn expire(&self, nodes: &mut [Node], now: Instant) -> NodeSet {
+        let mut expired = NodeSet::NONE;
+        if self.limit.is_some_and(|limit| now > self.alive_at + limit) {
+            for (node, id) in nodes.iter_mut().zip(axlewire::ikeya::NodeId::ALL) {
+                if node.aim.is_some() {
+                    node.owe(now);
+                    expired.insert(id);
+                }
+            }
+        }
+        expired
+    }
+}

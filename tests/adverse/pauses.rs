@@ -1,0 +1,150 @@
+//! Ports that take a packet in parts: whether the pauses between them have ended it (I12, U16).
+
+use std::pin::pin;
+
+use axlewire::{
+    drive::DriveError,
+    ikeya::{Mode, NodeId, NodeSet, Polling, Rps, WriteRequest},
+};
+
+use crate::{
+    motor::Motor,
+    port::{Unplugged, poll},
+    wire::{Bus, Wire, Write, run},
+};
+
+/// A motor at 10 rps behind a port that from now on treats the parts of each WRITE in turn like
+/// this. The node gives a packet up after five byte times of silence.
+fn turning(parts: impl Fn(usize) -> Write + 'static) -> (Wire, Bus) {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|config| config.polling = Polling::Manual);
+    bus.discover().unwrap();
+    bus.set_velocity(NodeId::N1, Rps::new(10.0).unwrap()).unwrap();
+    wire.pass(300_000);
+    let _ = bus.service();
+    let (mut part, mut left) = (0, 0);
+    wire.write_with(move |bytes| {
+        if bytes.len() == WriteRequest::LEN {
+            (part, left) = (0, WriteRequest::LEN);
+        } else if bytes.len() == left {
+            part += 1;
+        } else {
+            return Write::All;
+        }
+        let write = parts(part);
+        if let Write::Some(count) | Write::Late(_, count) | Write::Out(count, _) = write {
+            left = bytes.len().saturating_sub(count);
+        }
+        write
+    });
+    (wire, bus)
+}
+
+fn stop(wire: &Wire, bus: &mut Bus, is_async: bool) -> Result<(), DriveError<Unplugged>> {
+    match is_async {
+        true => wire.block_on(bus.stop_async(NodeId::N1)),
+        false => bus.stop(NodeId::N1),
+    }
+}
+
+/// The stop counts as paid only if the motor has heard it; a port that is well again stops it.
+fn is_paid(parts: impl Fn(usize) -> Write + Copy + 'static) -> bool {
+    let [blocking, by_async] = [false, true].map(|is_async| {
+        let (wire, mut bus) = turning(parts);
+        let stopped = stop(&wire, &mut bus, is_async);
+        assert!(stopped.is_err() || wire.rps() == 0.0, "stopped, and turns at {}", wire.rps());
+        wire.write_all();
+        run(&mut bus, 100);
+        assert_eq!((wire.rps(), bus.role().stops_owed()), (0.0, NodeSet::NONE));
+        stopped.is_ok()
+    });
+    assert_eq!(blocking, by_async);
+    blocking
+}
+
+#[test]
+fn a_stop_whose_write_comes_back_late_in_the_middle_of_the_packet_pays_nothing() {
+    for (count, late_us) in [(1, 130), (4, 130), (4, 300), (7, 130), (7, 1000)] {
+        let late = move |part| if part == 0 { Write::Out(count, late_us) } else { Write::All };
+        assert!(!is_paid(late), "a pause of {late_us} us behind {count} bytes");
+        let late = move |part| match part {
+            0 => Write::Some(count),
+            _ => Write::Late(20 * count as u64 + late_us, 8),
+        };
+        assert!(!is_paid(late), "{late_us} us before the rest of {count} bytes");
+    }
+}
+
+#[test]
+fn whatever_a_port_does_with_the_parts_of_a_stop_it_is_paid_only_if_it_was_heard() {
+    for count in [1, 2, 4, 7] {
+        for late_us in (0..=400).step_by(13) {
+            is_paid(move |_| Write::Late(late_us, count));
+            is_paid(move |_| Write::Out(count, late_us));
+            is_paid(move |part| if part == 0 { Write::Out(count, late_us) } else { Write::All });
+            is_paid(move |part| match part {
+                0 => Write::Some(count),
+                _ => Write::Late(late_us, count),
+            });
+        }
+    }
+}
+
+#[test]
+fn a_stop_leaves_through_a_port_that_takes_a_few_bytes_and_waits_until_they_are_out() {
+    for count in 1..=8 {
+        assert!(is_paid(move |_| Write::Out(count, 0)), "{count} bytes at a time");
+    }
+    for late_us in [10, 30] {
+        assert!(is_paid(move |_| Write::Out(4, late_us)), "with pauses of {late_us} us");
+    }
+}
+
+#[test]
+fn a_stop_leaves_through_a_port_that_takes_a_few_bytes_into_a_buffer() {
+    for count in 1..=8 {
+        assert!(is_paid(move |_| Write::Some(count)), "{count} bytes at a time");
+    }
+}
+
+/// The rest comes late, but perhaps not too late: only the flush can tell.
+const IN_DOUBT: fn(usize) -> Write =
+    |part| if part == 0 { Write::Some(4) } else { Write::Late(170, 8) };
+
+#[test]
+fn a_packet_in_doubt_is_flushed_before_the_next_one_is_sent() {
+    let (wire, mut bus) = turning(IN_DOUBT);
+    let before = wire.world().sent.len();
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    bus.service().unwrap();
+    let packet = before + WriteRequest::LEN;
+    assert_eq!(wire.world().sent.len(), packet, "a READ follows a WRITE that was cut");
+    wire.pass(50);
+    bus.service().unwrap();
+    assert_eq!(wire.world().sent.len(), packet, "no silence behind a WRITE that was cut");
+}
+
+#[test]
+fn a_packet_in_doubt_whose_flush_is_cancelled_or_stalls_counts_as_cut_off() {
+    for is_cancelled in [false, true] {
+        let (wire, mut bus) = turning(IN_DOUBT);
+        let writes = bus.role().statistics().writes;
+        wire.world().flushes_hang = true;
+        let now = bus.now();
+        bus.role_mut().stop(NodeId::N1, now);
+        if is_cancelled {
+            assert!(poll(pin!(bus.service_async())).is_pending());
+            assert_eq!(bus.role().statistics().writes, writes + 1);
+            wire.write_with(|_| Write::Error);
+            let _ = bus.service();
+        } else {
+            assert_eq!(wire.block_on(bus.service_async()), Err(DriveError::Stalled));
+        }
+        assert_eq!(bus.role().statistics().writes, writes, "the stop was not written");
+        wire.world().flushes_hang = false;
+        wire.write_all();
+        run(&mut bus, 100);
+        assert_eq!((wire.rps(), bus.role().stops_owed()), (0.0, NodeSet::NONE));
+    }
+}

@@ -1,0 +1,348 @@
+//! A rover's link: stops that a port cuts, receivers and transmitters that fail, robots held up.
+
+use axlewire::{
+    drive::{DriveError, Driver},
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+    ucp::{Body, Host, HostConfig, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry},
+};
+
+use crate::{
+    port::Unplugged,
+    wire::{Wire, Write},
+};
+
+/// A host that has driven, and an instant later.
+fn host() -> (Wire, Driver<Host, Wire, Wire>) {
+    let wire = Wire::link();
+    let mut host = wire.driver(|now| Host::new(HostConfig::default(), now));
+    host.service().unwrap();
+    wire.pass(30_000);
+    host.drive(60, 0).unwrap();
+    wire.pass(30_000);
+    (wire, host)
+}
+
+fn robot(wire: &Wire) -> Driver<Robot, Wire, Wire> {
+    let mut robot = wire.driver(|now| Robot::new(RobotConfig::default(), now));
+    robot.service().unwrap();
+    robot
+}
+
+fn drive() -> Vec<u8> {
+    MotorControl::new(60, 0).unwrap().frame(0).as_bytes().to_vec()
+}
+
+/// How long after the last byte that was sent a robot that hears all of it still drives.
+fn robot_drives_on(wire: &Wire) -> Duration {
+    let sent = &wire.world().sent;
+    let mut robot = Robot::new(RobotConfig::default(), Instant::from_micros(0));
+    let (mut bytes, mut drove) = (sent.iter().peekable(), Instant::from_micros(0));
+    let last = sent.last().unwrap().0;
+    for now_us in (0..last + 2_000_000).step_by(50) {
+        let now = Instant::from_micros(now_us);
+        while let Some(&(at, byte)) = bytes.next_if(|&&(at, _)| at <= now_us) {
+            robot.handle_input(&[byte], Instant::from_micros(at));
+        }
+        if robot.poll_timeout().is_some_and(|due| now >= due) {
+            robot.handle_timeout(now);
+        }
+        if robot.command(now).speed() != 0 {
+            drove = now;
+        }
+    }
+    assert!(drove > Instant::from_micros(0), "it has driven at all");
+    drove - Instant::from_micros(last)
+}
+
+#[test]
+fn a_stop_that_a_port_cut_in_two_is_sent_again() {
+    let fails_10_ms = [Write::Some(10)].into_iter().chain([Write::Error; 10]);
+    let pauses = [
+        fails_10_ms.collect(),
+        vec![Write::Some(10), Write::Late(50_000, usize::MAX)],
+        vec![Write::Out(10, 30_000)],
+        vec![Write::Out(10, 200_000)],
+        vec![Write::Some(10), Write::Late(30_000, 7), Write::Late(30_000, usize::MAX)],
+    ];
+    for steps in pauses {
+        for is_async in [false, true] {
+            let (wire, mut host) = host();
+            wire.write_as(steps.iter().copied());
+            let stopped = match is_async {
+                true => wire.block_on(host.stop_async()),
+                false => host.stop(),
+            };
+            let drives_on = robot_drives_on(&wire);
+            let is_true = stopped.is_err() || drives_on <= Duration::from_millis(1);
+            assert!(is_true, "{steps:?}: {stopped:?}, and it drives on for {drives_on:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_says_so() {
+    for is_async in [false, true] {
+        let (wire, mut host) = host();
+        wire.world().is_deaf = true;
+        let begin_us = wire.world().now_us;
+        let stopped = match is_async {
+            true => wire.block_on(host.stop_async()),
+            false => host.stop(),
+        };
+        assert_eq!(stopped, Ok(()), "it was written and flushed");
+        assert!(wire.world().now_us - begin_us < 10_000, "at once");
+        assert!(robot_drives_on(&wire) <= Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
+    for is_async in [false, true] {
+        let wire = Wire::link();
+        let mut robot = robot(&wire);
+        let (mut speeds, mut errors) = (vec![], 0);
+        for millis in 0..1000 {
+            if millis % 100 == 0 {
+                let stop = MotorControl::STOP.frame(1).as_bytes().to_vec();
+                wire.receive(&if millis < 500 { drive() } else { stop });
+            }
+            if millis == 300 {
+                wire.write_only(0);
+            }
+            if millis % 20 == 0 {
+                let now = robot.now();
+                robot.role_mut().set_telemetry(&Telemetry::default(), now);
+            }
+            let by = robot.now() + Duration::from_millis(1);
+            let command = match is_async {
+                true => wire.block_on(robot.next_command_async(by)),
+                false => robot.next_command(by),
+            };
+            match command {
+                Ok(Some(command)) => speeds.push(command.speed()),
+                Ok(None) => {}
+                Err(error) => {
+                    assert_eq!(error, DriveError::Port(Unplugged));
+                    errors += 1;
+                    wire.pass(1000);
+                }
+            }
+        }
+        assert!(errors > 0, "the transmitter fails");
+        assert_eq!(speeds, [60, 0], "the application hears of the stop");
+    }
+}
+
+#[test]
+fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
+    for is_async in [false, true] {
+        let wire = Wire::link();
+        let mut robot = robot(&wire);
+        wire.receive(&drive());
+        wire.pass(10_000_000);
+        let by = robot.now() + Duration::from_millis(1);
+        let command = match is_async {
+            true => wire.block_on(robot.next_command_async(by)),
+            false => robot.next_command(by),
+        };
+        let speed = command.unwrap().map_or(0, |command| command.speed());
+        assert_eq!(speed, 0, "it drives on a command of ten seconds ago");
+    }
+}
+
+#[test]
+fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
+    for is_async in [false, true] {
+        let wire = Wire::link();
+        let mut robot = robot(&wire);
+        let by = robot.now() + Duration::from_millis(5);
+        robot.run_until(by, |_, _, _| ()).unwrap();
+        wire.receive(&drive());
+        wire.pass(2_000_000);
+        let by = robot.now() + Duration::from_millis(5);
+        let speed = |_: &mut Robot, event, _| {
+            if let RobotEvent::Motor(command) = event {
+                assert_eq!((command.speed(), command.angular()), (0, 0));
+            }
+        };
+        match is_async {
+            true => wire.block_on(robot.run_until_async(by, speed)),
+            false => robot.run_until(by, speed),
+        }
+        .unwrap();
+        assert_eq!(robot.role().statistics().commands, 1, "it was a valid one");
+        assert_eq!(robot.role().statistics().watchdog_stops, 1);
+    }
+}
+
+/// The next command of a robot that is called all the time, for 5 ms.
+fn next(wire: &Wire, robot: &mut Driver<Robot, Wire, Wire>, is_async: bool) {
+    let by = robot.now() + Duration::from_millis(5);
+    let command = match is_async {
+        true => wire.block_on(robot.next_command_async(by)),
+        false => robot.next_command(by),
+    };
+    command.unwrap();
+}
+
+/// A robot that reports every 20 ms and has been called for a while.
+fn reporting(wire: &Wire, is_async: bool) -> Driver<Robot, Wire, Wire> {
+    let mut robot = robot(wire);
+    let now = robot.now();
+    robot.role_mut().set_telemetry(&Telemetry::default(), now);
+    (0..21).for_each(|_| next(wire, &mut robot, is_async));
+    robot
+}
+
+/// How long after a moment the robot drives at the last, with calls all the time, microseconds.
+fn drives_until(
+    wire: &Wire,
+    robot: &mut Driver<Robot, Wire, Wire>,
+    is_async: bool,
+    from_us: u64,
+) -> u64 {
+    let mut drove_us = 0;
+    for _ in 0..200 {
+        next(wire, robot, is_async);
+        let now = robot.now();
+        if !robot.role().command(now).stands_still() {
+            drove_us = now.as_micros() - from_us;
+        }
+    }
+    drove_us
+}
+
+#[test]
+fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
+    for (is_async, stall_us) in [(false, 3_000_000), (true, 3_000_000), (true, 900_000)] {
+        let wire = Wire::link();
+        let mut robot = reporting(&wire, is_async);
+        let sent = wire.world().sent.len();
+        let begin_us = wire.world().now_us;
+        let mut steps = vec![Write::Late(stall_us, usize::MAX)].into_iter();
+        wire.write_with(move |_| steps.next().unwrap_or(Write::All));
+        // The next report is due within 20 ms.
+        wire.receive_in(25_000, &drive());
+        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
+        assert!(wire.world().sent.len() > sent, "it has reported");
+        assert!(wire.world().now_us > begin_us + stall_us, "the write has stalled");
+        assert!(drove_us <= 525_000, "async {is_async}: until {drove_us} us after the command");
+    }
+}
+
+#[test]
+fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up() {
+    for count in 1..=4 {
+        let wire = Wire::link();
+        let mut robot = reporting(&wire, true);
+        let begin_us = wire.world().now_us;
+        let by = robot.now() + Duration::from_millis(100);
+        let bytes = drive().repeat(count);
+        wire.block_on_held(robot.next_command_async(by), &bytes, 3_000_000).unwrap();
+        let drove_us = drives_until(&wire, &mut robot, true, begin_us);
+        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they came");
+    }
+}
+
+#[test]
+fn more_commands_than_a_round_takes_in_are_all_as_old_as_the_hold_up() {
+    for (is_async, count) in [(false, 171), (false, 400), (true, 200), (true, 3000)] {
+        let wire = Wire::link();
+        let mut robot = reporting(&wire, is_async);
+        let begin_us = wire.world().now_us;
+        wire.receive(&drive().repeat(count));
+        wire.pass(10_000_000);
+        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
+        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they came");
+    }
+}
+
+/// A robot that neither reports nor asks for biases.
+fn silent(wire: &Wire) -> Driver<Robot, Wire, Wire> {
+    let mut config = RobotConfig::default();
+    config.bias_request_period = None;
+    let mut robot = wire.driver(|now| Robot::new(config, now));
+    robot.service().unwrap();
+    robot
+}
+
+#[test]
+fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
+    for is_async in [false, true] {
+        let wire = Wire::link();
+        let mut robot = silent(&wire);
+        let begin_us = wire.world().now_us;
+        wire.receive(&drive());
+        wire.pass(10_000_000);
+        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
+        assert_eq!(drove_us, 0, "async {is_async}: it drives on a command of ten seconds ago");
+    }
+}
+
+#[test]
+fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence() {
+    for is_async in [false, true] {
+        let wire = Wire::link();
+        let mut robot = silent(&wire);
+        let begin_us = wire.world().now_us;
+        wire.receive_in(3_000_000, &drive());
+        let by = robot.now() + Duration::from_millis(10_000);
+        let command = match is_async {
+            true => wire.block_on(robot.next_command_async(by)),
+            false => robot.next_command(by),
+        };
+        assert_eq!(command.unwrap().map(|command| command.speed()), Some(60));
+        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us + 3_000_000);
+        assert!((485_000..=500_000).contains(&drove_us), "async {is_async}: {drove_us} us");
+    }
+}
+
+#[test]
+fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
+    let wire = Wire::link();
+    let mut robot = silent(&wire);
+    wire.receive(&drive());
+    robot.service().unwrap();
+    let stop = MotorControl::STOP.frame(1).as_bytes().to_vec();
+    wire.pass(30_000);
+    wire.receive(&stop[..10]);
+    robot.service().unwrap();
+    wire.receive(&stop[10..]);
+    robot.service().unwrap();
+    let now = robot.now();
+    assert!(robot.role().command(now).stands_still(), "a stop is cut in two by the hold-up");
+}
+
+#[test]
+fn one_wrong_reading_of_the_clock_does_not_end_the_watchdog_of_a_robot() {
+    let wire = Wire::link();
+    let mut robot = robot(&wire);
+    wire.world().glitch = Some((0, 1 << 32));
+    robot.service().unwrap();
+    wire.receive(&drive());
+    robot.service().unwrap();
+    let now = robot.now();
+    assert_eq!(robot.role().command(now).speed(), 60);
+    wire.pass(60_000_000);
+    robot.service().unwrap();
+    let now = robot.now();
+    assert_eq!(robot.role().command(now).speed(), 0, "a minute after the last command");
+}
+
+#[test]
+fn a_stop_leaves_on_a_slow_link_through_a_port_that_takes_a_few_bytes_at_a_time() {
+    for count in [4, 8, 12, 24] {
+        let wire = Wire::new(1042, vec![]);
+        let mut config = HostConfig::default();
+        config.baud = 9600;
+        let mut host = wire.driver(|now| Host::new(config, now));
+        host.drive(60, 0).unwrap();
+        wire.write_with(move |_| Write::Out(count, 0));
+        assert_eq!(host.stop(), Ok(()), "{count} bytes at a time");
+        let sent: Vec<u8> = wire.world().sent.iter().map(|&(_, byte)| byte).collect();
+        let last = sent.len() - 24;
+        let stop = MotorControl::STOP.frame(sent[last + 5]);
+        assert_eq!(sent[last..], *stop.as_bytes());
+    }
+}

@@ -1,0 +1,158 @@
+//! A slave that is late, or whose switch was moved.
+
+use axlewire::{
+    drive::Driver,
+    endpoint::Endpoint,
+    ikeya::{Mode, NodeId, ReadRequest, Rps, Slave, SlaveConfig, SlaveEvent, WriteRequest},
+    time::{Duration, Instant},
+};
+
+use crate::wire::Wire;
+
+const FIVE_RPS: fn() -> WriteRequest =
+    || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
+
+#[test]
+fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
+    let wire = Wire::bus(vec![]);
+    let mut slave =
+        wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct()) });
+    wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+    wire.write_only(3);
+    assert!(slave.service().is_err());
+    assert_eq!(wire.world().sent.len(), 3);
+    wire.pass(5000);
+    wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
+    wire.write_all();
+    slave.service().unwrap();
+    assert_eq!(wire.world().sent.len(), 3, "it speaks when it is node 2's turn");
+    assert_eq!(slave.unsent(), []);
+}
+
+#[test]
+fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
+    let now = Instant::from_micros(0);
+    let mut slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+    slave.handle_input(FIVE_RPS().as_bytes(), now);
+    slave.set_mode(Mode::Position);
+    assert_eq!(slave.command(), None);
+    assert_eq!(slave.poll_event(), None, "a position node is handed a speed");
+}
+
+#[test]
+fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
+    let mut config = SlaveConfig::direct();
+    config.watchdog = Some(Duration::from_millis(100));
+    let wire = Wire::bus(vec![]);
+    let mut slave = wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+    wire.receive(FIVE_RPS().as_bytes());
+    slave.service().unwrap();
+    assert!(slave.role().command().is_some());
+    wire.pass(1000);
+    wire.receive(FIVE_RPS().as_bytes());
+    wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+    wire.pass(10_000_000);
+    slave.service().unwrap();
+    assert_eq!(slave.role().command(), None, "it turns on a command of ten seconds ago");
+    assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
+    let events: Vec<_> = std::iter::from_fn(|| slave.poll_event()).collect();
+    assert_eq!(events, [SlaveEvent::Watchdog]);
+}
+
+/// A slave that has heard nothing yet, and its watchdog.
+fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
+    let mut slave = wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+    slave.service().unwrap();
+    slave
+}
+
+fn with_watchdog() -> SlaveConfig {
+    let mut config = SlaveConfig::direct();
+    config.watchdog = Some(Duration::from_millis(500));
+    config
+}
+
+#[test]
+fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
+    for is_async in [false, true] {
+        let wire = Wire::bus(vec![]);
+        let mut slave = idle_slave(&wire, with_watchdog());
+        wire.receive(FIVE_RPS().as_bytes());
+        wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+        wire.pass(10_000_000);
+        match is_async {
+            true => wire.block_on(slave.service_async()),
+            false => slave.service(),
+        }
+        .unwrap();
+        assert_eq!(slave.role().command(), None, "it turns on a command of ten seconds ago");
+        assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
+        assert_eq!(slave.role().statistics().expired, 1);
+        assert_eq!(slave.poll_event(), Some(SlaveEvent::Watchdog));
+    }
+}
+
+#[test]
+fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
+    let wire = Wire::bus(vec![]);
+    let mut slave = idle_slave(&wire, with_watchdog());
+    let bytes =
+        [FIVE_RPS().as_bytes().repeat(20), ReadRequest::new(NodeId::N1).as_bytes().to_vec()];
+    let by = slave.now() + Duration::from_millis(1000);
+    let event = wire.block_on_held(slave.next_event_async(by), &bytes.concat(), 3_000_000);
+    // What is told before the rest has been taken in does not count.
+    let _ = event.unwrap();
+    wire.block_on(slave.service_async()).unwrap();
+    assert_eq!(slave.role().command(), None, "it turns on a command of three seconds ago");
+    assert_eq!(wire.world().sent, [], "it answers a request of three seconds ago");
+}
+
+#[test]
+fn an_idle_slave_answers_a_request_after_a_long_silence() {
+    for is_async in [false, true] {
+        let wire = Wire::bus(vec![]);
+        let mut slave = idle_slave(&wire, SlaveConfig::direct());
+        let begin_us = wire.world().now_us;
+        wire.receive_in(2_345_678, ReadRequest::new(NodeId::N1).as_bytes());
+        let by = slave.now() + Duration::from_millis(3000);
+        match is_async {
+            true => wire.block_on(slave.run_until_async(by, |_, _, _| ())),
+            false => slave.run_until(by, |_, _, _| ()),
+        }
+        .unwrap();
+        assert_eq!(wire.world().sent.len(), 8, "async {is_async}");
+        let delay_us = wire.world().sent[0].0 - begin_us - 2_345_678;
+        assert!(delay_us < 200, "async {is_async}: it has answered after {delay_us} us");
+    }
+}
+
+#[test]
+fn a_slave_that_is_called_when_its_driver_asks_for_it_or_bytes_come_answers() {
+    let wire = Wire::bus(vec![]);
+    let mut slave = idle_slave(&wire, SlaveConfig::direct());
+    let read_us = wire.world().now_us + 1_234_567;
+    wire.receive_in(1_234_567, ReadRequest::new(NodeId::N1).as_bytes());
+    while wire.world().now_us < 2_000_000 {
+        let at_us = slave.poll_timeout().unwrap().as_micros();
+        let now_us = wire.world().now_us;
+        let bytes_us = Some(read_us).filter(|&at| at > now_us).unwrap_or(u64::MAX);
+        // A timer of 1 ms is up to a millisecond late, the interrupt of the receiver is not.
+        let wake_us = bytes_us.min(at_us.next_multiple_of(1000) + 1000);
+        wire.pass(wake_us.saturating_sub(now_us).max(1));
+        slave.service().unwrap();
+    }
+    assert_eq!(wire.world().sent.len(), 8);
+}
+
+#[test]
+fn a_command_that_a_held_up_slave_finds_half_arrived_is_not_lost() {
+    let wire = Wire::bus(vec![]);
+    let mut slave = idle_slave(&wire, SlaveConfig::direct());
+    wire.pass(30_000);
+    wire.receive(&FIVE_RPS().as_bytes()[..5]);
+    slave.service().unwrap();
+    wire.receive_in(60, &FIVE_RPS().as_bytes()[5..]);
+    wire.pass(60);
+    slave.service().unwrap();
+    assert!(slave.role().command().is_some(), "a WRITE is cut in two by the hold-up");
+}

@@ -1,0 +1,90 @@
+//! A stop at a random moment on a line with every fault at once: how long and how far each motor
+//! still moves, against the bounds of the safety page.
+//!
+//! A few hundred episodes run with the other tests. All 50,000 of each kind, and the table:
+//!
+//! ```sh
+//! cargo test --release --test campaign -- --ignored --nocapture
+//! ```
+
+#![cfg(all(feature = "sim", any(feature = "ikeya", feature = "ucp")))]
+
+#[cfg(feature = "ikeya")]
+#[path = "campaign/bus.rs"]
+mod bus;
+#[cfg(feature = "ucp")]
+#[path = "campaign/rover.rs"]
+mod rover;
+#[path = "campaign/table.rs"]
+mod table;
+
+use axlewire::{
+    sim::{Faults, Rng},
+    time::Duration,
+};
+use table::{Run, Table};
+
+/// Every fault at once, each of a random strength.
+fn faults(rng: &mut Rng, longest_delay_us: u64) -> Faults {
+    let mut faults = Faults::noise(part(rng) * 1e-3);
+    faults.lost = part(rng) * 2e-4;
+    faults.duplicated = part(rng) * 2e-4;
+    faults.inserted = part(rng) * 2e-4;
+    faults.stray = rng.chance(0.5).then(|| rng.byte());
+    faults.delay = Duration::from_micros(rng.below(longest_delay_us) as u32);
+    faults.jitter = Duration::from_micros(rng.below(longest_delay_us) as u32);
+    faults
+}
+
+/// A number from 0 to 1.
+fn part(rng: &mut Rng) -> f64 {
+    rng.below(1_000_001) as f64 / 1e6
+}
+
+/// A time from `from` to `to` milliseconds.
+fn millis(rng: &mut Rng, from: u64, to: u64) -> Duration {
+    Duration::from_micros((1000 * from + rng.below(1000 * (to - from) + 1)) as u32)
+}
+
+/// All episodes with these seeds, on two threads.
+fn run(seeds: std::ops::Range<u64>, episode: fn(u64) -> Vec<Run>) -> Table {
+    let middle = seeds.start + (seeds.end - seeds.start) / 2;
+    let halves = [seeds.start..middle, middle..seeds.end];
+    let halves = halves.map(|half| std::thread::spawn(move || half.flat_map(episode).collect()));
+    let runs: Vec<Vec<Run>> = halves.into_iter().map(|half| half.join().unwrap()).collect();
+    Table::new(runs.concat())
+}
+
+#[test]
+#[cfg(feature = "ikeya")]
+fn every_motor_of_a_bus_stops_within_its_bound() {
+    let table = run(0..40, bus::episode);
+    println!("{table}");
+    table.check();
+}
+
+#[test]
+#[cfg(feature = "ucp")]
+fn every_rover_stops_within_its_bound() {
+    let table = run(0..40, rover::episode);
+    println!("{table}");
+    table.check();
+}
+
+#[test]
+#[cfg(feature = "ikeya")]
+#[ignore = "takes minutes: see the head of this file"]
+fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
+    let table = run(0..50_000, bus::episode);
+    println!("{table}");
+    table.check();
+}
+
+#[test]
+#[cfg(feature = "ucp")]
+#[ignore = "takes minutes: see the head of this file"]
+fn every_rover_stops_within_its_bound_50_000_times() {
+    let table = run(0..50_000, rover::episode);
+    println!("{table}");
+    table.check();
+}

@@ -1,0 +1,99 @@
+//! Health: strikes, and the search for abnormal nodes (I7).
+
+use axlewire::ikeya::{Cause, Health, MasterEvent, NodeId};
+
+use crate::rig::*;
+
+#[test]
+fn three_strikes_make_a_node_abnormal_and_one_answer_brings_it_back() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    let mut told = vec![];
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+        told.append(&mut desk.told());
+    }
+    let health = |health| MasterEvent::Health { node: NodeId::N1, health };
+    let failed = MasterEvent::ReadFailed { node: NodeId::N1, cause: Cause::Silent };
+    let expected =
+        [health(Health::Suspect(1)), health(Health::Suspect(2)), health(Health::Abnormal), failed];
+    assert_eq!(told, expected);
+    assert_eq!(desk.master.node_statistics(NodeId::N1).timeouts, 3);
+    assert_eq!(desk.master.node_statistics(NodeId::N1).retries, 2);
+
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    assert_eq!(desk.told()[0], health(Health::Online));
+}
+
+#[test]
+fn one_answer_ends_a_series_of_strikes() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..10 {
+        for _ in 0..2 {
+            desk.turn();
+            desk.silence();
+        }
+        desk.turn();
+        desk.hear(290, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+    }
+}
+
+#[test]
+fn a_write_does_not_reset_the_strikes() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..3 {
+        assert_ne!(desk.master.health(NodeId::N1), Some(Health::Abnormal));
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        desk.turn();
+        assert!(!desk.sent.is_empty(), "a WRITE");
+        desk.sent.clear();
+        desk.silence();
+    }
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Abnormal));
+}
+
+#[test]
+fn garbage_in_the_window_is_a_strike_that_names_its_cause() {
+    for (bytes, cause) in [
+        (vec![0x55, 1, 2, 3, 4, 5, 6, 7, 8], Cause::Damaged),
+        (velocity(NodeId::N7, 1.0), Cause::Unexpected),
+        (vec![], Cause::Silent),
+    ] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        for _ in 0..3 {
+            desk.turn();
+            desk.hear(300, &bytes);
+            desk.silence();
+        }
+        let failed = MasterEvent::ReadFailed { node: NodeId::N1, cause };
+        assert_eq!(desk.told().last(), Some(&failed));
+        let damaged = if cause == Cause::Damaged { 3 } else { 0 };
+        assert_eq!(desk.master.node_statistics(NodeId::N1).crc_errors, damaged);
+    }
+}
+
+#[test]
+fn looking_for_abnormal_nodes_costs_no_more_than_its_share() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    while desk.master.health(NodeId::N3) != Some(Health::Abnormal) {
+        match desk.turn()[1] {
+            1 => desk.hear(290, &velocity(NodeId::N1, 0.0)),
+            _ => desk.silence(),
+        }
+    }
+    let (begin, mut probing) = (desk.now, 0);
+    while desk.now - begin < MS(1000) {
+        let request = desk.turn();
+        if request[1] == 1 {
+            desk.hear(290, &velocity(NodeId::N1, 0.0));
+        } else {
+            let asked = desk.now;
+            desk.silence();
+            probing += (desk.now - asked).as_micros();
+        }
+        desk.told();
+    }
+    assert!((20_000..=50_000).contains(&probing), "{probing} us of a second, 5 % are allowed");
+}

@@ -1,0 +1,362 @@
+//! Modes: in doubt, changed, and what may be written meanwhile (I11).
+
+use axlewire::ikeya::{
+    Cause, CommandError, Health, MasterEvent, Mode, NodeId, Position, Status, StopProgress, Target,
+    WriteRequest,
+};
+
+use crate::rig::*;
+
+#[test]
+fn a_mode_that_changes_at_run_time_is_believed_the_second_time_and_ends_the_set_point() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.turn();
+    let at = Position::new(5, 6);
+    desk.hear(450, &position(NodeId::N1, at));
+    assert_eq!(desk.told(), [], "not believed yet");
+    desk.turn();
+    desk.hear(450, &position(NodeId::N1, at));
+    let changed = MasterEvent::ModeChanged { node: NodeId::N1, mode: Mode::Position };
+    let status = MasterEvent::Status { node: NodeId::N1, status: Status::Position(at) };
+    assert_eq!(desk.told(), [changed, status]);
+    desk.sent.clear();
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert!(desk.sent.is_empty(), "1 rps would be 16,256 turns");
+    assert_eq!(desk.master.node_statistics(NodeId::N1).other_mode, 1);
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+}
+
+/// A velocity node with a set-point that has just answered as a position node.
+fn in_doubt_at(at: Position) -> Desk {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.answer(NodeId::N1, Answer::Position(at));
+    assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (READ, 1)]);
+    assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+    desk.told();
+    desk
+}
+
+#[test]
+fn in_doubt_the_node_is_read_at_once_and_gets_no_write() {
+    let mut desk = in_doubt_at(turns(7));
+    let doubted = desk.now;
+    assert_eq!(desk.packet(), read(NodeId::N1));
+    assert_eq!(desk.now, doubted);
+    desk.silence();
+    // The guard, and a READ again, whatever the polling.
+    assert_eq!(desk.packet(), read(NodeId::N1));
+    assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Velocity), "nothing is decided");
+}
+
+#[test]
+fn in_doubt_set_points_of_either_mode_are_refused_and_not_kept() {
+    let mut desk = in_doubt_at(turns(7));
+    let refused = CommandError::ModeInDoubt { node: NodeId::N1 };
+    assert_eq!(refused.to_string(), "the mode of node 1 is in doubt");
+    assert_eq!(desk.master.set_velocity(NodeId::N1, rps(2.0), desk.now), Err(refused));
+    assert_eq!(desk.master.set_position(NodeId::N1, turns(2), desk.now), Err(refused));
+    // The mode has changed, and that ended the set-point: the node is stopped where it is.
+    let hold = WriteRequest::position(NodeId::N1, turns(7)).as_bytes().to_vec();
+    let writes = writes(&desk.run(MS(20)));
+    assert!(!writes.is_empty() && writes.iter().all(|write| *write == hold), "{writes:02x?}");
+    assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Position(turns(7))));
+}
+
+#[test]
+fn an_answer_in_the_mode_on_record_settles_the_doubt_and_the_set_point_goes_on() {
+    let mut desk = in_doubt_at(turns(7));
+    desk.answer(NodeId::N1, Answer::Velocity(0.5));
+    assert_eq!(desk.packets(1), [read(NodeId::N1)]);
+    assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.packets(2), [write(NodeId::N1, 1.0), read(NodeId::N1)]);
+    assert_eq!(desk.news(), []);
+}
+
+#[test]
+fn a_doubt_does_not_confirm_what_was_written_before_it() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.master.confirm(NodeId::N1, desk.now).unwrap();
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    desk.packets(2);
+    desk.answer(NodeId::N1, Answer::Velocity(0.5));
+    desk.packets(1);
+    assert_eq!(desk.news(), [], "it may have been read as a position");
+    assert_eq!(desk.packets(2), [write(NodeId::N1, 1.0), read(NodeId::N1)]);
+    assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }]);
+}
+
+#[test]
+fn a_changed_mode_ends_the_confirmation_with_the_set_point() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.master.confirm(NodeId::N1, desk.now).unwrap();
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    desk.packets(3);
+    let dropped = MasterEvent::NotConfirmed { node: NodeId::N1, cause: Cause::Dropped };
+    let changed = MasterEvent::ModeChanged { node: NodeId::N1, mode: Mode::Position };
+    assert_eq!(desk.news(), [dropped, changed]);
+}
+
+#[test]
+fn a_late_answer_in_another_mode_puts_the_mode_in_doubt_and_decides_nothing() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.packets(1);
+    for _ in 0..3 {
+        desk.hear(1000, &position(NodeId::N1, turns(7)));
+        assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+        assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Velocity));
+    }
+    assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(0.0), "nor is it taken");
+    assert_eq!(desk.packets(1), [read(NodeId::N1)]);
+    assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
+}
+
+#[test]
+fn an_early_answer_in_another_mode_puts_the_mode_in_doubt() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.turn();
+    desk.hear(1, &position(NodeId::N1, turns(7)));
+    assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.master.node_statistics(NodeId::N1).early, 1);
+}
+
+#[test]
+fn a_mode_that_nobody_has_heard_yet_is_not_in_doubt() {
+    let mut desk = Desk::new(manual());
+    desk.hear(1000, &position(NodeId::N1, turns(7)));
+    desk.hear(1000, &velocity(NodeId::N1, 1.0));
+    assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.master.mode(NodeId::N1), None);
+}
+
+#[test]
+fn in_doubt_a_stop_may_write_a_position_that_a_velocity_node_reads_as_standstill() {
+    // Rotation 12287 with count -1 is the largest: 0x2FFF_FFFF is 4.66e-10 as an f32.
+    for (at, may) in [
+        (Position::new(0, 0), true),
+        (Position::new(-1, 12_287), true),
+        (Position::new(0, 12_288), false),
+        (Position::new(0, -1), false),
+        (Position::new(-1, -1), false),
+        (Position::new(5, i16::MAX), false),
+        (Position::new(5, i16::MIN), false),
+    ] {
+        let mut desk = in_doubt_at(at);
+        desk.master.stop(NodeId::N1, desk.now);
+        // The READ that the stop waits for is damaged in the mode alone: the doubt stays.
+        desk.turn();
+        desk.silence();
+        // One answer would decide. A late one does not, nor is it measured.
+        desk.hear(10, &position(NodeId::N1, at));
+        assert_eq!(kinds(&desk.packets(1)), [(READ, 1)], "{at:?}");
+        assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
+        let first = writes(&desk.packets(4))[0].clone();
+        assert_eq!(first, hold(NodeId::N1, at), "decided, it is held wherever it is");
+
+        // A stop that was asked for before the doubt began is measured by the doubtful answer.
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.answer(NodeId::N1, Answer::Position(at));
+        desk.master.stop(NodeId::N1, desk.now);
+        assert_eq!(desk.packets(2), [write(NodeId::N1, 0.0), read(NodeId::N1)]);
+        assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+        let next = if may { hold(NodeId::N1, at) } else { read(NodeId::N1) };
+        assert_eq!(desk.packet(), next, "{at:?}");
+    }
+}
+
+#[test]
+fn a_stop_waits_for_the_mode_and_is_then_written_in_it() {
+    let mut desk = in_doubt_at(turns(-7));
+    desk.master.stop(NodeId::N1, desk.now);
+    let hold = hold(NodeId::N1, turns(-7));
+    assert_eq!(desk.packets(2), [read(NodeId::N1), hold]);
+    let mut desk = in_doubt_at(turns(-7));
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.answer(NodeId::N1, Answer::Velocity(1.0));
+    assert_eq!(desk.packets(2), [read(NodeId::N1), write(NodeId::N1, 0.0)]);
+}
+
+#[test]
+fn what_was_written_in_doubt_does_not_pay_the_stop() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    desk.master.stop(NodeId::N1, desk.now);
+    let sent = desk.packets(99);
+    let hold = hold(NodeId::N1, turns(7));
+    let read = read(NodeId::N1);
+    let in_doubt = [write(NodeId::N1, 0.0), read.clone(), hold.clone(), read.clone()];
+    let decided = [hold.clone(), read.clone(), hold, read];
+    assert_eq!(sent, [in_doubt, decided].concat());
+    let stopped = MasterEvent::Stopped { node: NodeId::N1 };
+    assert_eq!(desk.news().last(), Some(&stopped));
+}
+
+#[test]
+fn what_was_written_in_doubt_does_not_pay_the_stop_of_a_node_that_is_in_its_old_mode() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    desk.master.stop(NodeId::N1, desk.now);
+    let (zero, read) = (write(NodeId::N1, 0.0), read(NodeId::N1));
+    assert_eq!(desk.packets(3), [zero.clone(), read.clone(), hold(NodeId::N1, turns(7))]);
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    assert_eq!(desk.packets(1), std::slice::from_ref(&read));
+    assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.packets(99), [zero.clone(), read.clone(), zero, read]);
+    assert_eq!(desk.news().first(), Some(&MasterEvent::Stopped { node: NodeId::N1 }));
+}
+
+#[test]
+fn a_stop_that_six_exchanges_could_not_unblock_is_told_and_read_for_at_the_pace_of_the_search() {
+    for (has_stop, event) in [
+        (true, MasterEvent::StopBlocked { node: NodeId::N1 }),
+        (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
+    ] {
+        let mut config = direct();
+        config.stops_abnormal = false;
+        let mut desk = Desk::with_nodes(config, &[N1]);
+        desk.answer(NodeId::N1, Answer::Position(turns(-7)));
+        desk.packets(1);
+        desk.answer(NodeId::N1, Answer::Silence);
+        if has_stop {
+            desk.master.stop(NodeId::N1, desk.now);
+        }
+        assert_eq!(kinds(&desk.packets(5)), [(READ, 1); 5]);
+        assert!(!desk.news().contains(&event));
+        assert_eq!(kinds(&desk.packets(1)), [(READ, 1)]);
+        assert!(desk.news().contains(&event), "after the sixth");
+        let begin = desk.now;
+        assert_eq!(kinds(&desk.packets(4)), [(READ, 1); 4]);
+        assert!(desk.now - begin > US(3 * 14_000), "at the pace of the search");
+        assert_eq!(desk.news(), [], "told once");
+    }
+}
+
+#[test]
+fn a_stop_that_is_asked_for_when_the_doubt_is_old_is_told_to_be_blocked_at_once() {
+    let mut config = direct();
+    config.stops_abnormal = false;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.answer(NodeId::N1, Answer::Position(turns(-7)));
+    desk.packets(1);
+    desk.answer(NodeId::N1, Answer::Silence);
+    desk.packets(6);
+    desk.told();
+    desk.master.stop(NodeId::N1, desk.now);
+    assert_eq!(desk.told(), [MasterEvent::StopBlocked { node: NodeId::N1 }]);
+}
+
+#[test]
+fn a_hold_is_measured_anew_after_the_mode_was_in_doubt() {
+    let mut desk = Desk::with_nodes(direct(), &[N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    desk.master.stop(NodeId::N3, desk.now);
+    desk.run(MS(10));
+    desk.answer(NodeId::N3, Answer::Velocity(2.0));
+    while !desk.master.is_mode_in_doubt(NodeId::N3) {
+        desk.exchange();
+    }
+    assert_eq!(desk.master.stops_owed(), NodeId::N3.into(), "it may have been given up");
+    desk.answer(NodeId::N3, Answer::Position(turns(30)));
+    let written = writes(&desk.run(MS(10)));
+    assert!(written.len() > 2 && written.iter().all(|it| *it == hold(NodeId::N3, turns(30))));
+}
+
+#[test]
+fn a_hold_whose_confirmation_was_asked_for_is_not_confirmed_when_the_mode_is_in_doubt() {
+    let mut desk = Desk::with_nodes(direct(), &[N3]);
+    desk.master.stop(NodeId::N3, desk.now);
+    desk.run(MS(10));
+    desk.news();
+    desk.master.confirm(NodeId::N3, desk.now).unwrap();
+    desk.hear(1000, &velocity(NodeId::N3, 2.0));
+    desk.run(MS(10));
+    let ends = |event: &MasterEvent| {
+        matches!(event, MasterEvent::Confirmed { .. } | MasterEvent::NotConfirmed { .. })
+    };
+    let told: Vec<_> = desk.news().into_iter().filter(ends).collect();
+    let dropped = MasterEvent::NotConfirmed { node: NodeId::N3, cause: Cause::Dropped };
+    assert_eq!(told, [dropped]);
+}
+
+#[test]
+fn a_node_that_comes_back_in_another_mode_is_stopped_in_that_one() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.lose(NodeId::N1);
+    desk.answer(NodeId::N1, Answer::Position(turns(-3)));
+    let sent = desk.run(MS(60));
+    let back = sent.iter().position(|it| *it == hold(NodeId::N1, turns(-3))).unwrap();
+    let written = writes(&sent[back..]);
+    assert!(written.iter().all(|it| *it == hold(NodeId::N1, turns(-3))), "{written:02x?}");
+    // Until it has spoken it was stopped in the mode on record.
+    let blind = writes(&sent[..back]);
+    assert!(blind.iter().all(|it| *it == write(NodeId::N1, 0.0)));
+    assert!(desk.news().contains(&MasterEvent::Stopped { node: NodeId::N1 }));
+}
+
+#[test]
+fn a_set_point_that_has_not_left_when_the_doubt_begins_is_not_sent() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.hear(1000, &position(NodeId::N1, turns(7)));
+    desk.answer(NodeId::N1, Answer::Silence);
+    assert_eq!(kinds(&desk.packets(6)), [(READ, 1); 6]);
+}
+
+#[test]
+fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_comes() {
+    let mut desk = in_doubt_at(turns(7));
+    desk.turn();
+    desk.silence();
+    desk.now += MS(1);
+    assert_eq!(desk.packet(), read(NodeId::N1));
+}
+
+#[test]
+fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.answer(NodeId::N1, Answer::Velocity(3.0));
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.run(MS(10));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Paid);
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    let sent = desk.run(MS(100));
+    assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
+    // The last 0 rps may have been read as "go to 0".
+    let hold = WriteRequest::position(NodeId::N1, turns(7)).as_bytes().to_vec();
+    assert!(sent.contains(&hold));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    let stopped = MasterEvent::Stopped { node: NodeId::N1 };
+    assert_eq!(desk.news().iter().filter(|event| **event == stopped).count(), 2);
+}
+
+#[test]
+fn a_node_whose_answers_alternate_between_the_modes_is_never_said_to_be_stopped() {
+    let answers = [Answer::Position(turns(7)), Answer::Velocity(0.5)];
+    for first in [0, 1] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        desk.packets(2);
+        desk.master.stop(NodeId::N1, desk.now);
+        let mut reads = first;
+        while reads < 60 {
+            desk.answer(NodeId::N1, answers[reads % 2]);
+            let packet = desk.exchange().expect("it is read");
+            if packet[0] == WRITE {
+                // The latter means standstill in both modes.
+                let stops = [write(NodeId::N1, 0.0), hold(NodeId::N1, turns(7))];
+                assert!(stops.contains(&packet), "{packet:02x?}");
+            } else {
+                reads += 1;
+            }
+            assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+        }
+        assert!(desk.master.node_statistics(NodeId::N1).other_mode > 20);
+        assert!(!desk.news().contains(&MasterEvent::Stopped { node: NodeId::N1 }));
+    }
+}

@@ -1,0 +1,298 @@
+//! A master called by hand, in a time that the test makes.
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling, Position,
+        PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
+    },
+    time::{Duration, Instant},
+};
+
+pub(crate) const US: fn(u32) -> Duration = Duration::from_micros;
+pub(crate) const MS: fn(u32) -> Duration = Duration::from_millis;
+
+pub(crate) const READ: u8 = 0xAA;
+pub(crate) const WRITE: u8 = 0xBB;
+
+pub(crate) fn rps(value: f32) -> Rps {
+    Rps::new(value).unwrap()
+}
+
+pub(crate) fn read(node: NodeId) -> Vec<u8> {
+    ReadRequest::new(node).as_bytes().to_vec()
+}
+
+pub(crate) fn velocity(node: NodeId, value: f32) -> Vec<u8> {
+    VelocityResponse::new(node, rps(value)).as_bytes().to_vec()
+}
+
+pub(crate) fn position(node: NodeId, at: Position) -> Vec<u8> {
+    PositionResponse::new(node, at).as_bytes().to_vec()
+}
+
+/// A WRITE of a speed.
+pub(crate) fn write(node: NodeId, value: f32) -> Vec<u8> {
+    WriteRequest::velocity(node, rps(value)).as_bytes().to_vec()
+}
+
+/// A WRITE of a position.
+pub(crate) fn hold(node: NodeId, at: Position) -> Vec<u8> {
+    WriteRequest::position(node, at).as_bytes().to_vec()
+}
+
+pub(crate) const fn turns(rotation: i16) -> Position {
+    Position::new(0, rotation)
+}
+
+pub(crate) fn direct() -> MasterConfig {
+    MasterConfig::direct()
+}
+
+pub(crate) fn manual() -> MasterConfig {
+    let mut config = direct();
+    config.polling = Polling::Manual;
+    config
+}
+
+/// Settings of a bus that has these nodes and no others.
+pub(crate) fn only(nodes: &[NodeId]) -> MasterConfig {
+    let mut config = direct();
+    config.nodes = nodes.iter().copied().collect();
+    config
+}
+
+pub(crate) const N1: (NodeId, Mode) = (NodeId::N1, Mode::Velocity);
+pub(crate) const N3: (NodeId, Mode) = (NodeId::N3, Mode::Position);
+
+/// Header and node of a packet.
+pub(crate) fn kind(packet: &[u8]) -> (u8, u8) {
+    (packet[0], packet[1])
+}
+
+pub(crate) fn kinds(packets: &[Vec<u8>]) -> Vec<(u8, u8)> {
+    packets.iter().map(|packet| kind(packet)).collect()
+}
+
+pub(crate) fn writes(packets: &[Vec<u8>]) -> Vec<Vec<u8>> {
+    packets.iter().filter(|packet| packet[0] == WRITE).cloned().collect()
+}
+
+/// What a node answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Answer {
+    Silence,
+    Velocity(f32),
+    Position(Position),
+}
+
+impl Answer {
+    fn packet(self, node: NodeId) -> Option<Vec<u8>> {
+        match self {
+            Self::Silence => None,
+            Self::Velocity(at) => Some(velocity(node, at)),
+            Self::Position(at) => Some(position(node, at)),
+        }
+    }
+}
+
+/// A master, the time, what the nodes answer, and what the master has sent and told.
+#[derive(Clone)]
+pub(crate) struct Desk {
+    pub(crate) master: Master,
+    pub(crate) now: Instant,
+    pub(crate) sent: Vec<Vec<u8>>,
+    events: Vec<MasterEvent>,
+    answers: [Answer; 8],
+    is_behind_write: bool,
+}
+
+impl Desk {
+    pub(crate) fn new(config: MasterConfig) -> Self {
+        Self::at(config, Instant::from_micros(1_000_000))
+    }
+
+    pub(crate) fn at(config: MasterConfig, now: Instant) -> Self {
+        let master = Master::new(config, now);
+        Self {
+            master,
+            now,
+            sent: vec![],
+            events: vec![],
+            answers: [Answer::Silence; 8],
+            is_behind_write: false,
+        }
+    }
+
+    /// A master that knows these nodes and has told so. They answer 0 rps, or 7 turns and 3 counts,
+    /// wherever the test leaves the answering to the desk.
+    pub(crate) fn with_nodes(config: MasterConfig, nodes: &[(NodeId, Mode)]) -> Self {
+        let mut desk = Self::new(config);
+        for &(node, mode) in nodes {
+            desk.answer(
+                node,
+                match mode {
+                    Mode::Velocity => Answer::Velocity(0.0),
+                    Mode::Position => Answer::Position(Position::new(7, 3)),
+                },
+            );
+        }
+        desk.master.discover(desk.now);
+        while desk.master.is_discovering() {
+            let asked = desk.turn();
+            desk.reply(&asked, 290);
+        }
+        desk.told();
+        desk
+    }
+
+    /// A node answers this from now on.
+    pub(crate) fn answer(&mut self, node: NodeId, answer: Answer) {
+        self.answers[usize::from(node.get()) - 1] = answer;
+    }
+
+    /// Answers a READ as the node would, or lets its window close.
+    fn reply(&mut self, request: &[u8], after_us: u32) {
+        let node = NodeId::new(request[1]).unwrap();
+        match self.answers[usize::from(request[1]) - 1].packet(node) {
+            Some(answer) => self.hear(after_us, &answer),
+            None => self.silence(),
+        }
+    }
+
+    /// Goes on to the next packet, and past its answer or the end of its window if it is a READ;
+    /// `None` if there is nothing to do.
+    pub(crate) fn exchange(&mut self) -> Option<Vec<u8>> {
+        while self.master.poll_timeout().is_some() {
+            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
+                self.is_behind_write = packet[0] == WRITE;
+                if packet[0] == READ {
+                    let wait = self.answer_us();
+                    self.reply(&packet, wait);
+                }
+                self.keep_events();
+                return Some(packet);
+            }
+            self.expire();
+        }
+        None
+    }
+
+    /// When the answer to the READ that has just been handed out is whole: 100 us after the READ
+    /// has left, which may have packets in front of it, and its own 160 us.
+    fn answer_us(&self) -> u32 {
+        let deadline = self.master.poll_timeout().expect("a window");
+        // It may be the dead-man's, which is not waited for.
+        (deadline - self.now).as_micros().saturating_sub(400).max(340)
+    }
+
+    /// The next packets, at most this many.
+    pub(crate) fn packets(&mut self, most: usize) -> Vec<Vec<u8>> {
+        core::iter::from_fn(|| self.exchange()).take(most).collect()
+    }
+
+    /// Goes on for this long, as the nodes answer; returns the packets.
+    pub(crate) fn run(&mut self, span: Duration) -> Vec<Vec<u8>> {
+        let (end, mut sent) = (self.now + span, vec![]);
+        while self.now < end {
+            match self.exchange() {
+                Some(packet) => sent.push(packet),
+                None => break,
+            }
+        }
+        self.now = self.now.max(end);
+        sent
+    }
+
+    /// A node falls silent; goes on until it is abnormal.
+    pub(crate) fn lose(&mut self, node: NodeId) {
+        self.answer(node, Answer::Silence);
+        while self.master.health(node) != Some(Health::Abnormal) {
+            self.exchange().expect("it is asked");
+        }
+    }
+
+    /// The same with [`Polling::Manual`].
+    pub(crate) fn lose_by_hand(&mut self, node: NodeId) {
+        self.answer(node, Answer::Silence);
+        while self.master.read(node, self.now).is_ok() {
+            self.exchange().expect("it is asked");
+        }
+    }
+
+    /// Goes on to the next READ and returns it; what was sent before it is in `sent`.
+    pub(crate) fn turn(&mut self) -> Vec<u8> {
+        loop {
+            let packet = self.packet();
+            if packet[0] == READ {
+                return packet;
+            }
+            self.sent.push(packet);
+        }
+    }
+
+    /// Goes on to the next packet and returns it, unanswered.
+    pub(crate) fn packet(&mut self) -> Vec<u8> {
+        for _ in 0..100 {
+            if let Some(bytes) = self.master.poll_transmit(self.now) {
+                self.is_behind_write = bytes[0] == WRITE;
+                return bytes.to_vec();
+            }
+            self.expire();
+        }
+        panic!("nothing is sent");
+    }
+
+    /// Goes on to the master's next deadline.
+    fn expire(&mut self) {
+        let next = self.master.poll_timeout().expect("something to do");
+        assert!(next > self.now, "a busy loop at {next:?}");
+        self.check_sleep(next);
+        self.now = next;
+        self.master.handle_timeout(self.now);
+    }
+
+    /// A driver that sleeps until the next deadline misses nothing. What could be handed out behind a
+    /// WRITE that is still leaving would not leave sooner.
+    fn check_sleep(&self, next: Instant) {
+        if self.is_behind_write {
+            return;
+        }
+        let just_before = Instant::from_micros(next.as_micros() - 1);
+        let mut asleep = self.master.clone();
+        asleep.handle_timeout(just_before);
+        assert_eq!(asleep.poll_transmit(just_before), None, "it was due before {next:?}");
+    }
+
+    /// Lets time pass and then hands in these bytes.
+    pub(crate) fn hear(&mut self, after_us: u32, bytes: &[u8]) {
+        self.now += US(after_us);
+        self.master.handle_input(bytes, self.now);
+    }
+
+    /// Lets the window close.
+    pub(crate) fn silence(&mut self) {
+        self.now = self.master.poll_timeout().expect("a window");
+        self.master.handle_timeout(self.now);
+    }
+
+    fn keep_events(&mut self) {
+        while let Some(event) = self.master.poll_event() {
+            self.events.push(event);
+        }
+    }
+
+    /// What has been told since this was asked last.
+    pub(crate) fn told(&mut self) -> Vec<MasterEvent> {
+        self.keep_events();
+        std::mem::take(&mut self.events)
+    }
+
+    /// The same without readings and health.
+    pub(crate) fn news(&mut self) -> Vec<MasterEvent> {
+        let is_news = |event: &MasterEvent| {
+            !matches!(event, MasterEvent::Status { .. } | MasterEvent::Health { .. })
+        };
+        self.told().into_iter().filter(is_news).collect()
+    }
+}

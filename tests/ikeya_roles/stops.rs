@@ -1,0 +1,308 @@
+//! Stops of nodes that answer: a debt until it is confirmed twice (I6, I12).
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        CommandError, Health, MasterEvent, Mode, NodeId, NodeSet, Position, StopProgress, Target,
+    },
+};
+
+use crate::rig::*;
+
+const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
+const STOPPED_3: MasterEvent = MasterEvent::Stopped { node: NodeId::N3 };
+
+#[test]
+fn stop_means_zero_for_velocity_and_hold_for_position_never_go_to_zero() {
+    let mut desk = Desk::with_nodes(only(&[NodeId::N1, NodeId::N3]), &[N1, N3]);
+    desk.master.stop_all(desk.now);
+    let mut written = writes(&desk.run(MS(20)));
+    written.sort();
+    written.dedup();
+    let hold = hold(NodeId::N3, Position::new(7, 3));
+    assert_eq!(written, [write(NodeId::N1, 0.0), hold]);
+    let news = desk.news();
+    assert!(news.contains(&STOPPED_1) && news.contains(&STOPPED_3), "{news:?}");
+}
+
+#[test]
+fn a_stop_is_paid_by_two_writes_that_have_each_been_followed_by_an_answer() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    let (stop, read) = (write(NodeId::N1, 0.0), read(NodeId::N1));
+    assert_eq!(desk.packets(2), [stop.clone(), read.clone()]);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+    assert_eq!(desk.news(), []);
+    // The next WRITE may be lost together with its READ: it counts for nothing.
+    desk.answer(NodeId::N1, Answer::Silence);
+    assert_eq!(desk.packets(2), [stop.clone(), read.clone()]);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+    desk.answer(NodeId::N1, Answer::Velocity(3.0));
+    assert_eq!(desk.packets(9), [stop, read], "and then there is nothing more to do");
+    assert_eq!(desk.news(), [STOPPED_1]);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Paid);
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+}
+
+#[test]
+fn an_answer_to_a_read_from_before_the_stop_pays_nothing() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.turn();
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    let kinds = kinds(&desk.packets(9));
+    assert_eq!(kinds, [(WRITE, 1), (READ, 1), (WRITE, 1), (READ, 1)]);
+}
+
+#[test]
+fn a_position_stop_reads_first_and_holds_what_this_read_returned() {
+    let mut desk = Desk::with_nodes(manual(), &[N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    desk.now += MS(8000);
+    desk.master.stop(NodeId::N3, desk.now);
+    let (read, hold) = (read(NodeId::N3), hold(NodeId::N3, turns(40)));
+    let expected = [read.clone(), hold.clone(), read.clone(), hold, read];
+    assert_eq!(desk.packets(9), expected);
+    assert_eq!(desk.news()[0], STOPPED_3);
+}
+
+#[test]
+fn a_position_that_was_being_read_when_the_stop_was_asked_for_is_not_held() {
+    let mut desk = Desk::with_nodes(manual(), &[N3]);
+    desk.master.read(NodeId::N3, desk.now).unwrap();
+    desk.turn();
+    desk.master.stop(NodeId::N3, desk.now);
+    desk.hear(290, &position(NodeId::N3, turns(40)));
+    desk.answer(NodeId::N3, Answer::Position(turns(41)));
+    let sent = desk.packets(9);
+    assert_eq!(sent[0], read(NodeId::N3));
+    assert_eq!(sent[1], hold(NodeId::N3, turns(41)));
+}
+
+#[test]
+fn hold_age_says_how_old_a_position_may_be_that_is_held_without_a_read() {
+    for (age_us, is_held) in [(999, true), (1000, false), (1001, false)] {
+        let mut config = manual();
+        config.hold_age = US(1000);
+        let mut desk = Desk::with_nodes(config, &[N3]);
+        desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        let heard = desk.master.status(NodeId::N3).unwrap().1;
+        desk.now = heard + US(age_us);
+        desk.master.stop(NodeId::N3, desk.now);
+        let old = hold(NodeId::N3, Position::new(7, 3));
+        let expected = if is_held { old } else { read(NodeId::N3) };
+        assert_eq!(desk.packet(), expected, "{age_us} us");
+    }
+}
+
+#[test]
+fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
+    let mut desk = Desk::with_nodes(direct(), &[N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    desk.master.stop(NodeId::N3, desk.now);
+    let mut written = writes(&desk.packets(5));
+    // A shaft that is pushed is not held where it was pushed to.
+    for drift in 41..60 {
+        desk.answer(NodeId::N3, Answer::Position(turns(drift)));
+        written.extend(writes(&desk.packets(2)));
+    }
+    assert_eq!(desk.master.set_point(NodeId::N3), Some(Target::Position(turns(40))));
+    assert!(written.len() > 15 && written.iter().all(|it| *it == hold(NodeId::N3, turns(40))));
+    // Nor by a stop that is asked for once more.
+    desk.news();
+    desk.master.stop(NodeId::N3, desk.now);
+    assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Owed);
+    let (read, hold) = (read(NodeId::N3), hold(NodeId::N3, turns(40)));
+    assert_eq!(desk.packets(4), [hold.clone(), read.clone(), hold, read]);
+    assert_eq!(desk.news()[0], STOPPED_3);
+}
+
+#[test]
+fn a_hold_is_measured_anew_after_the_node_was_abnormal() {
+    let mut desk = Desk::with_nodes(direct(), &[N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    desk.master.stop(NodeId::N3, desk.now);
+    desk.run(MS(10));
+    desk.news();
+    desk.lose(NodeId::N3);
+    assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Owed);
+    desk.answer(NodeId::N3, Answer::Position(turns(30)));
+    let written = writes(&desk.run(MS(50)));
+    assert!(written.len() > 2 && written.iter().all(|it| *it == hold(NodeId::N3, turns(30))));
+    assert!(desk.news().contains(&STOPPED_3));
+}
+
+#[test]
+fn a_repeated_stop_joins_the_one_that_is_owed() {
+    for (node, way) in [(N1, 4), (N3, 5)] {
+        let mut desk = Desk::with_nodes(manual(), &[node]);
+        let mut sent = vec![];
+        for _ in 0..way {
+            desk.master.stop(node.0, desk.now);
+            sent.extend(desk.packets(1));
+        }
+        assert_eq!(sent.len(), way);
+        assert_eq!(
+            desk.master.stop_progress(node.0),
+            match node.1 {
+                Mode::Velocity => StopProgress::StandingStill,
+                Mode::Position => StopProgress::Paid,
+            }
+        );
+        assert_eq!(writes(&sent).len(), 2);
+    }
+}
+
+#[test]
+fn while_a_stop_is_owed_set_points_are_refused_and_not_kept() {
+    let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+    for node in [NodeId::N1, NodeId::N3] {
+        desk.master.stop(node, desk.now);
+        let owed = CommandError::StopOwed { node };
+        assert_eq!(owed.to_string(), format!("node {node} has not confirmed its stop yet"));
+        let set = match node {
+            NodeId::N1 => desk.master.set_velocity(node, rps(1.0), desk.now),
+            _ => desk.master.set_position(node, turns(1), desk.now),
+        };
+        assert_eq!(set, Err(owed));
+        assert_eq!(desk.master.set_point(node), None);
+    }
+    let written = writes(&desk.run(MS(20)));
+    let places = [write(NodeId::N1, 0.0), hold(NodeId::N3, Position::new(7, 3))];
+    assert!(written.len() == 4 && written.iter().all(|it| places.contains(it)), "{written:02x?}");
+    // Once it is paid they are taken again.
+    assert_eq!(desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now), Ok(()));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::NotAsked);
+    assert_eq!(desk.packets(1), [write(NodeId::N1, 1.0)]);
+}
+
+#[test]
+fn a_stop_drops_the_set_point_at_once_sent_or_not() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.master.stop(NodeId::N1, desk.now);
+    let written = writes(&desk.run(MS(20)));
+    assert!(written.len() > 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
+}
+
+#[test]
+fn a_release_does_not_cancel_a_stop() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.master.release(NodeId::N1);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+    assert_eq!(writes(&desk.packets(9)), [write(NodeId::N1, 0.0), write(NodeId::N1, 0.0)]);
+    assert_eq!(desk.news()[0], STOPPED_1);
+}
+
+#[test]
+fn a_stop_is_paid_though_nobody_takes_out_the_events() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for turn in 0..100 {
+        let request = desk.packet();
+        assert_eq!(request[0], READ);
+        match turn % 3 {
+            0 => desk.hear(290, &velocity(NodeId::N1, 0.0)),
+            _ => desk.silence(),
+        }
+    }
+    assert!(desk.master.lost_events() > 50);
+    let lost = desk.master.lost_events();
+    desk.master.stop(NodeId::N1, desk.now);
+    let mut written = 0;
+    while desk.master.stop_progress(NodeId::N1) == StopProgress::Owed {
+        let packet = desk.packet();
+        written += usize::from(packet == write(NodeId::N1, 0.0));
+        if packet[0] == READ {
+            desk.hear(450, &velocity(NodeId::N1, 0.0));
+        }
+    }
+    assert_eq!(written, 2);
+    assert!(desk.master.lost_events() > lost, "its event had no room");
+}
+
+#[test]
+fn a_stop_of_an_id_that_was_never_heard_reads_it_first() {
+    let mut desk = Desk::new(manual());
+    desk.answer(NodeId::N5, Answer::Position(turns(9)));
+    desk.master.stop(NodeId::N5, desk.now);
+    let (read, hold) = (read(NodeId::N5), hold(NodeId::N5, turns(9)));
+    let expected = [read.clone(), hold.clone(), read.clone(), hold, read];
+    assert_eq!(desk.packets(9), expected);
+    let found = MasterEvent::Discovered { node: NodeId::N5, mode: Mode::Position };
+    assert_eq!(desk.news()[..2], [found, MasterEvent::Stopped { node: NodeId::N5 }]);
+}
+
+#[test]
+fn a_stop_of_all_on_a_fresh_master_stops_whatever_answers_and_lists_the_silent_ids() {
+    let mut desk = Desk::new(direct());
+    desk.answer(NodeId::N1, Answer::Velocity(9.0));
+    desk.answer(NodeId::N3, Answer::Position(turns(9)));
+    desk.master.stop_all(desk.now);
+    assert_eq!(desk.master.stops_owed(), NodeSet::ALL);
+    let sent = desk.run(MS(100));
+    let eight: Vec<_> = kinds(&sent).into_iter().filter(|it| it.0 == READ).take(8).collect();
+    let mut asked: Vec<_> = eight.iter().map(|it| it.1).collect();
+    asked.sort_unstable();
+    assert_eq!(asked, [1, 2, 3, 4, 5, 6, 7, 8], "all are asked before any is asked again");
+    let mut silent = NodeSet::ALL;
+    silent.remove(NodeId::N1);
+    silent.remove(NodeId::N3);
+    assert_eq!(desk.master.stops_owed(), silent);
+    let written = writes(&sent);
+    assert!(written.contains(&write(NodeId::N1, 0.0)));
+    assert!(written.contains(&hold(NodeId::N3, turns(9))));
+    // One that is plugged in later is stopped then.
+    desk.news();
+    desk.answer(NodeId::N6, Answer::Velocity(2.0));
+    let written = writes(&desk.run(MS(200)));
+    assert!(written.contains(&write(NodeId::N6, 0.0)));
+    assert!(desk.news().contains(&MasterEvent::Stopped { node: NodeId::N6 }));
+}
+
+#[test]
+fn a_stop_of_all_goes_to_the_nodes_of_the_settings_and_to_others_that_have_answered() {
+    let mut desk = Desk::new(only(&[NodeId::N1]));
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    desk.answer(NodeId::N8, Answer::Velocity(0.0));
+    desk.master.stop(NodeId::N8, desk.now);
+    desk.run(MS(10));
+    assert_eq!(desk.master.health(NodeId::N8), Some(Health::Online));
+    desk.master.stop_all(desk.now);
+    let both: NodeSet = [NodeId::N1, NodeId::N8].into_iter().collect();
+    assert_eq!(desk.master.stops_owed(), both);
+    desk.run(MS(20));
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+}
+
+#[test]
+fn all_nodes_are_stopped_before_the_next_exchange() {
+    let nodes = NodeId::ALL.map(|node| (node, Mode::Velocity));
+    let mut desk = Desk::with_nodes(direct(), &nodes);
+    desk.master.stop_all(desk.now);
+    let begin = desk.now;
+    desk.turn();
+    let mut stops = NodeId::ALL.map(|node| write(node, 0.0)).to_vec();
+    desk.sent.sort();
+    stops.sort();
+    assert_eq!(desk.sent, stops);
+    // Handed out together, they leave one behind the other.
+    assert_eq!(desk.now, begin);
+    assert_eq!(desk.master.poll_timeout(), Some(begin + US(8 * 160 + 740)));
+}
+
+#[test]
+fn a_position_is_held_however_long_the_gap_between_packets() {
+    for gap in [MS(19), MS(20), MS(21), MS(200)] {
+        let mut config = direct();
+        config.turnaround_gap = gap;
+        let mut desk = Desk::with_nodes(config, &[N3]);
+        desk.master.stop(NodeId::N3, desk.now);
+        let sent = desk.packets(6);
+        let stop = hold(NodeId::N3, Position::new(7, 3));
+        assert_eq!(sent[1], stop, "{gap:?}: {sent:02x?}");
+        assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Paid, "{gap:?}");
+    }
+}

@@ -1,0 +1,233 @@
+//! Stops of nodes that do not answer, and nodes that are lost while they move (I12, I13).
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{CommandError, Health, MasterEvent, NodeId, NodeSet, StopProgress, Target},
+};
+
+use crate::rig::*;
+
+const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
+
+/// Window of a READ, and the pause of the search behind it: 5 % of the time.
+const WINDOW_US: u32 = 740;
+const PAUSE_US: u32 = 100 / 5 * WINDOW_US;
+
+#[test]
+fn an_abnormal_velocity_node_is_stopped_blind_at_once_and_then_at_the_pace_of_the_search() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.lose(NodeId::N1);
+    // It has just been looked for, without success.
+    desk.packets(2);
+    desk.now += US(500);
+    desk.master.stop(NodeId::N1, desk.now);
+    let begin = desk.now;
+    let mut attempts = vec![];
+    for _ in 0..6 {
+        let packet = desk.packet();
+        attempts.push((kind(&packet), (desk.now - begin).as_micros()));
+        if packet[0] == READ {
+            desk.silence();
+        } else {
+            assert_eq!(packet, write(NodeId::N1, 0.0));
+        }
+    }
+    let kinds: Vec<_> = attempts.iter().map(|it| it.0).collect();
+    assert_eq!(kinds, [(WRITE, 1), (READ, 1)].repeat(3), "it may still hear");
+    assert_eq!(attempts[0].1, 0, "at once");
+    let pause = attempts[4].1 - attempts[2].1;
+    assert!((PAUSE_US..PAUSE_US + WINDOW_US).contains(&pause), "{pause} us");
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+}
+
+#[test]
+fn an_abnormal_position_node_is_stopped_after_its_next_good_answer() {
+    let mut desk = Desk::with_nodes(direct(), &[N3]);
+    desk.lose(NodeId::N3);
+    desk.now += MS(3_600_000);
+    desk.master.stop(NodeId::N3, desk.now);
+    assert_eq!(desk.packet(), read(NodeId::N3), "asked at once");
+    desk.silence();
+    assert_eq!(writes(&desk.packets(10)), [[0; 0]; 0], "an old position is not held");
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    let sent = desk.packets(3);
+    assert_eq!(sent[1..2], [hold(NodeId::N3, turns(40))]);
+}
+
+#[test]
+fn a_stop_that_waits_survives_the_third_strike() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..2 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.turn();
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.silence();
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Abnormal));
+    assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
+}
+
+#[test]
+fn a_stop_that_was_paid_once_begins_anew_with_a_node_that_was_abnormal() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.packets(2);
+    desk.lose(NodeId::N1);
+    desk.answer(NodeId::N1, Answer::Velocity(5.0));
+    desk.news();
+    // The answer that brings it back may follow a WRITE that it has heard, and pays for that one.
+    let written = writes(&desk.run(MS(50)));
+    assert!(written.len() >= 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
+    assert_eq!(desk.news(), [STOPPED_1]);
+}
+
+#[test]
+fn a_node_that_becomes_abnormal_under_a_set_point_is_owed_a_stop() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+    let refused = CommandError::NotOnline { node: NodeId::N1 };
+    assert_eq!(desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now), Err(refused));
+    desk.answer(NodeId::N1, Answer::Velocity(5.0));
+    let written = writes(&desk.run(MS(50)));
+    assert!(written.len() > 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
+    assert!(desk.news().contains(&STOPPED_1));
+    // It does not move until somebody says so.
+    assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(0.0))));
+    assert_eq!(desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now), Ok(()));
+}
+
+#[test]
+fn a_released_node_that_becomes_abnormal_is_owed_a_stop_too() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.packets(2);
+    desk.master.release(NodeId::N1);
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into(), "it keeps its last command");
+}
+
+#[test]
+fn a_node_that_was_never_told_to_move_is_owed_nothing_when_it_becomes_abnormal() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    desk.lose(NodeId::N1);
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    assert_eq!(writes(&desk.run(MS(50))), [[0; 0]; 0]);
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+}
+
+#[test]
+fn without_stops_abnormal_a_node_that_comes_back_gets_no_write_at_all() {
+    let mut config = direct();
+    config.stops_abnormal = false;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+    desk.answer(NodeId::N1, Answer::Velocity(5.0));
+    assert_eq!(writes(&desk.run(MS(50))), [[0; 0]; 0], "the set-point is gone all the same");
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+    // A stop that the application asks for is owed all the same.
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+}
+
+#[test]
+fn a_search_share_of_0_looks_for_nodes_that_are_owed_a_stop_alone_at_1_percent() {
+    let mut config = direct();
+    config.recovery_share_pct = 0;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.exchange(), None, "nobody is looked for");
+    desk.master.stop(NodeId::N1, desk.now);
+    let mut asked = vec![];
+    for _ in 0..10 {
+        let packet = desk.packet();
+        if packet[0] == READ {
+            asked.push(desk.now);
+            desk.silence();
+        }
+    }
+    let pauses: Vec<_> = asked[1..].windows(2).map(|it| (it[1] - it[0]).as_micros()).collect();
+    let pace = 100 * WINDOW_US;
+    assert!(pauses.iter().all(|it| (pace..pace + 2 * WINDOW_US).contains(it)), "{pauses:?}");
+}
+
+#[test]
+fn a_node_that_comes_back_during_its_stop_pays_it_and_stands() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.lose_by_hand(NodeId::N1);
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.run(MS(100));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    desk.run(MS(100));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    assert_eq!(desk.master.poll_timeout(), None);
+}
+
+#[test]
+fn an_id_that_was_never_heard_has_all_attempts_of_a_read_at_once() {
+    let mut desk = Desk::new(manual());
+    desk.master.stop(NodeId::N5, desk.now);
+    let begin = desk.now;
+    assert_eq!(desk.packets(3), [read(NodeId::N5), read(NodeId::N5), read(NodeId::N5)]);
+    assert!(desk.now < begin + MS(5));
+}
+
+#[test]
+fn a_search_share_above_50_percent_counts_as_50() {
+    let mut config = direct();
+    config.recovery_share_pct = 100;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.lose(NodeId::N1);
+    desk.turn();
+    let begin = desk.now;
+    desk.silence();
+    desk.turn();
+    assert_eq!(desk.now, begin + US(2 * WINDOW_US));
+}
+
+#[test]
+fn a_stopped_node_that_is_lost_is_no_longer_known_to_stand() {
+    let mut config = direct();
+    config.stops_abnormal = false;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.run(MS(10));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    desk.lose(NodeId::N1);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::NotAsked);
+}
+
+#[test]
+fn hold_age_does_not_hold_for_a_node_that_is_lost() {
+    let mut config = direct();
+    config.hold_age = MS(60_000);
+    let mut desk = Desk::with_nodes(config, &[N3]);
+    desk.lose(NodeId::N3);
+    desk.master.stop(NodeId::N3, desk.now);
+    assert_eq!(writes(&desk.packets(5)), [[0; 0]; 0]);
+}
+
+#[test]
+fn a_doubt_gives_a_lost_node_no_attempt_beyond_the_pace_of_the_search() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.lose(NodeId::N1);
+    desk.packets(2);
+    desk.now += US(500);
+    desk.master.stop(NodeId::N1, desk.now);
+    assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (READ, 1)], "at once");
+    let attempted_at = desk.now;
+    for _ in 0..5 {
+        // Late, in the other mode.
+        desk.hear(100, &position(NodeId::N1, turns(7)));
+    }
+    assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert!(desk.now > attempted_at + MS(10), "at the pace of the search");
+}

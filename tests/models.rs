@@ -1,0 +1,241 @@
+//! Models: a master and a slave of a motor bus, and a host and a robot of UCP, in every order of
+//! calls, answers and faults, up to a stated depth.
+//!
+//! A world is a role, what it talks to, and an account of its own: what was called, sent and heard,
+//! and what therefore may and must be sent (rulings I6 to I14 and U6 to U16). A search tries all
+//! sequences of actions, shortest first, merges states that differ only in absolute time and in
+//! counters, and prints the shortest sequence that breaks an invariant.
+//!
+//! # What happens
+//!
+//! * Calls: set-point, stop, stop of all, release, confirm, read, discovery, sign of life.
+//! * Packets: arrive, are lost, are not taken by the port, cut off, or not flushed.
+//! * Answers: right, missing, late, damaged, of another node, left from an older request, in
+//!   another mode because the switch was moved.
+//! * Nodes restart; time passes a little, up to a deadline, 1 us past it, 10 s.
+//!
+//! On UCP:
+//!
+//! * Calls of a host: two motor commands, one of them on the spot, zero, stop, start and end of a
+//!   calibration, lamp, firmware update and its end; of a robot: its command, reports, results, the
+//!   end of a calibration, the answer to an update.
+//! * Frames: every message of the other side, right, unasked, repeated, damaged, in halves, held
+//!   back behind a false header, old, our own echo, of no known message.
+//! * Frames that come back untouched or cut off, and flushes that fail, at once or after other
+//!   calls.
+//! * A store that fails, or keeps nothing; events that nobody takes out, up to a full queue.
+//!
+//! # What is not in the models
+//!
+//! An answer that is later than `late_guard`, which nothing can tell from the next one; more than
+//! two nodes; answers that a master receives in pieces (`roles.rs` has them).
+//!
+//! On UCP: other settings than `sends_first_stop`, `low_ids_only` and the robot's asking for
+//! biases; what reports and pongs say beyond their arrival (`ucp_roles.rs` has it); a host and a
+//! robot that talk to each other.
+//!
+//! # Depths
+//!
+//! A plain run tries 2 or 3 actions in a row from each of some ninety prepared states: an abnormal
+//! node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run,
+//! `tests/models/deep.sh`, goes further, and prints each world with its depth, states and time:
+//!
+//! | Worlds, of both kinds of boards | Actions in a row | States in each |
+//! |---|---|---|
+//! | a fresh master of one node, in small steps | 7 | 59,000 to 69,000 |
+//! | a fresh master of two nodes, in small steps | 6 | 84,000 to 85,000 |
+//! | one known node, in small steps | 6 | 30,000 to 170,000 |
+//! | one node, an exchange at a time | 6 | 33,000 to 342,000 |
+//! | two nodes, an exchange at a time | 4 | 6,000 to 29,000 |
+//! | two nodes that are commanded and stopped all the time | 9 | 130,000 to 165,000 |
+//! | a slave | 4 | 19,000 to 26,000 |
+//!
+//! A plain run tries 2 or 3 actions in a row from each of some thirty states of a host and a robot,
+//! 85 to 2,000 states in each. The deep run:
+//!
+//! | Worlds of UCP | Actions in a row | States in each |
+//! |---|---|---|
+//! | a host and its motor commands | 6 | 73,000 to 125,000 |
+//! | a host and firmware updates | 5 | 19,000 to 58,000 |
+//! | a host and calibrations | 4 | 16,000 to 41,000 |
+//! | a host with a full queue | 4, halves of frames 6 | 16,000 to 35,000 |
+//! | a robot and its motor commands | 5 | 160,000 to 178,000 |
+//! | a robot and all other requests | 4 | 20,000 to 74,000 |
+//!
+//! Drivers, of one kind of boards; a plain run tries 1 or 2 actions. What is called, and what the
+//! port, the pin and the clock do, is in `models/drive/action.rs`:
+//!
+//! | Worlds of drivers | Actions in a row | States in each |
+//! |---|---|---|
+//! | a blocking driver of a master, commanded | 4 | 131,000 |
+//! | the same in other states and settings | 3 | 4,700 to 10,700 |
+//! | an async driver of a master: commanded, cut off, in position mode | 3 | 56,000 to 79,000 |
+//! | the same in other states and settings | 2 | 960 to 2,700 |
+//! | a driver of a host | 3 | 7,000 to 8,500 |
+#![cfg(all(any(feature = "ikeya", feature = "ucp"), feature = "std"))]
+
+#[cfg(feature = "ikeya")]
+#[path = "models/account.rs"]
+mod account;
+#[cfg(feature = "ikeya")]
+#[path = "models/action.rs"]
+mod action;
+#[cfg(feature = "ikeya")]
+#[path = "models/bus.rs"]
+mod bus;
+#[cfg(feature = "ikeya")]
+#[path = "models/checks.rs"]
+mod checks;
+#[cfg(feature = "ikeya")]
+#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
+#[path = "models/drive/mod.rs"]
+mod drive;
+#[cfg(feature = "ikeya")]
+#[path = "models/exchange.rs"]
+mod exchange;
+#[path = "models/fingerprint.rs"]
+mod fingerprint;
+#[cfg(feature = "ucp")]
+#[path = "models/host.rs"]
+mod host;
+#[cfg(feature = "ucp")]
+#[path = "models/host_account.rs"]
+mod host_account;
+#[cfg(feature = "ucp")]
+#[path = "models/host_calls.rs"]
+mod host_calls;
+#[cfg(feature = "ucp")]
+#[path = "models/host_checks.rs"]
+mod host_checks;
+#[cfg(feature = "ucp")]
+#[path = "models/host_motion.rs"]
+mod host_motion;
+#[cfg(feature = "ucp")]
+#[path = "models/host_request.rs"]
+mod host_request;
+#[cfg(feature = "ucp")]
+#[path = "models/host_starts.rs"]
+mod host_starts;
+#[cfg(feature = "ucp")]
+#[path = "models/host_store.rs"]
+mod host_store;
+#[cfg(feature = "ikeya")]
+#[path = "models/kit.rs"]
+mod kit;
+#[cfg(feature = "ikeya")]
+#[path = "models/merging.rs"]
+mod merging;
+#[cfg(feature = "ucp")]
+#[path = "models/robot.rs"]
+mod robot;
+#[cfg(feature = "ucp")]
+#[path = "models/robot_account.rs"]
+mod robot_account;
+#[cfg(feature = "ucp")]
+#[path = "models/robot_checks.rs"]
+mod robot_checks;
+#[cfg(feature = "ucp")]
+#[path = "models/robot_starts.rs"]
+mod robot_starts;
+#[path = "models/run.rs"]
+mod run;
+#[path = "models/search.rs"]
+mod search;
+#[cfg(feature = "ikeya")]
+#[path = "models/slave.rs"]
+mod slave;
+#[path = "models/sleep.rs"]
+mod sleep;
+#[cfg(feature = "ikeya")]
+#[path = "models/starts.rs"]
+mod starts;
+#[cfg(feature = "ucp")]
+#[path = "models/ucp.rs"]
+mod ucp;
+
+#[cfg(feature = "ikeya")]
+use axlewire::ikeya::{OneMotor, ThreeMotors};
+use run::Run;
+
+/// A shallow and a deep test of each group of worlds.
+macro_rules! models {
+    ($($name:ident $deep:ident: $($group:literal, $worlds:expr);+;)+) => {$(
+        #[test]
+        fn $name() {
+            $({
+                let mut run = Run::new($group, false);
+                $worlds(&mut run);
+                run.end();
+            })+
+        }
+
+        #[test]
+        #[ignore = "takes minutes: see tests/models/deep.sh"]
+        fn $deep() {
+            $({
+                let mut run = Run::new($group, true);
+                $worlds(&mut run);
+                run.end();
+            })+
+        }
+    )+};
+}
+
+#[cfg(feature = "ikeya")]
+models! {
+    a_fresh_master_obeys_the_rulings deep_fresh:
+        "one motor", starts::fresh::<OneMotor>;
+        "three motors", starts::fresh::<ThreeMotors>;
+    a_master_obeys_the_rulings_at_every_small_step deep_small_steps:
+        "one motor", starts::small_steps::<OneMotor>;
+        "three motors", starts::small_steps::<ThreeMotors>;
+    a_master_of_one_node_obeys_the_rulings deep_one_node:
+        "one motor", starts::one_node::<OneMotor>;
+        "three motors", starts::one_node::<ThreeMotors>;
+    a_master_with_other_settings_obeys_the_rulings deep_settings:
+        "one motor", starts::settings::<OneMotor>;
+        "three motors", starts::settings::<ThreeMotors>;
+    a_master_of_two_nodes_obeys_the_rulings deep_two_nodes:
+        "one motor", starts::two_nodes::<OneMotor>;
+        "three motors", starts::two_nodes::<ThreeMotors>;
+    nobody_waits_too_long_in_a_busy_queue deep_queues:
+        "one motor", starts::queues::<OneMotor>;
+        "three motors", starts::queues::<ThreeMotors>;
+    a_slave_obeys_the_rulings deep_slave:
+        "one motor", slave::lines::<OneMotor>;
+        "three motors", slave::lines::<ThreeMotors>;
+}
+
+#[cfg(feature = "ucp")]
+models! {
+    a_host_moves_a_robot_as_its_application_says deep_host_motion:
+        "host, motion", host_starts::motion;
+    a_host_starts_an_update_by_its_own_call_alone deep_host_updates:
+        "host, updates", host_starts::updates;
+    a_host_acknowledges_what_is_kept deep_host_calibrations:
+        "host, calibrations", host_starts::calibrations;
+    a_host_with_a_full_queue_loses_nothing deep_host_queues:
+        "host, queues", host_starts::queues;
+    a_robot_obeys_the_last_valid_command_for_500_ms deep_robot_motion:
+        "robot, motion", robot_starts::motion;
+    a_robot_answers_what_it_is_asked deep_robot_answers:
+        "robot, answers", robot_starts::answers;
+    a_robot_with_a_full_queue_acknowledges_nothing deep_robot_queues:
+        "robot, queues", robot_starts::queues;
+}
+
+#[cfg(feature = "ikeya")]
+#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
+models! {
+    a_blocking_driver_of_a_master_obeys_the_rulings deep_blocking_driver:
+        "blocking driver", drive::blocking;
+    an_async_driver_of_a_master_obeys_the_rulings deep_async_driver:
+        "async driver", drive::waiting;
+}
+
+#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
+#[cfg(all(feature = "ikeya", feature = "ucp"))]
+models! {
+    a_driver_of_a_host_obeys_the_rulings deep_driver_of_a_host:
+        "driver of a host", drive::host;
+}

@@ -1,0 +1,275 @@
+//! What a master may do to a node, kept by the test from what was called, sent and heard.
+//!
+//! Nothing here looks into the master. The rulings are I6 (hold), I8 (confirmation), I11 (doubt),
+//! I12 (debts) and I13 (order).
+
+use axlewire::{ikeya::Mode, time::Instant};
+
+use super::kit::Write;
+
+/// Windows without the answer after which a node is abnormal.
+pub(crate) const STRIKES: u8 = 3;
+
+/// Exchanges with a node in doubt after which the application is told.
+const UNDECIDED: u8 = 6;
+
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub(crate) enum Confirm {
+    #[default]
+    Unasked,
+    AfterWrite,
+    AfterAnswer,
+    /// It is to end now, like this.
+    Succeeds,
+    Fails,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Account {
+    /// The mode heard last, unless it is in doubt.
+    pub(crate) record: Option<Mode>,
+    pub(crate) is_in_doubt: bool,
+    /// Exchanges in doubt that decided nothing.
+    pub(crate) undecided: u8,
+    /// The application was told that the doubt does not end, and that a stop waits for it.
+    pub(crate) is_doubt_told: bool,
+    pub(crate) is_block_told: bool,
+    /// Windows in a row without the answer.
+    pub(crate) misses: u8,
+    /// The set-point that was accepted and not dropped since: its number, 1 or 2.
+    pub(crate) target: Option<u8>,
+    /// The number of the last one that was accepted.
+    pub(crate) last_target: u8,
+    /// It has not been sent.
+    pub(crate) is_target_new: bool,
+    /// The last order was a set-point.
+    pub(crate) is_under_order: bool,
+    /// The last order was a stop.
+    pub(crate) is_halted: bool,
+    /// The mode has changed since: the last WRITE of that stop may have been read in the new one.
+    pub(crate) is_halted_in_other_mode: bool,
+    /// Changes with each first stop after a set-point, so that a position tells for which one it
+    /// was measured.
+    pub(crate) is_odd_stop: bool,
+    pub(crate) is_owed: bool,
+    /// A stop WRITE is to be sent, or again.
+    pub(crate) is_stop_due: bool,
+    /// A stop WRITE has been sent and nothing was missed since.
+    pub(crate) is_stop_written: bool,
+    pub(crate) paid: u8,
+    /// Where the node was told to hold, and whether it may be told another place.
+    pub(crate) hold: Option<(i16, i16)>,
+    pub(crate) may_hold_anew: bool,
+    /// Stop WRITEs since the call that the node may not have got, or has forgotten.
+    pub(crate) stops_missed: u8,
+    pub(crate) confirm: Confirm,
+    /// Not to be asked before then.
+    pub(crate) guard_until: Option<Instant>,
+    /// Exchanges of others while it had something urgent due, and while its turn in the cycle was.
+    pub(crate) waits: u8,
+    pub(crate) cycle_waits: u8,
+}
+
+impl Account {
+    pub(crate) fn is_online(&self) -> bool {
+        self.record.is_some() && self.misses < STRIKES
+    }
+
+    /// The rotation that a READ handed out now measures.
+    pub(crate) fn rotation(&self) -> i16 {
+        if self.is_halted { 20 + i16::from(self.is_odd_stop) } else { 10 }
+    }
+
+    /// A set-point was accepted.
+    pub(crate) fn aim(&mut self) {
+        let number = 3 - self.last_target.max(1);
+        (self.target, self.last_target, self.is_target_new) = (Some(number), number, true);
+        (self.is_under_order, self.is_halted, self.hold) = (true, false, None);
+        self.is_halted_in_other_mode = false;
+        self.waits = 0;
+    }
+
+    /// The set-point is dropped.
+    pub(crate) fn drop_target(&mut self) {
+        (self.target, self.is_target_new) = (None, false);
+        if self.confirm != Confirm::Unasked {
+            self.confirm = Confirm::Fails;
+        }
+    }
+
+    /// The node is owed a stop, if it is not already.
+    pub(crate) fn owe(&mut self) {
+        self.drop_target();
+        if !self.is_halted {
+            (self.is_odd_stop, self.hold, self.may_hold_anew) = (!self.is_odd_stop, None, true);
+        }
+        (self.is_halted, self.is_under_order) = (true, false);
+        self.owe_again();
+    }
+
+    /// The same stop is owed, or owed once more.
+    pub(crate) fn owe_again(&mut self) {
+        self.is_halted_in_other_mode = false;
+        if !self.is_owed {
+            (self.is_owed, self.paid, self.stops_missed, self.waits) = (true, 0, 0, 0);
+            (self.is_stop_due, self.is_stop_written) = (true, false);
+        }
+    }
+
+    /// Nothing that was paid or measured counts any more.
+    fn restart_stop(&mut self) {
+        (self.paid, self.is_stop_written, self.is_stop_due) = (0, false, self.is_owed);
+        self.may_hold_anew = true;
+    }
+
+    /// A WRITE is handed out: may it be?
+    pub(crate) fn write(&mut self, write: Write, is_three: bool) -> Result<(), String> {
+        let zero = write.speed == 0;
+        let speed = self.target.map(|number| f32::from(number).to_bits());
+        let place = self.target.map(|number| (7, 100 + i16::from(number)));
+        let is_measured = |place: (i16, i16)| place.1 % 1000 == self.rotation();
+        match (self.record, self.is_in_doubt) {
+            (None, _) => return Err("a WRITE to a node that was never heard".into()),
+            (Some(_), true) => {
+                let is_still = (0..=12287).contains(&write.place.1)
+                    && (!is_three || (0..=12287).contains(&write.place.0));
+                if !(self.is_halted && is_measured(write.place) && is_still) {
+                    return Err("a WRITE in doubt that may move the node".into());
+                }
+            }
+            (Some(Mode::Velocity), _) if self.is_halted && zero => {}
+            (Some(Mode::Velocity), _) if !self.is_halted && Some(write.speed) == speed => {}
+            (Some(Mode::Position), _) if self.is_halted && is_measured(write.place) => {}
+            (Some(Mode::Position), _) if !self.is_halted && Some(write.place) == place => {}
+            (Some(mode), _) if self.is_halted => {
+                return Err(format!("after a stop, this to a {mode} node: {write:?}"));
+            }
+            (Some(mode), _) => {
+                return Err(format!("not the set-point of a {mode} node: {write:?}"));
+            }
+        }
+        let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
+        if is_hold {
+            if self.hold.is_some_and(|hold| hold != write.place) && !self.may_hold_anew {
+                return Err("another position to hold".into());
+            }
+            (self.hold, self.may_hold_anew) = (Some(write.place), false);
+        }
+        self.is_target_new = false;
+        if self.is_owed {
+            (self.is_stop_written, self.is_stop_due) = (true, false);
+        } else if self.confirm == Confirm::AfterWrite {
+            self.confirm = Confirm::AfterAnswer;
+        }
+        Ok(())
+    }
+
+    /// The WRITE handed out last did not leave, or perhaps not.
+    pub(crate) fn take_back_write(&mut self) {
+        self.is_target_new = self.target.is_some();
+        if self.is_owed {
+            (self.is_stop_written, self.is_stop_due) = (false, true);
+            // The node may never have heard where to hold: it may be measured anew.
+            self.may_hold_anew = true;
+        } else if self.confirm == Confirm::AfterAnswer {
+            self.confirm = Confirm::AfterWrite;
+        }
+    }
+
+    fn begin_doubt(&mut self) {
+        if !self.is_in_doubt {
+            (self.is_in_doubt, self.undecided) = (true, 0);
+            (self.is_doubt_told, self.is_block_told) = (false, false);
+            // A place that is held is to be measured anew: that ends the set-point of a paid stop.
+            let is_hold = self.is_halted && self.record == Some(Mode::Position);
+            if is_hold && self.confirm != Confirm::Unasked {
+                self.confirm = Confirm::Fails;
+            }
+            // A WRITE that may have been read in the other mode confirms nothing.
+            if self.confirm == Confirm::AfterAnswer {
+                self.confirm = Confirm::AfterWrite;
+            }
+            self.restart_stop();
+        }
+    }
+
+    /// A whole answer was heard outside its window: it may begin a doubt.
+    pub(crate) fn hear_outside(&mut self, mode: Mode) {
+        if self.record.is_some_and(|record| record != mode) {
+            self.begin_doubt();
+        }
+    }
+
+    /// The answer was heard in its window.
+    pub(crate) fn hear_answer(&mut self, mode: Mode) {
+        (self.misses, self.guard_until) = (0, None);
+        match self.record {
+            Some(record) if record != mode && !self.is_in_doubt => return self.begin_doubt(),
+            Some(record) if record != mode => {
+                self.restart_stop();
+                let had_set_point = self.target.is_some() || self.is_under_order;
+                self.drop_target();
+                if had_set_point {
+                    self.owe();
+                } else {
+                    self.is_halted_in_other_mode = self.is_halted;
+                }
+            }
+            Some(_) if self.is_in_doubt => self.restart_stop(),
+            _ => {}
+        }
+        (self.record, self.is_in_doubt) = (Some(mode), false);
+        if self.confirm == Confirm::AfterAnswer {
+            self.confirm = Confirm::Succeeds;
+        }
+        if self.is_owed {
+            self.paid += u8::from(self.is_stop_written);
+            (self.is_stop_written, self.is_stop_due) = (false, true);
+        }
+    }
+
+    /// Its window has closed without the answer.
+    pub(crate) fn miss(&mut self, guard_until: Instant, stops_abnormal: bool) {
+        self.guard_until = Some(guard_until);
+        (self.is_stop_written, self.is_stop_due) = (false, self.is_owed);
+        if self.is_in_doubt {
+            self.undecided = (self.undecided + 1).min(UNDECIDED);
+        }
+        if self.record.is_none() || self.misses == STRIKES {
+            return;
+        }
+        self.misses += 1;
+        if self.misses == STRIKES {
+            let had_set_point = self.target.is_some() || self.is_under_order;
+            self.drop_target();
+            self.restart_stop();
+            if stops_abnormal && had_set_point {
+                self.owe();
+            }
+        }
+    }
+
+    /// Is there an urgent exchange with it to be made, and may it be made?
+    pub(crate) fn is_urgent(&self, now: Instant) -> bool {
+        let is_readable = self.is_in_doubt && self.undecided < UNDECIDED;
+        let has_work = (self.is_owed || self.is_target_new) && !self.is_in_doubt;
+        self.is_askable(now) && (is_readable || has_work)
+    }
+
+    /// May it be asked?
+    pub(crate) fn is_askable(&self, now: Instant) -> bool {
+        self.is_online() && self.guard_until.is_none_or(|until| now >= until)
+    }
+
+    /// Is a doubt without a decision yet to be told?
+    pub(crate) fn untold(&self) -> Option<&'static str> {
+        if !self.is_in_doubt || self.undecided < UNDECIDED {
+            return None;
+        }
+        match self.is_owed {
+            true if !self.is_block_told => Some("StopBlocked was not told"),
+            false if !self.is_doubt_told => Some("ModeInDoubt was not told"),
+            _ => None,
+        }
+    }
+}

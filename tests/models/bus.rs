@@ -1,0 +1,378 @@
+//! A master, its application, a line and one or two nodes.
+//!
+//! The nodes are this test's own: a switch, a shaft that is somewhere else each time it is
+//! measured, and an answer that may be late. One that is later than its deadline and `late_guard`
+//! is lost: the protocol has no numbers by which a master could tell it from the next one.
+
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{Master, MasterConfig, Mode, NodeId, Position},
+    time::{Duration, Instant, wire_time},
+};
+
+use super::{
+    account::{Account, Confirm},
+    action::{Action, Answer, Call, Exchange, Fate, Menu},
+    fingerprint::{COUNTERS, COUNTERS_AND_STATUS, Merge},
+    kit::{Kit, Reply, Sent},
+    search::World,
+};
+
+/// What can be wrong with it is said in words.
+pub(crate) type Checked = Result<(), String>;
+
+#[derive(Clone, Debug)]
+pub(super) struct Motor {
+    pub(super) mode: Mode,
+    /// The last WRITE that it got was a stop.
+    pub(super) is_told_to_stop: bool,
+    pub(super) is_odd_place: bool,
+}
+
+/// A READ, or a WRITE that is answered, whose window is open.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    pub(super) node: NodeId,
+    pub(super) end: Instant,
+    pub(super) deadline: Instant,
+    /// The node has heard it and has not answered yet.
+    pub(super) is_heard: bool,
+    /// What a position node measures for it.
+    pub(super) rotation: i16,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Late {
+    pub(super) reply: Reply,
+    until: Instant,
+}
+
+#[derive(Clone)]
+pub(crate) struct Bus<B: Kit> {
+    pub(crate) master: Master<B>,
+    pub(crate) now: Instant,
+    pub(super) motors: Vec<Motor>,
+    pub(super) accounts: Vec<Account>,
+    pub(super) asked: Option<Asked>,
+    pub(super) late: Option<Late>,
+    pub(super) line_free: Instant,
+    /// The last sign of life of the application.
+    alive_at: Instant,
+    /// The application takes events out.
+    pub(crate) takes_events: bool,
+    /// Position nodes are at 13,000 turns and more: no velocity node would stand still at that.
+    pub(crate) is_far: bool,
+    pub(crate) menu: Menu,
+}
+
+impl<B: Kit> Bus<B> {
+    /// Nodes 1 and so on, in these modes, and a master that knows none of them.
+    pub(crate) fn new(modes: &[Mode], mut config: MasterConfig, menu: Menu) -> Self {
+        config.nodes = NodeId::ALL[..modes.len()].iter().copied().collect();
+        let now = Instant::from_micros(1_000_000);
+        let motor = |&mode| Motor { mode, is_told_to_stop: true, is_odd_place: false };
+        Self {
+            master: Master::new(config, now),
+            now,
+            motors: modes.iter().map(motor).collect(),
+            accounts: vec![Account::default(); modes.len()],
+            asked: None,
+            late: None,
+            line_free: now,
+            alive_at: now,
+            takes_events: true,
+            is_far: false,
+            menu,
+        }
+    }
+
+    /// Goes these steps to a prepared state.
+    pub(crate) fn after(mut self, actions: &[Action]) -> Self {
+        for &action in actions {
+            self.step(action).unwrap_or_else(|broken| panic!("{action:?}: {broken}"));
+        }
+        self
+    }
+
+    pub(super) fn account(&mut self, node: NodeId) -> &mut Account {
+        &mut self.accounts[usize::from(node.get()) - 1]
+    }
+
+    fn answer_time(&self) -> Duration {
+        wire_time(self.answer_len(), self.master.config().baud)
+    }
+
+    fn answer_len(&self) -> usize {
+        if B::ANSWERS_WRITE { 16 } else { 8 }
+    }
+
+    fn call(&mut self, call: Call) -> Checked {
+        let now = self.now;
+        match call {
+            Call::Set(node) => self.set(node)?,
+            Call::Stop(node) => {
+                self.expire_orders();
+                self.master.stop(node, now);
+                self.alive_at = now;
+                self.account(node).owe();
+            }
+            Call::StopAll => {
+                self.expire_orders();
+                self.master.stop_all(now);
+                self.alive_at = now;
+                self.accounts.iter_mut().for_each(Account::owe);
+            }
+            Call::Release(node) => {
+                self.master.release(node);
+                let account = self.account(node);
+                account.drop_target();
+                account.may_hold_anew |= !account.is_owed;
+            }
+            Call::Confirm(node) => {
+                if self.master.confirm(node, now).is_ok() {
+                    self.account(node).confirm = Confirm::AfterWrite;
+                }
+            }
+            Call::Read(node) => drop(self.master.read(node, now)),
+            Call::Discover => self.master.discover(now),
+            Call::KeepAlive => {
+                self.expire_orders();
+                self.master.keep_alive(now);
+                self.alive_at = now;
+            }
+        }
+        Ok(())
+    }
+
+    /// A new set-point in the mode that the application believes in. A refused one has the number
+    /// of the next one, which is never sent.
+    fn set(&mut self, node: NodeId) -> Checked {
+        self.expire_orders();
+        let mode = self.master.mode(node).unwrap_or(Mode::Velocity);
+        let mut after = *self.account(node);
+        after.aim();
+        let number = after.last_target;
+        let set = match mode {
+            Mode::Velocity => self.master.set_velocity(node, B::speed(f32::from(number)), self.now),
+            Mode::Position => {
+                let place = Position::new(7, 100 + i16::from(number));
+                self.master.set_position(node, B::place(place), self.now)
+            }
+        };
+        if set.is_ok() {
+            let account = self.account(node);
+            if !account.is_online() || account.is_owed || account.is_in_doubt {
+                return Err("a set-point was accepted that has to be refused".into());
+            }
+            *account = after;
+            self.alive_at = self.now;
+        }
+        Ok(())
+    }
+
+    /// Hands out the next packet; says whether it is to be answered.
+    pub(super) fn send(&mut self, fate: Fate) -> Result<Option<bool>, String> {
+        self.pass_time()?;
+        let Some(bytes) = self.master.poll_transmit(self.now) else {
+            self.check_rest()?;
+            return Ok(None);
+        };
+        let sent = Sent::read::<B>(bytes);
+        let is_exchange = sent.is_exchange::<B>();
+        if is_exchange && self.asked.is_some() {
+            return Err("a second request in an open window".into());
+        }
+        self.check_order(&sent)?;
+        let start = self.line_free.max(self.now);
+        let end = start + wire_time(sent.len, self.master.config().baud);
+        self.line_free = end;
+        let rotation = self.account(sent.node).rotation();
+        if let Some(write) = sent.write {
+            self.account(sent.node).write(write, B::ANSWERS_WRITE)?;
+        }
+        let arrives = matches!(fate, Fate::Arrives | Fate::UnflushedArrives);
+        if is_exchange {
+            let deadline = end + self.master.config().reply_timeout + self.answer_time();
+            let node = sent.node;
+            self.asked = Some(Asked { node, end, deadline, is_heard: arrives, rotation });
+        }
+        if sent.write.is_some() {
+            let is_halted = self.account(sent.node).is_halted;
+            if arrives {
+                self.motors[usize::from(sent.node.get()) - 1].is_told_to_stop = is_halted;
+            } else if fate == Fate::Lost {
+                let account = self.account(sent.node);
+                account.stops_missed = (account.stops_missed + 1).min(2);
+            }
+        }
+        self.port_fails(fate, &sent, start);
+        Ok(Some(is_exchange))
+    }
+
+    /// What the driver tells of a port that could not send.
+    fn port_fails(&mut self, fate: Fate, sent: &Sent, start: Instant) {
+        let unsent = match fate {
+            Fate::Arrives | Fate::Lost => return,
+            Fate::Untouched => Unsent::Untouched,
+            Fate::CutOff => Unsent::CutOff,
+            Fate::UnflushedArrives | Fate::UnflushedLost => Unsent::Unflushed,
+        };
+        self.master.handle_unsent(unsent, self.now);
+        if unsent == Unsent::Unflushed {
+            self.accounts.iter_mut().for_each(Account::take_back_write);
+        } else {
+            self.line_free = if unsent == Unsent::Untouched { start } else { self.now };
+            self.asked = self.asked.filter(|_| !sent.is_exchange::<B>());
+            if sent.write.is_some() {
+                self.account(sent.node).take_back_write();
+            }
+        }
+    }
+
+    /// The node that was asked answers.
+    pub(super) fn answer(&mut self, answer: Answer) -> Checked {
+        let Some(asked) = self.asked.filter(|asked| asked.is_heard) else { return Ok(()) };
+        self.asked = Some(Asked { is_heard: answer == Answer::Leftover, ..asked });
+        let reply = self.reply(asked.node, asked.rotation);
+        let at = self.now.max(asked.end + self.answer_time() + Duration::from_micros(50));
+        match answer {
+            Answer::Right => self.hear(reply, at)?,
+            // Later than that it could not be told from the right one.
+            Answer::Leftover if self.now >= asked.end => {}
+            Answer::Leftover => {
+                let place = (reply.place.0, 10);
+                self.hear(Reply { place, ..reply }, self.now + Duration::from_micros(1))?;
+            }
+            Answer::Late => {
+                let until = asked.deadline + self.master.config().late_guard;
+                self.late = Some(Late { reply, until });
+            }
+            Answer::Damaged => {
+                let mut bytes = reply.bytes::<B>();
+                bytes[3] ^= 1;
+                self.now = at;
+                self.master.handle_input(&bytes, at);
+            }
+            Answer::OfAnother => {
+                let other = if asked.node == NodeId::N1 { NodeId::N2 } else { NodeId::N1 };
+                if self.motors.len() > 1 {
+                    let reply = self.reply(other, 10);
+                    self.hear(reply, at)?;
+                } else {
+                    let reply = Reply { node: NodeId::N8, ..reply };
+                    self.now = at;
+                    self.master.handle_input(&reply.bytes::<B>(), at);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What a node measures now.
+    fn reply(&mut self, node: NodeId, rotation: i16) -> Reply {
+        let motor = &mut self.motors[usize::from(node.get()) - 1];
+        motor.is_odd_place = !motor.is_odd_place && motor.mode == Mode::Position;
+        let far = if self.is_far { 13_000 } else { 0 };
+        let count = if motor.is_odd_place { 200 } else { 100 };
+        Reply { node, mode: motor.mode, place: (count, rotation + far) }
+    }
+
+    /// The master hears a whole answer.
+    pub(super) fn hear(&mut self, reply: Reply, at: Instant) -> Checked {
+        self.now = at;
+        let earliest = Duration::from_micros(self.answer_time().as_micros() / 2);
+        let is_in_window = self.asked.is_some_and(|asked| {
+            asked.node == reply.node && at <= asked.deadline && at >= asked.end + earliest
+        });
+        let heard_before = self.master.status(reply.node).map(|(_, at)| at);
+        self.master.handle_input(&reply.bytes::<B>(), at);
+        let heard_after = self.master.status(reply.node).map(|(_, at)| at);
+        if heard_after != heard_before && !is_in_window {
+            return Err("an answer outside its window was taken".into());
+        }
+        if is_in_window {
+            self.asked = None;
+            self.line_free = at + self.master.config().turnaround_gap;
+            self.account(reply.node).hear_answer(reply.mode);
+        } else {
+            self.account(reply.node).hear_outside(reply.mode);
+        }
+        self.take_events()
+    }
+
+    /// The dead-man: what comes too late does not revive an order.
+    fn expire_orders(&mut self) {
+        let limit = self.master.config().dead_man;
+        if limit.is_some_and(|limit| self.now >= self.alive_at + limit) {
+            self.accounts.iter_mut().filter(|it| it.is_under_order).for_each(Account::owe);
+        }
+    }
+
+    /// What a driver does first: time, then events.
+    pub(super) fn pass_time(&mut self) -> Checked {
+        let config = *self.master.config();
+        self.master.handle_timeout(self.now);
+        if let Some(asked) = self.asked.filter(|asked| self.now >= asked.deadline) {
+            self.asked = None;
+            let guard = asked.deadline + config.late_guard;
+            self.account(asked.node).miss(guard, config.stops_abnormal);
+        }
+        self.expire_orders();
+        self.late = self.late.filter(|late| self.now <= late.until);
+        self.take_events()
+    }
+}
+
+impl<B: Kit> World for Bus<B> {
+    type Action = Action;
+
+    fn actions(&self) -> Vec<Action> {
+        let mut probe = self.master.clone();
+        probe.handle_timeout(self.now);
+        let sends = probe.poll_transmit(self.now).is_some();
+        let is_heard = self.asked.is_some_and(|asked| asked.is_heard);
+        self.menu.actions(self.motors.len(), sends, is_heard, self.late.is_some())
+    }
+
+    fn step(&mut self, action: Action) -> Checked {
+        match action {
+            Action::Call(call) => self.call(call)?,
+            Action::Send(fate) => drop(self.send(fate)?),
+            Action::Answer(answer) => self.answer(answer)?,
+            Action::LateAnswer => {
+                if let Some(late) = self.late.take().filter(|late| self.now <= late.until) {
+                    self.hear(late.reply, self.now)?;
+                }
+            }
+            Action::Switch(node) => {
+                let motor = &mut self.motors[usize::from(node.get()) - 1];
+                motor.mode = match motor.mode {
+                    Mode::Velocity => Mode::Position,
+                    Mode::Position => Mode::Velocity,
+                };
+                (motor.is_told_to_stop, motor.is_odd_place) = (true, false);
+                self.account(node).stops_missed = 2;
+            }
+            Action::Reset(node) => {
+                let motor = &mut self.motors[usize::from(node.get()) - 1];
+                (motor.is_told_to_stop, motor.is_odd_place) = (true, false);
+                self.account(node).stops_missed = 2;
+            }
+            Action::Wait(wait) => self.wait(wait)?,
+            Action::Command(node) => {
+                self.set(node)?;
+                self.exchange(Exchange::Right)?;
+            }
+            Action::Exchange(exchange) => self.exchange(exchange)?,
+        }
+        self.take_events()
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let is_status_needed = self.master.config().hold_age > Duration::ZERO;
+        let skipped = if is_status_needed { COUNTERS } else { COUNTERS_AND_STATUS };
+        let alive_at = self.master.config().dead_man.map(|_| self.alive_at);
+        let world = (&self.motors, &self.accounts, self.asked, self.late, alive_at);
+        Merge { now: self.now, skipped }.fingerprint(&(&self.master, world))
+    }
+}

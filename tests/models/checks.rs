@@ -1,0 +1,150 @@
+//! What must hold on a motor bus, after every step.
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{Health, MasterEvent, Mode, NodeId},
+    time::Duration,
+};
+
+use super::{
+    account::{Confirm, STRIKES},
+    bus::{Bus, Checked},
+    kit::{Kit, Sent},
+    sleep::check_sleep,
+};
+
+/// Exchanges of the other node that an urgent one waits for at the most.
+const URGENT_WAITS: u8 = 4;
+
+/// The same in the cycle.
+const CYCLE_WAITS: u8 = 10;
+
+/// The search comes back to a node that is owed a stop in this time at the latest: a window at 1 %.
+const LONGEST_PAUSE: Duration = Duration::from_millis(150);
+
+impl<B: Kit> Bus<B> {
+    /// Nobody waits longer than `queue.rs` says, here for two nodes.
+    pub(super) fn check_order(&mut self, sent: &Sent) -> Checked {
+        let (now, is_discovering) = (self.now, self.master.is_discovering());
+        let is_exchange = sent.is_exchange::<B>();
+        let polls = self.menu.polls_fastest;
+        for (account, node) in self.accounts.iter_mut().zip(NodeId::ALL) {
+            if node == sent.node {
+                if is_exchange && account.guard_until.is_some_and(|until| now < until) {
+                    return Err(format!("node {node} is asked while a late answer may come"));
+                }
+                (account.waits, account.cycle_waits) = (0, 0);
+                continue;
+            }
+            if !is_exchange || !account.is_askable(now) {
+                continue;
+            }
+            let is_velocity = account.record == Some(Mode::Velocity) && !B::ANSWERS_WRITE;
+            if is_velocity && account.is_owed && account.is_stop_due && !account.is_in_doubt {
+                return Err(format!("a READ of node {} before a velocity stop", sent.node));
+            }
+            if account.is_urgent(now) {
+                account.waits += 1;
+            } else if polls && !is_discovering && !account.is_owed && !account.is_in_doubt {
+                account.cycle_waits += 1;
+            }
+            if account.waits > URGENT_WAITS || account.cycle_waits > CYCLE_WAITS {
+                return Err(format!("node {node} waits for too long"));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was told has happened, and what has happened is told.
+    pub(super) fn take_events(&mut self) -> Checked {
+        while let Some(event) = self.takes_events.then(|| self.master.poll_event()).flatten() {
+            match event {
+                MasterEvent::Stopped { node } => {
+                    let motor = self.motors[usize::from(node.get()) - 1].clone();
+                    let account = self.account(node);
+                    if account.paid < 2 {
+                        return Err(format!("Stopped, with {} payments", account.paid));
+                    }
+                    if account.stops_missed < 2 && !motor.is_told_to_stop {
+                        return Err("Stopped, and the node was not told to".into());
+                    }
+                }
+                MasterEvent::Confirmed { node } => {
+                    let confirm = std::mem::take(&mut self.account(node).confirm);
+                    if confirm != Confirm::Succeeds {
+                        return Err(format!("Confirmed without a reason: {confirm:?}"));
+                    }
+                }
+                MasterEvent::NotConfirmed { node, .. } => {
+                    let account = self.account(node);
+                    let confirm = std::mem::take(&mut account.confirm);
+                    if confirm != Confirm::Fails && account.misses < STRIKES {
+                        return Err(format!("NotConfirmed without a reason: {confirm:?}"));
+                    }
+                }
+                MasterEvent::StopBlocked { node } => self.account(node).is_block_told = true,
+                MasterEvent::ModeInDoubt { node } => self.account(node).is_doubt_told = true,
+                _ => {}
+            }
+        }
+        self.check_accounts()
+    }
+
+    /// The master owes what is owed, and knows who is there.
+    fn check_accounts(&mut self) -> Checked {
+        let owed = self.master.stops_owed();
+        for (index, account) in self.accounts.iter_mut().enumerate() {
+            let node = NodeId::ALL[index];
+            if account.is_owed && !owed.contains(node) {
+                if account.paid < 2 {
+                    return Err(format!("node {node}: the stop is forgotten"));
+                }
+                (account.is_owed, account.is_stop_due) = (false, false);
+            }
+            if !account.is_owed && owed.contains(node) {
+                // A stop that was paid is owed once more after the node was abnormal or in doubt, or has
+                // changed its mode.
+                let is_renewed =
+                    account.is_in_doubt || !account.is_online() || account.is_halted_in_other_mode;
+                if !(account.is_halted && is_renewed) {
+                    return Err(format!("node {node}: a stop that nobody has asked for"));
+                }
+                account.owe_again();
+            }
+            if self.takes_events {
+                if let Confirm::Succeeds | Confirm::Fails = account.confirm {
+                    return Err(format!("node {node}: no end of a confirmation was told"));
+                }
+                if let Some(untold) = account.untold() {
+                    return Err(format!("node {node}: {untold}"));
+                }
+            }
+            let is_abnormal = self.master.health(node) == Some(Health::Abnormal);
+            if is_abnormal != (account.record.is_some() && !account.is_online()) {
+                return Err(format!("node {node}: abnormal: {is_abnormal}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The master has nothing to send: there is a time to come at which it has.
+    pub(super) fn check_rest(&self) -> Checked {
+        let timeout = self.master.poll_timeout();
+        if timeout.is_some_and(|at| at <= self.now) {
+            return Err("a deadline in the past".into());
+        }
+        // What could be handed out behind a WRITE that is still leaving would not leave sooner.
+        if timeout.is_none_or(|at| at > self.line_free) {
+            check_sleep(&self.master, self.now)?;
+        }
+        let is_owed = self.accounts.iter().any(|account| account.is_owed);
+        let is_waiting = self.accounts.iter().any(|account| account.confirm != Confirm::Unasked);
+        if timeout.is_none() && (is_owed || is_waiting) {
+            return Err("a stop or a confirmation is owed, and no deadline is given".into());
+        }
+        if is_owed && timeout.is_some_and(|at| at > self.now + LONGEST_PAUSE) {
+            return Err("a stop is owed, and nobody is asked for it".into());
+        }
+        Ok(())
+    }
+}

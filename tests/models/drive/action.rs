@@ -1,0 +1,150 @@
+//! What can happen to a driver.
+
+use axlewire::ikeya::Mode;
+
+use super::{
+    fault::{Flushing, Pinning, Reading, Writing},
+    line::Line,
+    node::{Answer, Node},
+};
+
+/// One thing that can happen.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Action {
+    /// Arranges what goes wrong next.
+    Fault(Fault),
+    Pass(Pass),
+    Call(Call),
+    /// An async call that is dropped after so many polls.
+    Drop(Call, usize),
+}
+
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Fault {
+    Write(Writing),
+    /// A frame is cut off: one byte is taken, then the port fails.
+    CutOff,
+    /// One byte is taken, and the next after too long a pause.
+    Late,
+    Read(Reading),
+    Flush(Flushing),
+    Pin(Pinning),
+    Answer(Answer),
+    /// The node loses its power, or has it again.
+    Power,
+}
+
+/// Time passes without a call.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Pass {
+    /// Shorter than a pause inside a frame may be.
+    Short,
+    /// Longer than that.
+    Pause,
+    Deadline,
+    PastDeadline,
+    Long,
+    /// The clock of the driver goes back.
+    Back,
+}
+
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Call {
+    Service,
+    /// Waits for a while.
+    Idle,
+    Discover,
+    /// A set-point, 1 or 2.
+    Set(u8),
+    Stop,
+    StopAll,
+    Read,
+    DriveFor,
+    /// Gives up what is unsent.
+    Discard,
+    KeepAlive,
+}
+
+impl Fault {
+    /// Arranges it.
+    pub(crate) fn arrange(self, line: &mut Line, node: Option<&mut Node>) {
+        match (self, node) {
+            (Self::Write(writing), _) => line.writes.push_back(writing),
+            (Self::CutOff, _) => line.writes.extend([Writing::One, Writing::Error]),
+            (Self::Late, _) => line.writes.extend([Writing::One, Writing::Slow]),
+            (Self::Read(reading), _) => line.reads.push_back(reading),
+            (Self::Flush(flushing), _) => line.flushes.push_back(flushing),
+            (Self::Pin(pinning), _) => line.pins.push_back(pinning),
+            (Self::Answer(answer), Some(node)) => node.answers.push_back(answer),
+            (Self::Power, Some(node)) => node.is_gone = !node.is_gone,
+            (Self::Answer(_) | Self::Power, None) => {}
+        }
+    }
+
+    /// Faults of the port and, if it has one, of its pin.
+    pub(crate) fn of_port(has_pin: bool, is_async: bool) -> Vec<Self> {
+        use {Flushing as F, Reading as R, Writing as W};
+        let mut faults = vec![Self::CutOff, Self::Late];
+        faults.extend([W::One, W::Half, W::Error, W::Zero, W::Slow, W::Stall].map(Self::Write));
+        faults.extend([R::One, R::Error, R::Zero].map(Self::Read));
+        faults.extend([R::ErrorAfterWrite, R::ErrorLater].map(Self::Read));
+        faults.extend((!is_async).then_some(Self::Read(R::ReadyError)));
+        faults.extend([F::ErrorLost, F::ErrorLeft, F::Stall].map(Self::Flush));
+        if has_pin {
+            faults.extend([Pinning::On, Pinning::Off].map(Self::Pin));
+        }
+        faults
+    }
+}
+
+/// What a world of a master offers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Setup {
+    pub(crate) is_async: bool,
+    pub(crate) has_pin: bool,
+    pub(crate) mode: Mode,
+    /// The dead-man of the master, milliseconds.
+    pub(crate) dead_man_ms: Option<u32>,
+    /// Two faults may wait to happen at a time, and async calls are dropped at every poll.
+    pub(crate) is_deep: bool,
+}
+
+impl Setup {
+    /// The actions that are possible after those of `past`.
+    pub(crate) fn actions(self, past: &[Action]) -> Vec<Action> {
+        let is_fault = |action: &&Action| matches!(action, Action::Fault(_));
+        let waiting = past.iter().rev().take_while(is_fault).count();
+        let mut actions = vec![];
+        if waiting < if self.is_deep { 2 } else { 1 } {
+            let mut faults = Fault::of_port(self.has_pin, self.is_async);
+            use Answer as A;
+            faults.extend([A::Late, A::Lost, A::Damaged, A::CutOff].map(Fault::Answer));
+            faults.push(Fault::Power);
+            actions.extend(faults.into_iter().map(Action::Fault));
+        }
+        if waiting == 0 {
+            use Pass as P;
+            let passes = [P::Short, P::Pause, P::Deadline, P::PastDeadline, P::Long, P::Back];
+            actions.extend(passes.map(Action::Pass));
+            actions.push(Action::Call(Call::Discard));
+            actions.extend(self.dead_man_ms.map(|_| Action::Call(Call::KeepAlive)));
+        }
+        let mut calls = vec![Call::Service, Call::Idle, Call::Set(2), Call::Stop, Call::Read];
+        calls.extend((self.mode == Mode::Velocity).then_some(Call::DriveFor));
+        calls.push(Call::StopAll);
+        if self.is_async {
+            for &call in &calls {
+                let polls: &[usize] = match (self.is_deep, call) {
+                    (true, Call::Service) => &[1, 2, 3, 4],
+                    (true, _) => &[1, 2, 3, 4, 5, 7, 9],
+                    (false, Call::Service | Call::DriveFor) => &[1, 2],
+                    (false, Call::Set(_) | Call::Stop) => &[1, 3],
+                    _ => &[2],
+                };
+                actions.extend(polls.iter().map(|&polls| Action::Drop(call, polls)));
+            }
+        }
+        actions.extend(calls.into_iter().map(Action::Call));
+        actions
+    }
+}

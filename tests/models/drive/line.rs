@@ -1,0 +1,253 @@
+//! What is on the other side of a driver: time, a line, and what goes wrong on it.
+
+use std::{
+    cell::RefCell,
+    collections::VecDeque,
+    fmt::{self, Debug},
+    hash::{Hash, Hasher},
+    rc::Rc,
+    task::Waker,
+};
+
+use axlewire::time::Instant;
+
+use super::{
+    fault::{Failure, Flushing, Pinning, Reading, Writing},
+    wire::Wire,
+};
+
+/// Operations of the port, the pin and the clock in one call at the most: far more than any call of
+/// these worlds needs.
+const OPERATIONS: u32 = 60_000;
+
+/// Whoever hears what is sent.
+pub(crate) trait Peer {
+    /// Hears a frame; says when it answers, microseconds after its end, and what.
+    fn hear(&mut self, frame: &[u8], end_us: u64) -> Option<(u64, Vec<u8>)>;
+}
+
+pub(crate) struct Line {
+    pub(crate) now_us: u64,
+    /// By how much the clock of the driver has gone back.
+    pub(crate) back_us: u64,
+    /// The time that a role is to be told: that of the clock, which stands still instead of going
+    /// back.
+    ahead_us: u64,
+    pub(crate) latest_us: u64,
+    byte_us: u64,
+    pub(crate) wire: Wire,
+    pub(crate) peer: Box<dyn Peer>,
+    /// Bytes on their way to the driver, and when each is there.
+    pub(crate) inbox: VecDeque<(u64, u8)>,
+    /// When the last byte that was written is out.
+    pub(crate) free_us: u64,
+    pub(crate) reads: VecDeque<Reading>,
+    pub(crate) writes: VecDeque<Writing>,
+    pub(crate) flushes: VecDeque<Flushing>,
+    pub(crate) pins: VecDeque<Pinning>,
+    /// When the current call began.
+    pub(crate) begun_us: u64,
+    pub(crate) writes_in_call: u32,
+    /// When the current call has first tried to write.
+    pub(crate) first_write_us: Option<u64>,
+    /// The current call has asked something of the port; one that is refused does not.
+    pub(crate) is_touched: bool,
+    /// Writes that were tried since the last flush was.
+    pub(crate) is_flush_due: bool,
+    /// Whether the driver has a pin, when it went on, and whether it is.
+    pub(crate) has_pin: bool,
+    pub(crate) pin_on_us: Option<u64>,
+    /// An async write or flush, or a delay of the pin, is under way.
+    pub(crate) is_sending: bool,
+    /// In the current call.
+    pub(crate) failures: Vec<(u64, Failure)>,
+    /// A flush has failed, or the port has stalled: what it has taken may be lost.
+    pub(crate) is_given_up: bool,
+    pub(crate) sleepers: Vec<(u64, u32, Waker)>,
+    sleepers_so_far: u32,
+    operations: u32,
+    /// The first invariant that was broken inside a call.
+    pub(crate) broken: Option<String>,
+}
+
+/// A handle of a line: its port, pin, clock and delay are such.
+#[derive(Clone)]
+pub(crate) struct Shared(pub(crate) Rc<RefCell<Line>>);
+
+/// Not a part of what a driver is.
+impl Debug for Shared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Shared")
+    }
+}
+
+impl Line {
+    pub(crate) fn new(byte_us: u64, wire: Wire, peer: Box<dyn Peer>, has_pin: bool) -> Self {
+        // Not 0, so that a clock can go back.
+        let start_us = 100_000_000_000;
+        Self {
+            now_us: start_us,
+            back_us: 0,
+            ahead_us: 0,
+            latest_us: start_us,
+            byte_us,
+            wire,
+            peer,
+            inbox: VecDeque::new(),
+            free_us: start_us,
+            reads: VecDeque::new(),
+            writes: VecDeque::new(),
+            flushes: VecDeque::new(),
+            pins: VecDeque::new(),
+            begun_us: start_us,
+            writes_in_call: 0,
+            first_write_us: None,
+            is_touched: false,
+            is_flush_due: false,
+            has_pin,
+            pin_on_us: None,
+            is_sending: false,
+            failures: vec![],
+            is_given_up: false,
+            sleepers: vec![],
+            sleepers_so_far: 0,
+            operations: 0,
+            broken: None,
+        }
+    }
+
+    /// A call begins.
+    pub(crate) fn begin(&mut self) {
+        self.begun_us = self.now_us;
+        (self.writes_in_call, self.first_write_us, self.is_touched) = (0, None, false);
+        self.operations = 0;
+        self.failures.clear();
+        self.is_given_up = false;
+        self.wire.begin();
+    }
+
+    /// Takes note of a broken invariant.
+    pub(crate) fn object(&mut self, invariant: &str) {
+        self.broken.get_or_insert_with(|| invariant.into());
+    }
+
+    /// One more operation. A call that does not end would try for ever, so it is ended by a panic.
+    pub(crate) fn count(&mut self) {
+        self.operations += 1;
+        assert!(self.operations < OPERATIONS, "the call does not end");
+    }
+
+    pub(crate) fn fail(&mut self, make: fn(u8) -> Failure) -> u8 {
+        let number = self.failures.len() as u8;
+        self.failures.push((self.now_us, make(number)));
+        number
+    }
+
+    pub(crate) fn failed(&mut self, failure: Failure) {
+        self.failures.push((self.now_us, failure));
+    }
+
+    /// The clock of the driver, which may have gone back.
+    pub(crate) fn clock(&mut self) -> Instant {
+        self.count();
+        self.latest_us = self.role_us();
+        self.ahead_us = self.latest_us - (self.now_us - self.back_us);
+        Instant::from_micros(self.now_us - self.back_us)
+    }
+
+    /// The time as the role should be told it, if it is asked for now.
+    fn role_us(&self) -> u64 {
+        self.latest_us.max(self.now_us - self.back_us + self.ahead_us)
+    }
+
+    pub(crate) fn role_now(&self) -> Instant {
+        Instant::from_micros(self.role_us())
+    }
+
+    /// Whoever idles or waits lets the others speak.
+    pub(crate) fn pass_until(&mut self, until_us: u64) {
+        self.now_us = self.now_us.max(until_us);
+        let now_us = self.now_us;
+        self.sleepers.retain(|(at_us, _, waker)| {
+            if *at_us <= now_us {
+                waker.wake_by_ref();
+            }
+            *at_us > now_us
+        });
+    }
+
+    pub(crate) fn idle_until(&mut self, until: Instant) {
+        self.count();
+        if self.pin_on_us.is_some() && !self.has_pin_failed() {
+            self.object("the driver-enable pin is on while the driver waits");
+        }
+        let arrival_us = self.inbox.front().map_or(u64::MAX, |&(at_us, _)| at_us);
+        // As long as the clock reads less than `until`.
+        let wait_us = until.as_micros().saturating_sub(self.now_us - self.back_us);
+        let until_us = self.now_us + wait_us;
+        self.pass_until(until_us.min(arrival_us).max(self.now_us + 1));
+    }
+
+    pub(crate) fn has_pin_failed(&self) -> bool {
+        self.failures.iter().any(|(_, failure)| matches!(failure, Failure::Pin(_)))
+    }
+
+    /// Takes bytes onto the wire. The write began at `begun_us`.
+    pub(crate) fn carry(&mut self, bytes: &[u8], begun_us: u64) {
+        self.free_us = self.free_us.max(self.now_us) + self.byte_us * bytes.len() as u64;
+        if let Err(invariant) = self.wire.carry(bytes, begun_us, self.now_us) {
+            self.object(&invariant);
+        }
+        let is_lost = self.flushes.front() == Some(&Flushing::ErrorLost);
+        while let Some(frame) = self.wire.next_unheard() {
+            let answer = (!is_lost).then(|| self.peer.hear(&frame, self.free_us)).flatten();
+            if let Some((after_us, answer)) = answer {
+                let begin_us = self.free_us + after_us;
+                let bytes = (1..).zip(answer).map(|(i, byte)| (begin_us + i * self.byte_us, byte));
+                self.inbox.extend(bytes);
+                self.inbox.make_contiguous().sort_by_key(|&(at_us, _)| at_us);
+            }
+        }
+    }
+
+    pub(crate) fn has_arrived(&self) -> bool {
+        self.inbox.front().is_some_and(|&(at_us, _)| at_us <= self.now_us)
+    }
+
+    /// What the next read does, if that is something else than giving what is there.
+    pub(crate) fn reading(&self) -> Option<Reading> {
+        self.reads.front().copied().filter(|reading| match reading {
+            Reading::One => self.has_arrived(),
+            Reading::ErrorAfterWrite => self.writes_in_call > 0,
+            Reading::ErrorLater => self.now_us >= self.begun_us + 300,
+            _ => true,
+        })
+    }
+
+    /// When there may be something to read, microseconds.
+    pub(crate) fn readable_us(&self) -> u64 {
+        let arrival_us = self.inbox.front().map_or(u64::MAX, |&(at_us, _)| at_us);
+        let is_later = self.reads.front() == Some(&Reading::ErrorLater);
+        arrival_us.min(if is_later { self.begun_us + 300 } else { u64::MAX })
+    }
+
+    pub(crate) fn next_sleeper(&mut self) -> u32 {
+        self.sleepers_so_far += 1;
+        self.sleepers_so_far
+    }
+}
+
+/// What matters for what comes next.
+impl Hash for Line {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        (&self.reads, &self.writes, &self.flushes, &self.pins).hash(hasher);
+        self.wire.digest(self.now_us).hash(hasher);
+        (self.pin_on_us.is_some(), self.free_us.saturating_sub(self.now_us)).hash(hasher);
+        // Time that will pass unseen, because the clock has gone back.
+        let reading_us = self.now_us - self.back_us + self.ahead_us;
+        self.latest_us.saturating_sub(reading_us).hash(hasher);
+        for &(at_us, byte) in &self.inbox {
+            (at_us.saturating_sub(self.now_us), byte).hash(hasher);
+        }
+    }
+}

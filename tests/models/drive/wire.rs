@@ -1,0 +1,167 @@
+//! An account of the bytes that a port has taken: whole frames, or cut ones and a silence.
+
+use std::collections::VecDeque;
+
+/// What the beginning of a byte stream is.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Shape {
+    /// A part of a frame.
+    Part,
+    Whole,
+    /// Neither.
+    Bad,
+}
+
+/// Frames of a protocol, and how long one may pause.
+#[derive(Clone, Copy)]
+pub(crate) struct Speech {
+    pub(crate) shape: fn(&[u8]) -> Shape,
+    pub(crate) pause_us: u64,
+    /// A frame that was cut off is followed by a silence of more than `pause_us`.
+    pub(crate) needs_silence: bool,
+}
+
+/// A frame that a driver has offered to its port, whether or not the port took any of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Offer {
+    /// The time of the role.
+    pub(crate) role_us: u64,
+    /// Frames of this call that the port had taken whole before.
+    pub(crate) taken: usize,
+    pub(crate) frame: Vec<u8>,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Taken {
+    pub(crate) frame: Vec<u8>,
+    pub(crate) is_flushed: bool,
+    /// A flush has failed: it may be lost, whatever the next flush says.
+    is_doubtful: bool,
+}
+
+pub(crate) struct Wire {
+    speech: Speech,
+    /// A frame that has begun and not ended.
+    pub(crate) open: Vec<u8>,
+    last_us: u64,
+    /// The rest of a frame came late: a silence follows.
+    is_noisy: bool,
+    /// The application has given up a frame: what comes next may be a new one.
+    pub(crate) is_given_up: bool,
+    unheard: VecDeque<Vec<u8>>,
+    /// Of the current call.
+    pub(crate) offers: Vec<Offer>,
+    pub(crate) taken: Vec<Taken>,
+    /// Frames that were cut off for good.
+    pub(crate) cuts: u32,
+}
+
+impl Wire {
+    pub(crate) fn new(speech: Speech) -> Self {
+        Self {
+            speech,
+            open: vec![],
+            last_us: 0,
+            is_noisy: false,
+            is_given_up: false,
+            unheard: VecDeque::new(),
+            offers: vec![],
+            taken: vec![],
+            cuts: 0,
+        }
+    }
+
+    pub(crate) fn begin(&mut self) {
+        self.offers.clear();
+        self.taken.clear();
+        self.cuts = 0;
+    }
+
+    /// A driver offers bytes to its port: a whole frame, or the rest of the one that has begun.
+    pub(crate) fn offer(&mut self, bytes: &[u8], at_us: u64, role_us: u64) -> Result<(), String> {
+        if (self.speech.shape)(bytes) == Shape::Whole {
+            self.offers.push(Offer { role_us, taken: self.taken.len(), frame: bytes.to_vec() });
+            return Ok(());
+        }
+        let whole = [&self.open[..], bytes].concat();
+        if self.open.is_empty() || (self.speech.shape)(&whole) != Shape::Whole {
+            return Err(format!("{bytes:02X?} is offered behind {:02X?}", self.open));
+        }
+        if self.is_late(at_us) {
+            return Err("the rest of a frame is offered after too long a pause".into());
+        }
+        Ok(())
+    }
+
+    /// Certainly: the time of the byte that follows on the line included.
+    pub(crate) fn longer_than_a_pause_us(&self) -> u64 {
+        self.speech.pause_us + 200
+    }
+
+    fn is_late(&self, at_us: u64) -> bool {
+        at_us - self.last_us > self.speech.pause_us
+    }
+
+    pub(crate) fn carry(&mut self, bytes: &[u8], begun_us: u64, at_us: u64) -> Result<(), String> {
+        if self.is_noisy {
+            if self.speech.needs_silence && !self.is_late(at_us) {
+                return Err("no silence behind a frame that was cut off".into());
+            }
+            self.is_noisy = false;
+        }
+        if !self.open.is_empty() && self.is_late(at_us) {
+            self.open.clear();
+            self.cuts += 1;
+            // The port came back late with a part of the rest, which nobody can know before.
+            if !self.is_late(begun_us) {
+                (self.is_noisy, self.last_us) = (true, at_us);
+                return Ok(());
+            }
+        } else if self.is_given_up && !self.open.is_empty() {
+            if self.speech.needs_silence {
+                return Err("no silence behind a frame that was given up".into());
+            }
+            self.open.clear();
+            self.cuts += 1;
+        }
+        self.is_given_up = false;
+        self.last_us = at_us;
+        for &byte in bytes {
+            self.open.push(byte);
+            match (self.speech.shape)(&self.open) {
+                Shape::Part => {}
+                Shape::Whole => {
+                    let frame = std::mem::take(&mut self.open);
+                    self.unheard.push_back(frame.clone());
+                    self.taken.push(Taken { frame, is_flushed: false, is_doubtful: false });
+                }
+                Shape::Bad => return Err(format!("on the line: {:02X?}", self.open)),
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn flushed(&mut self) {
+        self.taken.iter_mut().for_each(|taken| taken.is_flushed |= !taken.is_doubtful);
+    }
+
+    pub(crate) fn flush_failed(&mut self) {
+        self.taken.iter_mut().for_each(|taken| taken.is_doubtful |= !taken.is_flushed);
+    }
+
+    pub(crate) fn next_unheard(&mut self) -> Option<Vec<u8>> {
+        self.unheard.pop_front()
+    }
+
+    /// Of these bytes a part has left, and the rest may still go.
+    pub(crate) fn goes_on_with(&self, rest: &[u8]) -> bool {
+        let whole = [&self.open[..], rest].concat();
+        !self.open.is_empty() && (self.speech.shape)(&whole) == Shape::Whole
+    }
+
+    /// What matters for what comes next.
+    pub(crate) fn digest(&self, now_us: u64) -> (Vec<u8>, u64, bool, bool) {
+        let since_us = (now_us - self.last_us).min(self.speech.pause_us + 1);
+        (self.open.clone(), since_us, self.is_noisy, self.is_given_up)
+    }
+}

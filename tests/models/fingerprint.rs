@@ -1,0 +1,171 @@
+//! The fingerprint of a role: what two states have in common that differ only in absolute time and
+//! in counters.
+//!
+//! It is made of the role's `{:?}`: every `Instant` becomes its distance to now, and the fields
+//! that cannot change what happens next are left out. So no private field is opened.
+
+use std::fmt::{Debug, Write};
+
+use axlewire::time::Instant;
+
+/// What is older has happened long ago. No role looks back further than this, microseconds: the
+/// longest limit in these models is the 20 ms between two positions that show a standstill. The
+/// roles of UCP keep the ends of their waits, which lie ahead.
+const LONG_AGO: i64 = -100_000;
+
+/// Times before which something is not to be done. Once they have passed it does not matter when.
+const EARLIEST: [&str; 5] = ["guarded_until", "line_free", "next_at", "read_due", "guard_until"];
+
+/// How the states of a kind of world are told apart.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Merge {
+    pub(crate) now: Instant,
+    /// Fields that are left out.
+    pub(crate) skipped: &'static [&'static str],
+}
+
+/// Counters, settings that never change, and what has been handed out.
+#[cfg(feature = "ikeya")]
+pub(crate) const COUNTERS: &[&str] =
+    &["config", "last_failure", "ledger", "lost", "packet", "reported", "sent", "statistics"];
+
+/// The same, and the last answer where no stop may hold its position.
+#[cfg(feature = "ikeya")]
+pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
+    "config",
+    "last_failure",
+    "ledger",
+    "lost",
+    "packet",
+    "reported",
+    "sent",
+    "statistics",
+    "status",
+];
+
+impl Merge {
+    pub(crate) fn fingerprint(self, state: &impl Debug) -> u64 {
+        let mut text = String::with_capacity(16_384);
+        write!(text, "{state:?}").expect("a String takes everything");
+        let mut reader = Reader {
+            now: self.now,
+            skipped: self.skipped.iter().map(|name| hash(name.as_bytes())).collect(),
+            earliest: EARLIEST.map(|name| hash(name.as_bytes())),
+            hash: 0,
+            is_earliest: false,
+            is_instant: false,
+        };
+        reader.read(text.as_bytes());
+        reader.hash
+    }
+}
+
+fn mixed(hash: u64, value: u64) -> u64 {
+    let hash = (hash.rotate_left(5) ^ value).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    hash ^ hash >> 29
+}
+
+fn hash(word: &[u8]) -> u64 {
+    word.iter().fold(0, |hash, &byte| with_byte(hash, byte))
+}
+
+/// Five bits further: digits differ in four, letters in five.
+const fn with_byte(hash: u64, byte: u8) -> u64 {
+    hash.rotate_left(5) ^ byte as u64
+}
+
+/// Reads a `{:?}` word by word and hashes it.
+struct Reader {
+    now: Instant,
+    /// Hashes of the names.
+    skipped: Vec<u64>,
+    earliest: [u64; 5],
+    hash: u64,
+    /// What is being read belongs to a field of [`EARLIEST`].
+    is_earliest: bool,
+    /// It belongs to an `Instant`.
+    is_instant: bool,
+}
+
+impl Reader {
+    // Plain loops: without optimization, which a test has, anything else takes most of the time.
+    fn read(&mut self, text: &[u8]) {
+        // Brackets that are open, and those around the field that is left out.
+        let (mut depth, mut skipped_at) = (0_u32, None);
+        let (mut word, mut start, mut at) = (0, 0, 0);
+        while at < text.len() {
+            let byte = text[at];
+            at += 1;
+            if IS_OF_WORD[byte as usize] {
+                word = with_byte(word, byte);
+                continue;
+            }
+            if start + 1 < at {
+                if skipped_at.is_none() && self.is_skipped(word, &text[start..at - 1], byte) {
+                    skipped_at = Some(depth);
+                }
+                word = 0;
+            }
+            start = at;
+            if byte == b' ' {
+                continue;
+            }
+            let is_closed = matches!(byte, b'}' | b']' | b')');
+            if skipped_at == Some(depth) && (is_closed || byte == b',') {
+                skipped_at = None;
+            }
+            match byte {
+                b'{' | b'[' | b'(' => depth += 1,
+                _ if is_closed => depth -= 1,
+                _ => continue,
+            }
+            if skipped_at.is_none() {
+                self.hash = mixed(self.hash, u64::from(byte));
+            }
+        }
+    }
+
+    /// Takes in a word; says whether it is the name of a field that is left out.
+    fn is_skipped(&mut self, hash: u64, word: &[u8], delimiter: u8) -> bool {
+        if delimiter == b':' {
+            if word != b"micros" {
+                self.is_earliest = self.earliest.contains(&hash);
+            }
+            return self.skipped.contains(&hash);
+        }
+        if self.is_instant {
+            self.is_instant = false;
+            let mut micros = 0_u64;
+            for &digit in word {
+                micros = micros * 10 + u64::from(digit - b'0');
+            }
+            let distance = micros.wrapping_sub(self.now.as_micros()) as i64;
+            let distance = distance.max(if self.is_earliest { 0 } else { LONG_AGO });
+            self.hash = mixed(self.hash, distance as u64);
+        } else if hash == INSTANT {
+            self.is_instant = true;
+        } else {
+            self.hash = mixed(self.hash, hash);
+        }
+        false
+    }
+}
+
+const INSTANT: u64 = {
+    let (name, mut hash, mut at) = (b"Instant", 0, 0);
+    while at < name.len() {
+        hash = with_byte(hash, name[at]);
+        at += 1;
+    }
+    hash
+};
+
+const IS_OF_WORD: [bool; 256] = {
+    let (mut table, mut byte) = ([false; 256], 0_usize);
+    while byte < 256 {
+        let is_mark = matches!(byte as u8, b'_' | b'.' | b'-');
+        table[byte] = (byte as u8).is_ascii_alphanumeric() || is_mark;
+        byte += 1;
+    }
+    table
+};

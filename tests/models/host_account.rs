@@ -1,0 +1,289 @@
+//! The account of a host: what was called and heard, what may be sent, and what is owed.
+
+use axlewire::{
+    endpoint::Unsent,
+    time::Instant,
+    ucp::{CalibrationKind, CalibrationStep, ErrorCode, Frame, Link, Message},
+};
+
+use super::{
+    host_motion::Motion,
+    host_request::{Ack, Request, Results},
+    host_store::Shelf,
+    ucp::{Checked, ms},
+};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Update {
+    None,
+    /// The request goes behind one more stop, if the robot has been told anything.
+    Asked {
+        version: i16,
+        needs_stop: bool,
+    },
+    /// Nothing is sent.
+    Silent,
+}
+
+/// What the last frame carries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Last {
+    Motor,
+    ImuAck,
+    MagAck,
+    Biases,
+    Calibration,
+    Network,
+    Update(i16),
+    Ping,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Account {
+    pub(crate) motion: Motion,
+    pub(crate) low_ids_only: bool,
+    pings: bool,
+    ping_at: Instant,
+    ping_until: Option<Instant>,
+    pub(crate) link: Link,
+    link_until: Option<Instant>,
+    pub(crate) update: Update,
+    pub(crate) request: Option<Request>,
+    /// What the latest request has come to.
+    pub(crate) settled: Option<bool>,
+    /// Ends of requests that have not been taken out.
+    pub(crate) untold: Vec<(CalibrationStep, CalibrationKind, bool)>,
+    pub(crate) imu: Results,
+    pub(crate) mag: Results,
+    pub(crate) biases: Ack,
+    pub(crate) network: Option<u32>,
+    pub(crate) is_network_due: bool,
+    last: Option<Last>,
+    /// Frames that a failing flush may have lost.
+    pub(crate) is_unflushed: bool,
+    index: u8,
+}
+
+impl Account {
+    pub(crate) fn new(config: &axlewire::ucp::HostConfig, now: Instant) -> Self {
+        Self {
+            motion: Motion::new(config.sends_first_stop, now),
+            low_ids_only: config.low_ids_only,
+            pings: config.ping_period.is_some(),
+            ping_at: now,
+            ping_until: None,
+            link: Link::Waiting,
+            link_until: Some(now + ms(500)),
+            update: Update::None,
+            request: None,
+            settled: None,
+            untold: Vec::new(),
+            imu: Results::new(),
+            mag: Results::new(),
+            biases: Ack::No,
+            network: None,
+            is_network_due: false,
+            last: None,
+            is_unflushed: false,
+            index: 0,
+        }
+    }
+
+    /// The robot has said something.
+    pub(crate) fn heard(&mut self, now: Instant) {
+        self.link_until = Some(now + ms(500));
+        if self.link != Link::Up {
+            self.link = Link::Up;
+            self.is_network_due = self.network.is_some();
+        }
+    }
+
+    pub(crate) fn pong(&mut self) {
+        self.ping_until = None;
+    }
+
+    pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind) {
+        (self.request, self.settled) = (Some(Request::new(step, kind)), None);
+        match kind {
+            _ if step == CalibrationStep::End => {}
+            CalibrationKind::Imu => self.imu.popped = None,
+            _ => self.mag.popped = None,
+        }
+    }
+
+    /// An acknowledgement: a good one has to name the kind asked for; a robot that refuses may
+    /// name another.
+    pub(crate) fn acknowledged(
+        &mut self,
+        step: CalibrationStep,
+        kind: CalibrationKind,
+        err: ErrorCode,
+    ) {
+        let Some(request) = self.request.as_mut().filter(|it| it.step == step && it.attempts > 0)
+        else {
+            return;
+        };
+        if err != ErrorCode::Fine {
+            self.retry();
+        } else if kind == request.kind {
+            self.settle(true);
+        }
+    }
+
+    fn retry(&mut self) {
+        match &mut self.request {
+            Some(request) if request.attempts < 3 => request.until = None,
+            _ => self.settle(false),
+        }
+    }
+
+    fn settle(&mut self, is_fine: bool) {
+        if let Some(Request { step, kind, .. }) = self.request.take() {
+            self.settled = Some(is_fine);
+            self.untold.push((step, kind, is_fine));
+        }
+    }
+
+    /// The driver looks at the clock.
+    pub(crate) fn expire(&mut self, now: Instant) {
+        let is_reached = |at: Option<Instant>| at.is_some_and(|at| at <= now);
+        if is_reached(self.link_until) {
+            (self.link, self.link_until) = (Link::Down, None);
+        }
+        if is_reached(self.ping_until) {
+            self.ping_until = None;
+        }
+        if is_reached(self.request.as_ref().and_then(|request| request.until)) {
+            self.retry();
+        }
+    }
+
+    /// A frame goes out.
+    pub(crate) fn frame(&mut self, bytes: &[u8], shelf: &Shelf, now: Instant) -> Checked {
+        let frame = Frame::parse(bytes).map_err(|error| format!("no frame: {error:?}"))?;
+        let message = frame.message();
+        if frame.index() != self.index || bytes.len() > 64 {
+            return Err(format!("index {}, {} bytes", frame.index(), bytes.len()));
+        }
+        self.index = self.index.wrapping_add(1);
+        self.is_unflushed = true;
+        if self.update == Update::Silent {
+            return Err(format!("{message:?} during a firmware update"));
+        }
+        if self.low_ids_only && frame.id() > 4 {
+            return Err(format!("{message:?} to a robot that hangs on it"));
+        }
+        if let Message::MotorControl(command) = message {
+            self.motion.frame(command, now)?;
+            if let Update::Asked { needs_stop, .. } = &mut self.update {
+                *needs_stop = false;
+            }
+            self.last = Some(Last::Motor);
+            return Ok(());
+        }
+        if self.motion.is_due(now) {
+            return Err(format!("{message:?} before a motor command that is due"));
+        }
+        self.motion.other_frame();
+        let (is_right, last) = match message {
+            Message::Ping(_) => {
+                let is_right = self.pings && self.ping_until.is_none() && self.ping_at <= now;
+                (self.ping_at, self.ping_until) = (now + ms(200), Some(now + ms(500)));
+                (is_right, Last::Ping)
+            }
+            Message::ImuBiasAck(ack) => {
+                let may = std::mem::replace(&mut self.imu.ack, Ack::No) != Ack::No;
+                (may && ack.err() == ErrorCode::Fine, Last::ImuAck)
+            }
+            Message::MagBiasAck(ack) => {
+                let may = std::mem::replace(&mut self.mag.ack, Ack::No) != Ack::No;
+                (may && ack.err() == ErrorCode::Fine, Last::MagAck)
+            }
+            Message::Biases(biases) => {
+                let may = std::mem::replace(&mut self.biases, Ack::No) != Ack::No;
+                let is_stored = (shelf.imu, shelf.mag) == (Some(biases.imu()), Some(biases.mag()));
+                (may && is_stored, Last::Biases)
+            }
+            Message::CalibrationStart(start) => {
+                (self.asks(CalibrationStep::Start, start.kind(), now), Last::Calibration)
+            }
+            Message::CalibrationEnd(end) => {
+                (self.asks(CalibrationStep::End, end.kind(), now), Last::Calibration)
+            }
+            Message::SetNetworkState(body) => {
+                let is_due = std::mem::take(&mut self.is_network_due);
+                (is_due && self.network == Some(body.state().into()), Last::Network)
+            }
+            Message::OtaRequest(request) => {
+                let version = request.version();
+                let is_right = self.update == Update::Asked { version, needs_stop: false }
+                    && (self.motion.is_stop_sent() || self.motion.wanted.is_none());
+                self.update = Update::Silent;
+                (is_right, Last::Update(version))
+            }
+            _ => (false, Last::Ping),
+        };
+        self.last = Some(last);
+        if is_right { Ok(()) } else { Err(format!("{message:?} is not to be sent")) }
+    }
+
+    fn asks(&mut self, step: CalibrationStep, kind: CalibrationKind, now: Instant) -> bool {
+        self.request.as_mut().is_some_and(|request| request.frame(step, kind, now))
+    }
+
+    /// The last frame comes back, or a flush has failed.
+    pub(crate) fn unsent(&mut self, unsent: Unsent, now: Instant) {
+        let last = self.last.take();
+        self.motion.unsent(unsent);
+        if let (Some(Last::Update(version)), Update::Silent) = (last, self.update) {
+            let has_command = self.motion.wanted.is_some();
+            if unsent != Unsent::Unflushed || has_command {
+                self.update = Update::Asked { version, needs_stop: has_command };
+            }
+        }
+        if let Update::Asked { needs_stop, .. } = &mut self.update {
+            *needs_stop = self.motion.wanted.is_some();
+        }
+        if unsent == Unsent::Unflushed {
+            self.is_network_due = self.network.is_some();
+            self.is_unflushed = false;
+            return;
+        }
+        self.index = self.index.wrapping_sub(u8::from(last.is_some()));
+        let again = |results: &Results| if results.is_kept { Ack::Must } else { Ack::No };
+        match last {
+            Some(Last::ImuAck) => self.imu.ack = again(&self.imu),
+            Some(Last::MagAck) => self.mag.ack = again(&self.mag),
+            Some(Last::Biases) => self.biases = Ack::Must,
+            Some(Last::Network) => self.is_network_due = true,
+            Some(Last::Calibration) => {
+                if let Some(request) = &mut self.request {
+                    (request.attempts, request.until) = (request.attempts.saturating_sub(1), None);
+                }
+            }
+            Some(Last::Ping) if self.ping_until.take().is_some() => self.ping_at = now,
+            _ => {}
+        }
+    }
+
+    /// The port is flushed: nothing comes back any more.
+    pub(crate) fn flushed(&mut self) {
+        self.is_unflushed = false;
+        self.motion.flushed();
+    }
+
+    /// When something has to happen at the latest.
+    pub(crate) fn owed(&self, now: Instant) -> Option<Instant> {
+        if self.update == Update::Silent {
+            return self.link_until;
+        }
+        let is_due = self.is_network_due
+            || self.update != Update::None
+            || [self.imu.ack, self.mag.ack, self.biases].contains(&Ack::Must);
+        let ping = self.pings.then(|| self.ping_until.unwrap_or(self.ping_at));
+        let request = self.request.as_ref().map(|request| request.until.unwrap_or(now));
+        let dead_man = self.motion.dead_man;
+        let times = [self.link_until, self.motion.due(now), dead_man, ping, request];
+        times.into_iter().flatten().chain(is_due.then_some(now)).min()
+    }
+}

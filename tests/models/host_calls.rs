@@ -1,0 +1,76 @@
+//! The calls of a host's application, and which of them are refused.
+
+use axlewire::ucp::{CalibrationStep, CommandError, NetworkState};
+
+use super::{
+    host::{Act, ROOM, Site, VERSION, command},
+    host_account::Update,
+    ucp::{Checked, queue},
+};
+
+impl Site {
+    /// A call and its answer.
+    pub(super) fn call(&mut self, act: Act) -> Checked {
+        let is_updating = self.account.update != Update::None;
+        let (now, room_is_over) = (self.now, queue(&self.host).len() > ROOM);
+        let is_calibrating = self.account.request.is_some() || room_is_over;
+        let (result, expected) = match act {
+            Act::Go(number) => {
+                let result = self.host.drive(command(number), now);
+                if result.is_ok() {
+                    self.account.motion.call(command(number), now);
+                }
+                (result, is_updating.then_some(CommandError::Updating))
+            }
+            Act::Calibrate(step, kind) => {
+                let result = match step {
+                    CalibrationStep::Start => self.host.start_calibration(kind, now),
+                    CalibrationStep::End => self.host.end_calibration(kind, now),
+                };
+                if result.is_ok() {
+                    self.account.calibrate(step, kind);
+                }
+                let calibrating = is_calibrating.then_some(CommandError::Calibrating);
+                (result, is_updating.then_some(CommandError::Updating).or(calibrating))
+            }
+            Act::Show(state) => {
+                let result = self.host.set_network_state(NetworkState::from(state), now);
+                if result.is_ok() && self.account.network.replace(state) != Some(state) {
+                    self.account.is_network_due = true;
+                }
+                let is_barred = self.account.low_ids_only;
+                (result, is_barred.then_some(CommandError::LowIdsOnly { id: 0x0A }))
+            }
+            _ => {
+                let result = self.host.start_firmware_update(VERSION, now);
+                let motion = &mut self.account.motion;
+                let expected = match () {
+                    () if self.account.low_ids_only => Some(CommandError::LowIdsOnly { id: 9 }),
+                    () if is_updating => Some(CommandError::Updating),
+                    () if is_calibrating => Some(CommandError::Calibrating),
+                    () if motion.wanted.is_some() && !motion.is_stop_sent() => {
+                        Some(CommandError::Moving)
+                    }
+                    () => None,
+                };
+                if result.is_ok() {
+                    let needs_stop = motion.wanted.is_some();
+                    motion.is_called |= needs_stop;
+                    self.account.update = Update::Asked { version: VERSION, needs_stop };
+                }
+                (result, expected)
+            }
+        };
+        match (result.err(), expected) {
+            (found, expected) if found == expected => Ok(()),
+            (found, expected) => Err(format!("refused: {found:?} instead of {expected:?}")),
+        }
+    }
+
+    /// The line belongs to the host again.
+    pub(super) fn end_update(&mut self) {
+        let was_silent = self.account.update == Update::Silent;
+        self.account.update = Update::None;
+        self.account.motion.is_called |= was_silent;
+    }
+}

@@ -1,0 +1,169 @@
+//! The account of a host's motor commands: what may be sent, and what has to be (U10, U16).
+
+use axlewire::{
+    endpoint::Unsent,
+    time::Instant,
+    ucp::{MotorControl, RawMotorControl},
+};
+
+use super::ucp::{Checked, halted, ms};
+
+/// The first frame of a host (ruling U16).
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Greeting {
+    Due,
+    /// The port has it.
+    Handed,
+    /// Flushed, and no motor command since.
+    Flushed,
+    /// In doubt once more although it was flushed: it may come again.
+    May,
+    Done,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    /// What the robot is to do: the latest call, halted 500 ms after it.
+    pub(crate) wanted: Option<MotorControl>,
+    pub(crate) dead_man: Option<Instant>,
+    /// What the last motor frame says, unless it is in doubt.
+    told: Option<MotorControl>,
+    /// There was a call since.
+    pub(crate) is_called: bool,
+    gap_until: Instant,
+    repeat_at: Instant,
+    /// Frames owed right behind one that was cut off.
+    copies: u8,
+    /// The last motor frame was one of them.
+    is_copy_out: bool,
+    /// The last frame of all was a motor frame.
+    is_motor_last: bool,
+    greeting: Greeting,
+    /// The frame that was handed out last is the first of all.
+    is_greeting_last: bool,
+}
+
+impl Motion {
+    pub(crate) fn new(sends_first_stop: bool, now: Instant) -> Self {
+        Self {
+            wanted: sends_first_stop.then_some(MotorControl::STOP),
+            dead_man: None,
+            told: None,
+            is_called: false,
+            gap_until: now,
+            repeat_at: now,
+            copies: 0,
+            is_copy_out: false,
+            is_motor_last: false,
+            greeting: if sends_first_stop { Greeting::Due } else { Greeting::Done },
+            is_greeting_last: false,
+        }
+    }
+
+    pub(crate) fn call(&mut self, command: MotorControl, now: Instant) {
+        (self.wanted, self.is_called) = (Some(command), true);
+        self.dead_man = (!command.stands_still()).then(|| now + ms(500));
+    }
+
+    pub(crate) fn stop(&mut self, now: Instant) {
+        self.call(self.wanted.map_or(MotorControl::STOP, halted), now);
+    }
+
+    /// The application has been silent for 500 ms; says whether that is new.
+    pub(crate) fn expire(&mut self, now: Instant) -> bool {
+        let is_silent = self.dead_man.is_some_and(|at| at <= now);
+        if is_silent {
+            (self.wanted, self.dead_man) = (self.wanted.map(halted), None);
+        }
+        is_silent
+    }
+
+    /// When the next motor frame has to go at the latest.
+    pub(crate) fn due(&self, now: Instant) -> Option<Instant> {
+        let wanted = self.wanted?;
+        let Some(told) = self.told else { return Some(now) };
+        Some(match () {
+            () if self.copies > 0 || self.greeting == Greeting::Due => now,
+            () if told == wanted => self.repeat_at,
+            () if wanted.stands_still() && !told.stands_still() => now,
+            () => self.gap_until,
+        })
+    }
+
+    pub(crate) fn is_due(&self, now: Instant) -> bool {
+        self.due(now).is_some_and(|at| at <= now)
+    }
+
+    /// Has the robot been told to stand still, and nothing else since?
+    pub(crate) fn is_stop_sent(&self) -> bool {
+        let stands_still =
+            |command: Option<MotorControl>| command.is_some_and(|it| it.stands_still());
+        stands_still(self.wanted) && stands_still(self.told) && self.copies == 0
+    }
+
+    /// A motor frame goes out.
+    pub(crate) fn frame(&mut self, sent: &RawMotorControl, now: Instant) -> Checked {
+        let Some(wanted) = self.wanted else {
+            return Err("a motor frame, and nobody has asked for one".into());
+        };
+        if self.dead_man.is_some_and(|at| at <= now) {
+            return Err("a motor frame 500 ms after the last call".into());
+        }
+        let is_zero = *sent == RawMotorControl::from(halted(wanted));
+        let has_to_be_zero = self.greeting == Greeting::Due;
+        // One zero command more than needed harms nobody.
+        let is_extra = matches!(self.greeting, Greeting::Handed | Greeting::May) && is_zero;
+        let is_wanted = *sent == RawMotorControl::from(wanted);
+        if has_to_be_zero && !is_zero || !has_to_be_zero && !is_wanted && !is_extra {
+            return Err(format!("sent {sent:?} instead of {wanted:?}, first: {has_to_be_zero}"));
+        }
+        if !(self.is_called || self.told != self.wanted || self.is_due(now)) {
+            return Err("a motor frame without a reason".into());
+        }
+        self.told = Some(if is_zero { halted(wanted) } else { wanted });
+        (self.is_copy_out, self.is_motor_last) = (self.copies > 0, true);
+        self.copies = self.copies.saturating_sub(1);
+        (self.gap_until, self.repeat_at) = (now + ms(20), now + ms(100));
+        self.is_greeting_last = false;
+        if self.copies == 0 {
+            if self.greeting == Greeting::Due {
+                (self.greeting, self.is_greeting_last) = (Greeting::Handed, true);
+            } else if self.greeting == Greeting::Flushed {
+                self.greeting = Greeting::Done;
+            }
+            // What has been waiting behind the first frame goes out right behind it.
+            self.is_called &= self.told != self.wanted;
+        }
+        Ok(())
+    }
+
+    /// Some other frame goes out.
+    pub(crate) const fn other_frame(&mut self) {
+        (self.is_greeting_last, self.is_motor_last) = (false, false);
+    }
+
+    pub(crate) fn flushed(&mut self) {
+        if matches!(self.greeting, Greeting::Handed | Greeting::May) {
+            self.greeting = Greeting::Flushed;
+        }
+    }
+
+    /// Whatever the robot was told before, it is told again, twice behind half a frame (U16).
+    pub(crate) fn unsent(&mut self, unsent: Unsent) {
+        self.told = None;
+        self.greeting = match (self.greeting, unsent) {
+            (Greeting::Handed, Unsent::Unflushed) => Greeting::Due,
+            (Greeting::Handed, _) if self.is_greeting_last => Greeting::Due,
+            (Greeting::Flushed, _) => Greeting::May,
+            (as_before, _) => as_before,
+        };
+        match unsent {
+            Unsent::CutOff => self.copies = 2,
+            // One that came back was none, and of those that were not flushed nobody knows.
+            Unsent::Untouched if self.is_copy_out && self.is_motor_last => self.copies += 1,
+            Unsent::Unflushed if self.is_copy_out => self.copies = 2,
+            Unsent::Untouched | Unsent::Unflushed => {}
+        }
+        self.is_copy_out = false;
+    }
+}

@@ -1,0 +1,62 @@
+//! What a host has asked a robot for, and what it has been given.
+
+use axlewire::{
+    time::{Instant, wire_time},
+    ucp::{BAUD, CalibrationKind, CalibrationStep, HostEvent},
+};
+
+use super::ucp::ms;
+
+/// A calibration request: sent three times at the most, 200 ms apart.
+#[derive(Clone, Debug)]
+pub(crate) struct Request {
+    pub(crate) step: CalibrationStep,
+    pub(crate) kind: CalibrationKind,
+    pub(crate) attempts: u8,
+    /// `None`: to be sent now.
+    pub(crate) until: Option<Instant>,
+}
+
+/// May a result be acknowledged (U15)?
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Ack {
+    No,
+    May,
+    Must,
+}
+
+/// The results of one kind.
+#[derive(Clone, Debug)]
+pub(crate) struct Results {
+    pub(crate) ack: Ack,
+    /// The latest one is in the store, or its event is told.
+    pub(crate) is_kept: bool,
+    /// The latest event that was taken out since the calibration began.
+    pub(crate) popped: Option<HostEvent>,
+}
+
+impl Request {
+    pub(crate) const fn new(step: CalibrationStep, kind: CalibrationKind) -> Self {
+        Self { step, kind, attempts: 0, until: None }
+    }
+
+    /// It goes out; says whether it may.
+    pub(crate) fn frame(
+        &mut self,
+        step: CalibrationStep,
+        kind: CalibrationKind,
+        now: Instant,
+    ) -> bool {
+        let is_this = (self.step, self.kind) == (step, kind);
+        let is_due = self.until.is_none() && self.attempts < 3;
+        self.attempts += 1;
+        self.until = Some(now + wire_time(9, BAUD) + ms(200));
+        is_this && is_due
+    }
+}
+
+impl Results {
+    pub(crate) const fn new() -> Self {
+        Self { ack: Ack::No, is_kept: false, popped: None }
+    }
+}

@@ -1,0 +1,96 @@
+//! Packets of both kinds of boards, read and written in the test's own way.
+
+use axlewire::{
+    ikeya::{Board, Mode, NodeId, OneMotor, Position, Rps, ThreeMotors},
+    stream::Encode,
+};
+
+/// What a kind of board needs to be put into a world. Three motors are always told the same.
+pub(crate) trait Kit: Board {
+    /// Where the rotation of the first motor begins in a packet.
+    const ROTATION_AT: usize;
+
+    fn speed(rps: f32) -> Self::Velocity;
+    fn place(position: Position) -> Self::Position;
+}
+
+impl Kit for OneMotor {
+    const ROTATION_AT: usize = 4;
+
+    fn speed(rps: f32) -> Rps {
+        Rps::new(rps).unwrap()
+    }
+
+    fn place(position: Position) -> Position {
+        position
+    }
+}
+
+impl Kit for ThreeMotors {
+    const ROTATION_AT: usize = 8;
+
+    fn speed(rps: f32) -> [Rps; 3] {
+        [Rps::new(rps).unwrap(); 3]
+    }
+
+    fn place(position: Position) -> [Position; 3] {
+        [position; 3]
+    }
+}
+
+/// A packet of the master.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sent {
+    pub(crate) node: NodeId,
+    /// What is written, in both readings; `None` for a READ.
+    pub(crate) write: Option<Write>,
+    pub(crate) len: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Write {
+    /// The bits of the `f32`.
+    pub(crate) speed: u32,
+    /// Count and rotation.
+    pub(crate) place: (i16, i16),
+}
+
+impl Sent {
+    pub(crate) fn read<B: Kit>(bytes: &[u8]) -> Self {
+        let i16_at = |at: usize| i16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let node = NodeId::ALL[usize::from(bytes[1]) - 1];
+        let write = (bytes[0] == 0xBB).then(|| Write {
+            speed: u32::from_le_bytes([bytes[2], bytes[3], bytes[4], bytes[5]]),
+            place: (i16_at(2), i16_at(B::ROTATION_AT)),
+        });
+        Self { node, write, len: bytes.len() }
+    }
+
+    pub(crate) fn is_exchange<B: Kit>(&self) -> bool {
+        self.write.is_none() || B::ANSWERS_WRITE
+    }
+}
+
+/// What a node answers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reply {
+    pub(crate) node: NodeId,
+    pub(crate) mode: Mode,
+    /// Count and rotation of a position node; a velocity node turns at 3 rps.
+    pub(crate) place: (i16, i16),
+}
+
+impl Reply {
+    pub(crate) fn bytes<B: Kit>(&self) -> Vec<u8> {
+        let mut buffer = [0; 16];
+        let place = B::place(Position::new(self.place.0, self.place.1));
+        match self.mode {
+            Mode::Velocity => {
+                B::velocity_response(self.node, B::speed(3.0)).encode(&mut buffer).unwrap().to_vec()
+            }
+            Mode::Position => {
+                B::position_response(self.node, place).encode(&mut buffer).unwrap().to_vec()
+            }
+        }
+    }
+}

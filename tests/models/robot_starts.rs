@@ -1,0 +1,133 @@
+//! The worlds of a robot, and the states in which they start.
+
+use axlewire::{
+    endpoint::Unsent,
+    ucp::{CalibrationKind, ErrorCode, OtaStatus, RobotConfig},
+};
+
+use super::{
+    robot::{Act, Hear, Rover},
+    run::{Depth, Run},
+    ucp::Fate,
+};
+
+const IMU: CalibrationKind = CalibrationKind::Imu;
+const MAG: CalibrationKind = CalibrationKind::Magnetometer;
+
+const DONE: Act = Act::Round(Fate::Flushed);
+const LOST: Act = Act::Round(Fate::NotFlushed);
+const BACK: Act = Act::Round(Fate::First(Unsent::Untouched));
+const CUT: Act = Act::Round(Fate::First(Unsent::CutOff));
+
+/// Motor commands of all sorts, damaged, old and in halves, and what must not count as one.
+const MOTION: &[Act] = &[
+    Act::Hear(Hear::Motor(1)),
+    Act::Hear(Hear::Motor(2)),
+    Act::Hear(Hear::Motor(3)),
+    Act::Hear(Hear::Motor(4)),
+    Act::HearOld(Hear::Motor(1)),
+    Act::Hear(Hear::MotorUpdate),
+    Act::Hear(Hear::DamagedMotor),
+    Act::Hear(Hear::Ping),
+    Act::Hear(Hear::Unknown),
+    Act::Hear(Hear::Echo),
+    Act::Hear(Hear::Front),
+    Act::Hear(Hear::Rest),
+    Act::Hear(Hear::LongFront),
+    Act::TakeCommand,
+    Act::TakeEvents,
+    DONE,
+    Act::Wait(1_000),
+    Act::Wait(300_000),
+    Act::Wait(500_000),
+    Act::ToDeadline(0),
+    Act::ToDeadline(1),
+    Act::Wait(10_000_000),
+    Act::Run(499),
+    Act::Run(600),
+];
+
+/// All that a host can ask for, and what becomes of the answers.
+const ANSWERS: &[Act] = &[
+    Act::Hear(Hear::Motor(2)),
+    Act::Hear(Hear::MotorUpdate),
+    Act::Hear(Hear::Ping),
+    Act::Hear(Hear::Start(IMU)),
+    Act::Hear(Hear::Start(MAG)),
+    Act::Hear(Hear::End(IMU)),
+    Act::Hear(Hear::End(MAG)),
+    Act::Hear(Hear::ImuAck(ErrorCode::Fine)),
+    Act::Hear(Hear::ImuAck(ErrorCode::Damaged)),
+    Act::Hear(Hear::MagAck),
+    Act::Hear(Hear::Biases),
+    Act::Hear(Hear::Update),
+    Act::Hear(Hear::Show(3)),
+    Act::Telemetry(50),
+    Act::Telemetry(49),
+    Act::Imu(1),
+    Act::Imu(2),
+    Act::Mag(1),
+    Act::Abort,
+    Act::AnswerUpdate(OtaStatus::Forbidden),
+    Act::TakeEvent,
+    DONE,
+    LOST,
+    BACK,
+    CUT,
+    Act::One,
+    Act::Fail(Unsent::Untouched),
+    Act::Fail(Unsent::CutOff),
+    Act::Fail(Unsent::Unflushed),
+    Act::Wait(45_000),
+    Act::ToDeadline(0),
+    Act::ToDeadline(1),
+    Act::Run(1_100),
+];
+
+fn rover(menu: &'static [Act]) -> Rover {
+    Rover::new(RobotConfig::default(), menu)
+}
+
+/// A robot that asks for nothing.
+fn quiet(menu: &'static [Act]) -> Rover {
+    let mut config = RobotConfig::default();
+    config.bias_request_period = None;
+    Rover::new(config, menu)
+}
+
+/// A queue with room for this many more events.
+fn full(room: usize) -> Rover {
+    let mut rover = rover(ANSWERS).undrained();
+    for number in 0..16 - room {
+        let kind = if number % 2 == 0 { IMU } else { MAG };
+        rover = rover.after(&[Act::Hear(Hear::Start(kind)), DONE]);
+    }
+    rover
+}
+
+pub(crate) fn motion(run: &mut Run) {
+    run.world("fresh", Depth(2, 5), quiet(MOTION));
+    let driving = [Act::Hear(Hear::Motor(1)), Act::TakeCommand, DONE];
+    run.world("driving", Depth(3, 5), quiet(MOTION).after(&driving));
+    let changes = [Act::Hear(Hear::Motor(1)), Act::Hear(Hear::Motor(2))].repeat(6);
+    let left = quiet(MOTION).undrained().after(&changes);
+    run.world("events are left", Depth(2, 5), left);
+}
+
+pub(crate) fn answers(run: &mut Run) {
+    run.world("fresh", Depth(2, 4), rover(ANSWERS));
+    let reporting = [Act::Telemetry(50), Act::Hear(Hear::Start(IMU)), DONE];
+    run.world("calibrating", Depth(2, 4), rover(ANSWERS).after(&reporting));
+    let results = [Act::Imu(1), Act::Mag(1), DONE];
+    run.world("results", Depth(2, 4), rover(ANSWERS).after(&reporting).after(&results));
+    let due = [Hear::Ping, Hear::Start(IMU), Hear::End(IMU), Hear::End(MAG)].map(Act::Hear);
+    run.world("answers are due", Depth(2, 4), rover(ANSWERS).after(&[DONE]).after(&due));
+    let asked = [Act::Hear(Hear::Update), DONE];
+    run.world("an update is asked for", Depth(2, 4), rover(ANSWERS).after(&asked));
+}
+
+pub(crate) fn queues(run: &mut Run) {
+    run.world("full", Depth(2, 4), full(0));
+    run.world("room for one", Depth(2, 4), full(1));
+    run.world("full, with results", Depth(2, 4), full(0).after(&[Act::Imu(1), Act::Mag(1), DONE]));
+}

@@ -1,0 +1,36 @@
+//! What must hold before a motor is connected: nothing moves that was not told to, and what was
+//! told to stop does stop.
+//!
+//! A test that is marked `Fails today` says what is right and expects the message of its own
+//! assertion. Once the crate does what is right, the mark and `should_panic` go.
+
+#![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
+#![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
+
+#[path = "motion/drivers.rs"]
+mod drivers;
+#[path = "motion/faulty.rs"]
+mod faulty;
+#[cfg(feature = "ucp")]
+#[path = "motion/frames.rs"]
+mod frames;
+#[path = "motion/framing.rs"]
+mod framing;
+#[cfg(feature = "ucp")]
+#[path = "motion/host.rs"]
+mod host;
+#[path = "motion/master.rs"]
+mod master;
+#[path = "support/port.rs"]
+#[allow(dead_code, reason = "io.rs uses more of it")]
+mod port;
+#[cfg(feature = "ucp")]
+#[path = "motion/robot.rs"]
+mod robot;
+#[path = "motion/slave.rs"]
+mod slave;
+#[path = "motion/three.rs"]
+mod three;
+#[path = "support/world.rs"]
+#[allow(dead_code, reason = "drivers.rs uses more of it")]
+mod world;

@@ -1,0 +1,78 @@
+//! The safety page promises nothing without a test: every test that it names exists.
+
+#![cfg(not(target_os = "none"))]
+
+use std::{
+    collections::HashSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+const PAGE: &str = include_str!("../src/safety.md");
+
+/// All functions below a folder that are marked as tests.
+fn tests_below(folder: &Path, found: &mut HashSet<String>) {
+    let entries: Vec<PathBuf> = match fs::read_dir(folder) {
+        Ok(entries) => entries.map(|entry| entry.unwrap().path()).collect(),
+        // A published crate comes without the tool and the firmware.
+        Err(_) => return,
+    };
+    for path in entries {
+        if path.is_dir() {
+            tests_below(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let source = fs::read_to_string(&path).unwrap();
+            let mut is_test = false;
+            for line in source.lines().map(str::trim) {
+                if line.starts_with("#[") {
+                    is_test |= line.starts_with("#[test]");
+                } else if let Some(rest) = line.strip_prefix("fn ") {
+                    // Inside `proptest!` the attribute is the same.
+                    if is_test {
+                        found.extend(rest.split('(').next().map(str::to_owned));
+                    }
+                    is_test = false;
+                } else if !line.starts_with("//") {
+                    is_test = false;
+                }
+            }
+        }
+    }
+}
+
+/// The rows of the tables, cell by cell.
+fn rows() -> impl Iterator<Item = Vec<&'static str>> {
+    let rows = PAGE.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| hazard"));
+    rows.map(|line| line.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>())
+        .filter(|cells| cells.len() == 5)
+}
+
+#[test]
+fn every_test_that_the_safety_page_names_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut tests = HashSet::new();
+    tests_below(&root.join("tests"), &mut tests);
+    tests_below(&root.join("src"), &mut tests);
+    assert!(tests.contains("every_test_that_the_safety_page_names_exists"), "the search is blind");
+    let mut named = 0;
+    for row in rows() {
+        for name in row[3].split("<br>").filter_map(|name| name.trim().strip_prefix('`')) {
+            let name = name.trim_end_matches('`');
+            assert!(tests.contains(name), "no test is called {name}");
+            named += 1;
+        }
+    }
+    assert!(named > 30, "only {named} tests are named");
+}
+
+#[test]
+fn every_hazard_has_a_test_and_says_what_remains() {
+    let mut count = 0;
+    for row in rows() {
+        let is_beyond_us = row[2].starts_with("nothing can be done");
+        assert!(is_beyond_us || row[3].contains('`'), "no test: {}", row[0]);
+        assert!(row.iter().all(|cell| !cell.is_empty()), "{row:?}");
+        count += 1;
+    }
+    assert!(count >= 25, "{count} hazards");
+}
