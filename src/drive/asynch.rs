@@ -26,9 +26,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     ///
     /// # Errors
     ///
-    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero),
-    /// the first of several. What is due has been sent and flushed all the same, as far as the port
-    /// could. A call that fails has yielded once, so that a loop that ignores errors does not starve
+    /// [`DriveError::Port`], [`Closed`](DriveError::Closed), [`WriteZero`](DriveError::WriteZero) or
+    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Directed`](super::Directed) port
+    /// that cannot be flushed behind a `write` that failed is `Stalled`. What is due has been sent and
+    /// flushed all the same, as far as the port could. A call that fails has yielded once, so that a loop that ignores errors does not starve
     /// the other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round_async().await;

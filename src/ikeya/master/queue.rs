@@ -101,6 +101,7 @@ pub(super) struct Sent<B: Board> {
     choice: Choice<B>,
     /// When its first byte could leave.
     start: Instant,
+    len: usize,
 }
 
 /// Whose turn it is.
@@ -255,7 +256,7 @@ impl<B: Board> Master<B> {
         }
         let len = self.encode(&choice)?;
         let start = self.line_free.map_or(now, |free| free.max(now));
-        self.sent = Some(Sent { choice, start });
+        self.sent = Some(Sent { choice, start, len });
         let request_end = start + wire_time(len, self.config.baud);
         self.line_free = Some(request_end + self.config.turnaround_gap);
         let is_exchange = choice.request.is_exchange();
@@ -330,16 +331,18 @@ impl<B: Board> Master<B> {
             self.nodes.iter_mut().for_each(Node::take_back_write);
             return;
         }
-        let Some(Sent { choice, start }) = self.sent.take() else { return };
+        let Some(Sent { choice, start, len }) = self.sent.take() else { return };
         let Choice { index, request, reason, .. } = choice;
         self.is_behind_write = false;
         if unsent == Unsent::Untouched {
             self.line_free = Some(start);
             self.echo.forget_last();
         } else {
-            // Twice the pause that ends a packet: a slave must not take the next one for the rest.
+            // What the port has taken may still be on its way. Behind it twice the pause that ends a
+            // packet: a slave must not take the next one for the rest.
+            let end = start.max(now) + self.wire_time(len);
             let silence = self.frame_pause().saturating_mul(2);
-            self.line_free = Some(now + self.config.turnaround_gap + silence);
+            self.line_free = Some(end + self.config.turnaround_gap + silence);
             self.echo.forget_all();
         }
         let count = match request {

@@ -45,6 +45,10 @@ impl Line {
         match (failures.next(), failures.next()) {
             // The pin that did not go off because of it is told instead.
             (Some(Failure::WriteZero), Some(Failure::Pin(number))) => Some(Failure::Pin(number)),
+            // Behind a write that failed the pin waits for a flush, and does not come back from it.
+            (Some(_), Some(Failure::Stalled)) if self.has_pin && self.has_write_failed_first => {
+                Some(Failure::Stalled)
+            }
             (first, _) => first,
         }
     }

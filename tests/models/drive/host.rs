@@ -28,7 +28,7 @@ use crate::fingerprint::{COUNTERS, Merge};
 /// 115,200 bit/s.
 const BYTE_US: u64 = 87;
 /// A robot of this crate waits some 5 ms for the rest of a frame.
-const SPEECH: Speech = Speech { shape, pause_us: 5_000, needs_silence: false };
+const SPEECH: Speech = Speech { shape, byte_us: BYTE_US, pause_us: 5_000, needs_silence: false };
 
 /// Longer than the period of motor commands in this world, 10 ms.
 pub(super) const IDLE: Duration = Duration::from_millis(15);
@@ -129,7 +129,7 @@ impl<P: Wired> Life for HostLife<P> {
     type Action = Action;
 
     fn begin(_: usize) -> Self {
-        let line = Line::new(BYTE_US, Wire::new(SPEECH), Box::new(Rover), P::HAS_PIN);
+        let line = Line::new(Wire::new(SPEECH), Box::new(Rover), P::HAS_PIN);
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = HostConfig::default();
         config.command_period = Duration::from_millis(10);

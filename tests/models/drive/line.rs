@@ -34,7 +34,6 @@ pub(crate) struct Line {
     /// back.
     ahead_us: u64,
     pub(crate) latest_us: u64,
-    byte_us: u64,
     pub(crate) wire: Wire,
     pub(crate) peer: Box<dyn Peer>,
     /// Bytes on their way to the driver, and when each is there.
@@ -61,6 +60,8 @@ pub(crate) struct Line {
     pub(crate) is_sending: bool,
     /// In the current call.
     pub(crate) failures: Vec<(u64, Failure)>,
+    /// The first of them was that of a write.
+    pub(crate) has_write_failed_first: bool,
     /// A flush has failed, or the port has stalled: what it has taken may be lost.
     pub(crate) is_given_up: bool,
     pub(crate) sleepers: Vec<(u64, u32, Waker)>,
@@ -82,7 +83,7 @@ impl Debug for Shared {
 }
 
 impl Line {
-    pub(crate) fn new(byte_us: u64, wire: Wire, peer: Box<dyn Peer>, has_pin: bool) -> Self {
+    pub(crate) fn new(wire: Wire, peer: Box<dyn Peer>, has_pin: bool) -> Self {
         // Not 0, so that a clock can go back.
         let start_us = 100_000_000_000;
         Self {
@@ -90,7 +91,6 @@ impl Line {
             back_us: 0,
             ahead_us: 0,
             latest_us: start_us,
-            byte_us,
             wire,
             peer,
             inbox: VecDeque::new(),
@@ -108,6 +108,7 @@ impl Line {
             pin_on_us: None,
             is_sending: false,
             failures: vec![],
+            has_write_failed_first: false,
             is_given_up: false,
             sleepers: vec![],
             sleepers_so_far: 0,
@@ -122,6 +123,7 @@ impl Line {
         (self.writes_in_call, self.first_write_us, self.is_touched) = (0, None, false);
         self.operations = 0;
         self.failures.clear();
+        self.has_write_failed_first = false;
         self.is_given_up = false;
         self.wire.begin();
     }
@@ -194,8 +196,9 @@ impl Line {
 
     /// Takes bytes onto the wire. The write began at `begun_us`.
     pub(crate) fn carry(&mut self, bytes: &[u8], begun_us: u64) {
-        self.free_us = self.free_us.max(self.now_us) + self.byte_us * bytes.len() as u64;
-        if let Err(invariant) = self.wire.carry(bytes, begun_us, self.now_us) {
+        let byte_us = self.wire.speech.byte_us;
+        self.free_us = self.free_us.max(self.now_us) + byte_us * bytes.len() as u64;
+        if let Err(invariant) = self.wire.carry(bytes, begun_us, self.now_us, self.free_us) {
             self.object(&invariant);
         }
         let is_lost = self.flushes.front() == Some(&Flushing::ErrorLost);
@@ -203,7 +206,7 @@ impl Line {
             let answer = (!is_lost).then(|| self.peer.hear(&frame, self.free_us)).flatten();
             if let Some((after_us, answer)) = answer {
                 let begin_us = self.free_us + after_us;
-                let bytes = (1..).zip(answer).map(|(i, byte)| (begin_us + i * self.byte_us, byte));
+                let bytes = (1..).zip(answer).map(|(i, byte)| (begin_us + i * byte_us, byte));
                 self.inbox.extend(bytes);
                 self.inbox.make_contiguous().sort_by_key(|&(at_us, _)| at_us);
             }

@@ -18,7 +18,7 @@ use super::{
     action::{Action, Call, Pass, Setup},
     fault::Failure,
     line::{Line, Shared},
-    node::{BYTE_US, Ear, Node, SPEECH, SharedNode},
+    node::{Ear, Node, SPEECH, SharedNode},
     port::{Wired, failure},
     replay::Life,
     task::{End, guarded, run},
@@ -161,7 +161,7 @@ impl<P: Wired> Life for MasterLife<P> {
         let node = Node { mode: setup.mode, answers: VecDeque::new(), is_gone: false, log: vec![] };
         let node = Rc::new(RefCell::new(node));
         let ear = Box::new(Ear(node.clone()));
-        let line = Line::new(BYTE_US, Wire::new(SPEECH), ear, P::HAS_PIN);
+        let line = Line::new(Wire::new(SPEECH), ear, P::HAS_PIN);
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = MasterConfig::direct();
         config.nodes = [N1].into_iter().collect();

@@ -12,7 +12,8 @@ use super::{
 /// 500 kbit/s.
 pub(crate) const BYTE_US: u64 = 20;
 
-pub(crate) const SPEECH: Speech = Speech { shape, pause_us: 5 * BYTE_US, needs_silence: true };
+pub(crate) const SPEECH: Speech =
+    Speech { shape, byte_us: BYTE_US, pause_us: 5 * BYTE_US, needs_silence: true };
 
 /// The payload of a stop: 0 rps, or the position at which the node is, count 7 and rotation 1.
 pub(crate) const fn stop_payload(mode: Mode) -> [u8; 4] {

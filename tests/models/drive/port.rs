@@ -169,6 +169,8 @@ impl Shared {
         begun_us: u64,
     ) -> Result<usize, Broken> {
         let mut line = self.line();
+        let is_failure = matches!(writing, Some(Writing::Error | Writing::Stall | Writing::Zero));
+        line.has_write_failed_first |= is_failure && line.failures.is_empty();
         let count = match writing {
             None => bytes.len(),
             Some(Writing::One | Writing::Slow) => 1,
@@ -272,12 +274,12 @@ impl embedded_io::Write for Shared {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
         let begun_us = self.line().now_us;
         let writing = self.begin_write(bytes);
-        let late_us = match writing {
-            Some(Writing::Slow) => self.line().wire.longer_than_a_pause_us(),
-            Some(Writing::Stall) => SECOND_US,
-            _ => 0,
+        let end_us = match writing {
+            Some(Writing::Slow) => self.line().wire.too_late_us(begun_us),
+            Some(Writing::Stall) => begun_us + SECOND_US,
+            _ => begun_us,
         };
-        self.line().pass_until(begun_us + late_us);
+        self.line().pass_until(end_us);
         self.end_write(bytes, writing, begun_us)
     }
 

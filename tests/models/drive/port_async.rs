@@ -99,8 +99,8 @@ impl embedded_io_async::Write for Shared {
         let sending = Sending::begin(self);
         match writing {
             Some(Writing::Slow) => {
-                let late_us = self.line().wire.longer_than_a_pause_us();
-                self.sleep_until(begun_us + late_us).await;
+                let late_us = self.line().wire.too_late_us(begun_us);
+                self.sleep_until(late_us).await;
             }
             Some(Writing::Stall) => self.sleep_until(u64::MAX).await,
             _ => {}

@@ -1,6 +1,6 @@
 //! An account of the bytes that a port has taken: whole frames, or cut ones and a silence.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, hash::Hash};
 
 /// What the beginning of a byte stream is.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -16,6 +16,7 @@ pub(crate) enum Shape {
 #[derive(Clone, Copy)]
 pub(crate) struct Speech {
     pub(crate) shape: fn(&[u8]) -> Shape,
+    pub(crate) byte_us: u64,
     pub(crate) pause_us: u64,
     /// A frame that was cut off is followed by a silence of more than `pause_us`.
     pub(crate) needs_silence: bool,
@@ -40,10 +41,15 @@ pub(crate) struct Taken {
 }
 
 pub(crate) struct Wire {
-    speech: Speech,
+    pub(crate) speech: Speech,
     /// A frame that has begun and not ended.
     pub(crate) open: Vec<u8>,
+    /// When the last byte is out.
     last_us: u64,
+    /// The same had each byte left when its write began. What a driver does not know lies between.
+    early_us: u64,
+    /// The frame may have paused for too long.
+    is_doubtful: bool,
     /// The rest of a frame came late: a silence follows.
     is_noisy: bool,
     /// The application has given up a frame: what comes next may be a new one.
@@ -62,6 +68,8 @@ impl Wire {
             speech,
             open: vec![],
             last_us: 0,
+            early_us: 0,
+            is_doubtful: false,
             is_noisy: false,
             is_given_up: false,
             unheard: VecDeque::new(),
@@ -80,6 +88,12 @@ impl Wire {
     /// A driver offers bytes to its port: a whole frame, or the rest of the one that has begun.
     pub(crate) fn offer(&mut self, bytes: &[u8], at_us: u64, role_us: u64) -> Result<(), String> {
         if (self.speech.shape)(bytes) == Shape::Whole {
+            if !self.open.is_empty() {
+                self.is_given_up |= self.is_doubtful || self.may_be_late(at_us);
+                if !self.is_given_up {
+                    return Err("a frame is offered inside another".into());
+                }
+            }
             self.offers.push(Offer { role_us, taken: self.taken.len(), frame: bytes.to_vec() });
             return Ok(());
         }
@@ -93,39 +107,56 @@ impl Wire {
         Ok(())
     }
 
-    /// Certainly: the time of the byte that follows on the line included.
-    pub(crate) fn longer_than_a_pause_us(&self) -> u64 {
-        self.speech.pause_us + 200
+    /// When a pause is certainly too long, the time of the byte that follows on the line included, for
+    /// a write that begins now.
+    pub(crate) fn too_late_us(&self, now_us: u64) -> u64 {
+        self.last_us.max(now_us) + self.speech.pause_us + 200
     }
 
     fn is_late(&self, at_us: u64) -> bool {
-        at_us - self.last_us > self.speech.pause_us
+        at_us.saturating_sub(self.last_us) > self.speech.pause_us
     }
 
-    pub(crate) fn carry(&mut self, bytes: &[u8], begun_us: u64, at_us: u64) -> Result<(), String> {
+    /// For all that a driver knows, which is when its writes began and came back.
+    fn may_be_late(&self, at_us: u64) -> bool {
+        at_us + self.speech.byte_us > self.early_us + self.speech.pause_us
+    }
+
+    /// The port has taken bytes at `at_us`, in a write that began at `begun_us`. They are out at `end_us`.
+    pub(crate) fn carry(
+        &mut self,
+        bytes: &[u8],
+        begun_us: u64,
+        at_us: u64,
+        end_us: u64,
+    ) -> Result<(), String> {
         if self.is_noisy {
             if self.speech.needs_silence && !self.is_late(at_us) {
                 return Err("no silence behind a frame that was cut off".into());
             }
             self.is_noisy = false;
         }
-        if !self.open.is_empty() && self.is_late(at_us) {
+        if !self.open.is_empty() && self.is_given_up && !self.speech.needs_silence {
+            self.open.clear();
+            self.cuts += 1;
+        } else if !self.open.is_empty() && self.is_late(at_us) {
             self.open.clear();
             self.cuts += 1;
             // The port came back late with a part of the rest, which nobody can know before.
             if !self.is_late(begun_us) {
-                (self.is_noisy, self.last_us) = (true, at_us);
+                (self.is_noisy, self.last_us) = (true, end_us);
                 return Ok(());
             }
-        } else if self.is_given_up && !self.open.is_empty() {
-            if self.speech.needs_silence {
-                return Err("no silence behind a frame that was given up".into());
-            }
-            self.open.clear();
-            self.cuts += 1;
+        } else if !self.open.is_empty() && self.is_given_up {
+            return Err("no silence behind a frame that was given up".into());
         }
         self.is_given_up = false;
-        self.last_us = at_us;
+        self.last_us = end_us;
+        if self.open.is_empty() {
+            (self.early_us, self.is_doubtful) = (begun_us, false);
+        }
+        self.is_doubtful |= !self.open.is_empty() && self.may_be_late(at_us);
+        self.early_us = self.early_us.max(begun_us) + self.speech.byte_us * bytes.len() as u64;
         for &byte in bytes {
             self.open.push(byte);
             match (self.speech.shape)(&self.open) {
@@ -160,8 +191,10 @@ impl Wire {
     }
 
     /// What matters for what comes next.
-    pub(crate) fn digest(&self, now_us: u64) -> (Vec<u8>, u64, bool, bool) {
-        let since_us = (now_us - self.last_us).min(self.speech.pause_us + 1);
-        (self.open.clone(), since_us, self.is_noisy, self.is_given_up)
+    pub(crate) fn digest(&self, now_us: u64) -> impl Hash {
+        let since =
+            |at_us: u64| (now_us as i64 - at_us as i64).min(self.speech.pause_us as i64 + 1);
+        let flags = (self.is_noisy, self.is_given_up, self.is_doubtful);
+        (self.open.clone(), since(self.last_us), since(self.early_us), flags)
     }
 }
