@@ -80,6 +80,15 @@ pub trait Endpoint {
     /// The next bytes to send, if any: one frame, handed out once, to be sent from `now` on.
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]>;
 
+    /// Has the frame that `poll_transmit` handed out last become wrong since? Its command has been
+    /// dropped or replaced, or others have spoken before its answer was out. Never, as provided.
+    ///
+    /// A driver asks when it could send only a part of a frame and is called again. It gives up the rest of
+    /// one that is outdated, with [`Unsent::CutOff`].
+    fn is_outdated(&self) -> bool {
+        false
+    }
+
     /// The frame that `poll_transmit` handed out last did not reach the line whole. Nothing of it
     /// will be sent any more.
     ///

@@ -9,11 +9,14 @@ use core::{
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
 
-use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS};
-use crate::{endpoint::Endpoint, time::Instant};
+use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS, outbox::FRAME_LEN};
+use crate::{
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+};
 
-/// Longest time in which a port may take no byte, or not be flushed, microseconds.
-const STALL_US: u32 = 1_000_000;
+/// Longest time in which a port may take no byte, or not be flushed.
+const STALL: Duration = Duration::from_millis(1000);
 
 /// Longest delay asked for at once, microseconds: what a delay is off by does not add up.
 const NAP_US: u32 = 1_000_000;
@@ -153,8 +156,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn send_async(&mut self) -> Result<(), DriveError<P::Error>> {
         while !self.outbox.rest().is_empty() {
             self.before_write();
+            let now = self.now();
+            let waited = self.outbox.write_wait.begin(now);
+            let patience_us = self.patience_us(waited);
             let writing = self.port.write(self.outbox.rest());
-            let Some(written) = first(writing, self.clock.delay_us(STALL_US)).await else {
+            let written = first(writing, self.clock.delay_us(patience_us)).await;
+            self.outbox.write_wait.end();
+            let Some(written) = written else {
                 self.reclaim();
                 return self.stalled_async().await;
             };
@@ -167,10 +175,23 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     }
 
     async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        match first(self.port.flush(), self.clock.delay_us(STALL_US)).await {
+        let now = self.now();
+        let waited = self.outbox.flush_wait.begin(now);
+        let patience_us = self.patience_us(waited);
+        let flushed = first(self.port.flush(), self.clock.delay_us(patience_us)).await;
+        self.outbox.flush_wait.end();
+        match flushed {
             Some(flushed) => self.after_flush(flushed),
             None => self.stalled_async().await,
         }
+    }
+
+    /// For how long to wait for the port, microseconds: what is left of the time since it was asked first,
+    /// in a call that was dropped. A port that is well, and was not asked for a while, has the time
+    /// that a frame takes in any case.
+    fn patience_us(&self, waited: Duration) -> u32 {
+        let frame_us = 2 * self.role.wire_time(FRAME_LEN).as_micros() + 1000;
+        STALL.as_micros().saturating_sub(waited.as_micros()).max(frame_us)
     }
 
     /// The port has stalled. A write of no bytes, which takes no time, lets a

@@ -372,9 +372,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// Is there something to send? The rest of a frame goes before the next one.
+    /// Is there something to send? The rest of a frame goes before the next one, unless it is outdated.
     fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
         let now = self.now();
+        if !self.outbox.rest().is_empty() && self.role.is_outdated() {
+            let given_up = self.outbox.give_up();
+            self.tell_unsent(given_up);
+        }
         if self.outbox.rest().is_empty() {
             let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
             self.outbox.load(frame)?;

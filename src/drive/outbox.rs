@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Longest frame of any role, bytes.
-const FRAME_LEN: usize = 64;
+pub(super) const FRAME_LEN: usize = 64;
 
 /// What is left of a frame.
 #[derive(Clone, Debug)]
@@ -20,6 +20,11 @@ pub(super) struct Outbox {
     /// The frame, if a byte of it has left.
     begun: Option<Begun>,
     flush: Flush,
+    /// Since when the port has been asked without success to take bytes, and to flush them.
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) write_wait: Wait,
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) flush_wait: Wait,
 }
 
 /// How a frame leaves that a port takes in parts.
@@ -38,6 +43,24 @@ struct Begun {
     is_doubtful: bool,
 }
 
+/// Since when a port has been asked for something, in calls that were dropped as well.
+#[cfg(feature = "embedded-io-async")]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wait(Option<Instant>);
+
+#[cfg(feature = "embedded-io-async")]
+impl Wait {
+    /// The port is asked, for the first time or again: says how long ago the first time was.
+    pub(super) fn begin(&mut self, now: Instant) -> Duration {
+        now - *self.0.get_or_insert(now)
+    }
+
+    /// The port has done it, or has failed.
+    pub(super) fn end(&mut self) {
+        self.0 = None;
+    }
+}
+
 /// What the port may still hold.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Flush {
@@ -52,7 +75,16 @@ enum Flush {
 impl Outbox {
     pub(super) const fn new() -> Self {
         let asked_at = Instant::from_micros(0);
-        Self { rest: Vec::new(), asked_at, begun: None, flush: Flush::Done }
+        Self {
+            rest: Vec::new(),
+            asked_at,
+            begun: None,
+            flush: Flush::Done,
+            #[cfg(feature = "embedded-io-async")]
+            write_wait: Wait(None),
+            #[cfg(feature = "embedded-io-async")]
+            flush_wait: Wait(None),
+        }
     }
 
     /// Bytes that the port has not taken yet.

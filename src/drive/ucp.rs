@@ -25,6 +25,13 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         self.role.drive(command.with_front_led(is_lit), now)
     }
 
+    /// When to say a command again that is to go on: long before the host takes its application for
+    /// dead.
+    fn renew_at(&mut self) -> Instant {
+        let half_us = self.role.config().command_timeout.as_micros() / 2;
+        self.now() + Duration::from_micros(half_us.max(1))
+    }
+
     fn begin_stop(&mut self) {
         let now = self.now();
         self.role.stop(now);

@@ -295,13 +295,14 @@ impl<B: Board> Master<B> {
         if node.stop.is_none() {
             let held = node.set_point.filter(|set_point| set_point.is_stop);
             let measured = node.status.filter(|&(_, at)| now - at < hold_age);
-            let hold = match (held, measured) {
-                _ if node.doubt.is_some() || !node.is_online() => None,
-                (Some(held), _) => held.target.position(),
-                (None, Some((Status::Position(position), _))) => Some(position),
-                _ => None,
-            };
-            node.stop = Some(Stop::new(hold));
+            node.stop = Some(match (held, measured) {
+                _ if node.doubt.is_some() || !node.is_online() => Stop::new(None, None),
+                (Some(held), _) => Stop::new(held.target.position(), None),
+                (None, Some((Status::Position(position), _))) => {
+                    Stop::new(Some(position), Some(now))
+                }
+                _ => Stop::new(None, None),
+            });
             if node.doubt == Some(DOUBT_EXCHANGES) {
                 self.tell_undecided(id);
             }
@@ -397,6 +398,11 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn wire_time(&self, bytes: usize) -> Duration {
         wire_time(bytes, self.config.baud)
+    }
+
+    /// A WRITE of a set-point that has been dropped or replaced.
+    fn is_outdated(&self) -> bool {
+        self.has_sent_old_set_point()
     }
 
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {

@@ -318,6 +318,11 @@ impl<B: Board> Endpoint for Slave<B> {
         }
     }
 
+    /// An answer behind which more has been heard (I14).
+    fn is_outdated(&self) -> bool {
+        self.sent.is_none()
+    }
+
     /// An answer of which no byte has left is still due, within its time. One that was cut off is
     /// not repeated: the master asks again.
     fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {

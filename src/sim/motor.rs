@@ -233,6 +233,10 @@ impl Endpoint for MotorNode {
         self.slave.poll_transmit(now)
     }
 
+    fn is_outdated(&self) -> bool {
+        self.slave.is_outdated()
+    }
+
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
         self.slave.handle_unsent(unsent, now);
     }

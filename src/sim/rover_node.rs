@@ -97,6 +97,10 @@ impl Endpoint for RoverNode {
         self.robot.poll_transmit(now)
     }
 
+    fn is_outdated(&self) -> bool {
+        self.robot.is_outdated()
+    }
+
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
         self.robot.handle_unsent(unsent, now);
     }

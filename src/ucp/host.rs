@@ -337,6 +337,11 @@ impl<S: BiasStore> Endpoint for Host<S> {
         wire_time(bytes, self.state.config.baud)
     }
 
+    /// A motor command that moves the robot, and is no longer the latest.
+    fn is_outdated(&self) -> bool {
+        self.state.has_sent_old_command()
+    }
+
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
         self.state.unsent(unsent, now);
     }

@@ -99,6 +99,47 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
 }
 
 #[test]
+fn a_position_stop_is_paid_in_a_loop_that_always_comes_too_late_for_its_write() {
+    for (loop_us, gap_us) in [(1000, 50), (25_000, 50), (25_000, 1000), (59_000, 5000)] {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
+        let mut bus = wire.master(|config| {
+            config.turnaround_gap = Duration::from_micros(gap_us);
+            config.reply_timeout = Duration::from_millis(100);
+            config.late_guard = Duration::from_millis(5);
+        });
+        bus.discover().unwrap();
+        bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
+        let now = bus.now();
+        bus.role_mut().stop(NodeId::N1, now);
+        let mut rounds = 0;
+        while !bus.role().stops_owed().is_empty() {
+            bus.service().unwrap();
+            wire.pass(loop_us);
+            rounds += 1;
+            assert!(rounds < 40, "not paid in a loop of {loop_us} us with a gap of {gap_us} us");
+        }
+    }
+}
+
+#[test]
+fn a_position_from_before_the_stop_is_held_only_if_it_can_be_written_soon() {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
+    let mut bus = wire.master(|config| config.hold_age = Duration::from_millis(100));
+    bus.discover().unwrap();
+    bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
+    run(&mut bus, 1000);
+    wire.write_only(0);
+    assert!(bus.stop(NodeId::N1).is_err());
+    run(&mut bus, 2000);
+    let before = wire.turns();
+    wire.write_all();
+    bus.stop(NodeId::N1).unwrap();
+    run(&mut bus, 10_000);
+    let way = wire.turns() - before;
+    assert!(way.abs() < 1.0, "the stop drives the motor {way} turns");
+}
+
+#[test]
 fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
     for is_async in [false, true] {
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);

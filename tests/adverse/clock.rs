@@ -1,5 +1,10 @@
 //! Clocks that are wrong once, and ports that never get ready.
 
+use std::{
+    pin::pin,
+    task::{Context, Poll, Waker},
+};
+
 use axlewire::{
     drive::DriveError,
     ikeya::{Mode, NodeId, Polling, Rps},
@@ -70,5 +75,35 @@ fn an_async_port_that_never_gets_ready_does_not_hold_up_a_stop_for_ever() {
         (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
         assert_eq!(wire.block_on(bus.stop_async(NodeId::N1)), Ok(()));
         assert_eq!(wire.rps(), 0.0);
+    }
+}
+
+#[test]
+fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
+    for flushes_hang in [false, true] {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+        let mut bus = wire.master(|_| ());
+        bus.discover().unwrap();
+        bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let begin_us = wire.world().now_us;
+        loop {
+            let mut call = pin!(bus.service_async());
+            let mut context = Context::from_waker(Waker::noop());
+            if call.as_mut().poll(&mut context).is_ready() {
+                // Nothing is due yet.
+                wire.pass(100);
+                continue;
+            }
+            wire.pass(100_100);
+            // As whoever yields is polled again at once.
+            let _ = call.as_mut().poll(&mut context);
+            if let Poll::Ready(result) = call.as_mut().poll(&mut context) {
+                assert_eq!(result, Err(DriveError::Stalled));
+                break;
+            }
+            let waits_us = wire.world().now_us - begin_us;
+            assert!(waits_us < 1_300_000, "not found, flushes hang: {flushes_hang}");
+        }
     }
 }

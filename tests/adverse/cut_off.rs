@@ -59,6 +59,25 @@ fn a_cut_off_set_point_is_not_completed_after_a_stop() {
 }
 
 #[test]
+fn a_cut_off_set_point_is_not_completed_by_the_call_that_stops() {
+    for is_async in [false, true] {
+        let (wire, mut bus) = cut_after(5);
+        wire.write_all();
+        match is_async {
+            true => wire.block_on(bus.stop_async(NodeId::N1)).unwrap(),
+            false => bus.stop(NodeId::N1).unwrap(),
+        }
+        assert_eq!(wire.turns(), 0.0, "it stood still when it was stopped, and has turned");
+        // One that still counts is completed.
+        let (wire, mut bus) = cut_after(5);
+        wire.write_all();
+        wire.pass(50);
+        bus.service().unwrap();
+        assert_eq!(wire.rps(), 10.0);
+    }
+}
+
+#[test]
 fn a_cut_off_set_point_is_not_completed_while_the_mode_is_in_doubt() {
     let (wire, mut bus) = cut_after(5);
     let now_us = wire.world().now_us;

@@ -30,6 +30,35 @@ fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
 }
 
 #[test]
+fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once() {
+    for is_async in [false, true] {
+        let wire = Wire::bus(vec![]);
+        let config = SlaveConfig::usb_adapter();
+        let mut slave =
+            wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+        wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+        wire.write_only(4);
+        assert!(slave.service().is_err());
+        wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
+        wire.write_all();
+        match is_async {
+            true => wire.block_on(slave.service_async()).unwrap(),
+            false => slave.service().unwrap(),
+        }
+        assert_eq!(wire.world().sent.len(), 4, "it speaks when it is node 2's turn");
+        // Nothing was heard: the rest may go.
+        let mut slave =
+            wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+        wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+        wire.write_only(4);
+        assert!(slave.service().is_err());
+        wire.write_all();
+        slave.service().unwrap();
+        assert_eq!(wire.world().sent.len(), 4 + 8);
+    }
+}
+
+#[test]
 fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
     let now = Instant::from_micros(0);
     let mut slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());

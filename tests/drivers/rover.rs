@@ -24,6 +24,10 @@ const BYTE_US: u64 = 87;
 
 /// A host and a robot that reports its battery. The robot acts whenever the world does.
 fn story() -> (World, Rover, Far) {
+    story_with(|_| ())
+}
+
+fn story_with(change: impl FnOnce(&mut HostConfig)) -> (World, Rover, Far) {
     let world = World::default();
     let (near, far) = End::pair(&world, BYTE_US);
     let mut robot = Robot::new(RobotConfig::default(), world.now());
@@ -37,7 +41,9 @@ fn story() -> (World, Rover, Far) {
             robot.service().unwrap();
         }
     });
-    let host = Host::new(HostConfig::default(), world.now());
+    let mut config = HostConfig::default();
+    change(&mut config);
+    let host = Host::new(config, world.now());
     let rover = Driver::new(host, near, VirtualClock(world.clone()));
     (world, rover, robot)
 }
@@ -411,5 +417,23 @@ fn calls_take_out_what_comes_all_the_time_and_what_they_return_and_nothing_else(
         };
         assert!(!kept.iter().any(is_out), "{kept:?}");
         assert_eq!(rover.role().lost_events(), 0);
+    }
+}
+
+#[test]
+fn driving_for_a_while_keeps_the_command_alive_whatever_the_dead_man_is() {
+    for timeout_ms in [2, 30, 100, 150] {
+        for is_async in [false, true] {
+            let (world, mut rover, _robot) = story_with(|config| {
+                config.command_timeout = Duration::from_millis(timeout_ms);
+            });
+            let span = Duration::from_millis(600);
+            if is_async {
+                world.block_on(rover.drive_for_async(40, 0, span)).unwrap();
+            } else {
+                rover.drive_for(40, 0, span).unwrap();
+            }
+            assert_eq!(rover.role().statistics().dead_man, 0, "{timeout_ms} ms");
+        }
     }
 }

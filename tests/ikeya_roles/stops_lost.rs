@@ -231,3 +231,25 @@ fn a_doubt_gives_a_lost_node_no_attempt_beyond_the_pace_of_the_search() {
     assert_eq!(desk.turn(), read(NodeId::N1));
     assert!(desk.now > attempted_at + MS(10), "at the pace of the search");
 }
+
+#[test]
+fn a_node_that_is_lost_again_under_the_same_stop_gets_an_attempt_at_once_again() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    for _ in 0..3 {
+        while desk.master.health(NodeId::N1) != Some(Health::Abnormal) {
+            desk.turn();
+            desk.silence();
+        }
+        let begin = desk.now;
+        assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
+        assert_eq!(desk.packet(), read(NodeId::N1));
+        assert!(desk.now - begin < US(1000), "at once, and not at the pace of the search");
+        desk.silence();
+        // It answers once, in the course of the search, which pays half of the stop.
+        desk.turn();
+        desk.hear(450, &velocity(NodeId::N1, 1.0));
+        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+        assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+    }
+}

@@ -418,3 +418,41 @@ fn behind_any_frame_that_was_cut_off_a_stop_reaches_a_simple_receiver() {
         }
     }
 }
+
+#[test]
+fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() {
+    let cut = || {
+        let mut host = begun();
+        host.drive(go(40), ms(30)).unwrap();
+        assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
+        host.handle_unsent(Unsent::CutOff, ms(31));
+        host.stop(ms(31));
+        assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0), "the first copy");
+        host
+    };
+    let copies = |host: &mut Host, at| {
+        assert!(!host.is_stop_sent());
+        sent(host, at).iter().filter(|frame| speed(frame) == Some(0)).count()
+    };
+    // The port refuses the second, and may have lost the first.
+    let mut host = cut();
+    assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
+    host.handle_unsent(Unsent::Untouched, ms(32));
+    host.handle_unsent(Unsent::Unflushed, ms(32));
+    assert_eq!(copies(&mut host, ms(33)), 2);
+    // It may have lost both, with what was sent behind them.
+    let mut host = cut();
+    assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
+    host.set_network_state(NetworkState::Connected, ms(32)).unwrap();
+    sent(&mut host, ms(32));
+    host.handle_unsent(Unsent::Unflushed, ms(33));
+    assert_eq!(copies(&mut host, ms(33)), 2);
+    // Both are out, and it has only lost what came later.
+    let mut host = cut();
+    sent(&mut host, ms(31));
+    sent(&mut host, ms(40));
+    host.stop(ms(50));
+    sent(&mut host, ms(50));
+    host.handle_unsent(Unsent::Unflushed, ms(50));
+    assert_eq!(copies(&mut host, ms(51)), 1);
+}

@@ -144,10 +144,13 @@ where
             driver.drop_routine();
             driver.command(speed, angular).err()
         };
-        match self.until_async(end, refused).await? {
-            Some(error) => Err(error.into()),
-            None => Ok(()),
+        while self.now() < end {
+            let next = self.renew_at().min(end);
+            if let Some(error) = self.until_async(next, refused).await? {
+                return Err(error.into());
+            }
         }
+        Ok(())
     }
 
     /// Goes on until the stop has left, through errors of the port.

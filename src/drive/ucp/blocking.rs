@@ -129,10 +129,13 @@ where
             driver.drop_routine();
             driver.command(speed, angular).err()
         };
-        match self.until(end, refused)? {
-            Some(error) => Err(error.into()),
-            None => Ok(()),
+        while self.now() < end {
+            let next = self.renew_at().min(end);
+            if let Some(error) = self.until(next, refused)? {
+                return Err(error.into());
+            }
         }
+        Ok(())
     }
 
     /// Goes on until the stop has left, through errors of the port.

@@ -1,6 +1,10 @@
 //! Health: strikes, and the search for abnormal nodes (I7).
 
-use super::{Cause, Health, Master, MasterEvent, set_point::Confirm, stop::Standstill};
+use super::{
+    Cause, Health, Master, MasterEvent,
+    set_point::Confirm,
+    stop::{Standstill, Stop},
+};
 use crate::{
     ikeya::{Board, NodeId},
     time::{Duration, Instant},
@@ -73,7 +77,7 @@ impl<B: Board> Master<B> {
         node.set_point = None;
         node.standstill = Standstill::Unwatched;
         if let Some(stop) = &mut node.stop {
-            stop.restart();
+            *stop = Stop::new(None, None);
         } else if stops && was_commanded {
             self.owe_stop(id);
         }

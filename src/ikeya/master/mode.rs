@@ -53,7 +53,7 @@ impl<B: Board> Node<B> {
         );
         if is_hold {
             self.standstill = Standstill::Unwatched;
-            self.stop.get_or_insert(Stop::new(None));
+            self.stop.get_or_insert(Stop::new(None, None));
             return self.drop_set_point();
         }
         if self.confirm == Confirm::AfterAnswer {

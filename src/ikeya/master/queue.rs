@@ -322,6 +322,18 @@ impl<B: Board> Master<B> {
         }
     }
 
+    /// Is the packet that was handed out last a WRITE of a set-point that the node no longer has?
+    pub(super) fn has_sent_old_set_point(&self) -> bool {
+        let Some(Sent { choice, .. }) = &self.sent else { return false };
+        match (choice.reason, choice.request) {
+            (Reason::SetPoint | Reason::Cycle, Request::Write(target)) => {
+                let node = &self.nodes[choice.index & 7];
+                node.set_point.is_none_or(|set_point| set_point.target != target)
+            }
+            _ => false,
+        }
+    }
+
     /// The packet that was handed out last has not left: what it was for is to be sent again, or
     /// what has come in its place.
     pub(super) fn take_back(&mut self, unsent: Unsent, now: Instant) {

@@ -8,8 +8,12 @@ use crate::{
 /// Stop WRITEs that have to be followed by a good answer before a stop is paid.
 const PAYMENTS: u8 = 2;
 
-/// Time in which a measured position has to be written, or it is measured anew.
+/// Time in which a measured position has to be written, or it is measured anew. It doubles with each
+/// position that is given up, so that a loop that comes late finds one to write all the same.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
+
+/// How often it doubles at the most: to 1.28 s.
+const DOUBLINGS: u8 = 6;
 
 /// Time between two positions that are compared: 8 counts in this time are 0.05 rps.
 const STANDSTILL_TIME: Duration = Duration::from_millis(20);
@@ -21,6 +25,8 @@ pub(super) struct Stop<B: Board> {
     pub(super) hold: Option<B::Position>,
     /// When that was measured.
     measured_at: Option<Instant>,
+    /// Positions that were given up in a row.
+    given_up: u8,
     /// A stop WRITE has been sent and waits for an answer.
     pub(super) is_written: bool,
     /// Stop WRITEs sent.
@@ -34,11 +40,13 @@ pub(super) struct Stop<B: Board> {
 }
 
 impl<B: Board> Stop<B> {
-    /// A new debt; `hold` is a position that may be held without measuring it again.
-    pub(super) const fn new(hold: Option<B::Position>) -> Self {
+    /// A new debt; `hold` is a position that may be held without measuring it again, for as long as
+    /// if it had been measured at `measured_at`.
+    pub(super) const fn new(hold: Option<B::Position>, measured_at: Option<Instant>) -> Self {
         Self {
             hold,
-            measured_at: None,
+            measured_at,
+            given_up: 0,
             is_written: false,
             writes: 0,
             is_asked: false,
@@ -51,7 +59,7 @@ impl<B: Board> Stop<B> {
     /// doubt.
     pub(super) fn restart(&mut self) {
         let Self { is_asked, lost_attempts, .. } = *self;
-        *self = Self { is_asked, lost_attempts, ..Self::new(None) };
+        *self = Self { is_asked, lost_attempts, ..Self::new(None, None) };
     }
 
     /// Keeps the position of an answer to hold, if it was asked for after the stop was.
@@ -61,16 +69,23 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Has a position been measured that has not been written yet?
+    /// Has a position been measured for this stop that has not been written yet?
     pub(super) const fn is_measured(&self) -> bool {
+        self.is_asked && self.awaits_write()
+    }
+
+    /// The same, or one that was measured before and may be held.
+    const fn awaits_write(&self) -> bool {
         self.measured_at.is_some() && self.writes == 0
     }
 
     /// Gives up a position that could not be written at once, but for the `gap` behind each packet.
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        let is_old = self.measured_at.is_some_and(|at| now - at > HOLD_PATIENCE + gap);
-        if is_old && self.is_measured() {
+        let patience = HOLD_PATIENCE.saturating_mul(1 << self.given_up) + gap;
+        let is_old = self.measured_at.is_some_and(|at| now - at > patience);
+        if is_old && self.awaits_write() {
             (self.hold, self.measured_at) = (None, None);
+            self.given_up = (self.given_up + 1).min(DOUBLINGS);
         }
     }
 

@@ -18,11 +18,51 @@ pub(super) struct Motor {
     /// When the application has been silent for too long; set while the robot moves.
     dead_man: Option<Instant>,
     first: First,
-    /// Frames to be sent one right behind the other: two where the first may be taken for the rest
-    /// of a frame that was cut off.
-    copies: u8,
-    /// The frame that was handed out last was one of them.
-    is_copy_out: bool,
+    copies: Copies,
+}
+
+/// Motor commands behind a frame that was cut off: two, one right behind the other, because the robot
+/// may take the first for the rest of that frame (ruling U16).
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Copies {
+    /// One frame is enough.
+    None,
+    /// So many are to be handed out.
+    Due(u8),
+    /// Both are handed out.
+    Out,
+    /// Both are handed out, and so was all the rest: the port is flushed now.
+    Flushing,
+}
+
+impl Copies {
+    const BOTH: Self = Self::Due(2);
+
+    const fn are_due(self) -> bool {
+        matches!(self, Self::Due(_))
+    }
+
+    /// A motor command is handed out.
+    const fn take(self) -> Self {
+        match self {
+            Self::None => Self::None,
+            Self::Due(2..) => Self::Due(1),
+            Self::Due(_) | Self::Out | Self::Flushing => Self::Out,
+        }
+    }
+
+    /// A frame did not reach the line. All that were handed out since the last flush may be lost with
+    /// it; one that the port has not touched was a motor command or was not.
+    const fn unsent(self, unsent: Unsent, was_motor: bool) -> Self {
+        match (unsent, self) {
+            (Unsent::CutOff, _) => Self::BOTH,
+            (_, Self::None) => Self::None,
+            (Unsent::Unflushed, _) => Self::BOTH,
+            (Unsent::Untouched, Self::Due(_)) if was_motor => Self::BOTH,
+            (Unsent::Untouched, _) if was_motor => Self::Due(1),
+            (Unsent::Untouched, _) => self,
+        }
+    }
 }
 
 /// The first frame of a host, which tells the robot to stand still (ruling U16).
@@ -47,7 +87,7 @@ impl Motor {
         } else {
             (None, None, First::Done)
         };
-        Self { latest, sent: None, due, dead_man: None, first, copies: 0, is_copy_out: false }
+        Self { latest, sent: None, due, dead_man: None, first, copies: Copies::None }
     }
 
     /// The latest command, halted by now if the application has gone silent.
@@ -60,7 +100,7 @@ impl Motor {
         let stands_still = |command: &MotorControl| command.stands_still();
         self.latest.as_ref().is_some_and(stands_still)
             && self.sent.is_some_and(|(sent, _)| stands_still(&sent))
-            && self.copies == 0
+            && !self.copies.are_due()
     }
 
     /// May an update begin? The robot has been told to stand still, or this host has told it
@@ -80,7 +120,7 @@ impl Motor {
         self.dead_man = (!still).then(|| now + config.command_timeout);
         let earliest = match self.sent {
             // The first frame comes first, and more copies of it if need be.
-            _ if self.first == First::Due || self.copies > 0 => now,
+            _ if self.first == First::Due || self.copies.are_due() => now,
             // What the robot has been told already can wait for its turn.
             Some((sent, _)) if sent == command && self.due.is_some() => return,
             Some((sent, at)) if !still || sent.stands_still() => now.max(at + config.command_gap),
@@ -104,13 +144,12 @@ impl Motor {
     pub(super) fn take(&mut self, now: Instant, config: &HostConfig) -> Option<MotorControl> {
         let latest = self.latest.filter(|_| reached(self.due, now))?;
         let command = if self.first == First::Due { latest.halted() } else { latest };
-        self.is_copy_out = self.copies > 0;
-        self.copies = self.copies.saturating_sub(1);
+        self.copies = self.copies.take();
         self.sent = Some((command, now));
         // What has been waiting behind the first frame goes out right behind it.
-        let goes_on = self.copies > 0 || command != latest;
+        let goes_on = self.copies.are_due() || command != latest;
         self.due = Some(if goes_on { now } else { now + config.command_period });
-        if self.copies == 0 {
+        if !self.copies.are_due() {
             self.first = match self.first {
                 First::Due => First::Out,
                 First::Out | First::Followed => First::Followed,
@@ -121,10 +160,20 @@ impl Motor {
         Some(command)
     }
 
+    /// Somebody asks for a frame: whoever had everything before has flushed it.
+    pub(super) fn begin_round(&mut self) {
+        if self.copies == Copies::Flushing {
+            self.copies = Copies::None;
+        }
+    }
+
     /// Everything that was due has been handed out.
     pub(super) fn end_round(&mut self) {
         if matches!(self.first, First::Out | First::Followed) {
             self.first = First::Flushing;
+        }
+        if self.copies == Copies::Out {
+            self.copies = Copies::Flushing;
         }
     }
 
@@ -140,15 +189,7 @@ impl Motor {
         if is_lost {
             self.first = First::Due;
         }
-        match unsent {
-            Unsent::CutOff => self.copies = 2,
-            // One that has not left does not count.
-            Unsent::Untouched if was_last && self.is_copy_out => self.copies += 1,
-            // Nor do both.
-            Unsent::Unflushed if self.is_copy_out => self.copies = 2,
-            Unsent::Untouched | Unsent::Unflushed => {}
-        }
-        self.is_copy_out = false;
+        self.copies = self.copies.unsent(unsent, was_last);
         // Paused, it stays silent.
         if self.due.is_some() {
             self.due = Some(now);

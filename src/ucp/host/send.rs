@@ -32,6 +32,7 @@ pub(super) enum Outgoing {
 impl<S: BiasStore> State<S> {
     /// Writes the most urgent frame that is due and says how long it is.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
+        self.motor.begin_round();
         let Some(outgoing) = self.next(now) else {
             self.motor.end_round();
             return None;
@@ -117,6 +118,17 @@ impl<S: BiasStore> State<S> {
             self.events.push_frequent(HostEvent::BiasesSent);
         }
         Some(Biases::new(imu, mag))
+    }
+
+    /// Was the frame that was handed out last a motor command that moves the robot, and has another
+    /// come since?
+    pub(super) fn has_sent_old_command(&self) -> bool {
+        match self.last {
+            Some(Outgoing::Motor(command)) => {
+                !command.stands_still() && self.motor.latest() != Some(command)
+            }
+            _ => false,
+        }
     }
 
     /// Takes back the frame that was handed out last: what it carried is decided anew.

@@ -28,7 +28,8 @@ use crate::fingerprint::{COUNTERS, Merge};
 /// 115,200 bit/s.
 const BYTE_US: u64 = 87;
 /// A robot of this crate waits some 5 ms for the rest of a frame.
-const SPEECH: Speech = Speech { shape, byte_us: BYTE_US, pause_us: 5_000, needs_silence: false };
+const SPEECH: Speech =
+    Speech { shape, moves, byte_us: BYTE_US, pause_us: 5_000, needs_silence: false };
 
 /// Longer than the period of motor commands in this world, 10 ms.
 pub(super) const IDLE: Duration = Duration::from_millis(15);
@@ -98,6 +99,11 @@ fn shape(bytes: &[u8]) -> Shape {
         have if have == len + 4 && crc(bytes) == 0 => Shape::Whole,
         _ => Shape::Bad,
     }
+}
+
+/// A motor command, and not a stop.
+fn moves(frame: &[u8]) -> bool {
+    frame[4] == 2 && frame[6..10] != [0; 4]
 }
 
 impl<P: Wired> HostLife<P> {
@@ -172,6 +178,9 @@ impl<P: Wired> Life for HostLife<P> {
                 self.line.line().begin();
                 if call == Call::Discard {
                     self.line.line().wire.is_given_up |= !self.driver.unsent().is_empty();
+                }
+                if call == Call::Stop {
+                    self.line.line().wire.stop();
                 }
                 let outcome = guarded(|| Ok(self.blocking(call)))?;
                 self.after(call, before, outcome)?;

@@ -120,6 +120,9 @@ impl<P: Wired> MasterLife<P> {
         }
         let before = self.before(call);
         self.line.line().begin();
+        if matches!(call, Call::Stop | Call::StopAll) {
+            self.line.line().wire.stop();
+        }
         if call == Call::KeepAlive {
             let now = self.driver.now();
             self.driver.role_mut().keep_alive(now);

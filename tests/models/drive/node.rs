@@ -13,7 +13,12 @@ use super::{
 pub(crate) const BYTE_US: u64 = 20;
 
 pub(crate) const SPEECH: Speech =
-    Speech { shape, byte_us: BYTE_US, pause_us: 5 * BYTE_US, needs_silence: true };
+    Speech { shape, moves, byte_us: BYTE_US, pause_us: 5 * BYTE_US, needs_silence: true };
+
+fn moves(frame: &[u8]) -> bool {
+    let stops = [Mode::Velocity, Mode::Position].map(stop_payload);
+    frame[0] == 0xBB && !stops.iter().any(|stop| frame[2..6] == *stop)
+}
 
 /// The payload of a stop: 0 rps, or the position at which the node is, count 7 and rotation 1.
 pub(crate) const fn stop_payload(mode: Mode) -> [u8; 4] {

@@ -16,6 +16,8 @@ pub(crate) enum Shape {
 #[derive(Clone, Copy)]
 pub(crate) struct Speech {
     pub(crate) shape: fn(&[u8]) -> Shape,
+    /// Is a whole frame a command that moves something?
+    pub(crate) moves: fn(&[u8]) -> bool,
     pub(crate) byte_us: u64,
     pub(crate) pause_us: u64,
     /// A frame that was cut off is followed by a silence of more than `pause_us`.
@@ -44,6 +46,10 @@ pub(crate) struct Wire {
     pub(crate) speech: Speech,
     /// A frame that has begun and not ended.
     pub(crate) open: Vec<u8>,
+    /// It is a command that moves something.
+    is_moving: bool,
+    /// A stop was asked for behind it.
+    is_outdated: bool,
     /// When the last byte is out.
     last_us: u64,
     /// The same had each byte left when its write began. What a driver does not know lies between.
@@ -67,6 +73,8 @@ impl Wire {
         Self {
             speech,
             open: vec![],
+            is_moving: false,
+            is_outdated: false,
             last_us: 0,
             early_us: 0,
             is_doubtful: false,
@@ -85,21 +93,31 @@ impl Wire {
         self.cuts = 0;
     }
 
+    /// A stop is asked for.
+    pub(crate) fn stop(&mut self) {
+        self.is_outdated = self.is_moving && !self.open.is_empty();
+    }
+
     /// A driver offers bytes to its port: a whole frame, or the rest of the one that has begun.
     pub(crate) fn offer(&mut self, bytes: &[u8], at_us: u64, role_us: u64) -> Result<(), String> {
         if (self.speech.shape)(bytes) == Shape::Whole {
             if !self.open.is_empty() {
-                self.is_given_up |= self.is_doubtful || self.may_be_late(at_us);
+                // A command may have been replaced.
+                self.is_given_up |= self.is_moving || self.is_doubtful || self.may_be_late(at_us);
                 if !self.is_given_up {
                     return Err("a frame is offered inside another".into());
                 }
             }
+            (self.is_moving, self.is_outdated) = ((self.speech.moves)(bytes), false);
             self.offers.push(Offer { role_us, taken: self.taken.len(), frame: bytes.to_vec() });
             return Ok(());
         }
         let whole = [&self.open[..], bytes].concat();
         if self.open.is_empty() || (self.speech.shape)(&whole) != Shape::Whole {
             return Err(format!("{bytes:02X?} is offered behind {:02X?}", self.open));
+        }
+        if self.is_outdated {
+            return Err("the rest of a command is offered behind a stop".into());
         }
         if self.is_late(at_us) {
             return Err("the rest of a frame is offered after too long a pause".into());
@@ -195,6 +213,7 @@ impl Wire {
         let since =
             |at_us: u64| (now_us as i64 - at_us as i64).min(self.speech.pause_us as i64 + 1);
         let flags = (self.is_noisy, self.is_given_up, self.is_doubtful);
-        (self.open.clone(), since(self.last_us), since(self.early_us), flags)
+        let command = (self.is_moving, self.is_outdated);
+        (self.open.clone(), since(self.last_us), since(self.early_us), flags, command)
     }
 }
