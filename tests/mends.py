@@ -33,7 +33,7 @@ MENDS = [
      "(Some(known), None) if known != mode => Decision::Doubtful,",
      "(Some(known), None) if known != mode => Decision::Agreed,", []),
     ("3", "a stop is forgotten when its node becomes abnormal", "src/ikeya/master/health.rs",
-     "        if let Some(stop) = &mut node.stop {\n            stop.restart();\n        } else if",
+     "        if let Some(stop) = &mut node.stop {\n            *stop = Stop::new(None, None);\n        } else if",
      "        if node.stop.take().is_some() {\n        } else if", []),
     ("3b", "a node that becomes abnormal under a set-point is owed nothing", "src/ikeya/master/health.rs",
      "} else if stops && was_commanded {", "} else if stops && was_commanded && false {", []),

@@ -75,8 +75,10 @@
 //! * *A frame of which no byte has left* goes back to its role, which decides anew what to send: an
 //!   old command is never sent late.
 //! * *A frame that was cut off* goes on with the next call, unless its last byte left so long ago that
-//!   the other end no longer waits for the rest ([`Endpoint::frame_pause`], at most 20 ms): then it is
-//!   given up and the role is told, which sends a stop twice (ruling U16).
+//!   the other end no longer waits for the rest ([`Endpoint::frame_pause`], at most 20 ms), or it has
+//!   become wrong since ([`Endpoint::is_outdated`]: a command that was replaced or stopped, an answer
+//!   that others have overtaken). Then it is given up and the role is told, which sends a stop twice
+//!   (ruling U16).
 //! * *A frame that the port took in parts* counts as sent only if it cannot have paused for that long
 //!   in between: each `write` came back before the bytes in front of its own could have been out for
 //!   so long, or the whole frame was flushed in hardly more than its time on the line

@@ -295,14 +295,13 @@ impl<B: Board> Master<B> {
         if node.stop.is_none() {
             let held = node.set_point.filter(|set_point| set_point.is_stop);
             let measured = node.status.filter(|&(_, at)| now - at < hold_age);
-            node.stop = Some(match (held, measured) {
-                _ if node.doubt.is_some() || !node.is_online() => Stop::new(None, None),
-                (Some(held), _) => Stop::new(held.target.position(), None),
-                (None, Some((Status::Position(position), _))) => {
-                    Stop::new(Some(position), Some(now))
-                }
-                _ => Stop::new(None, None),
-            });
+            let (hold, measured_at) = match (held, measured) {
+                _ if node.doubt.is_some() || !node.is_online() => (None, None),
+                (Some(held), _) => (held.target.position(), None),
+                (None, Some((Status::Position(position), _))) => (Some(position), Some(now)),
+                _ => (None, None),
+            };
+            node.stop = Some(Stop::new(hold, measured_at));
             if node.doubt == Some(DOUBT_EXCHANGES) {
                 self.tell_undecided(id);
             }

@@ -222,6 +222,7 @@ impl<B: Board> Node<B> {
     }
 
     /// A request that it is to answer has been sent.
+    #[inline(never)]
     pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
         self.statistics.requests = self.statistics.requests.wrapping_add(1);
         if self.attempt > 0 {

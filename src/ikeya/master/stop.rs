@@ -12,9 +12,6 @@ const PAYMENTS: u8 = 2;
 /// position that is given up, so that a loop that comes late finds one to write all the same.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
-/// How often it doubles at the most: to 1.28 s.
-const DOUBLINGS: u8 = 6;
-
 /// Time between two positions that are compared: 8 counts in this time are 0.05 rps.
 const STANDSTILL_TIME: Duration = Duration::from_millis(20);
 
@@ -25,8 +22,8 @@ pub(super) struct Stop<B: Board> {
     pub(super) hold: Option<B::Position>,
     /// When that was measured.
     measured_at: Option<Instant>,
-    /// Positions that were given up in a row.
-    given_up: u8,
+    /// Time in which it has to be written.
+    patience: Duration,
     /// A stop WRITE has been sent and waits for an answer.
     pub(super) is_written: bool,
     /// Stop WRITEs sent.
@@ -46,7 +43,7 @@ impl<B: Board> Stop<B> {
         Self {
             hold,
             measured_at,
-            given_up: 0,
+            patience: HOLD_PATIENCE,
             is_written: false,
             writes: 0,
             is_asked: false,
@@ -57,9 +54,10 @@ impl<B: Board> Stop<B> {
 
     /// What was measured or paid before no longer counts: the node was abnormal, or its mode in
     /// doubt.
+    #[inline(never)]
     pub(super) fn restart(&mut self) {
-        let Self { is_asked, lost_attempts, .. } = *self;
-        *self = Self { is_asked, lost_attempts, ..Self::new(None, None) };
+        (self.hold, self.measured_at) = (None, None);
+        (self.is_written, self.writes, self.paid) = (false, 0, 0);
     }
 
     /// Keeps the position of an answer to hold, if it was asked for after the stop was.
@@ -71,21 +69,17 @@ impl<B: Board> Stop<B> {
 
     /// Has a position been measured for this stop that has not been written yet?
     pub(super) const fn is_measured(&self) -> bool {
-        self.is_asked && self.awaits_write()
-    }
-
-    /// The same, or one that was measured before and may be held.
-    const fn awaits_write(&self) -> bool {
-        self.measured_at.is_some() && self.writes == 0
+        self.is_asked && self.measured_at.is_some() && self.writes == 0
     }
 
     /// Gives up a position that could not be written at once, but for the `gap` behind each packet.
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        let patience = HOLD_PATIENCE.saturating_mul(1 << self.given_up) + gap;
-        let is_old = self.measured_at.is_some_and(|at| now - at > patience);
-        if is_old && self.awaits_write() {
+        if self.writes > 0 {
+            return;
+        }
+        if self.measured_at.is_some_and(|at| now - at > self.patience + gap) {
             (self.hold, self.measured_at) = (None, None);
-            self.given_up = (self.given_up + 1).min(DOUBLINGS);
+            self.patience = self.patience + self.patience;
         }
     }
 
