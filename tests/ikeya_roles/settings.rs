@@ -279,6 +279,16 @@ fn the_roles_fit_into_small_memories() {
         sizes[0], sizes[1], sizes[2]
     );
     assert!(sizes[0] <= 2304 && sizes[1] <= 384 && sizes[2] <= 3072, "{sizes:?}");
+    if cfg!(target_arch = "x86_64") {
+        let readme = include_str!("../../README.md");
+        for size in [
+            format!("`Master` {} bytes", sizes[0]),
+            format!("`Slave` {}", sizes[1]),
+            format!("three-motor boards {}", sizes[2]),
+        ] {
+            assert!(readme.contains(&size), "the README does not say {size}");
+        }
+    }
 }
 
 #[test]

@@ -224,6 +224,13 @@ fn the_roles_fit_into_small_memories() {
     let (host_event, robot_event) = (size_of::<HostEvent>(), size_of::<RobotEvent>());
     println!("Host {host} bytes, Robot {robot} bytes");
     println!("HostEvent {host_event} bytes, RobotEvent {robot_event} bytes");
+    if cfg!(target_arch = "x86_64") {
+        let sizes = format!("`Host` {host},\n`Robot` {robot};");
+        assert!(
+            include_str!("../../README.md").contains(&sizes),
+            "the README does not say {sizes}"
+        );
+    }
     assert!(host <= 2048, "{host}");
     assert!(robot <= 1280, "{robot}");
     assert!(host_event <= 64, "{host_event}");
