@@ -4,7 +4,9 @@ use axlewire::{
     drive::{DriveError, Driver},
     endpoint::Endpoint,
     time::{Duration, Instant},
-    ucp::{Body, Host, HostConfig, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry},
+    ucp::{
+        Body, FrameOf, Host, HostConfig, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry,
+    },
 };
 
 use crate::{
@@ -53,6 +55,28 @@ fn robot_drives_on(wire: &Wire) -> Duration {
     }
     assert!(drove > Instant::from_micros(0), "it has driven at all");
     drove - Instant::from_micros(last)
+}
+
+#[test]
+fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
+    for is_async in [false, true] {
+        let (wire, mut host) = host();
+        wire.write_only(10);
+        assert!(host.drive(99, 0).is_err());
+        let cut = wire.world().sent.len();
+        wire.write_all();
+        match is_async {
+            true => wire.block_on(host.stop_async()).unwrap(),
+            false => host.stop().unwrap(),
+        }
+        let sent: Vec<u8> = wire.world().sent[cut..].iter().map(|&(_, byte)| byte).collect();
+        let stop = FrameOf::<MotorControl>::LEN;
+        assert_eq!(sent.len(), 2 * stop, "the rest of the command, or one stop alone");
+        for frame in sent.chunks(stop) {
+            assert_eq!(frame[..5], [0xFD, 0xFF, 20, 0, 2]);
+            assert_eq!(frame[6..10], [0; 4]);
+        }
+    }
 }
 
 #[test]

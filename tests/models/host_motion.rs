@@ -32,10 +32,8 @@ pub(crate) struct Motion {
     pub(crate) is_called: bool,
     gap_until: Instant,
     repeat_at: Instant,
-    /// Frames owed right behind one that was cut off.
-    copies: u8,
-    /// The last motor frame was one of them.
-    is_copy_out: bool,
+    /// How many of the two frames behind one that was cut off have gone out, until both are flushed.
+    behind_cut: Option<u8>,
     /// The last frame of all was a motor frame.
     is_motor_last: bool,
     greeting: Greeting,
@@ -52,8 +50,7 @@ impl Motion {
             is_called: false,
             gap_until: now,
             repeat_at: now,
-            copies: 0,
-            is_copy_out: false,
+            behind_cut: None,
             is_motor_last: false,
             greeting: if sends_first_stop { Greeting::Due } else { Greeting::Done },
             is_greeting_last: false,
@@ -83,7 +80,7 @@ impl Motion {
         let wanted = self.wanted?;
         let Some(told) = self.told else { return Some(now) };
         Some(match () {
-            () if self.copies > 0 || self.greeting == Greeting::Due => now,
+            () if self.owes_copies() || self.greeting == Greeting::Due => now,
             () if told == wanted => self.repeat_at,
             () if wanted.stands_still() && !told.stands_still() => now,
             () => self.gap_until,
@@ -98,7 +95,11 @@ impl Motion {
     pub(crate) fn is_stop_sent(&self) -> bool {
         let stands_still =
             |command: Option<MotorControl>| command.is_some_and(|it| it.stands_still());
-        stands_still(self.wanted) && stands_still(self.told) && self.copies == 0
+        stands_still(self.wanted) && stands_still(self.told) && !self.owes_copies()
+    }
+
+    fn owes_copies(&self) -> bool {
+        self.behind_cut.is_some_and(|out| out < 2)
     }
 
     /// A motor frame goes out.
@@ -121,11 +122,11 @@ impl Motion {
             return Err("a motor frame without a reason".into());
         }
         self.told = Some(if is_zero { halted(wanted) } else { wanted });
-        (self.is_copy_out, self.is_motor_last) = (self.copies > 0, true);
-        self.copies = self.copies.saturating_sub(1);
+        self.is_motor_last = true;
+        self.behind_cut = self.behind_cut.map(|out| (out + 1).min(2));
         (self.gap_until, self.repeat_at) = (now + ms(20), now + ms(100));
         self.is_greeting_last = false;
-        if self.copies == 0 {
+        if !self.owes_copies() {
             if self.greeting == Greeting::Due {
                 (self.greeting, self.is_greeting_last) = (Greeting::Handed, true);
             } else if self.greeting == Greeting::Flushed {
@@ -146,6 +147,7 @@ impl Motion {
         if matches!(self.greeting, Greeting::Handed | Greeting::May) {
             self.greeting = Greeting::Flushed;
         }
+        self.behind_cut = self.behind_cut.filter(|&out| out < 2);
     }
 
     /// Whatever the robot was told before, it is told again, twice behind half a frame (U16).
@@ -157,13 +159,13 @@ impl Motion {
             (Greeting::Flushed, _) => Greeting::May,
             (as_before, _) => as_before,
         };
-        match unsent {
-            Unsent::CutOff => self.copies = 2,
-            // One that came back was none, and of those that were not flushed nobody knows.
-            Unsent::Untouched if self.is_copy_out && self.is_motor_last => self.copies += 1,
-            Unsent::Unflushed if self.is_copy_out => self.copies = 2,
-            Unsent::Untouched | Unsent::Unflushed => {}
-        }
-        self.is_copy_out = false;
+        self.behind_cut = match (unsent, self.behind_cut) {
+            (Unsent::CutOff, _) => Some(0),
+            // Of those that were not flushed nobody knows.
+            (Unsent::Unflushed, Some(_)) => Some(0),
+            (Unsent::Untouched, Some(out)) if self.is_motor_last => Some(out.saturating_sub(1)),
+            (_, as_before) => as_before,
+        };
+        self.is_motor_last = false;
     }
 }

@@ -115,6 +115,7 @@ impl<P: Wired> MasterLife<P> {
         if let End::Done(outcome, polls) = end {
             self.check_port(call, &before, outcome, polls)?;
             self.check_outcome(call, &before, outcome, was_owed)?;
+            self.line.line().waits_since_us = None;
         }
         self.settle(call, &before, &end);
         Ok(())

@@ -58,6 +58,10 @@ pub(crate) struct Line {
     pub(crate) pin_on_us: Option<u64>,
     /// An async write or flush, or a delay of the pin, is under way.
     pub(crate) is_sending: bool,
+    /// Since when an operation has been asked for that no call has waited for, microseconds.
+    pub(crate) waits_since_us: Option<u64>,
+    /// In the current call such an operation may have stalled.
+    pub(crate) may_have_stalled: bool,
     /// In the current call.
     pub(crate) failures: Vec<(u64, Failure)>,
     /// The first of them was that of a write.
@@ -107,6 +111,8 @@ impl Line {
             has_pin,
             pin_on_us: None,
             is_sending: false,
+            waits_since_us: None,
+            may_have_stalled: false,
             failures: vec![],
             has_write_failed_first: false,
             is_given_up: false,
@@ -124,7 +130,7 @@ impl Line {
         self.operations = 0;
         self.failures.clear();
         self.has_write_failed_first = false;
-        self.is_given_up = false;
+        (self.is_given_up, self.may_have_stalled) = (false, false);
         self.wire.begin();
     }
 
@@ -249,6 +255,8 @@ impl Hash for Line {
         // Time that will pass unseen, because the clock has gone back.
         let reading_us = self.now_us - self.back_us + self.ahead_us;
         self.latest_us.saturating_sub(reading_us).hash(hasher);
+        let waits_us = self.waits_since_us.map(|at_us| (self.now_us - at_us).min(1_000_000));
+        waits_us.hash(hasher);
         for &(at_us, byte) in &self.inbox {
             (at_us.saturating_sub(self.now_us), byte).hash(hasher);
         }

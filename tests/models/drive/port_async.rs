@@ -11,16 +11,26 @@ use super::{
     port::{Broken, Pin, SECOND_US},
 };
 
-/// An operation under way; notes a stall of a second that a driver has given up.
+/// The time that a port has in any case, however long it was asked before, microseconds: twice that of
+/// 64 bytes of a master, and a millisecond.
+const LEAST_US: u64 = 2 * 64 * 20 + 1000;
+
+/// An operation under way; notes a stall of a second that a driver has given up. The second may have
+/// begun in a call that was dropped.
 struct Sending<'a> {
     line: &'a Shared,
     begun_us: u64,
+    is_over: bool,
 }
 
 impl<'a> Sending<'a> {
     fn begin(line: &'a Shared) -> Self {
         line.line().is_sending = true;
-        Self { line, begun_us: line.line().now_us }
+        Self { line, begun_us: line.line().now_us, is_over: false }
+    }
+
+    fn end(mut self) {
+        self.is_over = true;
     }
 }
 
@@ -32,6 +42,11 @@ impl Drop for Sending<'_> {
         if line.now_us + 100 >= self.begun_us + SECOND_US {
             line.is_given_up = true;
             line.failed(Failure::Stalled);
+        } else if !self.is_over {
+            let waits_since_us = *line.waits_since_us.get_or_insert(self.begun_us);
+            let is_long = line.now_us >= self.begun_us + LEAST_US;
+            line.may_have_stalled |= is_long && line.now_us + 100 >= waits_since_us + SECOND_US;
+            line.is_given_up |= line.may_have_stalled;
         }
     }
 }
@@ -105,7 +120,7 @@ impl embedded_io_async::Write for Shared {
             Some(Writing::Stall) => self.sleep_until(u64::MAX).await,
             _ => {}
         }
-        drop(sending);
+        sending.end();
         self.end_write(bytes, writing, begun_us)
     }
 
@@ -120,7 +135,7 @@ impl embedded_io_async::Write for Shared {
             Some(Flushing::Stall) => self.sleep_until(u64::MAX).await,
             Some(_) => {}
         }
-        drop(sending);
+        sending.end();
         self.end_flush(flushing)
     }
 }
