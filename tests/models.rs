@@ -42,24 +42,27 @@
 //!
 //! | Worlds, of both kinds of boards | Actions in a row | States in each |
 //! |---|---|---|
-//! | a fresh master of one node, in small steps | 7 | 59,000 to 69,000 |
-//! | a fresh master of two nodes, in small steps | 6 | 84,000 to 85,000 |
-//! | one known node, in small steps | 6 | 30,000 to 170,000 |
-//! | one node, an exchange at a time | 6 | 33,000 to 342,000 |
-//! | two nodes, an exchange at a time | 4 | 6,000 to 29,000 |
-//! | two nodes that are commanded and stopped all the time | 9 | 130,000 to 165,000 |
-//! | a slave | 4 | 19,000 to 26,000 |
+//! | a fresh master of one node, in small steps | 7 | 62,000 to 73,000 |
+//! | a fresh master of two nodes, in small steps | 6 | 85,000 to 87,000 |
+//! | one known node, in small steps | 6 | 32,000 to 178,000 |
+//! | two known nodes, in small steps | 4 | 25,000 to 27,000 |
+//! | one node, an exchange at a time | 6 | 36,000 to 353,000 |
+//! | one node whose mode stays in doubt | 4 | 2,900 to 5,600 |
+//! | one node, with other settings | 6 | 43,000 to 323,000 |
+//! | two nodes, an exchange at a time | 4 | 10,000 to 50,000 |
+//! | two nodes that are commanded and stopped all the time | 9 | 143,000 to 214,000 |
+//! | a slave | 4 | 18,000 to 26,000 |
 //!
 //! A plain run tries 2 or 3 actions in a row from each of some thirty states of a host and a robot,
 //! 85 to 2,000 states in each. The deep run:
 //!
 //! | Worlds of UCP | Actions in a row | States in each |
 //! |---|---|---|
-//! | a host and its motor commands | 6 | 73,000 to 125,000 |
-//! | a host and firmware updates | 5 | 19,000 to 58,000 |
-//! | a host and calibrations | 4 | 16,000 to 41,000 |
+//! | a host and its motor commands | 6 | 72,000 to 125,000 |
+//! | a host and firmware updates | 5 | 18,000 to 58,000 |
+//! | a host and calibrations | 4 | 15,000 to 41,000 |
 //! | a host with a full queue | 4, halves of frames 6 | 16,000 to 35,000 |
-//! | a robot and its motor commands | 5 | 160,000 to 178,000 |
+//! | a robot and its motor commands | 5 | 160,000 to 181,000 |
 //! | a robot and all other requests | 4 | 20,000 to 74,000 |
 //!
 //! Drivers, of one kind of boards; a plain run tries 1 or 2 actions. What is called, and what the
@@ -67,11 +70,11 @@
 //!
 //! | Worlds of drivers | Actions in a row | States in each |
 //! |---|---|---|
-//! | a blocking driver of a master, commanded | 4 | 131,000 |
-//! | the same in other states and settings | 3 | 4,700 to 10,700 |
-//! | an async driver of a master: commanded, cut off, in position mode | 3 | 56,000 to 79,000 |
-//! | the same in other states and settings | 2 | 960 to 2,700 |
-//! | a driver of a host | 3 | 7,000 to 8,500 |
+//! | a blocking driver of a master, commanded | 4 | 142,000 |
+//! | the same in other states and settings | 3 | 4,700 to 10,500 |
+//! | an async driver of a master: commanded, cut off, in position mode | 3 | 34,000 to 87,000 |
+//! | the same in other states and settings | 2 | 970 to 2,900 |
+//! | a driver of a host | 3 | 6,900 to 8,500 |
 #![cfg(all(any(feature = "ikeya", feature = "ucp"), feature = "std"))]
 
 #[cfg(feature = "ikeya")]
