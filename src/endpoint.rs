@@ -83,8 +83,8 @@ pub trait Endpoint {
     /// Has the frame that `poll_transmit` handed out last become wrong since? Its command has been
     /// dropped or replaced, or others have spoken before its answer was out. Never, as provided.
     ///
-    /// A driver asks when it could send only a part of a frame and is called again. It gives up the rest of
-    /// one that is outdated, with [`Unsent::CutOff`].
+    /// A driver asks when it could send only a part of a frame and is called again. It gives up the
+    /// rest of one that is outdated, with [`Unsent::CutOff`].
     fn is_outdated(&self) -> bool {
         false
     }

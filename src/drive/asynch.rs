@@ -30,10 +30,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// # Errors
     ///
     /// [`DriveError::Port`], [`Closed`](DriveError::Closed), [`WriteZero`](DriveError::WriteZero) or
-    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Directed`](super::Directed) port
-    /// that cannot be flushed behind a `write` that failed is `Stalled`. What is due has been sent and
-    /// flushed all the same, as far as the port could. A call that fails has yielded once, so that a loop that ignores errors does not starve
-    /// the other tasks.
+    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Directed`](super::Directed)
+    /// port that cannot be flushed behind a `write` that failed is `Stalled`. What is due has been
+    /// sent and flushed all the same, as far as the port could. A call that fails has yielded once,
+    /// so that a loop that ignores errors does not starve the other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round_async().await;
         if result.is_err() {
@@ -186,9 +186,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    /// For how long to wait for the port, microseconds: what is left of the time since it was asked first,
-    /// in a call that was dropped. A port that is well, and was not asked for a while, has the time
-    /// that a frame takes in any case.
+    /// For how long to wait for the port, microseconds: what is left of a second since it was asked
+    /// first, perhaps in a call that was dropped. A port that is well, and was not asked for a while,
+    /// has the time that a frame takes in any case.
     fn patience_us(&self, waited: Duration) -> u32 {
         let frame_us = 2 * self.role.wire_time(FRAME_LEN).as_micros() + 1000;
         STALL.as_micros().saturating_sub(waited.as_micros()).max(frame_us)

@@ -374,7 +374,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// Is there something to send? The rest of a frame goes before the next one, unless it is outdated.
+    /// Is there something to send? The rest of a frame goes before the next one, unless it is
+    /// outdated.
     fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
         let now = self.now();
         if !self.outbox.rest().is_empty() && self.role.is_outdated() {

@@ -47,9 +47,9 @@ pub struct MasterConfig {
     /// [`early`](super::NodeStatistics::early) and not taken. Set it as well for a clock coarser
     /// than 50 µs.
     pub accepts_early: bool,
-    /// Greatest age of a measured position that a stop may hold without reading a new one, when the stop
-    /// is asked for; zero by default: always read (I6). Where it cannot be written within 20 ms, a new
-    /// one is read all the same.
+    /// Greatest age that a measured position may have when a stop is asked for, so that the stop
+    /// holds it without reading a new one; zero by default: always read (I6). Where it cannot be
+    /// written within 20 ms, a new one is read all the same.
     pub hold_age: Duration,
     /// Dead-man: after this much time without an accepted set-point, a stop or
     /// [`keep_alive`](super::Master::keep_alive), every node under a set-point is owed a stop (I13).
