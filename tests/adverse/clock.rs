@@ -107,3 +107,22 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
         }
     }
 }
+
+#[test]
+fn a_port_that_was_not_asked_for_a_while_after_a_dropped_call_has_not_stalled() {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|_| ());
+    bus.discover().unwrap();
+    bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+    wire.pass(10_000);
+    wire.world().flushes_hang = true;
+    let mut context = Context::from_waker(Waker::noop());
+    assert!(pin!(bus.service_async()).poll(&mut context).is_pending());
+    wire.pass(10_000_000);
+    // It takes its time, and no more.
+    let mut call = pin!(bus.service_async());
+    assert!(call.as_mut().poll(&mut context).is_pending());
+    wire.pass(2000);
+    wire.world().flushes_hang = false;
+    assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+}

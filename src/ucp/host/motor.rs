@@ -51,15 +51,13 @@ impl Copies {
         }
     }
 
-    /// A frame did not reach the line. All that were handed out since the last flush may be lost with
-    /// it; one that the port has not touched was a motor command or was not.
-    const fn unsent(self, unsent: Unsent, was_motor: bool) -> Self {
+    /// A frame did not reach the line. With a flush that failed, all that were handed out since the last
+    /// one may be lost; a copy that the port has not touched is due again with the command.
+    const fn unsent(self, unsent: Unsent) -> Self {
         match (unsent, self) {
             (Unsent::CutOff, _) => Self::BOTH,
             (_, Self::None) => Self::None,
-            (Unsent::Unflushed, _) => Self::BOTH,
-            (Unsent::Untouched, Self::Due(_)) if was_motor => Self::BOTH,
-            (Unsent::Untouched, _) if was_motor => Self::Due(1),
+            (Unsent::Unflushed, _) | (Unsent::Untouched, Self::Due(_)) => Self::BOTH,
             (Unsent::Untouched, _) => self,
         }
     }
@@ -189,7 +187,7 @@ impl Motor {
         if is_lost {
             self.first = First::Due;
         }
-        self.copies = self.copies.unsent(unsent, was_last);
+        self.copies = self.copies.unsent(unsent);
         // Paused, it stays silent.
         if self.due.is_some() {
             self.due = Some(now);
