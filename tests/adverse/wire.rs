@@ -3,7 +3,7 @@
 use std::{
     cell::{RefCell, RefMut},
     collections::VecDeque,
-    future::{Future, pending, poll_fn},
+    future::{Future, poll_fn},
     pin::pin,
     rc::Rc,
     task::Poll,
@@ -389,18 +389,20 @@ impl embedded_io_async::Read for Wire {
     }
 }
 
+impl Wire {
+    async fn until(&self, is_ready: impl Fn(&World) -> bool) {
+        poll_fn(|_| if is_ready(&self.world()) { Poll::Ready(()) } else { Poll::Pending }).await;
+    }
+}
+
 impl embedded_io_async::Write for Wire {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Unplugged> {
-        if self.world().writes_hang {
-            pending::<()>().await;
-        }
+        self.until(|world| !world.writes_hang).await;
         self.world().take(bytes)
     }
 
     async fn flush(&mut self) -> Result<(), Unplugged> {
-        if self.world().flushes_hang {
-            pending::<()>().await;
-        }
+        self.until(|world| !world.flushes_hang).await;
         embedded_io::Write::flush(self)
     }
 }

@@ -240,3 +240,50 @@ fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
     }
     assert_eq!(asked, 24);
 }
+
+#[test]
+fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    let begin = desk.now;
+    assert_eq!(kind(&desk.packet()), (WRITE, 1));
+    assert_eq!(kind(&desk.packet()), (READ, 1));
+    assert_eq!(desk.now, begin, "a port may take both at once");
+    fail(&mut desk, Unsent::CutOff);
+    desk.packet();
+    assert_eq!(desk.now, begin + US(160 + 80 + 200));
+}
+
+#[test]
+fn a_write_of_a_set_point_is_outdated_once_that_is_dropped_or_replaced() {
+    let fresh = |config| {
+        let mut desk = Desk::with_nodes(config, &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        assert!(!desk.master.is_outdated());
+        desk
+    };
+    let repeated = || {
+        let mut desk = fresh(direct());
+        desk.packet();
+        desk.hear(450, &velocity(NodeId::N1, 1.0));
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0), "in the cycle");
+        assert!(!desk.master.is_outdated());
+        desk
+    };
+    for mut desk in [fresh(manual()), repeated()] {
+        let now = desk.now;
+        desk.master.set_velocity(NodeId::N1, rps(1.0), now).unwrap();
+        assert!(!desk.master.is_outdated(), "the same once more");
+        let mut other = desk.clone();
+        other.master.set_velocity(NodeId::N1, rps(2.0), now).unwrap();
+        assert!(other.master.is_outdated());
+        let mut other = desk.clone();
+        other.master.release(NodeId::N1);
+        assert!(other.master.is_outdated());
+        desk.master.stop(NodeId::N1, now);
+        assert!(desk.master.is_outdated());
+        desk.turn();
+        assert!(!desk.master.is_outdated(), "neither a stop nor a READ ever is");
+    }
+}
