@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Takes out the mend of each finding of the motion review, one at a time, and shows that it is found again.
+"""Takes out the mends of what a review of motion found, one at a time, and shows that each is found again.
 
     tests/mends.py            all of them, on a copy of the tree; prints which test finds which
     tests/mends.py 3 5        only these findings
@@ -22,7 +22,7 @@ COPY = ROOT / "target" / "mends"
 # With its build. A test that goes on for longer waits for what the defect keeps from happening.
 PATIENCE_S = 300
 
-# Finding, what happens without its mend, file, the mend, what is put in its place, other tests that look.
+# A number, what happens without its mend, file, the mend, what is put in its place, other tests that look.
 MENDS = [
     ("1", "a position node is stopped where it was long ago", "src/ikeya/master.rs",
      "node.status.filter(|&(_, at)| now - at < hold_age)", "node.status.filter(|_| hold_age >= Duration::ZERO)", []),
