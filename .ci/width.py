@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""Checks that no comment and no line of prose is wider than 100 columns.
+
+    .ci/width.py             print each line that is too wide; exit code 1 if there is one
+    .ci/width.py --counts    print the number of such lines per file
+
+Why: rustfmt leaves comments as wide as they are, and nothing else in the gate measures them.
+
+The files are those that git knows. In Rust, Python, shell scripts and TOML, the lines that are
+comments are measured; in Markdown, all lines but those of fenced code. Rows of tables and lines
+that are only a link cannot be broken and may be wider, in comments as well.
+"""
+
+import argparse
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+LIMIT = 100
+# Fewer files mean that the script did not read what it should.
+LEAST_FILES = 100
+HASH_SUFFIXES = (".sh", ".py", ".toml")
+ONLY_LINK = re.compile(r"\W*(\[[^\]]*\][(:]?\s*)?<?https?://\S+\W*$|\[[^\]]*\](: ?\S+|\(\S+\))\W*$")
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--counts", action="store_true")
+    args = parser.parse_args()
+    names = files()
+    wide = {name: wide_lines(name) for name in names}
+    for name, lines in wide.items():
+        if args.counts and lines:
+            print(f"{len(lines):4} {name}")
+        elif not args.counts:
+            for number, line in lines:
+                print(f"{name}:{number}: {len(line)} columns")
+    total = sum(map(len, wide.values()))
+    few = len(names) < LEAST_FILES
+    print(f"{len(names)} files, {total} lines wider than {LIMIT} columns" + ": too few files" * few)
+    return total > 0 or few
+
+
+def files():
+    """The files to look at."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    names = listed.stdout.decode().split("\0")[:-1]
+    return [name for name in names if reader(name) and (ROOT / name).is_file()]
+
+
+def reader(name):
+    """The function that picks the comments or the prose, by the name of the file."""
+    path = Path(name)
+    if path.suffix == ".rs":
+        return comments("//")
+    if path.suffix == ".md":
+        return prose
+    if path.suffix in HASH_SUFFIXES or (path.parent.name == ".ci" and not path.suffix):
+        return comments("#")
+    return None
+
+
+def wide_lines(name):
+    lines = (ROOT / name).read_text().splitlines()
+    return [(number, line) for number, line in reader(name)(lines)
+            if len(line) > LIMIT and can_be_broken(line)]
+
+
+def comments(mark):
+    return lambda lines: [(number, line) for number, line in enumerate(lines, 1)
+                          if line.lstrip().startswith(mark)]
+
+
+def prose(lines):
+    is_code = False
+    for number, line in enumerate(lines, 1):
+        if re.match(r"\s*(```|~~~)", line):
+            is_code = not is_code
+        elif not is_code:
+            yield number, line
+
+
+def can_be_broken(line):
+    text = line.lstrip(" /!#")
+    return not (text.startswith("|") or ONLY_LINK.match(text))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
