@@ -62,15 +62,15 @@ pub struct Protocol {
 /// Ikeya MD, both directions on one line.
 pub const IKEYA: Protocol = Protocol {
     name: "Ikeya",
-    frames: ours::frames::<Portable<ikeya::Either>>,
-    each: ours::each::<Portable<ikeya::Either>>,
-    each_simd: ours::each::<ikeya::Either>,
-    decoder: ours::decoder::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
-    pushed: ours::pushed::<Portable<ikeya::Either>, { ikeya::MAX_LEN }>,
+    frames: ours::frames::<Portable<ikeya::BothDirections>>,
+    each: ours::each::<Portable<ikeya::BothDirections>>,
+    each_simd: ours::each::<ikeya::BothDirections>,
+    decoder: ours::decoder::<Portable<ikeya::BothDirections>, { ikeya::MAX_LEN }>,
+    pushed: ours::pushed::<Portable<ikeya::BothDirections>, { ikeya::MAX_LEN }>,
     c_table: reference::ikeya_table,
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
-    frame_ends: ours::frame_ends::<Portable<ikeya::Either>>,
+    frame_ends: ours::frame_ends::<Portable<ikeya::BothDirections>>,
 };
 
 /// UCP with the default cap of 64-byte frames.

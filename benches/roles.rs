@@ -3,7 +3,11 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Master, MasterConfig, MasterEvent, Mode, NodeId, Rps, Slave, SlaveConfig},
+    ikeya::{
+        Master, Mode, NodeId, Rps, Slave,
+        master::{MasterConfig, MasterEvent},
+        slave::SlaveConfig,
+    },
     time::{Duration, Instant},
 };
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};

@@ -3,8 +3,11 @@
 use axlewire::{
     ikeya::{NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest},
     ucp::{
-        BiasRequest, Body, CalibrationKind, CalibrationStartAck, ErrorCode, FirmwareReport,
-        ImuBias, MagBias, Pong, Telemetry,
+        Body, Telemetry,
+        message::{
+            BiasRequest, CalibrationKind, CalibrationStartAck, ErrorCode, FirmwareReport, ImuBias,
+            MagBias, Pong,
+        },
     },
 };
 

@@ -83,6 +83,11 @@ pub enum EncodeError {
         /// Largest value that can be sent.
         max: i16,
     },
+    /// A network state above 255, which one byte cannot carry (ruling U8).
+    NetworkState {
+        /// What was given.
+        value: u32,
+    },
     /// The caller's buffer cannot hold the frame.
     BufferTooSmall {
         /// Bytes that the frame needs.
@@ -128,6 +133,9 @@ impl fmt::Display for EncodeError {
                 write!(f, "position of {counts} counts is outside {min}..={max}")
             }
             Self::Percent { value, min, max } => write!(f, "{value} is outside {min}..={max}"),
+            Self::NetworkState { value } => {
+                write!(f, "network state {value} does not fit into one byte")
+            }
             Self::BufferTooSmall { needed, available } => {
                 write!(f, "frame needs {needed} bytes, buffer has {available}")
             }

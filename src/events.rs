@@ -1,6 +1,8 @@
-//! The queue in which a role keeps its events for the application.
+//! Where a role keeps its events for the application: a queue, or a place for the latest.
 
 use heapless::Deque;
+
+use crate::stats::count;
 
 /// A queue of at most `N` events, in their order.
 ///
@@ -25,14 +27,14 @@ impl<E, const N: usize> Events<E, N> {
     /// Queues a rare event that nobody can keep or repeat.
     pub(crate) fn push(&mut self, event: E) {
         if self.keep(event).is_err() {
-            self.lost = self.lost.saturating_add(1);
+            count(&mut self.lost);
         }
     }
 
     /// Queues an event that comes all the time, or again by itself.
     pub(crate) fn push_frequent(&mut self, event: E) {
         if self.is_reserved() {
-            self.lost = self.lost.saturating_add(1);
+            count(&mut self.lost);
         } else {
             self.push(event);
         }
@@ -48,7 +50,7 @@ impl<E, const N: usize> Events<E, N> {
         match newest {
             Some(newest) if is_reserved => {
                 *newest = event;
-                self.lost = self.lost.saturating_add(1);
+                count(&mut self.lost);
             }
             _ => self.push(event),
         }
@@ -86,6 +88,44 @@ impl<E, const N: usize> Events<E, N> {
     /// Is the rest of the room for rare events only?
     fn is_reserved(&self) -> bool {
         self.queue.len() >= N / 2
+    }
+}
+
+/// A place for one event, of which only the latest matters. It takes the place of one that nobody
+/// has taken out, which is counted as lost.
+///
+/// A queue of one would do the same in 150 more bytes of flash.
+#[cfg(feature = "ikeya")]
+#[derive(Clone, Debug)]
+pub(crate) struct Latest<E> {
+    event: Option<E>,
+    lost: u32,
+}
+
+#[cfg(feature = "ikeya")]
+impl<E> Latest<E> {
+    pub(crate) const fn new() -> Self {
+        Self { event: None, lost: 0 }
+    }
+
+    pub(crate) fn put(&mut self, event: E) {
+        if self.event.replace(event).is_some() {
+            count(&mut self.lost);
+        }
+    }
+
+    /// The event, left in its place.
+    pub(crate) const fn peek(&self) -> Option<&E> {
+        self.event.as_ref()
+    }
+
+    pub(crate) fn take(&mut self) -> Option<E> {
+        self.event.take()
+    }
+
+    /// Number of events that were replaced; stops at 2^32 - 1.
+    pub(crate) const fn lost(&self) -> u32 {
+        self.lost
     }
 }
 

@@ -55,7 +55,7 @@
 //!
 //! ```
 //! # #[cfg(feature = "ucp")] {
-//! use axlewire::{stream::Event, ucp::{self, Body, FirmwareReport, Message, MotorControl, Telemetry}};
+//! use axlewire::{stream::Event, ucp::{self, message::FirmwareReport, Body, Message, MotorControl, Telemetry}};
 //!
 //! // Host to robot: half speed ahead, a little to the right.
 //! let drive = MotorControl::turn_right(50, 10)?.frame(0);
@@ -86,7 +86,7 @@
 //! | `ucp` | yes | the rover link |
 //! | `embedded-io` | yes | [`drive::Driver`], [`io::FrameReader`] and [`io::FrameWriter`], blocking |
 //! | `embedded-io-async` | | the same calls, async |
-//! | `embedded-hal` | | [`drive::Directed`]: the driver-enable pin of an RS485 port |
+//! | `embedded-hal` | | [`drive::Rs485`]: the driver-enable pin of an RS485 port |
 //! | `alloc` | | [`stream::decode_capture`](stream): a whole capture at once |
 //! | `std` | | `alloc`, `std::io` errors in the port traits, [`drive::StdClock`](drive) |
 //! | `arbitrary` | | value types made from fuzz input; brings `std` |
@@ -117,14 +117,18 @@ extern crate std;
 pub mod crc16;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod drive;
+pub mod encode;
 pub mod endpoint;
 pub mod error;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod events;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod inbox;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
+mod machine;
 // A page, not code. Its examples use the features named here.
 #[cfg(all(
     any(doc, doctest),
@@ -141,8 +145,8 @@ pub mod porting {}
 pub mod safety {}
 #[cfg(feature = "sim")]
 pub mod sim;
-#[cfg(feature = "simd")]
-mod simd;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+pub mod stats;
 pub mod stream;
 pub mod time;
 #[cfg(feature = "ucp")]

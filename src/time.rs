@@ -184,6 +184,12 @@ pub(crate) fn earliest(deadlines: &[Option<Instant>]) -> Option<Instant> {
     deadlines.iter().flatten().copied().reduce(Instant::min)
 }
 
+/// Has this deadline been reached?
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+pub(crate) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
+    deadline.is_some_and(|at| at <= now)
+}
+
 /// How long `bytes` bytes take on a line: 10 bit times each, rounded up (ruling B6).
 ///
 /// A `baud` of 0 is a line that never gets done: the longest span there is.

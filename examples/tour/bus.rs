@@ -4,8 +4,9 @@ use std::error::Error;
 
 use axlewire::{
     ikeya::{
-        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Rps, Schedule, Slave,
-        SlaveConfig, Status,
+        Master, Mode, NodeId, Position, Rps, Slave, Status,
+        master::{Health, MasterConfig, MasterEvent, Schedule},
+        slave::SlaveConfig,
     },
     sim::{Direction, Faults, Line, Motor, MotorNode, Who},
     time::{Duration, Instant},
@@ -29,7 +30,7 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
         let slave = Slave::new(node, mode, config);
         let tail = bus.add(MotorNode::from_parts(slave, Motor::new()));
         // Firmware takes its time: so long after the request the answer begins.
-        bus.driver_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
+        bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
     }
     *bus.pair_mut(Direction::ToTails) = Faults::noise(BIT_ERRORS);
     *bus.pair_mut(Direction::ToHead) = Faults::noise(BIT_ERRORS);

@@ -13,7 +13,7 @@ type Line = (usize, &'static str, String);
 
 pub(crate) fn decode_captures() {
     title("Ikeya MD: a capture of an RS485 line with noise");
-    decode::<ikeya::Either>(include_bytes!("../captures/ikeya.bin"), ikeya_line);
+    decode::<ikeya::BothDirections>(include_bytes!("../captures/ikeya.bin"), ikeya_line);
 
     title("UCP: a capture of a rover's UART with noise");
     decode::<Ucp>(include_bytes!("../captures/ucp.bin"), ucp_line);
@@ -203,38 +203,48 @@ fn build_ucp() -> Result<(), EncodeError> {
     use ucp::{CalibrationKind::Imu, ErrorCode::Fine, NetworkState::Connected, OtaStatus};
 
     let telemetry = Telemetry { battery_pct: 87, voltage_dv: 119, ..Telemetry::default() };
-    let (imu, mag) = (ucp::ImuBias::new([1, 2, 3], [4, 5, 6]), ucp::MagBias::new([7, 8, 9]));
-    show("ping", ucp::Ping {}.frame(0).as_bytes());
-    show("pong", ucp::Pong::new(Fine).frame(0).as_bytes());
+    let (imu, mag) =
+        (ucp::message::ImuBias::new([1, 2, 3], [4, 5, 6]), ucp::message::MagBias::new([7, 8, 9]));
+    show("ping", ucp::message::Ping {}.frame(0).as_bytes());
+    show("pong", ucp::message::Pong::new(Fine).frame(0).as_bytes());
     show(
         "motor control",
         MotorControl::turn_right(60, 20)?.with_front_led(true).frame(1).as_bytes(),
     );
-    show("calibration start", ucp::CalibrationStart::new(Imu).frame(2).as_bytes());
-    show("calibration start ack", ucp::CalibrationStartAck::new(Imu, Fine).frame(0).as_bytes());
-    show("calibration end", ucp::CalibrationEnd::new(Imu).frame(3).as_bytes());
-    show("calibration end ack", ucp::CalibrationEndAck::new(Imu, Fine).frame(0).as_bytes());
-    show("report (firmware)", ucp::FirmwareReport::new(&telemetry, 38).frame(0).as_bytes());
-    show("report (document)", ucp::DocumentReport::new(&telemetry).frame(0).as_bytes());
+    show("calibration start", ucp::message::CalibrationStart::new(Imu).frame(2).as_bytes());
+    show(
+        "calibration start ack",
+        ucp::message::CalibrationStartAck::new(Imu, Fine).frame(0).as_bytes(),
+    );
+    show("calibration end", ucp::message::CalibrationEnd::new(Imu).frame(3).as_bytes());
+    show(
+        "calibration end ack",
+        ucp::message::CalibrationEndAck::new(Imu, Fine).frame(0).as_bytes(),
+    );
+    show(
+        "report (firmware)",
+        ucp::message::FirmwareReport::new(&telemetry, 38).frame(0).as_bytes(),
+    );
+    show("report (document)", ucp::message::DocumentReport::new(&telemetry).frame(0).as_bytes());
     show("IMU bias", imu.frame(0).as_bytes());
-    show("IMU bias ack", ucp::ImuBiasAck::new(Fine).frame(4).as_bytes());
+    show("IMU bias ack", ucp::message::ImuBiasAck::new(Fine).frame(4).as_bytes());
     show("magnetometer bias", mag.frame(0).as_bytes());
-    show("magnetometer bias ack", ucp::MagBiasAck::new(Fine).frame(5).as_bytes());
-    show("bias request", ucp::BiasRequest {}.frame(0).as_bytes());
-    show("biases", ucp::Biases::new(imu, mag).frame(6).as_bytes());
-    show("OTA request", ucp::OtaRequest::start_firmware_update(39).frame(7).as_bytes());
-    show("OTA ack", ucp::OtaAck::new(OtaStatus::Forbidden).frame(0).as_bytes());
-    if let Some(state) = ucp::SetNetworkState::new(Connected) {
+    show("magnetometer bias ack", ucp::message::MagBiasAck::new(Fine).frame(5).as_bytes());
+    show("bias request", ucp::message::BiasRequest {}.frame(0).as_bytes());
+    show("biases", ucp::message::Biases::new(imu, mag).frame(6).as_bytes());
+    show("OTA request", ucp::message::OtaRequest::start_firmware_update(39).frame(7).as_bytes());
+    show("OTA ack", ucp::message::OtaAck::new(OtaStatus::Forbidden).frame(0).as_bytes());
+    if let Some(state) = ucp::message::SetNetworkState::new(Connected) {
         show("network state", state.frame(8).as_bytes());
     }
     let mut buffer = [0; ucp::MAX_LEN];
     let raw = RawFrame { id: 0x20, index: 9, body: b"hi" };
-    show("unknown id", axlewire::stream::Encode::encode(&raw, &mut buffer)?);
+    show("unknown id", axlewire::encode::Encode::encode(&raw, &mut buffer)?);
 
     // What hangs or moves shipped robots cannot be built.
     println!("{:<24} {}", "speed 130 %", MotorControl::new(130, 0).expect_err("refused"));
     let report = RawFrame { id: 5, ..raw };
-    let refused = axlewire::stream::Encode::encode(&report, &mut buffer).expect_err("refused");
+    let refused = axlewire::encode::Encode::encode(&report, &mut buffer).expect_err("refused");
     println!("{:<24} {refused}", "report from a host");
     Ok(())
 }

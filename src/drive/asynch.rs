@@ -9,7 +9,9 @@ use core::{
 use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
 
-use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS, outbox::FRAME_LEN};
+use super::{
+    CHUNK_LEN, Driver, FRAMES, Needs, READS, clock::Clock, error::DriveError, outbox::FRAME_LEN,
+};
 use crate::{
     endpoint::Endpoint,
     time::{Duration, Instant},
@@ -30,7 +32,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// # Errors
     ///
     /// [`DriveError::Port`], [`Closed`](DriveError::Closed), [`WriteZero`](DriveError::WriteZero) or
-    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Directed`](super::Directed)
+    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Rs485`](super::Rs485)
     /// port that cannot be flushed behind a `write` that failed is `Stalled`. What is due has been
     /// sent and flushed all the same, as far as the port could. A call that fails has yielded once,
     /// so that a loop that ignores errors does not starve the other tasks.
@@ -195,7 +197,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     }
 
     /// The port has stalled. A write of no bytes, which takes no time, lets a
-    /// [`Directed`](super::Directed) port put its pin off, with bytes still in it, perhaps.
+    /// [`Rs485`](super::Rs485) port put its pin off, with bytes still in it, perhaps.
     async fn stalled_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.unflushed();
         let _ = first(self.port.write(&[]), ready(())).await;

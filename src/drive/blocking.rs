@@ -2,7 +2,7 @@
 
 use embedded_io::{Read, ReadReady, Write};
 
-use super::{CHUNK_LEN, Clock, DriveError, Driver, FRAMES, Needs, READS};
+use super::{CHUNK_LEN, Driver, FRAMES, Needs, READS, clock::Clock, error::DriveError};
 use crate::{endpoint::Endpoint, time::Instant};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {

@@ -35,25 +35,25 @@ pub enum DriveError<E> {
     Timeout(Operation),
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
-    Bus(ikeya::CommandError),
+    Bus(ikeya::master::CommandError),
     /// The stops of these nodes are not paid (ruling I12): they have not answered twice after a stop
     /// WRITE, or have never answered at all. **Their motors may be running.** The stops stay owed.
     #[cfg(feature = "ikeya")]
-    StopsOwed(ikeya::NodeSet),
+    StopsOwed(ikeya::master::NodeSet),
     /// A node could not be read, all attempts included.
     #[cfg(feature = "ikeya")]
     ReadFailed {
         /// Which node.
         node: ikeya::NodeId,
         /// What was heard instead of its answer.
-        cause: ikeya::Cause,
+        cause: ikeya::master::Cause,
     },
     /// The host refuses the command.
     #[cfg(feature = "ucp")]
-    Rover(ucp::CommandError),
+    Rover(ucp::host::CommandError),
     /// The robot did not agree to a calibration, or did not answer, all attempts included.
     #[cfg(feature = "ucp")]
-    Calibration(ucp::CalibrationFailure),
+    Calibration(ucp::host::CalibrationFailure),
 }
 
 /// The operation that timed out.
@@ -104,10 +104,10 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             #[cfg(feature = "ikeya")]
             Self::ReadFailed { node, cause } => {
                 let heard = match cause {
-                    ikeya::Cause::Silent => "nothing was heard",
-                    ikeya::Cause::Damaged => "only damaged bytes were heard",
-                    ikeya::Cause::Unexpected => "only other answers were heard",
-                    ikeya::Cause::Dropped => "its set-point was dropped",
+                    ikeya::master::Cause::Silent => "nothing was heard",
+                    ikeya::master::Cause::Damaged => "only damaged bytes were heard",
+                    ikeya::master::Cause::Unexpected => "only other answers were heard",
+                    ikeya::master::Cause::Dropped => "its set-point was dropped",
                 };
                 write!(f, "node {node} did not answer: {heard}")
             }
@@ -115,17 +115,17 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::Rover(error) => error.fmt(f),
             #[cfg(feature = "ucp")]
             Self::Calibration(failure) => {
-                let ucp::CalibrationFailure { step, kind, cause, attempts, .. } = failure;
+                let ucp::host::CalibrationFailure { step, kind, cause, attempts, .. } = failure;
                 let step = match step {
-                    ucp::CalibrationStep::Start => "begun",
-                    ucp::CalibrationStep::End => "ended",
+                    ucp::host::CalibrationStep::Start => "begun",
+                    ucp::host::CalibrationStep::End => "ended",
                 };
                 write!(f, "calibration of {kind:?} was not {step}: ")?;
                 match cause {
-                    ucp::FailureCause::NoAnswer => {
+                    ucp::host::FailureCause::NoAnswer => {
                         write!(f, "no answer to {attempts} requests")
                     }
-                    ucp::FailureCause::Refused(err) => write!(f, "the robot says {err:?}"),
+                    ucp::host::FailureCause::Refused(err) => write!(f, "the robot says {err:?}"),
                 }
             }
         }
@@ -168,15 +168,15 @@ impl<E: Error + 'static> Error for DriveError<E> {
 }
 
 #[cfg(feature = "ikeya")]
-impl<E> From<ikeya::CommandError> for DriveError<E> {
-    fn from(error: ikeya::CommandError) -> Self {
+impl<E> From<ikeya::master::CommandError> for DriveError<E> {
+    fn from(error: ikeya::master::CommandError) -> Self {
         Self::Bus(error)
     }
 }
 
 #[cfg(feature = "ucp")]
-impl<E> From<ucp::CommandError> for DriveError<E> {
-    fn from(error: ucp::CommandError) -> Self {
+impl<E> From<ucp::host::CommandError> for DriveError<E> {
+    fn from(error: ucp::host::CommandError) -> Self {
         Self::Rover(error)
     }
 }

@@ -2,12 +2,14 @@
 
 use heapless::Vec;
 
-use super::{Clock, DriveError, Driver};
+use super::{Driver, clock::Clock, error::DriveError};
 use crate::{
     endpoint::Endpoint,
     ikeya::{
-        Board, CommandError, Health, Master, MasterEvent, Mode, NodeId, NodeSet, Polling, Slave,
-        SlaveEvent, Status, StopProgress, Target,
+        Mode, NodeId,
+        board::{Board, Status, Target},
+        master::{CommandError, Health, Master, MasterEvent, NodeSet, Polling, StopProgress},
+        slave::{Slave, SlaveEvent},
     },
     time::{Duration, Instant},
 };

@@ -19,7 +19,7 @@
 //! ```
 //! # #[cfg(all(feature = "embedded-io", feature = "ikeya"))] {
 //! use axlewire::drive::{Clock, DriveError, Driver};
-//! use axlewire::ikeya::{Master, MasterConfig, Mode, NodeId, Rps};
+//! use axlewire::ikeya::{master::MasterConfig, Master, Mode, NodeId, Rps};
 //! use axlewire::time::Duration;
 //! use embedded_io::{Read, ReadReady, Write};
 //!
@@ -140,21 +140,21 @@
 //!
 //! # Half duplex
 //!
-//! [`Directed`] (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On
+//! [`Rs485`] (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On
 //! a line with two wires whose receiver stays on while it sends, set
-//! [`removes_echo`](crate::ikeya::MasterConfig::removes_echo) of the master as well.
+//! [`removes_echo`](crate::ikeya::master::MasterConfig::removes_echo) of the master as well.
 
 #[cfg(feature = "embedded-io-async")]
 mod asynch;
 #[cfg(feature = "embedded-io")]
 mod blocking;
 mod clock;
-#[cfg(feature = "embedded-hal")]
-mod direction;
 mod error;
 #[cfg(feature = "ikeya")]
 mod ikeya;
 mod outbox;
+#[cfg(feature = "embedded-hal")]
+mod rs485;
 #[cfg(feature = "ucp")]
 mod ucp;
 
@@ -163,11 +163,11 @@ pub use clock::Clock;
 pub use clock::StdClock;
 #[cfg(feature = "embedded-io-async")]
 pub use clock::WithDelay;
-#[cfg(feature = "embedded-hal")]
-pub use direction::{Directed, DirectedError, NoDelay};
 pub use error::{DriveError, Operation};
 #[cfg(feature = "ikeya")]
 pub use ikeya::OnlineNodes;
+#[cfg(feature = "embedded-hal")]
+pub use rs485::{NoDelay, Rs485, Rs485Error};
 
 use crate::{
     endpoint::{Endpoint, Unsent},

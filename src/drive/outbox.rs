@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::DriveError;
+use super::error::DriveError;
 use crate::{
     endpoint::Unsent,
     time::{Duration, Instant},

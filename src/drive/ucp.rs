@@ -1,11 +1,13 @@
 //! High-level rover-link calls: what the blocking and the async ones have in common.
 
-use super::{Clock, DriveError, Driver};
+use super::{Driver, clock::Clock, error::DriveError};
 use crate::{
     time::{Duration, Instant},
     ucp::{
-        BiasStore, CalibrationKind, CalibrationStep, CommandError, Host, HostEvent, MotorControl,
-        ReceivedReport, Robot, RobotEvent,
+        MotorControl,
+        host::{BiasStore, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport},
+        message::CalibrationKind,
+        robot::{Robot, RobotEvent},
     },
 };
 
@@ -28,7 +30,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     /// When to say a command again that is to go on: long before the host takes its application for
     /// dead.
     fn renew_at(&mut self) -> Instant {
-        let half_us = self.role.config().command_timeout.as_micros() / 2;
+        let half_us = self.role.config().dead_man.as_micros() / 2;
         self.now() + Duration::from_micros(half_us.max(1))
     }
 
@@ -109,9 +111,8 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
 impl<P, C: Clock> Driver<Robot, P, C> {
     fn new_command(&mut self) -> Option<MotorControl> {
         let now = self.now();
-        self.role.retain_events(|event| {
-            !matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop)
-        });
+        self.role
+            .retain_events(|event| !matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog));
         self.role.take_command(now)
     }
 }

@@ -1,82 +1,115 @@
-//! The two kinds of boards, so that one master and one slave serve both.
+//! The two kinds of boards, with one motor and with three: one master and one slave serve both.
 
-use core::fmt;
+use super::{
+    framing::{Packet, Request, Response},
+    three,
+    units::{Mode, NodeId, Position, Rps},
+    wire::WriteRequest,
+};
 
-use super::{Mode, NodeId, Packet, Position, Request, Response, Rps, WriteRequest, three};
-use crate::stream::{Encode, Framing};
-
-/// What a kind of board sends and understands (rulings I3, I10).
+/// A kind of board: its units, its packets, and whether it answers a WRITE (rulings I3, I10).
 ///
-/// Implemented by [`OneMotor`] and [`ThreeMotors`] and by nothing else.
-pub trait Board: sealed::Sealed + Copy + fmt::Debug + PartialEq + 'static {
-    /// A target or current speed.
-    type Velocity: Copy + fmt::Debug + PartialEq;
-    /// A speed as a packet carries it: any bits.
-    type RawVelocity: Copy + fmt::Debug + PartialEq;
-    /// A target or current position.
-    type Position: Copy + fmt::Debug + PartialEq;
-    /// A WRITE packet.
-    type Write: Encode;
-    /// A velocity response.
-    type VelocityResponse: Encode;
-    /// A position response.
-    type PositionResponse: Encode;
-    /// What slaves hear.
-    type ToSlave: Framing + Clone + fmt::Debug;
-    /// What the master hears.
-    type ToMaster: Framing + Clone + fmt::Debug;
-    /// What a slave on two wires hears.
-    type Either: Framing + Clone + fmt::Debug;
+/// | | [`OneMotor`] | [`ThreeMotors`] |
+/// |---|---|---|
+/// | target speed, `Velocity` | [`Rps`] | `[Rps; 3]` |
+/// | measured speed, `RawVelocity` | `f32`, any bits | `[f32; 3]` |
+/// | target or measured position, `Position` | [`Position`] | `[Position; 3]` |
+/// | packets | [`ikeya`](crate::ikeya), 8 bytes | [`three`], 16 bytes |
+/// | a WRITE is answered | no | yes, with the status |
+///
+/// Implemented by these two and by nothing else.
+pub trait Board: Packets {}
 
-    /// Standing still.
-    const ZERO: Self::Velocity;
+impl Board for OneMotor {}
+impl Board for ThreeMotors {}
 
-    /// Whether a WRITE is answered with the status.
-    const ANSWERS_WRITE: bool;
+pub(super) use packets::{Command, Heard, Packets};
 
-    /// A WRITE for a velocity node.
-    fn write_velocity(id: NodeId, target: Self::Velocity) -> Self::Write;
+/// Private, so that only this crate can implement [`Board`] and call what it is made of.
+mod packets {
+    use core::fmt;
 
-    /// A WRITE for a position node.
-    fn write_position(id: NodeId, target: Self::Position) -> Self::Write;
+    use super::{Board, Status};
+    use crate::{encode::Encode, ikeya::NodeId, stream::Framing};
 
-    /// The answer of a velocity node.
-    fn velocity_response(id: NodeId, current: Self::Velocity) -> Self::VelocityResponse;
+    /// What a kind of board sends and understands.
+    pub trait Packets: Copy + fmt::Debug + PartialEq + Sized + 'static {
+        /// A target or current speed.
+        type Velocity: Copy + fmt::Debug + PartialEq;
+        /// A speed as a packet carries it: any bits.
+        type RawVelocity: Copy + fmt::Debug + PartialEq;
+        /// A target or current position.
+        type Position: Copy + fmt::Debug + PartialEq;
+        /// A WRITE packet.
+        type Write: Encode;
+        /// A velocity response.
+        type VelocityResponse: Encode;
+        /// A position response.
+        type PositionResponse: Encode;
+        /// What slaves hear.
+        type ToSlave: Framing + Clone + fmt::Debug;
+        /// What the master hears.
+        type ToMaster: Framing + Clone + fmt::Debug;
+        /// What a slave on two wires hears.
+        type BothDirections: Framing + Clone + fmt::Debug;
 
-    /// The answer of a position node.
-    fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse;
+        /// Standing still.
+        const ZERO: Self::Velocity;
 
-    /// The speed that was meant; `None` where it is no number.
-    fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
+        /// Whether a WRITE is answered with the status.
+        const ANSWERS_WRITE: bool;
 
-    /// Below 0.05 rps: standing still (I12). What is no number is not.
-    fn is_still(speed: Self::RawVelocity) -> bool;
+        /// A WRITE for a velocity node.
+        fn write_velocity(id: NodeId, target: Self::Velocity) -> Self::Write;
 
-    /// Within 8 counts of each other (I12).
-    fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
+        /// A WRITE for a position node.
+        fn write_position(id: NodeId, target: Self::Position) -> Self::Write;
 
-    /// Would a velocity node read a WRITE of this position as standing still: as 0 to 5e-10 rps (I11)?
-    fn is_still_as_velocity(position: Self::Position) -> bool;
+        /// The answer of a velocity node.
+        fn velocity_response(id: NodeId, current: Self::Velocity) -> Self::VelocityResponse;
 
-    /// Who is asked, and what is commanded in either reading.
-    fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
+        /// The answer of a position node.
+        fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse;
 
-    /// The same on two wires; `None` for an answer of another node.
-    fn packet(frame: <Self::Either as Framing>::Frame<'_>) -> Option<Heard<Self>>;
+        /// The speed that was meant; `None` where it is no number.
+        fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
 
-    /// Who answers, and what.
-    fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>);
+        /// Below 0.05 rps: standing still (I12). What is no number is not.
+        fn is_still(speed: Self::RawVelocity) -> bool;
+
+        /// Within 8 counts of each other (I12).
+        fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
+
+        /// Would a velocity node read a WRITE of this position as standing still: as 0 to 5e-10 rps (I11)?
+        fn is_still_as_velocity(position: Self::Position) -> bool;
+
+        /// Who is asked, and what is commanded in either reading.
+        fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
+
+        /// The same on two wires; `None` for an answer of another node.
+        fn packet(frame: <Self::BothDirections as Framing>::Frame<'_>) -> Option<Heard<Self>>;
+
+        /// Who answers, and what.
+        fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>)
+        where
+            Self: Board;
+    }
+
+    /// A request as a slave hears it: the node that is asked and, in a WRITE, what is commanded.
+    pub(crate) type Heard<B> = (NodeId, Option<Command<B>>);
+
+    /// The payload of a WRITE in its two readings: its bytes do not say which was meant (ruling I3).
+    #[derive(Clone, Copy, Debug)]
+    pub struct Command<B: Packets> {
+        /// Read as a speed.
+        pub velocity: B::RawVelocity,
+        /// Read as a position.
+        pub position: B::Position,
+    }
 }
 
-/// A request as a slave hears it: the node that is asked and, in a WRITE, what is commanded.
-pub type Heard<B> = (NodeId, Option<Command<B>>);
-
-mod sealed {
-    /// Keeps `Board` to this crate.
-    pub trait Sealed {}
-    impl Sealed for super::OneMotor {}
-    impl Sealed for super::ThreeMotors {}
-}
+/// Longest packet of either kind of board, bytes.
+pub(super) const PACKET_LEN: usize = three::MAX_LEN;
 
 /// Speed below which a motor stands still, rps (I12).
 const STILL_RPS: f32 = 0.05;
@@ -87,15 +120,6 @@ const STILL_COUNTS: u32 = 8;
 /// Do these four bytes say 0 to 5e-10 rps? Bit patterns of positive numbers are in their order.
 const fn is_still_on_wire(payload: [u8; 4]) -> bool {
     u32::from_le_bytes(payload) >> 16 <= 12_287
-}
-
-/// The payload of a WRITE in its two readings: its bytes do not say which was meant (ruling I3).
-#[derive(Clone, Copy, Debug)]
-pub struct Command<B: Board> {
-    /// Read as a speed.
-    pub velocity: B::RawVelocity,
-    /// Read as a position.
-    pub position: B::Position,
 }
 
 /// What a motor is to do.
@@ -132,7 +156,7 @@ impl<B: Board> Target<B> {
 
 /// What a node measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Status<B: Board> {
+pub enum Status<B: Board = OneMotor> {
     /// Of a velocity node, revolutions per second: any `f32`.
     Velocity(B::RawVelocity),
     /// Of a position node.
@@ -158,7 +182,7 @@ pub enum OneMotor {}
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ThreeMotors {}
 
-impl Board for OneMotor {
+impl Packets for OneMotor {
     type Velocity = Rps;
     type RawVelocity = f32;
     type Position = Position;
@@ -167,7 +191,7 @@ impl Board for OneMotor {
     type PositionResponse = super::PositionResponse;
     type ToSlave = super::ToSlave;
     type ToMaster = super::ToMaster;
-    type Either = super::Either;
+    type BothDirections = super::BothDirections;
 
     const ZERO: Rps = Rps::ZERO;
     const ANSWERS_WRITE: bool = false;
@@ -229,7 +253,7 @@ impl Board for OneMotor {
     }
 }
 
-impl Board for ThreeMotors {
+impl Packets for ThreeMotors {
     type Velocity = [Rps; 3];
     type RawVelocity = [f32; 3];
     type Position = [Position; 3];
@@ -238,7 +262,7 @@ impl Board for ThreeMotors {
     type PositionResponse = three::PositionResponse;
     type ToSlave = three::ToSlave;
     type ToMaster = three::ToMaster;
-    type Either = three::Either;
+    type BothDirections = three::BothDirections;
 
     const ZERO: [Rps; 3] = [Rps::ZERO; 3];
     const ANSWERS_WRITE: bool = true;

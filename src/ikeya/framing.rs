@@ -3,16 +3,21 @@
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
-    PositionResponse, ReadRequest, VelocityResponse, WriteRequest,
-    runs::good_run,
-    sweep::sweep,
+    batch::PacketBatch,
+    judge::judge,
     three,
-    wire::header::{POSITION, READ, VELOCITY, WRITE},
+    wire::{
+        PositionResponse, ReadRequest, VelocityResponse, WriteRequest,
+        header::{POSITION, READ, VELOCITY},
+    },
 };
-use crate::{
-    crc16,
-    stream::{Framing, GoodRun, Reason, Swept, Verdict},
-};
+use crate::stream::{self, Framing, Verdict};
+
+/// Longest packet of a standard bus, bytes.
+pub const MAX_LEN: usize = WriteRequest::LEN;
+
+/// Decoder with the smallest buffer that a standard bus needs.
+pub type Decoder<F = ToMaster> = stream::Decoder<F, MAX_LEN>;
 
 /// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +29,7 @@ pub enum ToMaster {}
 
 /// Everything on the bus, as a monitor or a capture of both pairs sees it.
 #[derive(Clone, Copy, Debug)]
-pub enum Either {}
+pub enum BothDirections {}
 
 /// A packet for a slave.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -67,6 +72,7 @@ macro_rules! framing {
     ) => {
         impl Framing for $framing {
             type Frame<'a> = $($frame)::+<'a>;
+            type Batch = PacketBatch<{ $max_len }, $to_slave, $to_master>;
             const MIN_LEN: usize = $min_len;
             const MAX_LEN: usize = $max_len;
 
@@ -80,21 +86,6 @@ macro_rules! framing {
                 match *frame.first()? {
                     $($header => view(frame).map($view),)+
                 }
-            }
-
-            #[inline(always)]
-            fn sweep(bytes: &[u8]) -> Swept {
-                sweep::<Self, $to_slave, $to_master>(bytes)
-            }
-
-            #[inline(always)]
-            fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
-                good_run::<{ Self::MAX_LEN }, $to_slave, $to_master>(bytes, wide)
-            }
-
-            #[inline(always)]
-            fn is_short(bytes: &[u8]) -> bool {
-                bytes.first() == Some(&READ)
             }
         }
     };
@@ -117,7 +108,7 @@ framing! {
 }
 
 framing! {
-    Either: Packet,
+    BothDirections: Packet,
     to_slave: true, to_master: true,
     min_len: ReadRequest::LEN, max_len: WriteRequest::LEN,
     VELOCITY => |velocity| Packet::Response(Response::Velocity(velocity)),
@@ -143,55 +134,13 @@ framing! {
 }
 
 framing! {
-    three::Either: three::Packet,
+    three::BothDirections: three::Packet,
     to_slave: true, to_master: true,
     min_len: ReadRequest::LEN, max_len: three::WriteRequest::LEN,
     VELOCITY => |velocity| three::Packet::Response(three::Response::Velocity(velocity)),
     POSITION => |position| three::Packet::Response(three::Response::Position(position)),
     READ => |read| three::Packet::Request(three::Request::Read(read)),
     _ => |write| three::Packet::Request(three::Request::Write(write)),
-}
-
-/// The rule of all six framings: the header gives the length, the CRC decides, then the id.
-///
-/// `LONG` is the length of everything but a READ. An impossible id with a good CRC is somebody
-/// else's packet and skipped whole (ruling I1); with a bad one it is noise like any other.
-#[inline(always)]
-fn judge<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> Verdict {
-    match bytes.first() {
-        Some(&WRITE) if TO_SLAVE => judge_packet::<LONG>(bytes),
-        Some(&(VELOCITY | POSITION)) if TO_MASTER => judge_packet::<LONG>(bytes),
-        Some(&READ) if TO_SLAVE => judge_packet::<{ ReadRequest::LEN }>(bytes),
-        Some(_) => {
-            Verdict::Reject { reason: Reason::Header, more: noise::<TO_SLAVE, TO_MASTER>(bytes) }
-        }
-        None => Verdict::Partial { need: 1 },
-    }
-}
-
-/// How many bytes behind the first are no headers.
-fn noise<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> usize {
-    let is_header = |byte: &u8| match *byte {
-        READ | WRITE => TO_SLAVE,
-        VELOCITY | POSITION => TO_MASTER,
-        _ => false,
-    };
-    bytes.iter().skip(1).take_while(|byte| !is_header(byte)).count()
-}
-
-/// Judges a packet of `LEN` bytes whose header is right.
-#[inline(always)]
-fn judge_packet<const LEN: usize>(bytes: &[u8]) -> Verdict {
-    let Some(packet) = bytes.first_chunk::<LEN>() else {
-        return Verdict::Partial { need: LEN };
-    };
-    if !crc16::check_packet(packet) {
-        Verdict::Reject { reason: Reason::Crc, more: 0 }
-    } else if !matches!(packet.get(1), Some(1..=8)) {
-        Verdict::Reject { reason: Reason::Id, more: LEN - 1 }
-    } else {
-        Verdict::Frame { len: LEN }
-    }
 }
 
 /// One judged packet as its type.

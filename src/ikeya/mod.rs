@@ -72,7 +72,7 @@
 //!
 //! # Decoding
 //!
-//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`Either`] both. None of them waits for more
+//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`BothDirections`] both. None of them waits for more
 //! than the packet that a header promises, at most 8 bytes.
 //!
 //! ```
@@ -90,35 +90,22 @@
 //! assert_eq!(decoder.counters().framed, 4);
 //! ```
 
-mod board;
+mod batch;
+pub mod board;
 mod framing;
-mod master;
-mod nodes;
-mod runs;
-mod schedule;
-pub(crate) mod slave;
-mod sweep;
+mod judge;
+pub mod master;
+pub mod slave;
 pub mod three;
 mod units;
 mod wire;
 
-pub use board::{Board, Command, Heard, OneMotor, Status, Target, ThreeMotors};
-pub use framing::{Either, Packet, Request, Response, ToMaster, ToSlave};
-pub use master::{
-    Cause, CommandError, Health, Master, MasterConfig, MasterEvent, MasterStatistics,
-    NodeStatistics, Polling, StopProgress,
-};
-pub use nodes::NodeSet;
-pub use schedule::Schedule;
-pub use slave::{Slave, SlaveConfig, SlaveEvent, SlaveStatistics};
-pub use units::{DipSwitch, IdReading, Mode, NodeId, Position, Rps};
+#[doc(inline)]
+pub use board::{Status, Target};
+pub use framing::{BothDirections, Decoder, MAX_LEN, Packet, Request, Response, ToMaster, ToSlave};
+#[doc(inline)]
+pub use master::Master;
+#[doc(inline)]
+pub use slave::Slave;
+pub use units::{BAUD, Mode, NodeId, Position, Rps};
 pub use wire::{PositionResponse, ReadRequest, VelocityResponse, WriteRequest};
-
-/// Speed of the line, bit/s.
-pub const BAUD: u32 = 500_000;
-
-/// Longest packet of a standard bus, bytes.
-pub const MAX_LEN: usize = WriteRequest::LEN;
-
-/// Decoder with the smallest buffer that a standard bus needs.
-pub type Decoder<F = ToMaster> = crate::stream::Decoder<F, MAX_LEN>;

@@ -15,7 +15,7 @@ use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
 pub use super::wire::ReadRequest;
 use super::{
-    NodeId, Position, Rps,
+    units::{NodeId, Position, Rps},
     wire::{header, packet},
 };
 
@@ -35,7 +35,7 @@ pub enum ToMaster {}
 
 /// Everything on a bus of three-motor boards.
 #[derive(Clone, Copy, Debug)]
-pub enum Either {}
+pub enum BothDirections {}
 
 /// A packet for a three-motor board.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

@@ -2,7 +2,7 @@
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
-use super::{NodeId, Position, Rps};
+use super::units::{NodeId, Position, Rps};
 use crate::{crc16, error::ParseError};
 
 /// Headers, each an enum of one variant: any other byte is not a value of the packet.
@@ -329,7 +329,7 @@ macro_rules! packet {
             }
         }
 
-        impl $crate::stream::Encode for $packet {
+        impl $crate::encode::Encode for $packet {
             fn encoded_len(&self) -> usize {
                 Self::LEN
             }
@@ -338,7 +338,7 @@ macro_rules! packet {
                 &self,
                 buffer: &'b mut [u8],
             ) -> Result<&'b [u8], $crate::error::EncodeError> {
-                $crate::stream::encode_bytes(self.as_bytes(), buffer)
+                $crate::encode::encode_bytes(self.as_bytes(), buffer)
             }
         }
     )+};

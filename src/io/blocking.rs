@@ -3,7 +3,10 @@
 use embedded_io::{Read, Write};
 
 use super::{FrameReader, FrameWriter, WriteError};
-use crate::stream::{Encode, Event, Framing};
+use crate::{
+    encode::Encode,
+    stream::{Event, Framing},
+};
 
 impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
     /// The next event; waits for the port where there is none yet. `None` at an end of file.

@@ -9,7 +9,7 @@
 //!
 //! ```
 //! # #[cfg(all(feature = "embedded-io", feature = "ucp"))] {
-//! use axlewire::{io::{FrameReader, FrameWriter}, stream::Event, ucp::{Body, Ping, Ucp}};
+//! use axlewire::{io::{FrameReader, FrameWriter}, stream::Event, ucp::{message::Ping, Body, Ucp}};
 //!
 //! let mut line = [0; 16];
 //! let mut writer = FrameWriter::<_, 64>::new(&mut line[..]);
@@ -25,8 +25,9 @@
 use core::{error::Error, fmt};
 
 use crate::{
+    encode::Encode,
     error::EncodeError,
-    stream::{Decoder, Encode, Framing},
+    stream::{Decoder, Framing},
 };
 
 #[cfg(feature = "embedded-io-async")]

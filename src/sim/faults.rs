@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::Rng;
+use super::rng::Rng;
 use crate::time::Duration;
 
 /// What a piece of wire does to what passes it. The default does nothing.

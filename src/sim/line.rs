@@ -4,8 +4,9 @@ use alloc::vec::Vec;
 use core::{error::Error, fmt, mem};
 
 use super::{
-    Driver, Faults, PairStatistics, Rng,
-    port::{Port, Trouble, WireByte, earlier},
+    faults::{Faults, PairStatistics},
+    port::{Port, Timing, Trouble, WireByte, earlier},
+    rng::Rng,
 };
 use crate::{
     endpoint::Endpoint,
@@ -89,15 +90,11 @@ impl Error for Stuck {}
 ///   or on the stub of one station, for what it sends and for what it hears, with
 ///   [`stub_mut`](Self::stub_mut). What a delayed stub sends comes onto the pair later, so that an
 ///   answer can be late; all other delays are on the way from the pair to whom it concerns.
-/// * How late and in which pieces an endpoint's loop sees things is its [`Driver`].
+/// * How late and in which pieces an endpoint's loop sees things is its [`Timing`].
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
-/// use axlewire::{
-///     ikeya::{Master, MasterConfig, MasterEvent, Mode, NodeId, Rps},
-///     sim::{Line, MotorNode, Who},
-///     time::{Duration, Instant},
-/// };
+/// use axlewire::{ikeya::{master::{MasterConfig, MasterEvent}, Master, Mode, NodeId, Rps}, sim::{Line, MotorNode, Who}, time::{Duration, Instant}};
 ///
 /// let start = Instant::from_micros(0);
 /// let mut master: Master = Master::new(MasterConfig::direct(), start);
@@ -258,8 +255,8 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
     /// # Panics
     ///
     /// Where there is no such tail.
-    pub fn driver_mut(&mut self, who: Who) -> &mut Driver {
-        &mut self.ports[port_of(who)].driver
+    pub fn timing_mut(&mut self, who: Who) -> &mut Timing {
+        &mut self.ports[port_of(who)].timing
     }
 }
 

@@ -3,7 +3,11 @@
 use super::lag::{Lag, seconds};
 use crate::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{Mode, NodeId, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+    ikeya::{
+        Mode, NodeId, Position, Rps,
+        board::Target,
+        slave::{Slave, SlaveConfig, SlaveEvent},
+    },
     time::{Duration, Instant},
 };
 
@@ -153,7 +157,8 @@ impl MotorNode {
     /// A node with a [`Motor::new`] and a [`SlaveConfig::direct`].
     #[must_use]
     pub fn new(node: NodeId, mode: Mode) -> Self {
-        Self::from_parts(Slave::new(node, mode, SlaveConfig::direct()), Motor::new())
+        let slave = Slave::new(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
+        Self::from_parts(slave, Motor::new())
     }
 
     /// A node of this slave and this motor.
@@ -184,7 +189,7 @@ impl MotorNode {
     /// Moves the mode switch: the command is forgotten.
     pub fn set_mode(&mut self, mode: Mode) {
         self.slave.set_mode(mode);
-        self.obey();
+        self.obey(self.now.unwrap_or_default());
     }
 
     /// Lets the motor run up to `now`.
@@ -203,8 +208,8 @@ impl MotorNode {
     }
 
     /// Lets the motor do what the slave was told.
-    fn obey(&mut self) {
-        match (self.slave.command(), self.slave.mode()) {
+    fn obey(&mut self, now: Instant) {
+        match (self.slave.command(now), self.slave.mode()) {
             (Some(Target::Velocity(target)), _) => self.motor.turn(target),
             (Some(Target::Position(target)), _) => self.motor.go_to(target),
             (None, Mode::Velocity) => self.motor.turn(Rps::ZERO),
@@ -219,13 +224,13 @@ impl Endpoint for MotorNode {
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.run(now);
         self.slave.handle_input(bytes, now);
-        self.obey();
+        self.obey(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         self.run(now);
         self.slave.handle_timeout(now);
-        self.obey();
+        self.obey(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {

@@ -2,7 +2,7 @@
 
 use alloc::{collections::VecDeque, vec::Vec};
 
-use super::Faults;
+use super::faults::Faults;
 use crate::{
     endpoint::Endpoint,
     time::{Duration, Instant, wire_time},
@@ -21,7 +21,7 @@ const ROUNDS_AT_ONCE: u32 = 10_000;
 /// How the loop around an endpoint runs: at once and byte by byte, unless set otherwise.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
-pub struct Driver {
+pub struct Timing {
     /// How far the loop is behind: whatever arrives, and every deadline, is seen so much later.
     pub latency: Duration,
     /// In which pieces received bytes come.
@@ -31,7 +31,7 @@ pub struct Driver {
 }
 
 /// One that is never late.
-impl Default for Driver {
+impl Default for Timing {
     fn default() -> Self {
         Self { latency: Duration::ZERO, input: Input::Bytes, takes_events: true }
     }
@@ -112,7 +112,7 @@ pub(super) fn earlier(a: Option<Instant>, b: Option<Instant>) -> Option<Instant>
 /// One end of the line, without its endpoint.
 #[derive(Debug)]
 pub(super) struct Port {
-    pub(super) driver: Driver,
+    pub(super) timing: Timing,
     pub(super) stub: Faults,
     pub(super) polls: u64,
     /// Sent, and not yet at the end of the wire.
@@ -133,7 +133,7 @@ pub(super) struct Port {
 impl Port {
     pub(super) fn new(now: Instant) -> Self {
         Self {
-            driver: Driver::default(),
+            timing: Timing::default(),
             stub: Faults::CLEAN,
             polls: 0,
             sending: VecDeque::new(),
@@ -192,7 +192,7 @@ impl Port {
     pub(super) fn wakes_at(&self) -> Option<Instant> {
         let piece = self.next_piece().map(|(at, _)| at);
         let trigger = earlier(piece, earlier(self.deadline, self.touched));
-        trigger.map(|at| at + self.driver.latency)
+        trigger.map(|at| at + self.timing.latency)
     }
 
     /// The next piece of input: when it is complete, and how many bytes it has.
@@ -200,7 +200,7 @@ impl Port {
         let first = self.arrivals.front()?.0;
         let arrived_by = |limit: Instant| self.arrivals.partition_point(|(at, _)| *at <= limit);
         let arrival = |index: usize| self.arrivals.get(index).map(|(at, _)| *at);
-        match self.driver.input {
+        match self.timing.input {
             Input::Bytes => Some((first, 1)),
             Input::AfterFirst { wait, at_most } => match arrival(at_most.max(1) - 1) {
                 Some(full) if full <= first + wait => Some((full, at_most.max(1))),
@@ -228,7 +228,7 @@ impl Port {
         mut tell: impl FnMut(E::Event),
     ) -> Result<(), Trouble> {
         self.polls += 1;
-        let latency = self.driver.latency;
+        let latency = self.timing.latency;
         let is_seen = |at: &Instant| now >= *at + latency;
         let mut is_fruitful = self.touched.take_if(|at| is_seen(at)).is_some();
         while let Some((_, len)) = self.next_piece().filter(|(at, _)| is_seen(at)) {
@@ -239,7 +239,7 @@ impl Port {
         if endpoint.poll_timeout().is_some_and(|at| is_seen(&at)) {
             endpoint.handle_timeout(now);
         }
-        if self.driver.takes_events {
+        if self.timing.takes_events {
             for count in 0.. {
                 let Some(event) = endpoint.poll_event() else { break };
                 tell(event);

@@ -1,22 +1,17 @@
 //! A rover with the robot that drives it.
 
-use super::Rover;
+use super::rover::Rover;
 use crate::{
     endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
-    ucp::{Robot, RobotConfig, RobotEvent},
+    ucp::robot::{Robot, RobotConfig, RobotEvent},
 };
 
 /// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports
 /// are what the rover does at that moment.
 ///
 /// ```
-/// use axlewire::{
-///     endpoint::Endpoint,
-///     sim::RoverNode,
-///     time::Instant,
-///     ucp::{Body, MotorControl, RobotConfig},
-/// };
+/// use axlewire::{endpoint::Endpoint, sim::RoverNode, time::Instant, ucp::{robot::RobotConfig, Body, MotorControl}};
 ///
 /// let mut node = RoverNode::new(RobotConfig::default(), Instant::from_millis(0));
 /// let drive = MotorControl::new(50, 0)?.frame(0);

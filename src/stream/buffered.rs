@@ -1,6 +1,10 @@
 //! The decoder of the roles: less code, by way of the buffer alone.
 
-use super::{Decoder, Event, Framing, decoder::Held};
+use super::{
+    decoder::{Decoder, Held},
+    event::Event,
+    framing::Framing,
+};
 
 impl<F: Framing, const N: usize> Decoder<F, N> {
     /// The same events as [`decode`](Self::decode), one for one, without reading frames where they lie
@@ -13,7 +17,9 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.held_event(held)
     }
 
-    fn advance_buffered(&mut self, input: &mut &[u8]) -> Option<Held> {
+    /// Finds and books the next event, like [`decode_buffered`](Self::decode_buffered). The answer
+    /// borrows nothing from `self`.
+    pub(crate) fn advance_buffered(&mut self, input: &mut &[u8]) -> Option<Held> {
         // Each turn takes in bytes, or is the last.
         loop {
             if self.fill.is_early() {
@@ -116,7 +122,7 @@ mod tests {
         fn the_buffered_way_finds_the_same_events_on_a_bus(pieces in pieces()) {
             same_events::<crate::ikeya::ToSlave, 16>(&pieces)?;
             same_events::<crate::ikeya::ToMaster, 16>(&pieces)?;
-            same_events::<crate::ikeya::Either, 8>(&pieces)?;
+            same_events::<crate::ikeya::BothDirections, 8>(&pieces)?;
         }
     }
 

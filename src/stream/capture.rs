@@ -2,7 +2,12 @@
 
 use alloc::vec::Vec;
 
-use super::{Counters, Event, Framing, Front, ledger::Ledger, search};
+use super::{
+    event::Event,
+    framing::Framing,
+    ledger::{Counters, Ledger},
+    search::{Front, search},
+};
 
 /// An event, and the offset of its first byte in the capture.
 pub type Located<T> = (usize, Event<T>);
@@ -31,7 +36,11 @@ pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, 
     while let Some(rest) = bytes.get(at..) {
         let (found, front) = search::<F>(rest, &mut ledger, Ledger::refuse);
         at = bytes.len() - found.len();
-        if matches!(front, Front::Partial { .. }) && at < bytes.len() {
+        let frame = match front {
+            Front::Frame { len } => found.get(..len),
+            Front::Partial { .. } => None,
+        };
+        if frame.is_none() && at < bytes.len() {
             ledger.refuse_idle();
             at += 1;
             continue;
@@ -39,11 +48,10 @@ pub fn decode_capture<F: Framing>(bytes: &[u8]) -> (Vec<Located<F::Frame<'_>>>, 
         if let Some(gap) = ledger.take_gap() {
             events.push((at - gap.len as usize, Event::Skipped(gap)));
         }
-        let Front::Frame { len } = front else { break };
-        let frame = bytes.get(at..).and_then(|rest| rest.get(..len)).and_then(F::view);
-        events.extend(frame.map(|frame| (at, Event::Frame(frame))));
-        ledger.frame(len);
-        at += len;
+        let Some(frame) = frame else { break };
+        events.extend(F::view(frame).map(|view| (at, Event::Frame(view))));
+        ledger.frame(frame.len());
+        at += frame.len();
     }
     (events, ledger.counters(0))
 }

@@ -2,7 +2,14 @@
 
 use core::{cell::Cell, fmt, marker::PhantomData};
 
-use super::{Counters, Event, Framing, Front, Gap, Verdict, fill::Fill, ledger::Ledger, search};
+use super::{
+    event::Event,
+    fill::Fill,
+    framing::{Framing, Verdict},
+    ledger::{Counters, Gap, Ledger},
+    search::{Front, judge, search},
+};
+use crate::machine::IS_HOST;
 
 /// Frames of a stream that arrives in pieces of any size.
 ///
@@ -91,7 +98,6 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     pub const fn new() -> Self {
         const { assert!(N >= F::MAX_LEN, "the buffer is shorter than the longest frame") }
         const { assert!(N <= Fill::MAX, "the buffer is longer than a decoder counts") }
-        const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "no such lengths") }
         Self {
             buffer: [0; N],
             fill: Self::EMPTY,
@@ -119,7 +125,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         // What has been waited for is mostly one frame and nothing else: no need to go through `Held`.
         if self.fill.is_just(F::MIN_LEN..=N) {
             let end = self.fill.end();
-            match F::judge(self.buffer.get(..end)?) {
+            match judge::<F>(self.buffer.get(..end)?) {
                 Verdict::Frame { len } if len == end && !self.ledger.has_gap() => {
                     let frame = F::view(self.buffer.get(..len)?)?;
                     self.ledger.frame(len);
@@ -283,9 +289,20 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     }
 
     /// Nothing is held: reads `input` where it lies, and holds the candidate that it cuts off.
-    #[cfg_attr(target_pointer_width = "64", inline(always))]
-    #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
+    ///
+    /// Part of its caller on a host, and one copy on a microcontroller.
+    #[inline(always)]
     fn advance_input<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
+        if IS_HOST { self.read_input(input) } else { self.read_input_apart(input) }
+    }
+
+    #[inline(never)]
+    fn read_input_apart<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
+        self.read_input(input)
+    }
+
+    #[inline(always)]
+    fn read_input<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         if input.is_empty() {
             return None;
         }
@@ -296,6 +313,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     *input = found;
                     return Some(Found::Held(Held::Gap(gap)));
                 }
+                // Fails only if the framing breaks its contract; the input is then left as it is.
                 let (frame, rest) = found.split_at_checked(len)?;
                 *input = rest;
                 self.ledger.frame(len);
@@ -334,10 +352,6 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 self.clear();
                 return None;
             }
-            if !self.fill.is_early() {
-                // Only a framing that asks for what it has been given comes here.
-                return None;
-            }
         }
     }
 
@@ -349,7 +363,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             // What came behind a silence does not complete what was pending before it.
             let end = if self.line == Line::Busy { self.fill.end() } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
-            match (F::judge(held), self.line) {
+            match (judge::<F>(held), self.line) {
                 (Verdict::Reject { reason, more }, _) => {
                     let len = held.len().min(more.saturating_add(1));
                     self.ledger.refuse_apart(reason, len);

@@ -2,11 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-/// What a register holds.
-#[cfg(target_pointer_width = "64")]
-type Word = u64;
-#[cfg(not(target_pointer_width = "64"))]
-type Word = u32;
+use crate::machine::Word;
 
 /// Bits of half a word.
 const HALF: u32 = Word::BITS / 2;

@@ -2,7 +2,12 @@
 
 use core::marker::PhantomData;
 
-use super::{Counters, Framing, Front, GoodRun, Verdict, ledger::Ledger, run::Looks, search};
+use super::{
+    framing::{Framing, Verdict},
+    kernel::{Accepted, Kernel},
+    ledger::{Counters, Ledger},
+    search::{Front, Looks, judge, search},
+};
 
 /// Frames of a slice that is already in memory, borrowed from it.
 ///
@@ -52,7 +57,14 @@ impl<'a, F: Framing> Frames<'a, F> {
     // Rare: not to be compiled into the loop that takes the frames.
     #[inline(never)]
     pub fn idle(&mut self) {
-        if let (Verdict::Partial { .. }, [_, rest @ ..]) = (F::judge(self.rest), self.rest) {
+        let [_, rest @ ..] = self.rest else { return };
+        let is_cut_off = match judge::<F>(self.rest) {
+            Verdict::Partial { .. } => true,
+            // Only if the framing breaks its contract.
+            Verdict::Frame { len } => len > self.rest.len(),
+            Verdict::Reject { .. } => false,
+        };
+        if is_cut_off {
             self.ledger.refuse_idle();
             self.rest = rest;
         }
@@ -91,8 +103,8 @@ impl<'a, F: Framing> Frames<'a, F> {
     fn fold_rest<B>(&mut self, init: B, mut fold: impl FnMut(B, F::Frame<'a>) -> B) -> B {
         let (mut folded, mut looks) = (init, Looks::new());
         loop {
-            while let Some(run) = looks.run::<F>(self.rest) {
-                folded = self.fold_run(run, folded, &mut fold);
+            while let Some(batch) = looks.accept_batch::<F>(self.rest) {
+                folded = self.fold_batch(batch, folded, &mut fold);
             }
             match self.next() {
                 Some(frame) => folded = fold(folded, frame),
@@ -101,17 +113,17 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
-    /// Hands out the frames of a run, and books them.
+    /// Hands out the frames of a batch, and books them.
     #[inline(always)]
-    fn fold_run<B>(
+    fn fold_batch<B>(
         &mut self,
-        run: GoodRun,
+        batch: Accepted,
         init: B,
         fold: &mut impl FnMut(B, F::Frame<'a>) -> B,
     ) -> B {
-        let (mut folded, mut taken) = (init, GoodRun::default());
-        let Some(mut bytes) = self.rest.get(..run.len) else { return folded };
-        if run.frames.checked_mul(F::MAX_LEN) == Some(run.len) {
+        let (mut folded, mut taken) = (init, Accepted::default());
+        let Some(mut bytes) = self.rest.get(..batch.len) else { return folded };
+        if batch.frames.checked_mul(F::MAX_LEN) == Some(batch.len) {
             for frame in bytes.chunks_exact(F::MAX_LEN) {
                 let Some(frame) = F::view(frame) else { break };
                 folded = fold(folded, frame);
@@ -121,7 +133,7 @@ impl<'a, F: Framing> Frames<'a, F> {
         } else {
             loop {
                 // A branch: a length that is looked up would have to be waited for.
-                let (frame, behind) = if F::is_short(bytes) {
+                let (frame, behind) = if F::Batch::is_short(bytes) {
                     let Some(cut) = bytes.split_at_checked(F::MIN_LEN) else { break };
                     cut
                 } else {
@@ -133,7 +145,7 @@ impl<'a, F: Framing> Frames<'a, F> {
                 taken.frames += 1;
                 bytes = behind;
             }
-            taken.len = run.len - bytes.len();
+            taken.len = batch.len - bytes.len();
         }
         if taken.frames > 0 {
             self.ledger.frames(taken.frames, taken.len);

@@ -110,17 +110,14 @@ impl Counters {
 #[derive(Clone, Debug)]
 pub(super) struct Ledger {
     framed: u64,
-    #[cfg(not(target_pointer_width = "64"))]
-    frames: u64,
     /// Bytes in all gaps; those that no other count claims are [`Reason::Header`].
     skipped: u64,
     length: u64,
     id: u64,
     crc: u64,
     idle: u64,
-    /// On a host not beside `framed`: the compiler would count both in one register of 128 bits, and
+    /// Not beside `framed`: on a host the compiler would count both in one register of 128 bits, and
     /// each frame would wait for the store of the one before.
-    #[cfg(target_pointer_width = "64")]
     frames: u64,
     gaps: u64,
     /// Why the gap that is open began.

@@ -2,10 +2,13 @@
 
 use core::marker::PhantomData;
 
-use super::{Framing, GoodRun, Swept, Verdict};
+use super::{
+    framing::{Batch, Framing, Verdict},
+    kernel::{Accepted, Kernel, Rejected},
+};
 
-/// A framing without its SIMD: what is compiled is what would be without feature `simd`. To measure
-/// and to test with.
+/// A framing without its SIMD: compiled as it would be without feature `simd`. To measure and to
+/// test with.
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
@@ -21,9 +24,9 @@ pub struct Portable<F>(PhantomData<fn() -> F>);
 
 impl<F: Framing> Framing for Portable<F> {
     type Frame<'a> = F::Frame<'a>;
+    type Batch = WithoutAvx2<F::Batch>;
     const MIN_LEN: usize = F::MIN_LEN;
     const MAX_LEN: usize = F::MAX_LEN;
-    const SIMD: bool = false;
 
     #[inline(always)]
     fn judge(bytes: &[u8]) -> Verdict {
@@ -31,22 +34,32 @@ impl<F: Framing> Framing for Portable<F> {
     }
 
     #[inline(always)]
-    fn sweep(bytes: &[u8]) -> Swept {
-        F::sweep(bytes)
+    fn view(frame: &[u8]) -> Option<F::Frame<'_>> {
+        F::view(frame)
+    }
+}
+
+/// The batches of another, never compiled for AVX2.
+#[derive(Debug)]
+pub struct WithoutAvx2<K>(PhantomData<fn() -> K>);
+
+impl<K: Kernel> Batch for WithoutAvx2<K> {}
+
+impl<K: Kernel> Kernel for WithoutAvx2<K> {
+    const USES_AVX2: bool = false;
+
+    #[inline(always)]
+    fn reject_batch(bytes: &[u8]) -> Rejected {
+        K::reject_batch(bytes)
     }
 
     #[inline(always)]
-    fn good_run(bytes: &[u8], wide: bool) -> GoodRun {
-        F::good_run(bytes, wide)
+    fn accept_batch(bytes: &[u8], is_wide: bool) -> Accepted {
+        K::accept_batch(bytes, is_wide)
     }
 
     #[inline(always)]
     fn is_short(bytes: &[u8]) -> bool {
-        F::is_short(bytes)
-    }
-
-    #[inline(always)]
-    fn view(frame: &[u8]) -> Option<F::Frame<'_>> {
-        F::view(frame)
+        K::is_short(bytes)
     }
 }

@@ -1,6 +1,21 @@
-//! The six bytes in front of every body, and the names of the ids.
+//! The six bytes in front of every body, the names of the ids, and the sizes of a frame.
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
+
+/// Speed of the line, bit/s.
+pub const BAUD: u32 = 115_200;
+
+/// Longest frame that is sent, and that is accepted by default, bytes (ruling U2).
+pub const MAX_LEN: usize = 64;
+
+/// Longest body that is sent, bytes.
+pub const MAX_BODY_LEN: usize = MAX_LEN - Header::LEN - 2;
+
+/// `len` of a frame without a body.
+pub(super) const LEN_WITHOUT_BODY: usize = 4;
+
+/// Bytes of a frame that `len` does not count: the sync and the CRC.
+pub(super) const OUTSIDE_LEN: usize = 4;
 
 /// First byte of a frame: no other value is a header.
 #[derive(
@@ -78,7 +93,7 @@ impl Header {
 
     /// Header of a frame with a body of `body_len` bytes, at most 251.
     pub(super) const fn new(id: u8, index: u8, body_len: u8) -> Self {
-        let len = [body_len + super::LEN_WITHOUT_BODY as u8, 0];
+        let len = [body_len + LEN_WITHOUT_BODY as u8, 0];
         Self { first: FirstSync::Value, second: SecondSync::Value, len, id, index }
     }
 

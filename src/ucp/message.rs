@@ -1,333 +1,24 @@
-//! The bodies, in the order of their ids (ruling U4). All numbers are little-endian (B5).
+//! What frames say: the messages, their bodies and their values (ruling U4).
+//!
+//! [`Frame::message`] reads one, [`Body::frame`](super::Body::frame) builds one.
 
-use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned};
+use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-use super::{
-    CalibrationKind, ErrorCode, Frame, FrameOf, MessageId, NetworkState, OtaStatus, RawFrame,
-    RawMotorControl, RawOtaRequest, Report,
+pub use super::{
+    body::{
+        BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationStart,
+        CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, OtaAck, Ping, Pong,
+        SetNetworkState, SetNetworkStateWide,
+    },
+    codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+    motor::RawMotorControl,
+    report::{DocumentReport, FirmwareReport, Report},
+    update::{OtaRequest, RawOtaRequest},
 };
-
-/// The body of a known message that may be sent: a struct of bytes that knows its id.
-///
-/// Which message a frame holds follows from its id and the length of its body, so no two bodies
-/// share both. Implemented by this crate's bodies and by nothing else. [`RawMotorControl`] and
-/// [`RawOtaRequest`] are none (ruling U7): a motor command is sent as a
-/// [`MotorControl`](super::MotorControl), which is always harmless, and a request to update as an
-/// [`OtaRequest`](super::OtaRequest), which has one constructor.
-pub trait Body: IntoBytes + Immutable + KnownLayout + Unaligned + Copy + sealed::Sealed {
-    /// The id under which it travels.
-    const ID: MessageId;
-
-    /// The whole frame, as a value with the right CRC. `index` is the sender's counter (U9).
-    fn frame(self, index: u8) -> FrameOf<Self> {
-        FrameOf::new(index, self)
-    }
-}
-
-pub(super) mod sealed {
-    /// Keeps `Body` to this crate.
-    pub trait Sealed {}
-}
-
-/// Declares bodies: a struct of private byte fields, alignment 1, and the id it travels under.
-macro_rules! body {
-    ($(
-        $(#[$meta:meta])*
-        pub struct $name:ident($id:ident) { $($field:ident: $ty:ty),* }
-    )+) => {$(
-        $(#[$meta])*
-        #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-        #[derive(
-            zerocopy::FromBytes, zerocopy::IntoBytes, zerocopy::Immutable, zerocopy::KnownLayout,
-            zerocopy::Unaligned,
-        )]
-        #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-        #[repr(C)]
-        pub struct $name { $($field: $ty),* }
-
-        impl $crate::ucp::message::sealed::Sealed for $name {}
-
-        impl $crate::ucp::message::Body for $name {
-            const ID: $crate::ucp::MessageId = $crate::ucp::MessageId::$id;
-        }
-    )+};
-}
-pub(super) use body;
-
-body! {
-    /// Host to robot: are you there? No body.
-    pub struct Ping(Ping) {}
-
-    /// Robot to host, answers a ping: `err`, 1 byte.
-    pub struct Pong(Ping) { err: u8 }
-
-    /// Host to robot, begins a calibration: `type`, 1 byte (ruling U11).
-    pub struct CalibrationStart(CalibrationStart) { kind: u8 }
-
-    /// Robot to host, answers at once: `type | err`, 2 bytes.
-    pub struct CalibrationStartAck(CalibrationStart) { kind: u8, err: u8 }
-
-    /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11).
-    pub struct CalibrationEnd(CalibrationEnd) { kind: u8 }
-
-    /// Robot to host, answers at once: `type | err`, 2 bytes.
-    ///
-    /// The vendor firmware tells the type of the last *start* here.
-    pub struct CalibrationEndAck(CalibrationEnd) { kind: u8, err: u8 }
-
-    /// Robot to host, the result of an IMU calibration: `acc: 3 × i16 | gyro: 3 × i16`, 12 bytes.
-    ///
-    /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
-    pub struct ImuBias(ImuBias) { acc: [[u8; 2]; 3], gyro: [[u8; 2]; 3] }
-
-    /// Host to robot, acknowledges an [`ImuBias`]: `err`, 1 byte.
-    pub struct ImuBiasAck(ImuBias) { err: u8 }
-
-    /// Robot to host, the result of a magnetometer calibration: `mag: 3 × i16`, 6 bytes.
-    ///
-    /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
-    pub struct MagBias(MagBias) { mag: [[u8; 2]; 3] }
-
-    /// Host to robot, acknowledges a [`MagBias`]: `err`, 1 byte.
-    pub struct MagBiasAck(MagBias) { err: u8 }
-
-    /// Robot to host, asks for the stored biases at boot, every 1000 ms until answered. No body.
-    pub struct BiasRequest(Biases) {}
-
-    /// Host to robot, the stored biases: `err | acc: 3 × i16 | gyro: 3 × i16 | mag: 3 × i16`, 19
-    /// bytes. The vendor firmware takes them whatever `err` says.
-    pub struct Biases(Biases) {
-        err: u8,
-        acc: [[u8; 2]; 3],
-        gyro: [[u8; 2]; 3],
-        mag: [[u8; 2]; 3]
-    }
-
-    /// Robot to host, answers an [`OtaRequest`](super::OtaRequest): `err`, 1 byte. Shipped robots
-    /// never send it.
-    pub struct OtaAck(Ota) { status: u8 }
-
-    /// Host to robot, state of the host's network: 1 byte, what a host should send (ruling U8).
-    pub struct SetNetworkState(NetworkState) { state: u8 }
-
-    /// Host to robot, state of the host's network in the 4 bytes that a Linux `enum` takes.
-    /// Read, never built.
-    pub struct SetNetworkStateWide(NetworkState) { state: [u8; 4] }
-}
-
-impl Pong {
-    /// Answers a ping.
-    #[must_use]
-    pub fn new(err: ErrorCode) -> Self {
-        Self { err: err.into() }
-    }
-
-    /// Whether the ping arrived undamaged (ruling U12).
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-}
-
-impl CalibrationStart {
-    /// Begins a calibration.
-    #[must_use]
-    pub fn new(kind: CalibrationKind) -> Self {
-        Self { kind: kind.into() }
-    }
-
-    /// What is to be calibrated.
-    #[must_use]
-    pub fn kind(&self) -> CalibrationKind {
-        self.kind.into()
-    }
-}
-
-impl CalibrationStartAck {
-    /// Answers a [`CalibrationStart`].
-    #[must_use]
-    pub fn new(kind: CalibrationKind, err: ErrorCode) -> Self {
-        Self { kind: kind.into(), err: err.into() }
-    }
-
-    /// What is being calibrated.
-    #[must_use]
-    pub fn kind(&self) -> CalibrationKind {
-        self.kind.into()
-    }
-
-    /// Whether the request arrived undamaged.
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-}
-
-impl CalibrationEnd {
-    /// Ends a calibration; the result follows later.
-    #[must_use]
-    pub fn new(kind: CalibrationKind) -> Self {
-        Self { kind: kind.into() }
-    }
-
-    /// What was calibrated.
-    #[must_use]
-    pub fn kind(&self) -> CalibrationKind {
-        self.kind.into()
-    }
-}
-
-impl CalibrationEndAck {
-    /// Answers a [`CalibrationEnd`].
-    #[must_use]
-    pub fn new(kind: CalibrationKind, err: ErrorCode) -> Self {
-        Self { kind: kind.into(), err: err.into() }
-    }
-
-    /// What was calibrated.
-    #[must_use]
-    pub fn kind(&self) -> CalibrationKind {
-        self.kind.into()
-    }
-
-    /// Whether the request arrived undamaged.
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-}
-
-impl ImuBias {
-    /// Biases in the raw units of the [report](Report): x, y, z.
-    #[must_use]
-    pub fn new(acc: [i16; 3], gyro: [i16; 3]) -> Self {
-        Self { acc: acc.map(i16::to_le_bytes), gyro: gyro.map(i16::to_le_bytes) }
-    }
-
-    /// Accelerometer biases x, y, z, raw.
-    #[must_use]
-    pub fn acc(&self) -> [i16; 3] {
-        self.acc.map(i16::from_le_bytes)
-    }
-
-    /// Gyroscope biases x, y, z, raw.
-    #[must_use]
-    pub fn gyro(&self) -> [i16; 3] {
-        self.gyro.map(i16::from_le_bytes)
-    }
-}
-
-impl ImuBiasAck {
-    /// Acknowledges an [`ImuBias`].
-    #[must_use]
-    pub fn new(err: ErrorCode) -> Self {
-        Self { err: err.into() }
-    }
-
-    /// Whether it arrived undamaged; the vendor firmware ignores it.
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-}
-
-impl MagBias {
-    /// Biases in the raw units of the [report](Report): x, y, z.
-    #[must_use]
-    pub fn new(mag: [i16; 3]) -> Self {
-        Self { mag: mag.map(i16::to_le_bytes) }
-    }
-
-    /// Magnetometer biases x, y, z, raw.
-    #[must_use]
-    pub fn mag(&self) -> [i16; 3] {
-        self.mag.map(i16::from_le_bytes)
-    }
-}
-
-impl MagBiasAck {
-    /// Acknowledges a [`MagBias`].
-    #[must_use]
-    pub fn new(err: ErrorCode) -> Self {
-        Self { err: err.into() }
-    }
-
-    /// Whether it arrived undamaged; the vendor firmware ignores it.
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-}
-
-impl Biases {
-    /// What the host has kept from the last calibrations.
-    #[must_use]
-    pub fn new(imu: ImuBias, mag: MagBias) -> Self {
-        Self { err: ErrorCode::Fine.into(), acc: imu.acc, gyro: imu.gyro, mag: mag.mag }
-    }
-
-    /// 0 unless the host has reason to say otherwise; the vendor firmware ignores it.
-    #[must_use]
-    pub fn err(&self) -> ErrorCode {
-        self.err.into()
-    }
-
-    /// The same biases with another `err`.
-    #[must_use]
-    pub fn with_err(self, err: ErrorCode) -> Self {
-        Self { err: err.into(), ..self }
-    }
-
-    /// The accelerometer and gyroscope part.
-    #[must_use]
-    pub const fn imu(&self) -> ImuBias {
-        ImuBias { acc: self.acc, gyro: self.gyro }
-    }
-
-    /// The magnetometer part.
-    #[must_use]
-    pub const fn mag(&self) -> MagBias {
-        MagBias { mag: self.mag }
-    }
-}
-
-impl OtaAck {
-    /// Answers an [`OtaRequest`](super::OtaRequest).
-    #[must_use]
-    pub fn new(status: OtaStatus) -> Self {
-        Self { status: status.into() }
-    }
-
-    /// What the robot makes of the request.
-    #[must_use]
-    pub fn status(&self) -> OtaStatus {
-        self.status.into()
-    }
-}
-
-impl SetNetworkState {
-    /// Tells the robot which state its lamp is to show; `None` for a state above 255, which one
-    /// byte cannot carry.
-    #[must_use]
-    pub fn new(state: NetworkState) -> Option<Self> {
-        Some(Self { state: u8::try_from(u32::from(state)).ok()? })
-    }
-
-    /// The state.
-    #[must_use]
-    pub fn state(&self) -> NetworkState {
-        u32::from(self.state).into()
-    }
-}
-
-impl SetNetworkStateWide {
-    /// The state.
-    #[must_use]
-    pub fn state(&self) -> NetworkState {
-        u32::from_le_bytes(self.state).into()
-    }
-}
+use super::{
+    frame::{Frame, RawFrame},
+    header::MessageId,
+};
 
 /// What a frame says, borrowed from its body.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -357,10 +48,25 @@ pub enum Message<'a> {
     Unknown(RawFrame<'a>),
 }
 
+impl Frame {
+    /// What the frame says.
+    #[must_use]
+    pub fn message(&self) -> Message<'_> {
+        Message::of(self)
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Frame {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{} index {}: {}", self.id(), self.index(), self.message());
+    }
+}
+
 impl<'a> Message<'a> {
     /// Tells the message from the id and the length of the body; the first that fits is the only
     /// one that does.
-    pub(super) fn of(frame: &'a Frame) -> Self {
+    fn of(frame: &'a Frame) -> Self {
         let body = frame.body();
         let unknown = Self::Unknown(RawFrame { id: frame.id(), index: frame.index(), body });
         let Some(id) = MessageId::from_u8(frame.id()) else { return unknown };

@@ -97,48 +97,28 @@
 //! # Ok::<(), axlewire::error::EncodeError>(())
 //! ```
 
-mod bias;
+mod batch;
+mod body;
 mod codes;
+mod frame;
 mod framing;
 mod header;
-mod host;
-mod message;
+pub mod host;
+pub mod message;
 mod motor;
 mod report;
-mod robot;
+pub mod robot;
 mod role;
-mod sweep;
 mod update;
 
-pub use bias::{BiasStore, MemoryStore, NoStore, NotStored};
-pub use codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
-pub use framing::{Frame, FrameOf, RawFrame, RelayedFrame, Ucp};
-pub use header::{Header, MessageId, SYNC};
-pub use host::{
-    CalibrationFailure, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
-    HostStatistics, Link, ReceivedReport, RoundTrip, UnknownFrame,
-};
-pub use message::{
-    BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationStart,
-    CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, OtaAck, Ping, Pong,
-    SetNetworkState, SetNetworkStateWide,
-};
-pub use motor::{MotorControl, RawMotorControl};
-pub use report::{DocumentReport, FirmwareReport, Report, Telemetry};
-pub use robot::{ReportLayout, Robot, RobotConfig, RobotEvent, RobotStatistics, UpdateSource};
-pub use update::{OtaRequest, RawOtaRequest};
-
-/// Speed of the line, bit/s.
-pub const BAUD: u32 = 115_200;
-
-/// Longest frame that is sent, and that is accepted by default, bytes (ruling U2).
-pub const MAX_LEN: usize = 64;
-
-/// Longest body that is sent, bytes.
-pub const MAX_BODY_LEN: usize = MAX_LEN - Header::LEN - 2;
-
-/// `len` of a frame without a body.
-const LEN_WITHOUT_BODY: usize = 4;
-
-/// Decoder with the default cap and the smallest buffer for it.
-pub type Decoder = crate::stream::Decoder<Ucp, MAX_LEN>;
+pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};
+pub use framing::{Decoder, Ucp};
+pub use header::{BAUD, Header, MAX_BODY_LEN, MAX_LEN, MessageId, SYNC};
+#[doc(inline)]
+pub use host::Host;
+#[doc(inline)]
+pub use message::Message;
+pub use motor::MotorControl;
+pub use report::Telemetry;
+#[doc(inline)]
+pub use robot::Robot;

@@ -2,7 +2,10 @@
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned, transmute};
 
-use super::{Body, MessageId, message::sealed::Sealed};
+use super::{
+    frame::{Body, sealed::Sealed},
+    header::MessageId,
+};
 use crate::error::EncodeError;
 
 /// Host to robot: speed, turn and lamp, 16 bytes. Always harmless (ruling U7).
@@ -268,7 +271,7 @@ impl TryFrom<RawMotorControl> for MotorControl {
 /// frame that it came in, byte for byte.
 ///
 /// ```compile_fail
-/// use axlewire::ucp::{Body, RawMotorControl};
+/// use axlewire::ucp::{message::RawMotorControl, Body};
 /// fn send(received: RawMotorControl) {
 ///     let _ = received.frame(0); // no such method
 /// }

@@ -1,6 +1,6 @@
 //! Telemetry, robot to host every 20 ms: two layouts, one view (ruling U5).
 
-use super::message::body;
+use super::body::body;
 
 body! {
     /// The report that the vendor firmware sends: 36 bytes, `len` 40.
@@ -112,7 +112,7 @@ impl DocumentReport {
 /// A report of either layout, told apart by its length.
 ///
 /// ```
-/// use axlewire::ucp::{FirmwareReport, Report, Telemetry};
+/// use axlewire::ucp::{message::{FirmwareReport, Report}, Telemetry};
 ///
 /// let sent = FirmwareReport::new(&Telemetry { voltage_dv: 119, ..Default::default() }, 38);
 /// let report = Report::Firmware(&sent);

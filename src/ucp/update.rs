@@ -2,7 +2,10 @@
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned, transmute};
 
-use super::{Body, MessageId, message::sealed::Sealed};
+use super::{
+    frame::{Body, sealed::Sealed},
+    header::MessageId,
+};
 
 /// Host to robot, **starts a firmware update** where `version: i16` is above the robot's own, 2
 /// bytes. The robot then leaves this protocol and waits for YMODEM on the same line.
@@ -11,7 +14,7 @@ use super::{Body, MessageId, message::sealed::Sealed};
 /// no bytes can be cast to this type, and a received request is a [`RawOtaRequest`].
 ///
 /// ```compile_fail
-/// use axlewire::ucp::OtaRequest;
+/// use axlewire::ucp::message::OtaRequest;
 /// use zerocopy::FromBytes;
 /// let request = OtaRequest::read_from_bytes(&[40, 0]); // no such method
 /// ```
@@ -50,7 +53,7 @@ impl OtaRequest {
 /// byte for byte.
 ///
 /// ```compile_fail
-/// use axlewire::ucp::{Body, RawOtaRequest};
+/// use axlewire::ucp::{message::RawOtaRequest, Body};
 /// fn send(received: RawOtaRequest) {
 ///     let _ = received.frame(0); // no such method
 /// }

@@ -5,8 +5,9 @@ use std::{thread, time};
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        self, Board, Cause, Health, Master, MasterConfig, Mode, NodeId, NodeSet, OneMotor, Polling,
-        Status, StopProgress, ThreeMotors,
+        self, Master, Mode, NodeId, Status,
+        board::{Board, OneMotor, ThreeMotors},
+        master::{Cause, Health, MasterConfig, NodeSet, Polling, StopProgress},
     },
     time::{Duration, Instant},
 };

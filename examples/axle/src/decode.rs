@@ -61,10 +61,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             let line = "--direction is for ikeya and ikeya-3: a UCP frame tells its direction";
             return Err(Failure::Usage(line.to_owned()));
         }
-        (Protocol::Ikeya, None) => decode::<ikeya::Either>,
+        (Protocol::Ikeya, None) => decode::<ikeya::BothDirections>,
         (Protocol::Ikeya, Some(Direction::ToSlave)) => decode::<ikeya::ToSlave>,
         (Protocol::Ikeya, Some(Direction::ToMaster)) => decode::<ikeya::ToMaster>,
-        (Protocol::Ikeya3, None) => decode::<three::Either>,
+        (Protocol::Ikeya3, None) => decode::<three::BothDirections>,
         (Protocol::Ikeya3, Some(Direction::ToSlave)) => decode::<three::ToSlave>,
         (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
     };

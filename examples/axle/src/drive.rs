@@ -2,7 +2,7 @@
 
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{Link, MotorControl},
+    ucp::{MotorControl, host::Link},
 };
 
 use crate::{

@@ -12,10 +12,10 @@ use std::{
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Master, MasterConfig, Mode, NodeId},
+    ikeya::{Master, Mode, NodeId, master::MasterConfig},
     sim::MotorNode,
     time::Instant,
-    ucp::{Host, HostConfig, Robot, RobotConfig, Telemetry},
+    ucp::{Host, Robot, Telemetry, host::HostConfig, robot::RobotConfig},
 };
 use serialport::{
     ClearBuffer, DataBits, FlowControl, Parity, Result, SerialPort, StopBits, TTYPort,

@@ -5,7 +5,10 @@ use std::{thread, time};
 use axlewire::{
     endpoint::Endpoint,
     time::{Duration, Instant},
-    ucp::{self, Host, HostConfig, HostEvent, Link, MotorControl},
+    ucp::{
+        self, Host, MotorControl,
+        host::{HostConfig, HostEvent, Link},
+    },
 };
 
 use crate::{

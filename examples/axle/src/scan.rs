@@ -2,7 +2,11 @@
 
 use std::io::{self, Write};
 
-use axlewire::ikeya::{DipSwitch, IdReading, Mode, NodeId, OneMotor, Status};
+use axlewire::ikeya::{
+    Mode, NodeId, Status,
+    board::OneMotor,
+    slave::{DipSwitch, IdReading},
+};
 use serde::Serialize;
 
 use crate::{

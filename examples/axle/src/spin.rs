@@ -2,7 +2,7 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{MasterEvent, Mode, NodeId, OneMotor, Position, Rps, Status, Target},
+    ikeya::{Mode, NodeId, Position, Rps, Status, Target, board::OneMotor, master::MasterEvent},
     time::{Duration, Instant},
 };
 

@@ -1,6 +1,10 @@
 //! `axle stop`: whatever answers on a line is stopped.
 
-use axlewire::ikeya::{MasterConfig, NodeId, NodeSet, OneMotor, ThreeMotors};
+use axlewire::ikeya::{
+    NodeId,
+    board::{OneMotor, ThreeMotors},
+    master::{MasterConfig, NodeSet},
+};
 
 use crate::{
     MOTION_HELP,

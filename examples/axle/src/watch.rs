@@ -58,8 +58,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     match args.protocol {
         Protocol::Ucp => watch::<ucp::Ucp>(args, ucp::BAUD, &signals),
-        Protocol::Ikeya => watch::<ikeya::Either>(args, ikeya::BAUD, &signals),
-        Protocol::Ikeya3 => watch::<three::Either>(args, ikeya::BAUD, &signals),
+        Protocol::Ikeya => watch::<ikeya::BothDirections>(args, ikeya::BAUD, &signals),
+        Protocol::Ikeya3 => watch::<three::BothDirections>(args, ikeya::BAUD, &signals),
     }
 }
 

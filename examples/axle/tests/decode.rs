@@ -12,7 +12,7 @@ use std::{
 
 use axlewire::{
     ikeya::{NodeId, Rps, VelocityResponse},
-    ucp::{Body, Ping},
+    ucp::{Body, message::Ping},
 };
 use serde_json::{Value, json};
 use support::{Capture, axle, bytes, decode, file, run, run_in_pieces, stdout};

@@ -10,7 +10,7 @@ use std::{
     thread,
 };
 
-use axlewire::ucp::{Body, Ping};
+use axlewire::ucp::{Body, message::Ping};
 use support::axle;
 
 /// Bytes fed in all.

@@ -7,11 +7,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    drive::{Driver, WithDelay},
-    time::{Duration, Instant},
-    ucp::{BAUD, OtaStatus, Robot, RobotConfig, RobotEvent, Telemetry},
-};
+use axlewire::{drive::{Driver, WithDelay}, time::{Duration, Instant}, ucp::{message::OtaStatus, robot::{RobotConfig, RobotEvent}, Robot, Telemetry, BAUD}};
 use embassy_executor::Spawner;
 use embassy_stm32::{
     Config, Peri,

@@ -12,11 +12,7 @@ use panic_halt as _;
 
 #[rtic::app(device = stm32f4::stm32f405, dispatchers = [EXTI0])]
 mod app {
-    use axlewire::{
-        endpoint::Endpoint,
-        ikeya::{DipSwitch, IdReading, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
-        time::{Duration, Wrapping32},
-    };
+    use axlewire::{endpoint::Endpoint, ikeya::{slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent}, Position, Rps, Slave, Target}, time::{Duration, Wrapping32}};
     use heapless::spsc::{Consumer, Producer, Queue};
     use rtic_sync::signal::{Signal, SignalReader, SignalWriter};
     use stm32f4::stm32f405::Interrupt;

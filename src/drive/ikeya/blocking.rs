@@ -1,9 +1,15 @@
 //! The blocking motor-bus calls.
 
-use super::{DriveError, Driver, OnlineNodes};
+use super::OnlineNodes;
+use crate::drive::{Driver, error::DriveError};
 use crate::{
-    drive::{Clock, Needs, Operation},
-    ikeya::{Board, Master, NodeId, NodeSet, Slave, Status, Target},
+    drive::{Needs, clock::Clock, error::Operation},
+    ikeya::{
+        NodeId,
+        board::{Board, Status, Target},
+        master::{Master, NodeSet},
+        slave::Slave,
+    },
     time::{Duration, Instant},
 };
 
@@ -40,7 +46,7 @@ where
     /// any of them but a refusal the command is withdrawn: neither it nor its rest is sent later, and
     /// **the node is owed a stop** (ruling I12), because it may have heard the command. Keep calling
     /// the driver, or call [`stop`](Self::stop), until the stop is paid: set-points are refused with
-    /// [`CommandError::StopOwed`](crate::ikeya::CommandError::StopOwed) meanwhile.
+    /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed) meanwhile.
     pub fn set_velocity(
         &mut self,
         node: NodeId,
@@ -98,7 +104,7 @@ where
         self.pay_stops(node.into())
     }
 
-    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::MasterConfig::nodes), and every
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and every
     /// other one that has ever answered, as [`stop`](Self::stop) does.
     ///
     /// # Errors

@@ -1,10 +1,15 @@
 //! The async rover-link calls.
 
-use super::{DriveError, Driver};
+use crate::drive::{Driver, error::DriveError};
 use crate::{
-    drive::{Clock, Needs, Operation},
+    drive::{Needs, clock::Clock, error::Operation},
     time::{Duration, Instant},
-    ucp::{BiasStore, CalibrationKind, CalibrationStep, Host, MotorControl, ReceivedReport, Robot},
+    ucp::{
+        MotorControl,
+        host::{BiasStore, CalibrationStep, Host, ReceivedReport},
+        message::CalibrationKind,
+        robot::Robot,
+    },
 };
 
 /// The async calls of a host: the same as the blocking ones, and as cancel safe as the
@@ -18,7 +23,7 @@ where
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
     /// Waits for the robot to answer a ping, of which one is sent every
-    /// [`HostConfig::ping_period`](crate::ucp::HostConfig::ping_period); returns its round trip.
+    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period); returns its round trip.
     ///
     /// # Errors
     ///
@@ -99,7 +104,7 @@ where
     }
 
     /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
-    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::HostConfig::calibration_bound)
+    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound)
     /// leaves room for all attempts.
     ///
     /// # Errors

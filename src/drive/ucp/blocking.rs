@@ -1,10 +1,15 @@
 //! The blocking rover-link calls.
 
-use super::{DriveError, Driver};
+use crate::drive::{Driver, error::DriveError};
 use crate::{
-    drive::{Clock, Needs, Operation},
+    drive::{Needs, clock::Clock, error::Operation},
     time::{Duration, Instant},
-    ucp::{BiasStore, CalibrationKind, CalibrationStep, Host, MotorControl, ReceivedReport, Robot},
+    ucp::{
+        MotorControl,
+        host::{BiasStore, CalibrationStep, Host, ReceivedReport},
+        message::CalibrationKind,
+        robot::Robot,
+    },
 };
 
 /// The blocking calls of a host.
@@ -16,7 +21,7 @@ where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
     /// Waits for the robot to answer a ping, of which one is sent every
-    /// [`HostConfig::ping_period`](crate::ucp::HostConfig::ping_period); returns its round trip.
+    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period); returns its round trip.
     ///
     /// # Errors
     ///
@@ -84,7 +89,7 @@ where
     }
 
     /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
-    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::HostConfig::calibration_bound)
+    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound)
     /// leaves room for all attempts.
     ///
     /// # Errors

@@ -1,15 +1,13 @@
 //! Settings of a master.
 
-use crate::{
-    ikeya::{BAUD, NodeSet},
-    time::Duration,
-};
+use super::nodes::NodeSet;
+use crate::{ikeya::units::BAUD, time::Duration};
 
 /// Settings of a [`Master`](super::Master): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
 /// ```
-/// use axlewire::{ikeya::{MasterConfig, NodeId, NodeSet}, time::Duration};
+/// use axlewire::{ikeya::{master::{MasterConfig, NodeSet}, NodeId}, time::Duration};
 /// let mut config = MasterConfig::usb_adapter();
 /// config.reply_timeout = Duration::from_millis(5); // an adapter with its latency timer set to 1 ms
 /// config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus

@@ -1,25 +1,7 @@
 //! Discovery: every id that is not online is asked, silent ones again.
 
-use super::{Master, MasterEvent};
-use crate::ikeya::{Board, NodeId};
-
-/// How far a discovery is: all ids once, then all again.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) struct Discovery {
-    step: u16,
-}
-
-impl Discovery {
-    /// The node to be asked next, as an index.
-    pub(super) const fn index(self) -> usize {
-        (self.step & 7) as usize
-    }
-
-    /// How often each id was asked before.
-    const fn pass(self) -> u16 {
-        self.step >> 3
-    }
-}
+use super::{event::MasterEvent, role::Master, turns::Discovery};
+use crate::ikeya::{board::Board, units::NodeId};
 
 impl<B: Board> Master<B> {
     /// Begins a discovery, or joins the one that is under way.

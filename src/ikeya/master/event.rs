@@ -2,8 +2,11 @@
 
 use core::fmt;
 
-use super::Health;
-use crate::ikeya::{Board, Mode, NodeId, OneMotor, Status};
+use super::health::Health;
+use crate::ikeya::{
+    board::{Board, OneMotor, Status},
+    units::{Mode, NodeId},
+};
 
 /// What the master tells its application.
 #[derive(Clone, Copy, Debug, PartialEq)]

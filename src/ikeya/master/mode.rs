@@ -1,12 +1,19 @@
 //! Modes: what an answer in another mode does, and who decides (I11).
 
 use super::{
-    Cause, Master, MasterEvent,
+    event::{Cause, MasterEvent},
     node::{DOUBT_EXCHANGES, Node},
+    role::Master,
     set_point::{Confirm, SetPoint},
     stop::{Standstill, Stop},
 };
-use crate::ikeya::{Board, Mode, NodeId, Status, Target};
+use crate::{
+    ikeya::{
+        board::{Board, Status, Target},
+        units::{Mode, NodeId},
+    },
+    stats::count,
+};
 
 /// What an answer says about the mode.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -39,7 +46,7 @@ impl<B: Board> Node<B> {
     /// Puts the mode in doubt. A position that was held is to be measured anew. Says whether that
     /// ends a confirmation.
     fn doubt_mode(&mut self) -> bool {
-        self.statistics.other_mode = self.statistics.other_mode.wrapping_add(1);
+        count(&mut self.statistics.other_mode);
         if self.doubt.is_some() {
             return false;
         }

@@ -1,32 +1,26 @@
 //! Everything that a master keeps of one node.
 
 use super::{
-    Cause, CommandError, MasterConfig, Mode, NodeId, NodeStatistics, Polling, Status, StopProgress,
-    queue::Reason,
+    config::{MasterConfig, Polling},
+    event::{Cause, CommandError},
+    health::Health,
     set_point::{Confirm, SetPoint},
-    stop::{Standstill, Stop},
+    statistics::NodeStatistics,
+    stop::{Standstill, Stop, StopProgress},
+    turns::Reason,
 };
 use crate::{
-    ikeya::{Board, Target},
+    ikeya::{
+        board::{Board, Status, Target},
+        units::{Mode, NodeId},
+    },
+    stats::count,
     time::Instant,
 };
 
 /// Exchanges without a decision after which the application is told that a mode stays in doubt
 /// (I11). The node has been abnormal since the third, and is read at the pace of the search.
 pub(super) const DOUBT_EXCHANGES: u8 = 6;
-
-/// How a node is (ruling I7).
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Health {
-    /// It answered the last time.
-    Online,
-    /// It missed this many answers in a row, 1 or 2.
-    Suspect(u8),
-    /// It missed three in a row. It gets no set-points, and is asked now and then.
-    Abnormal,
-}
 
 // Flags in front: there they take short instructions.
 #[derive(Clone, Debug)]
@@ -88,7 +82,7 @@ impl<B: Board> Node<B> {
     }
 
     pub(super) fn is_online(&self) -> bool {
-        matches!(self.health, Some(Health::Online | Health::Suspect(_)))
+        self.health.is_some_and(Health::is_online)
     }
 
     pub(super) fn is_abnormal(&self) -> bool {
@@ -224,9 +218,9 @@ impl<B: Board> Node<B> {
     /// A request that it is to answer has been sent.
     #[inline(never)]
     pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
-        self.statistics.requests = self.statistics.requests.wrapping_add(1);
+        count(&mut self.statistics.requests);
         if self.attempt > 0 {
-            self.statistics.retries = self.statistics.retries.wrapping_add(1);
+            count(&mut self.statistics.retries);
         }
         (self.is_asked, self.is_written) = (false, false);
         let is_lost = !self.is_online();

@@ -17,135 +17,23 @@
 //!   rounds of the search, and for two discoveries;
 //! * the search waits for one round, also while a discovery goes on.
 
-use super::{Master, NodeId, PACKET_LEN, ReadRequest, node::Node, set_point::Confirm};
+use super::{
+    node::Node,
+    role::Master,
+    set_point::Confirm,
+    turns::{Choice, Reason, Request, Round, Sent},
+};
 use crate::{
+    encode::Encode,
     endpoint::{Endpoint as _, Unsent},
-    ikeya::{Board, Target},
-    stream::Encode,
+    ikeya::{
+        board::{Board, PACKET_LEN, Target},
+        units::NodeId,
+        wire::ReadRequest,
+    },
+    stats::{count, uncount},
     time::{Duration, Instant, wire_time},
 };
-
-/// What is sent.
-#[derive(Clone, Copy, Debug)]
-enum Request<B: Board> {
-    Read,
-    Write(Target<B>),
-}
-
-impl<B: Board> Request<B> {
-    /// A silent request is not answered.
-    const fn is_exchange(&self) -> bool {
-        B::ANSWERS_WRITE || matches!(self, Self::Read)
-    }
-}
-
-/// Why it is sent.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) enum Reason {
-    /// The WRITE of a position that has just been measured: the second half of an attempt.
-    Hold,
-    /// A stop WRITE for a velocity node that is online.
-    SpeedStop,
-    /// A stop WRITE for any node that is online.
-    Stop,
-    /// A READ that a stop or a mode in doubt waits for.
-    StopRead,
-    /// The first attempt for a node that is owed a stop and is not online.
-    LostStop,
-    SetPoint,
-    Discovery,
-    Search,
-    Cycle,
-}
-
-impl Reason {
-    /// What is urgent, in its order, and then the rest.
-    const ALL: [Self; 9] = [
-        Self::Hold,
-        Self::SpeedStop,
-        Self::Stop,
-        Self::StopRead,
-        Self::LostStop,
-        Self::SetPoint,
-        Self::Discovery,
-        Self::Search,
-        Self::Cycle,
-    ];
-
-    /// For a stop, or about a mode in doubt.
-    const fn is_stop(self) -> bool {
-        matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
-    }
-}
-
-/// One request.
-#[derive(Clone, Copy, Debug)]
-struct Choice<B: Board> {
-    index: usize,
-    request: Request<B>,
-    reason: Reason,
-    round: Round,
-}
-
-/// The round that a request belongs to: the one under way, or the next, in which each node has its
-/// turns again.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-enum Round {
-    Same,
-    Next,
-}
-
-/// The request that was handed out last.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sent<B: Board> {
-    choice: Choice<B>,
-    /// When its first byte could leave.
-    start: Instant,
-    len: usize,
-}
-
-/// Whose turn it is.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Turns {
-    /// The node that was served last with a stop, as an index.
-    stop: usize,
-    /// The same with a new set-point.
-    set_point: usize,
-    /// The node whose turn in the cycle it is.
-    cycle: usize,
-    /// Turns of the cycle that go in front of a discovery.
-    cycle_first: u8,
-    is_second_discovery: bool,
-    /// The last round ended with an exchange of the search.
-    was_search: bool,
-    /// The nodes that have had their exchange for a stop in this round, a bit for each.
-    had_stop: u8,
-    /// The same with their new set-point.
-    had_set_point: u8,
-}
-
-impl Turns {
-    /// A discovery has ended: after every second one each node has its turn in the cycle first.
-    pub(super) const fn end_discovery(&mut self) {
-        self.is_second_discovery = !self.is_second_discovery;
-        if !self.is_second_discovery {
-            self.cycle_first = 8;
-        }
-    }
-
-    /// Has this node its turn? A stop WRITE is followed by a READ before it is repeated, so it needs
-    /// no turn of its own unless it is answered.
-    fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
-        let had = match reason {
-            _ if round == Round::Next => 0,
-            Reason::SpeedStop | Reason::Stop if !B::ANSWERS_WRITE => 0,
-            Reason::SetPoint => self.had_set_point,
-            Reason::Hold | Reason::Discovery | Reason::Search | Reason::Cycle => 0,
-            _ => self.had_stop,
-        };
-        had >> index & 1 == 0
-    }
-}
 
 impl<B: Board> Master<B> {
     /// When the next request is due, wherever the line may be.
@@ -292,11 +180,11 @@ impl<B: Board> Master<B> {
             (self.turns.had_stop, self.turns.had_set_point) = (0, 0);
             self.turns.was_search = reason == Reason::Search;
         }
-        let count = match request {
+        let counter = match request {
             Request::Read => &mut self.statistics.reads,
             Request::Write(_) => &mut self.statistics.writes,
         };
-        *count = count.wrapping_add(1);
+        count(counter);
         let index = index & 7;
         if matches!(request, Request::Write(_)) {
             self.nodes[index].wrote();
@@ -357,11 +245,11 @@ impl<B: Board> Master<B> {
             self.line_free = Some(end + self.config.turnaround_gap + silence);
             self.echo.forget_all();
         }
-        let count = match request {
+        let counter = match request {
             Request::Read => &mut self.statistics.reads,
             Request::Write(_) => &mut self.statistics.writes,
         };
-        *count = count.wrapping_sub(1);
+        uncount(counter);
         if reason == Reason::Search {
             self.search.next_at = None;
         }
@@ -418,7 +306,7 @@ impl<B: Board> Node<B> {
     }
 
     fn take_back_request(&mut self, is_scan: bool) {
-        self.statistics.requests = self.statistics.requests.wrapping_sub(1);
+        uncount(&mut self.statistics.requests);
         self.scans = self.scans.saturating_sub(is_scan.into());
         self.is_asked = self.is_online();
         let is_lost = !self.is_asked;

@@ -1,6 +1,6 @@
 //! Set-points: what a node was last told, whether it has left, and its confirmation (I8).
 
-use crate::ikeya::{Board, Target};
+use crate::ikeya::board::{Board, Target};
 
 /// What a node is told, again in every cycle.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,11 @@
 //! Counts of a line and of its nodes.
 
-use crate::time::Duration;
+use crate::{
+    stats::{Latency, count},
+    time::Duration,
+};
 
-/// What the master has seen of the line as a whole. All counts wrap.
+/// What the master has seen of the line as a whole. Counts stop at 2^32 - 1.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -22,7 +25,7 @@ pub struct MasterStatistics {
     pub dead_man: u32,
 }
 
-/// The counts of one node. All wrap, but those of the latency, which stop together.
+/// The counts of one node. Counts stop at 2^32 - 1.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -46,10 +49,8 @@ pub struct NodeStatistics {
     pub retries: u32,
     /// READs that were given up, all attempts included.
     pub failures: u32,
-    latency_count: u32,
-    latency_min_us: u32,
-    latency_max_us: u32,
-    latency_sum_us: u64,
+    /// Times from the end of a request to the beginning of its answer.
+    pub latency: Latency,
 }
 
 impl NodeStatistics {
@@ -64,64 +65,11 @@ impl NodeStatistics {
         other_mode: 0,
         retries: 0,
         failures: 0,
-        latency_count: 0,
-        latency_min_us: 0,
-        latency_max_us: 0,
-        latency_sum_us: 0,
+        latency: Latency::NEW,
     };
 
-    /// Shortest time from the end of a request to the beginning of its answer.
-    #[must_use]
-    pub const fn latency_min(&self) -> Duration {
-        Duration::from_micros(self.latency_min_us)
-    }
-
-    /// Mean time from the end of a request to the beginning of its answer, over the first 2^32
-    /// answers.
-    #[must_use]
-    pub const fn latency_mean(&self) -> Duration {
-        match self.latency_sum_us.checked_div(self.latency_count as u64) {
-            Some(mean) => Duration::from_micros(mean as u32),
-            None => Duration::ZERO,
-        }
-    }
-
-    /// Longest time from the end of a request to the beginning of its answer.
-    #[must_use]
-    pub const fn latency_max(&self) -> Duration {
-        Duration::from_micros(self.latency_max_us)
-    }
-
     pub(super) fn reply(&mut self, latency: Duration) {
-        self.replies = self.replies.wrapping_add(1);
-        let micros = latency.as_micros();
-        let is_first = self.latency_count == 0;
-        self.latency_min_us = if is_first { micros } else { self.latency_min_us.min(micros) };
-        self.latency_max_us = self.latency_max_us.max(micros);
-        // 2^32 spans of 32 bits fit into 64; one more would let the mean drift.
-        if let Some(count) = self.latency_count.checked_add(1) {
-            self.latency_count = count;
-            self.latency_sum_us += u64::from(micros);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_mean_latency_stays_right_when_the_count_of_replies_wraps() {
-        let mut statistics = NodeStatistics {
-            replies: u32::MAX,
-            latency_count: u32::MAX,
-            latency_sum_us: u64::from(u32::MAX) * 50,
-            ..NodeStatistics::NEW
-        };
-        for _ in 0..3 {
-            statistics.reply(Duration::from_micros(50));
-        }
-        assert_eq!(statistics.replies, 2);
-        assert_eq!(statistics.latency_mean(), Duration::from_micros(50));
+        count(&mut self.replies);
+        self.latency.add(latency);
     }
 }

@@ -1,7 +1,7 @@
 //! Stops: debts that are paid by two WRITEs, each followed by an answer (I6, I12).
 
 use crate::{
-    ikeya::{Board, Status},
+    ikeya::board::{Board, Status},
     time::{Duration, Instant},
 };
 

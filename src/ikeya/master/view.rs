@@ -1,11 +1,20 @@
 //! What a master knows of its bus.
 
+use super::nodes::NodeSet;
 use super::{
-    Cause, CommandError, Health, Master, MasterConfig, MasterStatistics, NodeStatistics,
-    PACKET_LEN, StopProgress,
+    config::MasterConfig,
+    event::{Cause, CommandError},
+    health::Health,
+    role::Master,
+    statistics::{MasterStatistics, NodeStatistics},
+    stop::StopProgress,
 };
+use crate::ikeya::board::PACKET_LEN;
 use crate::{
-    ikeya::{Board, Mode, NodeId, NodeSet, Status, Target},
+    ikeya::{
+        board::{Board, Status, Target},
+        units::{Mode, NodeId},
+    },
     stream::Counters,
     time::{Duration, Instant, wire_time},
 };
@@ -113,7 +122,7 @@ impl<B: Board> Master<B> {
     }
 
     /// Longest time from the first request of a READ to its answer or its
-    /// [failure](crate::ikeya::MasterEvent::ReadFailed), on any line, where the driver is called in time and
+    /// [failure](crate::ikeya::master::MasterEvent::ReadFailed), on any line, where the driver is called in time and
     /// neither a discovery nor stops are under way, which go first.
     ///
     /// Between two attempts lie the guard, one exchange with each other node and as many of the search

@@ -1,7 +1,7 @@
 //! Settings of a slave.
 
 use crate::{
-    ikeya::BAUD,
+    ikeya::units::BAUD,
     time::{Duration, wire_time},
 };
 

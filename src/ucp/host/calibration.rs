@@ -1,9 +1,12 @@
 //! Calibration requests: acknowledged, repeated, given up.
 
-use super::{CalibrationFailure, CalibrationStep, FailureCause, HostConfig, HostEvent};
+use super::{
+    config::HostConfig,
+    event::{CalibrationFailure, CalibrationStep, FailureCause, HostEvent},
+};
 use crate::{
     time::Instant,
-    ucp::{CalibrationKind, ErrorCode},
+    ucp::codes::{CalibrationKind, ErrorCode},
 };
 
 /// A request that has not been settled.
@@ -50,7 +53,7 @@ impl Request {
     }
 
     /// What to send now, if anything, and whether it was sent before.
-    pub(super) fn take(
+    pub(super) fn take_due(
         &mut self,
         now: Instant,
         config: &HostConfig,

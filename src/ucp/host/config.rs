@@ -2,20 +2,20 @@
 
 use crate::{
     time::{Duration, wire_time},
-    ucp::{BAUD, CalibrationStart, FrameOf, role::SHORTEST},
+    ucp::{body::CalibrationStart, frame::FrameOf, header::BAUD, role::SHORTEST},
 };
 
-/// Settings of a [`Host`](super::Host): periods, timeouts, and what it may send.
+/// Settings of a [`Host`](super::Host): start from [`direct`](Self::direct) or
+/// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
-/// Take the default and change what has to be different. A period or timeout under 1 ms counts as
-/// 1 ms, because a driver would spin otherwise.
+/// A period or timeout under 1 ms counts as 1 ms, because a driver would spin otherwise.
 ///
 /// ```
-/// use axlewire::ucp::HostConfig;
+/// use axlewire::ucp::host::HostConfig;
 /// let mut config = HostConfig::default();
 /// config.ping_period = None; // the reports say enough
 /// ```
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct HostConfig {
@@ -35,7 +35,7 @@ pub struct HostConfig {
     pub sends_first_stop: bool,
     /// Dead-man: after this much silence of the application the robot is told to stand still
     /// (ruling U10); 500 ms.
-    pub command_timeout: Duration,
+    pub dead_man: Duration,
     /// How often a ping is sent; 200 ms, `None` for never.
     pub ping_period: Option<Duration>,
     /// How long a pong may take before the ping counts as lost; 500 ms. The next ping waits for it:
@@ -50,7 +50,7 @@ pub struct HostConfig {
     pub attempts: u8,
     /// A frame is cut off by a pause of two byte times and this; 20 ms, because USB adapters and
     /// operating systems hand in bytes up to 16 ms late. On a bare UART 1 ms will do.
-    pub quiet_margin: Duration,
+    pub idle_margin: Duration,
     /// Never sends an id in 5..=0x0A, for robots that hang on them (ruling U14); `false`.
     ///
     /// Firmware built from the vendor's main branch hangs for ever on any such frame, the answer to
@@ -84,7 +84,7 @@ impl HostConfig {
         Self {
             command_period: self.command_period.max(SHORTEST),
             command_gap: self.command_gap.max(SHORTEST),
-            command_timeout: self.command_timeout.max(SHORTEST),
+            dead_man: self.dead_man.max(SHORTEST),
             ping_period: self.ping_period.map(|period| period.max(SHORTEST)),
             ping_timeout: self.ping_timeout.max(SHORTEST),
             link_timeout: self.link_timeout.max(SHORTEST),
@@ -94,20 +94,35 @@ impl HostConfig {
     }
 }
 
+/// [`usb_adapter`](HostConfig::usb_adapter), which suits every host with an operating system.
 impl Default for HostConfig {
     fn default() -> Self {
+        Self::usb_adapter()
+    }
+}
+
+impl HostConfig {
+    /// For a UART of the processor itself: a frame is cut off by a pause of little more than 1 ms.
+    #[must_use]
+    pub const fn direct() -> Self {
+        Self { idle_margin: Duration::from_millis(1), ..Self::usb_adapter() }
+    }
+
+    /// For a USB adapter or an operating system, which may hold back bytes for 16 ms.
+    #[must_use]
+    pub const fn usb_adapter() -> Self {
         Self {
             baud: BAUD,
             command_period: Duration::from_millis(100),
             command_gap: Duration::from_millis(20),
             sends_first_stop: true,
-            command_timeout: Duration::from_millis(500),
+            dead_man: Duration::from_millis(500),
             ping_period: Some(Duration::from_millis(200)),
             ping_timeout: Duration::from_millis(500),
             link_timeout: Duration::from_millis(500),
             ack_timeout: Duration::from_millis(200),
             attempts: 3,
-            quiet_margin: Duration::from_millis(20),
+            idle_margin: Duration::from_millis(20),
             low_ids_only: false,
         }
     }

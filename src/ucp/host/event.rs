@@ -1,4 +1,4 @@
-//! What a host tells its application: events, refusals, figures.
+//! Events of a host, and its refusals.
 
 use core::{error::Error, fmt};
 
@@ -8,8 +8,11 @@ use crate::{
     error::EncodeError,
     time::Duration,
     ucp::{
-        CalibrationKind, ErrorCode, ImuBias, MAX_BODY_LEN, MagBias, OtaStatus, RawFrame, Report,
-        Telemetry,
+        body::{ImuBias, MagBias},
+        codes::{CalibrationKind, ErrorCode, OtaStatus},
+        frame::RawFrame,
+        header::MAX_BODY_LEN,
+        report::{Report, Telemetry},
     },
 };
 
@@ -168,13 +171,8 @@ pub enum FailureCause {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CommandError {
-    /// A speed or turn out of range (ruling U7).
+    /// A speed, a turn or a network state out of range (rulings U7, U8).
     Value(EncodeError),
-    /// A network state above 255, which one byte cannot carry (ruling U8).
-    NetworkState {
-        /// The state.
-        state: u32,
-    },
     /// A calibration that no robot knows: it would be acknowledged and do nothing.
     CalibrationKind {
         /// What was asked for.
@@ -199,10 +197,7 @@ pub enum CommandError {
 impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Value(_) => f.write_str("motor command is out of range"),
-            Self::NetworkState { state } => {
-                write!(f, "network state {state} does not fit into one byte")
-            }
+            Self::Value(_) => f.write_str("the value is out of range"),
             Self::CalibrationKind { kind } => write!(f, "no robot can calibrate {kind}"),
             Self::Calibrating => f.write_str("a calibration request is still unanswered"),
             Self::LowIdsOnly { id } => {
@@ -219,115 +214,6 @@ impl Error for CommandError {
         match self {
             Self::Value(error) => Some(error),
             _ => None,
-        }
-    }
-}
-
-/// What a host has seen. Counts stop at 2^32 - 1. What noise has cost is in
-/// [`counters`](super::Host::counters).
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct HostStatistics {
-    /// Motor commands sent.
-    pub commands: u32,
-    /// Times that the dead-man has stopped the robot.
-    pub dead_man: u32,
-    /// Times that the link has gone down.
-    pub links_lost: u32,
-    /// Pings sent.
-    pub pings: u32,
-    /// Pings that were not answered in time.
-    pub pings_lost: u32,
-    /// Pongs that say that the ping was damaged, or anything but 0.
-    pub pings_damaged: u32,
-    /// Pongs that nobody was waiting for, late ones among them.
-    pub pongs_unasked: u32,
-    /// Round trips of the answered pings.
-    pub round_trip: RoundTrip,
-    /// Reports received.
-    pub reports: u32,
-    /// Reports missing by their index.
-    pub reports_lost: u32,
-    /// Reports with the index of the one before: repeated, or of a robot that does not count.
-    pub reports_repeated: u32,
-    /// Calibration requests sent again.
-    pub calibration_retries: u32,
-    /// Calibration requests that came to nothing.
-    pub calibration_failures: u32,
-    /// Acknowledgements of calibration requests that nobody was waiting for.
-    pub acks_unasked: u32,
-    /// Calibration results received again.
-    pub results_repeated: u32,
-    /// Calibration results that the store has refused.
-    pub results_not_stored: u32,
-    /// Calibration results not acknowledged for want of room for their event: the robot repeats
-    /// them.
-    pub results_without_room: u32,
-    /// Requests for biases received.
-    pub bias_requests: u32,
-    /// Biases sent.
-    pub biases: u32,
-    /// Good frames without a message.
-    pub unknown: u32,
-    /// Frames that only a host sends, such as our own on an echoing line: not looked at.
-    pub misdirected: u32,
-}
-
-/// How long answers take, microseconds.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RoundTrip {
-    count: u32,
-    min: u32,
-    max: u32,
-    sum: u64,
-    last: u32,
-}
-
-impl RoundTrip {
-    pub(super) fn add(&mut self, round_trip: Duration) {
-        let micros = round_trip.as_micros();
-        self.min = if self.count == 0 { micros } else { self.min.min(micros) };
-        self.max = self.max.max(micros);
-        self.last = micros;
-        // 2^32 spans of 32 bits fit into 64; one more would let the mean drift.
-        if let Some(count) = self.count.checked_add(1) {
-            self.count = count;
-            self.sum += u64::from(micros);
-        }
-    }
-
-    /// How many were measured.
-    #[must_use]
-    pub const fn count(&self) -> u32 {
-        self.count
-    }
-
-    /// The latest; `None` before the first.
-    #[must_use]
-    pub const fn last(&self) -> Option<Duration> {
-        if self.count == 0 { None } else { Some(Duration::from_micros(self.last)) }
-    }
-
-    /// The fastest; `None` before the first.
-    #[must_use]
-    pub const fn min(&self) -> Option<Duration> {
-        if self.count == 0 { None } else { Some(Duration::from_micros(self.min)) }
-    }
-
-    /// The slowest; `None` before the first.
-    #[must_use]
-    pub const fn max(&self) -> Option<Duration> {
-        if self.count == 0 { None } else { Some(Duration::from_micros(self.max)) }
-    }
-
-    /// The mean, truncated; `None` before the first.
-    #[must_use]
-    pub const fn mean(&self) -> Option<Duration> {
-        match self.sum.checked_div(self.count as u64) {
-            Some(mean) => Some(Duration::from_micros(mean as u32)),
-            None => None,
         }
     }
 }

@@ -1,10 +1,10 @@
 //! The motor command: the latest wins, is repeated, and does not outlive its application.
 
-use super::HostConfig;
+use super::config::HostConfig;
 use crate::{
     endpoint::Unsent,
-    time::{Instant, earliest},
-    ucp::{MotorControl, role::reached},
+    time::{Instant, earliest, reached},
+    ucp::motor::MotorControl,
 };
 
 /// Which motor command is sent when.
@@ -115,7 +115,7 @@ impl Motor {
     pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
         let still = command.stands_still();
         self.latest = Some(command);
-        self.dead_man = (!still).then(|| now + config.command_timeout);
+        self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
             // The first frame comes first, and more copies of it if need be.
             _ if self.first == First::Due || self.copies.are_due() => now,
@@ -139,7 +139,7 @@ impl Motor {
     }
 
     /// The command to send now, if any.
-    pub(super) fn take(&mut self, now: Instant, config: &HostConfig) -> Option<MotorControl> {
+    pub(super) fn take_due(&mut self, now: Instant, config: &HostConfig) -> Option<MotorControl> {
         let latest = self.latest.filter(|_| reached(self.due, now))?;
         let command = if self.first == First::Due { latest.halted() } else { latest };
         self.copies = self.copies.take();

@@ -1,11 +1,11 @@
 //! Pings, one at a time: a pong does not say which ping it answers.
 
-use super::HostConfig;
+use super::config::HostConfig;
 use crate::time::{Duration, Instant};
 
 /// Where the ping is.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Ping {
+pub(super) enum PingState {
     /// Not wanted.
     Off,
     /// To be sent then.
@@ -14,13 +14,13 @@ pub(super) enum Ping {
     Sent { at: Instant, until: Instant },
 }
 
-impl Ping {
+impl PingState {
     pub(super) fn new(now: Instant, config: &HostConfig) -> Self {
         if config.ping_period.is_some() { Self::Due(now) } else { Self::Off }
     }
 
     /// Is a ping to be sent now? It counts as sent.
-    pub(super) fn take(&mut self, now: Instant, config: &HostConfig) -> bool {
+    pub(super) fn take_due(&mut self, now: Instant, config: &HostConfig) -> bool {
         let due = matches!(*self, Self::Due(at) if at <= now);
         if due {
             *self = Self::Sent { at: now, until: now + config.ping_timeout };

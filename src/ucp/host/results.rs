@@ -29,7 +29,7 @@ impl<B: PartialEq> Results<B> {
     }
 
     /// The result is where the application will find it.
-    pub(super) fn take(&mut self, result: B, ack_due: Option<Instant>) {
+    pub(super) fn accept(&mut self, result: B, ack_due: Option<Instant>) {
         (self.taken, self.is_refused, self.ack_due) = (Some(result), false, ack_due);
     }
 

@@ -1,33 +1,24 @@
 //! What a host sends next, and what comes back unsent.
 
 use super::{
-    CalibrationStep, HostEvent,
+    bias::BiasStore,
     calibration::Request,
+    event::{CalibrationStep, HostEvent},
+    outgoing::Outgoing,
     state::{State, Update},
 };
 use crate::{
     endpoint::Unsent,
+    stats::{count, uncount},
     time::{Instant, earliest},
     ucp::{
-        BiasStore, Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode,
-        ImuBiasAck, MAX_LEN, MagBiasAck, MotorControl, OtaRequest, Ping, SetNetworkState,
-        role::{bump, uncount, write},
+        body::{Biases, CalibrationEnd, CalibrationStart, ImuBiasAck, MagBiasAck, Ping},
+        codes::ErrorCode,
+        header::MAX_LEN,
+        role::write,
+        update::OtaRequest,
     },
 };
-
-/// What a frame carries.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Outgoing {
-    Motor(MotorControl),
-    ImuAck,
-    MagAck,
-    Biases(Biases),
-    /// The last says that it is a repetition.
-    Calibration(CalibrationStep, CalibrationKind, bool),
-    Network(SetNetworkState),
-    Update(i16),
-    Ping,
-}
 
 impl<S: BiasStore> State<S> {
     /// Writes the most urgent frame that is due and says how long it is.
@@ -64,8 +55,8 @@ impl<S: BiasStore> State<S> {
         if self.update == Update::Silent {
             return None;
         }
-        if let Some(command) = self.motor.take(now, &self.config) {
-            bump(&mut self.stats.commands);
+        if let Some(command) = self.motor.take_due(now, &self.config) {
+            count(&mut self.stats.commands);
             return Some(Outgoing::Motor(command));
         }
         if self.imu.ack_due.take().is_some() {
@@ -79,10 +70,10 @@ impl<S: BiasStore> State<S> {
         }
         let request = self.calibration.as_mut();
         if let Some((step, kind, again)) =
-            request.and_then(|request| request.take(now, &self.config))
+            request.and_then(|request| request.take_due(now, &self.config))
         {
             if again {
-                bump(&mut self.stats.calibration_retries);
+                count(&mut self.stats.calibration_retries);
             }
             return Some(Outgoing::Calibration(step, kind, again));
         }
@@ -97,8 +88,8 @@ impl<S: BiasStore> State<S> {
             }
             _ => {}
         }
-        if self.ping.take(now, &self.config) {
-            bump(&mut self.stats.pings);
+        if self.ping.take_due(now, &self.config) {
+            count(&mut self.stats.pings);
             return Some(Outgoing::Ping);
         }
         None
@@ -113,7 +104,7 @@ impl<S: BiasStore> State<S> {
             self.events.push_frequent(HostEvent::BiasesMissing { imu, mag });
             return None;
         };
-        bump(&mut self.stats.biases);
+        count(&mut self.stats.biases);
         if !core::mem::replace(&mut self.biases_told, true) {
             self.events.push_frequent(HostEvent::BiasesSent);
         }

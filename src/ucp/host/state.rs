@@ -1,21 +1,30 @@
 //! What a host knows and is waiting for.
 
 use super::{
-    CalibrationFailure, CalibrationStep, CommandError, HostConfig, HostEvent, HostStatistics, Link,
-    ReceivedReport, UnknownFrame,
+    bias::BiasStore,
     calibration::{Answer, Request},
+    config::HostConfig,
+    event::{
+        CalibrationFailure, CalibrationStep, CommandError, HostEvent, ReceivedReport, UnknownFrame,
+    },
+    link::Link,
     motor::Motor,
-    ping::Ping,
+    outgoing::Outgoing,
+    ping::PingState,
     results::Results,
-    send::Outgoing,
+    statistics::HostStatistics,
 };
 use crate::{
     events::Events,
-    time::Instant,
+    stats::count,
+    time::{Instant, reached},
     ucp::{
-        BiasStore, CalibrationKind, ErrorCode, Frame, ImuBias, MagBias, Message, NetworkState,
-        OtaStatus, Pong, RawFrame, Report, SetNetworkState,
-        role::{bump, is_from_host, reached},
+        body::{ImuBias, MagBias, Pong, SetNetworkState},
+        codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+        frame::{Frame, RawFrame},
+        message::Message,
+        report::Report,
+        role::is_from_host,
     },
 };
 
@@ -32,7 +41,7 @@ pub(super) struct State<S> {
     /// When the link goes down.
     pub(super) link_until: Option<Instant>,
     pub(super) motor: Motor,
-    pub(super) ping: Ping,
+    pub(super) ping: PingState,
     pub(super) calibration: Option<Request>,
     /// What the robot has been told to begin last; `None` if this host does not know.
     last_start: Option<CalibrationKind>,
@@ -82,7 +91,7 @@ impl<S: BiasStore> State<S> {
             link: Link::Waiting,
             link_until: Some(now + config.link_timeout),
             motor: Motor::new(now, &config),
-            ping: Ping::new(now, &config),
+            ping: PingState::new(now, &config),
             calibration: None,
             last_start: None,
             outcome: None,
@@ -133,8 +142,7 @@ impl<S: BiasStore> State<S> {
     }
 
     pub(super) fn show(&mut self, network: NetworkState, now: Instant) -> Result<(), CommandError> {
-        let body = SetNetworkState::new(network)
-            .ok_or(CommandError::NetworkState { state: network.into() })?;
+        let body = SetNetworkState::new(network).map_err(CommandError::Value)?;
         self.allow(0x0A)?;
         if self.network.replace(body) != Some(body) {
             self.network_due = Some(now);
@@ -203,7 +211,7 @@ impl<S: BiasStore> State<S> {
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant) {
         let message = frame.message();
         if is_from_host(&message) == Some(true) {
-            bump(&mut self.stats.misdirected);
+            count(&mut self.stats.misdirected);
             return;
         }
         self.heard(at);
@@ -238,12 +246,12 @@ impl<S: BiasStore> State<S> {
 
     fn pong(&mut self, pong: &Pong, at: Instant) {
         let Some(round_trip) = self.ping.pong(at, &self.config) else {
-            bump(&mut self.stats.pongs_unasked);
+            count(&mut self.stats.pongs_unasked);
             return;
         };
         let err = pong.err();
         if err != ErrorCode::Fine {
-            bump(&mut self.stats.pings_damaged);
+            count(&mut self.stats.pings_damaged);
         }
         self.stats.round_trip.add(round_trip);
         self.events.push_frequent(HostEvent::Pong { round_trip, err });
@@ -252,13 +260,13 @@ impl<S: BiasStore> State<S> {
     fn report(&mut self, report: &Report<'_>, index: u8) {
         let lost = match self.last_index.replace(index) {
             Some(last) if last == index => {
-                bump(&mut self.stats.reports_repeated);
+                count(&mut self.stats.reports_repeated);
                 0
             }
             Some(last) => index.wrapping_sub(last).wrapping_sub(1),
             None => 0,
         };
-        bump(&mut self.stats.reports);
+        count(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
         (self.last_report, self.is_report_new) = (Some(report), true);
@@ -277,7 +285,7 @@ impl<S: BiasStore> State<S> {
             None => Answer::Unasked,
         };
         match answer {
-            Answer::Unasked => bump(&mut self.stats.acks_unasked),
+            Answer::Unasked => count(&mut self.stats.acks_unasked),
             Answer::Again => {}
             Answer::Settled(event) => self.settle_calibration(event),
         }
@@ -287,7 +295,7 @@ impl<S: BiasStore> State<S> {
         self.calibration = None;
         self.settled = Some(match event {
             HostEvent::CalibrationFailed(failure) => {
-                bump(&mut self.stats.calibration_failures);
+                count(&mut self.stats.calibration_failures);
                 if failure.step == CalibrationStep::Start {
                     // It may have arrived all the same.
                     self.last_start = None;
@@ -306,7 +314,7 @@ impl<S: BiasStore> State<S> {
 
     fn imu_result(&mut self, bias: ImuBias, at: Instant) {
         if self.imu.is_repetition(&bias) {
-            bump(&mut self.stats.results_repeated);
+            count(&mut self.stats.results_repeated);
         } else if self.store.store_imu(bias).is_err() {
             self.imu.refuse();
             return self.not_stored(CalibrationKind::Imu);
@@ -314,12 +322,12 @@ impl<S: BiasStore> State<S> {
             return self.imu.refuse();
         }
         let ack_due = self.allow(6).is_ok().then_some(at);
-        self.imu.take(bias, ack_due);
+        self.imu.accept(bias, ack_due);
     }
 
     fn mag_result(&mut self, bias: MagBias, at: Instant) {
         if self.mag.is_repetition(&bias) {
-            bump(&mut self.stats.results_repeated);
+            count(&mut self.stats.results_repeated);
         } else if self.store.store_mag(bias).is_err() {
             self.mag.refuse();
             return self.not_stored(CalibrationKind::Magnetometer);
@@ -327,7 +335,7 @@ impl<S: BiasStore> State<S> {
             return self.mag.refuse();
         }
         let ack_due = self.allow(7).is_ok().then_some(at);
-        self.mag.take(bias, ack_due);
+        self.mag.accept(bias, ack_due);
     }
 
     /// Tells of a result that the store has taken; will the application find it (ruling U15)?
@@ -338,19 +346,19 @@ impl<S: BiasStore> State<S> {
         }
         let kept = self.events.keep(event).is_ok();
         if !kept {
-            bump(&mut self.stats.results_without_room);
+            count(&mut self.stats.results_without_room);
         }
         kept
     }
 
     fn not_stored(&mut self, kind: CalibrationKind) {
-        bump(&mut self.stats.results_not_stored);
+        count(&mut self.stats.results_not_stored);
         self.events.push_frequent(HostEvent::BiasNotStored(kind));
     }
 
     /// The robot has booted, not more than a second ago or unanswered since.
     fn bias_request(&mut self, at: Instant) {
-        bump(&mut self.stats.bias_requests);
+        count(&mut self.stats.bias_requests);
         self.last_index = None;
         self.network_due = self.network.map(|_| at);
         if self.allow(8).is_ok() {
@@ -371,7 +379,7 @@ impl<S: BiasStore> State<S> {
     }
 
     fn unknown(&mut self, frame: &RawFrame<'_>) {
-        bump(&mut self.stats.unknown);
+        count(&mut self.stats.unknown);
         if let Some(frame) = UnknownFrame::copy(frame) {
             self.events.push_frequent(HostEvent::Unknown(frame));
         }
@@ -383,11 +391,11 @@ impl<S: BiasStore> State<S> {
             self.link_until = None;
             self.link = Link::Down;
             self.last_index = None;
-            bump(&mut self.stats.links_lost);
+            count(&mut self.stats.links_lost);
             self.events.push_latest(HostEvent::LinkDown, is_link);
         }
         if self.ping.expire(now, &self.config) {
-            bump(&mut self.stats.pings_lost);
+            count(&mut self.stats.pings_lost);
         }
         let request = self.calibration.as_mut();
         if let Some(failure) = request.and_then(|request| request.expire(now, &self.config)) {
@@ -397,7 +405,7 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn expire_command(&mut self, now: Instant) {
         if self.motor.expire(now) {
-            bump(&mut self.stats.dead_man);
+            count(&mut self.stats.dead_man);
             self.events.push(HostEvent::DeadMan);
         }
     }

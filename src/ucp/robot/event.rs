@@ -1,20 +1,24 @@
-//! What a robot tells its application: events and figures.
+//! Events of a robot.
 
-use crate::ucp::{Biases, CalibrationKind, MotorControl, NetworkState};
+use crate::ucp::{
+    body::Biases,
+    codes::{CalibrationKind, NetworkState},
+    motor::MotorControl,
+};
 
 /// Events of a robot: what the host asks for, and that it has fallen silent.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RobotEvent {
-    /// The command has changed, or is back after a [`WatchdogStop`](Self::WatchdogStop). In range,
+    /// The command has changed, or is back after a [`Watchdog`](Self::Watchdog). In range,
     /// the lamp field 100 or 0, all other fields 0.
     ///
     /// To move the robot, ask [`Robot::command`](super::Robot::command) instead: it is right at any
     /// time. In a queue that fills, only the latest command is sure to be told.
     Motor(MotorControl),
     /// No valid command for 500 ms: speed and turn are 0, the lamp is as it was (ruling U10).
-    WatchdogStop,
+    Watchdog,
     /// A calibration is to begin; it is acknowledged because it is told here (ruling U15).
     CalibrationStart {
         /// What is to be calibrated.
@@ -56,47 +60,4 @@ pub enum UpdateSource {
     /// clear its memory. Speed and turn of such a command are not taken, and it does not feed the
     /// watchdog.
     MotorCommand,
-}
-
-/// What a robot has seen. Counts stop at 2^32 - 1. What noise has cost is in
-/// [`counters`](super::Robot::counters).
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct RobotStatistics {
-    /// Motor commands taken.
-    pub commands: u32,
-    /// Motor commands taken with speed or turn cut to -100..=100.
-    pub commands_clamped: u32,
-    /// Motor commands not taken because they would start a firmware update.
-    pub commands_refused: u32,
-    /// Times that the watchdog has stopped the robot.
-    pub watchdog_stops: u32,
-    /// Pings received.
-    pub pings: u32,
-    /// Pongs sent. Pings that arrive together are answered together, so these can be fewer.
-    pub pongs: u32,
-    /// Reports sent.
-    pub reports: u32,
-    /// Reports not sent because the driver came a period or more too late.
-    pub reports_skipped: u32,
-    /// Starts of a calibration that was running already.
-    pub calibration_repeats: u32,
-    /// Calibration requests of a kind that there is not, or to end what is not under way, be it
-    /// because the acknowledgement of the end was lost: acknowledged and without effect.
-    pub calibration_refused: u32,
-    /// Calibration results sent, repetitions included.
-    pub results: u32,
-    /// Acknowledgements of results that were not waited for, or that say that the result was
-    /// damaged.
-    pub acks_refused: u32,
-    /// Requests, biases and acknowledgements not taken for want of room for their event: what
-    /// expects an answer gets none, and the host says it again (ruling U15).
-    pub without_room: u32,
-    /// Requests for biases sent.
-    pub bias_requests: u32,
-    /// Good frames without a message.
-    pub unknown: u32,
-    /// Frames that only a robot sends, such as our own on an echoing line: not looked at (U13).
-    pub misdirected: u32,
 }

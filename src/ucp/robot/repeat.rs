@@ -1,8 +1,8 @@
 //! What is sent again and again until the other side has it, and what is sent for ever.
 
 use crate::{
+    stats::{count, uncount},
     time::{Duration, Instant},
-    ucp::role::{bump, uncount},
 };
 
 /// Something to be sent at once, and every period until it is dropped.
@@ -39,10 +39,10 @@ impl<T: Copy> Repeat<T> {
     }
 
     /// What to send now, if anything.
-    pub(super) fn take(&mut self, now: Instant, period: Duration) -> Option<T> {
+    pub(super) fn take_due(&mut self, now: Instant, period: Duration) -> Option<T> {
         let due = self.what.as_mut().filter(|due| due.at <= now)?;
         due.at = now + period;
-        bump(&mut due.sendings);
+        count(&mut due.sendings);
         Some(due.what)
     }
 
@@ -88,7 +88,7 @@ impl Cadence {
     }
 
     /// A beat, if it is time.
-    pub(super) fn take(&mut self, now: Instant, period: Duration) -> Option<Beat> {
+    pub(super) fn take_due(&mut self, now: Instant, period: Duration) -> Option<Beat> {
         let due = self.next.filter(|&next| next <= now)?;
         let late = now - due;
         if late == Duration::from_micros(u32::MAX) {

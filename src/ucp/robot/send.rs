@@ -1,63 +1,18 @@
 //! What a robot sends next, and what comes back unsent.
 
-use super::{ReportLayout, repeat::Beat, state::State};
+use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
     endpoint::Unsent,
+    stats::{count, uncount},
     time::{Instant, earliest},
     ucp::{
-        BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, DocumentReport,
-        ErrorCode, FirmwareReport, ImuBias, MAX_LEN, MagBias, OtaAck, OtaStatus, Pong,
-        role::{bump, uncount, write},
+        body::{CalibrationEndAck, CalibrationStartAck, OtaAck, Pong},
+        codes::ErrorCode,
+        header::MAX_LEN,
+        report::{DocumentReport, FirmwareReport},
+        role::write,
     },
 };
-
-/// Answers to be sent: the latest of each sort, however often the host asks.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Answers {
-    pub(super) pong: bool,
-    pub(super) calibration_start: Option<CalibrationKind>,
-    pub(super) calibration_end: Option<CalibrationKind>,
-    pub(super) update: Option<OtaStatus>,
-    /// When the oldest was asked for.
-    since: Option<Instant>,
-}
-
-impl Answers {
-    pub(super) fn ask(&mut self, at: Instant) {
-        self.since.get_or_insert(at);
-    }
-
-    /// The most urgent answer; it counts as sent.
-    fn next(&mut self) -> Option<Outgoing> {
-        if let Some(kind) = self.calibration_start.take() {
-            return Some(Outgoing::StartAck(kind));
-        }
-        if let Some(kind) = self.calibration_end.take() {
-            return Some(Outgoing::EndAck(kind));
-        }
-        if let Some(status) = self.update.take() {
-            return Some(Outgoing::UpdateAnswer(status));
-        }
-        if core::mem::take(&mut self.pong) {
-            return Some(Outgoing::Pong);
-        }
-        self.since = None;
-        None
-    }
-}
-
-/// What a frame carries.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Outgoing {
-    StartAck(CalibrationKind),
-    EndAck(CalibrationKind),
-    UpdateAnswer(OtaStatus),
-    Pong,
-    Imu(ImuBias),
-    Mag(MagBias),
-    BiasRequest(BiasRequest),
-    Report(Beat),
-}
 
 impl State {
     /// Writes the most urgent frame that is due and says how long it is.
@@ -84,26 +39,26 @@ impl State {
     fn next(&mut self, now: Instant) -> Option<Outgoing> {
         if let Some(answer) = self.answers.next() {
             if matches!(answer, Outgoing::Pong) {
-                bump(&mut self.stats.pongs);
+                count(&mut self.stats.pongs);
             }
             return Some(answer);
         }
-        if let Some(bias) = self.imu_result.take(now, self.config.result_period) {
-            bump(&mut self.stats.results);
+        if let Some(bias) = self.imu_result.take_due(now, self.config.result_period) {
+            count(&mut self.stats.results);
             return Some(Outgoing::Imu(bias));
         }
-        if let Some(bias) = self.mag_result.take(now, self.config.result_period) {
-            bump(&mut self.stats.results);
+        if let Some(bias) = self.mag_result.take_due(now, self.config.result_period) {
+            count(&mut self.stats.results);
             return Some(Outgoing::Mag(bias));
         }
         let period = self.config.bias_request_period;
-        if let Some(request) = period.and_then(|period| self.bias_request.take(now, period)) {
-            bump(&mut self.stats.bias_requests);
+        if let Some(request) = period.and_then(|period| self.bias_request.take_due(now, period)) {
+            count(&mut self.stats.bias_requests);
             return Some(Outgoing::BiasRequest(request));
         }
-        let beat = self.reports.take(now, self.config.report_period)?;
+        let beat = self.reports.take_due(now, self.config.report_period)?;
         self.stats.reports_skipped = self.stats.reports_skipped.saturating_add(beat.missed);
-        bump(&mut self.stats.reports);
+        count(&mut self.stats.reports);
         Some(Outgoing::Report(beat))
     }
 

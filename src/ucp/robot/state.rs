@@ -1,17 +1,25 @@
 //! What a robot knows and is waiting for.
 
 use super::{
-    RobotConfig, RobotEvent, RobotStatistics, UpdateSource,
+    config::RobotConfig,
+    event::{RobotEvent, UpdateSource},
+    outgoing::{Answers, Outgoing},
     repeat::{Cadence, Repeat},
-    send::{Answers, Outgoing},
+    statistics::RobotStatistics,
 };
 use crate::{
     events::Events,
-    time::Instant,
+    stats::count,
+    time::{Instant, reached},
     ucp::{
-        BiasRequest, Biases, CalibrationKind, ErrorCode, Frame, ImuBias, MagBias, Message,
-        MotorControl, NetworkState, OtaStatus, RawMotorControl, RawOtaRequest, Telemetry,
-        role::{bump, is_from_host, reached},
+        body::{BiasRequest, Biases, ImuBias, MagBias},
+        codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+        frame::Frame,
+        message::Message,
+        motor::{MotorControl, RawMotorControl},
+        report::Telemetry,
+        role::is_from_host,
+        update::RawOtaRequest,
     },
 };
 
@@ -109,12 +117,12 @@ impl State {
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant, now: Instant) {
         let message = frame.message();
         if is_from_host(&message) == Some(false) {
-            bump(&mut self.stats.misdirected);
+            count(&mut self.stats.misdirected);
             return;
         }
         match message {
             Message::Ping(_) => {
-                bump(&mut self.stats.pings);
+                count(&mut self.stats.pings);
                 self.answers.pong = true;
                 self.answers.ask(at);
             }
@@ -127,7 +135,7 @@ impl State {
             Message::OtaRequest(request) => self.update_request(request),
             Message::SetNetworkState(body) => self.network_state(body.state()),
             Message::SetNetworkStateWide(body) => self.network_state(body.state()),
-            Message::Unknown(_) => bump(&mut self.stats.unknown),
+            Message::Unknown(_) => count(&mut self.stats.unknown),
             // Frames of a robot, which have been refused above.
             _ => {}
         }
@@ -135,10 +143,10 @@ impl State {
 
     fn motor(&mut self, received: &RawMotorControl, at: Instant, now: Instant) {
         if received.starts_update() {
-            bump(&mut self.stats.commands_refused);
+            count(&mut self.stats.commands_refused);
             let (version, by) = (received.version().cast_signed(), UpdateSource::MotorCommand);
             if !self.tell_update(RobotEvent::UpdateRequested { version, by }) {
-                bump(&mut self.stats.without_room);
+                count(&mut self.stats.without_room);
             }
             return;
         }
@@ -146,11 +154,11 @@ impl State {
         self.watch(at);
         let mut command = clamped(received);
         if (command.speed(), command.angular()) != (received.speed(), received.angular()) {
-            bump(&mut self.stats.commands_clamped);
+            count(&mut self.stats.commands_clamped);
         }
-        bump(&mut self.stats.commands);
+        count(&mut self.stats.commands);
         let resumed = self.command_until.is_none();
-        self.command_until = Some(at + self.config.command_timeout);
+        self.command_until = Some(at + self.config.watchdog);
         if reached(self.command_until, now) {
             // Too old already: it moves nothing, and is not told as one that does.
             command = command.halted();
@@ -166,22 +174,22 @@ impl State {
         if reached(self.command_until, now) {
             self.command_until = None;
             (self.command, self.is_command_new) = (self.command.halted(), true);
-            bump(&mut self.stats.watchdog_stops);
-            self.events.push_latest(RobotEvent::WatchdogStop, is_motion);
+            count(&mut self.stats.watchdog);
+            self.events.push_latest(RobotEvent::Watchdog, is_motion);
         }
     }
 
     fn calibration_start(&mut self, kind: CalibrationKind, at: Instant) {
         if matches!(kind, CalibrationKind::Other(_)) {
-            bump(&mut self.stats.calibration_refused);
+            count(&mut self.stats.calibration_refused);
         } else {
             let repeated = self.calibrating() == Some(kind);
             if !self.tell_start(kind, repeated) {
-                bump(&mut self.stats.without_room);
+                count(&mut self.stats.without_room);
                 return;
             }
             if repeated {
-                bump(&mut self.stats.calibration_repeats);
+                count(&mut self.stats.calibration_repeats);
             }
             self.calibration = Some(Calibration { kind, has_result: false });
         }
@@ -201,11 +209,11 @@ impl State {
 
     fn calibration_end(&mut self, kind: CalibrationKind, at: Instant) {
         if self.calibrating() != Some(kind) {
-            bump(&mut self.stats.calibration_refused);
+            count(&mut self.stats.calibration_refused);
         } else if self.events.keep(RobotEvent::CalibrationEnd(kind)).is_ok() {
             self.calibration = None;
         } else {
-            bump(&mut self.stats.without_room);
+            count(&mut self.stats.without_room);
             return;
         }
         self.answers.calibration_end = Some(kind);
@@ -235,11 +243,11 @@ impl State {
         kind: CalibrationKind,
     ) -> bool {
         if !asked || err != ErrorCode::Fine {
-            bump(&mut self.stats.acks_refused);
+            count(&mut self.stats.acks_refused);
             return false;
         }
         if self.events.keep(event).is_err() {
-            bump(&mut self.stats.without_room);
+            count(&mut self.stats.without_room);
             return false;
         }
         self.calibration = self.calibration.filter(|it| it.kind != kind || !it.has_result);
@@ -252,7 +260,7 @@ impl State {
         if self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok() {
             self.bias_request.end();
         } else {
-            bump(&mut self.stats.without_room);
+            count(&mut self.stats.without_room);
         }
     }
 
@@ -261,7 +269,7 @@ impl State {
         if self.tell_update(RobotEvent::UpdateRequested { version, by }) {
             self.update_asked = true;
         } else {
-            bump(&mut self.stats.without_room);
+            count(&mut self.stats.without_room);
         }
     }
 
@@ -280,7 +288,7 @@ impl State {
 }
 
 const fn is_motion(event: &RobotEvent) -> bool {
-    matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop)
+    matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog)
 }
 
 const fn is_calibration(event: &RobotEvent) -> bool {

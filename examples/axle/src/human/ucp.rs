@@ -3,7 +3,10 @@
 use core::fmt;
 use std::io::{self, Write};
 
-use axlewire::ucp::{CalibrationKind, ErrorCode, NetworkState, OtaStatus, Telemetry};
+use axlewire::ucp::{
+    Telemetry,
+    message::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+};
 
 use super::Spaced;
 use crate::record::ucp::{Fields, MotorControl};

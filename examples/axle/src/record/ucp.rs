@@ -1,7 +1,8 @@
 //! Messages between a rover's Linux board and its robot.
 
 use axlewire::ucp::{
-    self, CalibrationKind, ErrorCode, Message, NetworkState, OtaStatus, RawFrame, Report, Telemetry,
+    self, Message, RawFrame, Telemetry,
+    message::{CalibrationKind, ErrorCode, NetworkState, OtaStatus, Report},
 };
 use serde::Serialize;
 
@@ -162,7 +163,7 @@ fn fields(frame: &ucp::Frame) -> (&'static str, Fields<'_>) {
     }
 }
 
-fn motor_control(body: &ucp::RawMotorControl) -> Fields<'static> {
+fn motor_control(body: &ucp::message::RawMotorControl) -> Fields<'static> {
     Fields::MotorControl(MotorControl {
         speed: body.speed(),
         angular: body.angular(),
@@ -183,7 +184,7 @@ fn report(body: Report<'_>) -> Fields<'static> {
     Fields::Report { layout, telemetry: body.telemetry(), version: body.version() }
 }
 
-fn biases(body: &ucp::Biases) -> Fields<'static> {
+fn biases(body: &ucp::message::Biases) -> Fields<'static> {
     Fields::Biases {
         err: body.err(),
         acc_bias: body.imu().acc(),

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Mode, NodeId, Slave, SlaveConfig, SlaveEvent, Target},
+    ikeya::{
+        Mode, NodeId, Slave, Target,
+        slave::{SlaveConfig, SlaveEvent},
+    },
     sim::{Motor, MotorNode},
     time::{Duration, Instant},
 };

@@ -4,7 +4,11 @@ use axlewire::{
     endpoint::Endpoint,
     sim::Rover,
     time::Duration,
-    ucp::{CalibrationKind, ImuBias, MagBias, MotorControl, Robot, RobotConfig, RobotEvent},
+    ucp::{
+        MotorControl, Robot,
+        message::{CalibrationKind, ImuBias, MagBias},
+        robot::{RobotConfig, RobotEvent},
+    },
 };
 
 use super::{Faults, pty::Pty, say};
@@ -62,7 +66,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> Option<String> {
     Some(match event {
         RobotEvent::Motor(command) => describe(&command),
-        RobotEvent::WatchdogStop => "watchdog: no command for 500 ms".to_owned(),
+        RobotEvent::Watchdog => "watchdog: no command for 500 ms".to_owned(),
         RobotEvent::CalibrationStart { kind, repeated: false } => {
             format!("calibration begins: {kind:?}")
         }

@@ -4,7 +4,7 @@ use std::{io::Write, thread, time::Duration};
 
 use axlewire::{
     stream::Event,
-    ucp::{self, Body, Message, Ping},
+    ucp::{self, Body, Message, message::Ping},
 };
 
 use super::{

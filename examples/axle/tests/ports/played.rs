@@ -17,7 +17,7 @@ use axlewire::{
     },
     stream::Event,
     time,
-    ucp::{self, Message, Robot, RobotConfig, Telemetry},
+    ucp::{self, Message, Robot, Telemetry, robot::RobotConfig},
 };
 use serialport::{SerialPort, TTYPort};
 

@@ -7,7 +7,11 @@ use std::{
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Mode, NodeId, Rps, Slave, SlaveConfig, SlaveEvent, Target, ThreeMotors},
+    ikeya::{
+        Mode, NodeId, Rps, Slave, Target,
+        board::ThreeMotors,
+        slave::{SlaveConfig, SlaveEvent},
+    },
     time,
 };
 

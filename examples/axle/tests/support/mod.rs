@@ -12,8 +12,8 @@ use std::{
 };
 
 use axlewire::{
-    stream::Encode,
-    ucp::{Body, MotorControl, Ping, RawFrame},
+    encode::Encode,
+    ucp::{Body, MotorControl, RawFrame, message::Ping},
 };
 use serde_json::{Value, json};
 

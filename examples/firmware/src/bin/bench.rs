@@ -9,16 +9,7 @@
 
 use core::hint::black_box;
 
-use axlewire::{
-    crc16,
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId, ReadRequest, Rps, Slave, SlaveConfig, ToMaster, VelocityResponse,
-    },
-    stream::Decoder,
-    time::Instant,
-    ucp::{Body, FirmwareReport, Host, Robot, Telemetry, Ucp},
-};
+use axlewire::{crc16, endpoint::Endpoint, ikeya::{slave::SlaveConfig, Master, Mode, NodeId, ReadRequest, Rps, Slave, ToMaster, VelocityResponse}, stream::Decoder, time::Instant, ucp::{message::FirmwareReport, Body, Host, Robot, Telemetry, Ucp}};
 #[cfg(feature = "board")]
 use axlewire_firmware::stack::Stack;
 use axlewire_firmware::work;
@@ -114,7 +105,7 @@ fn checksums(answer: &[u8], report: &[u8]) {
 /// From the last byte of a READ to the answer. The goal is 50 µs at 168 MHz (ruling I9), at 1.5
 /// cycles per instruction.
 fn read_to_answer() {
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct());
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
     slave.set_velocity(rps(1.0));
     let request = ReadRequest::new(NodeId::N2);
     let expected = VelocityResponse::new(NodeId::N2, rps(1.0));

@@ -8,14 +8,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    drive::{Clock as _, Directed, Driver},
-    ikeya::{
-        self, Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId,
-        NodeSet, Polling, Position, Rps, Status,
-    },
-    time::{Duration, Instant},
-};
+use axlewire::{drive::{Clock as _, Driver, Rs485}, ikeya::{self, master::{Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling}, Master, Mode, NodeId, Position, Rps, Status}, time::{Duration, Instant}};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
@@ -48,7 +41,7 @@ fn run(mut board: Board) {
     config.reply_timeout = board.patience(config.reply_timeout);
     config.accepts_early = board.is_emulated();
     config.polling = Polling::Every(CYCLE);
-    let Ok(port) = Directed::new(board.bus, board.driver_enable);
+    let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut report_at = board.clock.now();
     let mut driver = Driver::with(|now| Master::new(config, now), port, board.clock);
     let (mut program, mut exchanges) = (Program::default(), 0u32);

@@ -6,13 +6,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    drive::{Clock as _, Directed, Driver},
-    ikeya::{
-        self, DipSwitch, IdReading, Mode, NodeId, Slave, SlaveConfig, SlaveStatistics, Target,
-    },
-    time::Duration,
-};
+use axlewire::{drive::{Clock as _, Driver, Rs485}, ikeya::{self, slave::{DipSwitch, IdReading, SlaveConfig, SlaveStatistics}, Mode, NodeId, Slave, Target}, time::Duration};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
@@ -61,7 +55,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
     let mut motor = Motor::new();
     let mut slave: Slave = Slave::new(node, mode, config);
     slave.set_position(motor.position());
-    let Ok(port) = Directed::new(board.bus, board.driver_enable);
+    let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut last = board.clock.now();
     let mut driver = Driver::new(slave, port, board.clock);
     let (mut report_at, mut stops) = (last, 0u32);
@@ -70,7 +64,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
         // Neither the port nor the pin can fail.
         let until = last + STEP;
         let _ = driver.run_until(until, |_, event, _| {
-            if event == ikeya::SlaveEvent::Watchdog {
+            if event == ikeya::slave::SlaveEvent::Watchdog {
                 stops = stops.wrapping_add(1);
             }
         });

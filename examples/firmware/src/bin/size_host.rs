@@ -3,10 +3,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    time::Instant,
-    ucp::{Host, HostConfig},
-};
+use axlewire::{time::Instant, ucp::{host::HostConfig, Host}};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

@@ -3,10 +3,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    ikeya::{Master, MasterConfig},
-    time::Instant,
-};
+use axlewire::{ikeya::{master::MasterConfig, Master}, time::Instant};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

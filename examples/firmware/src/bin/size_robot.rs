@@ -3,10 +3,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    time::Instant,
-    ucp::{Robot, RobotConfig},
-};
+use axlewire::{time::Instant, ucp::{robot::RobotConfig, Robot}};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

@@ -15,7 +15,7 @@ use core::{
     sync::atomic::{AtomicU32, Ordering::Relaxed},
 };
 
-use axlewire::drive::Directed;
+use axlewire::drive::Rs485;
 use axlewire_firmware::{
     line::Line,
     stack::Stack,
@@ -174,7 +174,7 @@ fn the_pin_stays_on_until_the_last_stop_bit(
     core.SYST.enable_counter();
     // SAFETY: there is no critical section by priority that this could break.
     unsafe { NVIC::unmask(Interrupt::USART6) };
-    let Ok(mut port) = Directed::new(port, Pin);
+    let Ok(mut port) = Rs485::new(port, Pin);
     for frame in [&[1u8; 4][..], &[2; 8], &[3; 44]] {
         let before = SWITCHES.load(Relaxed);
         // The data register is full, and stays so until the first tick.

@@ -7,14 +7,7 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{
-    drive::{Clock as _, Driver},
-    time::{Duration, Instant},
-    ucp::{
-        self, CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus, Robot, RobotConfig,
-        RobotEvent, RobotStatistics, UpdateSource,
-    },
-};
+use axlewire::{drive::{Clock as _, Driver}, time::{Duration, Instant}, ucp::{self, message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus}, robot::{RobotConfig, RobotEvent, RobotStatistics, UpdateSource}, Robot}};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
@@ -51,7 +44,7 @@ fn main() -> ! {
 
 fn run(mut board: Board) {
     let mut config = RobotConfig::default();
-    config.quiet_margin = board.patience(config.quiet_margin);
+    config.idle_margin = board.patience(config.idle_margin);
     let mut last = board.clock.now();
     let mut report_at = last;
     let mut driver = Driver::new(Robot::new(config, last), board.bus, board.clock);
@@ -133,7 +126,7 @@ impl Shown {
 fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Instant) {
     let (command, (left, right)) = (robot.command(now), rover.rpm());
     let RobotStatistics {
-        commands, watchdog_stops, pings, pongs, reports, reports_skipped, ..
+        commands, watchdog, pings, pongs, reports, reports_skipped, ..
     } = *robot.statistics();
     line.number("speed", command.speed().into())
         .number("angular", command.angular().into())
@@ -141,7 +134,7 @@ fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Ins
         .number("left_rpm", left.into())
         .number("right_rpm", right.into())
         .count("commands", commands)
-        .count("stops", watchdog_stops)
+        .count("stops", watchdog)
         .count("pings", pings)
         .count("pongs", pongs)
         .count("reports", reports)

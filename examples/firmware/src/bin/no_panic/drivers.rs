@@ -1,18 +1,7 @@
 //! Drivers, the driver-enable pin, frame readers and writers: over a port and a pin that may fail at
 //! any call, and a port that may say that it has moved more bytes than there were.
 
-use axlewire::{
-    drive::{Directed, Driver},
-    endpoint::Endpoint,
-    ikeya::{
-        self, Board, Master, MasterConfig, Mode, NodeId, NodeSet, OneMotor, Position, Rps, Slave,
-        SlaveConfig, ThreeMotors,
-    },
-    io::{FrameReader, FrameWriter},
-    stream::Framing,
-    time::Instant,
-    ucp::{CalibrationKind, Host, HostConfig, MemoryStore, RawFrame, Robot, RobotConfig, Ucp},
-};
+use axlewire::{drive::{Driver, Rs485}, endpoint::Endpoint, ikeya::{self, board::{Board, OneMotor, ThreeMotors}, master::{MasterConfig, NodeSet}, slave::SlaveConfig, Master, Mode, NodeId, Position, Rps, Slave}, io::{FrameReader, FrameWriter}, stream::Framing, time::Instant, ucp::{host::{HostConfig, MemoryStore}, message::CalibrationKind, robot::RobotConfig, Host, RawFrame, Robot, Ucp}};
 use embedded_hal::{
     delay::DelayNs,
     digital::{self, OutputPin},
@@ -170,7 +159,7 @@ fn robot() {
 
 #[inline(never)]
 fn directed() {
-    let Ok(port) = Directed::with_delays(Port, Pin, Delay, duration(), duration()) else { return };
+    let Ok(port) = Rs485::with_delays(Port, Pin, Delay, duration(), duration()) else { return };
     let mut port = any(port);
     while any(true) {
         match any(0) {

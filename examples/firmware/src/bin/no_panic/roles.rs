@@ -1,16 +1,6 @@
 //! The four roles, bare: called in any order, with any settings.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Board, DipSwitch, IdReading, Master, MasterConfig, Mode, NodeId, OneMotor, Position, Rps,
-        Slave, SlaveConfig, Target, ThreeMotors,
-    },
-    ucp::{
-        BiasStore, CalibrationKind, Host, HostConfig, ImuBias, MagBias, MemoryStore, MotorControl,
-        NetworkState, NoStore, OtaStatus, Robot, RobotConfig, Telemetry,
-    },
-};
+use axlewire::{endpoint::{Endpoint, Unsent}, ikeya::{board::{Board, OneMotor, ThreeMotors}, master::MasterConfig, slave::{DipSwitch, IdReading, SlaveConfig}, Master, Mode, NodeId, Position, Rps, Slave, Target}, ucp::{host::{BiasStore, HostConfig, MemoryStore, NoStore}, message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus}, robot::RobotConfig, Host, MotorControl, Robot, Telemetry}};
 
 use crate::{any, input, keep, now};
 

@@ -11,10 +11,10 @@ use crate::{any, input, keep, room};
 pub fn all() {
     both::<ikeya::ToSlave, 8>();
     both::<ikeya::ToMaster, 8>();
-    both::<ikeya::Either, 64>();
+    both::<ikeya::BothDirections, 64>();
     both::<three::ToSlave, 16>();
     both::<three::ToMaster, 16>();
-    both::<three::Either, 64>();
+    both::<three::BothDirections, 64>();
     both::<Ucp, 64>();
     both::<Ucp<252>, 256>();
 }

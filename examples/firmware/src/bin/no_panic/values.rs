@@ -1,20 +1,6 @@
 //! Checksums, numbers, packets and frames.
 
-use axlewire::{
-    crc16,
-    ikeya::{
-        DipSwitch, IdReading, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Schedule,
-        ThreeMotors, VelocityResponse, WriteRequest, three,
-    },
-    stream::Encode,
-    time::{Duration, Wrapping32, wire_time},
-    ucp::{
-        BiasRequest, Biases, Body, CalibrationEnd, CalibrationEndAck, CalibrationKind,
-        CalibrationStart, CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, Frame,
-        ImuBias, ImuBiasAck, MagBias, MagBiasAck, Message, MessageId, MotorControl, NetworkState,
-        OtaAck, OtaRequest, OtaStatus, Ping, Pong, RawFrame, Report, SetNetworkState, Telemetry,
-    },
-};
+use axlewire::{crc16, encode::Encode, ikeya::{board::ThreeMotors, master::Schedule, slave::{DipSwitch, IdReading}, three, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest}, time::{wire_time, Duration, Wrapping32}, ucp::{message::{BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind, CalibrationStart, CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck, MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Ping, Pong, Report, SetNetworkState}, Body, Frame, Message, MessageId, MotorControl, RawFrame, Telemetry}};
 
 use crate::{any, duration, input, keep, now, room};
 

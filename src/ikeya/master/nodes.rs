@@ -2,12 +2,12 @@
 
 use core::fmt;
 
-use super::NodeId;
+use crate::ikeya::units::NodeId;
 
 /// A set of node ids, one bit each.
 ///
 /// ```
-/// use axlewire::ikeya::{NodeId, NodeSet};
+/// use axlewire::ikeya::{master::NodeSet, NodeId};
 ///
 /// let mut nodes: NodeSet = [NodeId::N1, NodeId::N3].into_iter().collect();
 /// nodes.insert(NodeId::N8);

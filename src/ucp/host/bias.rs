@@ -2,7 +2,7 @@
 
 use core::{error::Error, fmt};
 
-use super::{ImuBias, MagBias};
+use crate::ucp::body::{ImuBias, MagBias};
 
 /// What the host keeps for the robot, which has no memory of its own.
 ///

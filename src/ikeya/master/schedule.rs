@@ -1,6 +1,10 @@
 //! How fast a bus can be, before it is wired.
 
-use super::{BAUD, Board, OneMotor, ReadRequest};
+use crate::ikeya::{
+    board::{Board, OneMotor},
+    units::BAUD,
+    wire::ReadRequest,
+};
 use crate::{
     stream::Framing,
     time::{Duration, wire_time},
@@ -9,7 +13,7 @@ use crate::{
 /// The plan of a cycle: each node gets a WRITE, if it is commanded, and a READ that it answers.
 ///
 /// ```
-/// use axlewire::ikeya::Schedule;
+/// use axlewire::ikeya::master::Schedule;
 ///
 /// let plan = Schedule::new(8);
 /// assert_eq!(plan.exchange_time().as_micros(), 160 + 80 + 50 + 160);

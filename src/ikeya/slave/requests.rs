@@ -1,14 +1,16 @@
 //! Requests in the received bytes, on four wires or on two (I14).
 
-use super::PACKET_LEN;
 use crate::{
-    ikeya::{Board, Heard},
+    ikeya::board::{Board, Heard, PACKET_LEN},
+    inbox::{AfterIdle, Inbox},
     stream::{Counters, Decoder, Event},
+    time::{Duration, Instant},
 };
 
 /// Finds requests, and where they end.
 #[derive(Clone, Debug)]
-pub(super) struct Inbox<B: Board> {
+pub(super) struct Requests<B: Board> {
+    inbox: Inbox,
     decoder: AnyDecoder<B>,
 }
 
@@ -17,7 +19,7 @@ enum AnyDecoder<B: Board> {
     /// Only the master is heard.
     FourWire(Decoder<B::ToSlave, PACKET_LEN>),
     /// The other slaves are heard as well.
-    TwoWire(Decoder<B::Either, PACKET_LEN>),
+    TwoWire(Decoder<B::BothDirections, PACKET_LEN>),
 }
 
 /// A packet, and whether it ends with the last byte received.
@@ -26,14 +28,31 @@ pub(super) enum Found<B: Board> {
     Answer,
 }
 
-impl<B: Board> Inbox<B> {
-    pub(super) const fn new(two_wire: bool) -> Self {
-        let decoder = if two_wire {
+impl<B: Board> Requests<B> {
+    pub(super) const fn new(is_two_wire: bool, idle: Duration, now: Instant) -> Self {
+        let decoder = if is_two_wire {
             AnyDecoder::TwoWire(Decoder::new())
         } else {
             AnyDecoder::FourWire(Decoder::new())
         };
-        Self { decoder }
+        Self { inbox: Inbox::new(idle, AfterIdle::WaitAgain, now), decoder }
+    }
+
+    /// See [`Inbox::receive`].
+    pub(super) const fn receive(&mut self, chunk: &[u8], at: Instant, now: Instant) {
+        self.inbox.receive(chunk, at, now);
+    }
+
+    /// See [`Inbox::settle`].
+    pub(super) fn settle(&mut self, now: Instant) -> bool {
+        let is_idle = self.inbox.settle(self.pending(), now);
+        if is_idle {
+            match &mut self.decoder {
+                AnyDecoder::FourWire(decoder) => decoder.idle(),
+                AnyDecoder::TwoWire(decoder) => decoder.idle(),
+            }
+        }
+        is_idle
     }
 
     /// The next whole packet in the input.
@@ -62,26 +81,27 @@ impl<B: Board> Inbox<B> {
         }
     }
 
-    /// Received bytes that no packet or gap has been made of yet.
-    pub(super) const fn pending(&self) -> usize {
-        match &self.decoder {
-            AnyDecoder::FourWire(decoder) => decoder.pending(),
-            AnyDecoder::TwoWire(decoder) => decoder.pending(),
-        }
+    /// When the newest byte may have arrived first.
+    pub(super) const fn last(&self) -> Instant {
+        self.inbox.last()
     }
 
-    /// The line has gone quiet.
-    pub(super) fn idle(&mut self) {
-        match &mut self.decoder {
-            AnyDecoder::FourWire(decoder) => decoder.idle(),
-            AnyDecoder::TwoWire(decoder) => decoder.idle(),
-        }
+    /// When the start of a packet that is pending is given up.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        self.inbox.deadline(self.pending())
     }
 
     pub(super) const fn counters(&self) -> Counters {
         match &self.decoder {
             AnyDecoder::FourWire(decoder) => decoder.counters(),
             AnyDecoder::TwoWire(decoder) => decoder.counters(),
+        }
+    }
+
+    const fn pending(&self) -> usize {
+        match &self.decoder {
+            AnyDecoder::FourWire(decoder) => decoder.pending(),
+            AnyDecoder::TwoWire(decoder) => decoder.pending(),
         }
     }
 }

@@ -1,30 +1,27 @@
-//! The host's side: commands, pings, reports, calibrations.
+//! The host: its commands, and the calls of its driver.
 
-mod calibration;
-mod config;
-mod event;
-mod motor;
-mod ping;
-mod results;
-mod send;
-mod state;
-
-pub use config::HostConfig;
-pub use event::{
-    CalibrationFailure, CalibrationStep, CommandError, FailureCause, HostEvent, HostStatistics,
-    ReceivedReport, RoundTrip, UnknownFrame,
-};
+use super::state::{State, Update};
 
 use super::{
-    BiasStore, CalibrationKind, MAX_LEN, MotorControl, NetworkState, NoStore,
-    role::{FRAME_PAUSE, Inbox},
+    bias::{BiasStore, NoStore},
+    config::HostConfig,
+    event::{CalibrationFailure, CalibrationStep, CommandError, HostEvent, ReceivedReport},
+    link::Link,
+    statistics::HostStatistics,
 };
 use crate::{
     endpoint::{Endpoint, Unsent},
+    inbox::Inbox,
     stream::Counters,
     time::{Duration, Instant, earliest, wire_time},
+    ucp::{
+        codes::{CalibrationKind, NetworkState},
+        framing::Decoder,
+        header::MAX_LEN,
+        motor::MotorControl,
+        role::{FRAME_PAUSE, inbox},
+    },
 };
-use state::{State, Update};
 
 /// The host of a rover: a pure state machine, driven as [`Endpoint`] says.
 ///
@@ -69,7 +66,7 @@ use state::{State, Update};
 /// Every frame takes the next `index`.
 ///
 /// ```
-/// use axlewire::{endpoint::Endpoint, time::Instant, ucp::{Host, HostConfig, MotorControl}};
+/// use axlewire::{endpoint::Endpoint, time::Instant, ucp::{host::HostConfig, Host, MotorControl}};
 ///
 /// let now = Instant::from_millis(0);
 /// let mut host = Host::new(HostConfig::default(), now);
@@ -85,21 +82,10 @@ use state::{State, Update};
 /// ```
 #[derive(Clone, Debug)]
 pub struct Host<S = NoStore> {
+    decoder: Decoder,
     inbox: Inbox,
     outgoing: [u8; MAX_LEN],
     state: State<S>,
-}
-
-/// What is known about the robot.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Link {
-    /// Nothing has been heard yet, and the link timeout is not over.
-    Waiting,
-    /// Valid frames arrive.
-    Up,
-    /// None has for the link timeout.
-    Down,
 }
 
 impl Host {
@@ -116,7 +102,8 @@ impl<S: BiasStore> Host<S> {
     pub fn with_store(config: HostConfig, store: S, now: Instant) -> Self {
         let config = config.sane();
         Self {
-            inbox: Inbox::new(config.baud, config.quiet_margin),
+            decoder: Decoder::new(),
+            inbox: inbox(config.baud, config.idle_margin, now),
             outgoing: [0; MAX_LEN],
             state: State::new(config, store, now),
         }
@@ -177,7 +164,7 @@ impl<S: BiasStore> Host<S> {
     ///
     /// # Errors
     ///
-    /// [`CommandError::NetworkState`] for a state above 255, [`CommandError::LowIdsOnly`] with
+    /// [`CommandError::Value`] for a state above 255, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].
     pub fn set_network_state(
         &mut self,
@@ -286,8 +273,8 @@ impl<S: BiasStore> Host<S> {
 
     /// Where every received byte went.
     #[must_use]
-    pub fn counters(&self) -> Counters {
-        self.inbox.counters()
+    pub const fn counters(&self) -> Counters {
+        self.decoder.counters()
     }
 
     /// Events refused because nobody took the older ones out.
@@ -302,8 +289,21 @@ impl<S: BiasStore> Host<S> {
         self.state.retain_events(stays);
     }
 
+    /// Takes in the frames that `bytes` complete.
+    fn receive(&mut self, mut bytes: &[u8]) {
+        while let Some((frame, at)) = self.inbox.next(&mut self.decoder, &mut bytes) {
+            self.state.receive(frame, at);
+        }
+    }
+
     /// The store of biases.
-    pub const fn store(&mut self) -> &mut S {
+    #[must_use]
+    pub const fn store(&self) -> &S {
+        &self.state.store
+    }
+
+    /// The store of biases, to change what it keeps.
+    pub const fn store_mut(&mut self) -> &mut S {
         &mut self.state.store
     }
 }
@@ -312,14 +312,19 @@ impl<S: BiasStore> Endpoint for Host<S> {
     type Event = HostEvent;
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        let Self { inbox, state, .. } = self;
-        inbox.take(bytes, now, now, |frame, at| state.receive(frame, at));
+        if bytes.is_empty() {
+            return;
+        }
+        self.inbox.receive(bytes, now, now);
+        self.receive(bytes);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        let Self { inbox, state, .. } = self;
-        inbox.settle(now, |frame, at| state.receive(frame, at));
-        state.expire(now);
+        while self.inbox.settle(self.decoder.pending(), now) {
+            self.decoder.idle();
+            self.receive(&[]);
+        }
+        self.state.expire(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
@@ -351,7 +356,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        earliest(&[self.inbox.deadline(), self.state.deadline()])
+        earliest(&[self.inbox.deadline(self.decoder.pending()), self.state.deadline()])
     }
 }
 

@@ -1,48 +1,30 @@
-//! Polling order, reply matching, node health and stops of a motor bus.
+//! The master: its commands, and the calls of its driver.
 
-mod config;
-mod discovery;
-mod echo;
-mod event;
-mod health;
-mod mode;
-mod node;
-mod queue;
-mod set_point;
-mod statistics;
-mod stop;
-mod view;
-mod window;
-
-pub use config::{MasterConfig, Polling};
-pub use event::{Cause, CommandError, MasterEvent};
-pub use node::Health;
-pub use statistics::{MasterStatistics, NodeStatistics};
-pub use stop::StopProgress;
-
-use self::{
-    discovery::Discovery,
+use super::{
+    config::MasterConfig,
     echo::Echo,
-    health::Search,
+    event::{Cause, CommandError, MasterEvent},
     node::{DOUBT_EXCHANGES, Node},
-    queue::{Sent, Turns},
     set_point::Confirm,
+    statistics::MasterStatistics,
     stop::{Standstill, Stop},
+    turns::{Discovery, Search, Sent, Turns},
     window::Window,
 };
-use super::{Board, Mode, NodeId, OneMotor, ReadRequest, Status, Target};
 use crate::{
     endpoint::{Endpoint, Unsent},
     events::Events,
+    ikeya::{
+        board::{Board, OneMotor, PACKET_LEN, Status, Target},
+        units::NodeId,
+    },
+    stats::{add, count},
     stream::{Decoder, Framing},
     time::{Duration, Instant, wire_time},
 };
 
 /// Events that wait for the application at the most.
 const EVENTS: usize = 16;
-
-/// Longest packet of either kind of board, bytes.
-const PACKET_LEN: usize = 16;
 
 /// The master: discovers nodes, repeats the latest set-points, reads every node in turn, pays the
 /// stops that it owes, and accepts only genuine replies.
@@ -93,7 +75,7 @@ const PACKET_LEN: usize = 16;
 /// of a node that becomes abnormal is dropped.
 ///
 /// ```
-/// use axlewire::{endpoint::Endpoint, ikeya::{Master, MasterConfig}, time::Instant};
+/// use axlewire::{endpoint::Endpoint, ikeya::{master::MasterConfig, Master}, time::Instant};
 ///
 /// let now = Instant::from_micros(0);
 /// let mut master: Master = Master::new(MasterConfig::direct(), now);
@@ -106,29 +88,29 @@ const PACKET_LEN: usize = 16;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Master<B: Board = OneMotor> {
-    config: MasterConfig,
-    answer_wire_time: Duration,
+    pub(super) config: MasterConfig,
+    pub(super) answer_wire_time: Duration,
     /// The last packet was a WRITE that is not answered: a READ may follow without a pause.
-    is_behind_write: bool,
-    discovery: Option<Discovery>,
-    turns: Turns,
+    pub(super) is_behind_write: bool,
+    pub(super) discovery: Option<Discovery>,
+    pub(super) turns: Turns,
     /// Time of the last call.
-    now: Instant,
+    pub(super) now: Instant,
     /// When the bytes handed out for sending have left, and the gap behind them is over.
-    line_free: Option<Instant>,
+    pub(super) line_free: Option<Instant>,
     /// The node that may answer now.
-    window: Option<Window>,
-    search: Search,
+    pub(super) window: Option<Window>,
+    pub(super) search: Search,
     /// The last sign of life of the application.
-    alive_at: Instant,
-    statistics: MasterStatistics,
-    packet: [u8; PACKET_LEN],
+    pub(super) alive_at: Instant,
+    pub(super) statistics: MasterStatistics,
+    pub(super) packet: [u8; PACKET_LEN],
     /// What `packet` is.
-    sent: Option<Sent<B>>,
-    decoder: Decoder<B::ToMaster, PACKET_LEN>,
-    echo: Echo,
-    nodes: [Node<B>; 8],
-    events: Events<MasterEvent<B>, EVENTS>,
+    pub(super) sent: Option<Sent<B>>,
+    pub(super) decoder: Decoder<B::ToMaster, PACKET_LEN>,
+    pub(super) echo: Echo,
+    pub(super) nodes: [Node<B>; 8],
+    pub(super) events: Events<MasterEvent<B>, EVENTS>,
 }
 
 /// Commands.
@@ -282,14 +264,14 @@ impl<B: Board> Master<B> {
     }
 
     /// Drops the set-point, and says so to whoever waits for its confirmation.
-    fn drop_set_point(&mut self, node: NodeId) {
+    pub(super) fn drop_set_point(&mut self, node: NodeId) {
         if self.node_mut(node).drop_set_point() {
             self.tell(MasterEvent::NotConfirmed { node, cause: Cause::Dropped });
         }
     }
 
     /// The node is owed a stop from now on, if it is not already.
-    fn owe_stop(&mut self, id: NodeId) {
+    pub(super) fn owe_stop(&mut self, id: NodeId) {
         let (now, hold_age) = (self.now, self.config.hold_age);
         let node = self.node_mut(id);
         if node.stop.is_none() {
@@ -317,9 +299,9 @@ impl<B: Board> Master<B> {
         self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
     }
 
-    fn expire_commands(&mut self, now: Instant) {
+    pub(super) fn expire_commands(&mut self, now: Instant) {
         if self.dead_man_at().is_some_and(|at| now >= at) {
-            self.statistics.dead_man = self.statistics.dead_man.wrapping_add(1);
+            count(&mut self.statistics.dead_man);
             self.tell(MasterEvent::DeadMan);
             for id in NodeId::ALL {
                 if self.node(id).is_under_order {
@@ -331,11 +313,11 @@ impl<B: Board> Master<B> {
 }
 
 impl<B: Board> Master<B> {
-    fn node(&self, node: NodeId) -> &Node<B> {
+    pub(super) fn node(&self, node: NodeId) -> &Node<B> {
         &self.nodes[index_of(node)]
     }
 
-    fn node_mut(&mut self, node: NodeId) -> &mut Node<B> {
+    pub(super) fn node_mut(&mut self, node: NodeId) -> &mut Node<B> {
         &mut self.nodes[index_of(node)]
     }
 
@@ -346,13 +328,13 @@ impl<B: Board> Master<B> {
     }
 
     #[inline(never)]
-    fn tell(&mut self, event: MasterEvent<B>) {
+    pub(super) fn tell(&mut self, event: MasterEvent<B>) {
         self.events.push(event);
     }
 }
 
 /// Eight ids, eight nodes; the mask lets the compiler see it.
-const fn index_of(node: NodeId) -> usize {
+pub(super) const fn index_of(node: NodeId) -> usize {
     (node.get() as usize - 1) & 7
 }
 
@@ -364,8 +346,8 @@ impl<B: Board> Endpoint for Master<B> {
         let mut bytes = bytes;
         let removed = self.echo.remove(&mut bytes);
         let statistics = &mut self.statistics;
-        statistics.echo_bytes = statistics.echo_bytes.wrapping_add(removed.bytes);
-        statistics.echo_errors = statistics.echo_errors.wrapping_add(removed.is_wrong.into());
+        add(&mut statistics.echo_bytes, removed.bytes);
+        add(&mut statistics.echo_errors, removed.is_wrong.into());
         if let Some(window) = self.window.as_mut().filter(|_| !bytes.is_empty()) {
             window.hear_bytes();
         }

@@ -20,7 +20,7 @@ use crate::time::Duration;
 ///
 /// A `write` that fails flushes what the port has taken before, so that it reaches the line, and only
 /// then puts the pin off. Where that flush fails as well, the next `flush` is
-/// [`DirectedError::Lost`].
+/// [`Rs485Error::Lost`].
 ///
 /// A cancelled async `write` or `flush` leaves the pin as it is, because a part of the packet may be
 /// on the line: go on with the packet, or give it up with [`release`](Self::release) or with a `write`
@@ -29,7 +29,7 @@ use crate::time::Duration;
 ///
 /// High is on. For a transceiver that is enabled by low, hand in an inverted pin.
 #[derive(Debug)]
-pub struct Directed<P, O, D = NoDelay> {
+pub struct Rs485<P, O, D = NoDelay> {
     port: P,
     pin: O,
     delay: D,
@@ -48,7 +48,7 @@ enum State {
     On,
 }
 
-impl<P, O: OutputPin> Directed<P, O> {
+impl<P, O: OutputPin> Rs485<P, O> {
     /// Sends through `port` with `pin` on. It is put off first.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl<P, O: OutputPin> Directed<P, O> {
     }
 }
 
-impl<P, O: OutputPin, D> Directed<P, O, D> {
+impl<P, O: OutputPin, D> Rs485<P, O, D> {
     /// The same for a transceiver that needs the time `before` between the pin and the first byte, or
     /// `after` between the last byte and the pin.
     ///
@@ -124,22 +124,22 @@ impl<P, O: OutputPin, D> Directed<P, O, D> {
     }
 
     /// Puts the pin off for a write of no bytes.
-    fn give_up<E>(&mut self) -> Result<usize, DirectedError<E, O::Error>> {
+    fn give_up<E>(&mut self) -> Result<usize, Rs485Error<E, O::Error>> {
         if self.is_on() {
-            self.release().map_err(DirectedError::Pin)?;
+            self.release().map_err(Rs485Error::Pin)?;
         }
         Ok(0)
     }
 
     /// The end of a flush: says once whether bytes were lost before.
-    fn all_out<E>(&mut self) -> Result<(), DirectedError<E, O::Error>> {
-        if core::mem::take(&mut self.is_lost) { Err(DirectedError::Lost) } else { Ok(()) }
+    fn all_out<E>(&mut self) -> Result<(), Rs485Error<E, O::Error>> {
+        if core::mem::take(&mut self.is_lost) { Err(Rs485Error::Lost) } else { Ok(()) }
     }
 
     /// Puts the pin off because of `error`, which is the one to tell.
-    fn fail<T, E>(&mut self, error: E) -> Result<T, DirectedError<E, O::Error>> {
+    fn fail<T, E>(&mut self, error: E) -> Result<T, Rs485Error<E, O::Error>> {
         let _ = self.release();
-        Err(DirectedError::Port(error))
+        Err(Rs485Error::Port(error))
     }
 
     /// Puts the pin off after a write that took nothing. What was taken before is out, or may be lost.
@@ -147,7 +147,7 @@ impl<P, O: OutputPin, D> Directed<P, O, D> {
         &mut self,
         written: Result<usize, E>,
         is_flushed: bool,
-    ) -> Result<usize, DirectedError<E, O::Error>> {
+    ) -> Result<usize, Rs485Error<E, O::Error>> {
         self.is_lost |= !is_flushed;
         match written {
             Err(error) => self.fail(error),
@@ -172,7 +172,7 @@ impl embedded_hal_async::delay::DelayNs for NoDelay {
 /// The port's error, or the pin's.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum DirectedError<E, F> {
+pub enum Rs485Error<E, F> {
     /// The port failed.
     Port(E),
     /// The driver-enable pin failed.
@@ -182,7 +182,7 @@ pub enum DirectedError<E, F> {
     Lost,
 }
 
-impl<E: fmt::Display, F: fmt::Debug> fmt::Display for DirectedError<E, F> {
+impl<E: fmt::Display, F: fmt::Debug> fmt::Display for Rs485Error<E, F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Port(error) => error.fmt(f),
@@ -194,7 +194,7 @@ impl<E: fmt::Display, F: fmt::Debug> fmt::Display for DirectedError<E, F> {
     }
 }
 
-impl<E: Error + 'static, F: fmt::Debug> Error for DirectedError<E, F> {
+impl<E: Error + 'static, F: fmt::Debug> Error for Rs485Error<E, F> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             Self::Port(error) => Some(error),
@@ -203,7 +203,7 @@ impl<E: Error + 'static, F: fmt::Debug> Error for DirectedError<E, F> {
     }
 }
 
-impl<E: io::Error + 'static, F: fmt::Debug> io::Error for DirectedError<E, F> {
+impl<E: io::Error + 'static, F: fmt::Debug> io::Error for Rs485Error<E, F> {
     fn kind(&self) -> io::ErrorKind {
         match self {
             Self::Port(error) => error.kind(),
@@ -213,35 +213,35 @@ impl<E: io::Error + 'static, F: fmt::Debug> io::Error for DirectedError<E, F> {
     }
 }
 
-impl<P: io::ErrorType, O: OutputPin, D> io::ErrorType for Directed<P, O, D>
+impl<P: io::ErrorType, O: OutputPin, D> io::ErrorType for Rs485<P, O, D>
 where
     P::Error: 'static,
 {
-    type Error = DirectedError<P::Error, O::Error>;
+    type Error = Rs485Error<P::Error, O::Error>;
 }
 
-impl<P: io::ReadReady, O: OutputPin, D> io::ReadReady for Directed<P, O, D>
+impl<P: io::ReadReady, O: OutputPin, D> io::ReadReady for Rs485<P, O, D>
 where
     P::Error: 'static,
 {
     fn read_ready(&mut self) -> Result<bool, Self::Error> {
-        self.port.read_ready().map_err(DirectedError::Port)
+        self.port.read_ready().map_err(Rs485Error::Port)
     }
 }
 
 #[cfg(feature = "embedded-io")]
-impl<P: embedded_io::Read, O: OutputPin, D> embedded_io::Read for Directed<P, O, D>
+impl<P: embedded_io::Read, O: OutputPin, D> embedded_io::Read for Rs485<P, O, D>
 where
     P::Error: 'static,
 {
     fn read(&mut self, buf: &mut [u8]) -> Result<usize, Self::Error> {
-        self.port.read(buf).map_err(DirectedError::Port)
+        self.port.read(buf).map_err(Rs485Error::Port)
     }
 }
 
 #[cfg(feature = "embedded-io")]
 impl<P: embedded_io::Write, O: OutputPin, D: embedded_hal::delay::DelayNs> embedded_io::Write
-    for Directed<P, O, D>
+    for Rs485<P, O, D>
 where
     P::Error: 'static,
 {
@@ -249,14 +249,14 @@ where
         if buf.is_empty() {
             return self.give_up();
         }
-        let before = self.engage().map_err(DirectedError::Pin)?;
+        let before = self.engage().map_err(Rs485Error::Pin)?;
         if before > Duration::ZERO {
             self.delay.delay_us(before.as_micros());
         }
         self.state = State::On;
         let written = self.port.write(buf);
         if let Ok(1..) = written {
-            return written.map_err(DirectedError::Port);
+            return written.map_err(Rs485Error::Port);
         }
         let is_flushed = self.port.flush().is_ok();
         self.delay.delay_us(self.after.as_micros());
@@ -270,24 +270,24 @@ where
         }
         if self.is_on() {
             self.delay.delay_us(self.after.as_micros());
-            self.release().map_err(DirectedError::Pin)?;
+            self.release().map_err(Rs485Error::Pin)?;
         }
         self.all_out()
     }
 }
 
 #[cfg(feature = "embedded-io-async")]
-impl<P: embedded_io_async::Read, O: OutputPin, D> embedded_io_async::Read for Directed<P, O, D>
+impl<P: embedded_io_async::Read, O: OutputPin, D> embedded_io_async::Read for Rs485<P, O, D>
 where
     P::Error: 'static,
 {
     async fn read(&mut self, buf: &mut [u8]) -> Result<usize, Self::Error> {
-        self.port.read(buf).await.map_err(DirectedError::Port)
+        self.port.read(buf).await.map_err(Rs485Error::Port)
     }
 }
 
 #[cfg(feature = "embedded-io-async")]
-impl<P, O, D> embedded_io_async::Write for Directed<P, O, D>
+impl<P, O, D> embedded_io_async::Write for Rs485<P, O, D>
 where
     P: embedded_io_async::Write,
     P::Error: 'static,
@@ -298,14 +298,14 @@ where
         if buf.is_empty() {
             return self.give_up();
         }
-        let before = self.engage().map_err(DirectedError::Pin)?;
+        let before = self.engage().map_err(Rs485Error::Pin)?;
         if before > Duration::ZERO {
             self.delay.delay_us(before.as_micros()).await;
         }
         self.state = State::On;
         let written = self.port.write(buf).await;
         if let Ok(1..) = written {
-            return written.map_err(DirectedError::Port);
+            return written.map_err(Rs485Error::Port);
         }
         let is_flushed = self.port.flush().await.is_ok();
         self.delay.delay_us(self.after.as_micros()).await;
@@ -319,7 +319,7 @@ where
         }
         if self.is_on() {
             self.delay.delay_us(self.after.as_micros()).await;
-            self.release().map_err(DirectedError::Pin)?;
+            self.release().map_err(Rs485Error::Pin)?;
         }
         self.all_out()
     }

@@ -5,8 +5,21 @@
 
 use zerocopy::transmute;
 
-use super::{LEN_WITHOUT_BODY, SYNC};
-use crate::stream::Swept;
+use super::header::{LEN_WITHOUT_BODY, SYNC};
+use crate::stream::{Batch, Kernel, Rejected};
+
+/// The batches of UCP: bytes without a sync and a length of 4..=`CAP`.
+#[derive(Clone, Copy, Debug)]
+pub enum SyncBatch<const CAP: usize> {}
+
+impl<const CAP: usize> Batch for SyncBatch<CAP> {}
+
+impl<const CAP: usize> Kernel for SyncBatch<CAP> {
+    #[inline(always)]
+    fn reject_batch(bytes: &[u8]) -> Rejected {
+        reject_batch::<CAP>(bytes)
+    }
+}
 
 /// Places that are judged together.
 const PLACES: usize = 32;
@@ -17,9 +30,9 @@ const BLOCK: usize = PLACES + 3;
 /// How many bytes at the front start no frame. Ends in front of a length that a frame may have, or
 /// where less than a block is left.
 #[inline(always)]
-pub(super) fn sweep<const CAP: usize>(bytes: &[u8]) -> Swept {
-    let mut swept = Swept::default();
-    while let Some(block) = bytes.get(swept.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
+fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
+    let mut rejected = Rejected::default();
+    while let Some(block) = bytes.get(rejected.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
         let (mut syncs, mut starts) = ([0; PLACES], [0; PLACES]);
         let (mut count, mut any) = (0, 0);
         for at in 0..PLACES {
@@ -33,20 +46,20 @@ pub(super) fn sweep<const CAP: usize>(bytes: &[u8]) -> Swept {
             any |= starts[at];
         }
         if any == 0 {
-            swept.len += PLACES;
-            swept.length += usize::from(count);
+            rejected.len += PLACES;
+            rejected.length += usize::from(count);
             continue;
         }
         let first = first(starts);
-        swept.len += first;
+        rejected.len += first;
         // One of the syncs is that of the place it ends at.
         if count > 1 {
             let in_front = syncs.into_iter().take(first);
-            swept.length += in_front.map(usize::from).sum::<usize>();
+            rejected.length += in_front.map(usize::from).sum::<usize>();
         }
         break;
     }
-    swept
+    rejected
 }
 
 /// Where the first flag is set; at the end if none is.

@@ -2,7 +2,7 @@
 //! and of this crate.
 //!
 //! [`Line`] drives roles exactly as [`Endpoint`](crate::endpoint::Endpoint) says, byte by byte, with
-//! the [`Faults`] and the slow or chunky [`Driver`]s that you set. A second on it takes milliseconds,
+//! the [`Faults`] and the slow or chunky [`Timing`]s that you set. A second on it takes milliseconds,
 //! and the same seed gives the same second. An endpoint that would make a real driver spin is an
 //! error, [`Stuck`].
 //!
@@ -11,11 +11,7 @@
 //!
 //! ```
 //! # #[cfg(feature = "ikeya")] {
-//! use axlewire::{
-//!     ikeya::{Health, Master, MasterConfig, Mode, NodeId},
-//!     sim::{Direction, Faults, Line, MotorNode},
-//!     time::{Duration, Instant},
-//! };
+//! use axlewire::{ikeya::{master::{Health, MasterConfig}, Master, Mode, NodeId}, sim::{Direction, Faults, Line, MotorNode}, time::{Duration, Instant}};
 //!
 //! let start = Instant::from_micros(0); // a line begins at 0
 //! let mut master: Master = Master::new(MasterConfig::direct(), start);
@@ -49,7 +45,7 @@ pub use faults::{Faults, PairStatistics};
 pub use line::{Direction, Line, Stuck, Traced, Who};
 #[cfg(feature = "ikeya")]
 pub use motor::{Motor, MotorNode};
-pub use port::{Driver, Input};
+pub use port::{Input, Timing};
 pub use rng::Rng;
 #[cfg(feature = "ucp")]
 pub use rover::Rover;

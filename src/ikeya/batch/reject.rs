@@ -23,13 +23,17 @@
 
 use zerocopy::{little_endian::U16, transmute_ref};
 
-use super::{
-    ReadRequest, three,
-    wire::header::{POSITION, READ, VELOCITY, WRITE},
-};
 use crate::{
     crc16::TRINOMIAL,
-    stream::{Framing, Reason, Swept, Verdict},
+    ikeya::{
+        judge::judge,
+        three,
+        wire::{
+            ReadRequest,
+            header::{POSITION, READ, VELOCITY, WRITE},
+        },
+    },
+    stream::{Reason, Rejected, Verdict},
 };
 
 /// Places that are judged together: one half of them even, one odd.
@@ -44,38 +48,43 @@ const BLOCK: usize = 2 * WORDS + 1;
 /// How many bytes at the front start no frame. Ends in front of the first that does, or where less
 /// than a block is left.
 #[inline(always)]
-pub(super) fn sweep<F: Framing, const TO_SLAVE: bool, const TO_MASTER: bool>(
+pub(super) fn reject_batch<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
-) -> Swept {
-    let mut swept = Swept::default();
-    while let Some(block) = bytes.get(swept.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
+) -> Rejected {
+    let mut rejected = Rejected::default();
+    while let Some(block) = bytes.get(rejected.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
         let mut headers = [0; PLACES];
         let crowd = find_headers::<TO_SLAVE, TO_MASTER>(block, &mut headers);
         let mut multiples = [[0; PLACES / 2]; 2];
         let [even, odd] = &mut multiples;
         let ([from_even @ .., _], [_, from_odd @ ..]) = (block, block);
-        let any = find_multiples::<F, TO_SLAVE>(from_even, even)
-            | find_multiples::<F, TO_SLAVE>(from_odd, odd);
+        let any = find_multiples::<LONG, TO_SLAVE>(from_even, even)
+            | find_multiples::<LONG, TO_SLAVE>(from_odd, odd);
         if any == 0 {
-            swept.len += PLACES;
-            swept.crc += usize::from(crowd);
+            rejected.len += PLACES;
+            rejected.crc += usize::from(crowd);
             continue;
         }
         for (at, header) in headers.into_iter().enumerate() {
-            if multiples[at % 2][at / 2] != 0 && !is_refused::<F>(bytes, swept.len) {
-                return swept;
+            if multiples[at % 2][at / 2] != 0
+                && !is_rejected::<LONG, TO_SLAVE, TO_MASTER>(bytes, rejected.len)
+            {
+                return rejected;
             }
-            swept.len += 1;
-            swept.crc += usize::from(header);
+            rejected.len += 1;
+            rejected.crc += usize::from(header);
         }
     }
-    swept
+    rejected
 }
 
 /// What a single look says.
 #[inline(always)]
-fn is_refused<F: Framing>(bytes: &[u8], at: usize) -> bool {
-    let verdict = F::judge(bytes.get(at..).unwrap_or_default());
+fn is_rejected<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
+    bytes: &[u8],
+    at: usize,
+) -> bool {
+    let verdict = judge::<LONG, TO_SLAVE, TO_MASTER>(bytes.get(at..).unwrap_or_default());
     matches!(verdict, Verdict::Reject { reason: Reason::Crc | Reason::Header, .. })
 }
 
@@ -103,21 +112,21 @@ fn find_headers<const TO_SLAVE: bool, const TO_MASTER: bool>(
 /// Finds the places of a half where a window as long as a packet may be a multiple of `T`, 0xFFFF
 /// for yes; all of them ORed.
 #[inline(always)]
-fn find_multiples<F: Framing, const TO_SLAVE: bool>(
+fn find_multiples<const LONG: usize, const TO_SLAVE: bool>(
     bytes: &[u8; 2 * WORDS],
     found: &mut [u16; PLACES / 2],
 ) -> u16 {
-    const { assert!(F::MAX_LEN <= three::WriteRequest::LEN, "a block sees too little") }
+    const { assert!(LONG <= three::WriteRequest::LEN, "a block sees too little") }
     let words: &[U16; WORDS] = transmute_ref!(bytes);
     let mut any = 0;
     for lane in 0..PLACES / 2 {
         let (mut remainder, mut initial) = (words[lane].get(), 0xFFFF);
         let mut multiple = 0;
-        for next in 1..F::MAX_LEN / 2 {
+        for next in 1..LONG / 2 {
             remainder = times_x16(remainder) ^ words[lane + next].get();
             initial = times_x16(initial);
             let len = 2 * next + 2;
-            if len == F::MAX_LEN || (TO_SLAVE && len == ReadRequest::LEN) {
+            if len == LONG || (TO_SLAVE && len == ReadRequest::LEN) {
                 multiple |= flag((remainder ^ initial) & !TRINOMIAL == 0);
             }
         }

@@ -1,24 +1,21 @@
-//! The robot's side: takes commands, reports, calibrates.
+//! The robot: its commands, and the calls of its driver.
 
-mod config;
-mod event;
-mod repeat;
-mod send;
-mod state;
-
-pub use config::{ReportLayout, RobotConfig};
-pub use event::{RobotEvent, RobotStatistics, UpdateSource};
-
-use super::{
-    CalibrationKind, ImuBias, MAX_LEN, MagBias, MotorControl, NetworkState, OtaStatus, Telemetry,
-    role::{FRAME_PAUSE, Inbox, reached},
-};
+use super::{config::RobotConfig, event::RobotEvent, state::State, statistics::RobotStatistics};
 use crate::{
     endpoint::{Endpoint, Unsent},
+    inbox::Inbox,
     stream::Counters,
-    time::{Duration, Instant, earliest, wire_time},
+    time::{Duration, Instant, earliest, reached, wire_time},
+    ucp::{
+        body::{ImuBias, MagBias},
+        codes::{CalibrationKind, NetworkState, OtaStatus},
+        framing::Decoder,
+        header::MAX_LEN,
+        motor::MotorControl,
+        report::Telemetry,
+        role::{FRAME_PAUSE, inbox},
+    },
 };
-use state::State;
 
 /// A rover, as its host sees it: a pure state machine, driven as [`Endpoint`] says.
 ///
@@ -47,7 +44,7 @@ use state::State;
 ///
 /// ```
 /// use axlewire::{endpoint::Endpoint, time::Instant};
-/// use axlewire::ucp::{Body, MotorControl, Robot, RobotConfig};
+/// use axlewire::ucp::{robot::RobotConfig, Body, MotorControl, Robot};
 ///
 /// let mut robot = Robot::new(RobotConfig::default(), Instant::from_millis(0));
 /// let received = MotorControl::new(60, 0)?.frame(0);
@@ -58,6 +55,7 @@ use state::State;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Robot {
+    decoder: Decoder,
     inbox: Inbox,
     outgoing: [u8; MAX_LEN],
     state: State,
@@ -69,7 +67,8 @@ impl Robot {
     pub fn new(config: RobotConfig, now: Instant) -> Self {
         let config = config.sane();
         Self {
-            inbox: Inbox::new(config.baud, config.quiet_margin),
+            decoder: Decoder::new(),
+            inbox: inbox(config.baud, config.idle_margin, now),
             outgoing: [0; MAX_LEN],
             state: State::new(config, now),
         }
@@ -139,6 +138,12 @@ impl Robot {
         self.state.network
     }
 
+    /// The settings.
+    #[must_use]
+    pub const fn config(&self) -> &RobotConfig {
+        &self.state.config
+    }
+
     /// What the robot has seen.
     #[must_use]
     pub const fn statistics(&self) -> &RobotStatistics {
@@ -147,8 +152,15 @@ impl Robot {
 
     /// Where every received byte went.
     #[must_use]
-    pub fn counters(&self) -> Counters {
-        self.inbox.counters()
+    pub const fn counters(&self) -> Counters {
+        self.decoder.counters()
+    }
+
+    /// Takes in the frames that `bytes` complete.
+    fn receive(&mut self, mut bytes: &[u8], now: Instant) {
+        while let Some((frame, at)) = self.inbox.next(&mut self.decoder, &mut bytes) {
+            self.state.receive(frame, at, now);
+        }
     }
 
     /// Takes out the events that are not to stay.
@@ -172,9 +184,11 @@ impl Endpoint for Robot {
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        let Self { inbox, state, .. } = self;
-        inbox.settle(now, |frame, at| state.receive(frame, at, now));
-        state.watch(now);
+        while self.inbox.settle(self.decoder.pending(), now) {
+            self.decoder.idle();
+            self.receive(&[], now);
+        }
+        self.state.watch(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
@@ -197,8 +211,11 @@ impl Endpoint for Robot {
 
     /// A command is as old as it can be (U10).
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        let Self { inbox, state, .. } = self;
-        inbox.take(bytes, since, now, |frame, at| state.receive(frame, at, now));
+        if bytes.is_empty() {
+            return;
+        }
+        self.inbox.receive(bytes, since, now);
+        self.receive(bytes, now);
     }
 
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
@@ -210,6 +227,6 @@ impl Endpoint for Robot {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        earliest(&[self.inbox.deadline(), self.state.deadline()])
+        earliest(&[self.inbox.deadline(self.decoder.pending()), self.state.deadline()])
     }
 }

@@ -1,25 +1,27 @@
-//! A slave of a motor bus: follows all traffic, answers only its own READs, keeps the last command.
-
-mod config;
-mod event;
-mod inbox;
-
-pub use config::SlaveConfig;
-pub use event::{SlaveEvent, SlaveStatistics};
+//! The slave: its commands, and the calls of its driver.
 
 use heapless::Vec;
 
-use super::{Board, Command, DipSwitch, IdReading, Mode, NodeId, OneMotor, Target};
+use super::{
+    config::SlaveConfig,
+    dip::{DipSwitch, IdReading},
+    event::SlaveEvent,
+    requests::{Found, Requests},
+    statistics::SlaveStatistics,
+};
 use crate::{
+    encode::Encode,
     endpoint::{Endpoint, Unsent},
     error::EncodeError,
-    stream::{Counters, Encode},
-    time::{Duration, Instant, earliest, wire_time},
+    events::Latest,
+    ikeya::{
+        board::{Board, Command, OneMotor, PACKET_LEN, Target},
+        units::{Mode, NodeId},
+    },
+    stats::{count, uncount},
+    stream::Counters,
+    time::{Duration, Instant, earliest, reached, wire_time},
 };
-use inbox::{Found, Inbox};
-
-/// Longest packet of either kind of board, bytes.
-const PACKET_LEN: usize = 16;
 
 /// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that the
 /// application has set, and hands on the commands for it (ruling I9).
@@ -32,16 +34,12 @@ const PACKET_LEN: usize = 16;
 /// * On two wires it follows the answers of other nodes, so that it finds no request in them (I14).
 ///
 /// ```
-/// use axlewire::{
-///     endpoint::Endpoint,
-///     ikeya::{Mode, NodeId, ReadRequest, Rps, Slave, SlaveConfig, VelocityResponse},
-///     time::Instant,
-/// };
+/// use axlewire::{endpoint::Endpoint, ikeya::{slave::SlaveConfig, Mode, NodeId, ReadRequest, Rps, Slave, VelocityResponse}, time::Instant};
 ///
-/// let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct());
+/// let now = Instant::from_micros(0);
+/// let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
 /// let current = Rps::new(1.0)?;
 /// slave.set_velocity(current);
-/// let now = Instant::from_micros(0);
 /// slave.handle_input(ReadRequest::new(NodeId::N2).as_bytes(), now);
 /// let answer = VelocityResponse::new(NodeId::N2, current);
 /// assert_eq!(slave.poll_transmit(now), Some(&answer.as_bytes()[..]));
@@ -60,13 +58,9 @@ pub struct Slave<B: Board = OneMotor> {
     answer: Option<Answer>,
     /// The same, handed out, until more bytes are received.
     sent: Option<Answer>,
-    /// When the newest byte may have arrived first.
-    heard_at: Option<Instant>,
-    /// When it was handed in: the rest of its packet may come from then on.
-    read_at: Option<Instant>,
-    inbox: Inbox<B>,
+    requests: Requests<B>,
     packet: Vec<u8, PACKET_LEN>,
-    event: Option<SlaveEvent<B>>,
+    event: Latest<SlaveEvent<B>>,
     statistics: SlaveStatistics,
 }
 
@@ -88,7 +82,7 @@ impl Answer {
 impl<B: Board> Slave<B> {
     /// A slave that is not moving and has heard nothing yet.
     #[must_use]
-    pub fn new(node: NodeId, mode: Mode, config: SlaveConfig) -> Self {
+    pub fn new(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
         Self {
             node,
             mode,
@@ -99,11 +93,9 @@ impl<B: Board> Slave<B> {
             commanded_at: None,
             answer: None,
             sent: None,
-            heard_at: None,
-            read_at: None,
-            inbox: Inbox::new(config.two_wire),
+            requests: Requests::new(config.two_wire, config.idle, now),
             packet: Vec::new(),
-            event: None,
+            event: Latest::new(),
             statistics: SlaveStatistics::default(),
         }
     }
@@ -118,8 +110,9 @@ impl<B: Board> Slave<B> {
         dip: DipSwitch,
         reading: IdReading,
         config: SlaveConfig,
+        now: Instant,
     ) -> Result<Self, EncodeError> {
-        Ok(Self::new(dip.node_id(reading)?, dip.mode(), config))
+        Ok(Self::new(dip.node_id(reading)?, dip.mode(), config, now))
     }
 
     /// The speed that a velocity node answers with from now on.
@@ -138,8 +131,8 @@ impl<B: Board> Slave<B> {
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
-            if let Some(SlaveEvent::Command(_)) = self.event {
-                self.event = None;
+            if let Some(SlaveEvent::Command(_)) = self.event.peek() {
+                self.event.take();
             }
         }
     }
@@ -156,10 +149,19 @@ impl<B: Board> Slave<B> {
         self.mode
     }
 
-    /// The last good command; `None` before the first, and after the watchdog.
+    /// What to do at this moment: the last good command; `None` before the first, and once the
+    /// watchdog has fired.
+    ///
+    /// Right at any time, whether or not events have been taken out and timeouts handled.
     #[must_use]
-    pub const fn command(&self) -> Option<Target<B>> {
-        self.command
+    pub fn command(&self, now: Instant) -> Option<Target<B>> {
+        if reached(self.watchdog_at(), now) { None } else { self.command }
+    }
+
+    /// The settings.
+    #[must_use]
+    pub const fn config(&self) -> &SlaveConfig {
+        &self.config
     }
 
     /// The counts.
@@ -171,12 +173,19 @@ impl<B: Board> Slave<B> {
     /// Where every byte went.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        self.inbox.counters()
+        self.requests.counters()
+    }
+
+    /// Number of events that the next one replaced because the application had not taken them; stops
+    /// at 2^32 - 1.
+    #[must_use]
+    pub const fn lost_events(&self) -> u32 {
+        self.event.lost()
     }
 
     /// Takes in bytes and what they complete, which had arrived at `at`.
     fn receive(&mut self, mut bytes: &[u8], at: Instant) {
-        while let Some(found) = self.inbox.next(&mut bytes) {
+        while let Some(found) = self.requests.next(&mut bytes) {
             match found {
                 Found::Answer => count(&mut self.statistics.answers),
                 Found::Request { request: (node, command), is_last } => {
@@ -227,30 +236,18 @@ impl<B: Board> Slave<B> {
 
     /// The latest event counts: it replaces one that nobody has taken.
     fn tell(&mut self, event: SlaveEvent<B>) {
-        if self.event.replace(event).is_some() {
-            count(&mut self.statistics.lost_events);
-        }
+        self.event.put(event);
     }
 
     /// The next event, left in its place.
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
-    pub(crate) const fn peek_event(&self) -> Option<&SlaveEvent<B>> {
-        self.event.as_ref()
+    pub(crate) fn peek_event(&self) -> Option<&SlaveEvent<B>> {
+        self.event.peek()
     }
 
     fn watchdog_at(&self) -> Option<Instant> {
         Some(self.commanded_at? + self.config.watchdog?)
     }
-
-    /// When the start of a packet that is pending is given up.
-    fn idle_at(&self) -> Option<Instant> {
-        let pending = self.inbox.pending() > 0;
-        self.read_at.filter(|_| pending).map(|read| read + self.config.idle)
-    }
-}
-
-fn count(counter: &mut u32) {
-    *counter = counter.wrapping_add(1);
 }
 
 impl<B: Board> Endpoint for Slave<B> {
@@ -261,14 +258,12 @@ impl<B: Board> Endpoint for Slave<B> {
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        if self.idle_at().is_some_and(|at| now >= at) {
-            self.inbox.idle();
-            self.receive(&[], self.heard_at.unwrap_or(now));
-            // What is left may be the start of a packet again, with the same patience.
-            self.read_at = Some(now);
+        if self.requests.settle(now) {
+            self.receive(&[], self.requests.last());
         }
-        if self.watchdog_at().is_some_and(|at| now >= at) {
+        if reached(self.watchdog_at(), now) {
             (self.command, self.commanded_at) = (None, None);
+            count(&mut self.statistics.watchdog);
             self.tell(SlaveEvent::Watchdog);
         }
     }
@@ -312,8 +307,9 @@ impl<B: Board> Endpoint for Slave<B> {
     /// A command, and the request for an answer, is as old as it can be.
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
         if !bytes.is_empty() {
-            (self.heard_at, self.read_at, self.sent) = (Some(since), Some(now), None);
+            self.sent = None;
             self.overtake();
+            self.requests.receive(bytes, since, now);
             self.receive(bytes, since);
         }
     }
@@ -327,7 +323,7 @@ impl<B: Board> Endpoint for Slave<B> {
     /// not repeated: the master asks again.
     fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
         if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
-            self.statistics.replies = self.statistics.replies.wrapping_sub(1);
+            uncount(&mut self.statistics.replies);
             self.answer = Some(answer);
         }
     }
@@ -338,6 +334,6 @@ impl<B: Board> Endpoint for Slave<B> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let answer_at = self.answer.map(|answer| answer.from);
-        earliest(&[answer_at, self.idle_at(), self.watchdog_at()])
+        earliest(&[answer_at, self.requests.deadline(), self.watchdog_at()])
     }
 }

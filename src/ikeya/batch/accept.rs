@@ -5,11 +5,14 @@
 
 use zerocopy::{little_endian::U32, transmute_ref};
 
-use super::{
-    ReadRequest, VelocityResponse,
-    wire::header::{POSITION, READ, VELOCITY, WRITE},
+use crate::{
+    crc16,
+    ikeya::wire::{
+        ReadRequest, VelocityResponse,
+        header::{POSITION, READ, VELOCITY, WRITE},
+    },
+    stream::Accepted,
 };
-use crate::{crc16, stream::GoodRun};
 
 /// Words in which packets begin that are judged together; a bit in a mask for each.
 const PLACES: usize = 32;
@@ -29,41 +32,36 @@ const WORTH: usize = 3;
 /// The packets at the front, one behind the other.
 ///
 /// Packets of 8 bytes whose CRC is right: header and id are looked at when they are handed out. If there
-/// are hardly any, and registers are `wide`, whole and right packets of both lengths. In narrower ones those
+/// are hardly any, and registers are wide, whole and right packets of both lengths. In narrower ones those
 /// cost more than they bring, since every place may begin one.
-///
-/// None where `LONG`, the length of everything but a READ, is another: nobody needs it there.
 #[inline(always)]
-pub(super) fn good_run<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
+pub(super) fn accept_batch<const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
-    wide: bool,
-) -> GoodRun {
-    if LONG != VelocityResponse::LEN {
-        return GoodRun::default();
-    }
-    let Some(bytes) = bytes.first_chunk::<{ BLOCK + 4 }>() else { return GoodRun::default() };
+    is_wide: bool,
+) -> Accepted {
+    let Some(bytes) = bytes.first_chunk::<{ BLOCK + 4 }>() else { return Accepted::default() };
     let block: &Block = transmute_ref!(bytes);
     let evens = right_longs(block, 0);
     let frames = ((evens | !EVEN).trailing_ones() / 2) as usize;
-    if TO_SLAVE && wide && frames < WORTH {
+    if TO_SLAVE && is_wide && frames < WORTH {
         return both_lengths::<TO_MASTER>(block, evens);
     }
-    GoodRun { frames, len: frames * VelocityResponse::LEN }
+    Accepted { frames, len: frames * VelocityResponse::LEN }
 }
 
 /// The packets of both lengths at the front; of the even places it is known where a CRC is right.
 #[inline(always)]
-fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> GoodRun {
+fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> Accepted {
     let right = evens | right_longs(block, 1);
     let longs = right & mask(block, starts_long::<TO_MASTER>);
-    let shorts = mask(block, |word| flaws_of_short(word) == 0);
+    let shorts = mask(block, |word| read_mismatch(word) == 0);
     // Whatever no packet in front of it leads to is behind damage, or inside a packet.
     let led_to = 1 | longs << 2 | shorts << 1;
     let loose = (longs | shorts) & !led_to;
     let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
     let longs = (longs & in_front).count_ones() as usize;
     let shorts = (shorts & in_front).count_ones() as usize;
-    GoodRun {
+    Accepted {
         frames: longs + shorts,
         len: longs * VelocityResponse::LEN + shorts * ReadRequest::LEN,
     }
@@ -75,8 +73,8 @@ fn right_longs(block: &Block, from: usize) -> u32 {
     let mut found = 0;
     for pair in 0..PLACES / 2 {
         let place = 2 * pair + from;
-        let flaws = crc16::flaws_of_8(block[place].get(), block[place + 1].get());
-        found |= if flaws == 0 { 1 << place } else { 0 };
+        let syndrome = crc16::syndrome_8(block[place].get(), block[place + 1].get());
+        found |= if syndrome == 0 { 1 << place } else { 0 };
     }
     found
 }
@@ -94,18 +92,18 @@ fn mask(block: &Block, is_one: impl Fn(u32) -> bool) -> u32 {
 /// Does a packet of 8 bytes start like this?
 #[inline(always)]
 fn starts_long<const TO_MASTER: bool>(word: u32) -> bool {
-    let is = |header| flaws_of_start(word, header) == 0;
+    let is = |header| start_mismatch(word, header) == 0;
     is(WRITE) | (TO_MASTER & (is(VELOCITY) | is(POSITION)))
 }
 
 /// Zero for a READ.
 #[inline(always)]
-fn flaws_of_short(word: u32) -> u32 {
-    crc16::flaws_of_4(word) | flaws_of_start(word, READ)
+fn read_mismatch(word: u32) -> u32 {
+    crc16::syndrome_4(word) | start_mismatch(word, READ)
 }
 
 /// Zero for this header and an id of 1 to 8. Not in bytes: lanes would have to be taken apart.
 #[inline(always)]
-fn flaws_of_start(word: u32, header: u8) -> u32 {
+fn start_mismatch(word: u32, header: u8) -> u32 {
     ((word << 16).wrapping_sub(0x0100_0000) & 0xF8FF_0000) ^ u32::from(header) << 16
 }

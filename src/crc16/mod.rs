@@ -1,0 +1,206 @@
+//! CRC-16/MODBUS without a table (ruling B1).
+//!
+//! Both protocols end every frame with this checksum, low byte first: polynomial 0x8005 sent
+//! least significant bit first (0xA001 reflected), initial value 0xFFFF, no final XOR. The
+//! catalogue's check value, the CRC of `123456789`, is 0x4B37.
+//!
+//! # How it works
+//!
+//! A message is a polynomial over the field of two elements: the first bit sent is the coefficient of
+//! the highest power, and a frame is good when `P = x^16 + x^15 + x^2 + 1` divides it. Words are read
+//! little-endian, so bit 0 of a word was sent first. Multiplying by `x` is a shift to the *right*, and
+//! what a shift pushes out has to come back at the *left*. Whole words are done at a time, by shifts
+//! and XORs alone: no table, no multiplication, no step per bit or byte.
+//!
+//! **A word further.** Modulo `P`, `x^32 = x^16 + x^4 + x`, so a state of 32 bits is multiplied by `x^32`,
+//! to make room for the next word, by three shifts to the right. What they push out are powers from
+//! `x^32` on: the same equation applies to them. They are put in again at the left *before* the shifts,
+//! which then carry them along, and since no shift is longer than half a word, nothing is pushed out
+//! twice: `y = s ^ s<<16 ^ s<<28 ^ s<<31`, and `y>>16 ^ y>>4 ^ y>>1` is `s` times `x^32`.
+//!
+//! **Good or not.** Is a word a multiple of `P`? Dividing from the low powers up never ends, as with
+//! `1 / (1 + u)` of numbers, except for multiples. With `P = 1 + u` and `(1 + u)(1 + u) = 1 + u^2`, the
+//! quotient is the word times `(1 + u)(1 + u^2)(1 + u^4)`... until a power of `u` is beyond the word. Squaring
+//! doubles exponents and adds nothing between, so each factor has at most three shifts. For a multiple
+//! the quotient stops 16 places before the end: its last coefficients, 16 bits, are zero. The other way
+//! round, a quotient that stops there times `P` has no room for anything beyond the word: it is the word.
+//!
+//! **Making a CRC** is the division from the high powers down, which does end: the quotient comes of the
+//! same product in `1/x`, with `P = x^16 (1 + 1/x + x^-14 + x^-16)`, and the remainder is what is left.
+//!
+//! **Words of 64 bits.** The equation for `x^64` is dear, but `P = (x + 1)(x^15 + x + 1)`, and modulo
+//! the second factor `x^64 = x^8 + x^4`. The first factor divides what has an even number of ones: XOR
+//! all words, count once. A frame is good when both hold, because the factors have no common divisor. A
+//! remainder modulo `x^15 + x + 1` comes by `x^15 = x + 1`, and squared `x^30 = x^2 + 1`, which lowers
+//! all high powers at once; the parity then says which of the two 16-bit values that share it is the CRC.
+//!
+//! **Any length.** A message that does not fill its words gets zeros in front, which change nothing. The
+//! initial value is added to its first two bytes, wherever these then are.
+//!
+//! The words are the machine's own: 64 bits on a host, 32 on a microcontroller, where a shift of 64
+//! bits takes four instructions. Both forms are below, each complete.
+
+mod narrow;
+#[cfg(any(test, target_pointer_width = "64"))]
+mod wide;
+
+#[cfg(not(target_pointer_width = "64"))]
+use narrow as words;
+#[cfg(target_pointer_width = "64")]
+use wide as words;
+
+#[cfg(feature = "ikeya")]
+pub(crate) use narrow::{TRINOMIAL, syndrome_4, syndrome_8};
+
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+use crate::error::ParseError;
+
+/// Is `frame`, a whole frame with its CRC in the last two bytes, undamaged?
+///
+/// Anything shorter than its own CRC is not: fewer than two bytes are `false`.
+///
+/// ```
+/// use axlewire::crc16;
+/// assert!(crc16::check(&[0xAA, 0x01, 0xBE, 0xD0])); // READ for node 1
+/// assert!(!crc16::check(&[0xAA, 0x02, 0xBE, 0xD0]));
+/// ```
+#[inline]
+#[must_use]
+pub const fn check(frame: &[u8]) -> bool {
+    words::check(frame)
+}
+
+/// [`check`] of a packet whose length is known when it is compiled.
+#[cfg(feature = "ikeya")]
+#[inline(always)]
+pub(crate) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
+    words::check_packet(packet)
+}
+
+/// The CRC of `bytes`, to be sent low byte first behind them.
+///
+/// ```
+/// use axlewire::crc16;
+/// assert_eq!(crc16::compute(b"123456789"), 0x4B37);
+/// assert_eq!(crc16::compute(&[0xAA, 0x01]).to_le_bytes(), [0xBE, 0xD0]);
+/// ```
+#[inline]
+#[must_use]
+pub const fn compute(bytes: &[u8]) -> u16 {
+    words::compute(bytes)
+}
+
+/// [`check`] with an answer that says what was wrong.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+pub(crate) fn verify(frame: &[u8]) -> Result<(), ParseError> {
+    if check(frame) {
+        return Ok(());
+    }
+    let Some((body, found)) = frame.split_last_chunk::<2>() else {
+        return Err(ParseError::Length { expected: 2, found: frame.len() });
+    };
+    Err(ParseError::Crc { expected: compute(body), found: u16::from_le_bytes(*found) })
+}
+
+/// The CRC that belongs into the last two bytes of `frame`, whatever stands there now.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+pub(crate) fn seal(frame: &[u8]) -> [u8; 2] {
+    let body = frame.split_last_chunk::<2>().map_or(&[][..], |(body, _)| body);
+    compute(body).to_le_bytes()
+}
+
+/// The form that this machine does not use is tested on it, too: the tests in `tests` see only one.
+#[cfg(test)]
+mod tests {
+    extern crate alloc;
+
+    use super::{
+        narrow::{self, TRINOMIAL},
+        wide,
+    };
+    use alloc::vec;
+    use crc::{CRC_16_MODBUS, Crc, Table};
+    use proptest::prelude::*;
+
+    const ORACLE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
+
+    fn assert_equal_to_oracle(message: &[u8]) {
+        let crc = ORACLE.checksum(message);
+        assert_eq!(wide::compute(message), crc, "{message:02x?}");
+        assert_eq!(narrow::compute(message), crc, "{message:02x?}");
+        // The good frame, the one that differs by `x^15 + x + 1`, and a damaged one.
+        for (end, is_good) in [(crc, true), (crc ^ TRINOMIAL, false), (crc ^ 0x0100, false)] {
+            let mut frame = message.to_vec();
+            frame.extend(end.to_le_bytes());
+            assert_eq!(wide::check(&frame), is_good, "{frame:02x?}");
+            assert_eq!(narrow::check(&frame), is_good, "{frame:02x?}");
+        }
+    }
+
+    #[test]
+    fn every_one_hot_message_up_to_70_bytes_agrees_in_both_forms() {
+        for len in 0..=70 {
+            let mut message = vec![0; len];
+            assert_equal_to_oracle(&message);
+            for at in 0..len {
+                for bit in 0..8 {
+                    message[at] = 1 << bit;
+                    assert_equal_to_oracle(&message);
+                }
+                message[at] = 0;
+            }
+        }
+    }
+
+    #[cfg(feature = "ikeya")]
+    #[test]
+    fn a_packet_whose_length_is_known_is_judged_as_any_other() {
+        fn assert_alike<const LEN: usize>() {
+            let mut packet = [0xA5; LEN];
+            for _ in 0..2 {
+                let (body, crc) = packet.split_last_chunk_mut::<2>().unwrap();
+                *crc = ORACLE.checksum(body).to_le_bytes();
+                assert!(narrow::check_packet(&packet) && wide::check_packet(&packet));
+                for bit in 0..8 * LEN {
+                    packet[bit / 8] ^= 1 << (bit % 8);
+                    assert!(!narrow::check_packet(&packet) && !wide::check_packet(&packet));
+                    packet[bit / 8] ^= 1 << (bit % 8);
+                }
+                packet.reverse();
+            }
+        }
+        assert_alike::<4>();
+        assert_alike::<7>();
+        assert_alike::<8>();
+        assert_alike::<9>();
+    }
+
+    #[test]
+    fn both_forms_can_be_computed_at_compile_time() {
+        const WIDE: u16 = wide::compute(b"123456789");
+        const NARROW: u16 = narrow::compute(b"123456789");
+        assert_eq!((WIDE, NARROW), (0x4B37, 0x4B37));
+    }
+
+    #[test]
+    fn less_than_a_crc_is_good_in_no_form() {
+        assert!(!wide::check(&[]) && !narrow::check(&[]));
+        for byte in 0..=u8::MAX {
+            assert!(!wide::check(&[byte]) && !narrow::check(&[byte]));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_message_agrees_in_both_forms(message in prop::collection::vec(any::<u8>(), 0..400)) {
+            assert_equal_to_oracle(&message);
+        }
+
+        #[test]
+        fn both_forms_judge_any_bytes_alike(bytes in prop::collection::vec(any::<u8>(), 2..64)) {
+            let (body, crc) = bytes.split_at(bytes.len() - 2);
+            let is_good = ORACLE.checksum(body).to_le_bytes() == crc;
+            prop_assert_eq!((wide::check(&bytes), narrow::check(&bytes)), (is_good, is_good));
+        }
+    }
+}

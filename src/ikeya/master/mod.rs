@@ -1,0 +1,44 @@
+//! The master's side of the bus: settings, events, node health and statistics.
+//!
+//! [`Master`](super::Master) is the role. It is in the files of this module, one concept each:
+//!
+//! | file | what it decides |
+//! |---|---|
+//! | `role` | commands, and the calls of [`Endpoint`](crate::endpoint::Endpoint) |
+//! | `queue`, `turns` | which packet goes next (I13) |
+//! | `window`, `replies` | which replies are accepted, and what they do (I7) |
+//! | `echo` | which received bytes are the master's own |
+//! | `strikes`, `health` | when a node is abnormal, and how it is searched for (I7) |
+//! | `discovery` | which ids are asked for the first time |
+//! | `mode` | whether a node has changed its mode (I11) |
+//! | `stop`, `set_point` | what a node is owed and told (I12) |
+//! | `view` | what an application can ask |
+
+mod config;
+mod discovery;
+mod echo;
+mod event;
+mod health;
+mod mode;
+mod node;
+mod nodes;
+mod queue;
+mod replies;
+mod role;
+mod schedule;
+mod set_point;
+mod statistics;
+mod stop;
+mod strikes;
+mod turns;
+mod view;
+mod window;
+
+pub use config::{MasterConfig, Polling};
+pub use event::{Cause, CommandError, MasterEvent};
+pub use health::Health;
+pub use nodes::NodeSet;
+pub use role::Master;
+pub use schedule::Schedule;
+pub use statistics::{MasterStatistics, NodeStatistics};
+pub use stop::StopProgress;

@@ -1,0 +1,155 @@
+//! Turns: what may be sent next, why, and whose turn it is.
+
+use crate::{
+    ikeya::board::{Board, Target},
+    time::Instant,
+};
+
+/// What is sent.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Request<B: Board> {
+    Read,
+    Write(Target<B>),
+}
+
+impl<B: Board> Request<B> {
+    /// A silent request is not answered.
+    pub(super) const fn is_exchange(&self) -> bool {
+        B::ANSWERS_WRITE || matches!(self, Self::Read)
+    }
+}
+
+/// Why it is sent.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Reason {
+    /// The WRITE of a position that has just been measured: the second half of an attempt.
+    Hold,
+    /// A stop WRITE for a velocity node that is online.
+    SpeedStop,
+    /// A stop WRITE for any node that is online.
+    Stop,
+    /// A READ that a stop or a mode in doubt waits for.
+    StopRead,
+    /// The first attempt for a node that is owed a stop and is not online.
+    LostStop,
+    SetPoint,
+    Discovery,
+    Search,
+    Cycle,
+}
+
+impl Reason {
+    /// What is urgent, in its order, and then the rest.
+    pub(super) const ALL: [Self; 9] = [
+        Self::Hold,
+        Self::SpeedStop,
+        Self::Stop,
+        Self::StopRead,
+        Self::LostStop,
+        Self::SetPoint,
+        Self::Discovery,
+        Self::Search,
+        Self::Cycle,
+    ];
+
+    /// For a stop, or about a mode in doubt.
+    pub(super) const fn is_stop(self) -> bool {
+        matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
+    }
+}
+
+/// One request.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Choice<B: Board> {
+    pub(super) index: usize,
+    pub(super) request: Request<B>,
+    pub(super) reason: Reason,
+    pub(super) round: Round,
+}
+
+/// The round that a request belongs to: the one under way, or the next, in which each node has its
+/// turns again.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Round {
+    Same,
+    Next,
+}
+
+/// The request that was handed out last.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent<B: Board> {
+    pub(super) choice: Choice<B>,
+    /// When its first byte could leave.
+    pub(super) start: Instant,
+    pub(super) len: usize,
+}
+
+/// Whose turn it is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turns {
+    /// The node that was served last with a stop, as an index.
+    pub(super) stop: usize,
+    /// The same with a new set-point.
+    pub(super) set_point: usize,
+    /// The node whose turn in the cycle it is.
+    pub(super) cycle: usize,
+    /// Turns of the cycle that go in front of a discovery.
+    pub(super) cycle_first: u8,
+    is_second_discovery: bool,
+    /// The last round ended with an exchange of the search.
+    pub(super) was_search: bool,
+    /// The nodes that have had their exchange for a stop in this round, a bit for each.
+    pub(super) had_stop: u8,
+    /// The same with their new set-point.
+    pub(super) had_set_point: u8,
+}
+
+impl Turns {
+    /// A discovery has ended: after every second one each node has its turn in the cycle first.
+    pub(super) const fn end_discovery(&mut self) {
+        self.is_second_discovery = !self.is_second_discovery;
+        if !self.is_second_discovery {
+            self.cycle_first = 8;
+        }
+    }
+
+    /// Has this node its turn? A stop WRITE is followed by a READ before it is repeated, so it needs
+    /// no turn of its own unless it is answered.
+    pub(super) fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
+        let had = match reason {
+            _ if round == Round::Next => 0,
+            Reason::SpeedStop | Reason::Stop if !B::ANSWERS_WRITE => 0,
+            Reason::SetPoint => self.had_set_point,
+            Reason::Hold | Reason::Discovery | Reason::Search | Reason::Cycle => 0,
+            _ => self.had_stop,
+        };
+        had >> index & 1 == 0
+    }
+}
+
+/// How far a discovery is: all ids once, then all again.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) struct Discovery {
+    pub(super) step: u16,
+}
+
+impl Discovery {
+    /// The node to be asked next, as an index.
+    pub(super) const fn index(self) -> usize {
+        (self.step & 7) as usize
+    }
+
+    /// How often each id was asked before.
+    pub(super) const fn pass(self) -> u16 {
+        self.step >> 3
+    }
+}
+
+/// The search for nodes that do not answer, one at a time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Search {
+    /// Nobody is asked before then.
+    pub(super) next_at: Option<Instant>,
+    /// The node that was asked last, as an index.
+    pub(super) last: usize,
+}

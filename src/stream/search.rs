@@ -1,0 +1,208 @@
+//! The search for the next frame, and when to judge batches.
+
+use super::{
+    framing::{Framing, Verdict},
+    kernel::{Accepted, Kernel, Rejected},
+    ledger::{Ledger, Reason},
+};
+use crate::machine::{self, IS_HOST};
+
+/// What the search stops at: a verdict that is no rejection.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Front {
+    Frame { len: usize },
+    Partial { need: usize },
+}
+
+/// Judges the front of `bytes`. A verdict that would make a search go on for ever becomes the
+/// rejection of one byte: a frame shorter than any, or a candidate that asks for more than the
+/// longest frame has. For the framings of this crate the compiler sees that neither happens.
+///
+/// A frame longer than `bytes` stays one: whoever splits it off finds out.
+#[inline(always)]
+pub(super) fn judge<F: Framing>(bytes: &[u8]) -> Verdict {
+    const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "no such lengths") }
+    match F::judge(bytes) {
+        Verdict::Frame { len } if len >= F::MIN_LEN => Verdict::Frame { len },
+        Verdict::Partial { need } if bytes.len() < F::MAX_LEN => {
+            Verdict::Partial { need: need.max(bytes.len() + 1).min(F::MAX_LEN) }
+        }
+        Verdict::Reject { reason, more } if !bytes.is_empty() => Verdict::Reject { reason, more },
+        _ if bytes.is_empty() => Verdict::Partial { need: 1 },
+        _ => Verdict::Reject { reason: Reason::Header, more: 0 },
+    }
+}
+
+/// Books rejected bytes from the front of `bytes` until something else is there; returns the bytes
+/// from there on and what it is.
+///
+/// On a host, good frames do not wait for the registers that rejections need: those have a function
+/// of their own. A microcontroller has no flash for it, and its caller says how to book them.
+#[inline(always)]
+pub(super) fn search<'b, F: Framing>(
+    bytes: &'b [u8],
+    ledger: &mut Ledger,
+    refuse: impl Fn(&mut Ledger, Reason, usize),
+) -> (&'b [u8], Front) {
+    if IS_HOST {
+        match judge::<F>(bytes) {
+            Verdict::Frame { len } => (bytes, Front::Frame { len }),
+            Verdict::Partial { need } => (bytes, Front::Partial { need }),
+            Verdict::Reject { .. } => search_on::<F>(bytes, ledger),
+        }
+    } else {
+        search_through::<F>(bytes, ledger, refuse)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn search_on<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> (&'b [u8], Front) {
+    search_through::<F>(bytes, ledger, Ledger::refuse)
+}
+
+#[inline(always)]
+fn search_through<'b, F: Framing>(
+    bytes: &'b [u8],
+    ledger: &mut Ledger,
+    refuse: impl Fn(&mut Ledger, Reason, usize),
+) -> (&'b [u8], Front) {
+    let mut rest = bytes;
+    let mut back_off = BackOff::new();
+    let front = loop {
+        match judge::<F>(rest) {
+            Verdict::Frame { len } if len <= rest.len() => break Front::Frame { len },
+            Verdict::Frame { len: need } | Verdict::Partial { need } => {
+                break Front::Partial { need };
+            }
+            Verdict::Reject { reason, more } => {
+                let (len, behind) = match rest.get(more..) {
+                    Some([_, behind @ ..]) => (1 + more, Some(behind)),
+                    // The slice ends before.
+                    _ => (rest.len(), None),
+                };
+                refuse(ledger, reason, len);
+                let Some(behind) = behind else {
+                    rest = &[];
+                    break Front::Partial { need: 1 };
+                };
+                rest = behind;
+                if IS_HOST {
+                    rest = back_off.reject_batch::<F>(rest, ledger);
+                }
+            }
+        }
+    };
+    if rest.len() < bytes.len() {
+        ledger.skip(bytes.len() - rest.len());
+    }
+    (rest, front)
+}
+
+/// How many rejections to wait for before bytes are rejected in batches.
+///
+/// Batches pay where rejected bytes are dense. A damaged frame brings two or three rejections, and
+/// the good one behind it is found faster one byte at a time. Batches do not pay, either, where
+/// candidates that have to be judged are close together: there the attempts back off.
+struct BackOff {
+    /// Rejections still to wait for.
+    left: u32,
+    /// Rejections waited for this time.
+    begun: u32,
+}
+
+impl BackOff {
+    const LEAST: u32 = 6;
+    const MOST: u32 = 256;
+
+    const fn new() -> Self {
+        Self { left: Self::LEAST, begun: Self::LEAST }
+    }
+
+    /// Counts one rejection, of what was in front of `bytes`; returns what is left of them.
+    #[inline(always)]
+    fn reject_batch<'b, F: Framing>(&mut self, bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
+        self.left -= 1;
+        if self.left > 0 {
+            return bytes;
+        }
+        let behind = reject_batch::<F>(bytes, ledger);
+        if bytes.len() - behind.len() > F::MAX_LEN {
+            *self = Self::new();
+        } else {
+            self.begun = (2 * self.begun).min(Self::MOST);
+            self.left = self.begun;
+        }
+        behind
+    }
+}
+
+/// Books what a batch rejects; returns the bytes behind it.
+#[cold]
+#[inline(never)]
+fn reject_batch<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
+    let Rejected { len, length, crc } =
+        in_best_form::<F::Batch, _>(|_| F::Batch::reject_batch(bytes));
+    let Some(behind) = bytes.get(len..) else { return bytes };
+    ledger.refuse(Reason::Length, length);
+    ledger.refuse(Reason::Crc, crc);
+    behind
+}
+
+/// When to look for a batch of frames.
+///
+/// The end of a batch is a branch that the processor did not foresee, and a failed look is wasted
+/// work: where damage is dense, or frames are not of the lengths that batches have, the looks back
+/// off.
+#[derive(Debug)]
+pub(super) struct Looks {
+    /// The next look is due when no more than this is left, bytes.
+    due: usize,
+    /// From a look that did not pay to the next one, bytes.
+    wait: usize,
+}
+
+/// Frames that make a look pay: all that Ikeya's batches can have, or nearly.
+const MANY: usize = 14;
+
+/// Two packets.
+const FIRST_WAIT: usize = 16;
+
+/// What is lost when good frames come at last, bytes.
+const LONGEST_WAIT: usize = 1 << 14;
+
+impl Looks {
+    pub(super) const fn new() -> Self {
+        Self { due: usize::MAX, wait: 0 }
+    }
+
+    /// The batch at the front of `rest`, if a look is due and finds one.
+    #[inline(always)]
+    pub(super) fn accept_batch<F: Framing>(&mut self, rest: &[u8]) -> Option<Accepted> {
+        if !IS_HOST || rest.len() > self.due {
+            return None;
+        }
+        let batch = in_best_form::<F::Batch, _>(|is_wide| F::Batch::accept_batch(rest, is_wide));
+        let is_there = batch.frames > 0 && (1..=rest.len()).contains(&batch.len);
+        let behind = if is_there { rest.len() - batch.len } else { rest.len() };
+        self.wait = if is_there && batch.frames >= MANY {
+            self.wait / 4
+        } else {
+            (4 * self.wait).clamp(FIRST_WAIT, LONGEST_WAIT)
+        };
+        self.due = behind.saturating_sub(self.wait);
+        is_there.then_some(batch)
+    }
+}
+
+/// Runs a batch, with feature `simd` compiled for AVX2 where the processor has it; tells it whether
+/// that is so.
+#[inline(always)]
+fn in_best_form<K: Kernel, R>(batch: impl Fn(bool) -> R) -> R {
+    if K::USES_AVX2 {
+        if let Some(result) = machine::in_avx2(|| batch(true)) {
+            return result;
+        }
+    }
+    batch(false)
+}
