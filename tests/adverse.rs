@@ -7,29 +7,31 @@
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
-#[path = "adverse/bus.rs"]
-mod bus;
-#[path = "adverse/clock.rs"]
-mod clock;
-#[path = "adverse/cut_off.rs"]
-mod cut_off;
+#[path = "adverse/cut_off_packets.rs"]
+mod cut_off_packets;
 #[path = "models/kit.rs"]
 mod kit;
-#[path = "adverse/model.rs"]
-mod model;
+#[path = "adverse/master.rs"]
+mod master;
 #[path = "adverse/motor.rs"]
 mod motor;
-#[path = "adverse/pauses.rs"]
-mod pauses;
+#[path = "adverse/paused_packets.rs"]
+mod paused_packets;
 #[path = "support/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
-#[path = "adverse/random.rs"]
-mod random;
+#[path = "adverse/random_masters.rs"]
+mod random_masters;
 #[cfg(feature = "ucp")]
 #[path = "adverse/rover.rs"]
 mod rover;
+#[path = "adverse/rulings.rs"]
+mod rulings;
 #[path = "adverse/slave.rs"]
 mod slave;
+#[path = "adverse/stalled_ports.rs"]
+mod stalled_ports;
 #[path = "adverse/wire.rs"]
 mod wire;
+#[path = "adverse/wrong_clocks.rs"]
+mod wrong_clocks;

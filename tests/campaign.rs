@@ -12,17 +12,17 @@
 #[cfg(feature = "ikeya")]
 #[path = "campaign/bus.rs"]
 mod bus;
+#[path = "campaign/results.rs"]
+mod results;
 #[cfg(feature = "ucp")]
 #[path = "campaign/rover.rs"]
 mod rover;
-#[path = "campaign/table.rs"]
-mod table;
 
 use axlewire::{
     sim::{Faults, Rng},
     time::Duration,
 };
-use table::{Run, Table};
+use results::{Run, Table};
 
 /// Every fault at once, each of a random strength.
 fn faults(rng: &mut Rng, longest_delay_us: u64) -> Faults {

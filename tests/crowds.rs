@@ -1,9 +1,9 @@
 //! Crowds of headers, where candidates are refused many at a time, against the slow oracle.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "support/line.rs"]
+#[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
-mod line;
+mod checked_line;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
@@ -13,7 +13,7 @@ use axlewire::{
     stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
-use line::{Known, Line, Op};
+use checked_line::{Known, Line, Op};
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
 
@@ -150,8 +150,8 @@ fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
 
 /// Frames, gaps and counters of a slice.
 fn check_slice<F: Known>(stream: &[u8]) {
-    line::check_slice::<F>(stream);
-    line::check_finished_slice::<F>(stream);
+    checked_line::check_slice::<F>(stream);
+    checked_line::check_finished_slice::<F>(stream);
 }
 
 /// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.

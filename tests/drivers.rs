@@ -6,6 +6,8 @@
 
 #[path = "drivers/bus.rs"]
 mod bus;
+#[path = "drivers/bus_rig.rs"]
+mod bus_rig;
 #[path = "drivers/contract.rs"]
 mod contract;
 #[path = "drivers/direction.rs"]
@@ -20,9 +22,7 @@ mod recorder;
 mod rover;
 #[path = "drivers/stops.rs"]
 mod stops;
-#[path = "drivers/story.rs"]
-mod story;
-#[path = "drivers/unsent.rs"]
-mod unsent;
-#[path = "support/world.rs"]
-mod world;
+#[path = "drivers/unsent_frames.rs"]
+mod unsent_frames;
+#[path = "support/virtual_time.rs"]
+mod virtual_time;

@@ -11,12 +11,12 @@
 
 #![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
 
+#[path = "firmware/driver_enable_pin.rs"]
+mod driver_enable_pin;
 #[path = "firmware/master.rs"]
 mod master;
 #[path = "firmware/noise.rs"]
 mod noise;
-#[path = "firmware/pin.rs"]
-mod pin;
 #[path = "firmware/qemu.rs"]
 mod qemu;
 #[path = "support/quiet.rs"]

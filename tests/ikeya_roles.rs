@@ -2,8 +2,8 @@
 
 #![cfg(feature = "ikeya")]
 
-#[path = "ikeya_roles/commands.rs"]
-mod commands;
+#[path = "ikeya_roles/answer_windows.rs"]
+mod answer_windows;
 #[path = "ikeya_roles/dead_man.rs"]
 mod dead_man;
 #[path = "ikeya_roles/discovery.rs"]
@@ -12,14 +12,16 @@ mod discovery;
 mod health;
 #[path = "ikeya_roles/modes.rs"]
 mod modes;
-#[path = "ikeya_roles/order.rs"]
-mod order;
-#[path = "ikeya_roles/order_three.rs"]
-mod order_three;
 #[path = "ikeya_roles/rig.rs"]
 mod rig;
 #[path = "ikeya_roles/schedule.rs"]
 mod schedule;
+#[path = "ikeya_roles/sending_order.rs"]
+mod sending_order;
+#[path = "ikeya_roles/sending_order_three_motors.rs"]
+mod sending_order_three_motors;
+#[path = "ikeya_roles/set_points.rs"]
+mod set_points;
 #[path = "ikeya_roles/settings.rs"]
 mod settings;
 #[path = "ikeya_roles/slave.rs"]
@@ -28,11 +30,9 @@ mod slave;
 mod standstill;
 #[path = "ikeya_roles/stops.rs"]
 mod stops;
-#[path = "ikeya_roles/stops_lost.rs"]
-mod stops_lost;
-#[path = "ikeya_roles/three.rs"]
-mod three;
-#[path = "ikeya_roles/unsent.rs"]
-mod unsent;
-#[path = "ikeya_roles/windows.rs"]
-mod windows;
+#[path = "ikeya_roles/stops_of_lost_nodes.rs"]
+mod stops_of_lost_nodes;
+#[path = "ikeya_roles/three_motors.rs"]
+mod three_motors;
+#[path = "ikeya_roles/unsent_frames.rs"]
+mod unsent_frames;

@@ -1,10 +1,10 @@
 //! The stream layer against the slow oracle, on hostile streams, and as stories told by hand.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "support/generate.rs"]
-mod generate;
-#[path = "support/line.rs"]
-mod line;
+#[path = "support/checked_line.rs"]
+mod checked_line;
+#[path = "support/hostile_streams.rs"]
+mod hostile_streams;
 #[path = "support/oracle.rs"]
 mod oracle;
 
@@ -15,7 +15,7 @@ use axlewire::{
     stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
     ucp::{self, Body, MotorControl, Ucp},
 };
-use line::{Known, Line, Op};
+use checked_line::{Known, Line, Op};
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*};
 
@@ -30,7 +30,7 @@ macro_rules! properties {
             const MAX_LEN: usize = $max_len;
 
             fn stream() -> impl Strategy<Value = Vec<u8>> {
-                generate::stream(F::RULES)
+                hostile_streams::stream(F::RULES)
             }
 
             #[test]
@@ -41,12 +41,12 @@ macro_rules! properties {
             proptest! {
                 #[test]
                 fn a_slice_gives_what_the_oracle_says(stream in stream()) {
-                    line::check_slice::<F>(&stream);
+                    checked_line::check_slice::<F>(&stream);
                 }
 
                 #[test]
                 fn a_finished_slice_gives_what_the_oracle_says(stream in stream()) {
-                    line::check_finished_slice::<F>(&stream);
+                    checked_line::check_finished_slice::<F>(&stream);
                 }
 
                 #[test]
@@ -112,7 +112,7 @@ macro_rules! properties {
                 }
 
                 #[test]
-                fn nothing_that_a_user_does_matters(stream in stream(), ops in generate::ops()) {
+                fn nothing_that_a_user_does_matters(stream in stream(), ops in hostile_streams::ops()) {
                     Line::<F, MAX_LEN>::new().play(&stream, &ops);
                     Line::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
                     Line::<F, 512>::new().play(&stream, &ops);
@@ -121,13 +121,13 @@ macro_rules! properties {
                 #[test]
                 fn a_start_delays_a_frame_by_less_than_a_frame(
                     stream in stream(),
-                    frame in generate::frame(F::RULES),
+                    frame in hostile_streams::frame(F::RULES),
                 ) {
                     check_stall::<F, MAX_LEN>(&stream, &frame);
                 }
 
                 #[test]
-                fn work_is_bounded(stream in stream(), ops in generate::ops()) {
+                fn work_is_bounded(stream in stream(), ops in hostile_streams::ops()) {
                     check_work::<F, MAX_LEN>(&stream, &ops);
                     check_work::<F, MAX_LEN>(&stream, &[Op::Slice(1)]);
                 }
@@ -277,7 +277,7 @@ fn a_false_header_swallows_nothing() {
 
 #[test]
 fn a_frame_inside_a_damaged_frame_is_delivered() {
-    let mut outer = generate::ucp_frame_around(0x20, &motor());
+    let mut outer = hostile_streams::ucp_frame_around(0x20, &motor());
     *outer.last_mut().unwrap() ^= 1;
     let (seen, _) = seen::<Ucp, 64>(&[&outer], true);
     let before = Seen::Gap(6, Reason::Crc);
@@ -286,7 +286,7 @@ fn a_frame_inside_a_damaged_frame_is_delivered() {
 
 #[test]
 fn a_frame_inside_the_payload_of_a_good_one_is_not() {
-    let outer = generate::ucp_frame_around(0x20, &motor());
+    let outer = hostile_streams::ucp_frame_around(0x20, &motor());
     let (seen, _) = seen::<Ucp, 64>(&[&outer], true);
     assert_eq!(seen, [Seen::Frame(outer)]);
 }
@@ -294,7 +294,7 @@ fn a_frame_inside_the_payload_of_a_good_one_is_not() {
 #[test]
 fn the_payload_of_a_bad_id_packet_is_not_searched() {
     for id in [0, 9, 255] {
-        let packet = generate::ikeya_packet_around(0xBB, id, &read());
+        let packet = hostile_streams::ikeya_packet_around(0xBB, id, &read());
         let (seen, pending) = seen::<ikeya::ToSlave, 8>(&[&packet, &read()], false);
         assert_eq!(seen, [Seen::Gap(8, Reason::Id), Seen::Frame(read())], "id {id}");
         assert_eq!(pending, 0);
@@ -303,7 +303,7 @@ fn the_payload_of_a_bad_id_packet_is_not_searched() {
 
 #[test]
 fn a_bad_id_with_a_bad_crc_is_noise() {
-    let mut packet = generate::ikeya_packet_around(0xBB, 9, &read());
+    let mut packet = hostile_streams::ikeya_packet_around(0xBB, 9, &read());
     packet[7] ^= 0x80;
     let (seen, _) = seen::<ikeya::ToSlave, 8>(&[&packet], true);
     let (before, after) = (Seen::Gap(2, Reason::Crc), Seen::Gap(2, Reason::Header));
@@ -341,8 +341,8 @@ fn a_doubled_first_sync_byte_hides_no_frame() {
 
 #[test]
 fn length_61_is_refused_unless_the_cap_is_raised() {
-    let longest = generate::ucp_frame_around(0x20, &[0; 56]);
-    let longer = generate::ucp_frame_around(0x20, &[0; 57]);
+    let longest = hostile_streams::ucp_frame_around(0x20, &[0; 56]);
+    let longer = hostile_streams::ucp_frame_around(0x20, &[0; 57]);
     let (by_default, _) = seen::<Ucp, 64>(&[&longest], true);
     assert_eq!(by_default, [Seen::Frame(longest)]);
     let (by_default, _) = seen::<Ucp, 64>(&[&longer], true);
@@ -363,7 +363,7 @@ fn a_length_that_no_frame_has_stalls_nothing() {
 #[test]
 fn an_unknown_id_is_delivered() {
     for (id, body) in [(0x20, &[1, 2, 3][..]), (0, &[]), (2, &[0; 15]), (5, &[0; 35])] {
-        let frame = generate::ucp_frame_around(id, body);
+        let frame = hostile_streams::ucp_frame_around(id, body);
         let mut decoder = ucp::Decoder::new();
         let mut input = frame.as_slice();
         let Some(Event::Frame(frame)) = decoder.decode(&mut input) else { panic!("id {id}") };
@@ -386,7 +386,7 @@ fn a_truncated_frame_takes_nothing_with_it() {
 #[test]
 fn one_gap_is_one_event_with_the_reason_of_its_first_byte() {
     // A false header with a wrong CRC, stray bytes, a packet for node 9.
-    let stranger = generate::ikeya_packet_around(0xBB, 9, &[0; 4]);
+    let stranger = hostile_streams::ikeya_packet_around(0xBB, 9, &[0; 4]);
     let stream = [&[0xAA, 0x00, 0x00][..], &stranger, &read()].concat();
     let (gap_first, _) = seen::<ikeya::ToSlave, 8>(&[&stream], false);
     assert_eq!(gap_first, [Seen::Gap(11, Reason::Crc), Seen::Frame(read())]);
@@ -474,7 +474,7 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
     for mut input in [&[0xFD, 0xFF, 60, 0], chunk.as_slice()] {
         while let Some(event) = decoder.decode(&mut input) {
             if let Event::Frame(frame) = event {
-                places.push(line::place_in(&chunk, frame.as_bytes()));
+                places.push(checked_line::place_in(&chunk, frame.as_bytes()));
             }
         }
     }
@@ -633,7 +633,7 @@ fn a_byte_pushed_into_a_full_buffer_is_not_taken() {
 
 #[test]
 fn a_split_candidate_is_judged_no_more_often_than_its_bytes_can_change_the_verdict() {
-    let frame = generate::ucp_frame_around(0x20, &[0; 56]);
+    let frame = hostile_streams::ucp_frame_around(0x20, &[0; 56]);
     JUDGED.set(0);
     CHECKED.set(0);
     let mut line = Line::<Counted<Ucp>, 64>::new();

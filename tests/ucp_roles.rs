@@ -5,29 +5,29 @@
 //! ahead, or a driver would spin.
 #![cfg(feature = "ucp")]
 
-#[path = "ucp_roles/both.rs"]
-mod both;
+#[path = "ucp_roles/acknowledgement_properties.rs"]
+mod acknowledgement_properties;
+#[path = "ucp_roles/acknowledgements.rs"]
+mod acknowledgements;
 #[path = "ucp_roles/calibration.rs"]
 mod calibration;
-#[path = "ucp_roles/hang.rs"]
-mod hang;
-#[path = "ucp_roles/kept.rs"]
-mod kept;
-#[path = "ucp_roles/kept_properties.rs"]
-mod kept_properties;
+#[path = "ucp_roles/firmware_hangs.rs"]
+mod firmware_hangs;
+#[path = "ucp_roles/firmware_update.rs"]
+mod firmware_update;
+#[path = "ucp_roles/host_and_robot.rs"]
+mod host_and_robot;
 #[path = "ucp_roles/link.rs"]
 mod link;
-#[path = "ucp_roles/motion.rs"]
-mod motion;
-#[path = "ucp_roles/motion_properties.rs"]
-mod motion_properties;
-#[path = "ucp_roles/properties.rs"]
-mod properties;
+#[path = "ucp_roles/motor_commands.rs"]
+mod motor_commands;
 #[path = "ucp_roles/rig.rs"]
 mod rig;
 #[path = "ucp_roles/robot.rs"]
 mod robot;
+#[path = "ucp_roles/robustness.rs"]
+mod robustness;
+#[path = "ucp_roles/standstill_properties.rs"]
+mod standstill_properties;
 #[path = "ucp_roles/unsent.rs"]
 mod unsent;
-#[path = "ucp_roles/update.rs"]
-mod update;

@@ -10,7 +10,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use crate::{faults, millis, part, table::Run};
+use crate::{faults, millis, part, results::Run};
 
 /// Fastest that a motor is told to turn, and fastest that it goes to a position, rps.
 const FASTEST_RPS: f64 = 10.0;

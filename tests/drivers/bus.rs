@@ -10,9 +10,9 @@ use axlewire::{
 };
 
 use crate::{
+    bus_rig::{FOUND, Story, manual, only_two_and_five, rps},
     port::Unplugged,
-    story::{FOUND, Story, manual, only_two_and_five, rps},
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 #[test]

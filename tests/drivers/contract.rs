@@ -15,7 +15,7 @@ use embedded_hal_async::delay::DelayNs;
 use crate::{
     port::{Script, Step, Unplugged},
     recorder::{ASYNC, Call, ROUNDS, Recorder, scripted},
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 fn bytes(count: usize) -> Step {

@@ -11,7 +11,7 @@ use embedded_io::Error as _;
 use crate::{
     port::{Script, Step, Unplugged, poll},
     recorder::{Log, Recorder},
-    world::{VirtualClock, World},
+    virtual_time::{VirtualClock, World},
 };
 
 /// A part that writes down what it does.

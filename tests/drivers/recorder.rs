@@ -10,7 +10,7 @@ use axlewire::{
 
 use crate::{
     port::{Script, Unplugged, poll},
-    world::{VirtualClock, World},
+    virtual_time::{VirtualClock, World},
 };
 
 /// What was done to a role.

@@ -13,7 +13,7 @@ use axlewire::{
 
 use crate::{
     port::Unplugged,
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 type Rover = Driver<Host, End, VirtualClock>;

@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use crate::{
-    pin,
+    driver_enable_pin,
     qemu::{Board, PATIENCE, Program, Report},
     quiet::undisturbed,
     wire::{Wire, WireClock},
@@ -339,7 +339,7 @@ fn the_driver_enable_pin_is_on_while_an_answer_is_sent_and_off_otherwise() {
 
         // Mostly one answer each time; where requests lie in wait, the next one on its heels.
         let mut sent = 0;
-        for burst in pin::bursts(&master.board.accesses()) {
+        for burst in driver_enable_pin::bursts(&master.board.accesses()) {
             let mut answers = Frames::<ToMaster>::new(&burst);
             sent += answers.by_ref().count();
             assert_eq!(

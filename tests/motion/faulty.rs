@@ -1,6 +1,6 @@
 //! A port of which one half fails while the other works.
 
-use crate::{port::Unplugged, world::End};
+use crate::{port::Unplugged, virtual_time::End};
 
 /// An end of a line of which either half can fail while the other works.
 pub(crate) struct Faulty {

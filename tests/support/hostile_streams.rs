@@ -8,7 +8,7 @@ use axlewire::{
 use proptest::{collection::vec, prelude::*, sample::Index, strategy::Union};
 
 use super::{
-    line::Op,
+    checked_line::Op,
     oracle::{self, Rules},
 };
 

@@ -3,7 +3,7 @@
 use axlewire::ikeya::{NodeId, Position};
 
 use super::{Episode, index};
-use crate::{kit::Kit, model::Aim};
+use crate::{kit::Kit, rulings::Aim};
 
 impl<B: Kit> Episode<B> {
     /// The application orders something now and then.

@@ -25,7 +25,7 @@ use axlewire::{
 use crate::{
     faulty::Faulty,
     port::Unplugged,
-    world::{End, VirtualClock, Wakes, World},
+    virtual_time::{End, VirtualClock, Wakes, World},
 };
 
 // What a user calls.

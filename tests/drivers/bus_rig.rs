@@ -7,7 +7,7 @@ use axlewire::{
     ikeya::{Master, MasterConfig, Mode, NodeId, Polling, Position, Rps, Slave, SlaveConfig},
 };
 
-use crate::world::{End, VirtualClock, World};
+use crate::virtual_time::{End, VirtualClock, World};
 
 pub(crate) type Bus = Driver<Master, End, VirtualClock>;
 pub(crate) type Node = Rc<RefCell<Driver<Slave, End, VirtualClock>>>;

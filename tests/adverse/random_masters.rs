@@ -1,9 +1,9 @@
-//! Random masters on random buses, against the model of `model.rs`: answers get lost, late, damaged
-//! and cut, switches are moved, nodes die, ports fail, and applications order whatever they like.
+//! Random masters on random buses, against the model of `rulings.rs`: answers get lost, late,
+//! damaged and cut, switches are moved, nodes die, ports fail, and applications order whatever they like.
 //! Then the bus is well, and every stop has to be paid.
 
-#[path = "orders.rs"]
-mod orders;
+#[path = "random_orders.rs"]
+mod random_orders;
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ use axlewire::{
 
 use crate::{
     kit::{Kit, Reply, Sent},
-    model::{DeadMan, Node, Seen},
+    rulings::{DeadMan, Node, Seen},
 };
 
 /// Steps with faults.

@@ -15,7 +15,7 @@ use axlewire::{
 use crate::{
     port::{Script, Step, Unplugged},
     recorder::{ASYNC, Call, ROUNDS, Recorder, Scripted, scripted},
-    world::{VirtualClock, Wakes, World},
+    virtual_time::{VirtualClock, Wakes, World},
 };
 
 const GONE: DriveError<Unplugged> = DriveError::Port(Unplugged);
