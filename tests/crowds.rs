@@ -4,6 +4,8 @@
 #[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod checked_line;
+#[path = "support/known_framings.rs"]
+mod known_framings;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
@@ -13,7 +15,8 @@ use axlewire::{
     stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
-use checked_line::{Known, Line, Op};
+use checked_line::{Line, Op};
+use known_framings::Known;
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
 

@@ -8,6 +8,8 @@ mod checked_line;
 #[path = "support/hostile_streams.rs"]
 #[allow(dead_code, reason = "the stories of stream.rs use more of it")]
 mod hostile_streams;
+#[path = "support/known_framings.rs"]
+mod known_framings;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "the stories of stream.rs use more of it")]
 mod oracle;
@@ -22,7 +24,7 @@ use axlewire::{
     },
     ucp::{self, Body, Ucp},
 };
-use checked_line::Known;
+use known_framings::Known;
 use proptest::{collection::vec, prelude::*};
 
 /// One by one, together, and together by SIMD: the frames of the oracle, and its counters.

@@ -21,11 +21,14 @@ use axlewire::{
 #[path = "../../tests/support/checked_line.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
 mod checked_line;
+#[path = "../../tests/support/known_framings.rs"]
+mod known_framings;
 #[path = "../../tests/support/oracle.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
 mod oracle;
 
-use checked_line::{Known, Line, Op};
+use checked_line::{Line, Op};
+use known_framings::Known;
 
 /// Any stream, cut and interrupted in any way, against the oracle: the six Ikeya framings.
 pub fn ikeya_stream(data: &[u8]) {
