@@ -8,15 +8,25 @@
 mod bus;
 #[path = "drivers/bus_rig.rs"]
 mod bus_rig;
-#[path = "drivers/contract.rs"]
-mod contract;
-#[path = "drivers/direction.rs"]
-mod direction;
+#[path = "drivers/clocks.rs"]
+mod clocks;
+#[path = "drivers/driver_enable.rs"]
+mod driver_enable;
+#[path = "drivers/driver_enable_in_a_driver.rs"]
+mod driver_enable_in_a_driver;
+#[path = "drivers/driver_enable_rig.rs"]
+mod driver_enable_rig;
+#[path = "drivers/errors.rs"]
+mod errors;
+#[path = "drivers/failed_and_dropped_calls.rs"]
+mod failed_and_dropped_calls;
 #[path = "support/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
 #[path = "drivers/recorder.rs"]
 mod recorder;
+#[path = "drivers/rounds.rs"]
+mod rounds;
 #[cfg(feature = "ucp")]
 #[path = "drivers/rover.rs"]
 mod rover;
@@ -26,3 +36,5 @@ mod stops;
 mod unsent_frames;
 #[path = "support/virtual_time.rs"]
 mod virtual_time;
+#[path = "drivers/waiting.rs"]
+mod waiting;

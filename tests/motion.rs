@@ -9,8 +9,6 @@
 
 #[path = "motion/failing_ports.rs"]
 mod failing_ports;
-#[path = "motion/faulty.rs"]
-mod faulty;
 #[cfg(feature = "ucp")]
 #[path = "motion/host.rs"]
 mod host;

@@ -1,4 +1,6 @@
 //! The wire between a role on this machine and a board: a port, a clock, noise, and a loose plug.
+//!
+//! A socket in real time; nothing of it is scripted.
 
 use std::{
     collections::VecDeque,

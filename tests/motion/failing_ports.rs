@@ -23,7 +23,6 @@ use axlewire::{
 };
 
 use crate::{
-    faulty::Faulty,
     port::Unplugged,
     virtual_time::{End, VirtualClock, Wakes, World},
 };
@@ -43,7 +42,7 @@ fn stop(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> 
 
 // The bus.
 
-type Bus = Driver<Master, Faulty, VirtualClock>;
+type Bus = Driver<Master, End, VirtualClock>;
 
 /// A master and node 1 with its motor, which runs whenever the world does.
 struct Story {
@@ -68,7 +67,7 @@ impl Story {
             }
         });
         let master = Master::new(config, world.now());
-        let bus = Driver::new(master, Faulty::new(near), VirtualClock(world.clone()));
+        let bus = Driver::new(master, near, VirtualClock(world.clone()));
         Self { world, bus, node }
     }
 
@@ -182,7 +181,7 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_motor() {
 fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
     for is_async in [false, true] {
         let world = World::default();
-        let mut port = Faulty::new(End::new(&world, 87));
+        let mut port = End::new(&world, 87);
         port.is_deaf = true;
         let host = Host::new(HostConfig::default(), world.now());
         let mut rover = Driver::new(host, port, VirtualClock(world.clone()));
@@ -224,8 +223,7 @@ impl embedded_hal::digital::OutputPin for Pin {
 fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
     for is_async in [false, true] {
         let (world, pin) = (World::default(), Pin::default());
-        let (near, mut far) = End::pair(&world, 20);
-        let mut port = Faulty::new(near);
+        let (mut port, mut far) = End::pair(&world, 20);
         port.is_deafened = true;
         let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct());
         let port = Directed::new(port, pin.clone()).unwrap();
@@ -248,7 +246,7 @@ fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
 #[test]
 fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
     let world = World::default();
-    let mut port = Faulty::new(End::new(&world, 20));
+    let mut port = End::new(&world, 20);
     (port.is_deaf, port.is_mute) = (true, true);
     let config = MasterConfig::direct();
     let clock = VirtualClock(world.clone());

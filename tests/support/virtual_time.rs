@@ -1,4 +1,7 @@
 //! Ports and clocks in virtual time, for the tests of the drivers.
+//!
+//! The port is an end of a simulated line: unlike the scripted one of `port.rs` it gives what others
+//! have sent, when it has arrived, and whoever waits for it is woken.
 
 use std::{
     cell::{Cell, RefCell},
@@ -142,8 +145,16 @@ pub(crate) struct End {
     pub(crate) fails_flush: bool,
     /// The receiver fails once, at the next look for bytes.
     pub(crate) fails_read: bool,
+    /// There always seems to be a byte, and every read fails.
+    pub(crate) is_deaf: bool,
+    /// It becomes deaf when something is written.
+    pub(crate) is_deafened: bool,
+    /// Every write fails.
+    pub(crate) is_mute: bool,
     /// Async writes and flushes are ready at the second poll only.
     pub(crate) stutters: bool,
+    /// Every byte that it has taken.
+    pub(crate) written: Vec<u8>,
     pub(crate) unplugged: Rc<Cell<bool>>,
 }
 
@@ -158,7 +169,11 @@ impl End {
             fails_after: None,
             fails_flush: false,
             fails_read: false,
+            is_deaf: false,
+            is_deafened: false,
+            is_mute: false,
             stutters: false,
+            written: vec![],
             unplugged: Rc::default(),
         }
     }
@@ -181,6 +196,9 @@ impl End {
 
     fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
         self.is_plugged()?;
+        if self.is_deaf {
+            return Err(Unplugged);
+        }
         assert!(self.has_arrived(), "read without a byte would block for ever");
         let mut count = 0;
         for slot in buffer {
@@ -195,6 +213,9 @@ impl End {
 
     fn take(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
         self.is_plugged()?;
+        if self.is_mute {
+            return Err(Unplugged);
+        }
         let mut count = buffer.len().min(self.most);
         if let Some(left) = self.fails_after {
             count = count.min(left);
@@ -203,6 +224,8 @@ impl End {
                 return Err(Unplugged);
             }
         }
+        self.written.extend(&buffer[..count]);
+        self.is_deaf |= self.is_deafened;
         for outbox in &self.outboxes {
             let mut outbox = outbox.borrow_mut();
             for &byte in &buffer[..count] {
@@ -235,7 +258,10 @@ impl embedded_io::ErrorType for End {
 impl embedded_io::ReadReady for End {
     fn read_ready(&mut self) -> Result<bool, Unplugged> {
         self.is_plugged()?;
-        if core::mem::take(&mut self.fails_read) { Err(Unplugged) } else { Ok(self.has_arrived()) }
+        if core::mem::take(&mut self.fails_read) {
+            return Err(Unplugged);
+        }
+        Ok(self.is_deaf || self.has_arrived())
     }
 }
 
@@ -261,7 +287,7 @@ impl embedded_io_async::Read for End {
             return Err(Unplugged);
         }
         poll_fn(|context| match self.is_plugged() {
-            Ok(()) if !self.has_arrived() => self.world.sleep(context),
+            Ok(()) if !self.is_deaf && !self.has_arrived() => self.world.sleep(context),
             _ => Poll::Ready(self.give(buffer)),
         })
         .await

@@ -1,4 +1,5 @@
-//! The same port, pin and clock for async calls.
+//! The port, pin and clock of `port.rs` for async calls: as they are, whoever waits sleeps in virtual
+//! time, which the scripted port of `support/port.rs` does not have.
 
 use std::{
     future::poll_fn,
