@@ -29,5 +29,7 @@ mod robot;
 mod robustness;
 #[path = "ucp_roles/standstill_properties.rs"]
 mod standstill_properties;
-#[path = "ucp_roles/unsent.rs"]
-mod unsent;
+#[path = "ucp_roles/unsent_messages.rs"]
+mod unsent_messages;
+#[path = "ucp_roles/unsent_motor_commands.rs"]
+mod unsent_motor_commands;

@@ -1,7 +1,5 @@
 //! Acknowledged is what the application will find (U15).
 
-use axlewire::endpoint::Unsent;
-
 use crate::rig::*;
 
 fn report(index: u8) -> Vec<u8> {

@@ -1,7 +1,5 @@
 //! Firmware updates (U7, U13).
 
-use axlewire::endpoint::Unsent;
-
 use crate::rig::*;
 
 #[test]

@@ -1,6 +1,5 @@
 //! Properties of motion: whatever happens, what should stand still does (U10, U16).
 
-use axlewire::endpoint::Unsent;
 use proptest::{collection::vec, prelude::*};
 
 use crate::rig::*;
