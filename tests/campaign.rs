@@ -9,11 +9,14 @@
 
 #![cfg(all(feature = "sim", any(feature = "ikeya", feature = "ucp")))]
 
+/// An episode on a bus.
 #[cfg(feature = "ikeya")]
 #[path = "campaign/bus.rs"]
 mod bus;
+/// The results of all episodes.
 #[path = "campaign/results.rs"]
 mod results;
+/// An episode with a rover.
 #[cfg(feature = "ucp")]
 #[path = "campaign/rover.rs"]
 mod rover;

@@ -88,8 +88,8 @@ properties! {
     ucp_with_the_largest_cap: Ucp<252>, 256;
 }
 
-/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame has, of
-/// odd parity, plainly damaged.
+/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame
+/// has, of odd parity, plainly damaged.
 fn packets(rules: Rules) -> Vec<Vec<u8>> {
     let mut starts: Vec<(Vec<u8>, usize)> = Vec::new();
     match rules {

@@ -1,5 +1,5 @@
-//! Frames that are judged together, and bytes that are refused together, with SIMD and without, against
-//! the slow oracle: streams long enough for lanes, damaged everywhere.
+//! Frames that are judged together, and bytes that are refused together, with SIMD and without,
+//! against the slow oracle: streams long enough for lanes, damaged everywhere.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 #[path = "support/checked_line.rs"]
@@ -36,8 +36,8 @@ fn check<F: Known>(stream: &[u8]) {
     check_run::<F>(stream, true);
 }
 
-/// A run is what `judge` finds one by one, on a processor without AVX2 as well, up to the first frame that
-/// there is no view of.
+/// A run is what `judge` finds one by one, on a processor without AVX2 as well, up to the first
+/// frame that there is no view of.
 fn check_run<F: Framing>(stream: &[u8], wide: bool) {
     let run = F::good_run(stream, wide);
     let (mut frames, mut at) = (0, 0);

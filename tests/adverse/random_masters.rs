@@ -1,6 +1,6 @@
 //! Random masters on random buses, against the model of `rulings.rs`: answers get lost, late,
-//! damaged and cut, switches are moved, nodes die, ports fail, and applications order whatever they like.
-//! Then the bus is well, and every stop has to be paid.
+//! damaged and cut, switches are moved, nodes die, ports fail, and applications order whatever they
+//! like. Then the bus is well, and every stop has to be paid.
 
 #[path = "random_orders.rs"]
 mod random_orders;

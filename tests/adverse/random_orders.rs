@@ -1,4 +1,4 @@
-//! What the application of a random master orders.
+//! The orders that the application of a random master gives.
 
 use axlewire::ikeya::{NodeId, Position};
 

@@ -1,4 +1,4 @@
-//! Up to three motors on a bus, a plug that may be loose, and a stop.
+//! An episode on a bus: up to three motors, a plug that may be loose, and a stop.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -97,7 +97,8 @@ impl Episode {
         }
     }
 
-    /// Asks for the readings by which a standstill is seen: with [`Polling::Manual`] nothing else does.
+    /// Asks for the readings by which a standstill is seen: with [`Polling::Manual`] nothing else
+    /// does.
     fn read_stopped(&mut self) {
         let now = self.bus.now();
         for &(node, _) in &self.nodes {

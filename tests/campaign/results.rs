@@ -1,4 +1,4 @@
-//! What the episodes have come to.
+//! The results of all episodes: how long and how far each motor still moved, and its bound.
 
 use std::{collections::BTreeMap, fmt};
 

@@ -1,4 +1,4 @@
-//! A rover on a noisy link, a plug that may be loose, and a stop.
+//! An episode with a rover: a noisy link, a plug that may be loose, and a stop.
 
 use axlewire::{
     endpoint::Endpoint,

@@ -1,4 +1,4 @@
-//! Master and slaves, each behind a driver, on one line.
+//! High-level calls on a motor bus: what discovery, set-points, reads and stops return, and when.
 
 use axlewire::{
     drive::{DriveError, Driver, Operation},

@@ -1,4 +1,4 @@
-//! A master and two slaves, each behind a driver, on one line.
+//! A master and two slaves, each behind a driver, on one line: the bus of the stories.
 
 use std::{cell::RefCell, rc::Rc};
 

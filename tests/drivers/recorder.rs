@@ -1,4 +1,4 @@
-//! A role that writes down what is done to it.
+//! A role that records every call, for the tests of the loop that drives it.
 
 use std::{collections::VecDeque, pin::pin, rc::Rc, task::Poll};
 

@@ -17,7 +17,8 @@ enum Access {
 }
 
 impl Access {
-    /// From a line such as `memory_region_ops_write cpu 0 mr 0x.. addr 0x40011004 value 0x55 size 4`.
+    /// From a line such as
+    /// `memory_region_ops_write cpu 0 mr 0x.. addr 0x40011004 value 0x55 size 4`.
     fn parse(line: &str) -> Option<Self> {
         let mut words = line.split_ascii_whitespace();
         let is_write = match words.next()? {

@@ -1,4 +1,4 @@
-//! Windows: which answer is one (I7).
+//! Answer windows: which packet counts as the answer to a request, and which is late (I7).
 
 use axlewire::{
     endpoint::Endpoint,

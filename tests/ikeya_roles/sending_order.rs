@@ -1,4 +1,4 @@
-//! The order of what is sent, and how long anybody waits (I13).
+//! The order in which packets are sent, and how long each of them waits at most (I13).
 
 use axlewire::{
     endpoint::Endpoint,

@@ -1,5 +1,5 @@
-//! How long anybody waits on a bus of boards with three motors, where each WRITE is an exchange
-//! (I13).
+//! How long each packet waits at most on a bus of boards with three motors, where each WRITE is an
+//! exchange (I13).
 
 use axlewire::{
     endpoint::Endpoint,

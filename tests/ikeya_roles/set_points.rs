@@ -1,4 +1,4 @@
-//! Set-points and their confirmation.
+//! Set-points: the latest one is repeated, and a confirmation always ends in one event.
 
 use axlewire::ikeya::{Cause, CommandError, MasterEvent, Mode, NodeId, Position, Rps};
 

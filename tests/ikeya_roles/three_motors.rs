@@ -1,4 +1,4 @@
-//! Boards with three motors (I10).
+//! Boards with three motors: each WRITE is answered, and all three motors count (I10).
 
 use axlewire::{
     endpoint::Endpoint,

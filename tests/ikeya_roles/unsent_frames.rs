@@ -159,8 +159,8 @@ fn the_attempt_that_an_abnormal_node_gets_at_once_is_not_used_up_by_a_port_that_
     assert_eq!(desk.packet(), read(NodeId::N1));
     fail(&mut desk, Unsent::Untouched);
     assert_eq!(kind(&desk.packet()), (READ, 1));
-    // What the port has taken of a packet is out after 160 us, and 200 us of silence follow; then the
-    // time of the WRITE.
+    // What the port has taken of a packet is out after 160 us, and 200 us of silence follow; then
+    // the time of the WRITE.
     assert_eq!(desk.now, begin + US(160 + 200 + 160), "when the WRITE has left");
 }
 
@@ -213,7 +213,8 @@ fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
     fail(&mut desk, Unsent::CutOff);
     let cut = desk.now;
     desk.turn();
-    // Twice five byte times behind what is on its way, so that no slave takes the next packet for the rest.
+    // Twice five byte times behind what is on its way, so that no slave takes the next packet for
+    // the rest.
     assert_eq!((cut, desk.now), (heard, cut + US(80 + 100 + 200)), "the gap is kept");
 }
 

@@ -1,4 +1,4 @@
-//! A framing that says too much.
+//! A framing that refuses more bytes than there are does not take a decoder beyond its input.
 
 use std::{cell::Cell, panic::catch_unwind};
 

@@ -1,4 +1,4 @@
-//! Frames: what may not be sent.
+//! Frames that must not be sent are refused, however their bytes came about.
 
 use axlewire::{
     error::EncodeError,

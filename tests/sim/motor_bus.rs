@@ -1,5 +1,5 @@
-//! A master on a simulated bus: discovery, commands that move motors, how often each node is visited,
-//! and nodes that are unplugged or left without commands.
+//! A master on a simulated bus: discovery, commands that move motors, how often each node is
+//! visited, and nodes that are unplugged or left without commands.
 
 use axlewire::{
     ikeya::{

@@ -1,4 +1,5 @@
-//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and what does not fit.
+//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and what does not
+//! fit.
 
 use axlewire::{
     ikeya,

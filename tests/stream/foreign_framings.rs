@@ -3,8 +3,8 @@
 
 use axlewire::stream::{Decoder, Event, Frames, Framing, Reason, Verdict};
 
-/// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs nothing,
-/// a refusal of more than there is.
+/// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs
+/// nothing, a refusal of more than there is.
 struct Liar<const LIE: u8>;
 
 impl<const LIE: u8> Framing for Liar<LIE> {

@@ -1,7 +1,7 @@
 //! Ports and clocks in virtual time, for the tests of the drivers.
 //!
-//! The port is an end of a simulated line: unlike the scripted one of `port.rs` it gives what others
-//! have sent, when it has arrived, and whoever waits for it is woken.
+//! The port is an end of a simulated line: unlike the scripted one of `port.rs` it gives what
+//! others have sent, when it has arrived, and whoever waits for it is woken.
 
 use std::{
     cell::{Cell, RefCell},

@@ -1,4 +1,4 @@
-//! Acknowledged is what the application will find (U15).
+//! What a role acknowledges, its application will find, however full the queues are (U15).
 
 use crate::rig::*;
 

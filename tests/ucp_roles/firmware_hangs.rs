@@ -1,4 +1,5 @@
-//! Firmware that hangs on ids 5..=0x0A (U14).
+//! Ids 5..=0x0A, on which some builds of the firmware hang, are not sent where the settings say so
+//! (U14).
 
 use crate::rig::*;
 

@@ -1,4 +1,5 @@
-//! Firmware updates (U7, U13).
+//! A firmware update starts only when it is asked for, behind a stop, and silence follows (U7,
+//! U13).
 
 use crate::rig::*;
 

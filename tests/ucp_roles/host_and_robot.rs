@@ -1,4 +1,5 @@
-//! What holds for host and robot alike.
+//! What holds for host and robot alike: floods, full queues, unplugging, time that wraps, deadlines
+//! and memory.
 
 use crate::rig::*;
 

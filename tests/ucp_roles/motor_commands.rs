@@ -1,4 +1,4 @@
-//! Motor commands and the dead-man (U10).
+//! Motor commands are repeated, a stop goes first, and the dead-man ends what nobody renews (U10).
 
 use crate::rig::*;
 

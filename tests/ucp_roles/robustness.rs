@@ -1,4 +1,5 @@
-//! Properties of both roles under any calls, bytes and times.
+//! Whatever calls, bytes and times a role gets, it keeps to its contract, and a bad line moves
+//! nothing that was not asked for.
 
 use std::collections::HashSet;
 

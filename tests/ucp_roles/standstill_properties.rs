@@ -1,4 +1,5 @@
-//! Properties of motion: whatever happens, what should stand still does (U10, U16).
+//! Whatever happens, what should stand still does: the command is zero 500 ms after the last sign
+//! of life (U10, U16).
 
 use proptest::{collection::vec, prelude::*};
 

@@ -1,5 +1,5 @@
-//! Motor commands and stops that did not reach the line: due again at once, twice behind a frame that
-//! was cut off, and never too late (U16).
+//! Motor commands and stops that did not reach the line: due again at once, twice behind a frame
+//! that was cut off, and never too late (U16).
 
 use crate::rig::*;
 
