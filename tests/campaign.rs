@@ -9,20 +9,23 @@
 
 #![cfg(all(feature = "sim", any(feature = "ikeya", feature = "ucp")))]
 
+/// An episode on a bus.
 #[cfg(feature = "ikeya")]
 #[path = "campaign/bus.rs"]
 mod bus;
+/// The results of all episodes.
+#[path = "campaign/results.rs"]
+mod results;
+/// An episode with a rover.
 #[cfg(feature = "ucp")]
 #[path = "campaign/rover.rs"]
 mod rover;
-#[path = "campaign/table.rs"]
-mod table;
 
 use axlewire::{
     sim::{Faults, Rng},
     time::Duration,
 };
-use table::{Run, Table};
+use results::{Run, Table};
 
 /// Every fault at once, each of a random strength.
 fn faults(rng: &mut Rng, longest_delay_us: u64) -> Faults {

@@ -1,9 +1,11 @@
 //! Crowds of headers, where candidates are refused many at a time, against the slow oracle.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "support/line.rs"]
+#[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
-mod line;
+mod checked_line;
+#[path = "support/known_framings.rs"]
+mod known_framings;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
@@ -13,7 +15,8 @@ use axlewire::{
     stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
-use line::{Known, Line, Op};
+use checked_line::{Line, Op};
+use known_framings::Known;
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
 
@@ -85,8 +88,8 @@ properties! {
     ucp_with_the_largest_cap: Ucp<252>, 256;
 }
 
-/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame has, of
-/// odd parity, plainly damaged.
+/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame
+/// has, of odd parity, plainly damaged.
 fn packets(rules: Rules) -> Vec<Vec<u8>> {
     let mut starts: Vec<(Vec<u8>, usize)> = Vec::new();
     match rules {
@@ -150,8 +153,8 @@ fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
 
 /// Frames, gaps and counters of a slice.
 fn check_slice<F: Known>(stream: &[u8]) {
-    line::check_slice::<F>(stream);
-    line::check_finished_slice::<F>(stream);
+    checked_line::check_slice::<F>(stream);
+    checked_line::check_finished_slice::<F>(stream);
 }
 
 /// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.

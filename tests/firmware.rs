@@ -1,31 +1,39 @@
 //! The roles on a Cortex-M4: the programs of `examples/firmware` in QEMU, against the roles on this
 //! machine and against each other, over sockets and in real time.
 //!
-//! Order and content are asserted, never how long something takes: QEMU runs beside whatever else this
-//! machine does. Waits end after 30 s. Where the machine halts QEMU for 100 ms inside a packet, the
-//! packet is lost, as on a real line; so one test runs at a time, and one that fails while the machine
-//! was busy is run again.
+//! Order and content are asserted, never how long something takes: QEMU runs beside whatever else
+//! this machine does. Waits end after 30 s. Where the machine halts QEMU for 100 ms inside a
+//! packet, the packet is lost, as on a real line; so one test runs at a time, and one that fails
+//! while the machine was busy is run again.
 //!
-//! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Where they are missing
-//! the tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
+//! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Where they are
+//! missing the tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
 
 #![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
 
+/// The driver-enable pin, from the log of QEMU.
+#[path = "firmware/driver_enable_pin.rs"]
+mod driver_enable_pin;
+/// The firmware master.
 #[path = "firmware/master.rs"]
 mod master;
+/// The firmware on a noisy wire.
 #[path = "firmware/noise.rs"]
 mod noise;
-#[path = "firmware/pin.rs"]
-mod pin;
+/// A board in QEMU.
 #[path = "firmware/qemu.rs"]
 mod qemu;
 #[path = "support/quiet.rs"]
 mod quiet;
+/// The firmware robot.
 #[path = "firmware/robot.rs"]
 mod robot;
+/// The firmware slave.
 #[path = "firmware/slave.rs"]
 mod slave;
+/// The USART of the firmware.
 #[path = "firmware/uart.rs"]
 mod uart;
+/// The wire to a board.
 #[path = "firmware/wire.rs"]
 mod wire;

@@ -2,37 +2,54 @@
 
 #![cfg(feature = "ikeya")]
 
-#[path = "ikeya_roles/commands.rs"]
-mod commands;
+/// Which packet counts as an answer.
+#[path = "ikeya_roles/answer_windows.rs"]
+mod answer_windows;
+/// An application that falls silent.
 #[path = "ikeya_roles/dead_man.rs"]
 mod dead_man;
+/// Finding the nodes of a bus.
 #[path = "ikeya_roles/discovery.rs"]
 mod discovery;
+/// Strikes, and the search for abnormal nodes.
 #[path = "ikeya_roles/health.rs"]
 mod health;
+/// Modes in doubt and modes that change.
 #[path = "ikeya_roles/modes.rs"]
 mod modes;
-#[path = "ikeya_roles/order.rs"]
-mod order;
-#[path = "ikeya_roles/order_three.rs"]
-mod order_three;
+/// A master called by hand.
 #[path = "ikeya_roles/rig.rs"]
 mod rig;
+/// The rate of a bus.
 #[path = "ikeya_roles/schedule.rs"]
 mod schedule;
+/// What is sent first, and how long the rest waits.
+#[path = "ikeya_roles/sending_order.rs"]
+mod sending_order;
+/// The same for boards with three motors.
+#[path = "ikeya_roles/sending_order_three_motors.rs"]
+mod sending_order_three_motors;
+/// Set-points and their confirmation.
+#[path = "ikeya_roles/set_points.rs"]
+mod set_points;
+/// Settings of a master.
 #[path = "ikeya_roles/settings.rs"]
 mod settings;
+/// The slave.
 #[path = "ikeya_roles/slave.rs"]
 mod slave;
+/// Standing still is measured.
 #[path = "ikeya_roles/standstill.rs"]
 mod standstill;
+/// Stops of nodes that answer.
 #[path = "ikeya_roles/stops.rs"]
 mod stops;
-#[path = "ikeya_roles/stops_lost.rs"]
-mod stops_lost;
-#[path = "ikeya_roles/three.rs"]
-mod three;
-#[path = "ikeya_roles/unsent.rs"]
-mod unsent;
-#[path = "ikeya_roles/windows.rs"]
-mod windows;
+/// Stops of nodes that do not answer.
+#[path = "ikeya_roles/stops_of_lost_nodes.rs"]
+mod stops_of_lost_nodes;
+/// Boards with three motors.
+#[path = "ikeya_roles/three_motors.rs"]
+mod three_motors;
+/// Frames that did not reach the line.
+#[path = "ikeya_roles/unsent_frames.rs"]
+mod unsent_frames;

@@ -7,30 +7,36 @@
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
-#[path = "motion/drivers.rs"]
-mod drivers;
-#[path = "motion/faulty.rs"]
-mod faulty;
-#[cfg(feature = "ucp")]
-#[path = "motion/frames.rs"]
-mod frames;
-#[path = "motion/framing.rs"]
-mod framing;
+/// Drivers whose ports fail.
+#[path = "motion/failing_ports.rs"]
+mod failing_ports;
+/// The host of a rover.
 #[cfg(feature = "ucp")]
 #[path = "motion/host.rs"]
 mod host;
+/// A framing that breaks its contract.
+#[path = "motion/lying_framing.rs"]
+mod lying_framing;
+/// The master.
 #[path = "motion/master.rs"]
 mod master;
 #[path = "support/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
+/// Frames that must not be sent.
+#[cfg(feature = "ucp")]
+#[path = "motion/refused_frames.rs"]
+mod refused_frames;
+/// The robot.
 #[cfg(feature = "ucp")]
 #[path = "motion/robot.rs"]
 mod robot;
+/// The slave.
 #[path = "motion/slave.rs"]
 mod slave;
-#[path = "motion/three.rs"]
-mod three;
-#[path = "support/world.rs"]
+/// The master of three-motor boards.
+#[path = "motion/three_motors.rs"]
+mod three_motors;
+#[path = "support/virtual_time.rs"]
 #[allow(dead_code, reason = "drivers.rs uses more of it")]
-mod world;
+mod virtual_time;

@@ -8,9 +8,9 @@
 //! `cargo test --test noise -- --nocapture` prints the figures.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "support/line.rs"]
+#[path = "support/known_framings.rs"]
 #[allow(dead_code, reason = "only the bytes of frames are of interest here")]
-mod line;
+mod known_framings;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "a stream this long is too much for it")]
 mod oracle;
@@ -22,7 +22,7 @@ use axlewire::{
     stream::{Decoder, Event, Frames},
     ucp::{self, Body, CalibrationKind, ErrorCode, MotorControl, NetworkState, Ucp},
 };
-use line::Known;
+use known_framings::Known;
 
 const FRAMES: usize = 10_000;
 

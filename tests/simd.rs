@@ -1,13 +1,15 @@
-//! Frames that are judged together, and bytes that are refused together, with SIMD and without, against
-//! the slow oracle: streams long enough for lanes, damaged everywhere.
+//! Frames that are judged together, and bytes that are refused together, with SIMD and without,
+//! against the slow oracle: streams long enough for lanes, damaged everywhere.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "support/generate.rs"]
+#[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "the stories of stream.rs use more of it")]
-mod generate;
-#[path = "support/line.rs"]
+mod checked_line;
+#[path = "support/hostile_streams.rs"]
 #[allow(dead_code, reason = "the stories of stream.rs use more of it")]
-mod line;
+mod hostile_streams;
+#[path = "support/known_framings.rs"]
+mod known_framings;
 #[path = "support/oracle.rs"]
 #[allow(dead_code, reason = "the stories of stream.rs use more of it")]
 mod oracle;
@@ -22,20 +24,20 @@ use axlewire::{
     },
     ucp::{self, Body, Ucp},
 };
-use line::Known;
+use known_framings::Known;
 use proptest::{collection::vec, prelude::*};
 
 /// One by one, together, and together by SIMD: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {
-    line::check_slice::<Portable<F>>(stream);
-    line::check_slice::<F>(stream);
-    line::check_finished_slice::<F>(stream);
+    checked_line::check_slice::<Portable<F>>(stream);
+    checked_line::check_slice::<F>(stream);
+    checked_line::check_finished_slice::<F>(stream);
     check_run::<F>(stream, false);
     check_run::<F>(stream, true);
 }
 
-/// A run is what `judge` finds one by one, on a processor without AVX2 as well, up to the first frame that
-/// there is no view of.
+/// A run is what `judge` finds one by one, on a processor without AVX2 as well, up to the first
+/// frame that there is no view of.
 fn check_run<F: Framing>(stream: &[u8], wide: bool) {
     let run = F::good_run(stream, wide);
     let (mut frames, mut at) = (0, 0);
@@ -125,7 +127,7 @@ fn a_foreign_packet_with_a_good_crc_is_skipped_anywhere_in_a_run() {
             for header in [0x55, 0x56, 0xBB, 0xAA, 0x57, 0x00] {
                 let payload = [1, 2, 3, 4];
                 let payload = if header == 0xAA { &[][..] } else { &payload };
-                let packet = generate::ikeya_packet_around(header, id, payload);
+                let packet = hostile_streams::ikeya_packet_around(header, id, payload);
                 let stream = [&clean[..at], &packet, &clean[at..]].concat();
                 check::<ikeya::Either>(&stream);
                 check::<ikeya::ToSlave>(&stream);
@@ -302,9 +304,9 @@ fn a_framing_that_lies_about_runs_hangs_nothing() {
 
 /// Long streams of everything, long runs of good frames among them.
 fn long_stream(rules: oracle::Rules) -> impl Strategy<Value = Vec<u8>> {
-    let run = vec(generate::frame(rules), 0..60).prop_map(|frames| frames.concat());
+    let run = vec(hostile_streams::frame(rules), 0..60).prop_map(|frames| frames.concat());
     let noise = vec(any::<u8>(), 0..200);
-    vec(prop_oneof![4 => generate::stream(rules), 3 => run, 1 => noise], 1..8)
+    vec(prop_oneof![4 => hostile_streams::stream(rules), 3 => run, 1 => noise], 1..8)
         .prop_map(|pieces| pieces.concat())
 }
 

@@ -5,29 +5,45 @@
 //! ahead, or a driver would spin.
 #![cfg(feature = "ucp")]
 
-#[path = "ucp_roles/both.rs"]
-mod both;
+/// Properties: nothing acknowledged is lost.
+#[path = "ucp_roles/acknowledgement_properties.rs"]
+mod acknowledgement_properties;
+/// What is acknowledged, and when.
+#[path = "ucp_roles/acknowledgements.rs"]
+mod acknowledgements;
+/// Calibrations and biases.
 #[path = "ucp_roles/calibration.rs"]
 mod calibration;
-#[path = "ucp_roles/hang.rs"]
-mod hang;
-#[path = "ucp_roles/kept.rs"]
-mod kept;
-#[path = "ucp_roles/kept_properties.rs"]
-mod kept_properties;
+/// Ids on which some firmware hangs.
+#[path = "ucp_roles/firmware_hangs.rs"]
+mod firmware_hangs;
+/// Firmware updates.
+#[path = "ucp_roles/firmware_update.rs"]
+mod firmware_update;
+/// What holds for host and robot alike.
+#[path = "ucp_roles/host_and_robot.rs"]
+mod host_and_robot;
+/// The link, pings and reports.
 #[path = "ucp_roles/link.rs"]
 mod link;
-#[path = "ucp_roles/motion.rs"]
-mod motion;
-#[path = "ucp_roles/motion_properties.rs"]
-mod motion_properties;
-#[path = "ucp_roles/properties.rs"]
-mod properties;
+/// Motor commands and the dead-man.
+#[path = "ucp_roles/motor_commands.rs"]
+mod motor_commands;
+/// Roles alone, and two roles on one line.
 #[path = "ucp_roles/rig.rs"]
 mod rig;
+/// The robot.
 #[path = "ucp_roles/robot.rs"]
 mod robot;
-#[path = "ucp_roles/unsent.rs"]
-mod unsent;
-#[path = "ucp_roles/update.rs"]
-mod update;
+/// Properties: any calls, bytes and times.
+#[path = "ucp_roles/robustness.rs"]
+mod robustness;
+/// Properties: what should stand still does.
+#[path = "ucp_roles/standstill_properties.rs"]
+mod standstill_properties;
+/// Other messages that did not reach the line.
+#[path = "ucp_roles/unsent_messages.rs"]
+mod unsent_messages;
+/// Motor commands that did not reach the line.
+#[path = "ucp_roles/unsent_motor_commands.rs"]
+mod unsent_motor_commands;

@@ -18,14 +18,17 @@ use axlewire::{
     ucp::{self, Body, Message, RawFrame, Report, Telemetry},
 };
 
-#[path = "../../tests/support/line.rs"]
+#[path = "../../tests/support/checked_line.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
-mod line;
+mod checked_line;
+#[path = "../../tests/support/known_framings.rs"]
+mod known_framings;
 #[path = "../../tests/support/oracle.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
 mod oracle;
 
-use line::{Known, Line, Op};
+use checked_line::{Line, Op};
+use known_framings::Known;
 
 /// Any stream, cut and interrupted in any way, against the oracle: the six Ikeya framings.
 pub fn ikeya_stream(data: &[u8]) {
@@ -96,10 +99,10 @@ impl<'a> Script<'a> {
         let mut stream = self.stream.to_vec();
         self.repair.repair::<F>(&mut stream);
         Line::<F, N>::new().play(&stream, &self.ops);
-        line::check_slice::<F>(&stream);
-        line::check_slice::<Portable<F>>(&stream);
+        checked_line::check_slice::<F>(&stream);
+        checked_line::check_slice::<Portable<F>>(&stream);
         // Feature `simd` looks at blocks of 128 bytes: more than most inputs have.
-        line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
+        checked_line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
     }
 }
 
@@ -154,7 +157,8 @@ pub fn crc16(data: &[u8]) {
 
     let mut frame = [data, &crc.to_le_bytes()].concat();
     assert!(crc16::check(&frame));
-    // Two values have the same remainder modulo one factor of the polynomial, and two the same parity.
+    // Two values have the same remainder modulo one factor of the polynomial, and two have the
+    // same parity.
     for other in [0xC001, 0x0003, 0xFFFF] {
         let [.., low, high] = &mut frame[..] else { return };
         [*low, *high] = (crc ^ other).to_le_bytes();

@@ -1,4 +1,4 @@
-//! Motors of a bus, as the document has them.
+//! Motors of a bus as the document describes them, for the stories of this folder.
 
 use axlewire::{
     ikeya::{

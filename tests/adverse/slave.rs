@@ -1,4 +1,4 @@
-//! A slave that is late, or whose switch was moved.
+//! A slave that is called late, or whose switch is moved, neither obeys nor sends what is too old.
 
 use axlewire::{
     drive::Driver,

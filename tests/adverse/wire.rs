@@ -1,4 +1,7 @@
 //! A line in virtual time, with a port and a clock that do what a test says.
+//!
+//! Unlike with the scripted port of `support/port.rs`, bytes take their time, motors answer what
+//! has reached them, and a write may depend on its bytes and on the moment.
 
 use std::{
     cell::{RefCell, RefMut},

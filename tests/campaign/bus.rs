@@ -1,4 +1,4 @@
-//! Up to three motors on a bus, a plug that may be loose, and a stop.
+//! An episode on a bus: up to three motors, a plug that may be loose, and a stop.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -10,7 +10,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use crate::{faults, millis, part, table::Run};
+use crate::{faults, millis, part, results::Run};
 
 /// Fastest that a motor is told to turn, and fastest that it goes to a position, rps.
 const FASTEST_RPS: f64 = 10.0;
@@ -97,7 +97,8 @@ impl Episode {
         }
     }
 
-    /// Asks for the readings by which a standstill is seen: with [`Polling::Manual`] nothing else does.
+    /// Asks for the readings by which a standstill is seen: with [`Polling::Manual`] nothing else
+    /// does.
     fn read_stopped(&mut self) {
         let now = self.bus.now();
         for &(node, _) in &self.nodes {

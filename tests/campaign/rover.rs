@@ -1,4 +1,4 @@
-//! A rover on a noisy link, a plug that may be loose, and a stop.
+//! An episode with a rover: a noisy link, a plug that may be loose, and a stop.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -7,7 +7,7 @@ use axlewire::{
     ucp::{Host, HostConfig, MotorControl, RobotConfig},
 };
 
-use crate::{faults, millis, table::Run};
+use crate::{faults, millis, results::Run};
 
 /// The robot's watchdog, and as much again for the frames and loops on the way (ruling U10).
 const BOUND_MS: f64 = 500.0 + 20.0;

@@ -1,4 +1,4 @@
-//! Master and slaves, each behind a driver, on one line.
+//! High-level calls on a motor bus: what discovery, set-points, reads and stops return, and when.
 
 use axlewire::{
     drive::{DriveError, Driver, Operation},
@@ -10,9 +10,9 @@ use axlewire::{
 };
 
 use crate::{
+    bus_rig::{FOUND, Story, manual, only_two_and_five, rps},
     port::Unplugged,
-    story::{FOUND, Story, manual, only_two_and_five, rps},
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 #[test]

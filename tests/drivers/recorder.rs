@@ -1,6 +1,6 @@
-//! A role that writes down what is done to it.
+//! A role that records every call, for the tests of the loop that drives it.
 
-use std::{cell::RefCell, collections::VecDeque, pin::pin, rc::Rc, task::Poll};
+use std::{collections::VecDeque, pin::pin, rc::Rc, task::Poll};
 
 use axlewire::{
     drive::{DriveError, Driver},
@@ -9,9 +9,18 @@ use axlewire::{
 };
 
 use crate::{
-    port::{Script, Unplugged, poll},
-    world::{VirtualClock, World},
+    port::{Script, Step, Unplugged, poll},
+    virtual_time::{VirtualClock, World},
 };
+
+/// Some bytes to be read, or room for as many to be written.
+pub(crate) fn bytes(count: usize) -> Step {
+    Step::Bytes(vec![0; count])
+}
+
+pub(crate) fn at_ms(millis: u64) -> Instant {
+    Instant::from_millis(millis)
+}
 
 /// What was done to a role.
 #[derive(Clone, Debug, Eq, PartialEq)]
@@ -133,6 +142,3 @@ impl Recorder {
         self.calls.iter().filter_map(unsent).collect()
     }
 }
-
-/// A log that several parts write to.
-pub(crate) type Log = Rc<RefCell<Vec<String>>>;

@@ -1,4 +1,4 @@
-//! Host and robot, each behind a driver, on one line.
+//! High-level calls on a rover link: what pings, commands, stops and calibrations return, and when.
 
 use std::{cell::RefCell, rc::Rc};
 
@@ -13,7 +13,7 @@ use axlewire::{
 
 use crate::{
     port::Unplugged,
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 type Rover = Driver<Host, End, VirtualClock>;

@@ -13,8 +13,8 @@ use axlewire::{
 };
 
 use crate::{
+    bus_rig::{Story, manual, only_two_and_five, rps},
     port::Unplugged,
-    story::{Story, manual, only_two_and_five, rps},
 };
 
 type Outcome = Result<(), DriveError<Unplugged>>;

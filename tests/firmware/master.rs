@@ -15,7 +15,7 @@ use axlewire::{
 };
 
 use crate::{
-    pin,
+    driver_enable_pin,
     qemu::{Board, PATIENCE, Program},
     quiet::undisturbed,
     wire::{Wire, WireClock},
@@ -148,7 +148,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
         assert_eq!(bus.role().command(0), wanted[0]);
         board.report_when("told", |_| true).assert_nothing_lost();
         // The master's driver is on while it talks, and no longer.
-        let bursts = pin::bursts(&board.accesses());
+        let bursts = driver_enable_pin::bursts(&board.accesses());
         assert!(bursts.len() > 20, "{}", bursts.len());
         for burst in bursts {
             let mut requests = Frames::<ToSlave>::new(&burst);

@@ -51,7 +51,8 @@ fn a_motor_on_a_noisy_bus_keeps_each_speed_and_gets_no_command_that_nobody_gave(
         const SPEEDS: [f32; 3] = [2.0, -1.5, 3.25];
         let Some(mut board) = Board::start(Program::Slave) else { return };
         let mut config = MasterConfig::direct();
-        // QEMU answers when this machine has time for it. Short enough that a lost answer costs little.
+        // QEMU answers when this machine has time for it. Short enough that a lost
+        // answer costs little.
         config.reply_timeout = Duration::from_millis(30);
         config.polling = Polling::Every(Duration::from_millis(10));
         config.recovery_share_pct = 50;
@@ -90,11 +91,12 @@ fn a_rover_on_a_noisy_link_reports_in_order_keeps_its_command_and_stops_when_the
         const REPORTS: u32 = 100;
         let noisy = |stream| Wire::noisy(stream, Noise::ucp(12));
         let mut config = patient();
-        // Five commands in a row are lost now and then, and after 500 ms the robot stops. Ten are not.
+        // Five commands in a row are lost now and then, and after 500 ms the robot stops.
+        // Ten are not.
         config.command_period = Duration::from_millis(40);
         let Some((mut board, mut rover)) = linked_by(noisy, config) else { return };
-        // Losses are counted anew each time that the robot asks for its biases, which it does until it
-        // has them.
+        // Losses are counted anew each time that the robot asks for its biases, which it does until
+        // it has them.
         let (imu, mag) = (ImuBias::new([1, 2, 3], [4, 5, 6]), MagBias::new([7, 8, 9]));
         *rover.role_mut().store() = MemoryStore { imu: Some(imu), mag: Some(mag) };
         let begun = board_shows(&mut board, &mut rover, |told| told.at("biases") >= 1);

@@ -1,4 +1,4 @@
-//! The images, and a board in QEMU that runs one of them.
+//! The firmware images, and a board in QEMU that runs one of them.
 
 use std::{
     collections::HashMap,

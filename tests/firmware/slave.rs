@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use crate::{
-    pin,
+    driver_enable_pin,
     qemu::{Board, PATIENCE, Program, Report},
     quiet::undisturbed,
     wire::{Wire, WireClock},
@@ -157,7 +157,8 @@ fn an_unplugged_board_is_abnormal_stops_and_does_not_move_when_it_comes_back() {
     });
 }
 
-/// A master that is nothing but its packets: it sends when it is told to and waits as long as it takes.
+/// A master that is nothing but its packets: it sends when it is told to and waits for as
+/// long as it takes.
 struct Bare {
     board: Board,
     wire: Wire,
@@ -216,7 +217,8 @@ fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
         const EXCHANGES: u32 = 10_000;
         let Some(mut board) = Board::start(Program::Slave) else { return };
         let mut config = MasterConfig::direct();
-        // Longer than this machine ever leaves QEMU waiting, and no second try that would hide a loss.
+        // Longer than this machine ever leaves QEMU waiting, and no second try that would
+        // hide a loss.
         (config.reply_timeout, config.attempts) = (Duration::from_millis(400), 1);
         config.polling = Polling::Manual;
         let mut bus = master_on(Wire::new(board.bus()), config);
@@ -292,7 +294,8 @@ fn answers_that_are_overtaken_or_late_are_dropped_and_counted() {
         let told = loop {
             // Overtaken: the next request is there before the board has answered.
             master.wire.send(&read.repeat(20));
-            // Late: behind a false header the request is found after 100 ms. The board halts meanwhile.
+            // Late: behind a false header the request is found after 100 ms. The board
+            // halts meanwhile.
             answered += master.heard_in_silence();
             master.wire.send(&[&[0xBB], &read[..]].concat());
             std::thread::sleep(std::time::Duration::from_millis(30));
@@ -339,7 +342,7 @@ fn the_driver_enable_pin_is_on_while_an_answer_is_sent_and_off_otherwise() {
 
         // Mostly one answer each time; where requests lie in wait, the next one on its heels.
         let mut sent = 0;
-        for burst in pin::bursts(&master.board.accesses()) {
+        for burst in driver_enable_pin::bursts(&master.board.accesses()) {
             let mut answers = Frames::<ToMaster>::new(&burst);
             sent += answers.by_ref().count();
             assert_eq!(

@@ -1,4 +1,4 @@
-//! The USART of the programs, with what QEMU's own never does.
+//! The USART of the firmware counts overruns and damage, which QEMU's own USART never has.
 
 use crate::{qemu::check_uart, quiet::undisturbed};
 

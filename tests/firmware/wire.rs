@@ -1,4 +1,6 @@
 //! The wire between a role on this machine and a board: a port, a clock, noise, and a loose plug.
+//!
+//! A socket in real time; nothing of it is scripted.
 
 use std::{
     collections::VecDeque,
@@ -15,8 +17,8 @@ use std::{
 
 use axlewire::{drive, sim::Rng, time::Instant};
 
-/// What disturbs the bytes of one direction: about one in 60 has a bit turned, and in front of about
-/// one in 100 stands a stray byte, half of the time one that begins a packet.
+/// What disturbs the bytes of one direction: about one in 60 has a bit turned, and in front of
+/// about one in 100 stands a stray byte, half of the time one that begins a packet.
 #[derive(Debug)]
 pub(crate) struct Noise {
     rng: Rng,

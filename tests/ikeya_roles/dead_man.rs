@@ -1,4 +1,4 @@
-//! The dead-man of a master (I13).
+//! The dead-man of a master: a silent application stops its nodes (I13).
 
 use axlewire::{
     endpoint::Endpoint,

@@ -1,4 +1,4 @@
-//! Discovery: who is asked, and how often.
+//! Discovery: which nodes are asked, how often, and what goes first.
 
 use axlewire::{
     endpoint::Endpoint,

@@ -252,8 +252,8 @@ impl Desk {
         self.master.handle_timeout(self.now);
     }
 
-    /// A driver that sleeps until the next deadline misses nothing. What could be handed out behind a
-    /// WRITE that is still leaving would not leave sooner.
+    /// A driver that sleeps until the next deadline misses nothing. What could be handed out behind
+    /// a WRITE that is still leaving would not leave sooner.
     fn check_sleep(&self, next: Instant) {
         if self.is_behind_write {
             return;

@@ -1,4 +1,4 @@
-//! The rate of a bus.
+//! The schedule of a bus tells its rate before it is wired.
 
 use axlewire::ikeya::{Schedule, ThreeMotors};
 

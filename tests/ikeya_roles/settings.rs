@@ -1,4 +1,4 @@
-//! Settings of a master, and what it costs.
+//! Settings of a master: polling, gaps, echo removal, queues, defaults and memory.
 
 use axlewire::{
     endpoint::Endpoint,

@@ -1,4 +1,5 @@
-//! The slave (I2, I3, I9, I14).
+//! The slave answers requests for its own id in time and in its mode, and its watchdog ends
+//! commands (I2, I3, I9, I14).
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},

@@ -16,7 +16,7 @@ use axlewire::{
 
 use crate::{
     port::{Script, Step},
-    world::{End, VirtualClock, World},
+    virtual_time::{End, VirtualClock, World},
 };
 
 // What a user calls.

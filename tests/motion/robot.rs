@@ -12,7 +12,7 @@ use axlewire::{
 };
 use embedded_io::Write;
 
-use crate::world::{End, VirtualClock, World};
+use crate::virtual_time::{End, VirtualClock, World};
 
 // What a user calls.
 

@@ -1,9 +1,12 @@
-//! A port that does what a test says.
+//! The scripted port: it gives, takes, fails and stalls as a list of steps says, step by step. Time
+//! does not come in; for ports on a simulated line see `virtual_time.rs` and `adverse/wire.rs`.
 
 use std::{
+    cell::RefCell,
     collections::VecDeque,
     future::{Future, pending},
     pin::Pin,
+    rc::Rc,
     task::{Context, Poll, Waker},
 };
 
@@ -24,6 +27,9 @@ impl embedded_io::Error for Unplugged {
         embedded_io::ErrorKind::NotConnected
     }
 }
+
+/// A log that several parts write to.
+pub(crate) type Log = Rc<RefCell<Vec<String>>>;
 
 /// What the port does at one call.
 #[derive(Clone, Debug)]
@@ -48,6 +54,8 @@ pub(crate) struct Script {
     pub(crate) flushes: VecDeque<Step>,
     pub(crate) written: Vec<u8>,
     pub(crate) flushed: usize,
+    /// Every call of `write` and of `flush`.
+    pub(crate) log: Log,
 }
 
 impl Script {
@@ -61,6 +69,10 @@ impl Script {
 
     pub(crate) fn writing(steps: impl IntoIterator<Item = Step>) -> Self {
         Self { writes: steps.into_iter().collect(), ..Self::default() }
+    }
+
+    fn note(&self, call: &str) {
+        self.log.borrow_mut().push(call.into());
     }
 
     fn give(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
@@ -132,10 +144,12 @@ impl embedded_io::Read for Script {
 
 impl embedded_io::Write for Script {
     fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.note("write");
         self.take(buffer)
     }
 
     fn flush(&mut self) -> Result<(), Unplugged> {
+        self.note("flush");
         self.flushing()
     }
 }
@@ -152,11 +166,13 @@ impl embedded_io_async::Read for Script {
 
 impl embedded_io_async::Write for Script {
     async fn write(&mut self, buffer: &[u8]) -> Result<usize, Unplugged> {
+        self.note("write");
         stall(&mut self.writes).await;
         self.take(buffer)
     }
 
     async fn flush(&mut self) -> Result<(), Unplugged> {
+        self.note("flush");
         stall(&mut self.flushes).await;
         self.flushing()
     }

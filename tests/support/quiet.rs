@@ -14,19 +14,20 @@ use std::{
 /// have lost one.
 const STALL: Duration = Duration::from_millis(10);
 
-/// Share of the time in which more is to run than there are processors, percent: what a test and its
-/// processes make of it themselves is less.
+/// Share of the time in which more is to run than there are processors, percent: what a test and
+/// its processes make of it themselves is less.
 const CROWD_PCT: u32 = 20;
 
-/// Share of the processors' time that other guests of the same computer took, percent. The machine is
-/// halted meanwhile, or a part of it: no thread of ours need notice.
+/// Share of the processors' time that other guests of the same computer took, percent. The machine
+/// is halted meanwhile, or a part of it: no thread of ours need notice.
 const STOLEN_PCT: u64 = 1;
 
 /// A test that fails on a busy machine is tried this many times.
 const ATTEMPTS: u32 = 8;
 
-/// Runs one test at a time. A failure counts unless the machine was busy meanwhile; then the test is
-/// run again, because its failure may be that of the machine. The last attempt counts in any case.
+/// Runs one test at a time. A failure counts unless the machine was busy meanwhile; then the test
+/// is run again, because its failure may be that of the machine. The last attempt counts in any
+/// case.
 pub(crate) fn undisturbed(test: impl Fn()) {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);

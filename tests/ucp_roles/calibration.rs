@@ -1,4 +1,5 @@
-//! Calibration and biases (U11).
+//! Calibrations end with biases in the store, and each request is acknowledged or fails in time
+//! (U11).
 
 use crate::rig::*;
 

@@ -1,4 +1,5 @@
-//! Link, pings, reports (U9, U10, U12).
+//! The link: when it is up or lost, what pings and reports tell, and what passes through raw (U9,
+//! U10, U12).
 
 use crate::rig::*;
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 pub(crate) use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     stream::Encode,
     time::{Duration, Instant, wire_time},
     ucp::{
@@ -19,6 +19,9 @@ pub(crate) use axlewire::{
 
 pub(crate) const IMU: CalibrationKind = CalibrationKind::Imu;
 pub(crate) const MAG: CalibrationKind = CalibrationKind::Magnetometer;
+
+/// Everything that can have become of a frame that did not reach the line.
+pub(crate) const EVERY: [Unsent; 3] = [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed];
 
 pub(crate) fn ms(millis: u64) -> Instant {
     Instant::from_millis(millis)
@@ -116,6 +119,13 @@ pub(crate) fn fresh_host() -> Host {
     let mut config = quiet_config();
     config.sends_first_stop = true;
     Host::new(config, ms(0))
+}
+
+/// A host that has sent its first frame.
+pub(crate) fn begun() -> Host {
+    let mut host = fresh_host();
+    wait(&mut host, ms(0));
+    host
 }
 
 /// A robot is told to begin a calibration.

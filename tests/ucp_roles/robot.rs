@@ -1,4 +1,5 @@
-//! The robot (U9, U10, U12, U13).
+//! The robot answers at once, reports in step, and stands still without commands (U9, U10, U12,
+//! U13).
 
 use crate::rig::*;
 

@@ -1,4 +1,7 @@
 //! The port, the pin and the clock of a driver, all of them handles of a line.
+//!
+//! Unlike the scripted port of `support/port.rs` it has a line behind it: the search chooses what
+//! fails, calls take time, and a driver that breaks the contract is told so.
 
 use std::cell::RefMut;
 

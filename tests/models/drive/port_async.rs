@@ -1,4 +1,5 @@
-//! The same port, pin and clock for async calls.
+//! The port, pin and clock of `port.rs` for async calls: as they are, whoever waits sleeps in
+//! virtual time, which the scripted port of `support/port.rs` does not have.
 
 use std::{
     future::poll_fn,
@@ -11,12 +12,12 @@ use super::{
     port::{Broken, Pin, SECOND_US},
 };
 
-/// The time that a port has in any case, however long it was asked before, microseconds: twice that of
-/// 64 bytes of a master, and a millisecond.
+/// The time that a port has in any case, however long it was asked before, microseconds: twice that
+/// of 64 bytes of a master, and a millisecond.
 const LEAST_US: u64 = 2 * 64 * 20 + 1000;
 
-/// An operation under way; notes a stall of a second that a driver has given up. The second may have
-/// begun in a call that was dropped.
+/// An operation under way; notes a stall of a second that a driver has given up. The second may
+/// have begun in a call that was dropped.
 struct Sending<'a> {
     line: &'a Shared,
     begun_us: u64,

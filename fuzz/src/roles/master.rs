@@ -1,0 +1,229 @@
+//! A master under any calls, bytes and times: it writes nothing but the latest orders and the stops
+//! that it owes, and forgets no stop.
+
+use arbitrary::{Result, Unstructured};
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Board, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, NodeSet, OneMotor, Polling,
+        Position, PositionResponse, ReadRequest, Rps, Status, StopProgress, Target, ThreeMotors,
+        VelocityResponse, three,
+    },
+    stream::Encode,
+    time::{Duration, Instant},
+};
+
+use super::{Clock, raw, serve};
+
+/// The master of a motor bus of either kind of boards.
+pub fn ikeya_master(data: &[u8]) {
+    let mut u = Unstructured::new(data);
+    let turn = Rps::new(1.0).expect("a number");
+    let place = Position::new(1, -1);
+    let _ = match u.arbitrary() {
+        Ok(true) => master::<ThreeMotors>(&mut u, [turn; 3], [place; 3], |id, mode| match mode {
+            Mode::Velocity => three::VelocityResponse::new(id, [Rps::ZERO; 3]).as_bytes().to_vec(),
+            Mode::Position => {
+                three::PositionResponse::new(id, [Position::default(); 3]).as_bytes().to_vec()
+            }
+        }),
+        _ => master::<OneMotor>(&mut u, turn, place, |id, mode| match mode {
+            Mode::Velocity => VelocityResponse::new(id, Rps::ZERO).as_bytes().to_vec(),
+            Mode::Position => PositionResponse::new(id, Position::default()).as_bytes().to_vec(),
+        }),
+    };
+}
+
+fn packet(frame: &impl Encode) -> Vec<u8> {
+    let mut buffer = [0; 16];
+    frame.encode(&mut buffer).expect("room").to_vec()
+}
+
+/// What the application wants of each node.
+struct Wishes<B: Board> {
+    /// The latest order, unless it is a stop or has been withdrawn.
+    orders: [Option<Target<B>>; 8],
+    /// Nodes whose stop was owed the last time.
+    owed: NodeSet,
+}
+
+impl<B: Board> Wishes<B> {
+    fn order(&mut self, id: NodeId) -> &mut Option<Target<B>> {
+        &mut self.orders[usize::from(id.get() - 1)]
+    }
+
+    /// Takes in what the master has decided by itself: it never owes less than before unless a stop
+    /// is paid, and gives no node that is owed one anything else.
+    fn follow(&mut self, master: &mut Master<B>, turn: B::Velocity, now: Instant) {
+        let owed = master.stops_owed();
+        for id in NodeId::ALL {
+            let set_point = master.set_point(id);
+            if owed.contains(id) {
+                *self.order(id) = None;
+                assert_eq!(set_point, None, "a set-point beside a stop");
+                assert_eq!(master.stop_progress(id), StopProgress::Owed);
+                assert!(master.set_velocity(id, turn, now).is_err(), "taken, and the stop owed");
+            } else if self.owed.contains(id) && self.order(id).is_none() {
+                let progress = master.stop_progress(id);
+                let is_paid = matches!(progress, StopProgress::Paid | StopProgress::StandingStill);
+                assert!(is_paid, "a stop that is forgotten: {progress:?}");
+            }
+            let is_online = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
+            assert!(is_online || set_point.is_none(), "a set-point for a node that is not online");
+            if set_point.is_none() {
+                *self.order(id) = None;
+            }
+        }
+        self.owed = owed;
+    }
+
+    /// A WRITE is the latest order, in the mode of the node, or a stop: the nodes stand still at 0.
+    fn check(&mut self, sent: &[u8], master: &Master<B>, stop: &Stops) {
+        let id = NodeId::new(sent[1]).expect("an id on the wire");
+        let is_stop = [&stop.velocity, &stop.position]
+            .into_iter()
+            .any(|stop| stop[2..] == sent[2..sent.len() - 2]);
+        if is_stop {
+            return;
+        }
+        let order = self.order(id).expect("nobody has asked for that");
+        let expected = match order {
+            Target::Velocity(to) => packet(&B::write_velocity(id, to)),
+            Target::Position(to) => packet(&B::write_position(id, to)),
+        };
+        assert_eq!(sent, expected, "not the latest order");
+        assert_eq!(master.mode(id), Some(order.mode()), "in another mode");
+        assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "in doubt about the mode");
+    }
+}
+
+/// What stops a node that stands still at 0, without the CRC.
+struct Stops {
+    velocity: Vec<u8>,
+    position: Vec<u8>,
+}
+
+fn master<B: Board>(
+    u: &mut Unstructured<'_>,
+    turn: B::Velocity,
+    place: B::Position,
+    answer: fn(NodeId, Mode) -> Vec<u8>,
+) -> Result<()> {
+    let mut config =
+        if u.arbitrary()? { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+    config.attempts = u.int_in_range(0..=5)?;
+    config.removes_echo = u.arbitrary()?;
+    config.recovery_share_pct = u.arbitrary()?;
+    config.turnaround_gap = Duration::from_micros(*u.choose(&[0, 0, 35])?);
+    let polling = [Polling::Fastest, Polling::Every(Duration::from_millis(5)), Polling::Manual];
+    config.polling = *u.choose(&polling)?;
+    config.accepts_early = u.arbitrary()?;
+    config.stops_abnormal = u.arbitrary()?;
+    config.hold_age = Duration::from_millis(*u.choose(&[0, 0, 2])?);
+    config.dead_man = u.arbitrary::<bool>()?.then_some(Duration::from_millis(50));
+    if u.arbitrary()? {
+        config.nodes = [NodeId::N1, NodeId::N5].into_iter().collect();
+    }
+    let mut clock = Clock::new(u)?;
+    let mut master = Master::<B>::new(config, clock.0);
+    let mut wishes = Wishes { orders: [None; 8], owed: NodeSet::NONE };
+    // The node that was asked and may answer.
+    let mut asked = None;
+    while !u.is_empty() {
+        let id = *u.choose(&NodeId::ALL)?;
+        let now = clock.pass(u)?;
+        let mut statuses = 0;
+        match u.int_in_range(0..=14)? {
+            0 => master.discover(now),
+            1 => {
+                if master.set_velocity(id, turn, now).is_ok() {
+                    *wishes.order(id) = Some(Target::Velocity(turn));
+                }
+            }
+            2 => {
+                if master.set_position(id, place, now).is_ok() {
+                    *wishes.order(id) = Some(Target::Position(place));
+                }
+            }
+            3 => {
+                master.stop(id, now);
+                assert!(master.stops_owed().contains(id));
+            }
+            4 => {
+                master.stop_all(now);
+                assert_eq!(master.stops_owed().and(config.nodes), config.nodes);
+            }
+            5 => drop(master.confirm(id, now)),
+            6 => {
+                let owed = master.stops_owed();
+                master.release(id);
+                assert_eq!(master.stops_owed(), owed, "a release is no way out of a stop");
+            }
+            7 => drop(master.read(id, now)),
+            8 => master.keep_alive(now),
+            9 => {
+                let all = [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed];
+                master.handle_unsent(*u.choose(&all)?, now);
+            }
+            10 => master.handle_input(raw(u)?, now),
+            11 => {
+                let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
+                master.handle_input(&answer(id, mode), now);
+                // Only the node that was asked can have answered.
+                statuses = u32::from(asked == Some(id));
+            }
+            _ => {
+                if let Some(id) = asked {
+                    let mode = if u.ratio(1, 8)? { Mode::Position } else { Mode::Velocity };
+                    master.handle_input(&answer(id, master.mode(id).unwrap_or(mode)), now);
+                    statuses = 1;
+                }
+            }
+        }
+        wishes.follow(&mut master, turn, now);
+        let mut told = 0;
+        let sent = serve(&mut master, now, |event| {
+            told += u32::from(matches!(event, MasterEvent::Status { .. }));
+        });
+        wishes.follow(&mut master, turn, now);
+        // Raw input may hold a good answer, too; it is as long as one then.
+        assert!(told <= statuses.max(1), "{told} answers to one request");
+        for sent in sent {
+            let id = NodeId::new(sent[1]).expect("an id on the wire");
+            if sent[0] == 0xAA || B::ANSWERS_WRITE {
+                asked = Some(id);
+            }
+            if sent[0] == 0xBB {
+                let stops = Stops {
+                    velocity: without_crc(packet(&B::write_velocity(id, B::ZERO))),
+                    position: without_crc(answer(id, Mode::Position)),
+                };
+                wishes.check(&sent, &master, &stops);
+            } else {
+                assert_eq!(sent, ReadRequest::new(id).as_bytes());
+            }
+        }
+        check_counts(&master);
+    }
+    Ok(())
+}
+
+fn without_crc(mut packet: Vec<u8>) -> Vec<u8> {
+    packet.truncate(packet.len() - 2);
+    packet
+}
+
+fn check_counts<B: Board>(master: &Master<B>) {
+    for id in NodeId::ALL {
+        let node = master.node_statistics(id);
+        let closed = u64::from(node.replies) + u64::from(node.timeouts);
+        let requests = u64::from(node.requests);
+        assert!(closed <= requests, "an answer to no request: {node:?}");
+        // An answer that puts the mode in doubt closes its window as well.
+        let open = requests - closed;
+        let doubtful = u64::from(node.other_mode);
+        assert!(open <= doubtful + 1, "a request without an end: {node:?}");
+        let mode = master.status(id).map(|(status, _): (Status<B>, _)| status.mode());
+        assert_eq!(mode, master.mode(id));
+    }
+}

@@ -1,0 +1,84 @@
+//! Ports that never get ready: a call gives up after a second, and a later stop is sent anew.
+
+use std::{
+    pin::pin,
+    task::{Context, Poll, Waker},
+};
+
+use axlewire::{
+    drive::DriveError,
+    ikeya::{Mode, NodeId, Rps},
+};
+
+use crate::{motor::Motor, wire::Wire};
+
+#[test]
+fn an_async_port_that_never_gets_ready_does_not_hold_up_a_stop_for_ever() {
+    for flushes_hang in [false, true] {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+        let mut bus = wire.master(|_| ());
+        bus.discover().unwrap();
+        bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let begin_us = wire.world().now_us;
+        let stopped = wire.block_on(bus.stop_async(NodeId::N1));
+        assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
+        let took_us = wire.world().now_us - begin_us;
+        assert!(took_us < 1_500_000, "it gives up after {took_us} us");
+        let stalled = wire.block_on(bus.service_async());
+        assert_eq!(stalled, Err(DriveError::Stalled), "flushes hang: {flushes_hang}");
+        // The port is well again: the stop is sent anew.
+        (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
+        assert_eq!(wire.block_on(bus.stop_async(NodeId::N1)), Ok(()));
+        assert_eq!(wire.rps(), 0.0);
+    }
+}
+
+#[test]
+fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
+    for flushes_hang in [false, true] {
+        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+        let mut bus = wire.master(|_| ());
+        bus.discover().unwrap();
+        bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let begin_us = wire.world().now_us;
+        loop {
+            let mut call = pin!(bus.service_async());
+            let mut context = Context::from_waker(Waker::noop());
+            if call.as_mut().poll(&mut context).is_ready() {
+                // Nothing is due yet.
+                wire.pass(100);
+                continue;
+            }
+            wire.pass(100_100);
+            // As whoever yields is polled again at once.
+            let _ = call.as_mut().poll(&mut context);
+            if let Poll::Ready(result) = call.as_mut().poll(&mut context) {
+                assert_eq!(result, Err(DriveError::Stalled));
+                break;
+            }
+            let waits_us = wire.world().now_us - begin_us;
+            assert!(waits_us < 1_300_000, "not found, flushes hang: {flushes_hang}");
+        }
+    }
+}
+
+#[test]
+fn a_port_that_was_not_asked_for_a_while_after_a_dropped_call_has_not_stalled() {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|_| ());
+    bus.discover().unwrap();
+    bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+    wire.pass(10_000);
+    wire.world().flushes_hang = true;
+    let mut context = Context::from_waker(Waker::noop());
+    assert!(pin!(bus.service_async()).poll(&mut context).is_pending());
+    wire.pass(10_000_000);
+    // It takes its time, and no more.
+    let mut call = pin!(bus.service_async());
+    assert!(call.as_mut().poll(&mut context).is_pending());
+    wire.pass(2000);
+    wire.world().flushes_hang = false;
+    assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+}

@@ -1,0 +1,81 @@
+//! Clocks: one that goes backwards, that of `std`, and one that is joined to a delay.
+
+use std::cell::RefCell;
+
+use axlewire::{
+    drive::{Clock, Driver, StdClock, WithDelay},
+    time::{Duration, Instant},
+};
+use embedded_hal_async::delay::DelayNs;
+
+use crate::{
+    port::Script,
+    recorder::{Recorder, at_ms, bytes},
+    virtual_time::World,
+};
+
+#[test]
+fn a_clock_that_goes_backwards_goes_on_for_the_role_from_where_it_was() {
+    let mut readings = [100, 50, 70, 120].into_iter().cycle();
+    let clock = move || Instant::from_micros(readings.next().unwrap());
+    let flood = (0..100).map(|_| bytes(1));
+    // The recorder itself asserts the order of times.
+    let mut driver = Driver::new(Recorder::default(), Script::reading(flood), clock);
+    driver.service().unwrap();
+    assert_eq!(driver.role().received.len(), 64);
+
+    // One reading is an hour ahead: the steps before and after it count all the same.
+    let hour = 3_600_000_000;
+    let mut readings = [1000, hour + 1000, 1500, 2500, 2400, 2700].into_iter();
+    let clock = move || Instant::from_micros(readings.next().unwrap());
+    let mut driver = Driver::new(Recorder::default(), Script::default(), clock);
+    let times: Vec<u64> = (0..5).map(|_| driver.now().as_micros() - hour).collect();
+    assert_eq!(times, [1000, 1000, 2000, 2000, 2300]);
+}
+
+#[test]
+fn the_clock_of_std_naps_for_less_than_a_deadline_and_never_past_one_that_is_over() {
+    let mut clock = StdClock::default();
+    let start = clock.now();
+    clock.idle_until(start);
+    let far = start + Duration::from_millis(60_000);
+    let begin = clock.now();
+    clock.idle_until(far);
+    let end = clock.now();
+    assert!(end >= begin + Duration::from_micros(200) && end < far);
+}
+
+#[test]
+fn a_clock_and_a_delay_are_joined_and_each_does_its_part() {
+    let said = RefCell::new(vec![]);
+    struct Says<'a>(&'a RefCell<Vec<String>>);
+    impl Clock for Says<'_> {
+        fn now(&mut self) -> Instant {
+            at_ms(7)
+        }
+        fn idle_until(&mut self, until: Instant) {
+            self.0.borrow_mut().push(format!("idle until {}", until.as_micros()));
+        }
+    }
+    impl DelayNs for Says<'_> {
+        async fn delay_ns(&mut self, ns: u32) {
+            self.0.borrow_mut().push(format!("{ns} ns"));
+        }
+        async fn delay_us(&mut self, us: u32) {
+            self.0.borrow_mut().push(format!("{us} us"));
+        }
+        async fn delay_ms(&mut self, ms: u32) {
+            self.0.borrow_mut().push(format!("{ms} ms"));
+        }
+    }
+    let mut both = WithDelay { clock: Says(&said), delay: Says(&said) };
+    assert_eq!(both.now(), at_ms(7));
+    both.idle_until(at_ms(9));
+    let world = World::default();
+    world.block_on(async {
+        both.delay_ns(1).await;
+        both.delay_us(2).await;
+        both.delay_ms(3).await;
+    });
+    assert_eq!(*said.borrow(), ["idle until 9000", "1 ns", "2 us", "3 ms"]);
+}

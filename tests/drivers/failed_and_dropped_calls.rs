@@ -1,0 +1,125 @@
+//! Ports that fail and calls that are dropped: the next call goes on where this one has ended.
+
+use axlewire::drive::{DriveError, Driver};
+
+use crate::{
+    port::{Script, Step, Unplugged},
+    recorder::{ASYNC, ROUNDS, Recorder, at_ms, bytes, scripted},
+    virtual_time::{End, VirtualClock, World},
+};
+
+#[test]
+fn a_write_that_fails_inside_a_frame_leaves_the_rest_for_the_next_call() {
+    for (failure, error) in
+        [(Step::Error, DriveError::Port(Unplugged)), (Step::Zero, DriveError::WriteZero)]
+    {
+        for cut in 1..5 {
+            for round in ROUNDS {
+                let steps = [bytes(cut), failure.clone(), failure.clone()];
+                let mut driver =
+                    scripted(Recorder::sending(&[b"12345", b"67"]), Script::writing(steps));
+                assert_eq!(round(&mut driver), Some(Err(error)));
+                assert_eq!(driver.unsent(), &b"12345"[cut..]);
+                assert_eq!(round(&mut driver), Some(Err(error)));
+                assert_eq!(driver.unsent(), &b"12345"[cut..]);
+                assert_eq!(round(&mut driver), Some(Ok(())));
+                assert_eq!(
+                    (&driver.port().written[..], driver.port().flushed),
+                    (&b"1234567"[..], 3)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_unsent_can_be_given_up() {
+    for round in ROUNDS {
+        let steps = [bytes(2), Step::Error];
+        let mut driver = scripted(Recorder::sending(&[b"12345", b"67"]), Script::writing(steps));
+        assert_eq!(round(&mut driver), Some(Err(DriveError::Port(Unplugged))));
+        assert_eq!((driver.discard(), driver.discard()), (3, 0));
+        assert_eq!(round(&mut driver), Some(Ok(())));
+        assert_eq!(driver.port().written, b"1267");
+    }
+}
+
+#[test]
+fn a_flush_that_fails_is_made_again_by_the_next_call() {
+    for round in ROUNDS {
+        let port = Script { flushes: [Step::Error].into(), ..Script::default() };
+        let mut driver = scripted(Recorder::sending(&[b"12"]), port);
+        assert_eq!(round(&mut driver), Some(Err(DriveError::Port(Unplugged))));
+        assert_eq!(round(&mut driver), Some(Ok(())));
+        assert_eq!((&driver.port().written[..], driver.port().flushed), (&b"12"[..], 1));
+    }
+}
+
+#[test]
+fn a_read_that_fails_or_ends_is_told_after_what_came_before_and_loses_nothing() {
+    for (failure, error) in
+        [(Step::Error, DriveError::Port(Unplugged)), (Step::Zero, DriveError::Closed)]
+    {
+        for round in ROUNDS {
+            let (head, tail) = (Step::Bytes(b"he".into()), Step::Bytes(b"ad".into()));
+            let mut driver =
+                scripted(Recorder::default(), Script::reading([head, failure.clone(), tail]));
+            assert_eq!(round(&mut driver), Some(Err(error)));
+            assert_eq!(driver.role().received, b"he");
+            assert_eq!(round(&mut driver), Some(Ok(())));
+            assert_eq!(driver.role().received, b"head");
+        }
+    }
+}
+
+#[test]
+fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_frame() {
+    let incoming: Vec<u8> = (0..40).collect();
+    let frames: [&[u8]; 3] = [b"first", b"second", b"third"];
+    let whole = frames.concat();
+    // A write that is ready at the second poll never gets further with one.
+    for polls in 2..200 {
+        let world = World::default();
+        let (mut near, mut far) = End::pair(&world, 20);
+        (near.most, near.stutters) = (1, true);
+        embedded_io::Write::write(&mut far, &incoming).unwrap();
+        let mut role = Recorder::sending(&frames);
+        role.repeats = true;
+        let mut driver = Driver::new(role, near, VirtualClock(world.clone()));
+        let mut events = vec![];
+        let mut dropped = 0;
+        // Every call is dropped after so many polls, and again, and again.
+        for _ in 0..1000 {
+            match world.poll_times(polls, driver.next_event_async(at_ms(1000))) {
+                Some(event) => events.extend(event.unwrap()),
+                None => dropped += 1,
+            }
+            world.step(20);
+        }
+        assert!(dropped > 0);
+        assert_eq!(events, incoming, "dropped after {polls} polls");
+        let sent: Vec<u8> =
+            driver.port().outboxes[0].borrow().iter().map(|&(_, byte)| byte).collect();
+        assert_eq!(sent, whole, "dropped after {polls} polls");
+    }
+}
+
+#[test]
+fn a_stalled_write_or_flush_that_is_dropped_is_made_good_by_the_next_call() {
+    let port = Script {
+        writes: [bytes(3), Step::Stall, bytes(1), Step::Stall].into(),
+        flushes: [Step::Stall, Step::Stall].into(),
+        ..Script::default()
+    };
+    let mut driver = scripted(Recorder::sending(&[b"12345"]), port);
+    assert_eq!(ASYNC(&mut driver), None);
+    assert_eq!(driver.unsent(), b"45");
+    assert_eq!(ASYNC(&mut driver), None);
+    assert_eq!(driver.unsent(), b"5");
+    for _ in 0..2 {
+        assert_eq!(ASYNC(&mut driver), None);
+        assert_eq!((driver.unsent(), driver.port().flushed), (&b""[..], 0));
+    }
+    assert_eq!(ASYNC(&mut driver), Some(Ok(())));
+    assert_eq!((&driver.port().written[..], driver.port().flushed), (&b"12345"[..], 1));
+}

@@ -1,0 +1,228 @@
+//! Ports that fail: what is sent all the same, and what goes back to its role (I12, U16).
+
+use std::{
+    pin::pin,
+    sync::Arc,
+    task::{Context, Poll, Waker},
+};
+
+use axlewire::{
+    drive::{DriveError, Driver},
+    endpoint::Unsent,
+    time::Instant,
+};
+
+use crate::{
+    port::{Script, Step, Unplugged},
+    recorder::{ASYNC, Call, ROUNDS, Recorder, Scripted, scripted},
+    virtual_time::{VirtualClock, Wakes, World},
+};
+
+const GONE: DriveError<Unplugged> = DriveError::Port(Unplugged);
+
+fn bytes(count: usize) -> Step {
+    Step::Bytes(vec![0; count])
+}
+
+fn frames_of(driver: &Scripted) -> usize {
+    let is_frame = |call: &&Call| matches!(call, Call::Transmit(Some(_)));
+    driver.role().calls.iter().filter(is_frame).count()
+}
+
+#[test]
+fn a_receive_error_is_told_after_what_is_due_has_been_sent_and_flushed() {
+    for (failure, error) in [(Step::Error, GONE), (Step::Zero, DriveError::Closed)] {
+        for round in ROUNDS {
+            let mut role = Recorder::sending(&[b"stop", b"stop again"]);
+            role.timeout = Some(Instant::from_millis(0));
+            let mut driver = scripted(role, Script::reading([failure.clone()]));
+            assert_eq!(round(&mut driver), Some(Err(error)));
+            assert_eq!(driver.port().written, b"stopstop again");
+            assert_eq!(driver.port().flushed, 1);
+            assert!(driver.role().calls.contains(&Call::Timeout), "time passes as well");
+            assert_eq!(round(&mut driver), Some(Ok(())));
+        }
+    }
+}
+
+#[test]
+fn a_receiver_that_fails_while_a_frame_is_sent_does_not_cut_it() {
+    let port = Script {
+        reads: [Step::Bytes(b"x".into()), Step::Error, Step::Error, Step::Error].into(),
+        writes: [bytes(1), bytes(1), bytes(1)].into(),
+        ..Script::default()
+    };
+    for round in ROUNDS {
+        let port =
+            Script { reads: port.reads.clone(), writes: port.writes.clone(), ..Script::default() };
+        let mut driver = scripted(Recorder::sending(&[b"frame"]), port);
+        assert_eq!(round(&mut driver), Some(Err(GONE)));
+        assert_eq!((&driver.port().written[..], driver.port().flushed), (&b"frame"[..], 1));
+        assert!(driver.unsent().is_empty());
+        assert_eq!(driver.role().unsent(), []);
+    }
+}
+
+#[test]
+fn of_several_errors_the_first_is_told() {
+    for round in ROUNDS {
+        let port = Script {
+            reads: [Step::Zero].into(),
+            writes: [Step::Error].into(),
+            flushes: [Step::Error].into(),
+            ..Script::default()
+        };
+        let mut driver = scripted(Recorder::sending(&[b"frame"]), port);
+        assert_eq!(round(&mut driver), Some(Err(DriveError::Closed)));
+        let unsent = [Unsent::Untouched, Unsent::Unflushed];
+        assert_eq!(driver.role().unsent(), unsent, "all three were tried");
+    }
+}
+
+#[test]
+fn a_frame_of_which_no_byte_has_left_goes_back_to_its_role() {
+    for (failure, error) in [(Step::Error, GONE), (Step::Zero, DriveError::WriteZero)] {
+        for round in ROUNDS {
+            let role = Recorder::sending(&[b"old"]);
+            let mut driver = scripted(role, Script::writing([failure.clone()]));
+            assert_eq!(round(&mut driver), Some(Err(error)));
+            assert_eq!(driver.role().unsent(), [Unsent::Untouched]);
+            assert!(driver.unsent().is_empty());
+            // It decides anew.
+            driver.role_mut().frames.push_back(b"new".into());
+            assert_eq!(round(&mut driver), Some(Ok(())));
+            assert_eq!(driver.port().written, b"new");
+            assert_eq!(driver.role().unsent().len(), 1);
+        }
+    }
+}
+
+#[test]
+fn a_frame_that_was_cut_off_goes_on_within_20_ms_and_is_given_up_after() {
+    for (late_us, goes_on) in [(0, true), (20_000, true), (20_001, false), (1_000_000, false)] {
+        for round in ROUNDS {
+            let world = World::default();
+            let port = Script::writing([bytes(2), Step::Error]);
+            let role = Recorder::sending(&[b"12345"]);
+            let mut driver = Driver::new(role, port, VirtualClock(world.clone()));
+            assert_eq!(round(&mut driver), Some(Err(GONE)));
+            assert_eq!((driver.unsent(), driver.role().unsent().len()), (&b"345"[..], 0));
+            world.step(late_us);
+            driver.role_mut().frames.push_back(b"next".into());
+            assert_eq!(round(&mut driver), Some(Ok(())));
+            let (written, unsent) = match goes_on {
+                true => (&b"12345next"[..], vec![]),
+                false => (&b"12next"[..], vec![Unsent::CutOff]),
+            };
+            assert_eq!((&driver.port().written[..], driver.role().unsent()), (written, unsent));
+        }
+    }
+}
+
+#[test]
+fn the_patience_with_a_cut_off_frame_begins_anew_with_each_byte_that_leaves() {
+    for round in ROUNDS {
+        let world = World::default();
+        let steps = (0..4).flat_map(|_| [bytes(1), Step::Error]);
+        let role = Recorder::sending(&[b"12345"]);
+        let mut driver = Driver::new(role, Script::writing(steps), VirtualClock(world.clone()));
+        for _ in 0..4 {
+            assert_eq!(round(&mut driver), Some(Err(GONE)));
+            world.step(15_000);
+        }
+        assert_eq!(round(&mut driver), Some(Ok(())));
+        assert_eq!((&driver.port().written[..], frames_of(&driver)), (&b"12345"[..], 1));
+    }
+}
+
+#[test]
+fn a_role_is_told_of_a_failed_flush_once_for_what_was_written_since_the_last() {
+    for round in ROUNDS {
+        let flushes = [Step::Error, Step::Error, Step::Error];
+        let port = Script { flushes: flushes.into(), ..Script::default() };
+        let mut driver = scripted(Recorder::sending(&[b"12"]), port);
+        assert_eq!(round(&mut driver), Some(Err(GONE)));
+        assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
+        assert_eq!(round(&mut driver), Some(Err(GONE)), "tried again");
+        assert_eq!(driver.role().unsent().len(), 1);
+        driver.role_mut().frames.push_back(b"34".into());
+        assert_eq!(round(&mut driver), Some(Err(GONE)));
+        assert_eq!(driver.role().unsent(), [Unsent::Unflushed; 2]);
+        assert_eq!(round(&mut driver), Some(Ok(())));
+        assert_eq!(driver.port().flushed, 1);
+    }
+}
+
+#[test]
+fn what_is_given_up_is_told_to_the_role() {
+    for round in ROUNDS {
+        let port = Script {
+            writes: [bytes(2), Step::Error].into(),
+            flushes: [Step::Error].into(),
+            ..Script::default()
+        };
+        let mut driver = scripted(Recorder::sending(&[b"12345"]), port);
+        assert_eq!(round(&mut driver), Some(Err(GONE)));
+        assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
+        assert_eq!((driver.discard(), driver.discard()), (3, 0));
+        assert_eq!(driver.role().unsent(), [Unsent::Unflushed, Unsent::CutOff]);
+    }
+    // A frame that an async call has not got rid of, and a flush that it has not made.
+    let stalls = Script { writes: [Step::Stall].into(), ..Script::default() };
+    let mut driver = scripted(Recorder::sending(&[b"12345"]), stalls);
+    assert_eq!(ASYNC(&mut driver), None);
+    assert_eq!(driver.discard(), 5);
+    assert_eq!(driver.role().unsent(), [Unsent::Untouched, Unsent::Unflushed]);
+}
+
+#[test]
+fn a_dropped_write_of_which_no_byte_has_left_goes_back_to_its_role() {
+    let port = Script::writing([Step::Stall]);
+    let mut driver = scripted(Recorder::sending(&[b"old"]), port);
+    assert_eq!(ASYNC(&mut driver), None);
+    driver.role_mut().frames.push_back(b"new".into());
+    assert_eq!(ASYNC(&mut driver), Some(Ok(())));
+    assert_eq!(driver.role().unsent(), [Unsent::Untouched]);
+    assert_eq!(driver.port().written, b"new");
+}
+
+#[test]
+fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
+    let failing = || Script {
+        reads: [Step::Error].into(),
+        writes: [Step::Error].into(),
+        ..Script::default()
+    };
+    for waits in [false, true] {
+        let mut driver = scripted(Recorder::sending(&[b"stop"]), failing());
+        let wakes = Arc::new(Wakes::default());
+        let waker = Waker::from(wakes.clone());
+        let mut context = Context::from_waker(&waker);
+        let end = Instant::from_millis(1000);
+        let (first, second) = if waits {
+            let mut call = pin!(driver.next_event_async(end));
+            let first = call.as_mut().poll(&mut context).map(Result::err);
+            (first, call.as_mut().poll(&mut context).map(Result::err))
+        } else {
+            let mut call = pin!(driver.service_async());
+            let first = call.as_mut().poll(&mut context).map(Result::err);
+            (first, call.as_mut().poll(&mut context).map(Result::err))
+        };
+        assert_eq!((first, wakes.count()), (Poll::Pending, 1));
+        assert_eq!(second, Poll::Ready(Some(GONE)));
+    }
+}
+
+#[test]
+fn a_read_that_fails_while_the_driver_waits_yields_as_well() {
+    // The first read finds nothing, the one that waits fails.
+    let reads = [Step::Stall, Step::Error];
+    let mut driver = scripted(Recorder::default(), Script::reading(reads));
+    let wakes = Arc::new(Wakes::default());
+    let waker = Waker::from(wakes.clone());
+    let mut context = Context::from_waker(&waker);
+    let mut call = pin!(driver.next_event_async(Instant::from_millis(1000)));
+    assert_eq!(call.as_mut().poll(&mut context), Poll::Pending);
+    assert_eq!(wakes.count(), 1);
+    assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Err(GONE)));
+}

@@ -1,0 +1,106 @@
+//! Waiting for events: until the deadline and not longer, and awake for the role in between.
+
+use axlewire::{
+    drive::Driver,
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    recorder::{Call, Recorder, at_ms},
+    virtual_time::{End, VirtualClock, World},
+};
+
+#[test]
+fn on_a_silent_line_the_next_event_is_waited_for_until_the_deadline_and_not_longer() {
+    let world = World::default();
+    let (near, _far) = End::pair(&world, 20);
+    let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
+    assert_eq!(driver.next_event(at_ms(10)), Ok(None));
+    assert_eq!(world.now(), at_ms(10));
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(20))), Ok(None));
+    assert_eq!(world.now(), at_ms(20));
+    // No deadline in the past costs time, and none leaves out the round.
+    driver.role_mut().frames.push_back(b"12".into());
+    assert_eq!(driver.next_event(at_ms(0)), Ok(None));
+    assert_eq!(driver.port().outboxes[0].borrow().len(), 2);
+    driver.role_mut().frames.push_back(b"34".into());
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(0))), Ok(None));
+    assert_eq!(driver.port().outboxes[0].borrow().len(), 4);
+    assert_eq!(world.now(), at_ms(20));
+}
+
+#[test]
+fn a_waiting_driver_wakes_for_its_role() {
+    let world = World::default();
+    let (near, _far) = End::pair(&world, 20);
+    let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
+    driver.role_mut().timeout = Some(at_ms(5));
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(10))), Ok(None));
+    let calls = &driver.role().calls;
+    assert_eq!(calls.iter().filter(|call| **call == Call::Timeout).count(), 1);
+    // Asleep but for the role: a round at first, at 5 ms and at the end.
+    assert_eq!(calls.len(), 4, "{calls:?}");
+}
+
+#[test]
+fn every_event_is_handed_out_until_the_deadline() {
+    let world = World::default();
+    let (near, mut far) = End::pair(&world, 20);
+    embedded_io::Write::write(&mut far, b"abc").unwrap();
+    let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
+    let mut events = vec![];
+    driver.run_until(at_ms(1), |_, event, _| events.push(event)).unwrap();
+    assert_eq!((&events[..], world.now()), (&b"abc"[..], at_ms(1)));
+    embedded_io::Write::write(&mut far, b"def").unwrap();
+    let run = driver.run_until_async(at_ms(2), |role, event, _| {
+        events.push(event);
+        role.frames.push_back(vec![event]);
+    });
+    world.block_on(run).unwrap();
+    assert_eq!((&events[..], world.now()), (&b"abcdef"[..], at_ms(2)));
+    assert_eq!(driver.port().outboxes[0].borrow().len(), 3);
+}
+
+/// A role with nothing but what it has to have.
+#[derive(Default)]
+struct Plain {
+    heard: Vec<(Vec<u8>, Instant)>,
+    timeout: Option<Instant>,
+}
+
+impl Endpoint for Plain {
+    type Event = ();
+    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        self.heard.push((bytes.to_vec(), now));
+    }
+    fn handle_timeout(&mut self, _: Instant) {}
+    fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
+        None
+    }
+    fn poll_event(&mut self) -> Option<()> {
+        None
+    }
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.timeout
+    }
+}
+
+#[test]
+fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
+    let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
+    let world = World::default();
+    let mut driver = Driver::new(late, End::new(&world, 20), VirtualClock(world.clone()));
+    assert_eq!(driver.next_event(at_ms(1)), Ok(None));
+    assert_eq!(world.now(), at_ms(1));
+}
+
+#[test]
+fn as_provided_a_role_takes_old_bytes_for_new_ones_and_frames_may_pause_for_20_ms() {
+    let mut role = Plain::default();
+    role.handle_old_input(b"12", at_ms(1), at_ms(9));
+    assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);
+    assert_eq!(role.held_up_after(), None);
+    assert_eq!(role.frame_pause(), Duration::from_millis(20));
+    assert_eq!(role.wire_time(64), Duration::ZERO);
+}

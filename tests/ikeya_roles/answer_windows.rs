@@ -1,0 +1,181 @@
+//! Answer windows: which packet counts as the answer to a request, and which is late (I7).
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{Health, MasterEvent, NodeId, Position, Status},
+};
+
+use crate::rig::*;
+
+#[test]
+fn the_window_is_the_timeout_and_the_wire_time_behind_the_end_of_the_request() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    // 80 us of request, 500 us of patience, 160 us of answer.
+    assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(740)));
+    desk.hear(740, &velocity(NodeId::N1, 1.0));
+    assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]), "at the deadline is in time");
+
+    desk.turn();
+    desk.hear(741, &velocity(NodeId::N1, 1.0));
+    desk.master.handle_timeout(desk.now);
+    let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
+    assert_eq!(desk.told(), [suspect], "behind it is not");
+    assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
+}
+
+#[test]
+fn behind_a_write_the_window_begins_when_both_requests_have_left() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.turn();
+    assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(160 + 740)));
+}
+
+#[test]
+fn bytes_from_before_the_request_are_dropped() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    let answer = velocity(NodeId::N1, 9.0);
+    desk.hear(10, &answer[..5]);
+    desk.turn();
+    desk.hear(290, &answer[5..]);
+    assert_eq!(desk.told(), []);
+    assert_eq!(desk.master.statistics().stale_bytes, 5);
+}
+
+#[test]
+fn a_stray_byte_before_every_answer_costs_nothing() {
+    for stray in 0..=u8::MAX {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        for turn in 0..5 {
+            desk.turn();
+            let answer = [&[stray][..], &velocity(NodeId::N1, turn as f32)].concat();
+            desk.hear(310, &answer);
+            let status = Status::Velocity(turn as f32);
+            assert_eq!(
+                desk.told(),
+                [MasterEvent::Status { node: NodeId::N1, status }],
+                "{stray:#x}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_answer_of_another_node_is_counted_and_never_taken() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    desk.hear(290, &position(NodeId::N3, Position::new(1, 1)));
+    assert_eq!(desk.told(), []);
+    assert_eq!(desk.master.node_statistics(NodeId::N3).late, 1);
+    desk.hear(100, &velocity(NodeId::N1, 2.0));
+    let status = Status::Velocity(2.0);
+    assert_eq!(
+        desk.told(),
+        [MasterEvent::Status { node: NodeId::N1, status }],
+        "the window stayed open"
+    );
+}
+
+#[test]
+fn a_late_answer_is_not_taken_for_the_next_one() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    desk.silence();
+    // The node is not asked again before the guard is over, and the late answer meets no window.
+    desk.hear(400, &velocity(NodeId::N1, 9.0));
+    assert_eq!(desk.master.poll_transmit(desk.now), None);
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    let statuses: Vec<_> = desk
+        .told()
+        .into_iter()
+        .filter(|event| matches!(event, MasterEvent::Status { .. }))
+        .collect();
+    let status = Status::Velocity(1.0);
+    assert_eq!(statuses, [MasterEvent::Status { node: NodeId::N1, status }]);
+    assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
+}
+
+#[test]
+fn a_write_that_is_not_answered_does_not_wait_for_a_late_answer() {
+    for is_stop in [false, true] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        desk.turn();
+        desk.silence();
+        assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(500)), "the guard");
+        if is_stop {
+            desk.master.stop(NodeId::N1, desk.now);
+        } else {
+            desk.master.set_velocity(NodeId::N1, rps(2.0), desk.now).unwrap();
+        }
+        let sent = desk.master.poll_transmit(desk.now).map(<[u8]>::to_vec);
+        assert_eq!(sent, Some(write(NodeId::N1, if is_stop { 0.0 } else { 2.0 })));
+    }
+}
+
+#[test]
+fn while_one_node_is_guarded_the_others_are_read() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    desk.silence();
+    let closed = desk.now;
+    assert_eq!(desk.turn(), read(NodeId::N3));
+    assert_eq!(desk.now, closed);
+}
+
+#[test]
+fn a_second_answer_to_one_request_is_late() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    let twice = [velocity(NodeId::N1, 1.0), velocity(NodeId::N1, 2.0)].concat();
+    desk.hear(450, &twice);
+    let status = Status::Velocity(1.0);
+    assert_eq!(desk.told(), [MasterEvent::Status { node: NodeId::N1, status }]);
+    assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
+}
+
+#[test]
+fn any_f32_is_a_status() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    let nan = [0x55, 0x01, 0x00, 0x00, 0xC0, 0x7F];
+    let mut answer = nan.to_vec();
+    answer.extend(axlewire::crc16::compute(&nan).to_le_bytes());
+    desk.hear(290, &answer);
+    let [MasterEvent::Status { status: Status::Velocity(rps), .. }] = desk.told()[..] else {
+        panic!()
+    };
+    assert!(rps.is_nan());
+}
+
+#[test]
+fn latencies_are_measured_from_the_end_of_the_request_to_the_beginning_of_the_answer() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for latency in [10, 20, 90] {
+        desk.turn();
+        desk.hear(80 + latency + 160, &velocity(NodeId::N1, 0.0));
+    }
+    let statistics = desk.master.node_statistics(NodeId::N1);
+    let found = [statistics.latency_min(), statistics.latency_mean(), statistics.latency_max()];
+    // The discovery's answer took 50 us.
+    assert_eq!(found, [US(10), US((10 + 20 + 90 + 50) / 4), US(90)]);
+    assert_eq!((statistics.requests, statistics.replies), (4, 4));
+}
+
+#[test]
+fn a_late_answer_to_the_third_strike_does_not_answer_the_search_for_the_node() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.told();
+    assert_eq!(desk.master.poll_transmit(desk.now), None);
+    assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(500)));
+    desk.hear(400, &velocity(NodeId::N1, 9.0));
+    assert_eq!((desk.told(), desk.master.health(NodeId::N1)), (vec![], Some(Health::Abnormal)));
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(1.0));
+}

@@ -1,0 +1,151 @@
+//! How long each packet waits at most on a bus of boards with three motors, where each WRITE is an
+//! exchange (I13).
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Master, Mode, NodeId, StopProgress, ThreeMotors,
+        three::{PositionResponse, VelocityResponse},
+    },
+    time::Instant,
+};
+
+use crate::rig::*;
+
+/// Eight boards that answer at once whatever they are asked, and their master.
+struct Boards {
+    master: Master<ThreeMotors>,
+    now: Instant,
+    modes: [Mode; 8],
+}
+
+impl Boards {
+    fn new(modes: [Mode; 8]) -> Self {
+        let now = Instant::from_micros(1_000_000);
+        let mut boards = Self { master: Master::new(direct(), now), now, modes };
+        boards.master.discover(now);
+        while boards.master.is_discovering() {
+            boards.exchange();
+        }
+        boards
+    }
+
+    /// The next request; it has been answered.
+    fn exchange(&mut self) -> Vec<u8> {
+        let sent = loop {
+            if let Some(packet) = self.master.poll_transmit(self.now) {
+                break packet.to_vec();
+            }
+            let next = self.master.poll_timeout().expect("something to do");
+            assert!(next > self.now, "a busy loop at {next:?}");
+            self.now = next;
+            self.master.handle_timeout(next);
+        };
+        let node = NodeId::new(sent[1]).unwrap();
+        let answer = match self.modes[usize::from(sent[1]) - 1] {
+            Mode::Velocity => VelocityResponse::new(node, [0.0; 3].map(rps)).as_bytes().to_vec(),
+            Mode::Position => PositionResponse::new(node, [turns(7); 3]).as_bytes().to_vec(),
+        };
+        self.now += US(900);
+        self.master.handle_input(&answer, self.now);
+        while self.master.poll_event().is_some() {}
+        sent
+    }
+
+    fn set(&mut self, node: NodeId, to: i16) {
+        // Refused while its stop is owed.
+        let _ = match self.modes[usize::from(node.get()) - 1] {
+            Mode::Velocity => self.master.set_velocity(node, [rps(f32::from(to)); 3], self.now),
+            Mode::Position => self.master.set_position(node, [turns(to); 3], self.now),
+        };
+    }
+}
+
+/// All but node 8 get a new set-point before each packet, and are stopped often, rarely or never.
+/// The most exchanges in front of something of node 8 that `begin` begins, its own left out.
+fn longest_wait(
+    modes: [Mode; 8],
+    begin: impl Fn(&mut Boards),
+    is_done: impl Fn(&[u8]) -> bool,
+) -> usize {
+    let mut longest = 0;
+    let starts = (0..5).flat_map(|offset| [1, 2, 3, 4, 5, 7, 1000].map(|period| (offset, period)));
+    for (offset, period) in starts {
+        let mut boards = Boards::new(modes);
+        let mut waited = None;
+        for turn in 0..1000 {
+            for &node in &NodeId::ALL[..7] {
+                boards.set(node, 1);
+                if turn % period == 0 && boards.master.stop_progress(node) != StopProgress::Owed {
+                    boards.master.stop(node, boards.now);
+                }
+            }
+            if turn == 100 + offset {
+                begin(&mut boards);
+                waited = Some(0);
+            }
+            let packet = boards.exchange();
+            if waited.is_some() && is_done(&packet) {
+                break;
+            }
+            if packet[1] != 8 {
+                waited = waited.map(|count| count + 1);
+            }
+            assert!(turn < 999, "it waits for ever");
+        }
+        longest = longest.max(waited.unwrap());
+    }
+    longest
+}
+
+/// Node 8 and its seven neighbours, in every mixture that treats some of them differently.
+fn mixtures(last: Mode) -> [[Mode; 8]; 3] {
+    let (velocity, position) = (Mode::Velocity, Mode::Position);
+    [
+        [position, position, position, position, position, position, position, last],
+        [velocity, position, velocity, position, velocity, position, velocity, last],
+        [velocity, velocity, velocity, velocity, velocity, velocity, velocity, last],
+    ]
+}
+
+#[test]
+fn a_velocity_stop_waits_for_at_most_seven_other_stops_and_the_hold_under_way() {
+    for modes in mixtures(Mode::Velocity) {
+        let begin = |boards: &mut Boards| boards.master.stop(NodeId::N8, boards.now);
+        let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (WRITE, 8));
+        assert!(waited <= 8, "{waited} of {modes:?}");
+    }
+}
+
+#[test]
+fn a_position_stop_is_read_after_at_most_24_exchanges_and_written_next() {
+    for modes in mixtures(Mode::Position) {
+        let begin = |boards: &mut Boards| boards.master.stop(NodeId::N8, boards.now);
+        let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (READ, 8));
+        assert!((1..=24).contains(&waited), "{waited} of {modes:?}");
+        let written = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (WRITE, 8));
+        assert_eq!(written, waited, "its READ is followed by its WRITE");
+    }
+}
+
+#[test]
+fn a_new_set_point_waits_for_at_most_24_exchanges() {
+    for mode in [Mode::Velocity, Mode::Position] {
+        for modes in mixtures(mode) {
+            let begin = |boards: &mut Boards| boards.set(NodeId::N8, 4);
+            let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (WRITE, 8));
+            assert!((1..=24).contains(&waited), "{waited} of {modes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_node_in_the_cycle_waits_for_at_most_8_rounds_of_25_exchanges() {
+    for mode in [Mode::Velocity, Mode::Position] {
+        for modes in mixtures(mode) {
+            let begin = |boards: &mut Boards| boards.master.read(NodeId::N8, boards.now).unwrap();
+            let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (READ, 8));
+            assert!((1..=8 * 25).contains(&waited), "{waited} of {modes:?}");
+        }
+    }
+}

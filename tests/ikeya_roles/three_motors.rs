@@ -1,0 +1,348 @@
+//! Boards with three motors: each WRITE is answered, and all three motors count (I10).
+
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Slave, SlaveConfig, Status,
+        StopProgress, Target, ThreeMotors,
+        three::{PositionResponse, VelocityResponse, WriteRequest},
+    },
+    time::Instant,
+};
+
+use crate::rig::*;
+
+const T0: Instant = Instant::from_micros(5_000);
+
+#[test]
+fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
+    let mut master: Master<ThreeMotors> = Master::new(direct(), T0);
+    let mut slave: Slave<ThreeMotors> =
+        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+    master.discover(T0);
+    let mut now = T0;
+    let (mut heard, mut written) = (0, 0);
+    for _ in 0..40 {
+        let request = master.poll_transmit(now).map(<[u8]>::to_vec);
+        if let Some(request) = request {
+            written += usize::from(request[0] == 0xBB);
+            assert!(request[0] == 0xAA || request.len() == 16);
+            slave.handle_input(&request, now);
+            if let Some(answer) = slave.poll_transmit(now).map(<[u8]>::to_vec) {
+                now += US(700);
+                master.handle_input(&answer, now);
+                continue;
+            }
+        }
+        now = master.poll_timeout().unwrap();
+        master.handle_timeout(now);
+        while let Some(event) = master.poll_event() {
+            if let MasterEvent::Status { status: Status::Velocity(_), .. } = event {
+                heard += 1;
+                let targets = [rps(1.0), rps(-2.0), rps(3.0)];
+                master.set_velocity(NodeId::N1, targets, now).unwrap();
+            }
+        }
+    }
+    assert!(heard > 5 && written > 5, "{heard} answers, {written} writes");
+    let targets = Target::Velocity([rps(1.0), rps(-2.0), rps(3.0)]);
+    assert_eq!(slave.command(), Some(targets));
+    assert_eq!(master.node_statistics(NodeId::N1).timeouts, 0);
+    assert_eq!(slave.statistics().replies, slave.statistics().reads + slave.statistics().writes);
+}
+
+/// Boards 1 and 8 in velocity mode at these speeds; the packets to them are answered.
+struct Boards {
+    master: Master<ThreeMotors>,
+    now: Instant,
+    speeds: [f32; 3],
+    events: Vec<MasterEvent<ThreeMotors>>,
+}
+
+impl Boards {
+    fn new(mut config: MasterConfig) -> Self {
+        config.nodes = [NodeId::N1, NodeId::N8].into_iter().collect();
+        let mut boards =
+            Self { master: Master::new(config, T0), now: T0, speeds: [0.0; 3], events: vec![] };
+        boards.master.discover(T0);
+        while boards.master.is_discovering() {
+            boards.exchange();
+        }
+        boards.events.clear();
+        boards
+    }
+
+    fn exchange(&mut self) -> Option<Vec<u8>> {
+        loop {
+            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
+                let node = NodeId::new(packet[1]).unwrap();
+                let answer = VelocityResponse::new(node, self.speeds.map(rps));
+                let echo = if self.master.config().removes_echo { &packet[..] } else { &[] };
+                self.now += US(700);
+                self.master.handle_input(&[echo, answer.as_bytes()].concat(), self.now);
+                self.events.extend(core::iter::from_fn(|| self.master.poll_event()));
+                return Some(packet);
+            }
+            self.now = self.master.poll_timeout()?;
+            self.master.handle_timeout(self.now);
+        }
+    }
+
+    fn still(&self) -> usize {
+        let is_still = |event: &&MasterEvent<_>| matches!(event, MasterEvent::StandingStill { .. });
+        self.events.iter().filter(is_still).count()
+    }
+}
+
+#[test]
+fn the_answer_of_a_stop_write_pays_for_it() {
+    let mut boards = Boards::new(manual());
+    boards.master.stop(NodeId::N8, boards.now);
+    let stop = WriteRequest::velocity(NodeId::N8, [rps(0.0); 3]).as_bytes().to_vec();
+    let sent: Vec<_> = core::iter::from_fn(|| boards.exchange()).collect();
+    assert_eq!(sent, [stop.clone(), stop]);
+    assert!(boards.events.contains(&MasterEvent::Stopped { node: NodeId::N8 }));
+}
+
+#[test]
+fn a_write_waits_for_a_late_answer_because_it_is_answered_itself() {
+    for is_stop in [false, true] {
+        let mut boards = Boards::new(manual());
+        boards.master.read(NodeId::N8, boards.now).unwrap();
+        assert!(boards.master.poll_transmit(boards.now).is_some());
+        boards.now = boards.master.poll_timeout().expect("a window");
+        boards.master.handle_timeout(boards.now);
+        let targets = if is_stop { [0.0; 3] } else { [1.0, 2.0, 3.0] }.map(rps);
+        if is_stop {
+            boards.master.stop(NodeId::N8, boards.now);
+        } else {
+            boards.master.set_velocity(NodeId::N8, targets, boards.now).unwrap();
+        }
+        let (before, guarded_until) = (boards.now + US(499), boards.now + US(500));
+        assert_eq!(boards.master.poll_timeout(), Some(guarded_until));
+        assert_eq!(boards.master.poll_transmit(before), None);
+        let sent = boards.master.poll_transmit(guarded_until).map(<[u8]>::to_vec);
+        let expected = WriteRequest::velocity(NodeId::N8, targets).as_bytes().to_vec();
+        assert_eq!(sent, Some(expected));
+    }
+}
+
+#[test]
+fn turning_on_the_spot_is_not_standing_still() {
+    for (speeds, is_still) in [
+        ([0.04, -0.04, 0.0], true),
+        ([1.0, -1.0, 0.0], false),
+        ([0.0, 0.0, -0.05], false),
+        ([0.05, 0.0, 0.0], false),
+        ([0.0, 0.05, 0.0], false),
+    ] {
+        let mut boards = Boards::new(manual());
+        boards.speeds = speeds;
+        boards.master.stop(NodeId::N1, boards.now);
+        while boards.exchange().is_some() {}
+        assert_eq!(boards.still(), usize::from(is_still), "{speeds:?}");
+    }
+}
+
+#[test]
+fn all_three_positions_have_to_stay_within_8_counts() {
+    let place = |counts| Position::from_counts(counts).unwrap();
+    for (moved, is_still) in [
+        ([8, -8, 0], true),
+        ([9, 0, 0], false),
+        ([0, -9, 0], false),
+        ([0, 0, 9], false),
+        ([9, -9, 0], false),
+    ] {
+        let mut master: Master<ThreeMotors> = Master::new(manual(), T0);
+        let mut now = T0;
+        let mut answer = |master: &mut Master<ThreeMotors>, places: [i32; 3]| {
+            let sent = master.poll_transmit(now).map(|it| it[0]);
+            now += MS(25);
+            let answer = PositionResponse::new(NodeId::N1, places.map(place));
+            master.handle_input(answer.as_bytes(), now);
+            (sent, now)
+        };
+        let mut config = *master.config();
+        config.reply_timeout = MS(30);
+        master = Master::new(config, T0);
+        master.stop(NodeId::N1, T0);
+        for expected in [READ, WRITE, WRITE] {
+            assert_eq!(answer(&mut master, [0; 3]).0, Some(expected));
+        }
+        // The answer that paid the stop is compared with the next.
+        let (_, at) = answer(&mut master, [0; 3]);
+        master.read(NodeId::N1, at).unwrap();
+        assert_eq!(answer(&mut master, moved).0, Some(WRITE), "the hold, repeated");
+        let events = core::iter::from_fn(|| master.poll_event());
+        let told = events.filter(|it| matches!(it, MasterEvent::StandingStill { .. })).count();
+        assert_eq!(told == 1, is_still, "{moved:?}");
+    }
+}
+
+#[test]
+fn in_doubt_positions_may_be_written_that_all_read_as_standstill() {
+    // Sent as count x 3, then rotation x 3; read as f32 x 3: (count 1, count 2), (count 3, rotation
+    // 1), (rotation 2, rotation 3), the lower half first.
+    for (places, may) in [
+        ([(0, 0), (0, 0), (0, 0)], true),
+        ([(-1, 12_287), (12_287, -1), (-1, 12_287)], true),
+        ([(0, 0), (12_288, 0), (0, 0)], false),
+        ([(0, 0), (-1, 0), (0, 0)], false),
+        ([(0, 12_288), (0, 0), (0, 0)], false),
+        ([(0, -1), (0, 0), (0, 0)], false),
+        ([(0, 0), (0, 0), (0, 12_288)], false),
+        ([(0, 0), (0, 0), (0, -1)], false),
+    ] {
+        let places = places.map(|(count, rotation)| Position::new(count, rotation));
+        let packet = WriteRequest::position(NodeId::N1, places);
+        let harmless = packet.as_velocity().iter().all(|rps| rps.to_bits() < 0x3000_0000);
+        assert_eq!(harmless, may, "the table agrees with the packet");
+        let mut boards = Boards::new(manual());
+        boards.master.stop(NodeId::N1, boards.now);
+        // Its WRITE of 0 rps is answered as a position node would.
+        assert!(boards.master.poll_transmit(boards.now).is_some());
+        boards.now += US(700);
+        let answer = PositionResponse::new(NodeId::N1, places);
+        boards.master.handle_input(answer.as_bytes(), boards.now);
+        assert!(boards.master.is_mode_in_doubt(NodeId::N1));
+        // It has had its turn in this round; the round ends, because nothing else is due.
+        let next = boards.master.poll_transmit(boards.now).map(<[u8]>::to_vec);
+        let expected = if may { packet.as_bytes().to_vec() } else { read(NodeId::N1) };
+        assert_eq!(next, Some(expected), "{places:?}");
+    }
+}
+
+#[test]
+fn the_longest_echo_is_removed() {
+    let mut config = direct();
+    config.removes_echo = true;
+    let mut boards = Boards::new(config);
+    for _ in 0..50 {
+        boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
+        boards.exchange();
+    }
+    let statistics = boards.master.statistics();
+    assert_eq!(statistics.echo_errors, 0);
+    assert_eq!(statistics.echo_bytes, 4 * statistics.reads + 16 * statistics.writes);
+    assert!(statistics.writes > 20);
+}
+
+#[test]
+fn a_stop_has_one_attempt_per_round_where_its_write_is_answered() {
+    let mut boards = Boards::new(direct());
+    boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
+    boards.master.stop(NodeId::N8, boards.now);
+    let mut sent = || kind(&boards.exchange().unwrap());
+    assert_eq!([sent(), sent()], [(WRITE, 8), (WRITE, 1)]);
+    let rest = [sent(), sent()];
+    assert!(rest.contains(&(WRITE, 8)), "{rest:02x?}");
+}
+
+/// A control loop that has a new speed for seven boards before each packet, and one board under way
+/// in position mode: node 1, 100 counts further with each answer.
+struct Busy {
+    master: Master<ThreeMotors>,
+    now: Instant,
+    counts: i32,
+    commands: u16,
+    answer_us: u32,
+    /// Node 1 has lost its power.
+    is_dead: bool,
+}
+
+impl Busy {
+    fn new(config: MasterConfig, answer_us: u32) -> Self {
+        let master = Master::new(config, T0);
+        let mut busy = Self { master, now: T0, counts: 0, commands: 0, answer_us, is_dead: false };
+        busy.master.discover(busy.now);
+        for _ in 0..300 {
+            busy.exchange();
+        }
+        assert_eq!(busy.master.mode(NodeId::N1), Some(Mode::Position));
+        busy
+    }
+
+    /// The next packet, with the position of its answer if that is one.
+    fn exchange(&mut self) -> (Vec<u8>, i32) {
+        loop {
+            self.commands += 1;
+            for node in &NodeId::ALL[1..] {
+                let speeds = [rps(f32::from(self.commands % 50)); 3];
+                let _ = self.master.set_velocity(*node, speeds, self.now);
+            }
+            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
+                let node = NodeId::new(packet[1]).unwrap();
+                if self.is_dead && node == NodeId::N1 {
+                    self.now = self.master.poll_timeout().unwrap();
+                    self.master.handle_timeout(self.now);
+                    return (packet, self.counts);
+                }
+                self.now += US(self.answer_us);
+                let answer = if node == NodeId::N1 {
+                    self.counts += 100;
+                    let positions = [Position::from_counts(self.counts).unwrap(); 3];
+                    PositionResponse::new(node, positions).as_bytes().to_vec()
+                } else {
+                    VelocityResponse::new(node, [rps(1.0); 3]).as_bytes().to_vec()
+                };
+                self.master.handle_input(&answer, self.now);
+                while self.master.poll_event().is_some() {}
+                return (packet, self.counts);
+            }
+            self.now = self.master.poll_timeout().unwrap();
+            self.master.handle_timeout(self.now);
+        }
+    }
+}
+
+#[test]
+fn a_position_is_held_right_behind_its_read_however_many_set_points_wait() {
+    for (config, answer_us) in [
+        (direct(), 700),
+        (MasterConfig::usb_adapter(), 5_000),
+        (MasterConfig::usb_adapter(), 17_000),
+    ] {
+        for offset in 0..20 {
+            let mut busy = Busy::new(config, answer_us);
+            for _ in 0..offset {
+                busy.exchange();
+            }
+            busy.master.stop(NodeId::N1, busy.now);
+            let mut others = 0;
+            let measured = loop {
+                match busy.exchange() {
+                    (packet, counts) if packet[1] == 1 => {
+                        assert_eq!(packet[0], READ, "it is measured first");
+                        break counts;
+                    }
+                    _ => others += 1,
+                }
+            };
+            assert!(others <= 24, "{others} exchanges before the read");
+            let positions = [Position::from_counts(measured).unwrap(); 3];
+            let hold = WriteRequest::position(NodeId::N1, positions).as_bytes().to_vec();
+            assert_eq!(busy.exchange().0, hold, "the answer is held, and nothing comes between");
+            let begin = busy.now;
+            while busy.master.stop_progress(NodeId::N1) == StopProgress::Owed {
+                busy.exchange();
+            }
+            assert!(busy.now - begin < busy.master.stop_bound());
+        }
+    }
+}
+
+#[test]
+fn a_dead_board_is_found_within_the_read_bound_however_busy_the_others_are() {
+    for (config, answer_us) in [(direct(), 700), (MasterConfig::usb_adapter(), 17_000)] {
+        let mut busy = Busy::new(config, answer_us);
+        busy.master.read(NodeId::N1, busy.now).unwrap();
+        let (begin, bound) = (busy.now, busy.master.read_bound());
+        let failures = busy.master.node_statistics(NodeId::N1).failures;
+        busy.is_dead = true;
+        while busy.master.node_statistics(NodeId::N1).failures == failures {
+            busy.exchange();
+            assert!(busy.now - begin <= bound, "it is not given up within {bound:?}");
+        }
+    }
+}

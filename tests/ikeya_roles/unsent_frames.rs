@@ -1,0 +1,290 @@
+//! Frames that did not reach the line: the master decides anew (I12).
+
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{CommandError, Health, MasterEvent, NodeId, StopProgress},
+};
+
+use crate::rig::*;
+
+const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
+
+/// What was handed out last did not leave.
+fn fail(desk: &mut Desk, unsent: Unsent) {
+    desk.master.handle_unsent(unsent, desk.now);
+}
+
+#[test]
+fn a_read_that_did_not_leave_opens_no_window_and_is_sent_again() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        let before = *desk.master.node_statistics(NodeId::N1);
+        let reads = desk.master.statistics().reads;
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        for _ in 0..10 {
+            assert_eq!(desk.packet(), read(NodeId::N1));
+            fail(&mut desk, unsent);
+            desk.now += MS(1);
+        }
+        // Ten failures of the port are no strike of the node.
+        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+        assert_eq!(*desk.master.node_statistics(NodeId::N1), before);
+        assert_eq!(desk.master.statistics().reads, reads);
+        assert_eq!(desk.exchange(), Some(read(NodeId::N1)));
+        assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]));
+    }
+}
+
+#[test]
+fn a_set_point_that_did_not_leave_is_new_again_unless_another_has_come() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        assert!(desk.master.is_set_point_sent(NodeId::N1));
+        fail(&mut desk, unsent);
+        assert!(!desk.master.is_set_point_sent(NodeId::N1));
+        assert_eq!(desk.master.statistics().writes, 0);
+        let mut other = desk.clone();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        other.master.set_velocity(NodeId::N1, rps(2.0), other.now).unwrap();
+        assert_eq!(writes(&other.packets(9)), [write(NodeId::N1, 2.0)], "the latest wins");
+    }
+}
+
+#[test]
+fn a_set_point_that_did_not_leave_is_never_sent_once_it_is_dropped() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        let mut released = desk.clone();
+        // The driver learns of the failure late, and the application is quicker.
+        desk.master.stop(NodeId::N1, desk.now);
+        fail(&mut desk, unsent);
+        let sent = writes(&desk.packets(9));
+        assert_eq!(sent, [write(NodeId::N1, 0.0), write(NodeId::N1, 0.0)]);
+        released.master.release(NodeId::N1);
+        fail(&mut released, unsent);
+        assert_eq!(released.packets(9), [[0; 0]; 0]);
+    }
+}
+
+#[test]
+fn a_stop_write_that_did_not_leave_pays_nothing() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.stop(NodeId::N1, desk.now);
+        let stop = write(NodeId::N1, 0.0);
+        for _ in 0..3 {
+            assert_eq!(desk.packet(), stop);
+            fail(&mut desk, unsent);
+        }
+        let sent = desk.packets(9);
+        let expected = [stop, read(NodeId::N1)];
+        assert_eq!(sent, [expected.clone(), expected].concat(), "{unsent:?}");
+        assert_eq!(desk.news()[0], STOPPED_1);
+    }
+}
+
+#[test]
+fn after_a_failed_flush_an_answer_does_not_pay_for_the_write_in_front_of_its_read() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    assert_eq!(kind(&desk.packet()), (WRITE, 1));
+    assert_eq!(kind(&desk.packet()), (READ, 1));
+    fail(&mut desk, Unsent::Unflushed);
+    // The READ has left all the same.
+    desk.hear(450, &velocity(NodeId::N1, 9.0));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+    assert_eq!(writes(&desk.packets(9)).len(), 2);
+}
+
+#[test]
+fn after_a_failed_flush_all_set_points_are_new_again_those_of_paid_stops_too() {
+    let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.packets(9);
+    desk.master.set_position(NodeId::N3, turns(1), desk.now).unwrap();
+    desk.packets(9);
+    fail(&mut desk, Unsent::Unflushed);
+    let mut sent = writes(&desk.packets(9));
+    sent.sort();
+    assert_eq!(sent, [write(NodeId::N1, 0.0), hold(NodeId::N3, turns(1))]);
+}
+
+#[test]
+fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_behind_it() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        desk.master.confirm(NodeId::N1, desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        fail(&mut desk, unsent);
+        let sent = desk.packets(9);
+        let at = sent.iter().position(|it| *it == write(NodeId::N1, 1.0)).expect("it goes again");
+        assert!(sent[at..].contains(&read(NodeId::N1)));
+        assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }], "{unsent:?}");
+    }
+}
+
+#[test]
+fn a_discovery_on_a_port_that_fails_skips_nobody() {
+    let mut desk = Desk::new(direct());
+    NodeId::ALL.into_iter().for_each(|node| desk.answer(node, Answer::Velocity(0.0)));
+    desk.master.discover(desk.now);
+    for node in NodeId::ALL {
+        for _ in 0..5 {
+            assert_eq!(desk.packet(), read(node));
+            fail(&mut desk, Unsent::Untouched);
+        }
+        assert_eq!(desk.exchange(), Some(read(node)));
+    }
+    assert!(!desk.master.is_discovering());
+}
+
+#[test]
+fn the_attempt_that_an_abnormal_node_gets_at_once_is_not_used_up_by_a_port_that_fails() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.lose(NodeId::N1);
+    desk.packets(2);
+    desk.now += US(500);
+    desk.master.stop(NodeId::N1, desk.now);
+    let begin = desk.now;
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
+        fail(&mut desk, unsent);
+    }
+    assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
+    assert_eq!(desk.packet(), read(NodeId::N1));
+    fail(&mut desk, Unsent::Untouched);
+    assert_eq!(kind(&desk.packet()), (READ, 1));
+    // What the port has taken of a packet is out after 160 us, and 200 us of silence follow; then
+    // the time of the WRITE.
+    assert_eq!(desk.now, begin + US(160 + 200 + 160), "when the WRITE has left");
+}
+
+#[test]
+fn an_echo_is_not_expected_of_a_frame_that_did_not_leave() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        let mut config = manual();
+        config.removes_echo = true;
+        let mut desk = Desk::new(config);
+        desk.master.stop(NodeId::N1, desk.now);
+        assert_eq!(desk.packet(), read(NodeId::N1));
+        fail(&mut desk, unsent);
+        assert_eq!(desk.packet(), read(NodeId::N1));
+        desk.hear(450, &[read(NodeId::N1), velocity(NodeId::N1, 0.0)].concat());
+        assert_eq!(desk.master.statistics().echo_errors, 0);
+        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+    }
+}
+
+#[test]
+fn a_frame_that_left_is_not_taken_back_twice() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+    fail(&mut desk, Unsent::Untouched);
+    fail(&mut desk, Unsent::Untouched);
+    assert_eq!(desk.packets(9), [write(NodeId::N1, 1.0)]);
+    let absent = CommandError::NotOnline { node: NodeId::N2 };
+    assert_eq!(desk.master.read(NodeId::N2, desk.now), Err(absent));
+    assert_eq!(desk.master.statistics().writes, 1);
+}
+
+#[test]
+fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    let begin = desk.now;
+    assert_eq!(kind(&desk.packet()), (WRITE, 1));
+    assert_eq!(kind(&desk.packet()), (READ, 1));
+    fail(&mut desk, Unsent::Untouched);
+    // The WRITE takes 160 us, the READ behind it 80.
+    assert_eq!(desk.packet(), read(NodeId::N1));
+    assert_eq!(desk.master.poll_timeout(), Some(begin + US(160 + 740)));
+    let mut config = manual();
+    config.turnaround_gap = US(100);
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    let heard = desk.now;
+    desk.turn();
+    fail(&mut desk, Unsent::CutOff);
+    let cut = desk.now;
+    desk.turn();
+    // Twice five byte times behind what is on its way, so that no slave takes the next packet for
+    // the rest.
+    assert_eq!((cut, desk.now), (heard, cut + US(80 + 100 + 200)), "the gap is kept");
+}
+
+#[test]
+fn a_node_that_is_looked_for_is_asked_again_at_once_when_its_read_did_not_leave() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.lose(NodeId::N1);
+    desk.turn();
+    let begin = desk.now;
+    fail(&mut desk, Unsent::Untouched);
+    assert_eq!((desk.turn(), desk.now), (read(NodeId::N1), begin));
+}
+
+#[test]
+fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
+    let mut desk = Desk::new(direct());
+    desk.master.discover(desk.now);
+    let mut asked = 0;
+    while desk.master.is_discovering() {
+        desk.turn();
+        fail(&mut desk, Unsent::Untouched);
+        desk.exchange();
+        asked += 1;
+    }
+    assert_eq!(asked, 24);
+}
+
+#[test]
+fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    desk.master.stop(NodeId::N1, desk.now);
+    let begin = desk.now;
+    assert_eq!(kind(&desk.packet()), (WRITE, 1));
+    assert_eq!(kind(&desk.packet()), (READ, 1));
+    assert_eq!(desk.now, begin, "a port may take both at once");
+    fail(&mut desk, Unsent::CutOff);
+    desk.packet();
+    assert_eq!(desk.now, begin + US(160 + 80 + 200));
+}
+
+#[test]
+fn a_write_of_a_set_point_is_outdated_once_that_is_dropped_or_replaced() {
+    let fresh = |config| {
+        let mut desk = Desk::with_nodes(config, &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        assert!(!desk.master.is_outdated());
+        desk
+    };
+    let repeated = || {
+        let mut desk = fresh(direct());
+        desk.packet();
+        desk.hear(450, &velocity(NodeId::N1, 1.0));
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0), "in the cycle");
+        assert!(!desk.master.is_outdated());
+        desk
+    };
+    for mut desk in [fresh(manual()), repeated()] {
+        let now = desk.now;
+        desk.master.set_velocity(NodeId::N1, rps(1.0), now).unwrap();
+        assert!(!desk.master.is_outdated(), "the same once more");
+        let mut other = desk.clone();
+        other.master.set_velocity(NodeId::N1, rps(2.0), now).unwrap();
+        assert!(other.master.is_outdated());
+        let mut other = desk.clone();
+        other.master.release(NodeId::N1);
+        assert!(other.master.is_outdated());
+        desk.master.stop(NodeId::N1, now);
+        assert!(desk.master.is_outdated());
+        desk.turn();
+        assert!(!desk.master.is_outdated(), "neither a stop nor a READ ever is");
+    }
+}

@@ -1,0 +1,303 @@
+//! A master, a slave and a host behind drivers whose ports fail: what stops all the same.
+
+use std::{
+    cell::{Cell, RefCell},
+    convert::Infallible,
+    future::Future,
+    pin::pin,
+    rc::Rc,
+    sync::Arc,
+    task::{Context, Waker},
+};
+
+#[cfg(feature = "ucp")]
+use axlewire::ucp::{Host, HostConfig};
+use axlewire::{
+    drive::{Directed, DriveError, Driver},
+    ikeya::{
+        Health, Master, MasterConfig, Mode, NodeId, Polling, Position, ReadRequest, Rps, Slave,
+        SlaveConfig, WriteRequest,
+    },
+    sim::MotorNode,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    port::Unplugged,
+    virtual_time::{End, VirtualClock, Wakes, World},
+};
+
+// What a user calls.
+
+fn set_velocity(bus: &mut Bus, value: f32) -> Result<(), DriveError<Unplugged>> {
+    bus.set_velocity(NodeId::N1, Rps::new(value).unwrap())
+}
+
+fn stop(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> {
+    match is_async {
+        true => story.world.block_on(story.bus.stop_async(NodeId::N1)),
+        false => story.bus.stop(NodeId::N1),
+    }
+}
+
+// The bus.
+
+type Bus = Driver<Master, End, VirtualClock>;
+
+/// A master and node 1 with its motor, which runs whenever the world does.
+struct Story {
+    world: World,
+    bus: Bus,
+    node: Rc<RefCell<Driver<MotorNode, End, VirtualClock>>>,
+}
+
+impl Story {
+    fn new(config: MasterConfig, mode: Mode) -> Self {
+        let world = World::default();
+        let (near, far) = End::pair(&world, 20);
+        let node = MotorNode::new(NodeId::N1, mode);
+        let node = Rc::new(RefCell::new(Driver::new(node, far, VirtualClock(world.clone()))));
+        let actor = node.clone();
+        world.add(move || {
+            let mut node = actor.borrow_mut();
+            if node.port().unplugged.get() {
+                node.port_mut().inbox.borrow_mut().clear();
+            } else {
+                node.service().unwrap();
+            }
+        });
+        let master = Master::new(config, world.now());
+        let bus = Driver::new(master, near, VirtualClock(world.clone()));
+        Self { world, bus, node }
+    }
+
+    /// One whose velocity node has been found and turns at 10 rps.
+    fn at_10_rps(config: MasterConfig) -> Self {
+        let mut story = Self::new(config, Mode::Velocity);
+        story.bus.discover().unwrap();
+        set_velocity(&mut story.bus, 10.0).unwrap();
+        story.pass(500);
+        assert!(story.rps() > 9.9);
+        story
+    }
+
+    /// Lets the motor run while nobody calls the driver.
+    fn pass(&self, millis: u32) {
+        (0..10 * millis).for_each(|_| self.world.step(100));
+    }
+
+    /// Goes on with the driver, whatever it says.
+    fn run(&mut self, millis: u32) {
+        let end = self.world.now() + Duration::from_millis(millis);
+        while self.world.now() < end {
+            let _ = self.bus.run_until(end, |_, _, _| ());
+            self.world.step(20);
+        }
+    }
+
+    /// The node takes part in nothing any more; what it was told last it does on.
+    fn unplug_node(&self) {
+        self.node.borrow().port().unplugged.set(true);
+    }
+
+    fn rps(&self) -> f32 {
+        self.node.borrow().role().motor().velocity().get()
+    }
+
+    fn revolutions(&self) -> f64 {
+        self.node.borrow().role().motor().position().revolutions()
+    }
+}
+
+fn with_polling(polling: Polling) -> MasterConfig {
+    let mut config = MasterConfig::direct();
+    config.polling = polling;
+    config
+}
+
+// Stops that are told to have happened
+
+#[test]
+fn a_stop_after_a_pause_of_the_driver_leaves_a_position_node_where_it_is() {
+    let mut story = Story::new(MasterConfig::usb_adapter(), Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
+    story.pass(2000);
+    let before = story.revolutions();
+    assert!(before > 9.0, "it is on its way");
+    stop(&mut story, false).unwrap();
+    story.run(3000);
+    let way = story.revolutions() - before;
+    assert!(way.abs() < 1.0, "the shaft runs back to where it was long ago: {way} turns");
+}
+
+#[test]
+fn a_stop_of_an_abnormal_node_is_no_success() {
+    for is_async in [false, true] {
+        let mut story = Story::at_10_rps(MasterConfig::direct());
+        story.unplug_node();
+        story.run(200);
+        assert_eq!(story.bus.role().health(NodeId::N1), Some(Health::Abnormal));
+        let stopped = stop(&mut story, is_async);
+        assert!(stopped.is_err(), "an abnormal node is said to have stopped");
+    }
+}
+
+#[test]
+fn a_stop_of_all_on_a_fresh_master_is_no_success() {
+    let mut story = Story::new(MasterConfig::direct(), Mode::Velocity);
+    let stopped = story.bus.stop_all();
+    assert!(stopped.is_err(), "nobody was asked and everything is said to have stopped");
+}
+
+#[test]
+fn a_stop_of_all_on_a_fresh_master_stops_whatever_answers() {
+    let mut story = Story::at_10_rps(MasterConfig::direct());
+    *story.bus.role_mut() = Master::new(MasterConfig::direct(), story.world.now());
+    let _ = story.bus.stop_all();
+    story.run(1000);
+    let is_still = story.rps().abs() < 0.05;
+    assert!(is_still, "a motor that the last master has left turning turns on");
+}
+
+// Receivers that fail
+
+#[test]
+fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_motor() {
+    for is_async in [false, true] {
+        let mut story = Story::at_10_rps(MasterConfig::direct());
+        story.bus.port_mut().is_deaf = true;
+        for _ in 0..20 {
+            assert!(stop(&mut story, is_async).is_err(), "nothing can be heard");
+            story.world.step(500);
+        }
+        story.pass(1000);
+        assert!(story.rps().abs() < 0.05, "twenty stops and the motor runs on");
+    }
+}
+
+#[test]
+#[cfg(feature = "ucp")]
+fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let mut port = End::new(&world, 87);
+        port.is_deaf = true;
+        let host = Host::new(HostConfig::default(), world.now());
+        let mut rover = Driver::new(host, port, VirtualClock(world.clone()));
+        for _ in 0..1000 {
+            let stopped = match is_async {
+                true => world.block_on(rover.stop_async()),
+                false => rover.stop(),
+            };
+            assert_eq!(stopped, Ok(()), "nothing can be heard, but the stop has left");
+            world.step(100);
+        }
+        // The first frame is a motor command.
+        let id = rover.port().written.get(4);
+        assert_eq!(id, Some(&2), "a thousand stops and not a byte");
+    }
+}
+
+/// A driver-enable pin.
+#[derive(Clone, Default)]
+struct Pin(Rc<Cell<bool>>);
+
+impl embedded_hal::digital::ErrorType for Pin {
+    type Error = Infallible;
+}
+
+impl embedded_hal::digital::OutputPin for Pin {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.set(false);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.set(true);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
+    for is_async in [false, true] {
+        let (world, pin) = (World::default(), Pin::default());
+        let (mut port, mut far) = End::pair(&world, 20);
+        port.is_deafened = true;
+        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct());
+        let port = Directed::new(port, pin.clone()).unwrap();
+        let mut node = Driver::new(slave, port, VirtualClock(world.clone()));
+        let read = ReadRequest::new(NodeId::N2);
+        embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();
+        world.step(100);
+        for _ in 0..1000 {
+            let _ = match is_async {
+                true => world.block_on(node.service_async()),
+                false => node.service(),
+            };
+            world.step(10);
+        }
+        assert_eq!(node.role().statistics().replies, 1);
+        assert!(!pin.0.get(), "the pair is jammed for all");
+    }
+}
+
+#[test]
+fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
+    let world = World::default();
+    let mut port = End::new(&world, 20);
+    (port.is_deaf, port.is_mute) = (true, true);
+    let config = MasterConfig::direct();
+    let clock = VirtualClock(world.clone());
+    let mut bus: Driver<Master, _, _> = Driver::with(|now| Master::new(config, now), port, clock);
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    let mut careless = pin!(async {
+        for _ in 0..100 {
+            let _ = bus.next_event_async(Instant::from_millis(60_000)).await;
+        }
+    });
+    let wakes = Arc::new(Wakes::default());
+    let waker = Waker::from(wakes.clone());
+    let (mut pauses, mut woken) = (0, 0);
+    while careless.as_mut().poll(&mut Context::from_waker(&waker)).is_pending() {
+        pauses += 1;
+        assert!(pauses < 1_000_000, "it does not wake up any more");
+        if wakes.count() == woken {
+            // It waits for time to pass.
+            world.step(20);
+        }
+        woken = wakes.count();
+    }
+    assert!(pauses >= 100, "a loop that ignores errors lets no other task run");
+}
+
+// Senders that fail
+
+#[test]
+fn a_set_point_of_which_no_byte_has_left_is_not_sent_late() {
+    let mut story = Story::new(MasterConfig::direct(), Mode::Velocity);
+    story.bus.discover().unwrap();
+    story.bus.port_mut().is_mute = true;
+    assert!(set_velocity(&mut story.bus, 10.0).is_err());
+    story.pass(10_000);
+    story.bus.port_mut().is_mute = false;
+    stop(&mut story, false).unwrap();
+    let old = WriteRequest::velocity(NodeId::N1, Rps::new(10.0).unwrap());
+    let mut written = story.bus.port().written.windows(WriteRequest::LEN);
+    let is_sent = written.any(|packet| packet == old.as_bytes());
+    assert!(!is_sent, "a set-point of ten seconds ago goes out before the stop");
+}
+
+#[test]
+fn a_stop_whose_packet_was_discarded_is_written_again() {
+    let mut story = Story::at_10_rps(with_polling(Polling::Manual));
+    story.bus.port_mut().is_mute = true;
+    assert!(stop(&mut story, false).is_err());
+    story.bus.discard();
+    story.bus.port_mut().is_mute = false;
+    story.run(1000);
+    let is_still = story.rps().abs() < 0.05;
+    assert!(is_still, "the stop is discarded for good and the motor runs on");
+}

@@ -1,0 +1,151 @@
+//! Frames: what is parsed, what is encoded, and what is refused with which error.
+
+use axlewire::{
+    crc16,
+    error::{EncodeError, ParseError},
+    stream::{Encode, Event, Frames, Reason},
+    ucp::{
+        Body, CalibrationKind, CalibrationStart, ErrorCode, Frame, FrameOf, Header, Message, Ping,
+        Pong, RawFrame, Ucp,
+    },
+};
+
+use crate::by_hand::frame;
+
+#[test]
+fn parsing_one_frame_says_what_is_wrong_with_it() {
+    let good = frame(1, &[0]);
+    assert_eq!(Frame::parse(&good).unwrap().as_bytes(), good);
+    for length in 0..8 {
+        let error = ParseError::Length { expected: 8, found: length };
+        assert_eq!(Frame::parse(&good[..length]).unwrap_err(), error);
+    }
+    let error = ParseError::Length { expected: 9, found: 8 };
+    assert_eq!(Frame::parse(&good[..8]).unwrap_err(), error);
+    let mut long = good.clone();
+    long.push(0);
+    assert_eq!(Frame::parse(&long).unwrap_err(), ParseError::Length { expected: 9, found: 10 });
+    for bit in 0..8 * good.len() {
+        let mut bad = good.clone();
+        bad[bit / 8] ^= 1 << (bit % 8);
+        let error = Frame::parse(&bad).unwrap_err();
+        match bit / 8 {
+            0 | 1 => assert_eq!(error, ParseError::Field),
+            2 | 3 => assert!(matches!(error, ParseError::Length { found: 9, .. })),
+            _ => assert!(matches!(error, ParseError::Crc { .. })),
+        }
+    }
+}
+
+#[test]
+fn every_length_field_is_judged_by_the_cap() {
+    for length in 0..=u16::MAX {
+        let mut bytes = vec![0xFD, 0xFF];
+        bytes.extend(length.to_le_bytes());
+        bytes.resize(usize::from(length.min(300)) + 2, 0x11);
+        let crc = crc16::compute(&bytes);
+        bytes.extend(crc.to_le_bytes());
+        let default = Frames::<Ucp>::new(&bytes).next().map(|frame| frame.as_bytes().len());
+        let wide = Frames::<Ucp<252>>::new(&bytes).next().map(|frame| frame.as_bytes().len());
+        let whole = (length <= 300).then_some(bytes.len());
+        assert_eq!(default, whole.filter(|_| (4..=60).contains(&length)), "{length}");
+        assert_eq!(wide, whole.filter(|_| (4..=252).contains(&length)), "{length}");
+        if !(4..=60).contains(&length) {
+            let mut frames = Frames::<Ucp>::new(&bytes[..4]);
+            assert!(frames.next().is_none());
+            assert_eq!(frames.counters().skipped_for(Reason::Length), 1);
+        }
+    }
+}
+
+#[test]
+fn a_frame_behind_a_repeated_sync_byte_is_found() {
+    let mut line = vec![0xFD, 0xFD, 0xFD, 0xFF];
+    line.extend(frame(1, &[]));
+    let mut decoder = axlewire::ucp::Decoder::new();
+    let mut input = &line[..];
+    let Some(Event::Skipped(gap)) = decoder.decode(&mut input) else { panic!() };
+    assert_eq!((gap.len, gap.reason), (4, Reason::Header));
+    assert!(matches!(decoder.decode(&mut input), Some(Event::Frame(frame)) if frame.id() == 1));
+}
+
+#[test]
+fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
+    use zerocopy::TryFromBytes;
+    let mut buffer = [0xEE; 64];
+    for id in 0..=u8::MAX {
+        let bytes = frame(id, &[]);
+        let ping = FrameOf::<Ping>::try_read_from_bytes(&bytes).unwrap();
+        if id == 1 {
+            assert_eq!(ping.encode(&mut buffer), Ok(&bytes[..]));
+            buffer = [0xEE; 64];
+        } else {
+            assert_eq!(ping.encode(&mut buffer), Err(EncodeError::Header { id, len: 4 }));
+            assert_eq!(buffer, [0xEE; 64]);
+        }
+    }
+    // Nor with a length field that makes shipped robots overflow.
+    let mut long = frame(1, &[]);
+    long[2] = 253;
+    let ping = FrameOf::<Ping>::try_read_from_bytes(&long).unwrap();
+    let error = EncodeError::Header { id: 1, len: 253 };
+    assert_eq!(ping.encode(&mut buffer), Err(error));
+    assert_eq!(error.to_string(), "header with id 0x01 and length 253 is not that of its body");
+}
+
+#[test]
+fn a_raw_frame_with_a_known_id_is_refused_and_any_other_is_sent() {
+    for id in 0..=u8::MAX {
+        let mut buffer = [0xEE; 16];
+        let raw = RawFrame { id, index: 5, body: &[1, 2, 3] };
+        match raw.encode(&mut buffer) {
+            Ok(bytes) => {
+                assert!(!(1..=10).contains(&id));
+                let parsed = Frame::parse(bytes).unwrap();
+                assert_eq!(parsed.message(), Message::Unknown(raw));
+            }
+            Err(error) => {
+                assert!((1..=10).contains(&id));
+                assert_eq!(error, EncodeError::KnownId { id });
+                assert_eq!(buffer, [0xEE; 16]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_body_above_56_bytes_is_refused_and_56_is_sent() {
+    let body = [0x5A; 300];
+    let mut buffer = [0; 400];
+    let raw = |length| RawFrame { id: 0x30, index: 0, body: &body[..length] };
+    for length in 0..=56 {
+        let bytes = raw(length).encode(&mut buffer).unwrap();
+        assert_eq!(bytes.len(), length + 8);
+        assert_eq!(Frames::<Ucp>::new(bytes).next().unwrap().body(), &body[..length]);
+    }
+    for length in [57, 248, 256, 300] {
+        let error = EncodeError::BodyTooLong { length, limit: 56 };
+        assert_eq!(raw(length).encode(&mut buffer), Err(error));
+    }
+}
+
+#[test]
+fn a_buffer_too_small_is_refused_with_both_lengths_and_left_alone() {
+    for available in 0..9 {
+        let mut buffer = vec![0xEE; available];
+        let too_small = EncodeError::BufferTooSmall { needed: 9, available };
+        assert_eq!(Pong::new(ErrorCode::Fine).frame(0).encode(&mut buffer), Err(too_small));
+        assert_eq!(RawFrame { id: 99, index: 0, body: &[1] }.encode(&mut buffer), Err(too_small));
+        assert_eq!(buffer, vec![0xEE; available]);
+    }
+}
+
+#[test]
+fn frames_carry_the_index_of_their_sender() {
+    for index in 0..=u8::MAX {
+        assert_eq!(Ping {}.frame(index).index(), index);
+        let bytes = CalibrationStart::new(CalibrationKind::Imu).frame(index);
+        assert_eq!(Frame::parse(bytes.as_bytes()).unwrap().index(), index);
+    }
+    assert_eq!(Header::LEN, 6);
+}
