@@ -25,7 +25,12 @@ impl Bus {
     fn new() -> Self {
         let mut bus = Self {
             master: Master::new(MasterConfig::direct(), Instant::from_micros(0)),
-            slave: Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct()),
+            slave: Slave::new(
+                NodeId::N1,
+                Mode::Velocity,
+                SlaveConfig::direct(),
+                Instant::from_micros(0),
+            ),
             now: Instant::from_micros(0),
         };
         bus.master.discover(bus.now);

@@ -3,7 +3,7 @@
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "alloc"))]
 
 use axlewire::{
-    ikeya::Either,
+    ikeya::BothDirections,
     stream::{Event, Framing, Gap, Reason, decode_capture},
     ucp::Ucp,
 };
@@ -52,7 +52,7 @@ fn all_recorded(file: &str, bytes: &[u8], spans: &[Span]) {
 #[test]
 fn the_motor_bus_capture_has_eleven_frames_and_five_gaps() {
     let bytes = include_bytes!("../examples/captures/ikeya.bin");
-    let spans = spans::<Either>(bytes);
+    let spans = spans::<BothDirections>(bytes);
     all_recorded("ikeya.jsonl", bytes, &spans);
     assert_eq!((bytes.len(), spans.len()), (90, 16));
     let expected = [

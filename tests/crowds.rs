@@ -11,7 +11,7 @@ mod known_framings;
 mod oracle;
 
 use axlewire::{
-    ikeya::{Either, ToMaster, ToSlave, three},
+    ikeya::{BothDirections, ToMaster, ToSlave, three},
     stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
@@ -79,10 +79,10 @@ macro_rules! properties {
 properties! {
     to_slave: ToSlave, 8;
     to_master: ToMaster, 8;
-    either: Either, 8;
+    either: BothDirections, 8;
     three_to_slave: three::ToSlave, 16;
     three_to_master: three::ToMaster, 16;
-    three_either: three::Either, 16;
+    three_either: three::BothDirections, 16;
     ucp_by_default: Ucp, 64;
     ucp_with_the_smallest_cap: Ucp<4>, 8;
     ucp_with_the_largest_cap: Ucp<252>, 256;

@@ -4,12 +4,14 @@
 
 use axlewire::{
     crc16,
+    encode::Encode,
     error::{EncodeError, ParseError},
     ikeya::{
-        DipSwitch, Either, IdReading, Mode, NodeId, Packet, Position, PositionResponse,
-        ReadRequest, Request, Response, Rps, VelocityResponse, WriteRequest,
+        BothDirections, Mode, NodeId, Packet, Position, PositionResponse, ReadRequest, Request,
+        Response, Rps, VelocityResponse, WriteRequest,
+        slave::{DipSwitch, IdReading},
     },
-    stream::{Encode, Frames},
+    stream::Frames,
 };
 
 fn with_crc(body: &[u8]) -> Vec<u8> {
@@ -103,7 +105,7 @@ fn unusual_floats_decode_and_only_finite_ones_encode() {
         let [a, b, c, d] = bits.to_le_bytes();
         for header in [0x55, 0xBB] {
             let bytes = with_crc(&[header, 3, a, b, c, d]);
-            let packet = Frames::<Either>::new(&bytes).next().expect("any f32 decodes");
+            let packet = Frames::<BothDirections>::new(&bytes).next().expect("any f32 decodes");
             let rps = match packet {
                 Packet::Response(Response::Velocity(response)) => response.rps(),
                 Packet::Request(Request::Write(write)) => write.as_velocity(),

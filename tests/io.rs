@@ -14,7 +14,10 @@ use axlewire::{
     ikeya::{NodeId, Response, Rps, ToMaster, VelocityResponse},
     io::{FrameReader, FrameWriter, WriteError},
     stream::{Event, Framing, Gap, Reason},
-    ucp::{Body, ErrorCode, Ping, Pong, RawFrame, Ucp},
+    ucp::{
+        Body, RawFrame, Ucp,
+        message::{ErrorCode, Ping, Pong},
+    },
 };
 use port::{Script, Step, Unplugged, poll};
 

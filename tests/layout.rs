@@ -35,34 +35,34 @@ fn ikeya_packets_have_their_size_and_no_alignment() {
 fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
     is_packed! {
         ucp::Header: 6,
-        ucp::Ping: 0,
-        ucp::Pong: 1,
+        ucp::message::Ping: 0,
+        ucp::message::Pong: 1,
         ucp::MotorControl: 16,
-        ucp::RawMotorControl: 16,
-        ucp::CalibrationStart: 1,
-        ucp::CalibrationStartAck: 2,
-        ucp::CalibrationEnd: 1,
-        ucp::CalibrationEndAck: 2,
-        ucp::FirmwareReport: 36,
-        ucp::DocumentReport: 34,
-        ucp::ImuBias: 12,
-        ucp::ImuBiasAck: 1,
-        ucp::MagBias: 6,
-        ucp::MagBiasAck: 1,
-        ucp::BiasRequest: 0,
-        ucp::Biases: 19,
-        ucp::OtaRequest: 2,
-        ucp::RawOtaRequest: 2,
-        ucp::OtaAck: 1,
-        ucp::SetNetworkState: 1,
-        ucp::SetNetworkStateWide: 4,
-        FrameOf<ucp::Ping>: 8,
+        ucp::message::RawMotorControl: 16,
+        ucp::message::CalibrationStart: 1,
+        ucp::message::CalibrationStartAck: 2,
+        ucp::message::CalibrationEnd: 1,
+        ucp::message::CalibrationEndAck: 2,
+        ucp::message::FirmwareReport: 36,
+        ucp::message::DocumentReport: 34,
+        ucp::message::ImuBias: 12,
+        ucp::message::ImuBiasAck: 1,
+        ucp::message::MagBias: 6,
+        ucp::message::MagBiasAck: 1,
+        ucp::message::BiasRequest: 0,
+        ucp::message::Biases: 19,
+        ucp::message::OtaRequest: 2,
+        ucp::message::RawOtaRequest: 2,
+        ucp::message::OtaAck: 1,
+        ucp::message::SetNetworkState: 1,
+        ucp::message::SetNetworkStateWide: 4,
+        FrameOf<ucp::message::Ping>: 8,
         FrameOf<ucp::MotorControl>: 24,
-        FrameOf<ucp::FirmwareReport>: 44,
-        FrameOf<ucp::DocumentReport>: 42,
-        FrameOf<ucp::Biases>: 27,
+        FrameOf<ucp::message::FirmwareReport>: 44,
+        FrameOf<ucp::message::DocumentReport>: 42,
+        FrameOf<ucp::message::Biases>: 27,
     }
-    assert_eq!(FrameOf::<ucp::FirmwareReport>::LEN, 44);
+    assert_eq!(FrameOf::<ucp::message::FirmwareReport>::LEN, 44);
     assert_eq!((ucp::MAX_LEN, ucp::MAX_BODY_LEN, ucp::SYNC), (64, 56, [0xFD, 0xFF]));
 }
 
@@ -122,7 +122,7 @@ fn telemetry() -> Telemetry {
 
 #[test]
 fn the_firmware_report_is_in_the_order_of_the_firmware() {
-    let frame = ucp::FirmwareReport::new(&telemetry(), 0x2423).frame(9);
+    let frame = ucp::message::FirmwareReport::new(&telemetry(), 0x2423).frame(9);
     let body: Vec<u8> = (1..=36).collect();
     assert_eq!(frame.as_bytes()[..6], [0xFD, 0xFF, 40, 0, 5, 9]);
     assert_eq!(frame.as_bytes()[6..42], body);
@@ -130,7 +130,7 @@ fn the_firmware_report_is_in_the_order_of_the_firmware() {
 
 #[test]
 fn the_document_report_is_in_the_order_of_the_document() {
-    let frame = ucp::DocumentReport::new(&telemetry()).frame(9);
+    let frame = ucp::message::DocumentReport::new(&telemetry()).frame(9);
     let body: Vec<u8> = (1..=10).chain(0x1F..=0x22).chain(0x0B..=0x1E).collect();
     assert_eq!(frame.as_bytes()[..6], [0xFD, 0xFF, 38, 0, 5, 9]);
     assert_eq!(frame.as_bytes()[6..40], body);
@@ -171,5 +171,5 @@ fn bytemuck_and_zerocopy_agree_on_what_is_a_packet() {
         }
     }
     let body = [7; 16];
-    assert_eq!(bytemuck::from_bytes::<ucp::RawMotorControl>(&body).speed(), 0x0707);
+    assert_eq!(bytemuck::from_bytes::<ucp::message::RawMotorControl>(&body).speed(), 0x0707);
 }

@@ -157,7 +157,7 @@ mod starts;
 mod ucp;
 
 #[cfg(feature = "ikeya")]
-use axlewire::ikeya::{OneMotor, ThreeMotors};
+use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 use run::Run;
 
 /// A shallow and a deep test of each group of worlds.

@@ -20,7 +20,10 @@ use std::collections::HashSet;
 use axlewire::{
     ikeya::{self, NodeId, Position, Rps, three},
     stream::{Decoder, Event, Frames},
-    ucp::{self, Body, CalibrationKind, ErrorCode, MotorControl, NetworkState, Ucp},
+    ucp::{
+        self, Body, MotorControl, Ucp,
+        message::{CalibrationKind, ErrorCode, NetworkState},
+    },
 };
 use known_framings::Known;
 
@@ -68,18 +71,19 @@ fn ucp_everything_that_goes_to_a_robot() {
         "UCP to the robot",
         &[0xFD, 0xFD, 0xFF, 0x04, 0x00],
         |dice, index| match dice.below(6) {
-            0 => ucp::Ping {}.frame(index).as_bytes().to_vec(),
+            0 => ucp::message::Ping {}.frame(index).as_bytes().to_vec(),
             1 => {
-                let start = ucp::CalibrationStart::new(CalibrationKind::Imu);
+                let start = ucp::message::CalibrationStart::new(CalibrationKind::Imu);
                 start.frame(index).as_bytes().to_vec()
             }
             2 => {
                 let state = NetworkState::from(dice.below(5) as u32);
-                ucp::SetNetworkState::new(state).unwrap().frame(index).as_bytes().to_vec()
+                ucp::message::SetNetworkState::new(state).unwrap().frame(index).as_bytes().to_vec()
             }
             3 => {
-                let imu = ucp::ImuBias::new(dice.vector(), dice.vector());
-                let biases = ucp::Biases::new(imu, ucp::MagBias::new(dice.vector()));
+                let imu = ucp::message::ImuBias::new(dice.vector(), dice.vector());
+                let biases =
+                    ucp::message::Biases::new(imu, ucp::message::MagBias::new(dice.vector()));
                 biases.with_err(ErrorCode::Fine).frame(index).as_bytes().to_vec()
             }
             _ => motor_control(dice, index),
@@ -133,7 +137,7 @@ fn report(dice: &mut Dice, index: u8) -> Vec<u8> {
         voltage_dv: 119,
         current_ca: dice.below(256) as u16,
     };
-    ucp::FirmwareReport::new(&telemetry, 38).frame(index).as_bytes().to_vec()
+    ucp::message::FirmwareReport::new(&telemetry, 38).frame(index).as_bytes().to_vec()
 }
 
 /// Sends `FRAMES` frames over every kind of line and checks what comes out.

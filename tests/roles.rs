@@ -12,8 +12,9 @@ use std::collections::VecDeque;
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, NodeSet, Position, Slave,
-        SlaveConfig, SlaveEvent, Status, StopProgress, Target, WriteRequest,
+        Master, Mode, NodeId, Position, Slave, Status, Target, WriteRequest,
+        master::{Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        slave::{SlaveConfig, SlaveEvent},
     },
     sim::{Direction, Input, Line, Rng, Who},
     time::{Duration, Instant, wire_time},
@@ -33,7 +34,8 @@ struct Counting {
 
 impl Counting {
     fn new(node: NodeId, baud: u32) -> Self {
-        let slave = Slave::new(node, Mode::Position, SlaveConfig::at(baud));
+        let slave =
+            Slave::new(node, Mode::Position, SlaveConfig::at(baud), Instant::from_micros(0));
         Self { slave, answered: vec![Instant::from_micros(0)], heard: 0 }
     }
 
@@ -274,7 +276,7 @@ fn line(weather: &Weather) -> Line<Watched, Counting> {
     faults.jitter = Duration::from_micros(weather.jitter_us);
     if weather.by_pieces {
         let pause = wire_time(2, weather.baud);
-        line.driver_mut(Who::Head).input = Input::AfterPause { pause, at_most: 64 };
+        line.timing_mut(Who::Head).input = Input::AfterPause { pause, at_most: 64 };
     }
     line
 }

@@ -58,8 +58,8 @@ fn check_run<F: Framing>(stream: &[u8], wide: bool) {
 fn check_all(stream: &[u8]) {
     check::<ikeya::ToSlave>(stream);
     check::<ikeya::ToMaster>(stream);
-    check::<ikeya::Either>(stream);
-    check::<three::Either>(stream);
+    check::<ikeya::BothDirections>(stream);
+    check::<three::BothDirections>(stream);
     check::<Ucp>(stream);
     check::<Ucp<252>>(stream);
 }
@@ -89,7 +89,7 @@ fn exchanges(count: u8) -> Vec<u8> {
 }
 
 fn pings(count: u8) -> Vec<u8> {
-    (0..count).flat_map(|index| ucp::Ping {}.frame(index).as_bytes().to_vec()).collect()
+    (0..count).flat_map(|index| ucp::message::Ping {}.frame(index).as_bytes().to_vec()).collect()
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
             // One bit, a header in the wrong place, a header of another kind.
             for byte in [clean[at] ^ 0x10, 0xAA, 0xBB, 0x55, 0xFD] {
                 stream[at] = byte;
-                check::<ikeya::Either>(&stream);
+                check::<ikeya::BothDirections>(&stream);
                 check::<Ucp>(&stream);
             }
             stream[at] = clean[at];
@@ -113,7 +113,7 @@ fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_what_it_costs_without_simd() {
     for clean in [responses(40), exchanges(16)] {
         for at in 0..clean.len() {
             let (head, tail) = clean.split_at(at);
-            check::<ikeya::Either>(&[head, &tail[1..]].concat());
+            check::<ikeya::BothDirections>(&[head, &tail[1..]].concat());
             check::<ikeya::ToMaster>(&[head, &tail[..1], tail].concat());
         }
     }
@@ -129,7 +129,7 @@ fn a_foreign_packet_with_a_good_crc_is_skipped_anywhere_in_a_run() {
                 let payload = if header == 0xAA { &[][..] } else { &payload };
                 let packet = hostile_streams::ikeya_packet_around(header, id, payload);
                 let stream = [&clean[..at], &packet, &clean[at..]].concat();
-                check::<ikeya::Either>(&stream);
+                check::<ikeya::BothDirections>(&stream);
                 check::<ikeya::ToSlave>(&stream);
             }
         }
@@ -140,7 +140,7 @@ fn a_foreign_packet_with_a_good_crc_is_skipped_anywhere_in_a_run() {
 fn a_stream_may_end_anywhere() {
     for clean in [responses(50), exchanges(20)] {
         for end in 0..=clean.len() {
-            check::<ikeya::Either>(&clean[..end]);
+            check::<ikeya::BothDirections>(&clean[..end]);
             check::<ikeya::ToMaster>(&clean[..end]);
         }
     }
@@ -156,7 +156,7 @@ fn a_frame_behind_noise_of_any_length_is_found() {
             stream.extend(responses(2));
             stream.extend(pings(2));
             stream.extend(responses(12));
-            check::<ikeya::Either>(&stream);
+            check::<ikeya::BothDirections>(&stream);
             check::<Ucp>(&stream);
         }
     }
@@ -188,8 +188,8 @@ fn a_decoder_that_sweeps_gives_what_one_that_does_not_gives() {
     let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
     for chunk in [1, 64, 200, 5000] {
         assert_eq!(
-            events::<ikeya::Either>(&stream, chunk),
-            events::<Portable<ikeya::Either>>(&stream, chunk)
+            events::<ikeya::BothDirections>(&stream, chunk),
+            events::<Portable<ikeya::BothDirections>>(&stream, chunk)
         );
     }
 }
@@ -324,8 +324,8 @@ macro_rules! properties {
 properties! {
     a_long_stream_to_slaves_gives_what_the_oracle_says: ikeya::ToSlave;
     a_long_stream_to_the_master_gives_what_the_oracle_says: ikeya::ToMaster;
-    a_long_stream_of_both_gives_what_the_oracle_says: ikeya::Either;
-    a_long_stream_of_three_motors_gives_what_the_oracle_says: three::Either;
+    a_long_stream_of_both_gives_what_the_oracle_says: ikeya::BothDirections;
+    a_long_stream_of_three_motors_gives_what_the_oracle_says: three::BothDirections;
     a_long_stream_of_ucp_gives_what_the_oracle_says: Ucp;
     a_long_stream_of_long_ucp_frames_gives_what_the_oracle_says: Ucp<252>;
 }

@@ -6,11 +6,13 @@
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 use axlewire::{
+    encode::Encode,
     error::EncodeError,
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Counters, Encode, Event, Frames, Framing, Reason},
+    stream::{Counters, Event, Frames, Framing, Reason},
     ucp::{
-        self, Body, CalibrationKind, ErrorCode, Message, NetworkState, OtaStatus, RawFrame, Report,
+        self, Body, Message, RawFrame,
+        message::{CalibrationKind, ErrorCode, NetworkState, OtaStatus, Report},
     },
 };
 use serde_json::Value;
@@ -123,7 +125,7 @@ fn is_refused<F: Framing>(vector: &Vector, reason: Reason) {
 
 fn standard_vector(vector: &Vector) {
     let fields = &vector.fields;
-    let mut frames = Frames::<ikeya::Either>::new(&vector.bytes);
+    let mut frames = Frames::<ikeya::BothDirections>::new(&vector.bytes);
     let packet = frames.next().expect("a packet");
     assert_eq!(frames.counters().framed, vector.bytes.len() as u64);
     let id = NodeId::new(int(&fields["id"])).unwrap();
@@ -162,7 +164,7 @@ fn standard_vector(vector: &Vector) {
 
 fn three_motor_vector(vector: &Vector) {
     let fields = &vector.fields;
-    let mut frames = Frames::<three::Either>::new(&vector.bytes);
+    let mut frames = Frames::<three::BothDirections>::new(&vector.bytes);
     let packet = frames.next().expect("a packet");
     assert_eq!(frames.counters().framed, vector.bytes.len() as u64);
     let id = NodeId::new(int(&fields["id"])).unwrap();
@@ -258,28 +260,31 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
         Message::Ping(ping) => ("Ping", ping.frame(index).as_bytes().to_vec()),
         Message::Pong(pong) => {
             assert_eq!(pong.err(), err());
-            ("Pong", ucp::Pong::new(err()).frame(index).as_bytes().to_vec())
+            ("Pong", ucp::message::Pong::new(err()).frame(index).as_bytes().to_vec())
         }
         Message::MotorControl(command) => ("MotorControl", motor_control(command, fields, index)),
         Message::CalibrationStart(start) => {
             assert_eq!(start.kind(), kind());
             (
                 "CalibrationStart",
-                ucp::CalibrationStart::new(kind()).frame(index).as_bytes().to_vec(),
+                ucp::message::CalibrationStart::new(kind()).frame(index).as_bytes().to_vec(),
             )
         }
         Message::CalibrationStartAck(ack) => {
             assert_eq!((ack.kind(), ack.err()), (kind(), err()));
-            let ack = ucp::CalibrationStartAck::new(kind(), err());
+            let ack = ucp::message::CalibrationStartAck::new(kind(), err());
             ("CalibrationStartAck", ack.frame(index).as_bytes().to_vec())
         }
         Message::CalibrationEnd(end) => {
             assert_eq!(end.kind(), kind());
-            ("CalibrationEnd", ucp::CalibrationEnd::new(kind()).frame(index).as_bytes().to_vec())
+            (
+                "CalibrationEnd",
+                ucp::message::CalibrationEnd::new(kind()).frame(index).as_bytes().to_vec(),
+            )
         }
         Message::CalibrationEndAck(ack) => {
             assert_eq!((ack.kind(), ack.err()), (kind(), err()));
-            let ack = ucp::CalibrationEndAck::new(kind(), err());
+            let ack = ucp::message::CalibrationEndAck::new(kind(), err());
             ("CalibrationEndAck", ack.frame(index).as_bytes().to_vec())
         }
         Message::Report(report) => (
@@ -292,44 +297,45 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
         Message::ImuBias(bias) => {
             let (acc, gyro) = (ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
             assert_eq!((bias.acc(), bias.gyro()), (acc, gyro));
-            ("ImuBias", ucp::ImuBias::new(acc, gyro).frame(index).as_bytes().to_vec())
+            ("ImuBias", ucp::message::ImuBias::new(acc, gyro).frame(index).as_bytes().to_vec())
         }
         Message::ImuBiasAck(ack) => {
             assert_eq!(ack.err(), err());
-            ("ImuBiasAck", ucp::ImuBiasAck::new(err()).frame(index).as_bytes().to_vec())
+            ("ImuBiasAck", ucp::message::ImuBiasAck::new(err()).frame(index).as_bytes().to_vec())
         }
         Message::MagBias(bias) => {
             let mag = ints(&fields["mag_bias"]);
             assert_eq!(bias.mag(), mag);
-            ("MagBias", ucp::MagBias::new(mag).frame(index).as_bytes().to_vec())
+            ("MagBias", ucp::message::MagBias::new(mag).frame(index).as_bytes().to_vec())
         }
         Message::MagBiasAck(ack) => {
             assert_eq!(ack.err(), err());
-            ("MagBiasAck", ucp::MagBiasAck::new(err()).frame(index).as_bytes().to_vec())
+            ("MagBiasAck", ucp::message::MagBiasAck::new(err()).frame(index).as_bytes().to_vec())
         }
         Message::BiasRequest(request) => ("BiasRequest", request.frame(index).as_bytes().to_vec()),
         Message::Biases(biases) => {
-            let imu = ucp::ImuBias::new(ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
-            let mag = ucp::MagBias::new(ints(&fields["mag_bias"]));
+            let imu =
+                ucp::message::ImuBias::new(ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
+            let mag = ucp::message::MagBias::new(ints(&fields["mag_bias"]));
             assert_eq!((biases.imu(), biases.mag(), biases.err()), (imu, mag, err()));
-            let again = ucp::Biases::new(imu, mag).with_err(err());
+            let again = ucp::message::Biases::new(imu, mag).with_err(err());
             ("Biases", again.frame(index).as_bytes().to_vec())
         }
         Message::OtaRequest(request) => {
             let version = int(&fields["version"]);
             assert_eq!(request.version(), version);
-            let again = ucp::OtaRequest::start_firmware_update(version);
+            let again = ucp::message::OtaRequest::start_firmware_update(version);
             ("OtaRequest", again.frame(index).as_bytes().to_vec())
         }
         Message::OtaAck(ack) => {
             let status = OtaStatus::from(int::<u8>(&fields["err"]));
             assert_eq!(ack.status(), status);
-            ("OtaAck", ucp::OtaAck::new(status).frame(index).as_bytes().to_vec())
+            ("OtaAck", ucp::message::OtaAck::new(status).frame(index).as_bytes().to_vec())
         }
         Message::SetNetworkState(message) => {
             let state = NetworkState::from(int::<u32>(&fields["state"]));
             assert_eq!((message.state(), &fields["state_width"]), (state, &1.into()));
-            let again = ucp::SetNetworkState::new(state).unwrap();
+            let again = ucp::message::SetNetworkState::new(state).unwrap();
             ("SetNetworkState", again.frame(index).as_bytes().to_vec())
         }
         Message::SetNetworkStateWide(message) => {
@@ -352,7 +358,7 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
 }
 
 /// Constructors build what is legal and refuse what is not (U7); a copy keeps every field.
-fn motor_control(command: &ucp::RawMotorControl, fields: &Value, index: u8) -> Vec<u8> {
+fn motor_control(command: &ucp::message::RawMotorControl, fields: &Value, index: u8) -> Vec<u8> {
     let (speed, angular) = (int::<i16>(&fields["speed"]), int::<i16>(&fields["angular"]));
     assert_eq!((command.speed(), command.angular()), (speed, angular));
     assert_eq!(command.front_led(), int::<i16>(&fields["front_led"]));
@@ -372,7 +378,7 @@ fn motor_control(command: &ucp::RawMotorControl, fields: &Value, index: u8) -> V
             || command.reserve1() != 0
             || command.reserve2() != 0;
         let lamp = ![0, 100].contains(&command.front_led());
-        assert_eq!(ucp::RawMotorControl::from(ordinary) == *command, !reserved && !lamp);
+        assert_eq!(ucp::message::RawMotorControl::from(ordinary) == *command, !reserved && !lamp);
     }
     assert_eq!(ucp::MotorControl::try_from(*command).is_ok(), legal && !command.starts_update());
     let mut frame = vec![0xFD, 0xFF, 20, 0, 2, index];
@@ -399,12 +405,12 @@ fn telemetry(report: Report<'_>, fields: &Value, index: u8) -> Vec<u8> {
             assert_eq!(fields["layout"], "firmware-36");
             let version = int(&fields["version"]);
             assert_eq!(report.version(), Some(version));
-            ucp::FirmwareReport::new(&telemetry, version).frame(index).as_bytes().to_vec()
+            ucp::message::FirmwareReport::new(&telemetry, version).frame(index).as_bytes().to_vec()
         }
         Report::Document(_) => {
             assert_eq!(fields["layout"], "wiki-34");
             assert_eq!(report.version(), None);
-            ucp::DocumentReport::new(&telemetry).frame(index).as_bytes().to_vec()
+            ucp::message::DocumentReport::new(&telemetry).frame(index).as_bytes().to_vec()
         }
     }
 }

@@ -27,7 +27,7 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
         let mode = if node <= NodeId::N4 { Mode::Velocity } else { Mode::Position };
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(100));
-        let slave = Slave::new(node, mode, config);
+        let slave = Slave::new(node, mode, config, Instant::from_micros(0));
         let tail = bus.add(MotorNode::from_parts(slave, Motor::new()));
         // Firmware takes its time: so long after the request the answer begins.
         bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(50);

@@ -1,11 +1,13 @@
 //! Packets of which a part has left when the port fails: what the node makes of the rest.
 
 use axlewire::{
-    drive::{Directed, Driver},
+    drive::{Driver, Rs485},
     endpoint::Endpoint,
     ikeya::{
-        Master, MasterConfig, Mode, NodeId, Polling, Position, PositionResponse, ReadRequest, Rps,
-        Slave, SlaveConfig, Target, WriteRequest,
+        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Target,
+        WriteRequest,
+        master::{MasterConfig, Polling},
+        slave::SlaveConfig,
     },
     time::Instant,
 };
@@ -125,7 +127,8 @@ fn a_set_point_that_was_given_up_is_not_completed_by_the_next_header() {
     bus.role_mut().release(NodeId::N1);
     wire.write_all();
     run(&mut bus, 1000);
-    let mut slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+    let mut slave: Slave =
+        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
     for &(at, byte) in &wire.world().sent[begin..] {
         let now = Instant::from_micros(at);
         if slave.poll_timeout().is_some_and(|due| now >= due) {
@@ -196,7 +199,7 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
         let mut config = MasterConfig::direct();
         config.nodes = NodeId::N1.into();
-        let Ok(port) = Directed::new(wire.clone(), wire.clone());
+        let Ok(port) = Rs485::new(wire.clone(), wire.clone());
         let mut bus = Driver::with(|now| <Master>::new(config, now), port, wire.clone());
         bus.discover().unwrap();
         bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();

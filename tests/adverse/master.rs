@@ -4,7 +4,8 @@ use axlewire::{
     drive::DriveError,
     endpoint::Endpoint,
     ikeya::{
-        Master, MasterConfig, Mode, NodeId, Polling, Position, Rps, StopProgress, VelocityResponse,
+        Master, Mode, NodeId, Position, Rps, VelocityResponse,
+        master::{MasterConfig, Polling, StopProgress},
     },
     time::{Duration, Instant},
 };

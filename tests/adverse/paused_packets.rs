@@ -4,7 +4,10 @@ use std::pin::pin;
 
 use axlewire::{
     drive::DriveError,
-    ikeya::{Mode, NodeId, NodeSet, Polling, Rps, WriteRequest},
+    ikeya::{
+        Mode, NodeId, Rps, WriteRequest,
+        master::{NodeSet, Polling},
+    },
 };
 
 use crate::{

@@ -9,7 +9,11 @@ use std::collections::VecDeque;
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{Health, Master, MasterConfig, Mode, NodeId, OneMotor, Polling, ThreeMotors},
+    ikeya::{
+        Master, Mode, NodeId,
+        board::{OneMotor, ThreeMotors},
+        master::{Health, MasterConfig, Polling},
+    },
     sim::Rng,
     time::{Duration, Instant, wire_time},
 };

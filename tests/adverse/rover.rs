@@ -5,7 +5,9 @@ use axlewire::{
     endpoint::Endpoint,
     time::{Duration, Instant},
     ucp::{
-        Body, FrameOf, Host, HostConfig, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry,
+        Body, FrameOf, Host, MotorControl, Robot, Telemetry,
+        host::HostConfig,
+        robot::{RobotConfig, RobotEvent},
     },
 };
 
@@ -196,7 +198,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
         }
         .unwrap();
         assert_eq!(robot.role().statistics().commands, 1, "it was a valid one");
-        assert_eq!(robot.role().statistics().watchdog_stops, 1);
+        assert_eq!(robot.role().statistics().watchdog, 1);
     }
 }
 

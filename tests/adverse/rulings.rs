@@ -2,7 +2,7 @@
 //! it), I11 (doubt), I12 (debts) and I13 (dead-man).
 
 use axlewire::{
-    ikeya::{Mode, NodeSet},
+    ikeya::{Mode, master::NodeSet},
     time::{Duration, Instant},
 };
 

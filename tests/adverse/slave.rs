@@ -3,7 +3,10 @@
 use axlewire::{
     drive::Driver,
     endpoint::Endpoint,
-    ikeya::{Mode, NodeId, ReadRequest, Rps, Slave, SlaveConfig, SlaveEvent, WriteRequest},
+    ikeya::{
+        Mode, NodeId, ReadRequest, Rps, Slave, WriteRequest,
+        slave::{SlaveConfig, SlaveEvent},
+    },
     time::{Duration, Instant},
 };
 
@@ -15,8 +18,9 @@ const FIVE_RPS: fn() -> WriteRequest =
 #[test]
 fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
     let wire = Wire::bus(vec![]);
-    let mut slave =
-        wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct()) });
+    let mut slave = wire.driver(|now| -> Slave {
+        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now)
+    });
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     wire.write_only(3);
     assert!(slave.service().is_err());
@@ -35,7 +39,7 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
         let wire = Wire::bus(vec![]);
         let config = SlaveConfig::usb_adapter();
         let mut slave =
-            wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+            wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.write_only(4);
         assert!(slave.service().is_err());
@@ -48,7 +52,7 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
         assert_eq!(wire.world().sent.len(), 4, "it speaks when it is node 2's turn");
         // Nothing was heard: the rest may go.
         let mut slave =
-            wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+            wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.write_only(4);
         assert!(slave.service().is_err());
@@ -61,7 +65,8 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
 #[test]
 fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
     let now = Instant::from_micros(0);
-    let mut slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+    let mut slave: Slave =
+        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
     slave.handle_input(FIVE_RPS().as_bytes(), now);
     slave.set_mode(Mode::Position);
     assert_eq!(slave.command(), None);
@@ -73,7 +78,8 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let wire = Wire::bus(vec![]);
-    let mut slave = wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+    let mut slave =
+        wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
     wire.receive(FIVE_RPS().as_bytes());
     slave.service().unwrap();
     assert!(slave.role().command().is_some());
@@ -90,7 +96,8 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
 
 /// A slave that has heard nothing yet, and its watchdog.
 fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
-    let mut slave = wire.driver(|_| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config) });
+    let mut slave =
+        wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
     slave.service().unwrap();
     slave
 }

@@ -15,7 +15,7 @@ use std::{
 use axlewire::{
     drive::{Clock, Driver},
     endpoint::Endpoint,
-    ikeya::{Master, MasterConfig, NodeId},
+    ikeya::{Master, NodeId, master::MasterConfig},
     time::{Duration, Instant},
 };
 

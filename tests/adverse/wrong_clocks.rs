@@ -2,7 +2,7 @@
 
 use axlewire::{
     drive::DriveError,
-    ikeya::{Mode, NodeId, Polling, Rps},
+    ikeya::{Mode, NodeId, Rps, master::Polling},
     time::Duration,
 };
 

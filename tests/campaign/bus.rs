@@ -3,8 +3,9 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, MasterConfig, Mode, NodeId, Polling, Position, Rps, Slave, SlaveConfig,
-        StopProgress,
+        Master, Mode, NodeId, Position, Rps, Slave,
+        master::{MasterConfig, Polling, StopProgress},
+        slave::SlaveConfig,
     },
     sim::{Direction, Line, Motor, MotorNode, Rng, Who},
     time::{Duration, Instant},
@@ -45,17 +46,17 @@ impl Episode {
         };
         let mut bus = Bus::new(500_000, seed, Master::new(config, Instant::from_micros(0)));
         for &(node, mode) in &nodes {
-            let slave = Slave::new(node, mode, SlaveConfig::direct());
+            let slave = Slave::new(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
             let motor = Motor::new()
                 .with_time_constant(TIME_CONSTANT)
                 .with_speed_limit(Rps::new(POSITION_RPS as f32).unwrap());
             let tail = bus.add(MotorNode::from_parts(slave, motor));
-            bus.driver_mut(Who::Tail(tail)).latency = Duration::from_micros(rng.below(50) as u32);
+            bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(rng.below(50) as u32);
         }
         // An answer is never later than the 500 us that the master waits: 4 times 60, 50 and 150.
         *bus.pair_mut(Direction::ToTails) = faults(rng, 60);
         *bus.pair_mut(Direction::ToHead) = faults(rng, 60);
-        bus.driver_mut(Who::Head).latency = Duration::from_micros(rng.below(150) as u32);
+        bus.timing_mut(Who::Head).latency = Duration::from_micros(rng.below(150) as u32);
         Self { bus, nodes }
     }
 

@@ -4,7 +4,7 @@ use axlewire::{
     endpoint::Endpoint,
     sim::{Direction, Line, Rng, RoverNode, Who},
     time::{Duration, Instant},
-    ucp::{Host, HostConfig, MotorControl, RobotConfig},
+    ucp::{Host, MotorControl, host::HostConfig, robot::RobotConfig},
 };
 
 use crate::{faults, millis, results::Run};
@@ -27,8 +27,8 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
     link.add(RoverNode::new(RobotConfig::default(), zero));
     *link.pair_mut(Direction::ToTails) = faults(&mut rng, 2000);
     *link.pair_mut(Direction::ToHead) = faults(&mut rng, 2000);
-    link.driver_mut(Who::Head).latency = Duration::from_micros(rng.below(2000) as u32);
-    link.driver_mut(Who::Tail(0)).latency = Duration::from_micros(rng.below(2000) as u32);
+    link.timing_mut(Who::Head).latency = Duration::from_micros(rng.below(2000) as u32);
+    link.timing_mut(Who::Tail(0)).latency = Duration::from_micros(rng.below(2000) as u32);
 
     let percent = |rng: &mut Rng| rng.below(201) as i16 - 100;
     let command = MotorControl::new(percent(&mut rng), percent(&mut rng)).unwrap();

@@ -3,8 +3,10 @@
 use axlewire::{
     drive::{DriveError, Driver, Operation},
     ikeya::{
-        Cause, CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, OneMotor,
-        Position, Rps, Slave, SlaveConfig, SlaveEvent, Status, Target,
+        Master, Mode, NodeId, Position, Rps, Slave, Status, Target,
+        board::OneMotor,
+        master::{Cause, CommandError, Health, MasterConfig, MasterEvent},
+        slave::{SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},
 };
@@ -348,7 +350,7 @@ fn a_slaves_next_command_comes_in_time_or_not_at_all() {
         let (mut far, near) = End::pair(&world, 20);
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(5));
-        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
         let mut driver = Driver::new(slave, near, VirtualClock(world.clone()));
         let mut next = |deadline| match is_async {
             true => world.block_on(driver.next_command_async(deadline)),

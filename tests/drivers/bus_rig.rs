@@ -4,7 +4,11 @@ use std::{cell::RefCell, rc::Rc};
 
 use axlewire::{
     drive::Driver,
-    ikeya::{Master, MasterConfig, Mode, NodeId, Polling, Position, Rps, Slave, SlaveConfig},
+    ikeya::{
+        Master, Mode, NodeId, Position, Rps, Slave,
+        master::{MasterConfig, Polling},
+        slave::SlaveConfig,
+    },
 };
 
 use crate::virtual_time::{End, VirtualClock, World};
@@ -28,7 +32,7 @@ impl Story {
             let mut end = End::new(&world, 20);
             end.outboxes.push(master.inbox.clone());
             master.outboxes.push(end.inbox.clone());
-            let slave = Slave::new(id, mode, SlaveConfig::direct());
+            let slave = Slave::new(id, mode, SlaveConfig::direct(), Instant::from_micros(0));
             Rc::new(RefCell::new(Driver::new(slave, end, VirtualClock(world.clone()))))
         };
         let (two, five) = (node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position));

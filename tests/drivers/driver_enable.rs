@@ -3,7 +3,7 @@
 
 use std::error::Error;
 
-use axlewire::drive::{Directed, DirectedError};
+use axlewire::drive::{Rs485, Rs485Error};
 use embedded_io::Error as _;
 
 use crate::{
@@ -48,16 +48,16 @@ fn the_pin_is_off_after_every_error_of_the_port() {
         let failing = [Step::Error, Step::Bytes(vec![0]), Step::Error, Step::Zero];
         let (mut port, log, _) = undelayed(Script::writing(failing));
         drain(&log);
-        assert_eq!(write(&mut port, is_async, b"12"), Err(DirectedError::Port(Unplugged)));
+        assert_eq!(write(&mut port, is_async, b"12"), Err(Rs485Error::Port(Unplugged)));
         assert_eq!(drain(&log), "on write flush off");
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
-        assert_eq!(write(&mut port, is_async, b"2"), Err(DirectedError::Port(Unplugged)));
+        assert_eq!(write(&mut port, is_async, b"2"), Err(Rs485Error::Port(Unplugged)));
         assert_eq!(drain(&log), "on write write flush off");
         assert_eq!(write(&mut port, is_async, b"2"), Ok(0));
         assert_eq!(drain(&log), "on write flush off");
         port.port_mut().flushes.push_back(Step::Error);
         assert_eq!(write(&mut port, is_async, b"2"), Ok(1));
-        assert_eq!(flush(&mut port, is_async), Err(DirectedError::Port(Unplugged)));
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Port(Unplugged)));
         assert_eq!(drain(&log), "on write flush off");
         assert!(!port.is_on());
     }
@@ -72,7 +72,7 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
         let (mut port, log, _) = undelayed(Script::writing(steps()));
         let refused = |written| match refusal {
             Step::Zero => assert_eq!(written, Ok(0)),
-            _ => assert_eq!(written, Err(DirectedError::Port(Unplugged))),
+            _ => assert_eq!(written, Err(Rs485Error::Port(Unplugged))),
         };
         drain(&log);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
@@ -86,7 +86,7 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
         refused(write(&mut port, is_async, b"2"));
         assert_eq!(drain(&log), "on write write flush off");
-        assert_eq!(flush(&mut port, is_async), Err(DirectedError::Lost), "it cannot know");
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost), "it cannot know");
         assert_eq!(flush(&mut port, is_async), Ok(()), "told once");
 
         // Or by the flush behind, if that fails itself.
@@ -94,7 +94,7 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
         port.port_mut().flushes.extend([Step::Error, Step::Error]);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
         refused(write(&mut port, is_async, b"2"));
-        assert_eq!(flush(&mut port, is_async), Err(DirectedError::Port(Unplugged)));
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Port(Unplugged)));
         assert_eq!(flush(&mut port, is_async), Ok(()));
     }
     let (mut port, log) = delayed(Script::writing([Step::Bytes(vec![0]), Step::Error]), 0);
@@ -110,11 +110,11 @@ fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
         let (mut port, log, pin) = undelayed(Script::default());
         drain(&log);
         pin.failures.set(1);
-        assert_eq!(write(&mut port, is_async, b"12"), Err(DirectedError::Pin(Stuck)));
+        assert_eq!(write(&mut port, is_async, b"12"), Err(Rs485Error::Pin(Stuck)));
         assert_eq!(drain(&log), "on! off");
         assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
         pin.failures.set(1);
-        assert_eq!(flush(&mut port, is_async), Err(DirectedError::Pin(Stuck)));
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Pin(Stuck)));
         assert!(port.is_on());
         assert_eq!(flush(&mut port, is_async), Ok(()));
         assert_eq!(drain(&log), "on write flush off! flush off");
@@ -122,7 +122,7 @@ fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
     let pin = Pin::default();
     pin.failures.set(1);
     let port = logged(Script::default(), &pin.log);
-    assert!(matches!(Directed::new(port, pin), Err(Stuck)));
+    assert!(matches!(Rs485::new(port, pin), Err(Stuck)));
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn reading_does_not_touch_the_pin() {
     assert_eq!(embedded_io::Read::read(&mut port, &mut buffer), Ok(2));
     assert_eq!(ready(embedded_io_async::Read::read(&mut port, &mut buffer)), Ok(2));
     let failed = embedded_io::Read::read(&mut port, &mut buffer);
-    assert_eq!(failed, Err(DirectedError::Port(Unplugged)));
+    assert_eq!(failed, Err(Rs485Error::Port(Unplugged)));
     assert_eq!(drain(&log), "");
 }
 
@@ -171,7 +171,7 @@ fn a_write_of_no_bytes_puts_the_pin_off() {
         assert_eq!(drain(&log), "off", "from the start");
         assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
         pin.failures.set(1);
-        assert_eq!(write(&mut port, is_async, b""), Err(DirectedError::Pin(Stuck)));
+        assert_eq!(write(&mut port, is_async, b""), Err(Rs485Error::Pin(Stuck)));
         assert!(port.is_on());
         assert_eq!(write(&mut port, is_async, b""), Ok(0));
         assert_eq!(drain(&log), "on write off! off");
@@ -181,9 +181,8 @@ fn a_write_of_no_bytes_puts_the_pin_off() {
 
 #[test]
 fn the_error_tells_port_and_pin_apart() {
-    let (port, pin) = (DirectedError::Port(Unplugged), DirectedError::Pin(Stuck));
-    let (port, pin): (DirectedError<Unplugged, Stuck>, DirectedError<Unplugged, Stuck>) =
-        (port, pin);
+    let (port, pin) = (Rs485Error::Port(Unplugged), Rs485Error::Pin(Stuck));
+    let (port, pin): (Rs485Error<Unplugged, Stuck>, Rs485Error<Unplugged, Stuck>) = (port, pin);
     assert_eq!(port.to_string(), "unplugged");
     assert_eq!(port.source().unwrap().to_string(), "unplugged");
     assert_eq!(port.kind(), embedded_io::ErrorKind::NotConnected);

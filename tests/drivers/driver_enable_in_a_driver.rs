@@ -1,6 +1,6 @@
 //! Driver enable under a driver: whatever fails, stalls or is dropped, the pin goes off.
 
-use axlewire::drive::{DirectedError, DriveError, Driver};
+use axlewire::drive::{DriveError, Driver, Rs485Error};
 
 use crate::{
     driver_enable_rig::{drain, is_on, ready, undelayed},
@@ -24,7 +24,7 @@ fn a_driver_switches_once_per_round_and_lets_go_when_its_port_fails() {
         driver.role_mut().frames.push_back(b"56".into());
         let steps = [Step::Bytes(vec![0]), Step::Error];
         driver.port_mut().port_mut().writes.extend(steps);
-        let failed = DriveError::Port(DirectedError::Port(Unplugged));
+        let failed = DriveError::Port(Rs485Error::Port(Unplugged));
         assert_eq!(round(&mut driver), Err(failed));
         assert_eq!(drain(&log), "on write write flush off flush");
         assert_eq!(round(&mut driver), Ok(()));

@@ -3,7 +3,7 @@
 use std::{cell::Cell, rc::Rc, task::Poll};
 
 use axlewire::{
-    drive::{Directed, DirectedError, NoDelay},
+    drive::{NoDelay, Rs485, Rs485Error},
     time::Duration,
 };
 
@@ -73,7 +73,7 @@ impl embedded_hal_async::delay::DelayNs for Delay {
     }
 }
 
-pub(crate) type Port<D> = Directed<Script, Pin, D>;
+pub(crate) type Port<D> = Rs485<Script, Pin, D>;
 
 /// A port that writes down its calls here.
 pub(crate) fn logged(script: Script, log: &Log) -> Script {
@@ -83,7 +83,7 @@ pub(crate) fn logged(script: Script, log: &Log) -> Script {
 pub(crate) fn undelayed(script: Script) -> (Port<NoDelay>, Log, Pin) {
     let pin = Pin::default();
     let log = pin.log.clone();
-    (Directed::new(logged(script, &log), pin.clone()).unwrap(), log, pin)
+    (Rs485::new(logged(script, &log), pin.clone()).unwrap(), log, pin)
 }
 
 pub(crate) fn delayed(script: Script, stalls: usize) -> (Port<Delay>, Log) {
@@ -92,7 +92,7 @@ pub(crate) fn delayed(script: Script, stalls: usize) -> (Port<Delay>, Log) {
     let port = logged(script, &log);
     let delay = Delay { log: log.clone(), stalls };
     let (before, after) = (Duration::from_micros(5), Duration::from_micros(7));
-    (Directed::with_delays(port, pin, delay, before, after).unwrap(), log)
+    (Rs485::with_delays(port, pin, delay, before, after).unwrap(), log)
 }
 
 pub(crate) fn drain(log: &Log) -> String {
@@ -116,7 +116,7 @@ pub(crate) fn write<D>(
     port: &mut Port<D>,
     is_async: bool,
     bytes: &[u8],
-) -> Result<usize, DirectedError<Unplugged, Stuck>>
+) -> Result<usize, Rs485Error<Unplugged, Stuck>>
 where
     D: embedded_hal::delay::DelayNs + embedded_hal_async::delay::DelayNs,
 {
@@ -130,7 +130,7 @@ where
 pub(crate) fn flush<D>(
     port: &mut Port<D>,
     is_async: bool,
-) -> Result<(), DirectedError<Unplugged, Stuck>>
+) -> Result<(), Rs485Error<Unplugged, Stuck>>
 where
     D: embedded_hal::delay::DelayNs + embedded_hal_async::delay::DelayNs,
 {

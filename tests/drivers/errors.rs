@@ -22,7 +22,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
         "port is closed: its other end has gone"
     );
     assert_eq!(DriveError::<Unplugged>::WriteZero.to_string(), "port took no bytes");
-    let bus = ikeya::CommandError::NotOnline { node: NodeId::N2 };
+    let bus = ikeya::master::CommandError::NotOnline { node: NodeId::N2 };
     let told = DriveError::<Unplugged>::from(bus).source().unwrap().to_string();
     assert_eq!(told, bus.to_string());
 }
@@ -31,7 +31,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
 #[test]
 fn a_refused_value_is_the_source_of_the_refusal_and_that_of_the_error() {
     let value = ucp::MotorControl::new(101, 0).unwrap_err();
-    let rover = ucp::CommandError::Value(value);
+    let rover = ucp::host::CommandError::Value(value);
     assert_eq!(rover.source().unwrap().to_string(), value.to_string());
     let told = DriveError::<Unplugged>::from(rover).source().unwrap().to_string();
     assert_eq!(told, rover.to_string());

@@ -6,8 +6,10 @@ use axlewire::{
     drive::{DriveError, Driver, Operation},
     time::{Duration, Instant},
     ucp::{
-        CalibrationKind, CalibrationStep, CommandError, FailureCause, Host, HostConfig, HostEvent,
-        Link, MotorControl, Robot, RobotConfig, RobotEvent, Telemetry,
+        Host, MotorControl, Robot, Telemetry,
+        host::{CalibrationStep, CommandError, FailureCause, HostConfig, HostEvent, Link},
+        message::CalibrationKind,
+        robot::{RobotConfig, RobotEvent},
     },
 };
 
@@ -425,7 +427,7 @@ fn driving_for_a_while_keeps_the_command_alive_whatever_the_dead_man_is() {
     for timeout_ms in [2, 30, 100, 150] {
         for is_async in [false, true] {
             let (world, mut rover, _robot) = story_with(|config| {
-                config.command_timeout = Duration::from_millis(timeout_ms);
+                config.dead_man = Duration::from_millis(timeout_ms);
             });
             let span = Duration::from_millis(600);
             if is_async {

@@ -6,8 +6,9 @@ use axlewire::{
     drive::DriveError,
     endpoint::Endpoint,
     ikeya::{
-        CommandError, MasterConfig, MasterEvent, Mode, NodeId, NodeSet, OneMotor, Position, Rps,
-        StopProgress, Target, WriteRequest,
+        Mode, NodeId, Position, Rps, Target, WriteRequest,
+        board::OneMotor,
+        master::{CommandError, MasterConfig, MasterEvent, NodeSet, StopProgress},
     },
     time::{Duration, Instant},
 };

@@ -6,8 +6,8 @@ use axlewire::{
     drive::Driver,
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, Position, Response, Rps, Slave, SlaveConfig, SlaveEvent, Target, ToMaster,
-        ToSlave,
+        Mode, NodeId, Position, Response, Rps, Slave, Target, ToMaster, ToSlave,
+        slave::{SlaveConfig, SlaveEvent},
     },
     sim::{Motor, MotorNode},
     stream::Frames,
@@ -33,7 +33,7 @@ impl Nodes {
     pub(crate) fn new() -> Self {
         // As on a USB adapter: bytes come when this machine has time for them.
         let node = |id, mode| {
-            let slave = Slave::new(id, mode, SlaveConfig::usb_adapter());
+            let slave = Slave::new(id, mode, SlaveConfig::usb_adapter(), Instant::from_micros(0));
             MotorNode::from_parts(slave, Motor::new())
         };
         let nodes = [node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position)];

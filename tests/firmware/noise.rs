@@ -5,10 +5,16 @@ use std::{collections::HashSet, time::Instant};
 use axlewire::{
     drive::Driver,
     ikeya::{
-        Health, MasterConfig, MasterEvent, Mode, NodeId, Polling, Position, Rps, SlaveEvent, Target,
+        Mode, NodeId, Position, Rps, Target,
+        master::{Health, MasterConfig, MasterEvent, Polling},
+        slave::SlaveEvent,
     },
     time::Duration,
-    ucp::{HostEvent, ImuBias, MagBias, MemoryStore, MotorControl},
+    ucp::{
+        MotorControl,
+        host::{HostEvent, MemoryStore},
+        message::{ImuBias, MagBias},
+    },
 };
 
 use crate::{

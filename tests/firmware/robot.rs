@@ -7,8 +7,9 @@ use axlewire::{
     sim::Rng,
     time::Duration,
     ucp::{
-        Body, CalibrationKind, Host, HostConfig, HostEvent, ImuBias, Link, MagBias, MemoryStore,
-        MotorControl, NetworkState, OtaStatus, Ping,
+        Body, Host, MotorControl,
+        host::{HostConfig, HostEvent, Link, MemoryStore},
+        message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus, Ping},
     },
 };
 
@@ -30,7 +31,7 @@ pub(crate) fn patient() -> HostConfig {
     config.ack_timeout = Duration::from_millis(3000);
     config.ping_timeout = Duration::from_millis(10_000);
     config.link_timeout = Duration::from_millis(10_000);
-    config.quiet_margin = Duration::from_millis(200);
+    config.idle_margin = Duration::from_millis(200);
     config
 }
 

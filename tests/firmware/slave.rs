@@ -2,12 +2,13 @@
 
 use axlewire::{
     drive::Driver,
+    encode::Encode,
     ikeya::{
-        self, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling, ReadRequest,
-        Response, Rps, ToMaster, WriteRequest,
+        self, Master, Mode, NodeId, ReadRequest, Response, Rps, ToMaster, WriteRequest,
+        master::{Health, MasterConfig, MasterEvent, Polling},
     },
     sim::Rng,
-    stream::{Encode, Event, Frames},
+    stream::{Event, Frames},
     time::Duration,
 };
 

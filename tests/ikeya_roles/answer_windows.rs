@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Health, MasterEvent, NodeId, Position, Status},
+    ikeya::{
+        NodeId, Position, Status,
+        master::{Health, MasterEvent},
+    },
 };
 
 use crate::rig::*;

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{CommandError, MasterConfig, MasterEvent, NodeId, NodeSet, Polling},
+    ikeya::{
+        NodeId,
+        master::{CommandError, MasterConfig, MasterEvent, NodeSet, Polling},
+    },
     time::Instant,
 };
 

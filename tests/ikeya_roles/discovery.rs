@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Health, MasterConfig, MasterEvent, Mode, NodeId, Polling, Position, StopProgress},
+    ikeya::{
+        Mode, NodeId, Position,
+        master::{Health, MasterConfig, MasterEvent, Polling, StopProgress},
+    },
 };
 
 use crate::rig::*;

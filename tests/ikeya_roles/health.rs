@@ -1,6 +1,9 @@
 //! Health: strikes, and the search for abnormal nodes (I7).
 
-use axlewire::ikeya::{Cause, Health, MasterEvent, NodeId};
+use axlewire::ikeya::{
+    NodeId,
+    master::{Cause, Health, MasterEvent},
+};
 
 use crate::rig::*;
 

@@ -1,8 +1,8 @@
 //! Modes: in doubt, changed, and what may be written meanwhile (I11).
 
 use axlewire::ikeya::{
-    Cause, CommandError, Health, MasterEvent, Mode, NodeId, Position, Status, StopProgress, Target,
-    WriteRequest,
+    Mode, NodeId, Position, Status, Target, WriteRequest,
+    master::{Cause, CommandError, Health, MasterEvent, StopProgress},
 };
 
 use crate::rig::*;

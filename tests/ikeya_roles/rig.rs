@@ -3,8 +3,9 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling, Position,
-        PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
+        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse,
+        WriteRequest,
+        master::{Health, MasterConfig, MasterEvent, Polling},
     },
     time::{Duration, Instant},
 };

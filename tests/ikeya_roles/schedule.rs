@@ -1,6 +1,6 @@
 //! The schedule of a bus tells its rate before it is wired.
 
-use axlewire::ikeya::{Schedule, ThreeMotors};
+use axlewire::ikeya::{board::ThreeMotors, master::Schedule};
 
 use crate::rig::*;
 

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Health, MasterConfig, Mode, NodeId, StopProgress},
+    ikeya::{
+        Mode, NodeId,
+        master::{Health, MasterConfig, StopProgress},
+    },
 };
 
 use crate::rig::*;

@@ -4,7 +4,9 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, StopProgress, ThreeMotors,
+        Master, Mode, NodeId,
+        board::ThreeMotors,
+        master::StopProgress,
         three::{PositionResponse, VelocityResponse},
     },
     time::Instant,

@@ -1,6 +1,9 @@
 //! Set-points: the latest one is repeated, and a confirmation always ends in one event.
 
-use axlewire::ikeya::{Cause, CommandError, MasterEvent, Mode, NodeId, Position, Rps};
+use axlewire::ikeya::{
+    Mode, NodeId, Position, Rps,
+    master::{Cause, CommandError, MasterEvent},
+};
 
 use crate::rig::*;
 

@@ -3,8 +3,9 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        CommandError, Health, Master, MasterConfig, MasterEvent, NodeId, NodeSet, Polling, Slave,
-        Status, ThreeMotors,
+        Master, NodeId, Slave, Status,
+        board::ThreeMotors,
+        master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling},
     },
     time::{Duration, Instant},
 };

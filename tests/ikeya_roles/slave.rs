@@ -4,8 +4,9 @@
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{
-        DipSwitch, IdReading, Mode, NodeId, OneMotor, Position, ReadRequest, Slave, SlaveConfig,
-        SlaveEvent, Target, WriteRequest,
+        Mode, NodeId, Position, ReadRequest, Slave, Target, WriteRequest,
+        board::OneMotor,
+        slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},
 };
@@ -13,7 +14,7 @@ use axlewire::{
 use crate::rig::*;
 
 fn slave(mode: Mode) -> Slave {
-    Slave::new(NodeId::N2, mode, SlaveConfig::direct())
+    Slave::new(NodeId::N2, mode, SlaveConfig::direct(), Instant::from_micros(0))
 }
 
 fn answers(slave: &mut Slave, bytes: &[u8], now: Instant) -> Vec<Vec<u8>> {
@@ -107,7 +108,7 @@ fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
 fn the_watchdog_ends_a_command_and_tells_it_once() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(slave.poll_timeout(), None, "nothing moves yet");
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     slave.poll_event();
@@ -133,18 +134,31 @@ fn a_position_node_does_not_answer_before_it_knows_where_it_is() {
 #[test]
 fn a_slave_takes_id_and_mode_from_its_switch_as_told() {
     let dip: DipSwitch = "0101".parse().unwrap();
-    let slave: Slave =
-        Slave::from_dip(dip, IdReading::ValuePlusOne, SlaveConfig::direct()).unwrap();
+    let slave: Slave = Slave::from_dip(
+        dip,
+        IdReading::ValuePlusOne,
+        SlaveConfig::direct(),
+        Instant::from_micros(0),
+    )
+    .unwrap();
     assert_eq!((slave.node(), slave.mode()), (NodeId::N3, Mode::Position));
     let dip: DipSwitch = "0000".parse().unwrap();
-    assert!(Slave::<OneMotor>::from_dip(dip, IdReading::Value, SlaveConfig::direct()).is_err());
+    assert!(
+        Slave::<OneMotor>::from_dip(
+            dip,
+            IdReading::Value,
+            SlaveConfig::direct(),
+            Instant::from_micros(0)
+        )
+        .is_err()
+    );
 }
 
 #[test]
 fn a_turnaround_gap_holds_the_answer_back() {
     let mut config = SlaveConfig::direct();
     config.turnaround_gap = US(30);
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), Vec::<Vec<u8>>::new());
     assert_eq!(slave.poll_timeout(), Some(T0 + US(30)));
     assert!(slave.poll_transmit(T0 + US(30)).is_some());
@@ -185,7 +199,8 @@ fn a_slave_drops_its_answer_after_answer_within_and_not_earlier() {
             let mut config = config;
             config.turnaround_gap = US(gap);
             let asked = || {
-                let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+                let mut slave: Slave =
+                    Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
                 slave.handle_input(&read(NodeId::N2), T0);
                 slave
             };
@@ -209,7 +224,7 @@ fn trap() -> Vec<u8> {
 fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
     let mut config = SlaveConfig::direct();
     config.two_wire = true;
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &trap(), T0), [[0; 0]; 0]);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (1, 0));
     // It is asked itself all the same, and obeys.
@@ -235,7 +250,8 @@ fn a_speed_that_is_no_number_does_not_feed_the_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
     for bad in [Position::new(0, 0x7FC0), Position::new(0, 0x7F80), Position::new(1, -128)] {
-        let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+        let mut slave: Slave =
+            Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
         slave.handle_input(&write(NodeId::N2, 1.0), T0);
         let end = slave.poll_timeout();
         assert_eq!(end, Some(T0 + MS(100)));
@@ -251,7 +267,7 @@ fn a_speed_that_is_no_number_does_not_feed_the_watchdog() {
 fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     let mut damaged = write(NodeId::N2, 2.0);
     damaged[4] ^= 1;
@@ -267,7 +283,7 @@ fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
 fn a_slave_that_was_held_up_obeys_old_bytes_as_of_when_they_may_have_come() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
     slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
     assert_eq!(slave.command(), Some(Target::Velocity(rps(1.0))), "it is taken in");
@@ -299,7 +315,7 @@ fn a_slave_gives_up_an_answer_that_pauses_for_five_byte_times() {
     assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
     let mut config = SlaveConfig::direct();
     config.idle = MS(3);
-    let patient: Slave = Slave::new(NodeId::N2, Mode::Velocity, config);
+    let patient: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(patient.frame_pause(), MS(3), "as long as it waits itself");
 }
 

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{MasterEvent, NodeId, Position, PositionResponse, StopProgress},
+    ikeya::{
+        NodeId, Position, PositionResponse,
+        master::{MasterEvent, StopProgress},
+    },
 };
 
 use crate::rig::*;

@@ -3,7 +3,8 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        CommandError, Health, MasterEvent, Mode, NodeId, NodeSet, Position, StopProgress, Target,
+        Mode, NodeId, Position, Target,
+        master::{CommandError, Health, MasterEvent, NodeSet, StopProgress},
     },
 };
 

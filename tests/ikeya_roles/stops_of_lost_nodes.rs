@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{CommandError, Health, MasterEvent, NodeId, NodeSet, StopProgress, Target},
+    ikeya::{
+        NodeId, Target,
+        master::{CommandError, Health, MasterEvent, NodeSet, StopProgress},
+    },
 };
 
 use crate::rig::*;

@@ -3,8 +3,10 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Slave, SlaveConfig, Status,
-        StopProgress, Target, ThreeMotors,
+        Master, Mode, NodeId, Position, Slave, Status, Target,
+        board::ThreeMotors,
+        master::{MasterConfig, MasterEvent, StopProgress},
+        slave::SlaveConfig,
         three::{PositionResponse, VelocityResponse, WriteRequest},
     },
     time::Instant,
@@ -18,7 +20,7 @@ const T0: Instant = Instant::from_micros(5_000);
 fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
     let mut master: Master<ThreeMotors> = Master::new(direct(), T0);
     let mut slave: Slave<ThreeMotors> =
-        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct());
+        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
     master.discover(T0);
     let mut now = T0;
     let (mut heard, mut written) = (0, 0);

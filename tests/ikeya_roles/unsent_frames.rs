@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{CommandError, Health, MasterEvent, NodeId, StopProgress},
+    ikeya::{
+        NodeId,
+        master::{CommandError, Health, MasterEvent, StopProgress},
+    },
 };
 
 use crate::rig::*;

@@ -6,7 +6,7 @@
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{Master, MasterConfig, Mode, NodeId, Position},
+    ikeya::{Master, Mode, NodeId, Position, master::MasterConfig},
     time::{Duration, Instant, wire_time},
 };
 

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Health, MasterEvent, Mode, NodeId},
+    ikeya::{
+        Mode, NodeId,
+        master::{Health, MasterEvent},
+    },
     time::Duration,
 };
 

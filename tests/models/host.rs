@@ -4,8 +4,9 @@ use axlewire::{
     endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
     ucp::{
-        CalibrationKind, CalibrationStep, ErrorCode, Host, HostConfig, HostEvent, MotorControl,
-        OtaStatus,
+        Host, MotorControl,
+        host::{CalibrationStep, HostConfig, HostEvent},
+        message::{CalibrationKind, ErrorCode, OtaStatus},
     },
 };
 

@@ -3,7 +3,11 @@
 use axlewire::{
     endpoint::Unsent,
     time::Instant,
-    ucp::{CalibrationKind, CalibrationStep, ErrorCode, Frame, Link, Message},
+    ucp::{
+        Frame, Message,
+        host::{CalibrationStep, Link},
+        message::{CalibrationKind, ErrorCode},
+    },
 };
 
 use super::{
@@ -65,7 +69,7 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    pub(crate) fn new(config: &axlewire::ucp::HostConfig, now: Instant) -> Self {
+    pub(crate) fn new(config: &axlewire::ucp::host::HostConfig, now: Instant) -> Self {
         Self {
             motion: Motion::new(config.sends_first_stop, now),
             low_ids_only: config.low_ids_only,

@@ -1,6 +1,9 @@
 //! The calls of a host's application, and which of them are refused.
 
-use axlewire::ucp::{CalibrationStep, CommandError, NetworkState};
+use axlewire::ucp::{
+    host::{CalibrationStep, CommandError},
+    message::NetworkState,
+};
 
 use super::{
     host::{Act, ROOM, Site, VERSION, command},

@@ -4,9 +4,12 @@ use axlewire::{
     endpoint::Endpoint,
     time::Instant,
     ucp::{
-        BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, CalibrationStep,
-        ErrorCode, FailureCause, FirmwareReport, HostEvent, ImuBias, MagBias, OtaAck, OtaStatus,
-        Pong, Telemetry,
+        Telemetry,
+        host::{CalibrationStep, FailureCause, HostEvent},
+        message::{
+            BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, ErrorCode,
+            FirmwareReport, ImuBias, MagBias, OtaAck, OtaStatus, Pong,
+        },
     },
 };
 

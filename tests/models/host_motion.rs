@@ -3,7 +3,7 @@
 use axlewire::{
     endpoint::Unsent,
     time::Instant,
-    ucp::{MotorControl, RawMotorControl},
+    ucp::{MotorControl, message::RawMotorControl},
 };
 
 use super::ucp::{Checked, halted, ms};

@@ -2,7 +2,11 @@
 
 use axlewire::{
     time::{Instant, wire_time},
-    ucp::{BAUD, CalibrationKind, CalibrationStep, HostEvent},
+    ucp::{
+        BAUD,
+        host::{CalibrationStep, HostEvent},
+        message::CalibrationKind,
+    },
 };
 
 use super::ucp::ms;

@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Unsent,
-    ucp::{CalibrationKind, CalibrationStep, ErrorCode, HostConfig, OtaStatus},
+    ucp::{
+        host::{CalibrationStep, HostConfig},
+        message::{CalibrationKind, ErrorCode, OtaStatus},
+    },
 };
 
 use super::{

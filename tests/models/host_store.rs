@@ -1,6 +1,9 @@
 //! A store of biases that fails when it is told to.
 
-use axlewire::ucp::{BiasStore, ImuBias, MagBias, NotStored};
+use axlewire::ucp::{
+    host::{BiasStore, NotStored},
+    message::{ImuBias, MagBias},
+};
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shelf {

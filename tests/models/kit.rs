@@ -1,8 +1,11 @@
 //! Packets of both kinds of boards, read and written in the test's own way.
 
 use axlewire::{
-    ikeya::{Board, Mode, NodeId, OneMotor, Position, Rps, ThreeMotors},
-    stream::Encode,
+    encode::Encode,
+    ikeya::{
+        Mode, NodeId, Position, Rps,
+        board::{Board, OneMotor, ThreeMotors},
+    },
 };
 
 /// What a kind of board needs to be put into a world. Three motors are always told the same.

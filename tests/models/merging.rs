@@ -2,7 +2,11 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Master, MasterConfig, Mode, NodeId, OneMotor, Polling, Rps, VelocityResponse},
+    ikeya::{
+        Master, Mode, NodeId, Rps, VelocityResponse,
+        board::OneMotor,
+        master::{MasterConfig, Polling},
+    },
     time::{Duration, Instant},
 };
 

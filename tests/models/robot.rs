@@ -3,7 +3,11 @@
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
-    ucp::{CalibrationKind, ErrorCode, OtaStatus, Robot, RobotConfig, RobotEvent, Telemetry},
+    ucp::{
+        Robot, Telemetry,
+        message::{CalibrationKind, ErrorCode, OtaStatus},
+        robot::{RobotConfig, RobotEvent},
+    },
 };
 
 use super::{

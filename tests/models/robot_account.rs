@@ -4,7 +4,9 @@ use axlewire::{
     endpoint::Unsent,
     time::Instant,
     ucp::{
-        CalibrationKind, ErrorCode, Frame, Message, MotorControl, OtaStatus, RobotConfig, Telemetry,
+        Frame, Message, MotorControl, Telemetry,
+        message::{CalibrationKind, ErrorCode, OtaStatus},
+        robot::RobotConfig,
     },
 };
 

@@ -5,9 +5,12 @@ use axlewire::{
     endpoint::Endpoint,
     time::Instant,
     ucp::{
-        Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode, ImuBias, ImuBiasAck,
-        MagBias, MagBiasAck, MotorControl, NetworkState, OtaRequest, Ping, Pong, RobotEvent,
-        SetNetworkState, UpdateSource,
+        MotorControl,
+        message::{
+            Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode, ImuBias,
+            ImuBiasAck, MagBias, MagBiasAck, NetworkState, OtaRequest, Ping, Pong, SetNetworkState,
+        },
+        robot::{RobotEvent, UpdateSource},
     },
 };
 
@@ -82,7 +85,7 @@ const fn is_calibration(event: &RobotEvent) -> bool {
 
 /// Events of which only the latest counts.
 pub(crate) const fn is_frequent(event: &RobotEvent) -> bool {
-    matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop | RobotEvent::NetworkState(_))
+    matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog | RobotEvent::NetworkState(_))
 }
 
 impl Rover {
@@ -205,7 +208,7 @@ impl Rover {
     pub(super) fn told(&mut self, event: &RobotEvent) {
         match event {
             RobotEvent::Motor(command) => self.account.told = *command,
-            RobotEvent::WatchdogStop => self.account.told = halted(self.account.told),
+            RobotEvent::Watchdog => self.account.told = halted(self.account.told),
             _ => {}
         }
     }

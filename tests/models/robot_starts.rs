@@ -2,7 +2,10 @@
 
 use axlewire::{
     endpoint::Unsent,
-    ucp::{CalibrationKind, ErrorCode, OtaStatus, RobotConfig},
+    ucp::{
+        message::{CalibrationKind, ErrorCode, OtaStatus},
+        robot::RobotConfig,
+    },
 };
 
 use super::{

@@ -1,9 +1,12 @@
 //! A slave, node 1, and everything that can be heard on its line.
 
 use axlewire::{
+    encode::Encode,
     endpoint::{Endpoint, Unsent},
-    ikeya::{Mode, NodeId, Position, Slave, SlaveConfig, SlaveEvent, Target},
-    stream::Encode,
+    ikeya::{
+        Mode, NodeId, Position, Slave, Target,
+        slave::{SlaveConfig, SlaveEvent},
+    },
     time::{Duration, Instant},
 };
 
@@ -84,7 +87,7 @@ impl<B: Kit> Line<B> {
         let mut config = SlaveConfig::direct();
         (config.two_wire, config.watchdog) = (two_wire, Some(WATCHDOG));
         let now = Instant::from_micros(1_000_000);
-        let mut slave = Slave::new(NodeId::N1, mode, config);
+        let mut slave = Slave::new(NodeId::N1, mode, config, Instant::from_micros(0));
         slave.set_position(B::place(Position::new(1, 1)));
         Self {
             slave,

@@ -1,7 +1,10 @@
 //! The worlds of the motor bus, and the states in which they start.
 
 use axlewire::{
-    ikeya::{MasterConfig, Mode, NodeId, Polling},
+    ikeya::{
+        Mode, NodeId,
+        master::{MasterConfig, Polling},
+    },
     time::Duration,
 };
 

@@ -11,12 +11,13 @@ use std::{
 };
 
 #[cfg(feature = "ucp")]
-use axlewire::ucp::{Host, HostConfig};
+use axlewire::ucp::{Host, host::HostConfig};
 use axlewire::{
-    drive::{Directed, DriveError, Driver},
+    drive::{DriveError, Driver, Rs485},
     ikeya::{
-        Health, Master, MasterConfig, Mode, NodeId, Polling, Position, ReadRequest, Rps, Slave,
-        SlaveConfig, WriteRequest,
+        Master, Mode, NodeId, Position, ReadRequest, Rps, Slave, WriteRequest,
+        master::{Health, MasterConfig, Polling},
+        slave::SlaveConfig,
     },
     sim::MotorNode,
     time::{Duration, Instant},
@@ -225,8 +226,9 @@ fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
         let (world, pin) = (World::default(), Pin::default());
         let (mut port, mut far) = End::pair(&world, 20);
         port.is_deafened = true;
-        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct());
-        let port = Directed::new(port, pin.clone()).unwrap();
+        let slave: Slave =
+            Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
+        let port = Rs485::new(port, pin.clone()).unwrap();
         let mut node = Driver::new(slave, port, VirtualClock(world.clone()));
         let read = ReadRequest::new(NodeId::N2);
         embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();

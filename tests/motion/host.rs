@@ -8,9 +8,13 @@ use axlewire::{
     stream::Frames,
     time::{Duration, Instant},
     ucp::{
-        BiasRequest, BiasStore, Body, CalibrationKind, CalibrationStartAck, ErrorCode,
-        FirmwareReport, Frame, Host, HostConfig, HostEvent, ImuBias, MagBias, MemoryStore, Message,
-        NetworkState, NoStore, OtaAck, OtaStatus, Robot, RobotConfig, Telemetry, Ucp,
+        Body, Frame, Host, Message, Robot, Telemetry, Ucp,
+        host::{BiasStore, HostConfig, HostEvent, MemoryStore, NoStore},
+        message::{
+            BiasRequest, CalibrationKind, CalibrationStartAck, ErrorCode, FirmwareReport, ImuBias,
+            MagBias, NetworkState, OtaAck, OtaStatus,
+        },
+        robot::RobotConfig,
     },
 };
 

@@ -3,8 +3,8 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        CommandError, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Polling, Position,
-        PositionResponse, Rps, VelocityResponse, WriteRequest,
+        Master, Mode, NodeId, Position, PositionResponse, Rps, VelocityResponse, WriteRequest,
+        master::{CommandError, Health, MasterConfig, MasterEvent, Polling},
     },
     sim::{Line, MotorNode, Who},
     time::{Duration, Instant},

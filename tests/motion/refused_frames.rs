@@ -1,9 +1,12 @@
 //! Frames that must not be sent are refused, however their bytes came about.
 
 use axlewire::{
+    encode::Encode,
     error::EncodeError,
-    stream::Encode,
-    ucp::{Body, Frame, FrameOf, Message, MotorControl, Ping, RawMotorControl},
+    ucp::{
+        Body, Frame, FrameOf, Message, MotorControl,
+        message::{Ping, RawMotorControl},
+    },
 };
 use zerocopy::TryFromBytes;
 

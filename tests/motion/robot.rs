@@ -5,9 +5,12 @@ use axlewire::{
     endpoint::Endpoint,
     time::{Duration, Instant},
     ucp::{
-        Biases, Body, CalibrationKind, CalibrationStart, ErrorCode, Frame, ImuBias, ImuBiasAck,
-        MagBias, Message, MotorControl, NetworkState, Robot, RobotConfig, RobotEvent,
-        SetNetworkState,
+        Body, Frame, Message, MotorControl, Robot,
+        message::{
+            Biases, CalibrationKind, CalibrationStart, ErrorCode, ImuBias, ImuBiasAck, MagBias,
+            NetworkState, SetNetworkState,
+        },
+        robot::{RobotConfig, RobotEvent},
     },
 };
 use embedded_io::Write;

@@ -2,12 +2,12 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Mode, NodeId, ReadRequest, Slave, SlaveConfig},
+    ikeya::{Mode, NodeId, ReadRequest, Slave, slave::SlaveConfig},
     time::{Duration, Instant},
 };
 
 fn slave(config: SlaveConfig) -> Slave {
-    Slave::new(NodeId::N2, Mode::Velocity, config)
+    Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0))
 }
 
 /// A slave that has just been asked, and when that was.

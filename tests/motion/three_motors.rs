@@ -2,7 +2,7 @@
 
 use axlewire::{
     endpoint::Endpoint,
-    ikeya::{Master, MasterConfig, NodeId, Rps, ThreeMotors, three},
+    ikeya::{Master, NodeId, Rps, board::ThreeMotors, master::MasterConfig, three},
     time::{Duration, Instant},
 };
 

@@ -12,7 +12,7 @@ use crate::talker::{Talker, at, one_way, us};
 fn a_pause_or_a_full_buffer_ends_a_piece_of_dma() {
     let mut line = one_way(500_000, 0, &[0; 10]);
     line.head_mut().say(at(1000), &[1; 3]);
-    line.driver_mut(Who::Tail(0)).input = Input::AfterPause { pause: us(40), at_most: 8 };
+    line.timing_mut(Who::Tail(0)).input = Input::AfterPause { pause: us(40), at_most: 8 };
     line.run_for(us(2000)).unwrap();
     let pieces: Vec<_> = line.tail(0).heard.iter().map(|(at, it)| (*at, it.len())).collect();
     assert_eq!(pieces, [(160, 8), (240, 2), (1100, 3)]);
@@ -21,7 +21,7 @@ fn a_pause_or_a_full_buffer_ends_a_piece_of_dma() {
 #[test]
 fn a_usb_adapter_hands_in_after_its_latency_timer_or_when_it_is_full() {
     let mut line = one_way(500_000, 0, &[0; 70]);
-    line.driver_mut(Who::Tail(0)).input = Input::usb_adapter();
+    line.timing_mut(Who::Tail(0)).input = Input::usb_adapter();
     line.run_for(Duration::from_millis(50)).unwrap();
     let pieces: Vec<_> = line.tail(0).heard.iter().map(|(at, it)| (*at, it.len())).collect();
     assert_eq!(pieces, [(62 * 20, 62), (63 * 20 + 16_000, 8)]);
@@ -31,8 +31,8 @@ fn a_usb_adapter_hands_in_after_its_latency_timer_or_when_it_is_full() {
 fn a_slow_loop_sees_bytes_and_deadlines_later() {
     let mut line = one_way(500_000, 0, &[1, 2, 3]);
     line.head_mut().say(at(500), &[4]);
-    line.driver_mut(Who::Head).latency = us(7);
-    line.driver_mut(Who::Tail(0)).latency = us(50);
+    line.timing_mut(Who::Head).latency = us(7);
+    line.timing_mut(Who::Tail(0)).latency = us(50);
     line.run_for(us(2000)).unwrap();
     assert_eq!(line.tail(0).times(), [77, 97, 117, 577]);
 }

@@ -3,8 +3,9 @@
 
 use axlewire::{
     ikeya::{
-        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Rps, Schedule, Slave,
-        SlaveConfig,
+        Master, Mode, NodeId, Position, Rps, Slave,
+        master::{Health, MasterConfig, MasterEvent, Schedule},
+        slave::SlaveConfig,
     },
     sim::{Direction, Line, Motor, MotorNode, Who},
     time::{Duration, wire_time},
@@ -22,9 +23,9 @@ fn bus(nodes: &[NodeId], config: MasterConfig) -> Line<Master, MotorNode> {
     for &node in nodes {
         let mut slave = SlaveConfig::direct();
         slave.idle = wire_time(5, config.baud);
-        let slave = Slave::new(node, mode_of(node), slave);
+        let slave = Slave::new(node, mode_of(node), slave, Instant::from_micros(0));
         let tail = line.add(MotorNode::from_parts(slave, Motor::new()));
-        line.driver_mut(Who::Tail(tail)).latency = us(50);
+        line.timing_mut(Who::Tail(tail)).latency = us(50);
     }
     line
 }
@@ -144,7 +145,7 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 fn a_node_without_commands_stands_still_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let slave = Slave::new(NodeId::N1, Mode::Velocity, config);
+    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
     let master: Master = Master::new(MasterConfig::direct(), at(0));
     let mut line = Line::new(500_000, 0, master);
     line.add(MotorNode::from_parts(slave, Motor::new()));

@@ -60,7 +60,7 @@ fn a_packet_of_the_other_direction_is_no_header() {
     let stream = [response(), write()].concat();
     let (at_slave, _) = seen::<ikeya::ToSlave, 8>(&[&stream], true);
     assert_eq!(at_slave, [Seen::Gap(8, Reason::Header), Seen::Frame(write())]);
-    let (between, _) = seen::<ikeya::Either, 8>(&[&stream], true);
+    let (between, _) = seen::<ikeya::BothDirections, 8>(&[&stream], true);
     assert_eq!(between, [Seen::Frame(response()), Seen::Frame(write())]);
 }
 

@@ -134,10 +134,10 @@ macro_rules! properties {
 properties! {
     ikeya_to_slave: ikeya::ToSlave, 8;
     ikeya_to_master: ikeya::ToMaster, 8;
-    ikeya_either: ikeya::Either, 8;
+    ikeya_either: ikeya::BothDirections, 8;
     three_to_slave: three::ToSlave, 16;
     three_to_master: three::ToMaster, 16;
-    three_either: three::Either, 16;
+    three_either: three::BothDirections, 16;
     ucp_by_default: Ucp, 64;
     ucp_with_the_largest_cap: Ucp<252>, 256;
 }

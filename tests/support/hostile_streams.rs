@@ -1,9 +1,9 @@
 //! Hostile streams: everything that a line has been seen to do, in any mixture.
 
 use axlewire::{
+    encode::Encode,
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::Encode,
-    ucp::{self, Body, ErrorCode},
+    ucp::{self, Body, message::ErrorCode},
 };
 use proptest::{collection::vec, prelude::*, sample::Index, strategy::Union};
 
@@ -97,14 +97,14 @@ fn three_frame() -> impl Strategy<Value = Vec<u8>> {
 
 fn ucp_frame() -> impl Strategy<Value = Vec<u8>> {
     let known = (0..6, any::<u8>(), -100..=100_i16).prop_map(|(kind, index, value)| match kind {
-        0 => encoded(&ucp::Ping {}.frame(index)),
-        1 => encoded(&ucp::Pong::new(ErrorCode::Fine).frame(index)),
+        0 => encoded(&ucp::message::Ping {}.frame(index)),
+        1 => encoded(&ucp::message::Pong::new(ErrorCode::Fine).frame(index)),
         2 => encoded(&ucp::MotorControl::new(value, -value).unwrap().frame(index)),
-        3 => encoded(&ucp::MagBias::new([value; 3]).frame(index)),
-        4 => encoded(&ucp::BiasRequest {}.frame(index)),
+        3 => encoded(&ucp::message::MagBias::new([value; 3]).frame(index)),
+        4 => encoded(&ucp::message::BiasRequest {}.frame(index)),
         _ => {
             let telemetry = ucp::Telemetry { rpm: [value; 4], ..Default::default() };
-            encoded(&ucp::FirmwareReport::new(&telemetry, 38).frame(index))
+            encoded(&ucp::message::FirmwareReport::new(&telemetry, 38).frame(index))
         }
     });
     let foreign = (0x0B..=255_u8, any::<u8>(), vec(any::<u8>(), 0..=56))

@@ -61,7 +61,7 @@ impl Known for ikeya::ToMaster {
     }
 }
 
-impl Known for ikeya::Either {
+impl Known for ikeya::BothDirections {
     const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 8 };
 
     fn bytes<'a: 'a>(frame: &ikeya::Packet<'a>) -> &'a [u8] {
@@ -88,7 +88,7 @@ impl Known for three::ToMaster {
     }
 }
 
-impl Known for three::Either {
+impl Known for three::BothDirections {
     const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 16 };
 
     fn bytes<'a: 'a>(frame: &three::Packet<'a>) -> &'a [u8] {

@@ -2,11 +2,12 @@
 
 use axlewire::{
     crc16,
+    encode::Encode,
     error::{EncodeError, ParseError},
-    stream::{Encode, Event, Frames, Reason},
+    stream::{Event, Frames, Reason},
     ucp::{
-        Body, CalibrationKind, CalibrationStart, ErrorCode, Frame, FrameOf, Header, Message, Ping,
-        Pong, RawFrame, Ucp,
+        Body, Frame, FrameOf, Header, Message, RawFrame, Ucp,
+        message::{CalibrationKind, CalibrationStart, ErrorCode, Ping, Pong},
     },
 };
 

@@ -1,10 +1,12 @@
 //! Messages: which ids and bodies are known, and what their values say.
 
 use axlewire::{
-    stream::Encode,
+    encode::Encode,
     ucp::{
-        Body, CalibrationKind, ErrorCode, Frame, Message, MessageId, NetworkState, OtaRequest,
-        OtaStatus, SetNetworkState, Telemetry,
+        Body, Frame, Message, MessageId, Telemetry,
+        message::{
+            CalibrationKind, ErrorCode, NetworkState, OtaRequest, OtaStatus, SetNetworkState,
+        },
     },
 };
 

@@ -2,9 +2,9 @@
 //! mistake.
 
 use axlewire::{
+    encode::Encode,
     error::EncodeError,
-    stream::Encode,
-    ucp::{Body, Frame, Message, MotorControl, RawMotorControl},
+    ucp::{Body, Frame, Message, MotorControl, message::RawMotorControl},
 };
 
 use crate::by_hand::frame;

@@ -228,7 +228,7 @@ proptest! {
                 ToRobot::Motor(speed) => {
                     robot.handle_input(&bytes(go(speed)), now);
                     let is = |event: &RobotEvent| {
-                        matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop)
+                        matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog)
                     };
                     if let Some(event) = waiting(&robot).into_iter().rfind(is) {
                         prop_assert_eq!(event, RobotEvent::Motor(go(speed)));

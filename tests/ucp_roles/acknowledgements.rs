@@ -344,8 +344,8 @@ fn the_latest_command_and_network_state_have_getters_and_are_the_newest_of_their
     let seen = events(&mut robot);
     assert!(seen.len() <= 9 && robot.lost_events() == 61 - seen.len() as u32);
     let newest = |is: fn(&RobotEvent) -> bool| *seen.iter().rfind(|event| is(event)).unwrap();
-    let motion = newest(|event| matches!(event, RobotEvent::Motor(_) | RobotEvent::WatchdogStop));
-    assert_eq!(motion, RobotEvent::WatchdogStop);
+    let motion = newest(|event| matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog));
+    assert_eq!(motion, RobotEvent::Watchdog);
     let network = newest(|event| matches!(event, RobotEvent::NetworkState(_)));
     assert_eq!(network, RobotEvent::NetworkState(NetworkState::Other(30)));
 }

@@ -79,7 +79,7 @@ fn unplugging_stops_the_robot_and_is_reported_and_plugging_in_goes_on() {
     assert_eq!(speed, 0);
     assert!(stopped <= unplugged + Duration::from_millis(510), "frames were still on the line");
     assert_eq!(rig.host.link(), Link::Down);
-    assert_eq!(rig.robot_has_seen(&RobotEvent::WatchdogStop), 1);
+    assert_eq!(rig.robot_has_seen(&RobotEvent::Watchdog), 1);
     rig.unplug(false);
     drive_for(&mut rig, 200);
     assert_eq!((rig.motion.last().unwrap().1, rig.host.link()), (70, Link::Up));
@@ -141,19 +141,19 @@ fn periods_of_nothing_do_not_make_a_driver_spin() {
     let mut config = HostConfig::default();
     config.command_period = Duration::ZERO;
     config.command_gap = Duration::ZERO;
-    config.command_timeout = Duration::ZERO;
+    config.dead_man = Duration::ZERO;
     config.ping_period = Some(Duration::ZERO);
     config.ping_timeout = Duration::ZERO;
     config.link_timeout = Duration::ZERO;
     config.ack_timeout = Duration::ZERO;
     config.attempts = 0;
-    config.quiet_margin = Duration::ZERO;
+    config.idle_margin = Duration::ZERO;
     let mut robot_config = RobotConfig::default();
-    robot_config.command_timeout = Duration::ZERO;
+    robot_config.watchdog = Duration::ZERO;
     robot_config.report_period = Duration::ZERO;
     robot_config.result_period = Duration::ZERO;
     robot_config.bias_request_period = Some(Duration::ZERO);
-    robot_config.quiet_margin = Duration::ZERO;
+    robot_config.idle_margin = Duration::ZERO;
     for baud in [0, 1, BAUD, u32::MAX] {
         (config.baud, robot_config.baud) = (baud, baud);
         let mut host = Host::new(config, ms(0));
@@ -173,7 +173,7 @@ fn periods_of_nothing_do_not_make_a_driver_spin() {
 #[test]
 fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_never() {
     let mut config = quiet_config();
-    (config.command_gap, config.command_timeout) = (Duration::ZERO, Duration::ZERO);
+    (config.command_gap, config.dead_man) = (Duration::ZERO, Duration::ZERO);
     let mut host = Host::new(config, ms(0));
     host.drive(go(1), ms(0)).unwrap();
     let at_once = sent(&mut host, ms(0));

@@ -284,13 +284,13 @@ fn the_times_of_ruling_u10_are_the_defaults() {
     let millis = |duration: Duration| duration.as_micros() / 1000;
     assert_eq!((host.baud, host.attempts), (115_200, 3));
     assert_eq!((millis(host.command_period), millis(host.command_gap)), (100, 20));
-    assert_eq!((millis(host.command_timeout), millis(host.link_timeout)), (500, 500));
+    assert_eq!((millis(host.dead_man), millis(host.link_timeout)), (500, 500));
     assert_eq!((host.ping_period.map(millis), millis(host.ping_timeout)), (Some(200), 500));
-    assert_eq!((millis(host.ack_timeout), millis(host.quiet_margin)), (200, 20));
+    assert_eq!((millis(host.ack_timeout), millis(host.idle_margin)), (200, 20));
     assert!(host.sends_first_stop && !host.low_ids_only);
     let robot = RobotConfig::default();
-    assert_eq!((millis(robot.command_timeout), millis(robot.report_period)), (500, 20));
-    assert_eq!((millis(robot.result_period), millis(robot.quiet_margin)), (1000, 5));
+    assert_eq!((millis(robot.watchdog), millis(robot.report_period)), (500, 20));
+    assert_eq!((millis(robot.result_period), millis(robot.idle_margin)), (1000, 5));
     assert_eq!((robot.bias_request_period.map(millis), robot.baud), (Some(1000), 115_200));
     assert_eq!(robot.layout, ReportLayout::Firmware { version: 38 });
 }

@@ -3,17 +3,22 @@
 use std::collections::VecDeque;
 
 pub(crate) use axlewire::{
+    encode::Encode,
     endpoint::{Endpoint, Unsent},
-    stream::Encode,
     time::{Duration, Instant, wire_time},
     ucp::{
-        BAUD, BiasRequest, BiasStore, Biases, Body, CalibrationEnd, CalibrationEndAck,
-        CalibrationKind, CalibrationStart, CalibrationStartAck, CalibrationStep, CommandError,
-        ErrorCode, FailureCause, FirmwareReport, Frame, FrameOf, Host, HostConfig, HostEvent,
-        HostStatistics, ImuBias, ImuBiasAck, Link, MagBias, MagBiasAck, MemoryStore, Message,
-        MotorControl, NetworkState, NoStore, NotStored, OtaAck, OtaRequest, OtaStatus, Ping, Pong,
-        RawFrame, RawMotorControl, ReportLayout, Robot, RobotConfig, RobotEvent, SetNetworkState,
-        Telemetry, UpdateSource,
+        BAUD, Body, Frame, FrameOf, Host, Message, MotorControl, RawFrame, Robot, Telemetry,
+        host::{
+            BiasStore, CalibrationStep, CommandError, FailureCause, HostConfig, HostEvent,
+            HostStatistics, Link, MemoryStore, NoStore, NotStored,
+        },
+        message::{
+            BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind,
+            CalibrationStart, CalibrationStartAck, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck,
+            MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Ping, Pong,
+            RawMotorControl, SetNetworkState,
+        },
+        robot::{ReportLayout, RobotConfig, RobotEvent, UpdateSource},
     },
 };
 

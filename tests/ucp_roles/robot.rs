@@ -42,7 +42,7 @@ fn no_valid_motor_frame_for_500_ms_means_standing_still() {
     wait(&mut robot, ms(600));
     let still = MotorControl::STOP.with_front_led(true);
     assert_eq!(robot.command(ms(600)), still);
-    assert_eq!(events(&mut robot), [RobotEvent::WatchdogStop]);
+    assert_eq!(events(&mut robot), [RobotEvent::Watchdog]);
     wait(&mut robot, ms(5000));
     assert_eq!(events(&mut robot), [], "said once");
     robot.handle_input(&bytes(command), ms(6000));
@@ -57,7 +57,7 @@ fn a_robot_whose_driver_is_late_still_stands_still() {
     // The next command comes before anyone has handled the timeout.
     robot.handle_input(&bytes(go(60)), ms(700));
     let go = RobotEvent::Motor(go(60));
-    assert_eq!(events(&mut robot), [go, RobotEvent::WatchdogStop, go]);
+    assert_eq!(events(&mut robot), [go, RobotEvent::Watchdog, go]);
 }
 
 #[test]

@@ -356,7 +356,7 @@ proptest! {
             now = end;
             let moves = now < last + Duration::from_millis(500);
             prop_assert_eq!(robot.command(now).speed(), if moves { 50 } else { 0 });
-            let stops = events(&mut robot).into_iter().filter(|e| *e == RobotEvent::WatchdogStop);
+            let stops = events(&mut robot).into_iter().filter(|e| *e == RobotEvent::Watchdog);
             prop_assert_eq!(stops.count(), usize::from(!moves));
         }
     }

@@ -52,7 +52,7 @@ mod app {
         config.watchdog = Some(Duration::from_millis(500));
         // With the reading that fits ids 1 to 8, every position of the switch is an id (ruling I2).
         let slave = DipSwitch::from_bits(dip)
-            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config));
+            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config, Instant::from_micros(0)));
         let Ok(mut slave) = slave else { panic!("every switch of four digits has an id") };
         // The motor of this example stands at 0 when it starts.
         slave.set_position(Position::new(0, 0));

@@ -3,13 +3,15 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
+    encode::Encode,
     endpoint::{Endpoint, Unsent},
     ikeya::{
-        Board, Health, Master, MasterConfig, MasterEvent, Mode, NodeId, NodeSet, OneMotor, Polling,
-        Position, PositionResponse, ReadRequest, Rps, Status, StopProgress, Target, ThreeMotors,
-        VelocityResponse, three,
+        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Status, Target,
+        VelocityResponse,
+        board::{Board, OneMotor, ThreeMotors},
+        master::{Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
+        three,
     },
-    stream::Encode,
     time::{Duration, Instant},
 };
 

@@ -6,8 +6,10 @@ use axlewire::{
     endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
     ucp::{
-        self, Body, Frame, Host, HostConfig, ImuBias, MagBias, MemoryStore, Message, MotorControl,
-        Robot, RobotConfig,
+        self, Body, Frame, Host, Message, MotorControl, Robot,
+        host::{HostConfig, MemoryStore},
+        message::{ImuBias, MagBias},
+        robot::RobotConfig,
     },
 };
 
@@ -156,20 +158,22 @@ fn is_to_robot(message: &Message<'_>) -> bool {
 fn from_robot(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     let index = u.arbitrary()?;
     Ok(match u.int_in_range(0..=7)? {
-        0 => ucp::Pong::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
-        1 => ucp::FirmwareReport::new(&u.arbitrary()?, 38).frame(index).as_bytes().to_vec(),
-        2 => ucp::BiasRequest {}.frame(index).as_bytes().to_vec(),
+        0 => ucp::message::Pong::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        1 => {
+            ucp::message::FirmwareReport::new(&u.arbitrary()?, 38).frame(index).as_bytes().to_vec()
+        }
+        2 => ucp::message::BiasRequest {}.frame(index).as_bytes().to_vec(),
         3 => ImuBias::new(u.arbitrary()?, u.arbitrary()?).frame(index).as_bytes().to_vec(),
         4 => MagBias::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
         5 => {
-            let ack = ucp::CalibrationStartAck::new(u.arbitrary()?, u.arbitrary()?);
+            let ack = ucp::message::CalibrationStartAck::new(u.arbitrary()?, u.arbitrary()?);
             ack.frame(index).as_bytes().to_vec()
         }
         6 => {
-            let ack = ucp::CalibrationEndAck::new(u.arbitrary()?, u.arbitrary()?);
+            let ack = ucp::message::CalibrationEndAck::new(u.arbitrary()?, u.arbitrary()?);
             ack.frame(index).as_bytes().to_vec()
         }
-        _ => ucp::OtaAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        _ => ucp::message::OtaAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
     })
 }
 
@@ -177,7 +181,7 @@ fn from_robot(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
 fn from_host(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     let index = u.arbitrary()?;
     Ok(match u.int_in_range(0..=7)? {
-        0 => ucp::Ping {}.frame(index).as_bytes().to_vec(),
+        0 => ucp::message::Ping {}.frame(index).as_bytes().to_vec(),
         1 | 2 => {
             // Any sixteen bytes: also out of range, also a version that starts an update.
             let body: [u8; 16] = u.arbitrary()?;
@@ -186,12 +190,13 @@ fn from_host(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
             frame.extend(axlewire::crc16::compute(&frame).to_le_bytes());
             frame
         }
-        3 => ucp::CalibrationStart::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
-        4 => ucp::CalibrationEnd::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
-        5 => ucp::ImuBiasAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
-        6 => ucp::MagBiasAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
-        _ => {
-            ucp::OtaRequest::start_firmware_update(u.arbitrary()?).frame(index).as_bytes().to_vec()
-        }
+        3 => ucp::message::CalibrationStart::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        4 => ucp::message::CalibrationEnd::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        5 => ucp::message::ImuBiasAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        6 => ucp::message::MagBiasAck::new(u.arbitrary()?).frame(index).as_bytes().to_vec(),
+        _ => ucp::message::OtaRequest::start_firmware_update(u.arbitrary()?)
+            .frame(index)
+            .as_bytes()
+            .to_vec(),
     })
 }

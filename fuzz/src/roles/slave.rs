@@ -4,8 +4,10 @@ use arbitrary::{Result, Unstructured};
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{
-        Board, Mode, NodeId, OneMotor, ReadRequest, Rps, Slave, SlaveConfig, Target, ThreeMotors,
-        WriteRequest, three,
+        Mode, NodeId, ReadRequest, Rps, Slave, Target, WriteRequest,
+        board::{Board, OneMotor, ThreeMotors},
+        slave::SlaveConfig,
+        three,
     },
     time::Duration,
 };
@@ -38,7 +40,7 @@ fn slave<B: Board>(
     let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
     let mut clock = Clock::new(u)?;
     let id = *u.choose(&NodeId::ALL)?;
-    let mut slave = Slave::<B>::new(id, mode, config);
+    let mut slave = Slave::<B>::new(id, mode, config, Instant::from_micros(0));
     while !u.is_empty() {
         let now = clock.pass(u)?;
         match u.int_in_range(0..=6)? {

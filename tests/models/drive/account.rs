@@ -3,7 +3,7 @@
 use axlewire::{
     drive::Driver,
     endpoint::Endpoint,
-    ikeya::{Health, Master},
+    ikeya::{Master, master::Health},
 };
 
 use super::{

@@ -9,7 +9,7 @@ use std::{
 use axlewire::{
     drive::{DriveError, Driver},
     time::Duration,
-    ucp::{Host, HostConfig},
+    ucp::{Host, host::HostConfig},
 };
 
 use super::{
@@ -140,7 +140,7 @@ impl<P: Wired> Life for HostLife<P> {
         let mut config = HostConfig::default();
         config.command_period = Duration::from_millis(10);
         config.command_gap = Duration::from_millis(2);
-        config.command_timeout = Duration::from_micros(TIMEOUT_US as u32);
+        config.dead_man = Duration::from_micros(TIMEOUT_US as u32);
         config.ping_period = Some(Duration::from_millis(40));
         config.ping_timeout = Duration::from_millis(50);
         config.link_timeout = Duration::from_millis(80);

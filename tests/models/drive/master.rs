@@ -9,7 +9,7 @@ use std::{
 
 use axlewire::{
     drive::{DriveError, Driver},
-    ikeya::{Master, MasterConfig, Mode, NodeId, OneMotor, Position, Rps, Target},
+    ikeya::{Master, Mode, NodeId, Position, Rps, Target, board::OneMotor, master::MasterConfig},
     time::Duration,
 };
 
@@ -168,7 +168,7 @@ impl<P: Wired> Life for MasterLife<P> {
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = MasterConfig::direct();
         config.nodes = [N1].into_iter().collect();
-        config.polling = axlewire::ikeya::Polling::Every(Duration::from_millis(1));
+        config.polling = axlewire::ikeya::master::Polling::Every(Duration::from_millis(1));
         config.dead_man = setup.dead_man_ms.map(Duration::from_millis);
         let driver = Driver::with(|now| Master::new(config, now), P::plug(&line), line.clone());
         Self { setup, line, node, driver, account: Account::default() }

@@ -18,7 +18,7 @@ mod replay;
 mod task;
 mod wire;
 
-use axlewire::{drive::Directed, ikeya::Mode};
+use axlewire::{drive::Rs485, ikeya::Mode};
 
 use crate::run::{Depth, Run};
 use {
@@ -44,7 +44,7 @@ fn worlds<P: Wired>(run: &mut Run, setup: Setup, depth: Depth, starts: &[(&str, 
     }
 }
 
-type WithPin = Directed<Shared, Pin, Pin>;
+type WithPin = Rs485<Shared, Pin, Pin>;
 
 fn master(run: &mut Run, is_async: bool) {
     let setup =

@@ -6,7 +6,7 @@
 use std::cell::RefMut;
 
 use axlewire::{
-    drive::{Clock, Directed, DirectedError, DriveError},
+    drive::{Clock, DriveError, Rs485, Rs485Error},
     time::{Duration, Instant},
 };
 
@@ -74,20 +74,20 @@ impl Wired for Shared {
 #[derive(Clone, Debug)]
 pub(crate) struct Pin(pub(super) Shared);
 
-impl Wired for Directed<Shared, Pin, Pin> {
+impl Wired for Rs485<Shared, Pin, Pin> {
     const HAS_PIN: bool = true;
 
     fn plug(line: &Shared) -> Self {
         let [before, after] = [BEFORE_US, AFTER_US].map(|us| Duration::from_micros(us as u32));
         let pin = Pin(line.clone());
-        Directed::with_delays(line.clone(), pin.clone(), pin, before, after).unwrap()
+        Rs485::with_delays(line.clone(), pin.clone(), pin, before, after).unwrap()
     }
 
-    fn failure(error: DirectedError<Broken, Broken>) -> Failure {
+    fn failure(error: Rs485Error<Broken, Broken>) -> Failure {
         match error {
-            DirectedError::Port(error) => Failure::Port(error.0),
-            DirectedError::Pin(error) => Failure::Pin(error.0),
-            DirectedError::Lost => Failure::Lost,
+            Rs485Error::Port(error) => Failure::Port(error.0),
+            Rs485Error::Pin(error) => Failure::Pin(error.0),
+            Rs485Error::Lost => Failure::Lost,
         }
     }
 }

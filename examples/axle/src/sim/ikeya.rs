@@ -101,7 +101,7 @@ impl Node {
         let mut config = SlaveConfig::usb_adapter();
         config.watchdog =
             watchdog.map(|micros| Duration::from_micros(micros.try_into().unwrap_or(u32::MAX)));
-        let slave = Slave::new(node, mode, config);
+        let slave = Slave::new(node, mode, config, Instant::from_micros(0));
         let motor = Motor::new().with_time_constant(TIME_CONSTANT);
         Self { motor: MotorNode::from_parts(slave, motor), told: None, is_under_way: false }
     }

@@ -53,7 +53,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
     // on a line of 500 kbit/s.
     config.answer_within = config.answer_within.max(config.idle.saturating_mul(5));
     let mut motor = Motor::new();
-    let mut slave: Slave = Slave::new(node, mode, config);
+    let mut slave: Slave = Slave::new(node, mode, config, Instant::from_micros(0));
     slave.set_position(motor.position());
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut last = board.clock.now();

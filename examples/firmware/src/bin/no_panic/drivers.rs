@@ -118,7 +118,7 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 #[inline(never)]
 fn slave<B: Board>() {
     let config = any(SlaveConfig::direct());
-    let mut driver = driver(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config));
+    let mut driver = driver(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
     while any(true) {
         match any(0) {
             0 => keep(driver.next_command(now())),

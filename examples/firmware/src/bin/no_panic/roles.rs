@@ -52,9 +52,9 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 fn slave<B: Board>(velocity: B::Velocity, position: B::Position) {
     let config = any(SlaveConfig::at(any(0)));
     if let Ok(dip) = DipSwitch::from_bits(any(0)) {
-        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config));
+        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config, Instant::from_micros(0)));
     }
-    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config));
+    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
     while any(true) {
         match any(0) {
             0 => slave.set_velocity(any(velocity)),
