@@ -1,5 +1,5 @@
-//! Drivers, the driver-enable pin, frame readers and writers: over a port and a pin that may fail at
-//! any call, and a port that may say that it has moved more bytes than there were.
+//! Drivers, the driver-enable pin, frame readers and writers, over a port and a pin that may fail
+//! at any call, and a port that may report more bytes than requested.
 
 use axlewire::{
     drive::{Directed, Driver},
@@ -34,7 +34,7 @@ pub fn all() {
     writer();
 }
 
-/// A port that does anything.
+/// A port with arbitrary behavior.
 struct Port;
 
 impl ErrorType for Port {
@@ -90,7 +90,7 @@ impl DelayNs for Delay {
     }
 }
 
-/// What every driver does.
+/// Calls common to all drivers.
 fn turn<R: Endpoint>(driver: &mut Driver<R, Port, fn() -> Instant>) {
     match any(0) {
         0 => keep(driver.service()),

@@ -1,4 +1,4 @@
-//! The four roles, bare: called in any order, with any settings.
+//! The four roles without drivers, called in any order, with any settings.
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
@@ -122,7 +122,7 @@ fn robot() {
     }
 }
 
-/// What every role does.
+/// Calls common to all roles.
 fn turn(role: &mut impl Endpoint) {
     match any(0) {
         0 => role.handle_input(input(), now()),
