@@ -4,8 +4,8 @@
 //!
 //! ```text
 //! byte 0       framing and buffer size
-//! byte 1       low two bits: which CRCs are repaired; upper six: how many bytes of ops follow
-//! then         ops, one byte each: what is done to the decoder, in turn (see `op`)
+//! byte 1       low two bits: which CRCs are repaired; upper six: number of ops that follow
+//! then         ops, one byte each: actions on the decoder, in order (see `op`)
 //! then         the stream
 //! ```
 
@@ -27,7 +27,8 @@ mod oracle;
 
 use line::{Known, Line, Op};
 
-/// Any stream, cut and interrupted in any way, against the oracle: the six Ikeya framings.
+/// Checks any stream, chunked and interrupted in any way, against the oracle: the six Ikeya
+/// framings.
 pub fn ikeya_stream(data: &[u8]) {
     let Some(script) = Script::read(data) else { return };
     match script.choice % 12 {
@@ -66,13 +67,13 @@ struct Script<'a> {
     stream: &'a [u8],
 }
 
-/// Which candidates get the CRC that their bytes ask for: a fuzzer does not guess it.
+/// Which candidates get a correct CRC, since a fuzzer does not guess it.
 #[derive(Clone, Copy)]
 enum Repair {
     None,
-    /// One after the other.
+    /// Consecutive ones.
     Adjacent,
-    /// Each, and what starts inside it before: frames in payloads.
+    /// All, inner ones first: frames in payloads.
     Nested,
     /// Every second one.
     Alternate,
@@ -98,12 +99,12 @@ impl<'a> Script<'a> {
         Line::<F, N>::new().play(&stream, &self.ops);
         line::check_slice::<F>(&stream);
         line::check_slice::<Portable<F>>(&stream);
-        // Feature `simd` looks at blocks of 128 bytes: more than most inputs have.
+        // Feature `simd` works on blocks of 128 bytes: more than most inputs have.
         line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
     }
 }
 
-/// One op of the script: its upper bits say what, its lower ones how much.
+/// Runs one op of the script: its upper bits are the kind, its lower bits the amount.
 fn op(byte: u8) -> Op {
     let amount = usize::from(byte & 0x1F);
     match byte >> 5 {
@@ -147,7 +148,7 @@ impl Repair {
     }
 }
 
-/// The CRC of any bytes, made and checked, against one bit after the other.
+/// Compares the CRC of any bytes, computed and checked, with a bitwise CRC.
 pub fn crc16(data: &[u8]) {
     let crc = oracle::crc(data);
     assert_eq!(crc16::compute(data), crc);
@@ -166,9 +167,9 @@ pub fn crc16(data: &[u8]) {
     }
 }
 
-/// Any value of any packet or message: encoded, found again, equal.
+/// Any value of any packet or message must survive encoding and decoding.
 pub fn roundtrip(data: &[u8]) {
-    // Too few bytes to make a value of are no finding.
+    // Too few bytes for a value are not a finding.
     let _ = roundtrip_of(&mut Unstructured::new(data));
 }
 
@@ -377,7 +378,7 @@ fn ucp_report(u: &mut Unstructured<'_>) -> Result<()> {
     Ok(())
 }
 
-/// U3: what has no message of its own goes through as it is.
+/// U3: frames without a known message pass through unchanged.
 fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     let (id, index) = (u.arbitrary()?, u.arbitrary()?);
     let raw = RawFrame { id, index, body: u.bytes(u.len().min(70))? };
@@ -391,7 +392,7 @@ fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     Ok(())
 }
 
-/// A body makes a frame that parses as itself and says what went in.
+/// A body makes a frame that parses as the same body with the same values.
 fn message<B: Body>(index: u8, body: B, is_same: impl Fn(Message<'_>, &B) -> bool) {
     let frame = body.frame(index);
     let parsed = ucp::Frame::parse(frame.as_bytes()).expect("own frame");
@@ -400,16 +401,17 @@ fn message<B: Body>(index: u8, body: B, is_same: impl Fn(Message<'_>, &B) -> boo
     found::<ucp::Ucp>(&frame, |found| is_same(found.message(), &body));
 }
 
-/// A packet is encoded into room enough and refused by less; among noise it is found as itself.
+/// A packet is encoded into a large enough buffer and refused by a smaller one; in noise it is
+/// found unchanged.
 fn found<F: Framing>(packet: &impl Encode, is_same: impl Fn(F::Frame<'_>) -> bool) {
     let (mut buffer, len) = ([0xEE; 300], packet.encoded_len());
     assert_eq!(packet.encode(&mut buffer).map(<[u8]>::len), Ok(len));
-    assert!(buffer[len..].iter().all(|&byte| byte == 0xEE), "written behind the frame");
+    assert!(buffer[len..].iter().all(|&byte| byte == 0xEE), "written past the frame");
 
     let mut small = [0xEE; 300];
     let refusal = packet.encode(&mut small[..len - 1]).map(<[u8]>::len);
     assert_eq!(refusal, Err(EncodeError::BufferTooSmall { needed: len, available: len - 1 }));
-    assert_eq!(small, [0xEE; 300], "written although it was refused");
+    assert_eq!(small, [0xEE; 300], "written although refused");
 
     let line = [&[0, 0], &buffer[..len], &[0]].concat();
     let mut frames = Frames::<F>::new(&line);

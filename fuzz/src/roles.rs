@@ -1,6 +1,6 @@
-//! Any bytes at any time, and any calls: no role panics, spins, or forgets what it promised.
+//! Any bytes at any time, and any calls: no role panics, spins, or breaks its contract.
 //!
-//! The data is a list of ops, one byte each with its arguments behind it; see `op` of each role.
+//! The data is a list of ops, each one byte followed by its arguments; see `op` of each role.
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
@@ -18,8 +18,8 @@ use axlewire::{
     },
 };
 
-/// Polls a role as its contract says, and checks what holds for every role. Returns the packets
-/// that it has sent.
+/// Polls a role as its contract requires, and checks the properties common to all roles. Returns
+/// the packets that it has sent.
 fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)) -> Vec<Vec<u8>> {
     if role.poll_timeout().is_some_and(|at| now >= at) {
         role.handle_timeout(now);
@@ -28,15 +28,15 @@ fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)
     while let Some(event) = role.poll_event() {
         told(event);
         events += 1;
-        assert!(events <= 64, "events without end");
+        assert!(events <= 64, "endless events");
     }
     let mut sent = Vec::new();
     while let Some(bytes) = role.poll_transmit(now) {
-        assert!(!bytes.is_empty(), "a packet of no bytes");
+        assert!(!bytes.is_empty(), "an empty packet");
         sent.push(bytes.to_vec());
-        assert!(sent.len() <= 64, "packets without end");
+        assert!(sent.len() <= 64, "endless packets");
     }
-    // A call too many does nothing.
+    // Spurious calls are harmless.
     role.handle_input(&[], now);
     assert!(role.poll_transmit(now).is_none());
     let next = role.poll_timeout();
@@ -44,7 +44,7 @@ fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)
     sent
 }
 
-/// The time: anywhere, also just before it wraps, and then forward only.
+/// The time: starts anywhere, including just before it wraps, and then only advances.
 struct Clock(Instant);
 
 impl Clock {
@@ -53,7 +53,7 @@ impl Clock {
         Ok(Self(Instant::from_micros(*u.choose(&begin)?)))
     }
 
-    /// A little time, or a lot.
+    /// A short or a long time.
     fn pass(&mut self, u: &mut Unstructured<'_>) -> Result<Instant> {
         let (step, scale): (u8, u8) = u.arbitrary()?;
         self.0 += Duration::from_micros(u32::from(step) << (scale % 16));
@@ -61,16 +61,16 @@ impl Clock {
     }
 }
 
-/// Up to 20 bytes as they come.
+/// Up to 20 raw bytes.
 fn raw<'a>(u: &mut Unstructured<'a>) -> Result<&'a [u8]> {
     let len = u.arbitrary_len::<u8>()?.min(20);
     u.bytes(len)
 }
 
-/// The master of a motor bus of either kind of boards.
+/// The master of a motor bus, with either kind of board.
 pub fn ikeya_master(data: &[u8]) {
     let mut u = Unstructured::new(data);
-    let turn = Rps::new(1.0).expect("a number");
+    let turn = Rps::new(1.0).expect("finite");
     let place = Position::new(1, -1);
     let _ = match u.arbitrary() {
         Ok(true) => master::<ThreeMotors>(&mut u, [turn; 3], [place; 3], |id, mode| match mode {
@@ -91,11 +91,11 @@ fn packet(frame: &impl Encode) -> Vec<u8> {
     frame.encode(&mut buffer).expect("room").to_vec()
 }
 
-/// What the application wants of each node.
+/// Commands of the application for each node.
 struct Wishes<B: Board> {
-    /// The latest order, unless it is a stop or has been withdrawn.
+    /// The latest order, unless it is a stop or was withdrawn.
     orders: [Option<Target<B>>; 8],
-    /// Nodes whose stop was owed the last time.
+    /// Nodes whose stop was owed at the last check.
     owed: NodeSet,
 }
 
@@ -104,21 +104,24 @@ impl<B: Board> Wishes<B> {
         &mut self.orders[usize::from(id.get() - 1)]
     }
 
-    /// Takes in what the master has decided by itself: it never owes less than before unless a stop
-    /// is paid, and gives no node that is owed one anything else.
+    /// Checks and adopts the master's own decisions: it never owes less than before unless a stop
+    /// is paid, and a node that is owed a stop gets nothing else.
     fn follow(&mut self, master: &mut Master<B>, turn: B::Velocity, now: Instant) {
         let owed = master.stops_owed();
         for id in NodeId::ALL {
             let set_point = master.set_point(id);
             if owed.contains(id) {
                 *self.order(id) = None;
-                assert_eq!(set_point, None, "a set-point beside a stop");
+                assert_eq!(set_point, None, "a set-point despite an owed stop");
                 assert_eq!(master.stop_progress(id), StopProgress::Owed);
-                assert!(master.set_velocity(id, turn, now).is_err(), "taken, and the stop owed");
+                assert!(
+                    master.set_velocity(id, turn, now).is_err(),
+                    "accepted despite an owed stop"
+                );
             } else if self.owed.contains(id) && self.order(id).is_none() {
                 let progress = master.stop_progress(id);
                 let is_paid = matches!(progress, StopProgress::Paid | StopProgress::StandingStill);
-                assert!(is_paid, "a stop that is forgotten: {progress:?}");
+                assert!(is_paid, "a forgotten stop: {progress:?}");
             }
             let is_online = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
             assert!(is_online || set_point.is_none(), "a set-point for a node that is not online");
@@ -129,7 +132,7 @@ impl<B: Board> Wishes<B> {
         self.owed = owed;
     }
 
-    /// A WRITE is the latest order, in the mode of the node, or a stop: the nodes stand still at 0.
+    /// A WRITE is the latest order, in the mode of the node, or a stop: the nodes are at rest at 0.
     fn check(&mut self, sent: &[u8], master: &Master<B>, stop: &Stops) {
         let id = NodeId::new(sent[1]).expect("an id on the wire");
         let is_stop = [&stop.velocity, &stop.position]
@@ -138,18 +141,18 @@ impl<B: Board> Wishes<B> {
         if is_stop {
             return;
         }
-        let order = self.order(id).expect("nobody has asked for that");
+        let order = self.order(id).expect("an order that was not given");
         let expected = match order {
             Target::Velocity(to) => packet(&B::write_velocity(id, to)),
             Target::Position(to) => packet(&B::write_position(id, to)),
         };
         assert_eq!(sent, expected, "not the latest order");
-        assert_eq!(master.mode(id), Some(order.mode()), "in another mode");
-        assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "in doubt about the mode");
+        assert_eq!(master.mode(id), Some(order.mode()), "wrong mode");
+        assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "mode in doubt");
     }
 }
 
-/// What stops a node that stands still at 0, without the CRC.
+/// The stop command for a node at rest at 0, without the CRC.
 struct Stops {
     velocity: Vec<u8>,
     position: Vec<u8>,
@@ -179,7 +182,7 @@ fn master<B: Board>(
     let mut clock = Clock::new(u)?;
     let mut master = Master::<B>::new(config, clock.0);
     let mut wishes = Wishes { orders: [None; 8], owed: NodeSet::NONE };
-    // The node that was asked and may answer.
+    // The node that was read and may answer.
     let mut asked = None;
     while !u.is_empty() {
         let id = *u.choose(&NodeId::ALL)?;
@@ -209,7 +212,7 @@ fn master<B: Board>(
             6 => {
                 let owed = master.stops_owed();
                 master.release(id);
-                assert_eq!(master.stops_owed(), owed, "a release is no way out of a stop");
+                assert_eq!(master.stops_owed(), owed, "a release must not cancel a stop");
             }
             7 => drop(master.read(id, now)),
             8 => master.keep_alive(now),
@@ -221,7 +224,7 @@ fn master<B: Board>(
             11 => {
                 let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
                 master.handle_input(&answer(id, mode), now);
-                // Only the node that was asked can have answered.
+                // Only the node that was read can have answered.
                 statuses = u32::from(asked == Some(id));
             }
             _ => {
@@ -238,7 +241,7 @@ fn master<B: Board>(
             told += u32::from(matches!(event, MasterEvent::Status { .. }));
         });
         wishes.follow(&mut master, turn, now);
-        // Raw input may hold a good answer, too; it is as long as one then.
+        // Raw input may also contain a good answer if it is long enough.
         assert!(told <= statuses.max(1), "{told} answers to one request");
         for sent in sent {
             let id = NodeId::new(sent[1]).expect("an id on the wire");
@@ -270,17 +273,17 @@ fn check_counts<B: Board>(master: &Master<B>) {
         let node = master.node_statistics(id);
         let closed = u64::from(node.replies) + u64::from(node.timeouts);
         let requests = u64::from(node.requests);
-        assert!(closed <= requests, "an answer to no request: {node:?}");
-        // An answer that puts the mode in doubt closes its window as well.
+        assert!(closed <= requests, "an answer without a request: {node:?}");
+        // An answer that puts the mode in doubt also closes its window.
         let open = requests - closed;
         let doubtful = u64::from(node.other_mode);
-        assert!(open <= doubtful + 1, "a request without an end: {node:?}");
+        assert!(open <= doubtful + 1, "an unfinished request: {node:?}");
         let mode = master.status(id).map(|(status, _): (Status<B>, _)| status.mode());
         assert_eq!(mode, master.mode(id));
     }
 }
 
-/// A slave of a motor bus of either kind of boards.
+/// A slave of a motor bus, with either kind of board.
 pub fn ikeya_slave(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let _ = match u.arbitrary() {
@@ -316,7 +319,7 @@ fn slave<B: Board>(
             3 => slave.set_velocity(B::ZERO),
             4 => slave.handle_unsent(*u.choose(&[Unsent::Untouched, Unsent::CutOff])?, now),
             5 => {
-                // The beginning of the next packet is enough.
+                // The start of the next packet is enough.
                 slave.handle_input(&request(id, None), now);
                 slave.handle_input(&[0xAA], now);
                 assert_eq!(slave.poll_transmit(now + config.turnaround_gap), None);
@@ -356,7 +359,7 @@ fn host(u: &mut Unstructured<'_>) -> Result<()> {
     let low_ids_only = config.low_ids_only;
     let mut clock = Clock::new(u)?;
     let mut host = Host::with_store(config, MemoryStore::default(), clock.0);
-    // Speed and turn of the last command, and whether an update may be under way.
+    // Speed and turn of the last command, and whether an update may be in progress.
     let (mut wanted, mut updating) = (None, false);
     let mut is_first = true;
     while !u.is_empty() {
@@ -398,10 +401,10 @@ fn host(u: &mut Unstructured<'_>) -> Result<()> {
                     let motion = (command.speed(), command.angular());
                     assert!(
                         motion == (0, 0) || Some(motion) == wanted,
-                        "{motion:?} was not asked for"
+                        "{motion:?} was not commanded"
                     );
                 }
-                Message::OtaRequest(_) => assert!(updating, "an update that nobody started"),
+                Message::OtaRequest(_) => assert!(updating, "an update that was not started"),
                 message => assert!(is_to_robot(&message), "{message:?} from a host (U13)"),
             }
         }
@@ -417,7 +420,7 @@ pub fn ucp_robot(data: &[u8]) {
 fn robot(u: &mut Unstructured<'_>) -> Result<()> {
     let mut clock = Clock::new(u)?;
     let mut robot = Robot::new(RobotConfig::default(), clock.0);
-    // What has been received, and when.
+    // Received bytes with their times.
     let mut history: Vec<(Instant, u8)> = Vec::new();
     while !u.is_empty() {
         let now = clock.pass(u)?;
@@ -454,7 +457,7 @@ fn unsent(u: &mut Unstructured<'_>) -> Result<Unsent> {
     Ok(*u.choose(&[Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed])?)
 }
 
-/// Has a whole motor command for this motion arrived in the last 500 ms?
+/// Whether a complete motor command for this motion has arrived in the last 500 ms.
 fn was_commanded(history: &[(Instant, u8)], motion: (i16, i16), now: Instant) -> bool {
     let recent = |window: &&[(Instant, u8)]| now - window[23].0 < Duration::from_millis(500);
     history.windows(24).filter(recent).any(|window| {
@@ -466,7 +469,7 @@ fn was_commanded(history: &[(Instant, u8)], motion: (i16, i16), now: Instant) ->
     })
 }
 
-/// A message that only a host may send, those of both directions left out.
+/// Whether only a host may send this message; excludes those of both directions.
 fn is_to_robot(message: &Message<'_>) -> bool {
     matches!(
         message,
@@ -503,13 +506,13 @@ fn from_robot(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     })
 }
 
-/// A good frame of a host, a careless one included.
+/// A good frame of a host, possibly a careless one.
 fn from_host(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     let index = u.arbitrary()?;
     Ok(match u.int_in_range(0..=7)? {
         0 => ucp::Ping {}.frame(index).as_bytes().to_vec(),
         1 | 2 => {
-            // Any sixteen bytes: also out of range, also a version that starts an update.
+            // Any sixteen bytes, including values out of range and versions that start an update.
             let body: [u8; 16] = u.arbitrary()?;
             let mut frame = vec![0xFD, 0xFF, 20, 0, 2, index];
             frame.extend(body);
