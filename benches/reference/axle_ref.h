@@ -12,7 +12,7 @@ uint16_t axle_ref_crc_table(const uint8_t *bytes, size_t len);
 uint16_t axle_ref_crc_bitwise(const uint8_t *bytes, size_t len);
 
 /* The result of a receiver: the number of frames, and a sum over their contents: the id of every
- * frame, and the first four bytes behind its header as a little-endian number, if present. */
+ * frame, and the first four bytes after its header as a little-endian number, if present. */
 struct axle_ref_tally {
     uint64_t frames;
     uint64_t sum;

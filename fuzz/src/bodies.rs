@@ -155,7 +155,8 @@ pub fn crc16(data: &[u8]) {
 
     let mut frame = [data, &crc.to_le_bytes()].concat();
     assert!(crc16::check(&frame));
-    // Two values have the same remainder modulo one factor of the polynomial, and two the same parity.
+    // Two of these errors keep the remainder modulo one factor of the polynomial, and two the
+    // parity.
     for other in [0xC001, 0x0003, 0xFFFF] {
         let [.., low, high] = &mut frame[..] else { return };
         [*low, *high] = (crc ^ other).to_le_bytes();

@@ -22,7 +22,7 @@ use crate::{
 /// library), the tool repeats the stop until the reports show that all wheels have stopped; a
 /// second Ctrl-C does not cut this short. If the robot is no longer heard, it may be moving: the
 /// tool says so, and the exit code is 1. After Ctrl-Z and fg nothing moves again, and the exit code
-/// is 1. After Ctrl-Z and fg nothing moves again, and the exit code is 1.
+/// is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {

@@ -1,7 +1,7 @@
 //! `axle`: the host tool for Ikeya MD and UCP lines.
 //!
 //! Results go to standard output. Every failure gives one line on standard error and an exit code
-//! that tells a usage error from other failures.
+//! that distinguishes usage errors from other failures.
 
 mod args;
 mod bus;

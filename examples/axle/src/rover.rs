@@ -137,7 +137,7 @@ impl Rover {
         }))
     }
 
-    /// The latest report in one line.
+    /// The latest report on one line.
     pub(crate) fn describe(&self) -> Option<String> {
         let report = self.host.last_report()?;
         let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);

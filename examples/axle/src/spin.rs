@@ -41,7 +41,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     goal: GoalArgs,
 
-    /// Refuse an --rps faster than this, in either direction, to catch typing errors
+    /// Refuse an --rps faster than this, in either direction, to guard against typos
     #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
     max_rps: Rps,
 

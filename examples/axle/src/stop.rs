@@ -21,7 +21,7 @@ use crate::{
 /// have stopped.
 ///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
-/// within some 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.
+/// within about 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.
 ///
 /// What is sent on the wire: with --protocol ikeya or ikeya-3, READ packets for ids 1 to 8, or for
 /// --node only, and WRITE packets for those that answer; with --protocol ucp, zero motor commands

@@ -100,8 +100,7 @@ async fn main(_spawner: Spawner) {
     }
 }
 
-/// Telemetry for a 12-bit ADC reading: 4095 is 13.2 V. Three cells are empty at 9.6 V, full at 12.6
-/// V.
+/// Telemetry for a 12-bit ADC reading: 4095 is 13.2 V. Three cells range from 9.6 V to 12.6 V.
 fn measured(raw: u16) -> Telemetry {
     let voltage_dv = u32::from(raw.min(4095)) * 132 / 4095;
     let battery_pct = voltage_dv.saturating_sub(96).min(30) * 100 / 30;

@@ -95,8 +95,7 @@ impl Board {
         self.is_emulated
     }
 
-    /// Waiting time for something due `on_board`: longer in an emulator, whose host has no
-    /// real-time behavior.
+    /// The timeout `on_board`; longer in an emulator, whose host is not real-time.
     pub fn patience(&self, on_board: Duration) -> Duration {
         if self.is_emulated { on_board.max(EMULATOR_PATIENCE) } else { on_board }
     }

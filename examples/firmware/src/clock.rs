@@ -110,8 +110,8 @@ impl DriverClock for Clock {
             return;
         }
         // With interrupts disabled, an earlier interrupt shows in the flag, and a later one still
-        // wakes the processor and is served after the critical section. So does the alarm, which
-        // has no handler.
+        // wakes the processor and is served after the critical section. The alarm, which has no
+        // handler, wakes it too.
         critical_section::with(|cs| {
             if uart::has_happened(cs) {
                 return;

@@ -44,7 +44,7 @@ impl Line {
 
     /// Adds a name and a number in thousandths, saturating.
     pub fn thousandths(&mut self, name: &str, value: f32) -> &mut Self {
-        // `as` truncates and saturates, so half of one away from zero makes it round.
+        // `as` truncates and saturates, so adding half away from zero rounds.
         self.number(name, (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i32)
     }
 

@@ -20,8 +20,7 @@ use critical_section::{CriticalSection, Mutex};
 use heapless::spsc::Queue as Spsc;
 use stm32f4::stm32f405::{Interrupt, usart1::RegisterBlock};
 
-/// Queue between an interrupt and the main loop, 511 bytes: 10 ms of a fully loaded line at 500
-/// kbit/s.
+/// Queue between an interrupt and the main loop, 511 bytes: 10 ms of a full 500 kbit/s line.
 pub type Queue = Spsc<u8, 512>;
 
 /// A queue that both sides access in a critical section.
@@ -65,11 +64,13 @@ pub struct Channel<U> {
     usart: Mutex<OnceCell<U>>,
     inbox: Shared,
     outbox: Shared,
-    /// Bytes lost by the hardware because the previous one was still in the data register.
+    /// Number of bytes lost by the hardware because the previous one was still in the data
+    /// register.
     overruns: AtomicU32,
-    /// Bytes that arrived while the queue was full: the main loop was too slow.
+    /// Number of bytes that arrived while the queue was full: the main loop was too slow.
     lost: AtomicU32,
-    /// Bytes with a framing error or noise in the middle of a bit. They are still received.
+    /// Number of bytes with a framing error or noise in the middle of a bit. They are still
+    /// received.
     damaged: AtomicU32,
 }
 

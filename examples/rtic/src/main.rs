@@ -1,5 +1,4 @@
-//! A slave of a motor bus with RTIC: receives all traffic, answers a READ for its own id within 50
-//! µs.
+//! A slave of a motor bus with RTIC: receives all traffic, answers its own READs within 50 µs.
 //!
 //! STM32F405. PA9 and PA10 are the UART at 500 kbit/s, PA8 enables the driver of the RS485
 //! transceiver, PC0 to PC3 are the DIP switch.

@@ -178,7 +178,8 @@ fn the_pin_stays_on_until_the_last_stop_bit(
     let Ok(mut port) = Directed::new(port, Pin);
     for frame in [&[1u8; 4][..], &[2; 8], &[3; 44]] {
         let before = SWITCHES.load(Relaxed);
-        // The data register is full, and remains so until the first tick. SAFETY: RAM.
+        // The data register is full, and remains so until the first tick.
+        // SAFETY: RAM.
         unsafe { registers.sr().write(|w| w.bits(0)) };
         SHIFTING.store(SHIFT_TICKS, Relaxed);
         expect("a frame is queued", port.write(frame) == Ok(frame.len()));
