@@ -34,7 +34,7 @@ pub fn all() {
     writer();
 }
 
-/// A port with arbitrary behavior.
+/// A port with arbitrary behaviour.
 struct Port;
 
 impl ErrorType for Port {
