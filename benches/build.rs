@@ -1,14 +1,14 @@
-//! Builds the C reference, always at -O3: it is what axlewire is measured against, so it must not
-//! change with the Rust profile.
+//! Builds the C reference, always at -O3: axlewire is measured against it, so it must not change
+//! with the Rust profile.
 
 use std::{env, fmt::Write, fs, path::Path};
 
-/// 0x8005 with its bits in the order of the wire (ruling B1).
+/// 0x8005 with its bits in wire order (ruling B1).
 const POLYNOMIAL: u16 = 0xA001;
 
 fn main() {
     let out = env::var_os("OUT_DIR").expect("cargo sets OUT_DIR");
-    fs::write(Path::new(&out).join("crc_tables.h"), tables()).expect("OUT_DIR can be written");
+    fs::write(Path::new(&out).join("crc_tables.h"), tables()).expect("OUT_DIR is writable");
 
     for source in ["axle_ref.c", "axle_ref.h"] {
         println!("cargo::rerun-if-changed=reference/{source}");
@@ -24,7 +24,7 @@ fn main() {
         .compile("axle_ref");
 }
 
-/// The two tables of the classic code: low and high byte of what one byte does to the CRC.
+/// The two tables of the classic code: low and high byte of the CRC of each byte.
 fn tables() -> String {
     let effects: Vec<u16> = (0..=255).map(effect).collect();
     let mut header = String::new();
@@ -40,7 +40,7 @@ fn tables() -> String {
     header
 }
 
-/// What one byte does to the CRC, bit by bit.
+/// CRC of one byte, bit by bit.
 fn effect(byte: u16) -> u16 {
     (0..8).fold(byte, |crc, _| if crc & 1 == 1 { crc >> 1 ^ POLYNOMIAL } else { crc >> 1 })
 }

@@ -103,7 +103,7 @@ def recovered(values):
 
 
 def nice(limit):
-    """The next round number that leaves room above."""
+    """The next round number that leaves headroom."""
     step = 10.0
     while step > limit:
         step /= 10

@@ -1,7 +1,7 @@
 //! CRC-16/MODBUS of 2 to 4096 bytes: ours, C and the `crc` crate.
 //!
-//! 6 and 42 bytes are what the CRC covers in an Ikeya packet and in a UCP report. All are called
-//! through a function pointer, as C has to be, which costs each of them the same.
+//! The CRC covers 6 bytes of an Ikeya packet and 42 of a UCP report. All are called through a
+//! function pointer, as C must be, at the same cost for each.
 
 use std::hint::black_box;
 
@@ -56,7 +56,7 @@ fn length(criterion: &mut Criterion, len: usize) {
         });
     }
 
-    // `check` reads the two bytes of the CRC on top.
+    // `check` also reads the two CRC bytes.
     assert!(crc16::check(&frame), "{len} bytes");
     group.bench_with_input("axlewire check", &frame[..], |bencher, frame| {
         let check = black_box(crc16::check as fn(&[u8]) -> bool);

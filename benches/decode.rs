@@ -1,8 +1,8 @@
-//! Frames out of a byte stream: ours, C and other crates, in bytes and frames per second.
+//! Decoding of byte streams by axlewire, C and other crates, in bytes and frames per second.
 //!
-//! The streams have 4 MiB: more than the second-level cache of today's machines, less than most
-//! third-level ones. Every iteration checks what was found against the slow oracle; axlewire must
-//! find exactly that, C must find it on clean streams and the same as before on all others.
+//! The streams have 4 MiB: more than the second-level cache of current machines, less than most
+//! third-level caches. Every iteration checks its result against the slow oracle: axlewire must
+//! match it exactly; C must match it on clean streams, and itself on all others.
 
 use std::hint::black_box;
 
@@ -29,7 +29,7 @@ fn main() {
     criterion.final_summary();
 }
 
-/// A stream with frames in it: however it is cut, every intact one is found.
+/// A stream with frames: however it is chunked, every intact frame is found.
 fn sent(criterion: &mut Criterion, stream: &Stream) {
     let Stream { name, protocol, bytes, intact, .. } = stream;
     let found = (protocol.frame_ends)(bytes);
@@ -48,7 +48,7 @@ fn sent(criterion: &mut Criterion, stream: &Stream) {
     bench_c(&mut group, stream);
 }
 
-/// A stream without frames, except for those that chance made.
+/// A stream without frames, except by chance.
 fn hostile(criterion: &mut Criterion, stream: &Stream) {
     let Stream { name, protocol, bytes, .. } = stream;
     let expected = (protocol.oracle)(bytes);
@@ -61,7 +61,7 @@ fn hostile(criterion: &mut Criterion, stream: &Stream) {
     bench_c(&mut group, stream);
 }
 
-/// C must find everything on a clean line; on others it loses frames, and always the same ones.
+/// C must find all frames of a clean stream; in others it loses frames, but always the same ones.
 fn bench_c(group: &mut Group<'_>, stream: &Stream) {
     let Stream { name, protocol, bytes, sent, intact } = stream;
     let all = (protocol.oracle)(bytes);
@@ -73,7 +73,7 @@ fn bench_c(group: &mut Group<'_>, stream: &Stream) {
     bench(group, "C bitwise", bytes, expected, protocol.c_bitwise);
 }
 
-/// UCP reports against frames as long, or a byte shorter, of other protocols.
+/// UCP reports against frames of other protocols, equally long or one byte shorter.
 fn frames_of_44_bytes(criterion: &mut Criterion) {
     let ours = streams::reports(LEN);
     let frames = ours.intact.len();
@@ -111,7 +111,7 @@ fn bench_peer(
 
 type Group<'a> = BenchmarkGroup<'a, WallTime>;
 
-/// Measures one decoder, in bytes and frames, and checks what it finds every time.
+/// Measures one decoder, in bytes and frames, and checks its result every time.
 fn bench(
     group: &mut Group<'_>,
     name: &str,

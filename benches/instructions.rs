@@ -1,8 +1,8 @@
-//! A fixed amount of one kind of work, for `instructions.sh` to count the instructions of.
+//! A fixed amount of one kind of work, whose instructions `instructions.sh` counts.
 //!
-//! `instructions list` names the kinds and how many frames one round has; `instructions NAME N`
-//! does N rounds of one and checks the answers. The script takes the difference between two counts,
-//! so making the streams and starting the program cost nothing.
+//! `instructions list` lists the kinds and their frames per round; `instructions NAME N` runs N
+//! rounds of one kind and checks the answers. The script takes the difference between two counts,
+//! which cancels the cost of startup and of making the streams.
 
 use std::{env, hint::black_box, process::ExitCode};
 
@@ -12,10 +12,10 @@ use axlewire_benches::{
     streams::{self, Stream},
 };
 
-/// Short, since valgrind takes its time, but long enough for the rare frames to have their share.
+/// Short, because valgrind is slow, but long enough to contain the rare frames.
 const STREAM_LEN: usize = 256 << 10;
 
-/// CRCs in one round.
+/// Number of CRCs in one round.
 const CRCS: u64 = 1000;
 
 type Decode = fn(&[u8]) -> Tally;
@@ -73,7 +73,7 @@ fn usage() -> ExitCode {
 }
 
 impl Kind {
-    /// Frames, or CRCs, in one round.
+    /// Number of frames or CRCs in one round.
     fn frames(&self) -> u64 {
         match self {
             Self::Stream(make, _) => make(STREAM_LEN).sent as u64,

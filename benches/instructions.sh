@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# Instructions per frame, counted by valgrind: figures that a busy machine does not change.
+# Instructions per frame, counted by valgrind: figures that do not depend on machine load.
 #
 #   bash benches/instructions.sh            count and print, `name instructions`
 #   bash benches/instructions.sh --record   the same, into benches/instructions.txt
 #   bash benches/instructions.sh --check    fail when a count is more than 3 % over the recorded one
 #
-# `c_...` are those of the C reference: recorded to compare with, not checked.
+# `c_...` counts are of the C reference: recorded for comparison, not checked.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 record=benches/instructions.txt
 
 if ! command -v valgrind >/dev/null; then
-    echo "instructions: skipped, there is no valgrind"
+    echo "instructions: skipped, valgrind is missing"
     exit
 fi
 if [ "$(uname -m)" != x86_64 ]; then
@@ -24,14 +24,14 @@ program=${CARGO_TARGET_DIR:-target}/release/instructions
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
 
-# Instructions of the whole program with so many rounds of one kind.
+# Instructions of the whole program with this many rounds of one kind.
 count() {
     valgrind --tool=callgrind --callgrind-out-file="$scratch/out" "$program" "$1" "$2" 2>"$scratch/log" ||
         { cat "$scratch/log" >&2; return 1; }
     awk '$1 == "summary:" || $1 == "totals:" { print $2; exit }' "$scratch/out"
 }
 
-# The second round costs nothing but the work itself.
+# The second round adds only the work itself.
 measure() {
     local name frames once twice
     while read -r name frames; do
@@ -61,7 +61,7 @@ case ${1:-} in
         { counted[$1] = $2; print $1, $2, "recorded", ($1 in recorded) ? recorded[$1] : "nothing" }
         END {
             for (name in counted) if (!(name in recorded)) { print name ": not recorded"; bad = 1 }
-            for (name in recorded) if (!(name in counted)) { print name ": recorded, but gone"; bad = 1 }
+            for (name in recorded) if (!(name in counted)) { print name ": recorded, but not counted"; bad = 1 }
             for (name in counted) if (name !~ /^c_/ && (name in recorded) && counted[name] > 1.03 * recorded[name]) {
                 print name ": more than 3 % over the recorded count"; bad = 1
             }

@@ -1,7 +1,7 @@
-//! What the benchmarks share: byte streams to decode, the decoders of axlewire, C and other crates
-//! behind one signature, and a slow oracle that says what is in a stream.
+//! Code shared by the benchmarks: byte streams to decode, the decoders of axlewire, C and other
+//! crates behind one signature, and a slow oracle for the contents of a stream.
 //!
-//! `cargo bench -p axlewire-benches` measures; with `-- --test` it runs everything once and so
+//! `cargo bench -p axlewire-benches` measures; with `-- --test` it runs everything once, which
 //! checks all answers in a few seconds.
 
 pub mod oracle;
@@ -13,19 +13,19 @@ pub mod streams;
 
 use axlewire::{ikeya, stream::Portable, ucp};
 
-/// What a decoder found. All decoders of the same bytes can be compared by it.
+/// The result of a decoder, for comparing decoders of the same bytes.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[repr(C)]
 pub struct Tally {
-    /// Frames.
+    /// Number of frames.
     pub frames: u64,
-    /// Sum over what was in them, so that no decoder can get away without handing them out: the
-    /// id of every frame, and its first four payload bytes as a number where it has so many.
+    /// Sum over their contents, so that no decoder can skip handing them out: the id of every
+    /// frame, and its first four payload bytes as a number if it has as many.
     pub sum: u64,
 }
 
 impl Tally {
-    // The C reference adds inline, too.
+    // The C reference also adds inline.
     #[inline]
     fn add(&mut self, id: u8, payload: Option<[u8; 4]>) {
         let number = payload.map_or(0, u32::from_le_bytes);
@@ -34,28 +34,28 @@ impl Tally {
     }
 }
 
-/// One protocol with all that decodes it.
+/// One protocol with all of its decoders.
 #[derive(Clone, Copy, Debug)]
 pub struct Protocol {
-    /// For reports.
+    /// Name for reports.
     pub name: &'static str,
     /// `axlewire::stream::Frames` over the whole slice, in a loop.
     pub frames: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Frames::each`.
     pub each: fn(&[u8]) -> Tally,
-    /// The same with feature `simd`; everything else here is as without.
+    /// The same with feature `simd`; everything else here runs without it.
     pub each_simd: fn(&[u8]) -> Tally,
-    /// `axlewire::stream::Decoder`, fed with pieces of so many bytes.
+    /// `axlewire::stream::Decoder`, fed with chunks of this many bytes.
     pub decoder: fn(&[u8], usize) -> Tally,
-    /// The same, with each byte pushed as a receive interrupt does.
+    /// The same, with each byte pushed as by a receive interrupt.
     pub pushed: fn(&[u8]) -> Tally,
     /// The C receiver with the two-table CRC.
     pub c_table: fn(&[u8]) -> Tally,
     /// The C receiver with the bitwise CRC.
     pub c_bitwise: fn(&[u8]) -> Tally,
-    /// What is in the bytes.
+    /// The true contents of the bytes.
     pub oracle: fn(&[u8]) -> Tally,
-    /// Where the frames end that axlewire finds.
+    /// End offsets of the frames that axlewire finds.
     pub frame_ends: fn(&[u8]) -> Vec<usize>,
 }
 

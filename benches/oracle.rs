@@ -1,5 +1,5 @@
-//! Says what is in a stream, slowly and plainly: tries every offset with the bitwise CRC of the C
-//! reference. It shares no code with axlewire.
+//! Finds the contents of a stream slowly and simply: tries every offset with the bitwise CRC of the
+//! C reference. It shares no code with axlewire.
 
 use crate::{Tally, reference::crc_bitwise};
 
@@ -13,7 +13,7 @@ pub fn ikeya(bytes: &[u8]) -> Tally {
             _ => return None,
         };
         let frame = rest.get(..len).filter(|frame| crc_is_right(frame))?;
-        // A whole packet for a node that cannot exist is skipped whole (ruling I1).
+        // A complete packet with an invalid node id is skipped as a whole (ruling I1).
         let payload = if len == 8 { frame.get(2..6) } else { None };
         Some(Candidate { len, id: frame[1], payload, counts: (1..=8).contains(&frame[1]) })
     })
@@ -35,7 +35,7 @@ pub fn ucp(bytes: &[u8]) -> Tally {
     })
 }
 
-/// A whole frame with a right CRC.
+/// A complete frame with a correct CRC.
 struct Candidate<'a> {
     len: usize,
     id: u8,

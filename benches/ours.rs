@@ -1,4 +1,4 @@
-//! The decoders of axlewire behind the signature that all decoders here share.
+//! The decoders of axlewire behind the signature shared by all decoders here.
 
 use axlewire::{
     ikeya::{Packet, Request, Response},
@@ -43,7 +43,7 @@ impl Sample for &ucp::Frame {
     }
 }
 
-/// Decodes a slice that is in memory, in a loop; nothing follows it.
+/// Decodes a complete slice in a loop.
 pub fn frames<F>(bytes: &[u8]) -> Tally
 where
     F: Framing,
@@ -56,7 +56,7 @@ where
     })
 }
 
-/// The same, all frames taken together.
+/// The same with `Frames::each`.
 pub fn each<F>(bytes: &[u8]) -> Tally
 where
     F: Framing,
@@ -65,7 +65,7 @@ where
     whole::<F>(bytes, |frames, tally| frames.each(|frame| frame.add_to(tally)))
 }
 
-/// Takes all frames, also those behind candidates that the end cuts off.
+/// Takes all frames, including those inside candidates truncated by the end.
 #[inline(always)]
 fn whole<F: Framing>(bytes: &[u8], take: impl Fn(&mut Frames<'_, F>, &mut Tally)) -> Tally {
     let mut tally = Tally::default();
@@ -115,7 +115,7 @@ where
     tally
 }
 
-/// The line goes quiet: what is still held is looked through.
+/// Searches the bytes still held, as after silence on the line.
 fn finish<F, const N: usize>(mut decoder: Decoder<F, N>, tally: &mut Tally)
 where
     F: Framing,
@@ -127,7 +127,7 @@ where
     }
 }
 
-/// Takes what the decoder has. Inlined, as a loop that a user writes is.
+/// Takes all pending events. Inlined, like a loop in user code.
 #[inline(always)]
 fn drain<F, const N: usize>(decoder: &mut Decoder<F, N>, tally: &mut Tally)
 where
@@ -141,7 +141,7 @@ where
     }
 }
 
-/// Where the frames end that [`frames`] finds, bytes from the front.
+/// End offsets of the frames that [`frames`] finds.
 pub fn frame_ends<F: Framing>(bytes: &[u8]) -> Vec<usize> {
     let mut ends = Vec::new();
     let mut frames = Frames::<F>::new(bytes);

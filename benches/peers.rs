@@ -1,5 +1,5 @@
 //! Other crates on frames of their own protocols, as long as ours: clean streams, so that every
-//! parser does nothing but its ordinary work.
+//! parser does only its ordinary work.
 
 use std::io::Cursor;
 
@@ -20,7 +20,8 @@ pub const MAVLINK_LEN: usize = 44;
 /// Length of a UBX frame here, bytes: that of a UCP report.
 pub const UBLOX_LEN: usize = 44;
 
-/// Length of a Modbus response here, bytes: registers come in pairs, so one less than a report.
+/// Length of a Modbus response here, bytes: registers have two bytes each, so one less than a
+/// report.
 pub const MODBUS_RESPONSE_LEN: usize = 43;
 
 /// Length of a Modbus request here, bytes: that of an Ikeya response.
@@ -45,7 +46,7 @@ pub fn mavlink_frames(count: usize) -> Vec<u8> {
             yawspeed: unit(),
         };
         mavlink::write_v2_msg(&mut bytes, header, &MavMessage::ATTITUDE_QUATERNION(attitude))
-            .expect("a vector takes all");
+            .expect("a vector accepts all bytes");
     }
     bytes
 }
@@ -55,7 +56,7 @@ pub fn mavlink_frames(count: usize) -> Vec<u8> {
 pub fn mavlink_read(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();
     let mut reader = MavlinkReader::new(Cursor::new(bytes));
-    // The end of the bytes is an error.
+    // The end of the bytes gives an error.
     while let Ok((header, message)) = reader.read_message::<MavMessage>(MavlinkVersion::V2) {
         if let MavMessage::ATTITUDE_QUATERNION(attitude) = message {
             tally.add(header.sequence, Some(attitude.time_boot_ms.to_le_bytes()));
@@ -74,7 +75,7 @@ pub fn ublox_frames(count: usize) -> Vec<u8> {
         let (content, sums) = frame.split_at_mut(UBLOX_LEN - 2);
         content.fill_with(|| rng.byte());
         content[..6].copy_from_slice(&[0xB5, 0x62, 0x01, 0x12, 36, 0]);
-        // Fletcher's two sums leave out the two bytes of the header.
+        // Fletcher's two sums exclude the two header bytes.
         let (mut first, mut second) = (0u8, 0u8);
         for byte in &content[2..] {
             first = first.wrapping_add(*byte);
@@ -146,8 +147,8 @@ fn modbus_read(kind: modbus_core::DecoderType, mut bytes: &[u8]) -> Tally {
     tally
 }
 
-/// `rmodbus` as the server that the requests are for. It does not look for frames: it is handed
-/// each one, cut out.
+/// `rmodbus` as the server addressed by the requests. It does not search for frames: it gets each
+/// one as a separate slice.
 #[must_use]
 pub fn rmodbus_read_requests(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();

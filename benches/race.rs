@@ -1,4 +1,4 @@
-//! Measures contenders in turns, so that whatever else the machine does meets all of them alike.
+//! Measures contenders in turn, so that other load on the machine affects all of them alike.
 
 use std::{hint::black_box, time::Instant};
 
@@ -8,27 +8,27 @@ use crate::Tally;
 pub struct Contender<'a> {
     name: String,
     work: Box<dyn Fn() -> Tally + 'a>,
-    /// What it must answer, every time.
+    /// Required result of every run.
     expected: Tally,
 }
 
 impl<'a> Contender<'a> {
-    /// `work` must answer `expected`, or the benchmark ends.
+    /// `work` must return `expected`, or the benchmark panics.
     #[must_use]
     pub fn new(name: &str, expected: Tally, work: impl Fn() -> Tally + 'a) -> Self {
         Self { name: name.into(), work: Box::new(work), expected }
     }
 }
 
-/// Lets all take turns; the median of the times that each one took, seconds.
+/// Runs all contenders in turn and returns the median time of each, seconds.
 ///
 /// # Panics
 ///
-/// When an answer is wrong.
+/// Panics if a result is wrong.
 #[must_use]
 pub fn race<const N: usize>(rounds: usize, contenders: [Contender<'_>; N]) -> [f64; N] {
     let mut times = [const { Vec::new() }; N];
-    // The first round fills the caches and is not counted.
+    // The first round warms the caches and is not counted.
     for round in 0..=rounds {
         for (contender, times) in contenders.iter().zip(&mut times) {
             let start = Instant::now();

@@ -1,10 +1,9 @@
-//! How many times faster axlewire is than C and than other crates: one line per figure,
-//! `name value goal`, more is better.
+//! Speed of axlewire relative to C and to other crates: one line per figure, `name value goal`;
+//! higher is better.
 //!
 //! `cargo bench -p axlewire-benches --bench ratios` takes less than 50 seconds once it is built.
-//! Contenders take turns, and a value is the ratio of their medians, so whatever else the machine
-//! does meets both sides alike. It ends with an error when an answer is wrong, never because a
-//! figure is slow.
+//! Contenders take turns, and a value is the ratio of their medians, so other load on the machine
+//! affects both sides alike. It fails if an answer is wrong, never because a figure is low.
 
 use std::{env, hint::black_box};
 
@@ -17,21 +16,21 @@ use axlewire_benches::{
 };
 use crc::{CRC_16_MODBUS, Crc, Table};
 
-/// How much work is done, so that a test run can do little of it.
+/// Amount of work; small for a test run.
 struct Effort {
-    /// Clean streams, bytes: more than any cache holds.
+    /// Length of clean streams, bytes: larger than any cache.
     clean_len: usize,
-    /// Streams for other crates, bytes.
+    /// Length of streams for other crates, bytes.
     peers_len: usize,
-    /// Streams with bit errors, bytes: drawing the errors is what takes long.
+    /// Length of streams with bit errors, bytes: generating the errors is slow.
     damaged_len: usize,
-    /// Hostile streams, bytes: the oracle needs seconds for each MiB of the worst.
+    /// Length of hostile streams, bytes: the oracle takes seconds per MiB of the worst.
     hostile_len: usize,
-    /// CRCs for one time.
+    /// Number of CRCs per timing.
     crc_calls: u64,
-    /// Times of each stream decoder.
+    /// Number of timings per stream decoder.
     rounds: usize,
-    /// Times of each CRC.
+    /// Number of timings per CRC.
     crc_rounds: usize,
 }
 
@@ -56,7 +55,7 @@ const TINY: Effort = Effort {
 };
 
 fn main() {
-    // Like criterion: `cargo bench` passes `--bench`, and without it nobody wants to wait.
+    // As with criterion: `cargo bench` passes `--bench`; without it, the run should be short.
     let given = |wanted: &str| env::args().any(|argument| argument == wanted);
     let effort = if given("--bench") && !given("--test") { FULL } else { TINY };
 
@@ -103,7 +102,7 @@ fn main() {
     print("ikeya8_over_modbus_core", peers.modbus_core_8 / peers.ikeya_8, 3.5);
     print("ikeya8_over_rmodbus", peers.rmodbus / peers.ikeya_8, 12.0);
 
-    // What the figures above are made of, and what they leave out.
+    // Components of the figures above, and further figures.
     for ((name, _), times) in STREAMS.iter().zip(&clean) {
         print(&format!("{name}_each_over_c"), times.c / times.each, None);
         times.print_throughput(name);
@@ -121,25 +120,25 @@ fn main() {
     }
 }
 
-/// Makes a stream of so many bytes.
+/// Makes a stream of this many bytes.
 type Make = fn(usize) -> Stream;
 
-/// What ordinary traffic looks like.
+/// Ordinary traffic.
 const STREAMS: [(&str, Make); 3] = [
     ("ikeya8", streams::responses),
     ("ikeya_mixed", streams::requests_and_responses),
     ("ucp44", streams::reports),
 ];
 
-/// One line. A figure without a goal has a dash.
+/// Prints one line, with a dash for a missing goal.
 fn print(name: &str, value: f64, goal: impl Into<Option<f64>>) {
     let goal = goal.into().map_or("-".into(), |goal| goal.to_string());
     println!("{name} {value:.3} {goal}");
 }
 
-/// The times for one clean stream, seconds.
+/// Times for one clean stream, seconds.
 struct StreamTimes {
-    /// The stream, bytes.
+    /// Length of the stream, bytes.
     len: usize,
     c: f64,
     frames: f64,
@@ -169,7 +168,7 @@ impl StreamTimes {
         Self { len: bytes.len(), c, frames, each, each_simd, decoder_4096, decoder_1 }
     }
 
-    /// Of all figures the ones that depend most on the machine.
+    /// Prints the figures that depend most on the machine.
     fn print_throughput(&self, stream: &str) {
         for (decoder, seconds) in [
             ("c", self.c),
@@ -184,8 +183,7 @@ impl StreamTimes {
     }
 }
 
-/// Bit errors: how many of the frames that stayed intact are recovered, and at what speed compared
-/// with the same stream undamaged.
+/// Bit errors: share of intact frames recovered, and speed relative to the undamaged stream.
 fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
     let protocol = clean.protocol;
     let sent = (protocol.oracle)(&clean.bytes);
@@ -198,8 +196,8 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
         let found = intact.iter().filter(|end| ends.binary_search(end).is_ok()).count();
         assert_eq!(found, intact.len(), "{}: intact frames were lost", damaged.name);
 
-        // C tells how many it found, not where. A damaged frame passes for a good one so rarely
-        // that this is what it recovered.
+        // C reports the number of frames found, not where. Damaged frames are accepted so rarely
+        // that this is the number recovered.
         let by_c = (protocol.c_table)(&damaged.bytes).frames;
         let percent = |found: f64| 100.0 * found / intact.len() as f64;
         println!("recovered_{name}_{rate}_axlewire_percent {:.4} 100", percent(found as f64));
@@ -222,20 +220,20 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
     }
 }
 
-/// A hostile stream, and how fast axlewire gets rid of it.
+/// A hostile stream, and how fast axlewire rejects it.
 struct Pattern {
     name: String,
     over_c: f64,
     over_c_simd: f64,
 }
 
-/// Its candidates have 64 bytes, the cap. The goal is for at most 44.
+/// Its candidates have 64 bytes, the cap. The goal applies to at most 44.
 const LONGEST_CANDIDATES: &str = "UCP FD FF 3C 00 repeated";
 
 fn hostile(effort: &Effort) -> Vec<Pattern> {
     let measure = |Stream { name, protocol, bytes, .. }: Stream| {
         let expected = (protocol.oracle)(&bytes);
-        // C loses frames that chance made, always the same ones.
+        // C loses some chance frames, always the same ones.
         let by_c = (protocol.c_table)(&bytes);
         let [c, frames, each_simd] = race(
             effort.rounds,
@@ -252,7 +250,7 @@ fn hostile(effort: &Effort) -> Vec<Pattern> {
 
 type Decode = fn(&[u8]) -> Tally;
 
-/// Caps of the length field, and `Frames` with each.
+/// Caps of the length field, each with its `Frames`.
 const CAPS: [(u8, Decode); 5] = [
     (24, ours::frames::<Portable<Ucp<24>>>),
     (40, ours::frames::<Portable<Ucp<40>>>),
@@ -261,8 +259,8 @@ const CAPS: [(u8, Decode); 5] = [
     (252, ours::frames::<Portable<Ucp<252>>>),
 ];
 
-/// What a cap may cost: every fourth byte begins a candidate as long as it allows, and each has to be
-/// checked whole.
+/// Worst-case cost of a cap: every fourth byte begins a candidate of the maximum length, and each
+/// must be checked to its end.
 fn caps(effort: &Effort) {
     for (cap, decode) in CAPS {
         let bytes = [0xFD, 0xFF, cap, 0].repeat(effort.hostile_len / 4);
@@ -275,7 +273,7 @@ fn caps(effort: &Effort) {
 
 type Compute = fn(&[u8]) -> u16;
 
-/// The forms of each crate that were the fastest at some length of ours.
+/// The variants of each crate that were fastest at one of our lengths.
 const CRATES: [(&str, Compute); 5] = [
     ("crc_table1", |bytes| {
         const CRC: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
@@ -300,7 +298,7 @@ const CRATES: [(&str, Compute); 5] = [
     }),
 ];
 
-/// The times of CRCs of one length, seconds.
+/// Times for CRCs of one length, seconds.
 struct CrcTimes {
     len: usize,
     calls: u64,
@@ -310,7 +308,7 @@ struct CrcTimes {
 }
 
 impl CrcTimes {
-    /// All are called through a pointer, as C has to be, which costs each of them the same.
+    /// All are called through a pointer, as C must be, at the same cost for each.
     fn measure(len: usize, effort: &Effort) -> Self {
         let mut rng = Rng::new(len as u64);
         let bytes: Vec<u8> = (0..len).map(|_| rng.byte()).collect();
@@ -322,9 +320,9 @@ impl CrcTimes {
             Contender::new(&format!("{name}, {len} bytes"), expected, move || {
                 let mut sum = 0;
                 for _ in 0..frames {
-                    // Hiding the pointer anew loads it into the register of the last result. Code
-                    // that sets only the low half of it would wait for that result otherwise, and
-                    // look three times slower than it is.
+                    // Hiding the pointer each time loads it into the register of the last result.
+                    // Otherwise, code that sets only the low half of that register would wait for
+                    // the result and look three times slower than it is.
                     let compute = black_box(compute);
                     sum += u64::from(compute(black_box(bytes)));
                 }
@@ -360,7 +358,7 @@ impl CrcTimes {
     }
 }
 
-/// The times for one frame, seconds.
+/// Times for one frame, seconds.
 struct PeerTimes {
     ucp_44: f64,
     mavlink: f64,
@@ -412,8 +410,7 @@ impl PeerTimes {
 
         let (count, short_count) = (count as f64, short_count as f64);
         Self {
-            // Two in a hundred of these frames are shorter: the time for 44 bytes is dearer than
-            // that for an average frame.
+            // 2 % of these frames are shorter, so 44 bytes take longer than an average frame.
             ucp_44: ucp_time / (reports.bytes.len() as f64 / 44.0),
             mavlink: mavlink_time / count,
             ublox: ublox_time / count,
@@ -425,7 +422,7 @@ impl PeerTimes {
     }
 }
 
-/// A peer must find each of its frames, and the same in them every time.
+/// A peer must find all of its frames, with the same contents every time.
 fn peer<'a>(name: &str, count: usize, bytes: &'a [u8], read: fn(&[u8]) -> Tally) -> Contender<'a> {
     let expected = read(bytes);
     assert_eq!(expected.frames, count as u64, "{name}");

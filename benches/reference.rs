@@ -1,4 +1,4 @@
-//! The C reference, made safe to call.
+//! Safe wrappers of the C reference.
 #![allow(unsafe_code)]
 
 use crate::Tally;

@@ -1,5 +1,5 @@
-//! What an exchange costs the processor: a WRITE and a READ with its answer, master and slave
-//! together, without a port in between.
+//! Processor cost of an exchange: a WRITE and a READ with its answer, master and slave together,
+//! without a port.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -14,7 +14,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 const EXCHANGES: u32 = 1000;
 
-/// A bus with one node, and the time on it.
+/// A bus with one node, and its time.
 struct Bus {
     master: Master,
     slave: Slave,
@@ -42,7 +42,7 @@ impl Bus {
         bus
     }
 
-    /// Hands over what is sent, or lets time pass; says how many statuses were told.
+    /// Transfers what is sent, or advances time; returns the number of statuses reported.
     fn step(&mut self) -> u32 {
         while let Some(bytes) = self.master.poll_transmit(self.now) {
             self.slave.handle_input(bytes, self.now);
@@ -62,7 +62,7 @@ impl Bus {
         told
     }
 
-    /// A thousand exchanges, each with its WRITE, READ and answer.
+    /// Runs a thousand exchanges, each with WRITE, READ and answer.
     fn exchanges(&mut self) {
         let before = (self.slave.statistics().writes, self.slave.statistics().replies);
         let mut told = 0;

@@ -1,4 +1,4 @@
-//! Byte streams to decode, the same on every run and every machine.
+//! Byte streams to decode, identical on every run and every machine.
 
 use axlewire::{
     ikeya::{NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest},
@@ -16,15 +16,15 @@ use crate::{IKEYA, Protocol, UCP};
 /// A stream and what is known about it.
 #[derive(Clone, Debug)]
 pub struct Stream {
-    /// What it is, for reports.
+    /// Name for reports.
     pub name: String,
-    /// What decodes it.
+    /// Protocol, with its decoders.
     pub protocol: Protocol,
     /// The stream.
     pub bytes: Vec<u8>,
-    /// How many frames were sent.
+    /// Number of frames sent.
     pub sent: usize,
-    /// Where the frames end that were sent and not damaged on the way, bytes from the front.
+    /// End offsets of the frames that arrived undamaged.
     pub intact: Vec<usize>,
 }
 
@@ -49,13 +49,13 @@ impl Stream {
     }
 }
 
-/// Three clean streams of `len` bytes and a little more: see the functions they come from.
+/// Three clean streams of `len` bytes or slightly more: see the functions that make them.
 #[must_use]
 pub fn clean(len: usize) -> [Stream; 3] {
     [responses(len), requests_and_responses(len), reports(len)]
 }
 
-/// The answers of 8 nodes polled in turn, half of them in each mode: 8-byte packets.
+/// Answers of 8 nodes polled in turn, half of them in each mode: 8-byte packets.
 #[must_use]
 pub fn responses(len: usize) -> Stream {
     let mut rng = Rng::new(1);
@@ -66,7 +66,7 @@ pub fn responses(len: usize) -> Stream {
     })
 }
 
-/// Both directions: each of 8 nodes is asked, answers and is commanded.
+/// Both directions: each of 8 nodes is read, answers and is commanded.
 #[must_use]
 pub fn requests_and_responses(len: usize) -> Stream {
     let mut rng = Rng::new(2);
@@ -79,7 +79,7 @@ pub fn requests_and_responses(len: usize) -> Stream {
     })
 }
 
-/// The telemetry of a rover, 44-byte frames, with 2 % other messages at random places.
+/// Telemetry of a rover in 44-byte frames, with 2 % other messages at random places.
 #[must_use]
 pub fn reports(len: usize) -> Stream {
     let mut rng = Rng::new(3);
@@ -105,10 +105,10 @@ pub fn reports(len: usize) -> Stream {
     })
 }
 
-/// Streams of exactly `len` bytes in which nothing was sent: noise, and patterns made to hurt.
+/// Streams of exactly `len` bytes without sent frames: noise, and worst-case patterns.
 ///
-/// The patterns put a header as often as possible in front of the longest frame that it can
-/// promise, or make the next byte as hard to predict as possible.
+/// The patterns contain as many headers of maximum-length frames as possible, or make the next byte
+/// as unpredictable as possible.
 #[must_use]
 pub fn hostile(len: usize) -> Vec<Stream> {
     let mut rng = Rng::new(4);
@@ -139,7 +139,7 @@ pub fn hostile(len: usize) -> Vec<Stream> {
     .into()
 }
 
-/// SplitMix64: small, fixed, and random enough to fill frames.
+/// SplitMix64: small, reproducible, and random enough to fill frames.
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
@@ -178,7 +178,7 @@ impl Rng {
     }
 }
 
-/// Collects frames and remembers where they end.
+/// Collects frames and their end offsets.
 #[derive(Default)]
 struct Sent {
     bytes: Vec<u8>,
@@ -192,7 +192,7 @@ impl Sent {
     }
 }
 
-/// Whole rounds of frames until there are `len` bytes.
+/// Whole rounds of frames, until at least `len` bytes.
 fn from_rounds(
     name: &str,
     protocol: Protocol,
@@ -227,7 +227,7 @@ fn position(rng: &mut Rng) -> Position {
     Position::new(rng.i16(), rng.i16())
 }
 
-/// Up to 128 revolutions per second in either direction, with the digits of a measured value.
+/// Up to 128 revolutions per second in either direction, with as many digits as a measured value.
 fn rps(rng: &mut Rng) -> Rps {
     Rps::new(rng.number() as i32 as f32 / (1 << 24) as f32).unwrap_or_default()
 }

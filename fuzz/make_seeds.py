@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes seeds/ from the frames in ../tests/vectors: the same files every time.
+"""Builds seeds/ from the frames in ../tests/vectors, with identical files every time.
 
-Run it from anywhere; it replaces what is there. The format of a stream seed is told in
-src/bodies.rs: framing, repair and number of ops, ops, stream.
+Run it from anywhere; it replaces existing files. src/bodies.rs describes the format of a stream
+seed: framing, repair and number of ops, ops, stream.
 """
 
 import json
@@ -14,7 +14,7 @@ HERE = Path(__file__).resolve().parent
 VECTORS = HERE.parent / "tests" / "vectors"
 SEEDS = HERE / "seeds"
 
-# Ops as src/bodies.rs reads them: the upper three bits say what, the lower five how much.
+# Ops as src/bodies.rs reads them: the upper three bits are the kind, the lower five the amount.
 SLICE, SLICE8, COMMIT, COMMIT8, STOP1, STOP2, DRAIN, IDLE = (kind << 5 for kind in range(8))
 PLANS = {
     "whole": [SLICE8 | 31],
@@ -44,7 +44,7 @@ def write(target, name, data):
 
 
 def noisy(frames, headers, dice):
-    """Some frames, cut and damaged, with false headers and noise between them."""
+    """Some frames, truncated and damaged, with false headers and noise between them."""
     out = bytearray()
     for frame in dice.sample(frames, 6):
         frame = bytearray(frame)

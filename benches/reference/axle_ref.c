@@ -1,6 +1,6 @@
 /* The receivers are state machines fed one byte at a time, as from a UART interrupt. A frame that
- * fails is dropped whole and the search starts over behind it: that is what such code does, and
- * why it loses good frames behind a bad header. */
+ * fails is dropped as a whole and the search restarts after it. Such code usually does this, and
+ * therefore loses good frames after a bad header. */
 #include "axle_ref.h"
 
 #include <stdbool.h>
@@ -36,7 +36,7 @@ uint16_t axle_ref_crc_bitwise(const uint8_t *bytes, size_t len)
     return crc;
 }
 
-/* `bitwise` is a constant wherever this ends up. */
+/* `bitwise` is a constant wherever this is inlined. */
 static inline bool crc_is_right(const uint8_t *frame, size_t len, bool bitwise)
 {
     uint16_t crc = bitwise ? axle_ref_crc_bitwise(frame, len - 2) : axle_ref_crc_table(frame, len - 2);

@@ -1,4 +1,4 @@
-/* What axlewire is measured against: the CRC and the receivers as firmware usually has them. */
+/* The reference for axlewire: the CRC and the receivers as firmware usually has them. */
 #ifndef AXLE_REF_H
 #define AXLE_REF_H
 
@@ -11,8 +11,8 @@ uint16_t axle_ref_crc_table(const uint8_t *bytes, size_t len);
 /* The same, bit by bit. */
 uint16_t axle_ref_crc_bitwise(const uint8_t *bytes, size_t len);
 
-/* What a receiver found, and a sum over what was in it: the id of every frame, and the first four
- * bytes behind its header as a little-endian number where it has so many. */
+/* The result of a receiver: the number of frames, and a sum over their contents: the id of every
+ * frame, and the first four bytes after its header as a little-endian number, if present. */
 struct axle_ref_tally {
     uint64_t frames;
     uint64_t sum;

@@ -1,4 +1,4 @@
-//! The linker script of cortex-m-rt; embassy-stm32 brings the memory map of the processor.
+//! Selects the linker script of cortex-m-rt; embassy-stm32 provides the memory map.
 
 fn main() {
     println!("cargo:rustc-link-arg-bins=--nmagic");

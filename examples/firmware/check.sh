@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
-# Checks the firmware in QEMU: a line per result, what the programs cost, then `N passed, N failed`.
+# Checks the firmware in QEMU: prints one line per result, the costs, then `N passed, N failed`.
 #
 #   examples/firmware/check.sh
 #
-# Exit status 1 when something failed. QEMU and a compiler for thumbv7em come from Debian if they are
-# missing. Takes some 45 s once everything is built.
+# Exit status 1 if a check failed. QEMU and a compiler for thumbv7em come from Debian if they are
+# missing. Takes about 45 s once everything is built.
 set -uo pipefail
 cd "$(dirname "$0")" || exit
 programs=(ikeya_slave ikeya_master ucp_robot)
 # 50 µs at 168 MHz and 1.5 cycles per instruction (ruling I9).
 budget=5600
-# Bytes of stack that the benchmark may use.
+# Limit of the benchmark's stack, bytes.
 stack_of_bench=3072
 
 passed=0 failed=0
@@ -18,7 +18,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 
-# check NAME COMMAND ...: the last line that the command prints is its result.
+# check NAME COMMAND ...: the last line printed by the command is its result.
 check() {
     local name=$1 begun=$SECONDS status=passed
     shift
@@ -34,11 +34,11 @@ check() {
 build() { ./run.sh --build "${programs[@]}" uart_check bench >"$folder/images" && [ "$(wc -l <"$folder/images")" = $((${#programs[@]} + 2)) ]; }
 image() { grep "/$1\$" "$folder/images"; }
 
-# Fails as well where the tests have been compiled out. They mostly wait, so more run than there are cores.
+# Also fails if the tests were compiled out. They mostly wait, so more run than there are cores.
 end_to_end() {
     local images
     images=$(dirname "$(image ikeya_slave)")
-    # From the top, where cargo is not told to build for a board.
+    # From the top, where cargo is not configured to build for a board.
     (
         cd ../.. && AXLEWIRE_FIRMWARE=required AXLEWIRE_FIRMWARE_IMAGES=$images \
             cargo test --quiet --test firmware -- --nocapture --test-threads=4
@@ -49,13 +49,13 @@ end_to_end() {
     [ $status = 0 ] && grep -q '[1-9][0-9]* passed' "$folder/tests"
 }
 
-# The most that any test has seen; each compares it with its limit.
+# The largest value of any test; each test compares it with its limit.
 stack() {
     grep -o "stack $1 [0-9]*" "$folder/tests" | sort -n -k3 | tail -1 | cut -d' ' -f3 | tee "$folder/stack_$1" | grep . ||
-        { echo "no test has told it" >&2; false; }
+        { echo "no test reported it" >&2; false; }
 }
 
-# The stack of the benchmark, which has no board to test: it says so itself, and fails by itself.
+# The stack of the benchmark, which has no test: it prints the value itself and is checked here.
 stack_of_bench() {
     timeout 120 qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 \
         -semihosting-config enable=on,target=native -kernel "$(image bench)" </dev/null >"$folder/bench" || return
@@ -63,7 +63,7 @@ stack_of_bench() {
         [ "$(cat "$folder/stack_bench")" -le "$stack_of_bench" ]
 }
 
-no_panic() { ./no_panic.sh "$1" && echo "none can be reached"; }
+no_panic() { ./no_panic.sh "$1" && echo "none is reachable"; }
 planted() { ./no_panic.sh --self-test && echo found; }
 
 # response PROGRAM

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Proves that no panic can be reached in a program, or says where one can.
+# Proves that no panic is reachable in a program, or prints where one is.
 #
-#   examples/firmware/no_panic.sh PROGRAM ...   builds each so that it links only without a panic
-#   examples/firmware/no_panic.sh --self-test   a panic that was planted is found
+#   examples/firmware/no_panic.sh PROGRAM ...   builds each so that it links only without panics
+#   examples/firmware/no_panic.sh --self-test   checks that a planted panic is found
 #
 # PROGRAM is ikeya_slave, ikeya_master, ucp_robot, or no_panic, which calls everything in the crate.
-# Optimized as shipped: what the compiler cannot rule out there counts as reachable.
+# Optimized as shipped: whatever the compiler cannot rule out counts as reachable.
 set -euo pipefail
 cd "$(dirname "$0")"
 [ $# -gt 0 ] || { sed -n '4,8s/^# \?//p' "$0" >&2; exit 2; }
@@ -16,7 +16,7 @@ link() {
     "${cargo[0]}" rustc "${cargo[@]:2}" --quiet --locked --release --features "$1" --bin "$2" -- ${3:+-C link-arg="$3"}
 }
 
-# Links a program with the panics in it, and prints which functions call one.
+# Links a program with its panics, and prints the functions that call one.
 where_in() {
     local objdump
     objdump=$(command -v llvm-objdump || command -v arm-none-eabi-objdump) || return 0
@@ -31,10 +31,10 @@ where_in() {
 
 if [ "$1" = --self-test ]; then
     if said=$(link planted-panic no_panic 2>&1); then
-        echo "a planted panic was linked" >&2
+        echo "the planted panic was linked" >&2
         exit 1
     fi
-    # Failed because of the panic, and not of something else.
+    # It must have failed because of the panic, not for another reason.
     grep -q 'undefined.*a_panic_can_be_reached' <<<"$said" || { echo "$said" >&2; exit 1; }
     exit
 fi

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# How many instructions a program needs from the interrupt of a request's last byte until it writes the
-# first byte of the answer into the data register: prints `least median most`.
+# Number of instructions from the interrupt of a request's last byte until a program writes the
+# first byte of the answer to the data register: prints `least median most`.
 #
 #   examples/firmware/response.sh ikeya_slave   READ, answered by a velocity response
 #   examples/firmware/response.sh ucp_robot     ping, answered by a pong
 #
-# The image as shipped, in QEMU, which runs one instruction at a time and logs each, along with every
-# interrupt and every access to a register. The most is more than on a board: QEMU's USART takes a whole
-# line of text at once, in one interrupt. Fails where requests stay unanswered.
+# Runs the image as shipped in QEMU, which executes one instruction at a time and logs each, along
+# with every interrupt and every register access. The maximum is larger than on a board: QEMU's
+# USART takes a whole line of text at once, in one interrupt. Fails if requests stay unanswered.
 set -euo pipefail
 cd "$(dirname "$0")"
 
-# Answers that are counted.
+# Number of answers to count.
 count=25
 case ${1:-} in
 ikeya_slave) request='\xAA \x01 \xBE \xD0' answer=55010000000031de ;;
@@ -26,7 +26,7 @@ one_by_one=(-singlestep)
 
 folder=$(mktemp -d)
 qemu= counter=
-# With QEMU its log and its port end, and so do those who read them; but the log may not have begun.
+# Ending QEMU also ends its log and port, and thus their readers; but the log may not have begun.
 trap 'for id in $qemu $counter; do kill -KILL "$id" || true; done 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 mkfifo "$folder/log"
@@ -54,17 +54,17 @@ exec {bus}<>"$port"
 stty -F "$port" raw -echo
 cat <&"$bus" >"$folder/answers" 2>/dev/null &
 
-# A first line tells that it runs; QEMU sees the open port after a second, and then comes another.
+# The first line shows that it runs; QEMU sees the open port after a second, and then another comes.
 for _ in 1 2 3; do
-    read -r -t 20 -u "$lines" line || { echo "the firmware says nothing" >&2; exit 1; }
+    read -r -t 20 -u "$lines" line || { echo "the firmware prints nothing" >&2; exit 1; }
 done
 answered() { od -An -v -tx1 "$folder/answers" | tr -d ' \n' | { grep -o "$answer" || true; } | wc -l; }
 have=0
-# A request whose bytes this machine holds back for too long is none: twice as many may be needed.
+# A request delayed too long by this machine does not count, so up to twice as many are sent.
 for ((i = 0; have < count && i < 2 * count; i++)); do
     for byte in "${request[@]}"; do
         printf '%b' "$byte" >&"$bus"
-        # The byte has been dealt with before the next one comes, as on a line.
+        # The byte is processed before the next one comes, as on a line.
         sleep 0.002
     done
     for ((wait = 0, before = have; have == before && wait < 50; wait++)); do

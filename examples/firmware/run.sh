@@ -1,22 +1,22 @@
 #!/usr/bin/env bash
 # Runs firmware in QEMU.
 #
-#   examples/firmware/run.sh PROGRAM                 until Ctrl-C; prints the port and the text
-#   examples/firmware/run.sh PROGRAM -- COMMAND ...  as long as COMMAND runs; PORT in it is the port
-#   examples/firmware/run.sh --build PROGRAM ...     only builds; prints the paths of the images
+#   examples/firmware/run.sh PROGRAM                 runs until Ctrl-C; prints the port and the text
+#   examples/firmware/run.sh PROGRAM -- COMMAND ...  runs while COMMAND does; replaces PORT in it
+#   examples/firmware/run.sh --build PROGRAM ...     only builds; prints the image paths
 #
-# PROGRAM is ikeya_slave, ikeya_master or ucp_robot. In one command, a motor that turns:
+# PROGRAM is ikeya_slave, ikeya_master or ucp_robot. To turn a motor in one command:
 #
 #   examples/firmware/run.sh ikeya_slave -- cargo run -q -p axle -- spin --port PORT --node 1 --rps 2
 #
-# The port is a pseudo-terminal; its speed does not matter. Lines of the firmware begin with
+# The port is a pseudo-terminal; its speed does not matter. Lines from the firmware begin with
 # "firmware: ". The compiler and QEMU come from Debian if they are missing.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 
 usage() { sed -n '2,14s/^# \?//p' "$0" >&2; exit 2; }
 
-# In a shell of its own: what the build sets must not reach the command.
+# In a subshell: variables set by the build must not reach the command.
 build() (
     cd "$here"
     . ./toolchain.sh
@@ -40,13 +40,13 @@ shift
 [ $# = 0 ] || { [ "$1" = -- ] && [ $# -gt 1 ]; } || usage
 image=$(build "$program")
 
-# In a session of its own: Ctrl-C is for the command, which may have a motor to stop first.
+# In a separate session: Ctrl-C goes to the command, which may have to stop a motor first.
 exec {lines}< <(
     exec setsid qemu-system-arm -M netduinoplus2 -display none -monitor none -serial pty -serial stdio \
         -kernel "$image" </dev/null 2>&1
 )
 qemu=$!
-# Not by a signal that QEMU would comment on.
+# With KILL, because QEMU prints a message for other signals.
 trap 'kill -KILL "$qemu" 2>/dev/null || true' EXIT
 trap 'exit 130' INT TERM
 # "char device redirected to /dev/pts/3 (label serial0)"
@@ -55,11 +55,11 @@ while [ -z "$port" ] && read -r -u "$lines" line; do
     port=$(grep -o '/dev/[^ ]*' <<<"$line" || echo "$line" >&2)
 done
 [ -n "$port" ] || { echo "QEMU did not start" >&2; exit 1; }
-# QEMU looks at a closed port only once a second, so it is kept open; but not where the firmware talks
-# by itself and nobody may be reading, because QEMU stands still while the port is full.
+# QEMU checks a closed port only once a second, so it is kept open; but not if the firmware sends
+# unprompted and nothing may be reading, because QEMU stalls while the port is full.
 [ $# = 0 ] && [ "$program" != ikeya_slave ] || exec {keep}<>"$port"
 
-# A line that says the same as the one before, but for the time, is left out.
+# Skips a line that equals the previous one except for the time.
 show() {
     local line last=
     while read -r -u "$lines" line; do
@@ -75,7 +75,7 @@ if [ $# = 0 ]; then
 else
     shift
     show &
-    # Until QEMU has seen that the port is open.
+    # Wait until QEMU has seen that the port is open.
     sleep 1.2
     "${@//PORT/$port}"
 fi

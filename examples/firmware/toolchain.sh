@@ -1,10 +1,10 @@
-# Builds for thumbv7em: sourced by the scripts beside it, which stand in this folder.
+# Builds for thumbv7em; sourced by the other scripts in this folder.
 #
-# Uses the rustup target where it is installed, otherwise Debian's compiler. QEMU and lld come from
+# Uses the rustup target if it is installed, otherwise Debian's compiler. QEMU and lld come from
 # Debian if they are missing; with INSTALL=no that is an error.
 #
-# Afterwards `out` is the target folder, `target` the target's name, `cargo` the words of a build,
-# `compiler` its name and version.
+# Sets `out` to the target folder, `target` to the target's name, `cargo` to the build command, and
+# `compiler` to its name and version.
 
 target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}

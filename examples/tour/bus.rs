@@ -1,12 +1,11 @@
-//! Third act: a master and eight simulated motors on a noisy line, one of them with a loose plug.
+//! Part three: a master and eight simulated motors on a noisy line, one of them with a loose plug.
 
 use std::error::Error;
 
 use axlewire::{
     ikeya::{
-        Master, Mode, NodeId, Position, Rps, Slave, Status,
-        master::{Health, MasterConfig, MasterEvent, Schedule},
-        slave::SlaveConfig,
+        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Rps, Schedule, Slave,
+        SlaveConfig, Status,
     },
     sim::{Direction, Faults, Line, Motor, MotorNode, Who},
     time::{Duration, Instant},
@@ -16,7 +15,7 @@ use crate::title;
 
 type Bus = Line<Master, MotorNode>;
 
-/// One wrong bit in so many.
+/// Bit error rate.
 const BIT_ERRORS: f64 = 1e-4;
 
 pub(crate) fn run() -> Result<(), Box<dyn Error>> {
@@ -27,10 +26,10 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
         let mode = if node <= NodeId::N4 { Mode::Velocity } else { Mode::Position };
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(100));
-        let slave = Slave::new(node, mode, config, Instant::from_micros(0));
+        let slave = Slave::new(node, mode, config);
         let tail = bus.add(MotorNode::from_parts(slave, Motor::new()));
-        // Firmware takes its time: so long after the request the answer begins.
-        bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
+        // Firmware delay between a request and the start of its answer.
+        bus.driver_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
     }
     *bus.pair_mut(Direction::ToTails) = Faults::noise(BIT_ERRORS);
     *bus.pair_mut(Direction::ToHead) = Faults::noise(BIT_ERRORS);
@@ -38,7 +37,7 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
     let now = bus.now();
     bus.head_mut().discover(now);
     let loose = Who::Tail(2);
-    // When the commands were given, and how many answers there had been.
+    // Time of the commands and number of answers before them.
     let (mut commanded, mut abnormal) = (None, None);
     for tenth in 0..20 {
         bus.stub_mut(loose).unplugged = (8..12).contains(&tenth);
@@ -59,7 +58,7 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Sets every node going.
+/// Commands every node.
 fn command(master: &mut Master, now: Instant) -> Result<(), Box<dyn Error>> {
     for node in NodeId::ALL {
         match master.mode(node) {
@@ -70,11 +69,11 @@ fn command(master: &mut Master, now: Instant) -> Result<(), Box<dyn Error>> {
             None => println!("node {node} was not found"),
         }
     }
-    println!("    0.100 s  commands: 60 rpm, or one and a quarter turn");
+    println!("    0.100 s  commands: 60 rpm, or 1.25 turns");
     Ok(())
 }
 
-/// Prints what matters of an event; remembers the node that is abnormal.
+/// Prints an event if it matters; remembers the abnormal node.
 fn tell(at: Instant, event: MasterEvent, abnormal: &mut Option<NodeId>) {
     let seconds = at.as_micros() as f64 / 1e6;
     match event {
@@ -90,18 +89,18 @@ fn tell(at: Instant, event: MasterEvent, abnormal: &mut Option<NodeId>) {
         }
         MasterEvent::Health { node, health: Health::Online } if *abnormal == Some(node) => {
             *abnormal = None;
-            println!("{seconds:9.3} s  node {node} answers again");
+            println!("{seconds:9.3} s  node {node} is answering again");
         }
         MasterEvent::Stopped { node } => {
             println!("{seconds:9.3} s  node {node} has confirmed its stop twice");
         }
         MasterEvent::StandingStill { node } => {
-            println!("{seconds:9.3} s  node {node} stands still");
+            println!("{seconds:9.3} s  node {node} is at rest");
         }
         MasterEvent::ModeChanged { node, mode } => {
             println!("{seconds:9.3} s  node {node} is now in {mode} mode");
         }
-        // A status after every exchange, and now and then a strike: the table sums them up.
+        // A status after every exchange, and occasional strikes: the table sums them up.
         _ => {}
     }
 }
@@ -141,10 +140,10 @@ fn rates(bus: &Bus, begin: Instant, before: u32) {
     let seconds = f64::from((bus.now() - begin).as_micros()) / 1e6;
     let errors = [Direction::ToTails, Direction::ToHead].map(|way| bus.statistics(way).bit_errors);
     println!(
-        "\n{:.0} answers a second; a clean line with eight commanded nodes, each answering after {} us, \
-         allows {}.\n{} bits were wrong. Node 3 stopped by its own watchdog. It was lost under a \
-         set-point, so the\nmaster stopped it when it came back: it stands still until there is a new \
-         command.",
+        "\n{:.0} answers per second; a clean line with eight commanded nodes, each answering after \
+         {} us,\nallows {}. {} bits were wrong. Node 3 was stopped by its own watchdog. It was \
+         lost while under\ncommand, so the master stopped it when it came back: it stays at rest \
+         until the next command.",
         f64::from(answers(bus) - before) / seconds,
         plan.response_time.as_micros(),
         plan.cycles_per_second() * 8,

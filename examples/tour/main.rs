@@ -1,7 +1,7 @@
-//! The first thing to run: `cargo run --example tour`. No hardware, no arguments.
+//! Start here: `cargo run --example tour`. It needs no hardware and no arguments.
 //!
-//! Four acts: captures decoded with the noise in them, packets built, a bus of eight motors with a
-//! noisy line and a loose plug, and a drive with a rover.
+//! Four parts: decoding noisy captures, building packets, a bus of eight motors with a noisy line
+//! and a loose plug, and driving a rover.
 
 mod bus;
 mod rover;

@@ -1,4 +1,4 @@
-//! Fourth act: a host drives a simulated rover.
+//! Part four: a host drives a simulated rover.
 
 use std::error::Error;
 
@@ -6,10 +6,8 @@ use axlewire::{
     sim::{Direction, Faults, Line, RoverNode},
     time::{Duration, Instant},
     ucp::{
-        BAUD, Host, MotorControl,
-        host::{HostConfig, HostEvent, MemoryStore},
-        message::{CalibrationKind, ImuBias, NetworkState},
-        robot::{RobotConfig, RobotEvent},
+        BAUD, CalibrationKind, Host, HostConfig, HostEvent, ImuBias, MemoryStore, MotorControl,
+        NetworkState, RobotConfig, RobotEvent,
     },
 };
 
@@ -18,7 +16,7 @@ use crate::title;
 type Link = Line<Host<MemoryStore>, RoverNode>;
 
 pub(crate) fn run() -> Result<(), Box<dyn Error>> {
-    title("UCP: a drive with a rover over a noisy link (six seconds in virtual time)");
+    title("UCP: driving a rover over a noisy link (six seconds in virtual time)");
     let begin = Instant::from_millis(0);
     let host = Host::with_store(HostConfig::default(), MemoryStore::default(), begin);
     let mut link: Link = Line::new(BAUD, 2026, host);
@@ -34,7 +32,7 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
             0 => host.set_network_state(NetworkState::Connected, now)?,
             5..20 => host.drive(MotorControl::turn_right(60, 0)?.with_front_led(true), now)?,
             20..30 => host.drive(MotorControl::turn_right(30, 30)?, now)?,
-            // From 3.0 s on the application is silent, as if it had crashed.
+            // From 3.0 s on, the application sends no commands, as if it had crashed.
             45 => host.start_calibration(CalibrationKind::Imu, now)?,
             50 => host.end_calibration(CalibrationKind::Imu, now)?,
             _ => {}
@@ -49,20 +47,18 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Prints what matters; what the robot repeats from its boot on, only the first time.
+/// Prints the events that matter; events that the robot repeats after boot, only once.
 fn tell(link: &mut Link, booted: &mut bool) {
     let line = |at: Instant, who: &str, what: &str| {
         println!("{:9.3} s  {who:<5}  {what}", at.as_micros() as f64 / 1e6);
     };
     for (at, event) in link.take_head_events() {
         match event {
-            HostEvent::LinkUp => line(at, "host", "the robot is there"),
-            HostEvent::LinkDown => line(at, "host", "the robot is gone"),
-            HostEvent::DeadMan => {
-                line(at, "host", "no command for 500 ms: telling the robot to stand still")
-            }
+            HostEvent::LinkUp => line(at, "host", "link up"),
+            HostEvent::LinkDown => line(at, "host", "link down"),
+            HostEvent::DeadMan => line(at, "host", "no command for 500 ms: stopping the robot"),
             HostEvent::BiasesMissing { .. } if !*booted => {
-                line(at, "host", "the robot asks for biases, none are stored")
+                line(at, "host", "the robot requests biases, but none are stored")
             }
             HostEvent::CalibrationStarted(kind) => {
                 line(at, "host", &format!("calibrating: {kind:?}"))
@@ -79,11 +75,13 @@ fn tell(link: &mut Link, booted: &mut bool) {
             RobotEvent::NetworkState(state) if !*booted => {
                 line(at, "robot", &format!("network lamp: {state:?}"))
             }
-            RobotEvent::Watchdog => {
-                line(at, "robot", "no valid command for 500 ms: standing still")
-            }
+            RobotEvent::WatchdogStop => line(at, "robot", "no valid command for 500 ms: stopping"),
             RobotEvent::CalibrationEnd(_) => {
-                line(at, "robot", "calibration ended, sending the result until the host has it");
+                line(
+                    at,
+                    "robot",
+                    "calibration ended, sending the result until the host acknowledges it",
+                );
                 let result = ImuBias::new([12, -7, 90], [3, 1, -2]);
                 link.tail_mut(0).robot_mut().calibration_result_imu(result, now);
             }
@@ -93,7 +91,7 @@ fn tell(link: &mut Link, booted: &mut bool) {
     *booted = true;
 }
 
-/// What the host knows of the rover.
+/// Prints the host's latest report.
 fn report(link: &Link) {
     let Some(report) = link.head().last_report() else { return };
     let values = report.telemetry;
@@ -111,7 +109,7 @@ fn report(link: &Link) {
 fn account(link: &Link) {
     let line = link.head().counters();
     println!(
-        "\nThe rover made {:.2} m. The host heard {} bytes: {} in {} frames, {} skipped.",
+        "\nThe rover travelled {:.2} m. The host received {} bytes: {} in {} frames, {} skipped.",
         link.tail(0).rover().distance_m(),
         line.received,
         line.framed,

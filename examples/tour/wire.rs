@@ -1,4 +1,5 @@
-//! First act: a capture of each protocol, decoded with its noise, and one packet of each kind, built.
+//! Parts one and two: decoding a noisy capture of each protocol, and building one packet of each
+//! kind.
 
 use crate::title;
 use axlewire::{
@@ -8,7 +9,7 @@ use axlewire::{
     ucp::{self, Body, Message, MotorControl, RawFrame, Telemetry, Ucp},
 };
 
-/// What is shown of a frame: its length, its name and its meaning.
+/// Printed parts of a frame: its length, its name and its meaning.
 type Line = (usize, &'static str, String);
 
 pub(crate) fn decode_captures() {
@@ -20,13 +21,14 @@ pub(crate) fn decode_captures() {
 }
 
 pub(crate) fn build_packets() -> Result<(), EncodeError> {
-    title("One packet of each kind, built");
+    title("Building one packet of each kind");
     build_ikeya()?;
     println!();
     build_ucp()
 }
 
-/// Feeds a capture in pieces of 10 bytes, as a serial port would, and prints what comes out.
+/// Feeds a capture to a decoder in pieces of 10 bytes, as a serial port would, and prints the
+/// events.
 fn decode<F: Framing>(capture: &[u8], line: fn(F::Frame<'_>) -> Line) {
     let mut decoder = Decoder::<F, 64>::new();
     let mut offset = 0;
@@ -35,7 +37,7 @@ fn decode<F: Framing>(capture: &[u8], line: fn(F::Frame<'_>) -> Line) {
             offset += print(offset, event, line);
         }
     }
-    // The capture is over, so what is still pending will not be completed.
+    // The capture has ended, so pending bytes will not be completed.
     while decoder.pending() > 0 {
         decoder.idle();
         while let Some(event) = decoder.decode(&mut [].as_slice()) {
@@ -45,7 +47,7 @@ fn decode<F: Framing>(capture: &[u8], line: fn(F::Frame<'_>) -> Line) {
     account(&decoder.counters(), decoder.pending());
 }
 
-/// Prints one event and says how many bytes it covers.
+/// Prints one event and returns the number of bytes that it covers.
 fn print<T>(offset: usize, event: Event<T>, line: fn(T) -> Line) -> usize {
     match event {
         Event::Frame(frame) => {
@@ -63,10 +65,10 @@ fn print<T>(offset: usize, event: Event<T>, line: fn(T) -> Line) -> usize {
 fn why(reason: &str) -> &str {
     match reason {
         "header" => "no frame starts here",
-        "length" => "a length that no frame has",
-        "id" => "a whole packet for a node that cannot exist",
-        "crc" => "damaged: the CRC does not fit",
-        "idle" => "cut off by the end of the capture",
+        "length" => "invalid length",
+        "id" => "a complete packet with an invalid node id",
+        "crc" => "damaged: CRC mismatch",
+        "idle" => "truncated at the end of the capture",
         other => other,
     }
 }
@@ -82,12 +84,12 @@ fn account(counters: &Counters, pending: usize) {
 fn ikeya_line(packet: Packet<'_>) -> Line {
     match packet {
         Packet::Request(Request::Read(it)) => {
-            (it.as_bytes().len(), "READ", format!("node {}: how are you?", it.id()))
+            (it.as_bytes().len(), "READ", format!("node {}: status request", it.id()))
         }
         Packet::Request(Request::Write(it)) => {
             let (rps, to) = (it.as_velocity(), it.as_position());
             let meaning = format!(
-                "node {}: turn at {rps} rps, or go to {:.4} turns: its mode decides",
+                "node {}: turn at {rps} rps, or go to {:.4} turns, depending on its mode",
                 it.id(),
                 to.revolutions()
             );
@@ -112,7 +114,7 @@ fn ikeya_line(packet: Packet<'_>) -> Line {
 
 fn ucp_line(frame: &ucp::Frame) -> Line {
     let (name, meaning) = match frame.message() {
-        Message::Ping(_) => ("ping", "are you there?".into()),
+        Message::Ping(_) => ("ping", "keep-alive".into()),
         Message::Pong(it) => ("pong", format!("{:?}", it.err())),
         Message::MotorControl(it) => {
             let lamp = if it.front_led() == 0 { "off" } else { "on" };
@@ -189,7 +191,7 @@ fn build_ikeya() -> Result<(), EncodeError> {
     show("3-motor velocity", three::VelocityResponse::new(NodeId::N1, [rps; 3]).as_bytes());
     show("3-motor position", three::PositionResponse::new(NodeId::N1, [position; 3]).as_bytes());
 
-    // What could hurt somebody cannot be built.
+    // Invalid or dangerous values cannot be built.
     println!("{:<24} {}", "0 / 0 rps", Rps::new(f32::NAN).expect_err("refused"));
     println!(
         "{:<24} {}",
@@ -241,7 +243,7 @@ fn build_ucp() -> Result<(), EncodeError> {
     let raw = RawFrame { id: 0x20, index: 9, body: b"hi" };
     show("unknown id", axlewire::encode::Encode::encode(&raw, &mut buffer)?);
 
-    // What hangs or moves shipped robots cannot be built.
+    // Frames that hang or move shipped robots cannot be built.
     println!("{:<24} {}", "speed 130 %", MotorControl::new(130, 0).expect_err("refused"));
     let report = RawFrame { id: 5, ..raw };
     let refused = axlewire::encode::Encode::encode(&report, &mut buffer).expect_err("refused");

@@ -4,34 +4,31 @@
 //!
 //! ```text
 //! byte 0       framing and buffer size
-//! byte 1       low two bits: which CRCs are repaired; upper six: how many bytes of ops follow
-//! then         ops, one byte each: what is done to the decoder, in turn (see `op`)
+//! byte 1       low two bits: which CRCs are repaired; upper six: number of ops that follow
+//! then         ops, one byte each: actions on the decoder, in order (see `op`)
 //! then         the stream
 //! ```
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
     crc16,
-    encode::Encode,
     error::EncodeError,
     ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Frames, Framing, Portable},
-    ucp::{self, Body, Message, RawFrame, Telemetry, message::Report},
+    stream::{Encode, Frames, Framing, Portable},
+    ucp::{self, Body, Message, RawFrame, Report, Telemetry},
 };
 
-#[path = "../../tests/support/checked_line.rs"]
+#[path = "../../tests/support/line.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
-mod checked_line;
-#[path = "../../tests/support/known_framings.rs"]
-mod known_framings;
+mod line;
 #[path = "../../tests/support/oracle.rs"]
 #[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
 mod oracle;
 
-use checked_line::{Line, Op};
-use known_framings::Known;
+use line::{Known, Line, Op};
 
-/// Any stream, cut and interrupted in any way, against the oracle: the six Ikeya framings.
+/// Checks any stream, chunked and interrupted in any way, against the oracle: the six Ikeya
+/// framings.
 pub fn ikeya_stream(data: &[u8]) {
     let Some(script) = Script::read(data) else { return };
     match script.choice % 12 {
@@ -39,14 +36,14 @@ pub fn ikeya_stream(data: &[u8]) {
         1 => script.play::<ikeya::ToSlave, 37>(),
         2 => script.play::<ikeya::ToMaster, 8>(),
         3 => script.play::<ikeya::ToMaster, 37>(),
-        4 => script.play::<ikeya::BothDirections, 8>(),
-        5 => script.play::<ikeya::BothDirections, 37>(),
+        4 => script.play::<ikeya::Either, 8>(),
+        5 => script.play::<ikeya::Either, 37>(),
         6 => script.play::<three::ToSlave, 16>(),
         7 => script.play::<three::ToSlave, 37>(),
         8 => script.play::<three::ToMaster, 16>(),
         9 => script.play::<three::ToMaster, 37>(),
-        10 => script.play::<three::BothDirections, 16>(),
-        _ => script.play::<three::BothDirections, 37>(),
+        10 => script.play::<three::Either, 16>(),
+        _ => script.play::<three::Either, 37>(),
     }
 }
 
@@ -70,13 +67,13 @@ struct Script<'a> {
     stream: &'a [u8],
 }
 
-/// Which candidates get the CRC that their bytes ask for: a fuzzer does not guess it.
+/// Which candidates get a correct CRC, since a fuzzer does not guess it.
 #[derive(Clone, Copy)]
 enum Repair {
     None,
-    /// One after the other.
+    /// Consecutive ones.
     Adjacent,
-    /// Each, and what starts inside it before: frames in payloads.
+    /// All, inner ones first: frames in payloads.
     Nested,
     /// Every second one.
     Alternate,
@@ -100,14 +97,14 @@ impl<'a> Script<'a> {
         let mut stream = self.stream.to_vec();
         self.repair.repair::<F>(&mut stream);
         Line::<F, N>::new().play(&stream, &self.ops);
-        checked_line::check_slice::<F>(&stream);
-        checked_line::check_slice::<Portable<F>>(&stream);
-        // Feature `simd` looks at blocks of 128 bytes: more than most inputs have.
-        checked_line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
+        line::check_slice::<F>(&stream);
+        line::check_slice::<Portable<F>>(&stream);
+        // Feature `simd` works on blocks of 128 bytes: more than most inputs have.
+        line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
     }
 }
 
-/// One op of the script: its upper bits say what, its lower ones how much.
+/// Runs one op of the script: its upper bits are the kind, its lower bits the amount.
 fn op(byte: u8) -> Op {
     let amount = usize::from(byte & 0x1F);
     match byte >> 5 {
@@ -151,15 +148,15 @@ impl Repair {
     }
 }
 
-/// The CRC of any bytes, made and checked, against one bit after the other.
+/// Compares the CRC of any bytes, computed and checked, with a bitwise CRC.
 pub fn crc16(data: &[u8]) {
     let crc = oracle::crc(data);
     assert_eq!(crc16::compute(data), crc);
 
     let mut frame = [data, &crc.to_le_bytes()].concat();
     assert!(crc16::check(&frame));
-    // Two values have the same remainder modulo one factor of the polynomial, and two have the
-    // same parity.
+    // Two of these errors keep the remainder modulo one factor of the polynomial, and two the
+    // parity.
     for other in [0xC001, 0x0003, 0xFFFF] {
         let [.., low, high] = &mut frame[..] else { return };
         [*low, *high] = (crc ^ other).to_le_bytes();
@@ -171,9 +168,9 @@ pub fn crc16(data: &[u8]) {
     }
 }
 
-/// Any value of any packet or message: encoded, found again, equal.
+/// Any value of any packet or message must survive encoding and decoding.
 pub fn roundtrip(data: &[u8]) {
-    // Too few bytes to make a value of are no finding.
+    // Too few bytes for a value are not a finding.
     let _ = roundtrip_of(&mut Unstructured::new(data));
 }
 
@@ -208,7 +205,7 @@ fn ikeya_request(u: &mut Unstructured<'_>) -> Result<()> {
 
     let go = ikeya::WriteRequest::position(id, position);
     let request = ikeya::Request::Write(&go);
-    found::<ikeya::BothDirections>(&go, |found| found == ikeya::Packet::Request(request));
+    found::<ikeya::Either>(&go, |found| found == ikeya::Packet::Request(request));
     assert_eq!((go.id(), go.as_position()), (id, position));
     Ok(())
 }
@@ -224,7 +221,7 @@ fn ikeya_response(u: &mut Unstructured<'_>) -> Result<()> {
     let status = ikeya::PositionResponse::new(id, position);
     assert_eq!(ikeya::PositionResponse::parse(status.as_bytes()), Ok(&status));
     let response = ikeya::Response::Position(&status);
-    found::<ikeya::BothDirections>(&status, |found| found == ikeya::Packet::Response(response));
+    found::<ikeya::Either>(&status, |found| found == ikeya::Packet::Response(response));
     assert_eq!((status.id(), status.position()), (id, position));
 
     // I5: where the split is defined, it and its inverse agree.
@@ -253,7 +250,7 @@ fn three_request(u: &mut Unstructured<'_>) -> Result<()> {
 
     let go = three::WriteRequest::position(id, positions);
     let request = three::Request::Write(&go);
-    found::<three::BothDirections>(&go, |found| found == three::Packet::Request(request));
+    found::<three::Either>(&go, |found| found == three::Packet::Request(request));
     assert_eq!((go.id(), go.as_position()), (id, positions));
     Ok(())
 }
@@ -272,7 +269,7 @@ fn three_response(u: &mut Unstructured<'_>) -> Result<()> {
     let status = three::PositionResponse::new(id, positions);
     assert_eq!(three::PositionResponse::parse(status.as_bytes()), Ok(&status));
     let response = three::Response::Position(&status);
-    found::<three::BothDirections>(&status, |found| found == three::Packet::Response(response));
+    found::<three::Either>(&status, |found| found == three::Packet::Response(response));
     assert_eq!((status.id(), status.positions()), (id, positions));
     Ok(())
 }
@@ -281,9 +278,9 @@ fn three_response(u: &mut Unstructured<'_>) -> Result<()> {
 fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
     let index = u.arbitrary()?;
 
-    message(index, ucp::message::Ping {}, |said, body| said == Message::Ping(body));
+    message(index, ucp::Ping {}, |said, body| said == Message::Ping(body));
     let err = value::error(u)?;
-    message(index, ucp::message::Pong::new(err), |said, body| {
+    message(index, ucp::Pong::new(err), |said, body| {
         body.err() == err && said == Message::Pong(body)
     });
 
@@ -291,7 +288,7 @@ fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
     let in_range = |percent| (-100..=100).contains(&percent);
     match ucp::MotorControl::new(speed, angular) {
         Ok(command) => message(index, command.with_front_led(lamp), |said, body| {
-            let raw = ucp::message::RawMotorControl::from(*body);
+            let raw = ucp::RawMotorControl::from(*body);
             let harmless = (raw.back_led(), raw.version(), raw.reserve1(), raw.reserve2());
             in_range(speed)
                 && in_range(angular)
@@ -308,17 +305,16 @@ fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
     }
 
     let version = u.arbitrary()?;
-    message(index, ucp::message::OtaRequest::start_firmware_update(version), |said, body| {
-        body.version() == version
-            && said == Message::OtaRequest(&ucp::message::RawOtaRequest::from(*body))
+    message(index, ucp::OtaRequest::start_firmware_update(version), |said, body| {
+        body.version() == version && said == Message::OtaRequest(&ucp::RawOtaRequest::from(*body))
     });
     let status = value::ota(u)?;
-    message(index, ucp::message::OtaAck::new(status), |said, body| {
+    message(index, ucp::OtaAck::new(status), |said, body| {
         body.status() == status && said == Message::OtaAck(body)
     });
 
     let state = value::network(u)?;
-    match ucp::message::SetNetworkState::new(state) {
+    match ucp::SetNetworkState::new(state) {
         Some(body) => message(index, body, |said, body| {
             u32::from(body.state()) == u32::from(state) && said == Message::SetNetworkState(body)
         }),
@@ -330,16 +326,16 @@ fn ucp_command(u: &mut Unstructured<'_>) -> Result<()> {
 /// Starts and ends of calibrations, and their acknowledgements.
 fn ucp_calibration(u: &mut Unstructured<'_>) -> Result<()> {
     let (index, kind, err) = (u.arbitrary()?, value::calibration(u)?, value::error(u)?);
-    message(index, ucp::message::CalibrationStart::new(kind), |said, body| {
+    message(index, ucp::CalibrationStart::new(kind), |said, body| {
         body.kind() == kind && said == Message::CalibrationStart(body)
     });
-    message(index, ucp::message::CalibrationStartAck::new(kind, err), |said, body| {
+    message(index, ucp::CalibrationStartAck::new(kind, err), |said, body| {
         (body.kind(), body.err()) == (kind, err) && said == Message::CalibrationStartAck(body)
     });
-    message(index, ucp::message::CalibrationEnd::new(kind), |said, body| {
+    message(index, ucp::CalibrationEnd::new(kind), |said, body| {
         body.kind() == kind && said == Message::CalibrationEnd(body)
     });
-    message(index, ucp::message::CalibrationEndAck::new(kind, err), |said, body| {
+    message(index, ucp::CalibrationEndAck::new(kind, err), |said, body| {
         (body.kind(), body.err()) == (kind, err) && said == Message::CalibrationEndAck(body)
     });
     Ok(())
@@ -350,21 +346,20 @@ fn ucp_biases(u: &mut Unstructured<'_>) -> Result<()> {
     let index = u.arbitrary()?;
     let (acc, gyro, mag) = (u.arbitrary()?, u.arbitrary()?, u.arbitrary()?);
     let err = value::error(u)?;
-    let (imu, magnetometer) =
-        (ucp::message::ImuBias::new(acc, gyro), ucp::message::MagBias::new(mag));
+    let (imu, magnetometer) = (ucp::ImuBias::new(acc, gyro), ucp::MagBias::new(mag));
 
     message(index, imu, |said, body| {
         (body.acc(), body.gyro()) == (acc, gyro) && said == Message::ImuBias(body)
     });
-    message(index, ucp::message::ImuBiasAck::new(err), |said, body| {
+    message(index, ucp::ImuBiasAck::new(err), |said, body| {
         body.err() == err && said == Message::ImuBiasAck(body)
     });
     message(index, magnetometer, |said, body| body.mag() == mag && said == Message::MagBias(body));
-    message(index, ucp::message::MagBiasAck::new(err), |said, body| {
+    message(index, ucp::MagBiasAck::new(err), |said, body| {
         body.err() == err && said == Message::MagBiasAck(body)
     });
-    message(index, ucp::message::BiasRequest {}, |said, body| said == Message::BiasRequest(body));
-    message(index, ucp::message::Biases::new(imu, magnetometer).with_err(err), |said, body| {
+    message(index, ucp::BiasRequest {}, |said, body| said == Message::BiasRequest(body));
+    message(index, ucp::Biases::new(imu, magnetometer).with_err(err), |said, body| {
         (body.err(), body.imu(), body.mag()) == (err, imu, magnetometer)
             && said == Message::Biases(body)
     });
@@ -374,17 +369,17 @@ fn ucp_biases(u: &mut Unstructured<'_>) -> Result<()> {
 /// Both layouts of the report.
 fn ucp_report(u: &mut Unstructured<'_>) -> Result<()> {
     let (index, telemetry, version) = (u.arbitrary()?, value::telemetry(u)?, u.arbitrary()?);
-    message(index, ucp::message::FirmwareReport::new(&telemetry, version), |said, body| {
+    message(index, ucp::FirmwareReport::new(&telemetry, version), |said, body| {
         (body.telemetry(), body.version()) == (telemetry, version)
             && said == Message::Report(Report::Firmware(body))
     });
-    message(index, ucp::message::DocumentReport::new(&telemetry), |said, body| {
+    message(index, ucp::DocumentReport::new(&telemetry), |said, body| {
         body.telemetry() == telemetry && said == Message::Report(Report::Document(body))
     });
     Ok(())
 }
 
-/// U3: what has no message of its own goes through as it is.
+/// U3: frames without a known message pass through unchanged.
 fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     let (id, index) = (u.arbitrary()?, u.arbitrary()?);
     let raw = RawFrame { id, index, body: u.bytes(u.len().min(70))? };
@@ -398,7 +393,7 @@ fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     Ok(())
 }
 
-/// A body makes a frame that parses as itself and says what went in.
+/// A body makes a frame that parses as the same body with the same values.
 fn message<B: Body>(index: u8, body: B, is_same: impl Fn(Message<'_>, &B) -> bool) {
     let frame = body.frame(index);
     let parsed = ucp::Frame::parse(frame.as_bytes()).expect("own frame");
@@ -407,16 +402,17 @@ fn message<B: Body>(index: u8, body: B, is_same: impl Fn(Message<'_>, &B) -> boo
     found::<ucp::Ucp>(&frame, |found| is_same(found.message(), &body));
 }
 
-/// A packet is encoded into room enough and refused by less; among noise it is found as itself.
+/// A packet is encoded into a large enough buffer and refused by a smaller one; in noise it is
+/// found unchanged.
 fn found<F: Framing>(packet: &impl Encode, is_same: impl Fn(F::Frame<'_>) -> bool) {
     let (mut buffer, len) = ([0xEE; 300], packet.encoded_len());
     assert_eq!(packet.encode(&mut buffer).map(<[u8]>::len), Ok(len));
-    assert!(buffer[len..].iter().all(|&byte| byte == 0xEE), "written behind the frame");
+    assert!(buffer[len..].iter().all(|&byte| byte == 0xEE), "written past the frame");
 
     let mut small = [0xEE; 300];
     let refusal = packet.encode(&mut small[..len - 1]).map(<[u8]>::len);
     assert_eq!(refusal, Err(EncodeError::BufferTooSmall { needed: len, available: len - 1 }));
-    assert_eq!(small, [0xEE; 300], "written although it was refused");
+    assert_eq!(small, [0xEE; 300], "written although refused");
 
     let line = [&[0, 0], &buffer[..len], &[0]].concat();
     let mut frames = Frames::<F>::new(&line);
@@ -442,9 +438,9 @@ mod value {
         rps: Rps;
         position: Position;
         telemetry: Telemetry;
-        error: ucp::message::ErrorCode;
-        calibration: ucp::message::CalibrationKind;
-        ota: ucp::message::OtaStatus;
-        network: ucp::message::NetworkState;
+        error: ucp::ErrorCode;
+        calibration: ucp::CalibrationKind;
+        ota: ucp::OtaStatus;
+        network: ucp::NetworkState;
     }
 }

@@ -1,5 +1,5 @@
-//! What the fuzz targets run. The bodies are plain functions of bytes, so that `cargo test` runs
-//! them too: `tests/fuzz_seeds.rs`.
+//! Bodies of the fuzz targets: plain functions of bytes, so that `cargo test` can run them too
+//! (`tests/fuzz_seeds.rs`).
 
 pub mod bodies;
 pub mod roles;

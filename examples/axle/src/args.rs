@@ -1,4 +1,4 @@
-//! Arguments that several subcommands have, and what is refused in them.
+//! Arguments shared by several subcommands, and their validation.
 
 use axlewire::ikeya::{NodeId, Position, Rps};
 use clap::ValueEnum;
@@ -10,25 +10,25 @@ pub(crate) struct Line {
     #[arg(long, value_name = "PATH")]
     pub(crate) port: String,
 
-    /// Speed of the line, bit/s; without it, 500000 for Ikeya and 115200 for UCP
+    /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) baud: Option<u32>,
 }
 
-/// What is spoken on a line.
+/// Protocol of a line.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub(crate) enum Protocol {
-    /// Linux board and robot of a rover
+    /// Link between the Linux board and the robot of a rover
     Ucp,
-    /// Motor bus, one motor a board
+    /// Motor bus, one motor per board
     Ikeya,
-    /// Motor bus, three motors a board
+    /// Motor bus, three motors per board
     #[value(name = "ikeya-3")]
     Ikeya3,
 }
 
 impl Protocol {
-    /// The title of the number that a frame has.
+    /// Column title of a frame's number.
     pub(crate) const fn number(self) -> &'static str {
         match self {
             Self::Ucp => "index",
@@ -39,34 +39,34 @@ impl Protocol {
 
 /// A node id, 1 to 8.
 pub(crate) fn node(text: &str) -> Result<NodeId, String> {
-    let id: u8 = text.parse().map_err(|_| "a node is a number, 1 to 8".to_owned())?;
+    let id: u8 = text.parse().map_err(|_| "a node is a number from 1 to 8".to_owned())?;
     NodeId::new(id).map_err(|error| error.to_string())
 }
 
-/// A speed that is a number (ruling I4).
+/// A finite speed (ruling I4).
 pub(crate) fn rps(text: &str) -> Result<Rps, String> {
-    let rps: f32 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let rps: f32 = text.parse().map_err(|_| "not a number".to_owned())?;
     Rps::new(rps).map_err(|error| error.to_string())
 }
 
-/// A limit of speed: above 0.
+/// A speed limit, above 0.
 pub(crate) fn max_rps(text: &str) -> Result<Rps, String> {
     let limit = rps(text)?;
-    if limit.get() > 0.0 { Ok(limit) } else { Err("a limit is above 0".to_owned()) }
+    if limit.get() > 0.0 { Ok(limit) } else { Err("a limit must be above 0".to_owned()) }
 }
 
-/// A way that is a number and fits onto the wire (rulings I4, I5).
+/// A finite distance that fits on the wire (rulings I4, I5).
 pub(crate) fn revolutions(text: &str) -> Result<Position, String> {
-    let revolutions: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let revolutions: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     Position::from_revolutions(revolutions).map_err(|error| error.to_string())
 }
 
-/// Longest time that can be asked for, seconds: a day.
+/// Longest accepted time, seconds: one day.
 const LONGEST: f64 = 86_400.0;
 
 /// A time in seconds, as microseconds.
 pub(crate) fn seconds(text: &str) -> Result<u64, String> {
-    let seconds: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if !(0.0..=LONGEST).contains(&seconds) {
         return Err(format!("{seconds} s is not within 0..={LONGEST} s"));
     }

@@ -1,4 +1,4 @@
-//! A motor bus on a port, with its master: what `scan`, `spin` and `stop` share.
+//! A motor bus on a port, with its master; shared by `scan`, `spin` and `stop`.
 
 use std::{thread, time};
 
@@ -19,24 +19,24 @@ use crate::{
     signals::{ABSENCE, Awake, Signals},
 };
 
-/// How often each node is read, and its set-point repeated: often enough for every motor, and a USB
-/// adapter keeps up with three nodes.
+/// Period at which each node is read and its set-point repeated: short enough for every motor, and
+/// a USB adapter keeps up with three nodes.
 const PERIOD: Duration = Duration::from_millis(20);
 
-/// Longest pause between two looks at the bus.
+/// Longest interval between two rounds on the bus.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
-/// Least time in which nodes that answer have to confirm a stop. A slow line has more:
+/// Minimum time allowed for nodes that answer to confirm a stop. A slow line gets more:
 /// [`Master::stop_bound`].
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 
-/// Time that a motor may take to run out, once its node has confirmed the stop.
+/// Time allowed for a motor to coast down after its node has confirmed the stop.
 const RUN_OUT: Duration = Duration::from_millis(3000);
 
-/// Time in which an id that has never answered has to be asked without an answer before it counts as silent.
+/// Time for which an id must be asked without ever answering before it counts as silent.
 const SILENCE: Duration = Duration::from_millis(1000);
 
-/// Pause after a failure of the port in a stop, which goes on.
+/// Pause after a port failure during a stop, before the stop continues.
 const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 
 /// The arguments of a master.
@@ -45,8 +45,8 @@ pub(crate) struct MasterArgs {
     #[command(flatten)]
     line: args::Line,
 
-    /// Wait 500 us for an answer, as the protocol says, instead of the 20 ms that a USB adapter may
-    /// need: for a UART of this machine itself
+    /// Wait 500 us for an answer, as the protocol specifies, instead of the 20 ms that a USB
+    /// adapter may need; for a UART built into this machine
     #[arg(long)]
     direct: bool,
 }
@@ -58,20 +58,20 @@ pub(crate) struct Bus<B: Board = OneMotor> {
     pub(crate) baud: u32,
 }
 
-/// What is known of a node at the end of a stop.
+/// Outcome of a stop for one node.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Halt {
-    /// The stop is confirmed, and the motor was measured standing still (ruling I12).
+    /// The stop is confirmed, and the motor was measured at rest (ruling I12).
     Still,
-    /// The stop is confirmed, but the motor was not measured standing still.
+    /// The stop is confirmed, but the motor was not measured at rest.
     Moving,
     /// The stop is not confirmed.
     Owed,
-    /// The stop is not confirmed, because it is in doubt which mode the node is in (ruling I11).
+    /// The stop is not confirmed, because the mode of the node is in doubt (ruling I11).
     Doubtful,
-    /// Bytes came when the id was asked, but no undamaged answer ever.
+    /// The id has only ever given damaged answers.
     Damaged,
-    /// Nothing has ever been heard of the id.
+    /// The id has never answered.
     Silent,
 }
 
@@ -90,8 +90,8 @@ impl Bus {
         Ok(!signals.is_raised())
     }
 
-    /// Reads a node now, so that nothing is decided by an old mode or position. `None` if it does
-    /// not answer, or a signal came first.
+    /// Reads a node now, so that no decision uses an old mode or position. `None` if it does not
+    /// answer, or a signal came first.
     pub(crate) fn read(
         &mut self,
         node: NodeId,
@@ -131,19 +131,19 @@ impl<B: Boards> Bus<B> {
         self.port.round(&mut self.master, until)
     }
 
-    /// One round whose events are not needed: everything is asked of the master.
+    /// One round without its events; callers query the master instead.
     fn look(&mut self) -> Result<(), Failure> {
         let round = self.round(self.port.now() + LOOK_PERIOD);
         while self.master.poll_event().is_some() {}
         round
     }
 
-    /// What a node measured last.
+    /// Last measurement of a node.
     pub(crate) fn status(&self, node: NodeId) -> Option<Status<B>> {
         self.master.status(node).map(|(status, _)| status)
     }
 
-    /// The nodes that have answered so far, and how.
+    /// The nodes that have answered so far, each with its mode and status.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = (NodeId, Mode, Status<B>)> {
         NodeId::ALL.into_iter().filter_map(|node| {
             let status = self.status(node)?;
@@ -151,7 +151,7 @@ impl<B: Boards> Bus<B> {
         })
     }
 
-    /// Has an id never answered, though bytes came when it was asked?
+    /// Whether an id has given only damaged answers.
     pub(crate) fn is_damaged(&self, node: NodeId) -> bool {
         self.status(node).is_none() && self.master.node_statistics(node).crc_errors > 0
     }
@@ -160,11 +160,10 @@ impl<B: Boards> Bus<B> {
         matches!(self.master.health(node), Some(Health::Online | Health::Suspect(_)))
     }
 
-    /// Stops these nodes, and waits until it is known of each what has become of it. Failures of the
-    /// port do not end it before its time; the last one is returned, unless the port has come back
-    /// since.
+    /// Stops these nodes and waits until the outcome of each is known. Port failures do not end the
+    /// wait early; the last one is returned, unless the port has recovered since.
     ///
-    /// It ends by itself, and no signal ends it earlier.
+    /// The wait is bounded, and no signal ends it early.
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
         let begin = self.port.now();
         nodes.iter().for_each(|node| self.master.stop(node, begin));
@@ -193,13 +192,13 @@ impl<B: Boards> Bus<B> {
         }
     }
 
-    /// Has an id never answered, and not been asked often enough to call it silent?
+    /// Whether an id has never answered, but was not asked often enough to count as silent.
     fn is_unasked(&self, node: NodeId) -> bool {
         let attempts = u32::from(self.master.config().attempts);
         self.status(node).is_none() && self.master.node_statistics(node).requests < attempts
     }
 
-    /// What is known of a node that was told to stop.
+    /// Outcome so far for a node that was told to stop.
     pub(crate) fn halt(&self, node: NodeId) -> Halt {
         match self.master.stop_progress(node) {
             StopProgress::StandingStill => Halt::Still,
@@ -211,7 +210,7 @@ impl<B: Boards> Bus<B> {
         }
     }
 
-    /// The same in words; `None` if the node stands still.
+    /// The same as a message; `None` if the motor is at rest.
     pub(crate) fn complaint(&self, node: NodeId) -> Option<String> {
         Some(match self.halt(node) {
             Halt::Still => return None,
@@ -219,33 +218,32 @@ impl<B: Boards> Bus<B> {
                 let seconds = RUN_OUT.as_micros() / 1_000_000;
                 let now = self.status(node).map(B::describe).unwrap_or_default();
                 format!(
-                    "node {node} has confirmed the stop, but still moves after {seconds} s: {now}"
+                    "node {node} confirmed the stop, but is still moving after {seconds} s: {now}"
                 )
             }
             Halt::Owed => {
                 let heard = match self.master.last_failure(node) {
                     _ if self.is_online(node) => "",
-                    Some(Cause::Damaged) => " (damaged bytes are heard)",
-                    Some(Cause::Unexpected) => " (other answers are heard)",
-                    _ => " (nothing is heard)",
+                    Some(Cause::Damaged) => " (damaged bytes received)",
+                    Some(Cause::Unexpected) => " (other answers received)",
+                    _ => " (nothing received)",
                 };
                 format!(
                     "node {node} was told to stop and has not confirmed it{heard}: it may be moving"
                 )
             }
             Halt::Doubtful => format!(
-                "the mode of node {node} is in doubt, so that it cannot be stopped: it may be \
-                 moving"
+                "the mode of node {node} is in doubt, so it cannot be stopped: it may be moving"
             ),
             Halt::Damaged => {
-                format!("id {node} gives only damaged answers: what is there may be moving")
+                format!("id {node} gives only damaged answers: its motor may be moving")
             }
             Halt::Silent => format!("node {node} does not answer"),
         })
     }
 }
 
-/// Boards whose status can be shown.
+/// Boards whose status can be printed.
 pub(crate) trait Boards: Board {
     fn describe(status: Status<Self>) -> String;
 }

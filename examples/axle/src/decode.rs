@@ -1,4 +1,4 @@
-//! `axle decode`: a byte stream in, one line for each frame and each gap out.
+//! `axle decode`: reads a byte stream, prints one line per frame and per gap.
 
 use std::{
     io::{self, BufWriter, Write},
@@ -23,17 +23,17 @@ use crate::{
 
 /// List the frames of a captured byte stream, and the gaps between them
 ///
-/// Every byte of the input is in exactly one line: a frame, or a gap with the reason why no frame
-/// starts there. The end of the input counts as a quiet line: a frame that it cuts off becomes a
-/// gap. Memory does not grow with the input.
+/// Every input byte appears in exactly one line: a frame, or a gap with the reason why no frame
+/// starts there. The end of the input counts as a quiet line: a truncated frame becomes a gap.
+/// Memory use does not grow with the input.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    /// What is spoken on the line
+    /// Protocol of the line
     #[arg(long, value_enum)]
     protocol: Protocol,
 
-    /// Ikeya: look for the packets of one direction only; without it, for both
+    /// Ikeya: decode packets of one direction only; by default, of both
     #[arg(long, value_enum)]
     direction: Option<Direction>,
 
@@ -41,15 +41,15 @@ pub(crate) struct Args {
     #[arg(long)]
     json: bool,
 
-    /// The capture; none, or -, is standard input
+    /// The capture; if omitted or -, standard input
     file: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Direction {
-    /// What the master sends
+    /// Sent by the master
     ToSlave,
-    /// What the slaves send
+    /// Sent by the slaves
     ToMaster,
 }
 
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let decode = match (args.protocol, args.direction) {
         (Protocol::Ucp, None) => decode::<ucp::Ucp>,
         (Protocol::Ucp, Some(_)) => {
-            let line = "--direction is for ikeya and ikeya-3: a UCP frame tells its direction";
+            let line = "--direction is for ikeya and ikeya-3: UCP frames show their own direction";
             return Err(Failure::Usage(line.to_owned()));
         }
         (Protocol::Ikeya, None) => decode::<ikeya::BothDirections>,
@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     decode(input, Listing::new(style))
 }
 
-/// Room for the longest frame of any framing here.
+/// Length of the longest frame of any protocol.
 pub(crate) const BUFFER_LEN: usize = ucp::MAX_LEN;
 
 fn decode<F>(mut input: Input, mut listing: Listing) -> Result<(), Failure>
@@ -91,7 +91,7 @@ where
             Ok(bytes) => bytes,
             Err(failure) => break Some(failure),
         };
-        // The source is slower than we are: perhaps somebody is watching it live.
+        // The source is slower than the tool: the listing may be watched live.
         let waiting = bytes.len() < input::CHUNK_LEN;
         listing.drain(&mut decoder, &mut bytes).map_err(Failure::Write)?;
         if waiting {
@@ -99,11 +99,11 @@ where
         }
     };
     if let Some(failure) = broken {
-        // What was decoded is still good; that there is no summary says that it is not all.
+        // What was decoded is still valid; the missing summary shows that it is incomplete.
         listing.flush().map_err(Failure::Write)?;
         return Err(failure);
     }
-    // Nothing follows. Each call refuses what the end cuts off and searches on inside it, so that
+    // End of input. Each call rejects a truncated frame and continues the search inside it, so that
     // a frame behind a false header is still found (ruling B3).
     loop {
         decoder.idle();
@@ -115,20 +115,20 @@ where
     listing.finish(Summary::new(&decoder.counters(), decoder.pending())).map_err(Failure::Write)
 }
 
-/// How a record is printed.
+/// Output style.
 enum Style {
     Json,
     Human(human::Listing),
 }
 
-/// Gives each event its offset and prints it.
+/// Prints each event with its offset.
 struct Listing {
     out: BufWriter<io::StdoutLock<'static>>,
     style: Style,
-    /// Where the next event begins, or the gap that is held.
+    /// Offset of the next event, or of the held gap.
     offset: u64,
-    /// The last gap: at the end of the input a second one may follow right behind it, and both
-    /// are one to the reader.
+    /// The last gap, held back: at the end of the input a second gap may follow directly, and the
+    /// two are printed as one.
     gap: Option<Gap>,
 }
 
@@ -138,7 +138,7 @@ impl Listing {
         Self { out, style, offset: 0, gap: None }
     }
 
-    /// Prints all that the decoder has to say of `bytes`.
+    /// Prints all events in `bytes`.
     fn drain<F, const N: usize>(
         &mut self,
         decoder: &mut Decoder<F, N>,

@@ -1,4 +1,4 @@
-//! `axle drive`: a rover drives, and stands still again before the tool ends.
+//! `axle drive`: drives a rover, and stops it before the tool exits.
 
 use axlewire::{
     time::{Duration, Instant},
@@ -14,15 +14,15 @@ use crate::{
     teller::{self, Teller},
 };
 
-/// Drive a rover for a while
+/// Drive a rover for a set time
 ///
-/// Waits until the robot is heard and tells it to stand still meanwhile. Then repeats the command
-/// every 100 ms and prints what the robot reports. At the end, on every error and on every signal
-/// that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not those of a crash, nor 32 and
-/// 33, which belong to the C library), the rover is told to stand still, again and again, until its
-/// reports say that all wheels do; a second Ctrl-C does not end that earlier. If it is not heard any
-/// more it may be moving: the tool says so, and the exit code is 1. After Ctrl-Z and fg nothing
-/// moves again, and the exit code is 1.
+/// Sends stops until the robot is heard. Then repeats the command every 100 ms and prints the
+/// robot's reports. At the end, on every error and on every signal that can be caught (Ctrl-C,
+/// Ctrl-Z, Ctrl-\, a kill without -9; not those of a crash, nor 32 and 33, which belong to the C
+/// library), the tool repeats the stop until the reports show that all wheels have stopped; a
+/// second Ctrl-C does not cut this short. If the robot is no longer heard, it may be moving: the
+/// tool says so, and the exit code is 1. After Ctrl-Z and fg nothing moves again, and the exit code
+/// is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
@@ -33,13 +33,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = percent())]
     speed: i16,
 
-    /// Turn of the steering wheel, -100 to 100 percent; positive is to the right, as robots do it
-    /// (the protocol document says left). Forward and on the spot the nose then swings right; in
-    /// reverse, with a speed below -5, it swings left, as with a car
+    /// Steering, -100 to 100 percent; positive is to the right, as on shipped robots (the protocol
+    /// document says left). Going forward or turning on the spot, the nose then swings right; in
+    /// reverse, with a speed below -5, it swings left, as in a car
     #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = percent())]
     turn: i16,
 
-    /// How long, seconds
+    /// Duration, seconds
     #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
 }
@@ -49,7 +49,7 @@ fn percent() -> clap::builder::RangedI64ValueParser<i16> {
     clap::value_parser!(i16).range(-limit..=limit)
 }
 
-/// How often a report is printed; the robot sends one every 20 ms.
+/// Interval between printed reports; the robot sends one every 20 ms.
 const PRINT_PERIOD: Duration = Duration::from_millis(250);
 
 /// Runs the subcommand.
@@ -57,11 +57,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let command = command(args).map_err(|error| Failure::Usage(error.to_string()))?;
     let signals = Signals::listen_to_all()?;
     let result = prepare_and_drive(args, command, &signals);
-    // The port is closed by now.
+    // The port is closed here.
     signals.suspend_if_wanted(result)
 }
 
-/// A turn by its direction's name, so that the sign is the one that robots mean (ruling U6).
+/// Builds the turn by direction name, so that the sign is the one that robots use (ruling U6).
 fn command(args: &Args) -> Result<MotorControl, axlewire::error::EncodeError> {
     match args.turn {
         turn @ 0.. => MotorControl::turn_right(args.speed, turn),
@@ -74,19 +74,19 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     if !rover.find(|| signals.is_raised())? {
         return signals.interrupted();
     }
-    // Printed before anything moves: a terminal may suspend whoever prints in the background.
-    let announced = format!("to drive: {}", rover::describe(&command));
+    // Print before anything moves: a terminal may suspend a background process that prints.
+    let announced = format!("target: {}", rover::describe(&command));
     teller::print(&line(0.0, &announced)).map_err(Failure::Write)?;
     let start = rover.port.now();
     let mut drive = Drive { rover, start, teller: Teller::new() };
 
     let driven = drive.drive(command, args.micros, signals);
-    // Whatever has happened: first the wheels, then the complaint. That they may still turn is the
-    // gravest of all.
+    // In any case, stop the wheels first and report errors afterwards. That the wheels may still
+    // turn is the most serious one.
     let stopped = drive.stop();
     let told = drive.teller.finish();
     stopped?;
-    driven.map_err(|failure| failure.and("it was stopped and stands still"))?;
+    driven.map_err(|failure| failure.and("it was stopped and is at rest"))?;
     told
 }
 
@@ -97,7 +97,7 @@ struct Drive {
 }
 
 impl Drive {
-    /// Drives until the time is over or a signal comes.
+    /// Drives until the time is up or a signal comes.
     fn drive(
         &mut self,
         command: MotorControl,
@@ -109,8 +109,8 @@ impl Drive {
         let mut attendance = Attendance::new(self.start);
         while !signals.is_raised() {
             let now = self.rover.port.now();
-            // An absence ends the drive. The host stops the robot after it, and would drive on with
-            // the next command.
+            // An absence ends the drive: the host stops the robot after one, but the next command
+            // would drive it again.
             attendance.check(now)?;
             if now >= end {
                 break;
@@ -123,7 +123,7 @@ impl Drive {
                 return Err(Failure::Undone(DEAD_MAN.to_owned()));
             }
             if self.rover.host.link() == Link::Down {
-                return Err(Failure::Undone("the robot is not heard any more".to_owned()));
+                return Err(Failure::Undone("the robot is no longer heard".to_owned()));
             }
             if self.rover.port.now() >= print_at {
                 print_at = self.rover.port.now() + PRINT_PERIOD;
@@ -135,7 +135,7 @@ impl Drive {
 
     fn stop(&mut self) -> Result<(), Failure> {
         self.rover.stop()?;
-        // Where nobody reads that, it stands still all the same.
+        // If the output fails, the rover has stopped all the same.
         drop(self.say_report(", stopped"));
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! What can go wrong: one line and an exit code each.
+//! Failures, each with a one-line message and an exit code.
 
 use core::fmt;
 use std::{
@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-/// Why the tool ends early.
+/// Reason why the tool exits early.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// The command line is wrong.
@@ -16,20 +16,21 @@ pub(crate) enum Failure {
     Open { path: PathBuf, error: io::Error },
     /// The file is a directory.
     Directory { path: PathBuf },
-    /// The input broke off; `None` is standard input.
+    /// Reading the input failed; `None` is standard input.
     Read { path: Option<PathBuf>, error: io::Error },
-    /// The output broke off.
+    /// Writing the output failed.
     Write(io::Error),
     /// The port cannot be used.
     Port { path: String, cause: String },
-    /// The port was good and is no more; what that means for what moves, if anything does.
+    /// The port failed after it was opened; `moving` is the consequence for a moving motor or
+    /// rover.
     PortLost { path: String, cause: String, moving: Option<String> },
-    /// What was to be done did not come about.
+    /// The operation failed.
     Undone(String),
 }
 
 impl Failure {
-    /// The first paragraph of clap's answer in one line; usage and tips are what --help is for.
+    /// The first paragraph of clap's message on one line; --help shows usage and tips.
     pub(crate) fn usage(error: &clap::Error) -> Self {
         let text = error.render().to_string();
         let paragraph = text.split("\n\n").next().unwrap_or_default();
@@ -38,7 +39,7 @@ impl Failure {
         Self::Usage(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
     }
 
-    /// The same, happening while something moves: a lost port then says what becomes of that.
+    /// Adds the consequence for what is moving, if the port was lost.
     pub(crate) fn while_moving(self, consequence: &str) -> Self {
         match self {
             Self::PortLost { path, cause, .. } => {
@@ -48,7 +49,7 @@ impl Failure {
         }
     }
 
-    /// The same, where what was to be done did not come about, with what is known besides.
+    /// Adds `besides` to the message of a failed operation.
     pub(crate) fn and(self, besides: &str) -> Self {
         match self {
             Self::Undone(line) => Self::Undone(format!("{line}; {besides}")),
@@ -56,14 +57,14 @@ impl Failure {
         }
     }
 
-    /// Tells the user, and gives the exit code.
+    /// Prints the message and returns the exit code.
     pub(crate) fn report(&self) -> ExitCode {
         match self {
-            // `axle ... | head`: the reader has seen enough, nothing is wrong.
+            // `axle ... | head`: the reader has seen enough; this is not an error.
             Self::Write(error) if error.kind() == io::ErrorKind::BrokenPipe => {
                 return ExitCode::SUCCESS;
             }
-            // Where standard error is closed there is nobody left to tell.
+            // If standard error is closed, there is nowhere left to report.
             _ => drop(writeln!(io::stderr(), "axle: {self}")),
         }
         match self {
@@ -73,7 +74,7 @@ impl Failure {
     }
 }
 
-/// Paths are printed with their control characters escaped, so that one line stays one line.
+/// Control characters in paths are escaped, so that the message stays on one line.
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -85,10 +86,10 @@ impl fmt::Display for Failure {
             Self::Write(error) => write!(f, "cannot write the output: {error}"),
             Self::Port { path, cause } => write!(f, "cannot use port {path:?}: {cause}"),
             Self::PortLost { path, cause, moving: None } => {
-                write!(f, "port {path:?} has failed: {cause}")
+                write!(f, "port {path:?} failed: {cause}")
             }
             Self::PortLost { path, cause, moving: Some(consequence) } => {
-                write!(f, "port {path:?} has failed: {cause}; {consequence}")
+                write!(f, "port {path:?} failed: {cause}; {consequence}")
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Stops over a port that fails for a while and then comes back.
+//! Stops over a port that fails for a while and then recovers.
 
 use std::{
     io::{self, ErrorKind, Read, Write},
@@ -27,7 +27,7 @@ use crate::{
     rover::Rover,
 };
 
-/// A port that neither reads nor writes while it is broken.
+/// A port whose reads and writes fail while it is broken.
 struct Flaky {
     port: TTYPort,
     is_broken: Arc<AtomicBool>,
@@ -56,7 +56,7 @@ impl Write for Flaky {
     }
 }
 
-/// Hands these calls on as they are.
+/// Forwards these calls unchanged.
 macro_rules! hand_on {
     ($(fn $name:ident(&$($this:ident)+ $(, $arg:ident: $kind:ty)*) -> $result:ty;)+) => {
         $(fn $name(&$($this)+ $(, $arg: $kind)*) -> $result {
@@ -97,7 +97,7 @@ impl SerialPort for Flaky {
     }
 }
 
-/// A broken port that comes back after half a second, with this role at the other end.
+/// A broken port that recovers after half a second, with this role at the other end.
 fn broken_for_a_while<E: Endpoint + Send + 'static>(
     role: impl FnOnce(Instant) -> E,
     mut react: impl FnMut(&mut E, Instant) + Send + 'static,

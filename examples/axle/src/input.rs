@@ -1,4 +1,4 @@
-//! Where the bytes come from: a file or standard input, a chunk at a time.
+//! Input bytes from a file or standard input, one chunk at a time.
 
 use std::{
     fs::File,
@@ -10,13 +10,13 @@ use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use crate::failure::Failure;
 
-/// Most bytes read at once.
+/// Maximum number of bytes read at once.
 pub(crate) const CHUNK_LEN: usize = 64 * 1024;
 
-/// Files up to this many bytes are decoded before a progress bar could be read.
+/// Files up to this many bytes are decoded too quickly for a progress bar.
 const NO_PROGRESS_UP_TO: u64 = 8 * 1024 * 1024;
 
-/// A source of bytes with one chunk of memory, however long it is.
+/// A byte source of any length that holds one chunk in memory.
 pub(crate) struct Input {
     path: Option<PathBuf>,
     reader: Box<dyn Read>,
@@ -25,7 +25,7 @@ pub(crate) struct Input {
 }
 
 impl Input {
-    /// Opens `path`; none, or `-`, is standard input.
+    /// Opens `path`, or standard input for `None` and `-`.
     pub(crate) fn open(path: Option<&Path>) -> Result<Self, Failure> {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let Some(path) = path.filter(|path| *path != "-") else {
@@ -42,7 +42,7 @@ impl Input {
         Ok(Self { path: Some(path.to_owned()), reader: Box::new(file), chunk, progress })
     }
 
-    /// The next bytes; none at the end.
+    /// The next bytes; empty at the end.
     pub(crate) fn read(&mut self) -> Result<&[u8], Failure> {
         let read = loop {
             match self.reader.read(&mut self.chunk) {
@@ -58,7 +58,7 @@ impl Input {
     }
 }
 
-/// A bar on standard error where somebody sees it and the listing does not run through it.
+/// A bar on standard error, if that is a terminal and the listing does not go to the terminal too.
 fn progress(len: u64) -> Option<ProgressBar> {
     if len <= NO_PROGRESS_UP_TO || !io::stderr().is_terminal() || io::stdout().is_terminal() {
         return None;

@@ -1,7 +1,7 @@
 //! `axle`: the host tool for Ikeya MD and UCP lines.
 //!
-//! Results go to standard output. Whatever goes wrong is one line on standard error and an exit
-//! code that tells whose fault it was.
+//! Results go to standard output. Every failure gives one line on standard error and an exit code
+//! that distinguishes usage errors from other failures.
 
 mod args;
 mod bus;
@@ -30,30 +30,30 @@ use clap::{Parser, Subcommand};
 
 use failure::Failure;
 
-/// A literal, so that other texts can contain it.
+/// A macro, so that `concat!` accepts it.
 macro_rules! exit_codes {
     () => {
         "\
 Exit codes:
-  0  done; also when the reader of the output has closed it
-  1  the input, the output or the port failed, or what is on the line did not do as it was told
+  0  done, or the reader of the output closed it
+  1  the input, the output or the port failed, or a device on the line did not do as commanded
   2  the command line is wrong"
     };
 }
 
 const EXIT_CODES: &str = exit_codes!();
 
-/// For subcommands on lines where something may move.
+/// For subcommands on lines where something may be moving.
 const MOTION_HELP: &str = concat!(
     exit_codes!(),
     "
 
-What a kill -9, a SIGSTOP or a power cut of this machine leaves behind (no program can prevent it):
-  motor bus  goes on turning, for ever, unless its slaves have watchdogs: the last command holds
-  rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts, also one
-             that another program sends, and noise
-  After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise use axle stop. A machine that
-  can hurt somebody needs an emergency stop that removes power."
+After a kill -9, a SIGSTOP or a power cut of this machine (no program can prevent it):
+  motor bus  keeps turning indefinitely, unless its slaves have watchdogs: the last command holds
+  rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts,
+             including noise and bytes from other programs
+  After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise run axle stop. A machine that
+  can injure people needs an emergency stop that cuts power."
 );
 
 /// Host tool for Ikeya MD and UCP lines
@@ -79,7 +79,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match Cli::try_parse() {
         Ok(Cli { command }) => run(&command),
-        // --help and --version are "errors" that belong on standard output.
+        // --help and --version are "errors" that go to standard output.
         Err(error) if !error.use_stderr() => error.print().map_err(Failure::Write),
         Err(error) => Err(Failure::usage(&error)),
     };

@@ -1,4 +1,4 @@
-//! A serial port and a clock, and the loop that drives a role over them.
+//! A serial port with a clock, and the loop that runs a role on them.
 
 use std::{
     fs,
@@ -15,32 +15,32 @@ use serialport::SerialPort;
 
 use crate::{args, failure::Failure};
 
-/// Longest wait for bytes, so that a signal is seen in time. Nothing spins: each round of a loop
-/// waits for bytes, for the role's next deadline, or for this long.
+/// Longest wait for bytes, so that signals are noticed in time. No loop spins: each round waits for
+/// bytes, for the role's next deadline, or for this long.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Longest wait for the port to take more of a frame. After it the role decides anew what to send,
-/// so that no old command leaves late (ruling U16).
+/// Longest wait for the port to accept more of a frame. After that the role decides again what to
+/// send, so that no outdated command leaves late (ruling U16).
 const FRAME_PATIENCE: Duration = Duration::from_millis(20);
 
-/// Time in which a port takes no byte at all, after which it has failed.
+/// Time after which a port that accepts no byte has failed.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// Frames sent in one round at the most, so that no role keeps a signal from being seen.
+/// Maximum number of frames sent in one round, so that no role keeps signals from being noticed.
 const FRAMES: usize = 8;
 
-/// Difference from the speed that was asked for at which a UART still reads the bytes, percent.
+/// Deviation from the requested baud rate at which a UART still reads the bytes, percent.
 const BAUD_TOLERANCE_PCT: u64 = 3;
 
-/// A frame that did not reach the line whole.
+/// A frame that was not sent completely.
 #[derive(Debug)]
 pub(crate) struct NotSent {
     unsent: Unsent,
-    /// `None` where the port may yet come back.
+    /// `None` if the port may still recover.
     failure: Option<Failure>,
 }
 
-/// Bytes one way, bytes the other way, and time.
+/// Bytes in both directions, and a clock.
 pub(crate) trait Line {
     /// The time since the line was opened.
     fn now(&self) -> Instant;
@@ -48,12 +48,12 @@ pub(crate) trait Line {
     /// Sends all of `bytes`.
     fn send(&mut self, bytes: &[u8]) -> Result<(), NotSent>;
 
-    /// Waits for bytes, until `until` or a moment at the most; none is no failure.
+    /// Waits briefly for bytes, at most until `until`. An empty result is not a failure.
     fn receive(&mut self, until: Instant) -> Result<&[u8], Failure>;
 
-    /// One round of the loop that [`Endpoint`] describes: takes in what has been received, sends
-    /// what is due, waits until `until` at the most, and takes in what came. Events and commands are
-    /// the caller's, between two rounds.
+    /// One round of the loop that [`Endpoint`] describes: hands in what has been received, sends
+    /// what is due, waits at most until `until`, and hands in what came. The caller handles events
+    /// and commands between rounds.
     ///
     /// What is due is sent even if receiving fails, because it may be a stop; the failure is
     /// returned afterwards.
@@ -67,7 +67,7 @@ pub(crate) trait Line {
                 result = result.and(failure.map_or(Ok(()), Err));
                 break;
             }
-            // Bytes that have been received go in before the next frame goes out.
+            // Hand in received bytes before the next frame goes out.
             let received = self.hand_in(role, self.now());
             result = result.and(received);
         }
@@ -78,14 +78,14 @@ pub(crate) trait Line {
         Ok(())
     }
 
-    /// Hands in what comes until `until`.
+    /// Hands in the bytes that come until `until`.
     fn hand_in<E: Endpoint>(&mut self, role: &mut E, until: Instant) -> Result<(), Failure> {
         let received = self.receive(until)?.to_vec();
         role.handle_input(&received, self.now());
         Ok(())
     }
 
-    /// Lets time pass.
+    /// Handles the role's deadline if it has passed.
     fn expire<E: Endpoint>(&self, role: &mut E) {
         let now = self.now();
         if role.poll_timeout().is_some_and(|deadline| now >= deadline) {
@@ -99,13 +99,13 @@ pub(crate) struct Port {
     path: String,
     tty: Box<dyn SerialPort>,
     start: Clock,
-    /// Since when the port has taken no byte, if it takes none.
+    /// Time since which the port has accepted no byte, if it is stuck.
     stuck_since: Option<Clock>,
     buffer: [u8; 4096],
 }
 
 impl Port {
-    /// Opens a port for this process alone, and forgets what was received before.
+    /// Opens a port for exclusive use, and discards bytes received before.
     pub(crate) fn open(line: &args::Line, default_baud: u32) -> Result<Self, Failure> {
         let (path, baud) = (&line.port, line.baud.unwrap_or(default_baud));
         let refused = |cause| Failure::Port { path: path.clone(), cause };
@@ -114,13 +114,13 @@ impl Port {
         if let Ok(actual) = tty.baud_rate()
             && !is_close(baud, actual)
         {
-            return Err(refused(format!("it does not run at {baud} bit/s, only at {actual}")));
+            return Err(refused(format!("it runs at {actual} bit/s instead of {baud}")));
         }
         tty.clear(serialport::ClearBuffer::Input).map_err(|error| refused(error.description))?;
         Ok(Self::new(path.clone(), tty))
     }
 
-    /// A port that is open already.
+    /// Wraps a port that is already open.
     pub(crate) fn new(path: String, tty: Box<dyn SerialPort>) -> Self {
         Self { path, tty, start: Clock::now(), stuck_since: None, buffer: [0; 4096] }
     }
@@ -135,15 +135,15 @@ impl Port {
         is_pseudo_terminal(&self.path)
     }
 
-    /// As [`Line::receive`], with bytes that may be changed.
+    /// Like [`Line::receive`], but the bytes are mutable.
     pub(crate) fn fill(&mut self, until: Instant) -> Result<&mut [u8], Failure> {
         let wait = Duration::from_micros((until - self.now()).as_micros().into()).min(PATIENCE);
         self.set_timeout(wait)?;
         match self.tty.read(&mut self.buffer) {
-            Ok(0) => Err(self.lost("it has vanished (end of file)")),
+            Ok(0) => Err(self.lost("disconnected (end of file)")),
             Ok(len) => Ok(self.buffer.get_mut(..len).unwrap_or_default()),
             Err(error) if is_moment(error.kind()) => Ok(&mut []),
-            Err(error) => Err(self.lost(&format!("it has vanished ({error})"))),
+            Err(error) => Err(self.lost(&format!("disconnected ({error})"))),
         }
     }
 
@@ -151,13 +151,13 @@ impl Port {
         self.tty.set_timeout(timeout).map_err(|error| self.lost(&error.description))
     }
 
-    /// The failure behind an error of a write, unless the port may yet take the next frame.
+    /// The failure for a write error, unless the port may still accept the next frame.
     fn write_failure(&mut self, error: &io::Error) -> Option<Failure> {
         if !is_moment(error.kind()) {
-            return Some(self.lost(&format!("it has vanished ({error})")));
+            return Some(self.lost(&format!("disconnected ({error})")));
         }
         let since = *self.stuck_since.get_or_insert_with(Clock::now);
-        (since.elapsed() >= WRITE_TIMEOUT).then(|| self.lost("it takes no more bytes"))
+        (since.elapsed() >= WRITE_TIMEOUT).then(|| self.lost("it accepts no more bytes"))
     }
 
     fn lost(&self, cause: &str) -> Failure {
@@ -188,7 +188,7 @@ impl Line for Port {
     }
 }
 
-/// Writes all of `bytes`, or says how much of them has left.
+/// Writes all of `bytes`, or returns whether a part of them was sent.
 fn write_all(port: &mut impl Write, bytes: &[u8]) -> Result<(), (Unsent, io::Error)> {
     let mut rest = bytes;
     while !rest.is_empty() {
@@ -207,37 +207,37 @@ fn write_all(port: &mut impl Write, bytes: &[u8]) -> Result<(), (Unsent, io::Err
     Ok(())
 }
 
-/// Nothing came, or a signal did.
+/// Whether a call timed out or was interrupted by a signal.
 fn is_moment(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::TimedOut | ErrorKind::Interrupted | ErrorKind::WouldBlock)
 }
 
-/// Is this path, or what it is a link to, the name of a pseudo-terminal?
+/// Whether this path, or the target of this link, is a pseudo-terminal.
 fn is_pseudo_terminal(path: &str) -> bool {
     let target = fs::canonicalize(path).unwrap_or_else(|_| Path::new(path).to_owned());
-    // Linux has a folder of them; macOS numbers them, as in /dev/ttys003.
+    // Linux has a directory of them; macOS numbers them, as in /dev/ttys003.
     let number = target.to_str().and_then(|path| path.strip_prefix("/dev/ttys"));
     target.starts_with("/dev/pts")
         || number.is_some_and(|it| cfg!(target_os = "macos") && it.parse::<u32>().is_ok())
 }
 
-/// Does a port that runs at `actual` read bytes that are sent at `asked`?
+/// Whether a port running at `actual` can read bytes sent at `asked`.
 fn is_close(asked: u32, actual: u32) -> bool {
     u64::from(asked.abs_diff(actual)) * 100 <= u64::from(asked) * BAUD_TOLERANCE_PCT
 }
 
-/// Why a port could not be opened, in words that help.
+/// A helpful reason why a port could not be opened.
 fn explain(error: &serialport::Error, path: &str) -> String {
     use serialport::ErrorKind as Kind;
 
     let is_no_tty = error.description == "Not a typewriter"
         || fs::metadata(path).is_ok_and(|found| found.is_file() || found.is_dir());
     match error.kind() {
-        Kind::Io(ErrorKind::NotFound) => "there is no such path".to_owned(),
+        Kind::Io(ErrorKind::NotFound) => "no such path".to_owned(),
         Kind::Io(ErrorKind::PermissionDenied) => {
-            "permission denied (on Linux, serial ports are for the group dialout)".to_owned()
+            "permission denied (on Linux, serial ports belong to the group dialout)".to_owned()
         }
-        _ if is_no_tty => "it is no serial port".to_owned(),
+        _ if is_no_tty => "not a serial port".to_owned(),
         Kind::NoDevice if cfg!(unix) => "another program is using it".to_owned(),
         _ => error.description.clone(),
     }

@@ -1,4 +1,4 @@
-//! A rover on a port, with its host: what `drive` and `stop` share.
+//! A rover on a port, with its host; shared by `drive` and `stop`.
 
 use std::{thread, time};
 
@@ -18,37 +18,37 @@ use crate::{
     signals::Awake,
 };
 
-/// Time in which a robot has to be heard first.
+/// Time allowed for a robot to be heard for the first time.
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
 
-/// Time that the wheels may take to stand still once they are told to.
+/// Time allowed for the wheels to come to rest after the first stop.
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 
-/// Stops sent before a report counts: motor frames are not answered (ruling U16), so each may be
-/// lost.
+/// Number of stops sent before a report counts: motor frames are not acknowledged (ruling U16), so
+/// any may be lost.
 const STOPS: u32 = 3;
 
-/// Reports in a row that say that all wheels stand still. One alone may be of a wheel that changes
-/// its direction.
+/// Number of consecutive reports with all wheels at rest. A single one may show a wheel that is
+/// changing direction.
 const STILL_REPORTS: u32 = 3;
 
-/// Longest pause between two calls of the host: well under its dead-man's 500 ms.
+/// Longest interval between two calls of the host: well under its dead-man timeout of 500 ms.
 pub(crate) const CALL_PERIOD: Duration = Duration::from_millis(50);
 
-/// Pause after a failure of the port in a stop, which goes on.
+/// Pause after a port failure during a stop, before the stop continues.
 const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 
-/// What becomes of a robot that can no longer be told to stop.
-pub(crate) const OUT_OF_REACH: &str = "the robot cannot be told to stop any more: it may be moving, until 500 ms after the last byte \
+/// Consequence of a lost port for a moving robot.
+pub(crate) const OUT_OF_REACH: &str = "the robot can no longer be told to stop: it may be moving until 500 ms after the last byte \
      on its line";
 
 /// A port and the host on it.
 pub(crate) struct Rover {
     pub(crate) port: Port,
     pub(crate) host: Host,
-    /// The host has stopped the robot by its dead-man.
+    /// The host's dead-man has stopped the robot.
     pub(crate) has_dead_man_fired: bool,
-    /// Reports in a row with all wheels standing still.
+    /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
 }
 
@@ -65,7 +65,7 @@ impl Rover {
         Self { port, host, has_dead_man_fired: false, still_reports: 0 }
     }
 
-    /// Waits for the first sign of life; `false` if `is_over` says so first.
+    /// Waits until the robot is heard; `false` if `is_over` returns `true` first.
     pub(crate) fn find(&mut self, is_over: impl Fn() -> bool) -> Result<bool, Failure> {
         let end = self.port.now() + LINK_PATIENCE;
         while self.host.link() != Link::Up && !is_over() {
@@ -73,10 +73,10 @@ impl Rover {
                 let (path, seconds) = (self.port.path(), LINK_PATIENCE.as_micros() / 1_000_000);
                 let heard = match self.host.counters().received {
                     0 => "nothing".to_owned(),
-                    bytes => format!("{bytes} bytes that are no message"),
+                    bytes => format!("{bytes} bytes but no message"),
                 };
                 return Err(Failure::Undone(format!(
-                    "no robot answers on {path:?}: {heard} in {seconds} s"
+                    "no robot answers on {path:?}: {heard} received in {seconds} s"
                 )));
             }
             self.round(end)?;
@@ -84,12 +84,12 @@ impl Rover {
         Ok(!is_over())
     }
 
-    /// One round, and its events.
+    /// Runs one round and handles its events.
     pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
         let result = self.port.round(&mut self.host, until);
         while let Some(event) = self.host.poll_event() {
             match event {
-                // Turning on the spot is moving as well: every wheel counts.
+                // Turning on the spot is also motion: every wheel counts.
                 HostEvent::Report(report) if report.telemetry.rpm == [0; 4] => {
                     self.still_reports = self.still_reports.saturating_add(1);
                 }
@@ -101,8 +101,8 @@ impl Rover {
         result
     }
 
-    /// Tells the robot to stand still, again and again, until its reports say that all wheels do.
-    /// Failures of the port and of the link do not end it before its time, and no signal does.
+    /// Repeats the stop until the robot's reports show all wheels at rest. Failures of the port and
+    /// of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, sent) = (self.port.now(), self.host.statistics().commands);
         let (mut awake, mut has_told) = (Awake::new(begin), false);
@@ -111,7 +111,7 @@ impl Rover {
             let result = self.round(self.port.now() + CALL_PERIOD);
             let told = self.host.statistics().commands.saturating_sub(sent);
             if !has_told && told >= STOPS {
-                // What was reported before does not count.
+                // Earlier reports do not count.
                 (has_told, self.still_reports) = (true, 0);
             }
             let is_told = has_told && self.host.is_stop_sent();
@@ -131,16 +131,16 @@ impl Rover {
         let sent = self.host.statistics().commands.saturating_sub(sent);
         Err(Failure::Undone(match self.host.link() {
             Link::Up => {
-                format!("the robot was told {sent} times to stop, and its wheels still turn")
+                format!("the robot was told {sent} times to stop, but its wheels are still turning")
             }
             _ => format!(
-                "the robot was told {sent} times to stop, and is not heard any more: it may be \
+                "the robot was told {sent} times to stop and is no longer heard: it may be \
                  moving"
             ),
         }))
     }
 
-    /// The latest report in one line.
+    /// The latest report on one line.
     pub(crate) fn describe(&self) -> Option<String> {
         let report = self.host.last_report()?;
         let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);
@@ -156,7 +156,7 @@ impl Rover {
     }
 }
 
-/// A motor command in words, with what the nose does where the steering wheel alone would mislead
+/// A motor command as text, with the direction of the nose where the steering alone would mislead
 /// (ruling U6).
 pub(crate) fn describe(command: &MotorControl) -> String {
     let (speed, turn) = (command.speed(), command.angular());

@@ -1,4 +1,4 @@
-//! `axle scan`: which nodes are on a motor bus.
+//! `axle scan`: lists the nodes of a motor bus.
 
 use std::io::{self, Write};
 
@@ -21,7 +21,7 @@ use crate::{
 ///
 /// Asks ids 1 to 8 for their status, silent ones three times; nothing moves. A node's DIP switch is
 /// shown in both readings, because the protocol document has two: compare one board with both
-/// columns and you know which one its maker meant. Finding no node is no failure.
+/// columns to see which one its manufacturer uses. Finding no node is not a failure.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
@@ -45,9 +45,9 @@ enum Record {
         status: Fields<'static>,
         dip: Dip,
     },
-    /// An id that something damaged came from.
+    /// An id that gave only damaged answers.
     Damaged { node: NodeId },
-    /// The end.
+    /// Totals.
     Summary { nodes: usize, damaged: usize },
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)
 }
 
-/// Ids that have not answered, though bytes came when they were asked.
+/// Ids that have given only damaged answers.
 fn damaged(bus: &Bus) -> Vec<NodeId> {
     NodeId::ALL.into_iter().filter(|&node| bus.is_damaged(node)).collect()
 }
@@ -119,15 +119,20 @@ fn print_table(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
     }
     let damaged = damaged(bus);
     for node in &damaged {
-        writeln!(out, "id {node}: only damaged answers: noise, two boards, or another --baud")?;
+        writeln!(
+            out,
+            "id {node}: only damaged answers: noise, two boards with this id, or a wrong --baud"
+        )?;
     }
     let (path, baud) = (bus.port.path(), bus.baud);
     match (count, damaged.is_empty()) {
         (0, true) => writeln!(
             out,
-            "No node answers on {path:?} at {baud} bit/s: power? wires A and B? --baud?"
+            "No node answers on {path:?} at {baud} bit/s: check power, wires A and B, and --baud."
         ),
-        (0, false) => writeln!(out, "No node answers on {path:?} at {baud} bit/s undamaged."),
+        (0, false) => {
+            writeln!(out, "No node answers on {path:?} at {baud} bit/s: all answers are damaged.")
+        }
         (1, _) => writeln!(out, "1 node answers."),
         (count, _) => writeln!(out, "{count} nodes answer."),
     }?;

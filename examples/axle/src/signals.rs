@@ -1,4 +1,4 @@
-//! Signals as flags, looked at between two rounds: what moves is stopped first.
+//! Signals as flags, checked between rounds, so that motors are stopped first.
 
 use std::{
     io,
@@ -16,19 +16,19 @@ use signal_hook::{
 
 use crate::failure::Failure;
 
-/// Ctrl-C, the polite kill and the terminal that is closed end every subcommand.
+/// Ctrl-C, SIGTERM and a closed terminal end every subcommand.
 #[cfg(unix)]
 const ENDS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
 #[cfg(not(unix))]
 const ENDS: &[i32] = &[SIGINT, SIGTERM];
 
-/// Ctrl-Z, and what the terminal sends to a program in the background.
+/// Ctrl-Z, and the signals that a terminal sends to a background process.
 #[cfg(unix)]
 const SUSPENSIONS: &[i32] =
     &[signal_hook::consts::SIGTSTP, signal_hook::consts::SIGTTIN, signal_hook::consts::SIGTTOU];
 
-/// Signals that neither end nor suspend a program that does not listen to them; those that cannot be
-/// caught; and faults of the program itself, behind which it cannot go on.
+/// Signals that neither end nor suspend a process by default; those that cannot be caught; and
+/// faults of the program itself, after which it cannot continue.
 #[cfg(unix)]
 const LEFT_ALONE: &[i32] = {
     use signal_hook::consts::*;
@@ -38,11 +38,11 @@ const LEFT_ALONE: &[i32] = {
     ]
 };
 
-/// The largest number of a signal, real-time signals included.
+/// The largest signal number, including real-time signals.
 #[cfg(unix)]
 const LAST_SIGNAL: i32 = 64;
 
-/// The signals so far. They stay: a second Ctrl-C is no other wish than the first.
+/// The signals received so far. Flags are never cleared: a second Ctrl-C adds nothing to the first.
 #[derive(Debug, Default)]
 pub(crate) struct Signals {
     end: Arc<AtomicBool>,
@@ -50,7 +50,7 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// For a subcommand that moves nothing: Ctrl-C and its like become a flag.
+    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag.
     pub(crate) fn listen() -> Result<Self, Failure> {
         let signals = Self::default();
         listen_to(ENDS, &signals.end)?;
@@ -64,25 +64,25 @@ impl Signals {
         #[cfg(unix)]
         {
             listen_to(SUSPENSIONS, &signals.suspend)?;
-            // What a supervisor, a script or a limit sends: it would end the tool at once, with the
-            // motors running.
+            // Signals from a supervisor, a script or a resource limit would end the tool at once,
+            // with the motors running.
             let is_other = |signal: &i32| {
                 [ENDS, SUSPENSIONS, LEFT_ALONE].iter().all(|known| !known.contains(signal))
             };
             for signal in (1..=LAST_SIGNAL).filter(is_other) {
-                // A system refuses numbers that it does not have or keeps for itself.
+                // A system refuses numbers that it lacks or reserves.
                 let _ = flag::register(signal, Arc::clone(&signals.end));
             }
         }
         Ok(signals)
     }
 
-    /// Has any signal come?
+    /// Whether any signal has come.
     pub(crate) fn is_raised(&self) -> bool {
         self.end.load(Ordering::SeqCst) || self.suspend.load(Ordering::SeqCst)
     }
 
-    /// A signal has come before anything moved. Ctrl-Z has a line of its own, in
+    /// The result after a signal that came before anything moved. Ctrl-Z has its own message, in
     /// [`suspend_if_wanted`](Self::suspend_if_wanted).
     pub(crate) fn interrupted(&self) -> Result<(), Failure> {
         if self.suspend.load(Ordering::SeqCst) {
@@ -91,12 +91,12 @@ impl Signals {
         Err(Failure::Undone("interrupted before anything moved".to_owned()))
     }
 
-    /// The result of a subcommand, if Ctrl-Z was not pressed. Otherwise tells it, suspends the
-    /// process so that a shell sees it, and fails when the process goes on.
+    /// Returns `result` if Ctrl-Z was not pressed. Otherwise prints its failure, suspends the
+    /// process so that the shell notices, and fails once the process resumes.
     ///
-    /// Call it when everything is stopped and the port is closed, so that another program can use
-    /// the line meanwhile. What was known of the line before is out of date afterwards, so nothing
-    /// is sent any more.
+    /// Call it after everything is stopped and the port is closed, so that another program can use
+    /// the line meanwhile. The known state of the line is outdated afterwards, so nothing more is
+    /// sent.
     pub(crate) fn suspend_if_wanted(&self, result: Result<(), Failure>) -> Result<(), Failure> {
         if !self.suspend.load(Ordering::SeqCst) {
             return result;
@@ -107,7 +107,8 @@ impl Signals {
         // SIGSTOP cannot fail for the process itself.
         #[cfg(unix)]
         let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
-        let line = "suspended by Ctrl-Z: what moved was told to stop first, and is not moved again";
+        let line =
+            "suspended by Ctrl-Z: everything that moved was told to stop first and stays stopped";
         Err(Failure::Undone(line.to_owned()))
     }
 }
@@ -120,7 +121,7 @@ fn listen_to(signals: &[i32], flag: &Arc<AtomicBool>) -> Result<(), Failure> {
         .map_err(|error: io::Error| Failure::Undone(format!("cannot listen for signals: {error}")))
 }
 
-/// Time of which the tool was awake, for deadlines: a stop that was begun is given all of its time
+/// Time for which the tool was running, for deadlines: a suspended stop still gets all of its time
 /// after a SIGCONT.
 #[derive(Debug)]
 pub(crate) struct Awake {
@@ -133,7 +134,7 @@ impl Awake {
         Self { time: Duration::ZERO, seen_at: now }
     }
 
-    /// The time so far. To be called in every round.
+    /// The time so far. Call it in every round.
     pub(crate) fn time(&mut self, now: Instant) -> Duration {
         self.time = self.time + (now - self.seen_at).min(ABSENCE);
         self.seen_at = now;
@@ -141,14 +142,15 @@ impl Awake {
     }
 }
 
-/// Longest pause between two rounds of a tool that is awake. The dead-man of both masters is as
-/// long.
+/// Longest pause between two rounds of a running tool. The dead-man timeouts of the master and the
+/// host are equal to it.
 pub(crate) const ABSENCE: Duration = Duration::from_millis(500);
 
-/// The same in words, where a dead-man notices it first.
+/// Message for an absence that a dead-man detects first.
 pub(crate) const DEAD_MAN: &str = "the tool did not run for a while (suspended?)";
 
-/// Notices that the tool was not there: suspended by a SIGSTOP, which cannot be caught, or starved.
+/// Detects that the tool was not running: suspended by a SIGSTOP, which cannot be caught, or
+/// starved of CPU time.
 #[derive(Debug)]
 pub(crate) struct Attendance {
     seen_at: Instant,
@@ -159,7 +161,7 @@ impl Attendance {
         Self { seen_at: now }
     }
 
-    /// To be called in every round. After an absence what moves is to be stopped, not driven on.
+    /// Call it in every round. After an absence, stop what is moving instead of driving it on.
     pub(crate) fn check(&mut self, now: Instant) -> Result<(), Failure> {
         let away = now - self.seen_at;
         self.seen_at = now;

@@ -1,4 +1,4 @@
-//! `axle spin`: one motor turns, and stands still again before the tool ends.
+//! `axle spin`: turns one motor, and stops it before the tool exits.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -15,18 +15,19 @@ use crate::{
     teller::{self, Teller},
 };
 
-/// Turn one motor of a motor bus for a while
+/// Turn one motor of a motor bus for a set time
 ///
-/// Finds the node, reads it once more, commands it and prints what it measures. At the end, on every
-/// error and on every signal that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not those
-/// of a crash, nor 32 and 33, which belong to the C library), the motor is stopped: a velocity node
-/// gets 0 rps, a position node holds the position that is then read. The tool goes on until the node
-/// has confirmed the stop twice and stands still, or says what is known instead; a second Ctrl-C
-/// does not end that earlier. After Ctrl-Z and fg nothing moves again, and the exit code is 1.
+/// Finds the node, reads it again, commands it and prints its measurements. At the end, on every
+/// error and on every signal that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not
+/// those of a crash, nor 32 and 33, which belong to the C library), the motor is stopped: a
+/// velocity node gets 0 rps, a position node holds the position read at that moment. The tool
+/// continues until the node has confirmed the stop twice and the motor is at rest, or else reports
+/// what is known; a second Ctrl-C does not cut this short. After Ctrl-Z and fg nothing moves again,
+/// and the exit code is 1.
 ///
-/// The exit code is 1 as well if the target is not reached when the time is over: the last speed has
-/// to be within 10 % or 0.1 rps of it, whichever is more, but not further than half of it or, if
-/// that is more, 0.05 rps; the last position within 8 counts.
+/// The exit code is also 1 if the target is not reached when the time is up: the last speed must be
+/// within 10 % or 0.1 rps of it, whichever is more, but not off by more than half of it or 0.05
+/// rps, whichever is more; the last position must be within 8 counts.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
@@ -40,11 +41,11 @@ pub(crate) struct Args {
     #[command(flatten)]
     goal: GoalArgs,
 
-    /// Refuse an --rps faster than this, in either direction: a typing error is not to move a motor
+    /// Refuse an --rps faster than this, in either direction, to guard against typos
     #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
     max_rps: Rps,
 
-    /// How long, seconds
+    /// Duration, seconds
     #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
 }
@@ -56,21 +57,21 @@ struct GoalArgs {
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::rps)]
     rps: Option<Rps>,
 
-    /// For a position node: go this many revolutions on from where it is
+    /// For a position node: move by this many revolutions from where it is
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::revolutions)]
     revolutions: Option<Position>,
 }
 
-/// How often the measured value is printed.
+/// Interval between printed measurements.
 const PRINT_PERIOD: Duration = Duration::from_millis(250);
 
-/// Longest pause between two looks at the bus: well under the master's dead-man.
+/// Longest interval between two rounds on the bus: well under the master's dead-man timeout.
 const CALL_PERIOD: Duration = Duration::from_millis(50);
 
-/// A measurement older than this says nothing about the motor now.
+/// Maximum age of a measurement that counts as current.
 const FRESH: Duration = Duration::from_millis(250);
 
-/// Largest difference between a position and its target.
+/// Largest difference between a position and its target, counts.
 const TARGET_COUNTS: u32 = 8;
 
 /// Runs the subcommand.
@@ -80,12 +81,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     {
         let (rps, limit) = (rps.get(), args.max_rps.get());
         return Err(Failure::Usage(format!(
-            "--rps {rps} is faster than --max-rps {limit}: give a larger limit if you mean it"
+            "--rps {rps} is faster than --max-rps {limit}: raise the limit if you mean it"
         )));
     }
     let signals = Signals::listen_to_all()?;
     let result = prepare_and_spin(args, &signals);
-    // The port is closed by now.
+    // The port is closed here.
     signals.suspend_if_wanted(result)
 }
 
@@ -96,10 +97,10 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     }
     let node = args.node;
     let found = choose(args, &bus, bus.status(node))?;
-    // Printed before anything moves: a terminal may suspend whoever prints in the background.
+    // Print before anything moves: a terminal may suspend a background process that prints.
     teller::print(&line(0.0, node, &announce(found))).map_err(Failure::Write)?;
 
-    // The discovery took a while, and so may the reader of that line: the mode may have changed.
+    // Discovery took a while, and so may the reader of that line: the mode may have changed.
     let status = bus.read(node, signals)?;
     if signals.is_raised() {
         return signals.interrupted();
@@ -112,16 +113,16 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     let mut spin = Spin { bus, node, start, teller: Teller::new() };
 
     let spun = spin.spin(target, args.micros, signals);
-    // Whatever has happened: first the motor, then the complaint. That it may still turn is the
-    // gravest of all.
+    // In any case, stop the motor first and report errors afterwards. That it may still turn is the
+    // most serious one.
     let stopped = spin.stop();
     let told = spin.teller.finish();
     stopped?;
-    spun.map_err(|failure| failure.and("it was stopped and stands still"))?;
+    spun.map_err(|failure| failure.and("it was stopped and is at rest"))?;
     told
 }
 
-/// What this node is to do, if it answers and is in the right mode.
+/// The target for this node, if it answers and is in the right mode.
 fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Target, Failure> {
     let node = args.node;
     let refuse = |line: String| Err(Failure::Undone(line));
@@ -132,8 +133,8 @@ fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Ta
             match goal {
                 Some(Ok(goal)) => Ok(Target::Position(goal)),
                 _ => refuse(format!(
-                    "node {node} is at {:.4} turns: {:.4} turns more are beyond what a position \
-                     can tell",
+                    "node {node} is at {:.4} turns: {:.4} turns more exceed the range of a \
+                     position",
                     at.revolutions(),
                     way.revolutions(),
                 )),
@@ -159,8 +160,8 @@ fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Ta
 
 fn announce(target: Target) -> String {
     match target {
-        Target::Velocity(rps) => format!("to turn at {:.2} rps", rps.get()),
-        Target::Position(position) => format!("to go to {:.4} turns", position.revolutions()),
+        Target::Velocity(rps) => format!("target {:.2} rps", rps.get()),
+        Target::Position(position) => format!("target {:.4} turns", position.revolutions()),
     }
 }
 
@@ -171,13 +172,13 @@ fn line(seconds: f64, node: NodeId, what: &str) -> String {
 struct Spin {
     bus: Bus,
     node: NodeId,
-    /// When the motor was commanded.
+    /// Time at which the motor was commanded.
     start: Instant,
     teller: Teller,
 }
 
 impl Spin {
-    /// Commands the motor and watches it until the time is over or a signal comes.
+    /// Commands the motor and watches it until the time is up or a signal comes.
     fn spin(&mut self, target: Target, micros: u64, signals: &Signals) -> Result<(), Failure> {
         self.command(target)?;
         let end = Instant::from_micros(self.start.as_micros() + micros);
@@ -201,7 +202,7 @@ impl Spin {
         Ok(())
     }
 
-    /// The master refuses what is meant for another mode than the last one heard.
+    /// The master refuses a target for any mode other than the last one reported.
     fn command(&mut self, target: Target) -> Result<(), Failure> {
         let (master, node) = (&mut self.bus.master, self.node);
         match target {
@@ -211,7 +212,7 @@ impl Spin {
         .map_err(|error| Failure::Undone(error.to_string()))
     }
 
-    /// Ends the spin where the node no longer follows.
+    /// Fails if the node no longer follows its command.
     fn check_follows(&mut self, target: Target) -> Result<(), Failure> {
         let (bus, node) = (&mut self.bus, self.node);
         let mut has_dead_man_fired = false;
@@ -220,7 +221,7 @@ impl Spin {
         }
         let refuse = |line: String| Err(Failure::Undone(line));
         match bus.master.mode(node) {
-            _ if !bus.is_online(node) => refuse(format!("node {node} does not answer any more")),
+            _ if !bus.is_online(node) => refuse(format!("node {node} no longer answers")),
             Some(mode) if mode != target.mode() => {
                 refuse(format!("node {node} has changed to {mode} mode"))
             }
@@ -239,7 +240,7 @@ impl Spin {
         }
     }
 
-    /// At the end of the time: is the motor where it was to be, or as fast?
+    /// Checks at the end that the motor has reached its target.
     fn check_reached(&self, target: Target) -> Result<(), Failure> {
         let (node, now) = (self.node, self.bus.port.now());
         let measured = self.bus.master.status(node);
@@ -248,18 +249,18 @@ impl Spin {
             Some((status, _)) if is_reached(target, status) => return Ok(()),
             Some((status, _)) => {
                 let (now, target) = (OneMotor::describe(status), announce(target));
-                format!("node {node} was {target} and is at {now} when the time is over")
+                format!("node {node} was at {now} when the time was up, {target}")
             }
-            None => format!("node {node} was not measured when the time was over"),
+            None => format!("node {node} has no current measurement at the end of the time"),
         };
         Err(Failure::Undone(line))
     }
 
-    /// Stops the motor and waits until it stands still (rulings I6, I12).
+    /// Stops the motor and waits until it is at rest (rulings I6, I12).
     fn stop(&mut self) -> Result<(), Failure> {
         let failure = self.bus.stop(self.node.into()).err();
         let Some(complaint) = self.bus.complaint(self.node) else {
-            // Where nobody reads that, it stands still all the same.
+            // If the output fails, the motor has stopped all the same.
             drop(self.say_status(", stopped and confirmed"));
             return Ok(());
         };
@@ -289,8 +290,8 @@ fn is_reached(target: Target, status: Status<OneMotor>) -> bool {
     }
 }
 
-/// Largest difference between a speed and its target, rps. A motor that stands still has not
-/// reached a slow speed, unless that counts as standing still itself.
+/// Largest difference between a speed and its target, rps. A motor at rest has not reached a slow
+/// target speed, unless that speed itself counts as rest.
 fn tolerance(target: Rps) -> f32 {
     let target = target.get().abs();
     (target * 0.1).max((target * 0.5).min(0.1)).max(0.05)

@@ -1,4 +1,4 @@
-//! `axle stop`: whatever answers on a line is stopped.
+//! `axle stop`: stops whatever answers on a line.
 
 use axlewire::ikeya::{
     NodeId,
@@ -16,33 +16,33 @@ use crate::{
     teller,
 };
 
-/// Stop what answers on a line, and wait until it stands still
+/// Stop whatever answers on a line, and wait until it is at rest
 ///
-/// A motor bus: all ids are read, those that answer are stopped (a velocity node gets 0 rps, a
-/// position node holds the position that is then read), and the stop is repeated until each has
-/// confirmed it twice and was measured standing still. Silent ids are listed and are no failure, as
-/// long as one node answers. A rover: zero motor commands are sent every 100 ms until its reports say
-/// that all wheels stand still.
+/// Motor bus: reads all ids, stops those that answer (a velocity node gets 0 rps, a position node
+/// holds the position read at that moment), and repeats the stop until each has confirmed it twice
+/// and was measured at rest. Silent ids are listed and are not a failure, as long as one node
+/// answers. Rover: sends zero motor commands every 100 ms until the reports show that all wheels
+/// have stopped.
 ///
-/// The exit code is 0 only if something has answered and all of it stands still. The tool ends by
-/// itself within some 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not end it earlier.
+/// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
+/// within about 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.
 ///
-/// What is sent on the wire: with --protocol ikeya or ikeya-3 READ packets for ids 1 to 8, or for
-/// --node alone, and WRITE packets for those that answer; with --protocol ucp zero motor commands and
-/// pings. Without --protocol first the READ packets of one-motor boards, for a second, at 500000
-/// bit/s; if nothing answers, then zero motor commands and pings at 115200 bit/s. Any byte keeps a
-/// vendor robot going for 500 ms, so for a rover --protocol ucp is faster by that second.
+/// What is sent on the wire: with --protocol ikeya or ikeya-3, READ packets for ids 1 to 8, or for
+/// --node only, and WRITE packets for those that answer; with --protocol ucp, zero motor commands
+/// and pings. Without --protocol, first the READ packets of one-motor boards, for one second, at
+/// 500000 bit/s; if nothing answers, then zero motor commands and pings at 115200 bit/s. Any byte
+/// keeps a vendor robot going for 500 ms, so for a rover --protocol ucp is faster by that second.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     line: args::Line,
 
-    /// What is spoken on the line; without it, ikeya is tried and then ucp
+    /// Protocol of the line; by default ikeya is tried first, then ucp
     #[arg(long, value_enum)]
     protocol: Option<Protocol>,
 
-    /// Stop this node of a motor bus alone, 1 to 8; it has to answer
+    /// Stop only this node of a motor bus, 1 to 8; it must answer
     #[arg(long, value_name = "N", value_parser = args::node)]
     node: Option<NodeId>,
 }
@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let line = "--node is for ikeya and ikeya-3: a rover has no nodes";
         return Err(Failure::Usage(line.to_owned()));
     }
-    // A stop is not interrupted. It ends by itself.
+    // Signals do not interrupt a stop, which is bounded.
     let _signals = Signals::listen_to_all()?;
     match args.protocol {
         Some(Protocol::Ikeya) => stop_bus::<OneMotor>(args)?.judge(),
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// A bus if a node answers, otherwise a rover.
+/// Stops a bus if a node answers, otherwise a rover.
 fn stop_whatever(args: &Args) -> Result<(), Failure> {
     let bus = stop_bus::<OneMotor>(args)?;
     if bus.answered > 0 || args.node.is_some() {
@@ -75,20 +75,20 @@ fn stop_whatever(args: &Args) -> Result<(), Failure> {
     })
 }
 
-/// What has become of a bus.
+/// Outcome for a bus.
 struct Stopped {
     path: String,
     answered: usize,
-    /// Ids that gave only damaged answers.
+    /// Number of ids that gave only damaged answers.
     damaged: usize,
-    /// What is wrong with each node that is not known to stand still.
+    /// One message for each node that is not known to be at rest.
     complaints: Vec<String>,
-    /// What is wrong with the port.
+    /// Failure of the port.
     failure: Option<Failure>,
 }
 
 impl Stopped {
-    /// Good if something has answered and all of it stands still.
+    /// `Ok` if something has answered and all of it is at rest.
     fn judge(self) -> Result<(), Failure> {
         let complaint = match (self.complaints.is_empty(), self.answered) {
             (false, _) => self.complaints.join("; "),
@@ -102,7 +102,7 @@ impl Stopped {
     }
 
     fn nothing(&self) -> String {
-        let heard = if self.damaged > 0 { " undamaged" } else { "" };
+        let heard = if self.damaged > 0 { " (damaged bytes received)" } else { "" };
         format!("no node answers on {:?}{heard}", self.path)
     }
 }
@@ -126,7 +126,7 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
         match bus.halt(node) {
             Halt::Still => {
                 let line = format!("node {node}: {status}, stopped and confirmed");
-                // Where nobody reads that, it stands still all the same.
+                // If the output fails, the motor has stopped all the same.
                 drop(teller::print(&line));
             }
             Halt::Silent if args.node.is_none() => silent.push(node.to_string()),
@@ -141,7 +141,7 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
 
 fn stop_rover(line: &args::Line) -> Result<(), Failure> {
     let mut rover = Rover::open(line)?;
-    // The host's first frames tell the robot to stand still, heard or not.
+    // The host's first frames are stops, whether or not the robot is heard.
     rover.find(|| false)?;
     rover.stop()?;
     if let Some(report) = rover.describe() {

@@ -1,5 +1,5 @@
-//! Lines of output while something moves, from a thread of their own: a reader that does not read,
-//! such as a terminal after Ctrl-S, must not keep a stop from being sent.
+//! Output lines while something moves, printed by a separate thread: a stalled reader, such as a
+//! terminal after Ctrl-S, must not keep a stop from being sent.
 
 use std::{
     io::{self, Write},
@@ -10,16 +10,16 @@ use std::{
 
 use crate::failure::Failure;
 
-/// Lines that wait for the reader: half a minute of them. Those that find no room are lost.
+/// Number of lines that may wait for the reader: half a minute of output. Further lines are lost.
 const QUEUE: usize = 128;
 
-/// Time that the reader has for the last lines when the tool ends.
+/// Time allowed for the reader to take the last lines when the tool exits.
 const FAREWELL: Duration = Duration::from_millis(500);
 
-/// Prints lines without ever waiting for their reader.
+/// Prints lines without ever waiting for the reader.
 pub(crate) struct Teller {
     lines: SyncSender<String>,
-    /// Why the printing has ended. It ends well when no more lines can come.
+    /// Result of the printing thread; `Ok` when no more lines can come.
     end: Receiver<io::Result<()>>,
     has_lost_lines: bool,
 }
@@ -30,13 +30,13 @@ impl Teller {
         let (ended, end) = mpsc::channel();
         thread::spawn(move || {
             let print = |line: String| print(&line);
-            // Whoever started this has gone if nobody takes it.
+            // Fails only if the `Teller` is gone.
             let _ = ended.send(queue.iter().try_for_each(print));
         });
         Self { lines, end, has_lost_lines: false }
     }
 
-    /// Prints a line when the reader takes it.
+    /// Queues a line for the reader.
     ///
     /// Fails if an earlier line could not be written.
     pub(crate) fn say(&mut self, line: String) -> Result<(), Failure> {
@@ -51,24 +51,24 @@ impl Teller {
         Ok(())
     }
 
-    /// Waits a moment for the last lines to be read.
+    /// Waits briefly for the last lines to be read.
     pub(crate) fn finish(self) -> Result<(), Failure> {
         let Self { lines, end, has_lost_lines } = self;
         drop(lines);
         match end.recv_timeout(FAREWELL) {
             Ok(Ok(())) if !has_lost_lines => Ok(()),
             Ok(Err(error)) => Err(Failure::Write(error)),
-            // An error that `say` has reported already.
+            // `say` has already reported the error.
             Err(RecvTimeoutError::Disconnected) => Ok(()),
             Ok(Ok(())) | Err(RecvTimeoutError::Timeout) => {
-                let error = io::Error::new(io::ErrorKind::TimedOut, "its reader does not read");
+                let error = io::Error::new(io::ErrorKind::TimedOut, "the reader has stalled");
                 Err(Failure::Write(error))
             }
         }
     }
 }
 
-/// Prints a line at once, however long its reader takes: for when nothing moves.
+/// Prints a line at once, however long the reader takes; for use while nothing moves.
 pub(crate) fn print(line: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     writeln!(out, "{line}").and_then(|()| out.flush())

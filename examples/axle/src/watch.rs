@@ -1,4 +1,4 @@
-//! `axle watch`: what is said on a line, live, without a word of our own.
+//! `axle watch`: shows the traffic on a line live, without sending anything.
 
 use std::{
     collections::BTreeMap,
@@ -25,32 +25,31 @@ use crate::{
 
 /// Watch a line without sending anything
 ///
-/// Decodes what comes in, of both directions: how often each message of each node is heard, what it
-/// said last, and where all other bytes went. On a terminal the table is redrawn in place;
-/// elsewhere there is one line a second. Ctrl-C ends it with a summary.
+/// Decodes both directions and shows how often each message of each node is heard, its last
+/// contents, and how many bytes were skipped and why. On a terminal the table is redrawn in place;
+/// elsewhere one line is printed per second. Ctrl-C ends with a summary.
 ///
-/// Nothing is asked, so only what is on the line anyway is seen: robots report by themselves, nodes
-/// of a motor bus answer only to a master, and on a four-wire bus an adapter hears one direction.
+/// It sends no requests, so it shows existing traffic only: robots report by themselves, nodes of a
+/// motor bus answer only to a master, and on a four-wire bus an adapter hears one direction.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     line: args::Line,
 
-    /// What is spoken on the line
+    /// Protocol of the line
     #[arg(long, value_enum)]
     protocol: Protocol,
 }
 
-/// How often the table is redrawn, and how often a line is printed.
+/// Intervals at which the table is redrawn and a line is printed.
 const REDRAW_PERIOD: Duration = Duration::from_millis(250);
 const PRINT_PERIOD: Duration = Duration::from_millis(1000);
 
 /// The time over which a rate is measured.
 const RATE_PERIOD: Duration = Duration::from_millis(1000);
 
-/// A silence that ends what looked like the start of a frame (ruling B3): longer than the pauses of
-/// a USB adapter.
+/// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
 const QUIET: Duration = Duration::from_millis(30);
 
 /// Runs the subcommand.
@@ -107,13 +106,13 @@ where
     broken
 }
 
-/// What has been heard of each message. There are not many kinds of messages, so it stays small.
+/// Traffic per message. There are few kinds of messages, so the table stays small.
 struct Table {
     protocol: Protocol,
     rows: BTreeMap<(u8, &'static str), Row>,
     start: Instant,
     measured_at: Instant,
-    /// Lines on the screen that the next table replaces.
+    /// Number of lines on the screen that the next table replaces.
     drawn: usize,
 }
 
@@ -121,7 +120,7 @@ struct Table {
 #[derive(Default)]
 struct Row {
     count: u64,
-    /// Of these, how many were there when the rate was measured.
+    /// `count` at the last rate measurement.
     measured: u64,
     per_second: f64,
     last: String,
@@ -139,7 +138,7 @@ impl Table {
         for<'a> F::Frame<'a>: Into<Frame<'a>>,
     {
         while let Some(event) = decoder.decode(&mut bytes) {
-            // A gap is in the counters already.
+            // Gaps are already in the counters.
             let Event::Frame(frame) = event else { continue };
             let frame = frame.into();
             let key = match &frame {
@@ -152,7 +151,7 @@ impl Table {
         }
     }
 
-    /// Measures the rates, once in their period.
+    /// Measures the rates, once per period.
     fn measure(&mut self, now: Instant) {
         if now < self.measured_at + RATE_PERIOD {
             return;
@@ -177,8 +176,8 @@ impl Table {
     fn redraw(&mut self, out: &mut impl Write, counters: &Counters) -> io::Result<()> {
         let mut text = String::new();
         for line in self.lines() {
-            // Cut at the edge of the screen instead of wrapped: the next table counts on one row
-            // for each line.
+            // Lines are cut at the screen edge, not wrapped: the next table expects one row per
+            // line.
             text.push_str(&format!("{line}\n"));
         }
         text.push_str(&format!("{}\n", account(counters)));
@@ -202,7 +201,7 @@ impl Table {
         [title].into_iter().chain(rows)
     }
 
-    /// The rates in one line.
+    /// The rates on one line.
     fn print_line(
         &self,
         out: &mut impl Write,
@@ -217,7 +216,7 @@ impl Table {
         out.flush()
     }
 
-    /// The table with the rates of the whole time, and where every byte went.
+    /// The table with the rates of the whole run, and the byte counts.
     fn finish(
         &mut self,
         out: &mut impl Write,
@@ -245,7 +244,7 @@ impl Table {
     }
 }
 
-/// Where the bytes went, in one line.
+/// The byte counts on one line.
 fn account(counters: &Counters) -> String {
     let mut text = format!("{} bytes, {} frames", counters.received, counters.frames);
     text.push_str(&format!(", {} skipped", counters.skipped()));

@@ -1,4 +1,4 @@
-//! `axle decode` says what is in a byte stream.
+//! `axle decode` lists the contents of a byte stream.
 
 mod support;
 
@@ -17,7 +17,7 @@ use axlewire::{
 use serde_json::{Value, json};
 use support::{Capture, axle, bytes, decode, file, run, run_in_pieces, stdout};
 
-/// The frames of running implementations, and what they mean.
+/// Frames of running implementations, and their meaning.
 fn vectors(name: &str) -> Vec<Value> {
     let path = format!("{}/../../tests/vectors/{name}.jsonl", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
@@ -30,7 +30,7 @@ fn hex(vector: &Value) -> &str {
     vector["hex"].as_str().unwrap()
 }
 
-/// Our name for a vector's UCP message, which in the vectors is the same in both directions.
+/// Our name for a vector's UCP message; the vectors use one name for both directions.
 fn message(fields: &Value) -> &'static str {
     match (fields["name"].as_str().unwrap(), fields["len"].as_u64().unwrap() - 4) {
         ("keep_alive", 0) => "ping",
@@ -155,7 +155,7 @@ fn ikeya_packets_say_what_running_implementations_mean() {
     assert_eq!(refused, 10);
 }
 
-/// Bit for bit, except that all NaNs are one; an array of speeds speed for speed.
+/// Compares bit for bit, except that all NaNs are equal; arrays of speeds element by element.
 fn assert_same_speeds(found: &Value, bits: &Value, expected: &Value) {
     if let Value::Array(found) = found {
         assert_eq!(found.len(), 3);
@@ -186,7 +186,7 @@ fn a_speed_has_no_more_digits_than_it_needs() {
 
 #[test]
 fn the_direction_decides_what_is_a_frame() {
-    // READ for node 1, velocity response of node 2.
+    // READ for node 1, velocity response from node 2.
     let input = bytes("aa01bed0 55020000803f540e");
     let messages = |args: &[&str]| {
         let (events, _) = decode(args, &input);
@@ -230,11 +230,11 @@ fn events_tile_the_input_and_add_up() {
                 (framed, frames, after_gap) = (framed + length, frames + 1, false);
             } else {
                 assert_eq!(event["event"], "skipped");
-                assert!(!after_gap, "two gaps in a row are one: {event}");
+                assert!(!after_gap, "consecutive gaps are printed as one: {event}");
                 (skipped, after_gap) = (skipped + length, true);
             }
         }
-        assert!(frames > 3 && skipped > 0, "{line:?} shows too little");
+        assert!(frames > 3 && skipped > 0, "{line:?} covers too little");
         assert_eq!(end, input.len() as u64);
         assert_eq!(
             summary,
@@ -262,7 +262,7 @@ fn each_reason_has_its_name() {
 
 #[test]
 fn a_frame_behind_a_false_header_at_the_end_is_not_lost() {
-    // Two headers that promise 64 bytes, a ping, and the start of another one.
+    // Two headers that announce 64 bytes, a ping, and the start of another one.
     let input = bytes("fdff3c00 fdff3c00 fdff040001000142 fdff0400");
     let (events, summary) = decode(&["--protocol", "ucp"], &input);
     assert_eq!(
@@ -288,7 +288,7 @@ fn chunk_boundaries_change_nothing() {
         let last = offset + event["length"].as_u64().unwrap() - 1;
         event["event"] == "frame" && offset / CHUNK_LEN != last / CHUNK_LEN
     });
-    assert!(split.count() >= 3, "no frame lies across a boundary");
+    assert!(split.count() >= 3, "no frame crosses a boundary");
 
     let path = file("chunks.bin", &capture.bytes);
     let args = ["decode", "--json", "--protocol", "ucp", path.to_str().unwrap()];
@@ -389,7 +389,7 @@ fn people_get_columns_and_units_of_a_rover() {
        200      1  (skipped)                     header: no frame starts here
        201      9  network_state              1  SIM absent, in 1 byte
        210     24  unknown                    0  id 10, body 00000000000000000000000000000000
-       234     13  (skipped)                     crc: damaged, or no frame at all
+       234     13  (skipped)                     crc: damaged, or not a frame
 
        247 bytes received
        230 in 11 frames
@@ -417,10 +417,10 @@ fn people_get_columns_and_units_of_a_motor_bus() {
          0      4  read_request               1
          4      8  write                      1  -0.5 rps or -16640.0000 turns (rotation -16640, count 0)
         12      8  position_response          6  32770.9999 turns (rotation 32767, count 32767)
-        20      4  (skipped)                     id: a packet for a node that cannot exist
+        20      4  (skipped)                     id: invalid node id
         24      8  velocity_response          2  -3.4028235e38 rps
         32      8  write                      2  inf rps or 32640.0000 turns (rotation 32640, count 0)
-        40      2  (skipped)                     idle: cut off by the end
+        40      2  (skipped)                     idle: truncated at the end
 
         42 bytes received
         36 in 5 frames

@@ -1,4 +1,4 @@
-//! Whatever goes wrong is one clear line on standard error, and an exit code.
+//! Every failure gives one clear line on standard error, and an exit code.
 
 mod support;
 
@@ -9,14 +9,14 @@ use std::{
 
 use support::{Capture, axle, file, run, stdout};
 
-/// The one line of complaint of a run that ended with `code` and printed nothing else.
+/// The single error line of a run that exited with `code` and printed nothing else.
 fn complaint(output: Output, code: i32) -> String {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(code), "{stderr}");
     assert_eq!(String::from_utf8(output.stdout).unwrap(), "");
     let line = stderr.strip_suffix('\n').expect("a whole line");
     assert!(!line.contains('\n'), "more than one line: {stderr}");
-    line.strip_prefix("axle: ").expect("the tool's name in front").to_owned()
+    line.strip_prefix("axle: ").expect("the tool's name first").to_owned()
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_file_that_may_not_be_read_is_named() {
     let path = file("secret.bin", &[0xAA]);
     fs::set_permissions(&path, Permissions::from_mode(0o000)).unwrap();
     if File::open(&path).is_ok() {
-        eprintln!("skipped: this user may read everything");
+        eprintln!("skipped: this user can read everything");
         return;
     }
     let args = ["decode", "--protocol", "ucp", path.to_str().unwrap()];
@@ -91,7 +91,7 @@ fn a_file_that_may_not_be_read_is_named() {
     assert!(line.contains("secret.bin") && line.contains("ermission"), "{line}");
 }
 
-/// Its own memory is a file that opens, but has nothing at offset 0.
+/// A process's own memory opens as a file, but has nothing at offset 0.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_read_error_is_one_line() {
@@ -121,7 +121,7 @@ fn a_full_disk_is_one_line() {
 
 #[test]
 fn a_reader_that_has_seen_enough_ends_the_run_quietly() {
-    // Far more output than a pipe holds.
+    // Far more output than fits in a pipe.
     let path = file("closed.bin", &Capture::noisy(1_000_000, 7).bytes);
     for style in [&["--json"][..], &[]] {
         let args = [&["decode", "--protocol", "ucp", path.to_str().unwrap()], style].concat();

@@ -1,4 +1,4 @@
-//! Memory does not grow with the input.
+//! Memory use does not grow with the input.
 #![cfg(target_os = "linux")]
 
 mod support;
@@ -13,10 +13,10 @@ use std::{
 use axlewire::ucp::{Body, message::Ping};
 use support::axle;
 
-/// Bytes fed in all.
+/// Total number of bytes fed in.
 const FED: usize = 200 * 1024 * 1024;
 
-/// Most memory that the tool may ever have held, KiB.
+/// Limit of the tool's peak memory, KiB.
 const PEAK_LIMIT_KIB: usize = 16 * 1024;
 
 #[test]
@@ -31,7 +31,7 @@ fn memory_does_not_grow_with_the_input() {
         output.lines().map_while(Result::ok).filter(|line| line.contains("ping")).count()
     });
 
-    // One gap without end first, then a frame now and then.
+    // First one endless gap, then occasional frames.
     let mut block = vec![0; 64 * 1024];
     let mut stdin = child.stdin.take().unwrap();
     let blocks = FED / block.len();
@@ -41,7 +41,7 @@ fn memory_does_not_grow_with_the_input() {
         }
         stdin.write_all(&block).unwrap();
     }
-    // Standard input is still open, so the tool is still there.
+    // Standard input is still open, so the tool is still running.
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
     drop(stdin);
     assert!(child.wait().unwrap().success());

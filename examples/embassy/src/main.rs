@@ -1,8 +1,9 @@
-//! A rover's robot side with embassy: takes commands over USART1, turns two wheels, reports.
+//! The robot side of a rover link with embassy: takes commands over USART1, drives two wheels,
+//! reports.
 //!
 //! STM32F405, internal oscillator, 168 MHz. PA9 and PA10 are the UART to the Linux board, PA6 and
-//! PA7 carry the speed of the left and the right wheel as PWM, PB0 and PB1 their directions (low is
-//! ahead), PB5 is the lamp. PA0 measures the battery through a divider of 4.
+//! PA7 carry the speeds of the left and right wheels as PWM, PB0 and PB1 their directions (low is
+//! forward), and PB5 is the lamp. PA0 measures the battery through a divide-by-4 divider.
 
 #![no_std]
 #![no_main]
@@ -28,10 +29,10 @@ bind_interrupts!(struct Irqs {
     USART1 => BufferedInterruptHandler<USART1>;
 });
 
-/// How often the battery is measured, and the longest time without a look at the command.
+/// Interval between battery measurements, and longest interval between checks of the command.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// Longest time for one turn of the loop before the processor is reset, which stops the wheels.
+/// Longest time for one loop iteration before the processor is reset, which stops the wheels.
 const HANG_US: u32 = 500_000;
 
 #[embassy_executor::main]
@@ -57,12 +58,12 @@ async fn main(_spawner: Spawner) {
     let mut lamp = low(p.PB5.into());
     let (mut adc, mut battery) = (Adc::new(p.ADC1), p.PA0);
 
-    // Room for what comes in while a report of 44 bytes goes out, several times over.
+    // Ample room for bytes received while a 44-byte report is sent.
     let (mut sent, mut received) = ([0; 128], [0; 256]);
     let mut config = usart::Config::default();
     config.baudrate = BAUD;
     let uart = BufferedUart::new(p.USART1, p.PA10, p.PA9, &mut sent, &mut received, Irqs, config);
-    let Ok(uart) = uart else { panic!("115,200 bit/s is no speed of this clock") };
+    let Ok(uart) = uart else { panic!("115,200 bit/s is not possible with this clock") };
 
     let clock = || Instant::from_micros(embassy_time::Instant::now().as_micros());
     let robot = Robot::new(RobotConfig::default(), clock());
@@ -74,13 +75,14 @@ async fn main(_spawner: Spawner) {
         let now = rover.now();
         rover.role_mut().set_telemetry(&measured(raw), now);
 
-        // Ends early when the command changes. A port that failed is tried again, and meanwhile the
-        // robot's watchdog counts on: so the command is asked for here, whatever this call says.
+        // Returns early when the command changes. A failed port is retried, and meanwhile the
+        // robot's watchdog keeps running, so the command is queried below whatever this call
+        // returns.
         let _ = rover.next_command_async(now + PERIOD).await;
         while let Some(event) = rover.poll_event() {
             if let RobotEvent::UpdateRequested { .. } = event {
-                // This board has no loader for one. An update asked for by a motor command has no
-                // answer, and then there is nobody to give this to.
+                // This board has no boot loader. An update requested by a motor command expects no
+                // answer, and then this call does nothing.
                 let now = rover.now();
                 rover.role_mut().answer_update(OtaStatus::Forbidden, now);
             }
@@ -94,7 +96,7 @@ async fn main(_spawner: Spawner) {
     }
 }
 
-/// What 12 bits of the converter say: 4095 is 13.2 V. Three cells are empty at 9.6 V, full at 12.6 V.
+/// Telemetry for a 12-bit ADC reading: 4095 is 13.2 V. Three cells range from 9.6 V to 12.6 V.
 fn measured(raw: u16) -> Telemetry {
     let voltage_dv = u32::from(raw.min(4095)) * 132 / 4095;
     let battery_pct = voltage_dv.saturating_sub(96).min(30) * 100 / 30;

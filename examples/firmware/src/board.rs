@@ -1,11 +1,11 @@
 //! The board: an STM32F405, two USARTs, two pins.
 //!
-//! | what | where |
+//! | function | pins |
 //! |---|---|
 //! | the line: motor bus or rover link | USART1, TX PA9, RX PA10 |
 //! | driver enable of an RS485 transceiver, high while sending | PA8 |
-//! | text, 115,200 bit/s: a line per second, and one per received byte | USART2, TX PA2, RX PA3 |
-//! | lamp of the robot, high is on | PA5 |
+//! | text, 115,200 bit/s: one line per second, and one per received byte | USART2, TX PA2, RX PA3 |
+//! | lamp of the robot, active high | PA5 |
 
 use core::convert::Infallible;
 
@@ -20,37 +20,37 @@ use crate::{
     uart::{Channel, Port, Queue},
 };
 
-/// The interrupt's half of the line.
+/// Interrupt side of the line.
 pub static BUS: Channel<USART1> = Channel::new(Interrupt::USART1);
 
-/// The interrupt's half of the text.
+/// Interrupt side of the text port.
 pub static TEXT: Channel<USART2> = Channel::new(Interrupt::USART2);
 
-/// Speed of the text, bit/s.
+/// Speed of the text port, bit/s.
 const TEXT_BAUD: u32 = 115_200;
 
-/// How long an emulator may hold back the next byte: its host may have others to serve.
+/// Time for which an emulator may delay the next byte, because its host may be busy.
 const EMULATOR_PATIENCE: Duration = Duration::from_millis(100);
 
-/// Everything that a program needs.
+/// All resources of a program.
 pub struct Board {
-    /// Tells the time, and sleeps.
+    /// Clock, with sleeping.
     pub clock: Clock,
     /// The line.
     pub bus: Port<USART1>,
     /// Driver enable of the line's transceiver.
     pub driver_enable: Pin<8>,
-    /// The text.
+    /// The text port.
     pub text: Port<USART2>,
     /// The robot's lamp.
     pub lamp: Pin<5>,
-    /// The mark on the stack.
+    /// Deepest use of the stack.
     pub stack: Stack,
     is_emulated: bool,
 }
 
 impl Board {
-    /// The board with its line at `baud` bit/s; `None` at a second call.
+    /// The board with its line at `baud` bit/s; `None` on a second call.
     pub fn take(baud: u32) -> Option<Self> {
         let (core, chip) = (cortex_m::Peripherals::take()?, Peripherals::take()?);
         let bus_queues = [
@@ -68,7 +68,7 @@ impl Board {
         chip.RCC.apb2enr().modify(|_, w| w.usart1en().enabled());
 
         let pins: &'static GPIOA = cortex_m::singleton!(: GPIOA = chip.GPIOA)?;
-        // A receiver without a transceiver would hear a floating pin.
+        // Without a transceiver, the receiver would read a floating pin.
         pins.pupdr().modify(|_, w| w.pupdr3().pull_up().pupdr10().pull_up());
         pins.afrl().modify(|_, w| w.afrl2().af7().afrl3().af7());
         pins.afrh().modify(|_, w| w.afrh9().af7().afrh10().af7());
@@ -81,7 +81,7 @@ impl Board {
         let clock = Clock::new(chip.TIM2, core.SYST, is_emulated);
         let bus = BUS.start(chip.USART1, divider(clock::APB2_HZ, baud), bus_queues);
         let text = TEXT.start(chip.USART2, divider(clock::APB1_HZ, TEXT_BAUD), text_queues);
-        // SAFETY: unmasking can break a critical section that masks by priority; there is none.
+        // SAFETY: unmasking can break a critical section based on priority masks; there is none.
         unsafe {
             NVIC::unmask(Interrupt::USART1);
             NVIC::unmask(Interrupt::USART2);
@@ -90,20 +90,20 @@ impl Board {
         Some(Self { clock, bus, driver_enable, text, lamp, stack, is_emulated })
     }
 
-    /// Is this an emulator? Its line carries a byte in no time.
+    /// Whether this is an emulator, whose line transfers bytes instantly.
     pub const fn is_emulated(&self) -> bool {
         self.is_emulated
     }
 
-    /// How long to wait for what is due `on_board`: longer in an emulator, whose host is never in time.
+    /// The timeout `on_board`; longer in an emulator, whose host is not real-time.
     pub fn patience(&self, on_board: Duration) -> Duration {
         if self.is_emulated { on_board.max(EMULATOR_PATIENCE) } else { on_board }
     }
 }
 
-/// What to divide a USART's clock by, to the nearest.
+/// Divider of a USART's clock, rounded to nearest.
 ///
-/// 500,000 bit/s come out exact, 115,200 bit/s 0.02 % fast on APB2 and 0.11 % slow on APB1.
+/// 500,000 bit/s is exact, 115,200 bit/s is 0.02 % fast on APB2 and 0.11 % slow on APB1.
 const fn divider(clock_hz: u32, baud: u32) -> u32 {
     match (clock_hz + baud / 2).checked_div(baud) {
         Some(divider) => divider,

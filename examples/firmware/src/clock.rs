@@ -1,4 +1,4 @@
-//! 168 MHz, microseconds, and sleeping until something happens.
+//! The 168 MHz clock, microseconds, and sleeping until an event.
 
 use axlewire::{
     drive::Clock as DriverClock,
@@ -9,11 +9,11 @@ use stm32f4::stm32f405::{FLASH, RCC, TIM2};
 
 use crate::uart;
 
-/// The crystal of the board, MHz. Boards of this family carry 8, 12 or 25: change it to yours. Where
-/// no crystal starts, the processor's own oscillator takes its place.
+/// Crystal of the board, MHz. Boards of this family have 8, 12 or 25: change it to match yours. If
+/// no crystal starts, the internal oscillator is used.
 const CRYSTAL_MHZ: u8 = 8;
 
-/// The processor's own oscillator, MHz: within 1 % at 25 °C.
+/// Internal oscillator, MHz: within 1 % at 25 °C.
 const INTERNAL_MHZ: u8 = 16;
 
 /// Clock of the processor, MHz.
@@ -28,31 +28,32 @@ pub const APB1_HZ: u32 = 42_000_000;
 /// Clock of the timers on APB1, MHz: twice the bus.
 const TIMER_MHZ: u16 = 84;
 
-/// Clock of the same timers in QEMU, MHz, whatever the bus does.
+/// Clock of the same timers in QEMU, MHz, whatever the bus clock.
 const EMULATED_TIMER_MHZ: u16 = 1000;
 
-/// How often a crystal is looked at before it counts as missing: some 30 ms at 16 MHz. One that is
-/// there starts within 10.
+/// Number of polls before a crystal counts as missing: about 30 ms at 16 MHz. A present crystal
+/// starts within 10 ms.
 const CRYSTAL_PATIENCE: u32 = 50_000;
 
-/// Is this QEMU, which models neither clocks nor pins?
+/// Whether this is QEMU, which models neither clocks nor pins.
 ///
-/// After every reset the processor runs from its own oscillator, so that HSIRDY is 1 wherever there is
-/// somebody to say so.
+/// After every reset a processor runs from its internal oscillator, so HSIRDY is 1 wherever it is
+/// modelled.
 pub fn is_emulated(rcc: &RCC) -> bool {
     rcc.cr().read().hsirdy().bit_is_clear()
 }
 
 /// Runs the processor at 168 MHz, APB1 at 42 MHz and APB2 at 84 MHz.
 ///
-/// An emulator is left alone: it runs at its own speed, and would never say that a clock is ready.
+/// Does nothing in an emulator, which runs at its own speed and would never report a clock as
+/// ready.
 pub fn speed_up(rcc: &RCC, flash: &FLASH) {
     if is_emulated(rcc) {
         return;
     }
     rcc.cr().modify(|_, w| w.hseon().on());
     let has_crystal = (0..CRYSTAL_PATIENCE).any(|_| rcc.cr().read().hserdy().is_ready());
-    // 1 MHz · 336 / 2 = 168 MHz; 336 / 7 = 48 MHz for a USB that nobody uses.
+    // 1 MHz · 336 / 2 = 168 MHz; 336 / 7 = 48 MHz for the unused USB.
     let divider = if has_crystal { CRYSTAL_MHZ } else { INTERNAL_MHZ };
     rcc.pllcfgr().write(|w| {
         // SAFETY: M, N and Q may hold values that the PLL cannot run with; these are within its
@@ -70,7 +71,7 @@ pub fn speed_up(rcc: &RCC, flash: &FLASH) {
     while !rcc.cfgr().read().sws().is_pll() {}
 }
 
-/// The time since the start: TIM2 counts microseconds. SysTick is the alarm clock.
+/// The time since the start. TIM2 counts microseconds; SysTick is the alarm.
 pub struct Clock {
     timer: TIM2,
     alarm: SYST,
@@ -78,7 +79,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Starts at 0. The timer's own clock has to be on.
+    /// Starts at 0. The timer's clock must already be enabled.
     pub fn new(timer: TIM2, mut alarm: SYST, is_emulated: bool) -> Self {
         let mhz = if is_emulated { EMULATED_TIMER_MHZ } else { TIMER_MHZ };
         timer.psc().write(|w| w.psc().set(mhz - 1));
@@ -90,7 +91,7 @@ impl Clock {
     }
 }
 
-/// A time for people, milliseconds since the start. Wraps after 49 days.
+/// A time for display, milliseconds since the start. Wraps after 49 days.
 pub fn milliseconds(now: Instant) -> u32 {
     (now.as_micros() / 1000) as u32
 }
@@ -102,15 +103,15 @@ impl DriverClock for Clock {
 
     /// Sleeps until `until`, until an interrupt of a USART, or for 90 ms, whichever is first.
     fn idle_until(&mut self, until: Instant) {
-        /// As long as SysTick can count, microseconds.
+        /// Longest time that SysTick can count, microseconds.
         const LONGEST: u32 = 90_000;
         let micros = (until - self.now()).as_micros().min(LONGEST);
         if micros == 0 {
             return;
         }
-        // With interrupts off: one that came before is seen in the flag, one that comes later wakes
-        // the processor all the same, and is served behind the critical section. So is the alarm,
-        // which has no handler.
+        // With interrupts disabled, an earlier interrupt shows in the flag, and a later one still
+        // wakes the processor and is served after the critical section. The alarm, which has no
+        // handler, wakes it too.
         critical_section::with(|cs| {
             if uart::has_happened(cs) {
                 return;

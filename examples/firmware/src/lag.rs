@@ -1,13 +1,13 @@
-//! First-order lag: how a motor follows what it is told.
+//! First-order lag: how a motor follows its command.
 
 use axlewire::time::Duration;
 
 /// A value that follows its target with a time constant.
 #[derive(Clone, Copy, Debug)]
 pub struct Lag {
-    /// Where it is.
+    /// Current value.
     pub value: f32,
-    /// Where it goes.
+    /// Target value.
     pub target: f32,
     /// Time to about 63 % of the way, seconds.
     time_constant: f32,
@@ -19,7 +19,7 @@ impl Lag {
         Self { value: 0.0, target: 0.0, time_constant }
     }
 
-    /// Lets `dt` pass. By the implicit Euler method: coarse, and stable for steps of any length.
+    /// Advances by `dt` with the implicit Euler method: coarse, but stable for steps of any length.
     pub fn step(&mut self, dt: Duration) {
         let dt = seconds(dt);
         self.value += (self.target - self.value) * dt / (self.time_constant + dt);

@@ -1,12 +1,12 @@
-//! What the programs of this package share.
+//! Code shared by the programs of this package.
 //!
-//! * `board`: clocks, pins and the two USARTs, put together once at the start;
-//! * `clock`: microseconds, and sleeping until something happens;
-//! * `uart`: an interrupt-driven USART with a queue each way;
+//! * `board`: clocks, pins and the two USARTs, set up once at the start;
+//! * `clock`: microseconds, and sleeping until an event;
+//! * `uart`: an interrupt-driven USART with one queue per direction;
 //! * `line`: a line of text without `core::fmt`;
-//! * `stack`: how deep the stack has been;
-//! * `motor`, `rover`, `lag`: models of what the programs drive;
-//! * `work`: what `bench` measures.
+//! * `stack`: deepest use of the stack;
+//! * `motor`, `rover`, `lag`: models of the driven hardware;
+//! * `work`: the code that `bench` measures.
 //!
 //! All but the last need feature `board`.
 
@@ -30,8 +30,8 @@ pub mod stack;
 pub mod uart;
 pub mod work;
 
-/// A program of which only the size matters: it does `$work`, a `fn(&[u8]) -> u32`, to bytes that
-/// the compiler does not know.
+/// A program built only for its size: it runs `$work`, a `fn(&[u8]) -> u32`, on bytes unknown to
+/// the compiler.
 #[macro_export]
 macro_rules! size_program {
     ($work:expr) => {
@@ -49,10 +49,10 @@ macro_rules! size_program {
     };
 }
 
-/// What a program does about a panic: it stops.
+/// Panic handler: halts the program.
 ///
-/// With feature `no-panic` there is none: where one can be reached, the link fails for want of a
-/// function `a_panic_can_be_reached`.
+/// With feature `no-panic` there is no handler: if a panic is reachable, the link fails because the
+/// function `a_panic_can_be_reached` is missing.
 #[macro_export]
 macro_rules! on_panic {
     () => {
@@ -72,7 +72,7 @@ macro_rules! on_panic {
 
 /// The two interrupts of a program that uses [`board`].
 ///
-/// A macro, because a handler that stands in a library is linked into every program of the package.
+/// A macro, because a handler defined in a library is linked into every program of the package.
 #[cfg(feature = "board")]
 #[macro_export]
 macro_rules! serve_usarts {

@@ -1,6 +1,6 @@
-//! A line of text: words and whole numbers with a space in front of each.
+//! A line of text: words and integers, each preceded by a space.
 //!
-//! Not by `core::fmt`, which would be the larger part of these programs.
+//! Avoids `core::fmt`, which would be the larger part of these programs.
 
 use core::ops::Deref;
 
@@ -9,10 +9,11 @@ use stm32f4::stm32f405::usart1::RegisterBlock;
 
 use crate::uart::Channel;
 
-/// Longest line, bytes, its end included. Shorter than the queue that it is sent through.
+/// Maximum length of a line, bytes, including its end. Shorter than the queue that it is sent
+/// through.
 const LEN: usize = 500;
 
-/// A line that is being written. What does not fit is left out, whole words at a time.
+/// A line being built. Words that do not fit are left out as a whole.
 #[derive(Debug)]
 pub struct Line(String<LEN>);
 
@@ -43,11 +44,11 @@ impl Line {
 
     /// Adds a name and a number in thousandths, saturating.
     pub fn thousandths(&mut self, name: &str, value: f32) -> &mut Self {
-        // `as` truncates and saturates, so half of one away from zero makes it round.
+        // `as` truncates and saturates, so adding half away from zero rounds.
         self.number(name, (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i32)
     }
 
-    /// Adds what a USART has lost or damaged.
+    /// Adds the counts of lost and damaged bytes of a USART.
     pub fn losses<U: Deref<Target = RegisterBlock> + Send>(
         &mut self,
         channel: &Channel<U>,
@@ -80,7 +81,7 @@ impl Line {
         let _ = self.0.push_str(text);
     }
 
-    /// Ends the line, and gives its bytes.
+    /// Ends the line and returns its bytes.
     pub fn end(&mut self) -> &[u8] {
         while self.0.push_str("\r\n").is_err() {
             self.0.pop();

@@ -1,4 +1,4 @@
-//! A small model of a motor, in place of one.
+//! A small motor model.
 
 use axlewire::{
     ikeya::{Mode, Position, Rps, Target},
@@ -19,19 +19,19 @@ const TRAVEL_RPS: f32 = 5.0;
 pub struct Motor {
     speed: Lag,
     counts: i32,
-    /// What is left of the last steps, less than one count.
+    /// Remainder of the last steps, less than one count.
     part: f32,
-    /// Where to go, counts; `None` when turning.
+    /// Target position, counts; `None` when turning.
     goal: Option<i32>,
 }
 
 impl Motor {
-    /// A motor that stands still at position 0.
+    /// A motor at rest at position 0.
     pub const fn new() -> Self {
         Self { speed: Lag::new(0.05), counts: 0, part: 0.0, goal: None }
     }
 
-    /// Does what a slave was told; without a command it stands still or holds.
+    /// Follows a slave's command; without one it stops or holds its position.
     pub fn obey(&mut self, command: Option<Target>, mode: Mode) {
         match (command, mode) {
             (Some(Target::Velocity(to)), _) => (self.goal, self.speed.target) = (None, to.get()),
@@ -43,7 +43,7 @@ impl Motor {
         }
     }
 
-    /// Lets `dt` pass.
+    /// Advances the model by `dt`.
     pub fn step(&mut self, dt: Duration) {
         match self.goal {
             None => {
@@ -67,7 +67,7 @@ impl Motor {
         let way = rps * COUNTS_PER_REVOLUTION * seconds(dt) + self.part;
         let whole = way as i32; // truncates, saturates
         self.part = way - whole as f32;
-        // At the end of what the wire can carry it stays.
+        // Stops at the limit of the wire format.
         let counts = self.counts.saturating_add(whole);
         if Position::from_counts(counts).is_ok() {
             self.counts = counts;

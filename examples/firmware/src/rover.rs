@@ -1,4 +1,4 @@
-//! A small model of a rover, in place of one.
+//! A small rover model.
 
 use axlewire::{
     time::Duration,
@@ -10,10 +10,10 @@ use crate::lag::{Lag, seconds};
 /// Speed of a wheel at 100 %, rpm.
 const FULL_RPM: f32 = 120.0;
 
-/// How fast it turns when one side runs a rpm faster than the other, degrees per second.
+/// Turn rate per rpm of difference between the two sides, degrees per second.
 const TURN_PER_RPM: f32 = 4.0;
 
-/// A rover on flat ground with a battery that stays full: commands go in, telemetry comes out.
+/// A rover on flat ground with a battery that stays full: takes commands, gives telemetry.
 ///
 /// It steers as the vendor's firmware does (ruling U6).
 #[derive(Debug)]
@@ -24,7 +24,7 @@ pub struct Rover {
 }
 
 impl Rover {
-    /// A rover that stands still and heads north.
+    /// A rover at rest, heading north.
     pub const fn new() -> Self {
         Self { left_rpm: Lag::new(0.15), right_rpm: Lag::new(0.15), heading_deg: 0.0 }
     }
@@ -37,7 +37,7 @@ impl Rover {
         self.right_rpm.target = rpm(right_pct);
     }
 
-    /// Lets `dt` pass, less than a second.
+    /// Advances the model by `dt`, less than a second.
     pub fn step(&mut self, dt: Duration) {
         self.left_rpm.step(dt);
         self.right_rpm.step(dt);
@@ -56,7 +56,7 @@ impl Rover {
         (rounded(self.left_rpm.value), rounded(self.right_rpm.value))
     }
 
-    /// What its sensors say.
+    /// Sensor readings.
     pub fn telemetry(&self) -> Telemetry {
         let (left, right) = self.rpm();
         Telemetry {

@@ -1,32 +1,32 @@
-//! How deep the stack has been.
+//! Deepest use of the stack.
 
 use core::ptr;
 
 use cortex_m_rt::STACK_PAINT_VALUE;
 
 unsafe extern "C" {
-    /// Where the stack begins: behind the end of the RAM.
+    /// Start of the stack: just past the end of RAM.
     static _stack_start: u32;
-    /// Where the RAM is free from.
+    /// Start of free RAM.
     static _stack_end: u32;
 }
 
-/// How far below the deepest known use the next look goes, bytes: twice the largest buffer on the
-/// stack, which may be in use and still painted; and not so far that answers wait for it.
+/// Distance searched below the deepest known use, bytes: twice the largest buffer on the stack,
+/// which may be in use but still painted; and short enough not to delay answers.
 const REACH: usize = 1024;
 
-/// The mark that the stack has left in the paint: cortex-m-rt has painted all free RAM at the start.
+/// Stack use, found by the paint that it overwrites: cortex-m-rt paints all free RAM at startup.
 pub struct Stack {
     deepest: usize,
 }
 
 impl Stack {
-    /// Nothing is known yet.
+    /// No use is known yet.
     pub fn new() -> Self {
         Self { deepest: (&raw const _stack_start).addr() }
     }
 
-    /// Bytes of stack that have been in use at the same time, at the most.
+    /// Largest number of stack bytes ever in use.
     pub fn used(&mut self) -> u32 {
         let lowest = (&raw const _stack_end).addr();
         loop {
@@ -49,9 +49,9 @@ impl Default for Stack {
     }
 }
 
-/// Is the word at this address as it was at the start?
+/// Whether the word at this address still has its startup value.
 fn is_painted(at: usize) -> bool {
-    // SAFETY: aligned, within the RAM between `_stack_end` and `_stack_start`, and no object of
-    // Rust's as long as the stack has not come there. Volatile, because an interrupt may write to it.
+    // SAFETY: aligned, within the RAM between `_stack_end` and `_stack_start`, and not part of any
+    // Rust object until the stack reaches it. Volatile, because an interrupt may write to it.
     unsafe { ptr::with_exposed_provenance::<u32>(at).read_volatile() == STACK_PAINT_VALUE }
 }

@@ -1,13 +1,12 @@
-//! A USART with a queue each way.
+//! A USART with one queue per direction.
 //!
-//! The interrupt moves bytes and nothing else: a received byte goes from the data register into a
-//! queue, a queued byte into the data register. Decoding, answering and everything that takes its
-//! time is the main loop's.
+//! The interrupt only moves bytes: a received byte from the data register into a queue, a queued
+//! byte into the data register. The main loop does the decoding, answering and all other slow work.
 //!
-//! Why not decode in the interrupt: at 500 kbit/s a byte comes every 20 µs, and the next one must have
-//! been fetched when it is over. Moving a byte takes less than 1 µs; a decoder may have to search
-//! through a whole packet for one byte, and a role sends answers. The price is the way from the
-//! interrupt to the main loop, less than 1 µs on a processor that has nothing else to do.
+//! Why not decode in the interrupt: at 500 kbit/s a byte comes every 20 µs and must be fetched
+//! before the next one is complete. Moving a byte takes less than 1 µs; a decoder may have to
+//! search a whole packet for one byte, and a role sends answers. The price is the delay from the
+//! interrupt to the main loop, less than 1 µs on an otherwise idle processor.
 
 use core::{
     cell::{Cell, OnceCell},
@@ -21,13 +20,14 @@ use critical_section::{CriticalSection, Mutex};
 use heapless::spsc::Queue as Spsc;
 use stm32f4::stm32f405::{Interrupt, usart1::RegisterBlock};
 
-/// Bytes between an interrupt and the main loop, 511 of them: 10 ms of a full line at 500 kbit/s.
+/// Queue between an interrupt and the main loop, 511 bytes: 10 ms of a full 500 kbit/s line.
 pub type Queue = Spsc<u8, 512>;
 
-/// A queue that both sides reach in a critical section.
+/// A queue that both sides access in a critical section.
 ///
-/// Taken out of its cell and put back: no cell is ever found borrowed, so that nothing can panic. Not
-/// split into two ends, because those look up the queue's length at run time and divide by it.
+/// It is taken out of its cell and put back: no cell is ever found borrowed, so nothing can panic.
+/// It is not split into two ends, because those read the queue's length at run time and divide by
+/// it.
 struct Shared(Mutex<Cell<Option<&'static mut Queue>>>);
 
 impl Shared {
@@ -35,7 +35,7 @@ impl Shared {
         Self(Mutex::new(Cell::new(None)))
     }
 
-    /// Does something with the queue; `None` before there is one.
+    /// Runs `work` on the queue; `None` before there is one.
     fn with<T>(&self, work: impl FnOnce(&mut Queue) -> T) -> Option<T> {
         critical_section::with(|cs| {
             let cell = self.0.borrow(cs);
@@ -50,25 +50,27 @@ impl Shared {
 /// Set by every interrupt of a USART: there may be something to do.
 static HAPPENED: AtomicBool = AtomicBool::new(false);
 
-/// Has an interrupt of a USART been served since the last call?
+/// Whether an interrupt of a USART has been served since the last call.
 pub fn has_happened(_: CriticalSection<'_>) -> bool {
-    // Load and store, in a critical section: there is nobody to come between.
+    // Load and store cannot be interrupted in a critical section.
     let happened = HAPPENED.load(Relaxed);
     HAPPENED.store(false, Relaxed);
     happened
 }
 
-/// What the interrupt of a USART and the main loop share. `U` is its register block.
+/// State shared by the interrupt of a USART and the main loop. `U` is its register block.
 pub struct Channel<U> {
     interrupt: Interrupt,
     usart: Mutex<OnceCell<U>>,
     inbox: Shared,
     outbox: Shared,
-    /// Bytes that came while the one before was still in the data register: the hardware lost them.
+    /// Number of bytes lost by the hardware because the previous one was still in the data
+    /// register.
     overruns: AtomicU32,
-    /// Bytes that found the queue full: the main loop was too slow.
+    /// Number of bytes that arrived while the queue was full: the main loop was too slow.
     lost: AtomicU32,
-    /// Bytes with a framing error or noise in the middle of a bit. They are received all the same.
+    /// Number of bytes with a framing error or noise in the middle of a bit. They are still
+    /// received.
     damaged: AtomicU32,
 }
 
@@ -86,9 +88,9 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
         }
     }
 
-    /// Starts the USART, 8N1, with its clock divided by `divider` for the speed, and gives its port.
+    /// Starts the USART, 8N1, with its clock divided by `divider`, and returns its port.
     ///
-    /// To be called once, with the USART's clock on; the interrupt is unmasked by the caller.
+    /// Call it once, with the USART's clock enabled; the caller unmasks the interrupt.
     pub fn start(
         &'static self,
         usart: U,
@@ -109,10 +111,10 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
         Port(self)
     }
 
-    /// What the interrupt does.
+    /// The interrupt handler.
     pub fn serve(&self) {
         self.on_usart(|usart| {
-            // Status first: reading the data behind it is what clears the error flags.
+            // Status first: reading the data register after it clears the error flags.
             let status = usart.sr().read();
             if status.ore().bit_is_set() {
                 count(&self.overruns);
@@ -139,7 +141,7 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
         }
     }
 
-    /// Fills the data register; once there is nothing left to send, the interrupt is no more asked for.
+    /// Fills the data register; disables the interrupt once nothing is left to send.
     ///
     /// On a board the register is full after two bytes. In QEMU it never is.
     fn feed(&self, usart: &RegisterBlock) {
@@ -152,18 +154,18 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
         }
     }
 
-    /// Lets the interrupt fetch what has been queued.
+    /// Enables the interrupt that sends queued bytes.
     fn wake_sender(&self) {
         self.on_usart(|usart| {
             usart.cr1().modify(|_, w| w.txeie().enabled());
         });
-        // An empty data register asks for it at once, except in QEMU.
+        // An empty data register triggers it at once, except in QEMU.
         NVIC::pend(self.interrupt);
     }
 
-    /// Has everything been sent, and has the last stop bit left the pin?
+    /// Whether everything has been sent and the last stop bit has left the pin.
     fn is_sent(&self) -> bool {
-        // In this order: what has left the queue is in the data register, and TC is 0.
+        // In this order: a byte that has left the queue is in the data register, and TC is 0.
         self.outbox.with(|outbox| outbox.is_empty()) != Some(false)
             && self.on_usart(|usart| usart.sr().read().tc().bit_is_set()) != Some(false)
     }
@@ -172,28 +174,28 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
         critical_section::with(|cs| self.usart.borrow(cs).get().map(|usart| work(usart)))
     }
 
-    /// Bytes that the hardware lost because the one before had not been fetched.
+    /// Number of bytes lost by the hardware because the previous one had not been fetched.
     pub fn overruns(&self) -> u32 {
         self.overruns.load(Relaxed)
     }
 
-    /// Bytes that were lost because the main loop had not emptied the queue.
+    /// Number of bytes lost because the queue was full.
     pub fn lost(&self) -> u32 {
         self.lost.load(Relaxed)
     }
 
-    /// Bytes with a wrong stop bit or noise within a bit.
+    /// Number of bytes with a wrong stop bit or noise within a bit.
     pub fn damaged(&self) -> u32 {
         self.damaged.load(Relaxed)
     }
 }
 
-/// Only the interrupt counts, and it is not interrupted by itself.
+/// Only the interrupt counts, and it does not interrupt itself.
 fn count(counter: &AtomicU32) {
     counter.store(counter.load(Relaxed).wrapping_add(1), Relaxed);
 }
 
-/// The main loop's end of a [`Channel`]: a port with the traits of `embedded-io`.
+/// Main loop side of a [`Channel`]: a port with the traits of `embedded-io`.
 pub struct Port<U: 'static>(&'static Channel<U>);
 
 impl<U: Deref<Target = RegisterBlock> + Send> Port<U> {
@@ -202,12 +204,14 @@ impl<U: Deref<Target = RegisterBlock> + Send> Port<U> {
         self.0.inbox.with(Queue::dequeue).flatten()
     }
 
-    /// Queues all of `bytes`, or nothing where there is no room; says whether there was. Never waits.
+    /// Queues all of `bytes` if there is room, otherwise nothing; returns whether there was room.
+    /// Never waits.
     pub fn try_send(&mut self, bytes: &[u8]) -> bool {
         let outbox = &self.0.outbox;
         let has_room = outbox.with(|it| it.capacity().saturating_sub(it.len()) >= bytes.len());
-        // Nobody else fills it, so the room stays. A few bytes at a time: interrupts are off
-        // meanwhile, and the other line's next byte does not wait longer than 20 µs.
+        // Nothing else fills the queue, so the room remains. A few bytes at a time, because
+        // interrupts are off meanwhile and the other line's next byte must not wait longer than 20
+        // µs.
         let queued = has_room == Some(true)
             && bytes.chunks(16).all(|chunk| {
                 outbox.with(|it| chunk.iter().all(|&byte| it.enqueue(byte).is_ok())) == Some(true)
@@ -256,8 +260,8 @@ impl<U: Deref<Target = RegisterBlock> + Send> embedded_io::Write for Port<U> {
         Ok(count)
     }
 
-    /// Waits until the last stop bit is out, as a driver-enable pin needs it. What comes in meanwhile
-    /// is received by the interrupt.
+    /// Waits until the last stop bit is out, as a driver-enable pin requires. The interrupt
+    /// receives bytes meanwhile.
     fn flush(&mut self) -> Result<(), Infallible> {
         while !self.0.is_sent() {
             core::hint::spin_loop();

@@ -1,4 +1,4 @@
-//! What is measured: each reads something of every frame, so that no part of the work is left out.
+//! The measured code. Each function reads part of every frame, so that no work is optimized away.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -28,7 +28,7 @@ pub fn ucp_byte(decoder: &mut Decoder<Ucp, 64>, byte: u8) -> u32 {
     if decoder.push(byte) { read_all(decoder, read_frame) } else { 0 }
 }
 
-/// What the main loop does then: apart from the interrupt, whose registers it would take.
+/// Main loop part; separate, so that it does not use up the interrupt's registers.
 #[inline(never)]
 fn read_all<F: Framing, const N: usize>(
     decoder: &mut Decoder<F, N>,
@@ -43,7 +43,7 @@ fn read_all<F: Framing, const N: usize>(
     sum
 }
 
-/// Drives a role as its loop does; the size of everything that hangs on it.
+/// Drives a role as its loop does, for the size of all code that it needs.
 pub fn drive<E: Endpoint>(role: &mut E, bytes: &[u8], now: Instant) -> u32 {
     role.handle_input(bytes, now);
     role.handle_timeout(now);

@@ -1,17 +1,17 @@
-//! The board, by its registers: clock, timer, UART, pins.
+//! The board at register level: clock, timer, UART, pins.
 
 use stm32f4::stm32f405::{GPIOA, Peripherals, RCC, TIM2, USART1};
 
-/// What the slave needs of it.
+/// Board resources used by the slave.
 pub struct Board {
     pub port: Port,
     pub micros: Micros,
-    /// The four digits of the switch.
+    /// The four bits of the DIP switch.
     pub dip: u8,
 }
 
 impl Board {
-    /// Starts it.
+    /// Initializes the board.
     pub fn new(device: Peripherals) -> Self {
         let rcc = device.RCC;
         rcc.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpiocen().set_bit());
@@ -27,8 +27,8 @@ impl Board {
     }
 }
 
-/// 168 MHz from the internal oscillator, timers and UART at 84. Without the PLL, which QEMU does not
-/// have either, all of them stay at 16 MHz: right on the bus, but too slow for answers in 50 µs.
+/// 168 MHz from the internal oscillator, timers and UART at 84. Without the PLL, as in QEMU, all of
+/// them stay at 16 MHz: correct on the bus, but too slow for answers within 50 µs.
 fn is_fast(rcc: &RCC) -> bool {
     // 16 MHz / 8 * 168 / 2.
     // SAFETY: M, N and Q may hold values that the PLL cannot run with; these are within its limits.
@@ -42,7 +42,7 @@ fn is_fast(rcc: &RCC) -> bool {
     true
 }
 
-/// Microseconds in 32 bits, and an interrupt at any of them.
+/// A 32-bit microsecond counter with a compare interrupt.
 pub struct Micros {
     timer: TIM2,
 }
@@ -50,7 +50,7 @@ pub struct Micros {
 impl Micros {
     fn new(timer: TIM2, clock_hz: u32) -> Self {
         timer.psc().write(|w| w.psc().set((clock_hz / 1_000_000 - 1) as u16));
-        // The prescaler counts from an update event on.
+        // The prescaler takes effect at an update event.
         timer.egr().write(|w| w.ug().set_bit());
         timer.dier().write(|w| w.cc1ie().set_bit());
         timer.cr1().write(|w| w.cen().set_bit());
@@ -61,20 +61,20 @@ impl Micros {
         self.timer.cnt().read().bits()
     }
 
-    /// Asks for an interrupt, and gives the time: that may have been reached meanwhile, and the
-    /// interrupt be missed. It comes once every 71 minutes in any case.
+    /// Requests an interrupt and returns the current time: `micros` may already have passed, so
+    /// that the interrupt is missed. It still comes once every 71 minutes.
     pub fn wake_at(&self, micros: u32) -> u32 {
         self.timer.ccr1().write(|w| w.ccr().set(micros));
         self.now()
     }
 
-    /// The interrupt has been seen.
+    /// Clears the interrupt.
     pub fn acknowledge(&self) {
         self.timer.sr().modify(|_, w| w.cc1if().clear_bit());
     }
 }
 
-/// The UART and the pin that enables the driver of the transceiver. Only its interrupt uses it.
+/// The UART and the driver-enable pin of the transceiver. Only the UART interrupt uses it.
 pub struct Port {
     uart: USART1,
     pins: GPIOA,
@@ -93,7 +93,7 @@ impl Port {
         Self { uart, pins }
     }
 
-    /// A byte, if one has come. Reading it ends an overrun as well.
+    /// The received byte, if any. Reading it also clears an overrun.
     pub fn receive(&self) -> Option<u8> {
         let status = self.uart.sr().read();
         let is_new = status.rxne().bit_is_set();
@@ -102,7 +102,7 @@ impl Port {
             .filter(|_| is_new)
     }
 
-    /// Sends what `next` gives, with the driver on until the last stop bit is out.
+    /// Sends the bytes from `next`, with the driver on until the last stop bit is out.
     pub fn send(&self, mut next: impl FnMut() -> Option<u8>) {
         loop {
             let status = self.uart.sr().read();
@@ -118,7 +118,7 @@ impl Port {
                 self.uart.cr1().modify(|_, w| w.txeie().clear_bit().tcie().clear_bit());
                 return;
             } else {
-                // The register is empty, the line is not yet: the last byte is on its way.
+                // The register is empty, but the last byte is still being shifted out.
                 self.uart.cr1().modify(|_, w| w.txeie().clear_bit().tcie().set_bit());
                 return;
             }

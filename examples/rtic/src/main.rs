@@ -1,4 +1,4 @@
-//! A slave of a motor bus with RTIC: hears all, answers a READ for its own id within 50 µs.
+//! A slave of a motor bus with RTIC: receives all traffic, answers its own READs within 50 µs.
 //!
 //! STM32F405. PA9 and PA10 are the UART at 500 kbit/s, PA8 enables the driver of the RS485
 //! transceiver, PC0 to PC3 are the DIP switch.
@@ -12,7 +12,11 @@ use panic_halt as _;
 
 #[rtic::app(device = stm32f4::stm32f405, dispatchers = [EXTI0])]
 mod app {
-    use axlewire::{endpoint::Endpoint, ikeya::{slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent}, Position, Rps, Slave, Target}, time::{Duration, Wrapping32}};
+    use axlewire::{
+        endpoint::Endpoint,
+        ikeya::{DipSwitch, IdReading, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+        time::{Duration, Wrapping32},
+    };
     use heapless::spsc::{Consumer, Producer, Queue};
     use rtic_sync::signal::{Signal, SignalReader, SignalWriter};
     use stm32f4::stm32f405::Interrupt;
@@ -50,13 +54,13 @@ mod app {
 
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(500));
-        // With the reading that fits ids 1 to 8, every position of the switch is an id (ruling I2).
+        // With the reading that covers ids 1 to 8, every switch setting is a valid id (ruling I2).
         let slave = DipSwitch::from_bits(dip)
-            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config, Instant::from_micros(0)));
-        let Ok(mut slave) = slave else { panic!("every switch of four digits has an id") };
-        // The motor of this example stands at 0 when it starts.
+            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config));
+        let Ok(mut slave) = slave else { panic!("every 4-bit switch setting has an id") };
+        // The motor of this example starts at position 0.
         slave.set_position(Position::new(0, 0));
-        // Nobody else spawns it, so there is room.
+        // It is spawned only here, so there is room.
         let _ = talk::spawn();
         let (line_woke, micros_woke) = (wake.clone(), wake);
         (
@@ -65,19 +69,19 @@ mod app {
         )
     }
 
-    /// Moves bytes between the UART and the queues. Nobody else touches the UART.
+    /// Moves bytes between the UART and the queues. Only this task uses the UART.
     #[task(binds = USART1, priority = 3, local = [port, heard, answer, line_woke])]
     fn line(cx: line::Context) {
         let line::LocalResources { port, heard, answer, line_woke, .. } = cx.local;
         if let Some(byte) = port.receive() {
-            // Without room, or after an overrun, a byte is missing: the CRC will tell.
+            // If there is no room, or after an overrun, a byte is missing and the CRC fails.
             let _ = heard.enqueue(byte);
             line_woke.write(());
         }
         port.send(|| answer.dequeue());
     }
 
-    /// The time that the slave has asked for has come.
+    /// Runs at the time requested by the slave.
     #[task(binds = TIM2, priority = 2, shared = [micros], local = [micros_woke])]
     fn late(mut cx: late::Context) {
         cx.shared.micros.lock(|micros| micros.acknowledge());
@@ -95,16 +99,16 @@ mod app {
                 slave.handle_input(&[byte], now);
             }
             slave.handle_timeout(now);
-            // The answer is due in 50 µs: everything else comes after it.
+            // The answer is due within 50 µs, so it goes first.
             if let Some(answer) = slave.poll_transmit(now) {
                 for &byte in answer {
-                    // There is room: two answers are never on their way together.
+                    // There is room: two answers are never in flight together.
                     let _ = say.enqueue(byte);
                 }
                 rtic::pend(Interrupt::USART1);
             }
             while let Some(event) = slave.poll_event() {
-                // Your motor goes here. This one turns as it is told, at once.
+                // Your motor goes here. This one follows commands instantly.
                 match event {
                     SlaveEvent::Command(Target::Velocity(speed)) => slave.set_velocity(speed),
                     SlaveEvent::Command(Target::Position(at)) => slave.set_position(at),

@@ -1,4 +1,4 @@
-//! Contents of motor bus packets: revolutions per second, and turns.
+//! Contents of motor bus packets, in revolutions per second and turns.
 
 use core::{fmt, slice};
 use std::io::{self, Write};
@@ -23,7 +23,7 @@ struct Speed<'a>(&'a Motors<Rps>);
 
 impl fmt::Display for Speed<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // `Debug` of a float is as exact as `Display`, and has an exponent where that is shorter.
+        // `Debug` of a float is as exact as `Display`, and uses an exponent where that is shorter.
         write!(f, "{:?} rps", Spaced(each(&self.0.map(|Rps(rps)| rps))))
     }
 }

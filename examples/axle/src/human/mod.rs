@@ -1,4 +1,4 @@
-//! The listing for people: aligned columns, units written out.
+//! The human-readable listing: aligned columns, with units.
 
 mod ikeya;
 mod ucp;
@@ -10,10 +10,10 @@ use axlewire::stream::Reason;
 
 use crate::record::{Frame, Record, Summary};
 
-/// A listing under way.
+/// State of a listing.
 #[derive(Debug)]
 pub(crate) struct Listing {
-    /// Title of the column of numbers that frames have: node or index.
+    /// Title of the number column: node or index.
     number: &'static str,
     titled: bool,
 }
@@ -23,7 +23,7 @@ impl Listing {
         Self { number, titled: false }
     }
 
-    /// Prints one record, the titles in front of the first event.
+    /// Prints one record, with the titles before the first event.
     pub(crate) fn print(&mut self, out: &mut impl Write, record: &Record<'_>) -> io::Result<()> {
         if let Record::Summary(summary) = record {
             return print_summary(out, summary, self.titled);
@@ -58,7 +58,7 @@ fn print_frame(out: &mut impl Write, offset: u64, frame: &Frame<'_>) -> io::Resu
     writeln!(out)
 }
 
-/// What a frame says, without its name.
+/// Contents of a frame, without its name.
 pub(crate) fn contents(frame: &Frame<'_>) -> String {
     let mut text = Vec::new();
     let written = match frame {
@@ -68,7 +68,7 @@ pub(crate) fn contents(frame: &Frame<'_>) -> String {
     written.map_or_else(|_| String::new(), |()| String::from_utf8_lossy(&text).trim().to_owned())
 }
 
-/// The columns that all lines have; the longest message name has 21 letters.
+/// Columns common to all lines; the longest message name has 21 characters.
 fn row(
     out: &mut impl Write,
     offset: &dyn fmt::Display,
@@ -82,15 +82,15 @@ fn row(
 const fn explain(reason: Reason) -> &'static str {
     match reason {
         Reason::Header => "no frame starts here",
-        Reason::Length => "no frame has such a length",
-        Reason::Id => "a packet for a node that cannot exist",
-        Reason::Crc => "damaged, or no frame at all",
-        Reason::Idle => "cut off by the end",
+        Reason::Length => "invalid length",
+        Reason::Id => "invalid node id",
+        Reason::Crc => "damaged, or not a frame",
+        Reason::Idle => "truncated at the end",
         _ => "no frame",
     }
 }
 
-/// Prints where every byte went.
+/// Prints the byte counts.
 pub(crate) fn print_summary(
     out: &mut impl Write,
     summary: &Summary,
@@ -122,7 +122,7 @@ pub(crate) fn print_summary(
     Ok(())
 }
 
-/// Values in a row, one space between them.
+/// Values separated by spaces.
 struct Spaced<'a, T>(&'a [T]);
 
 impl<T: fmt::Display> fmt::Display for Spaced<'_, T> {

@@ -1,4 +1,4 @@
-//! Contents of UCP messages: volts, amperes, percent, and codes by name.
+//! Contents of UCP messages, with volts, amperes and percent, and codes by name.
 
 use core::fmt;
 use std::io::{self, Write};
@@ -46,7 +46,7 @@ const fn plural(count: u8) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-/// Speed, turn and lamp always; the rest, which is 0 in an ordinary command, only where it is not.
+/// Always prints speed, turn and lamp; the other fields, 0 in an ordinary command, only if nonzero.
 fn motor_control(out: &mut impl Write, command: &MotorControl) -> io::Result<()> {
     let MotorControl { speed, angular, front_led, .. } = command;
     write!(out, "  speed {speed:>4} %  angular {angular:>4} %  front led ")?;
@@ -93,7 +93,7 @@ fn report(out: &mut impl Write, telemetry: &Telemetry, version: Option<u16>) -> 
     }
 }
 
-/// A code by its name, or by its number where it has none.
+/// The name of a code, or its number if it has none.
 struct Named<T>(T);
 
 impl fmt::Display for Named<ErrorCode> {

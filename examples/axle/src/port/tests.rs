@@ -16,7 +16,7 @@ fn only_pseudo_terminals_have_no_line_speed() {
     }
 }
 
-/// A role with frames to send, that notes what is done with it.
+/// A role with frames to send that logs its calls.
 #[derive(Default)]
 struct Role {
     frames: VecDeque<&'static [u8]>,
@@ -53,7 +53,7 @@ impl Endpoint for Role {
     }
 }
 
-/// A line by script: what each call of it comes to.
+/// A scripted line, with the result of each call.
 #[derive(Default)]
 struct Scripted {
     received: VecDeque<Result<Vec<u8>, Failure>>,
@@ -121,7 +121,7 @@ fn a_role_that_never_stops_sending_ends_no_round_late() {
     assert_eq!(role.log.len(), FRAMES);
 }
 
-/// A port that takes this many bytes with each call, and then fails.
+/// A port with a scripted result for each write, and the bytes it has accepted.
 struct Takes(VecDeque<io::Result<usize>>, Vec<u8>);
 
 impl Write for Takes {

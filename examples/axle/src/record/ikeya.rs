@@ -1,4 +1,4 @@
-//! Packets of the motor bus, one or three motors a board.
+//! Packets of the motor bus, with one or three motors per board.
 
 use axlewire::ikeya::{
     NodeId, Packet, Position, PositionResponse, ReadRequest, Request, Response, VelocityResponse,
@@ -19,12 +19,12 @@ pub(crate) struct Frame<'a> {
     pub(crate) fields: Fields<'a>,
 }
 
-/// What a packet says.
+/// Contents of a packet.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Fields<'a> {
     Read {},
-    /// Both readings: the bytes do not tell a speed from a position (ruling I3).
+    /// Both readings, because the bytes do not distinguish a speed from a position (ruling I3).
     Write {
         rps: Motors<Rps>,
         #[serde(flatten)]
@@ -37,7 +37,7 @@ pub(crate) enum Fields<'a> {
     Position(Positions),
 }
 
-/// A value for one motor, or for each of three.
+/// One value, or one for each of three motors.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Motors<T> {
@@ -46,7 +46,7 @@ pub(crate) enum Motors<T> {
 }
 
 impl<T> Motors<T> {
-    /// The same for each motor.
+    /// Applies `change` to each value.
     pub(crate) fn map<U>(self, change: impl FnMut(T) -> U) -> Motors<U> {
         let mut change = change;
         match self {
@@ -71,7 +71,7 @@ impl Serialize for Rps {
     }
 }
 
-/// Where shafts are; as on the wire, all counts in front of all rotations.
+/// Shaft positions; as on the wire, all counts precede all rotations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Positions(pub(crate) Motors<Position>);
 

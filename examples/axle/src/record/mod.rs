@@ -1,4 +1,4 @@
-//! What is printed, as types: the field names here are those of the JSON.
+//! Output records; the field names are those of the JSON.
 
 pub(crate) mod ikeya;
 pub(crate) mod ucp;
@@ -12,7 +12,7 @@ use serde::{Serialize, Serializer};
 #[derive(Debug, Serialize)]
 #[serde(tag = "event", rename_all = "lowercase")]
 pub(crate) enum Record<'a> {
-    /// A whole frame, its CRC right.
+    /// A complete frame with a correct CRC.
     Frame {
         offset: u64,
         #[serde(flatten)]
@@ -20,7 +20,7 @@ pub(crate) enum Record<'a> {
     },
     /// A run of bytes that belong to no frame.
     Skipped { offset: u64, length: u64, reason: Reason },
-    /// Where every byte went.
+    /// Byte counts.
     Summary(Summary),
 }
 
@@ -42,7 +42,7 @@ impl Frame<'_> {
     }
 }
 
-/// The end of a listing.
+/// The last record of a listing.
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
     pub(crate) received: u64,
@@ -50,7 +50,7 @@ pub(crate) struct Summary {
     pub(crate) skipped: u64,
     pub(crate) pending: usize,
     pub(crate) frames: u64,
-    /// What was skipped, by reason: for people.
+    /// Skipped bytes by reason, for the human-readable listing.
     #[serde(skip)]
     pub(crate) counters: Counters,
 }

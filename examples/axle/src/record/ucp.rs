@@ -20,7 +20,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) fields: Fields<'a>,
 }
 
-/// What a message says; codes print as the numbers on the wire.
+/// Contents of a message; codes print as their wire values.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Fields<'a> {
@@ -85,12 +85,13 @@ pub(crate) struct MotorControl {
     pub(crate) version: u16,
     pub(crate) reserve1: u16,
     pub(crate) reserve2: u32,
-    /// For people: whether a shipped robot takes it for a firmware update (ruling U7).
+    /// For the human-readable listing: whether a shipped robot treats it as a firmware update
+    /// (ruling U7).
     #[serde(skip)]
     pub(crate) starts_update: bool,
 }
 
-/// The names that the JSON has for a report's values.
+/// JSON names of a report's values.
 #[derive(Serialize)]
 #[serde(remote = "Telemetry")]
 struct TelemetryNames {
@@ -158,7 +159,7 @@ fn fields(frame: &ucp::Frame) -> (&'static str, Fields<'_>) {
             ("network_state", Fields::NetworkState { state: body.state(), state_width: 4 })
         }
         Message::Unknown(RawFrame { body, .. }) => ("unknown", Fields::Unknown { body: Hex(body) }),
-        // A message that the library learns before this tool does: its bytes, unread.
+        // A message that only a newer library knows: its raw bytes.
         _ => ("unknown", Fields::Unknown { body: Hex(frame.body()) }),
     }
 }

@@ -13,16 +13,16 @@ use axlewire::{
 use super::{Faults, pty::Pty, say};
 use crate::{EXIT_CODES, args, failure::Failure, port::Line, signals::Signals};
 
-/// Motors on a bus: they answer, and turn as they are told
+/// Simulate motors on a bus, which answer and turn as commanded
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Args {
-    /// A node and its mode, such as 1:velocity or 3:position; once for each
+    /// A node and its mode, such as 1:velocity or 3:position; repeat it for each node
     #[arg(long = "node", value_name = "N:MODE", required = true, value_parser = node)]
     nodes: Vec<(NodeId, Mode)>,
 
-    /// Stop a motor that gets no command for so long; without it, it goes on for ever, as the
-    /// protocol has it
+    /// Stop a motor that gets no command for this long; by default it keeps turning, as the
+    /// protocol specifies
     #[arg(long, value_name = "SECONDS", value_parser = args::seconds)]
     watchdog: Option<u64>,
 
@@ -32,22 +32,22 @@ pub(super) struct Args {
 
 fn node(text: &str) -> Result<(NodeId, Mode), String> {
     let (node, mode) =
-        text.split_once(':').ok_or("a node is written N:MODE, as in 1:velocity".to_owned())?;
+        text.split_once(':').ok_or("expected N:MODE, as in 1:velocity".to_owned())?;
     let mode = match mode {
         "velocity" => Mode::Velocity,
         "position" => Mode::Position,
-        _ => return Err("a mode is velocity or position".to_owned()),
+        _ => return Err("the mode must be velocity or position".to_owned()),
     };
     Ok((args::node(node)?, mode))
 }
 
-/// Time to 63 % of a new speed: slow enough to be watched.
+/// Time to reach 63 % of a new speed: slow enough to watch.
 const TIME_CONSTANT: Duration = Duration::from_millis(150);
 
-/// Slower than this is standing still, and closer than this is there.
+/// Speeds below this count as rest; speeds this close to the target count as reached.
 const STILL_RPS: f32 = 0.005;
 
-/// How often the motors are looked at.
+/// Interval between two checks of the motors.
 const STEP: Duration = Duration::from_millis(20);
 
 /// Runs the subcommand.
@@ -87,12 +87,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A node, and what has been said of it.
+/// A node, and what has been printed about it.
 struct Node {
     motor: MotorNode,
-    /// The command that was printed last.
+    /// The last printed command.
     told: Option<Target>,
-    /// It has not yet done what it was told.
+    /// Whether the motor has not yet reached its target.
     is_under_way: bool,
 }
 
@@ -106,7 +106,7 @@ impl Node {
         Self { motor: MotorNode::from_parts(slave, motor), told: None, is_under_way: false }
     }
 
-    /// A line for what is new; a command is repeated many times a second.
+    /// A line for each new command; masters repeat commands many times a second.
     fn describe(&mut self, event: SlaveEvent) -> Option<String> {
         let node = self.motor.slave().node();
         let told = match event {
@@ -122,11 +122,11 @@ impl Node {
             Some(Target::Position(position)) => {
                 format!("node {node}: command {:.4} turns", position.revolutions())
             }
-            None => format!("node {node}: watchdog, no command any more"),
+            None => format!("node {node}: watchdog, no more commands"),
         })
     }
 
-    /// A line when the motor has come to what it was told.
+    /// A line when the motor has reached its target.
     fn arrival(&mut self) -> Option<String> {
         let (node, motor) = (self.motor.slave().node(), self.motor.motor());
         let (now, at) = (motor.velocity().get(), motor.position());
@@ -141,14 +141,14 @@ impl Node {
         self.is_under_way = false;
         Some(match self.told {
             Some(Target::Velocity(rps)) if rps.get().abs() >= STILL_RPS => {
-                format!("node {node}: turns at {now:.2} rps")
+                format!("node {node}: turning at {now:.2} rps")
             }
-            _ => format!("node {node}: stands still at {:.4} turns", at.revolutions()),
+            _ => format!("node {node}: at rest at {:.4} turns", at.revolutions()),
         })
     }
 }
 
-/// All nodes hear everything, and each says what it has to.
+/// All nodes receive every byte, and each sends its own answers.
 struct Nodes(Vec<Node>);
 
 impl Endpoint for Nodes {

@@ -1,4 +1,4 @@
-//! `axle sim`: motors or a rover, played on a pseudo-terminal.
+//! `axle sim`: simulates motors or a rover on a pseudo-terminal.
 
 mod ikeya;
 mod pty;
@@ -10,10 +10,10 @@ use axlewire::time::Instant;
 
 use crate::{EXIT_CODES, failure::Failure};
 
-/// Play motors or a rover on a pseudo-terminal
+/// Simulate motors or a rover on a pseudo-terminal
 ///
 /// The first line of the output is `pty: PATH`: use that path as the --port of another program. The
-/// lines that follow say what happens, until Ctrl-C.
+/// following lines show what happens, until Ctrl-C.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES, arg_required_else_help = false)]
 pub(crate) struct Args {
@@ -27,20 +27,20 @@ enum What {
     Ucp(ucp::Args),
 }
 
-/// What is wrong with the line.
+/// Faults of the line.
 #[derive(Clone, Copy, Debug, clap::Args)]
 struct Faults {
-    /// Wrong bits, from 0 (none) to 1 (all), in both directions; 1e-4 is one in 10,000
+    /// Bit error rate in both directions, from 0 (none) to 1 (all); 1e-4 is one in 10,000
     #[arg(long, value_name = "RATE", default_value = "0", value_parser = rate)]
     noise: f64,
 
-    /// Where the noise begins: the same seed and the same bytes, the same wrong bits
+    /// Seed of the noise: the same seed and the same bytes give the same bit errors
     #[arg(long, value_name = "N", default_value = "1")]
     seed: u64,
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let rate: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let rate: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err(format!("{rate} is not within 0..=1")) }
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// One line, with the time in front.
+/// Prints one line with a timestamp.
 fn say(now: Instant, what: &str) -> Result<(), Failure> {
     let seconds = now.as_micros() as f64 / 1e6;
     let mut out = io::stdout().lock();

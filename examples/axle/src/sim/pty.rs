@@ -1,4 +1,4 @@
-//! A pseudo-terminal in place of a line: whoever opens its path is at the other end.
+//! A pseudo-terminal in place of a line: the program that opens its path is at the other end.
 
 use std::io::{self, Write};
 
@@ -14,28 +14,29 @@ use crate::{
     port::{Line, NotSent, Port},
 };
 
-/// Bytes that may wait for a reader. On a wire, what nobody reads is gone; here it would wait for
-/// ever, and block the sender.
+/// Number of bytes that may wait for a reader. On a wire, unread bytes are lost; here they would
+/// wait forever and block the sender.
 const UNREAD_LIMIT: u32 = 2048;
 
-/// Silence after which whoever had the path open may be gone.
+/// Silence after which the program that had the path open may be gone.
 const GONE: Duration = Duration::from_millis(1000);
 
 /// Our end of a pseudo-terminal, with noise.
 pub(super) struct Pty {
     port: Port,
-    /// The other end. Held open, so that it does not hang up when a program closes it.
+    /// The other end, held open so that the terminal does not hang up when a program closes it.
     held: TTYPort,
     heard_at: Instant,
     buffer: Vec<u8>,
     noise: f64,
-    /// Chance of its own for each direction, so that the pace of one does not change the other.
+    /// Separate random numbers for each direction, so that the timing of one does not affect the
+    /// other.
     incoming: Rng,
     outgoing: Rng,
 }
 
 impl Pty {
-    /// Opens one and says where.
+    /// Opens a pseudo-terminal and prints its path.
     pub(super) fn open(faults: Faults) -> Result<Self, Failure> {
         let pty = Self::pair(faults)?;
         let mut out = io::stdout().lock();
@@ -46,7 +47,8 @@ impl Pty {
     }
 
     fn pair(faults: Faults) -> Result<Self, Failure> {
-        let failed = |cause: String| Failure::Undone(format!("no pseudo-terminal: {cause}"));
+        let failed =
+            |cause: String| Failure::Undone(format!("cannot open a pseudo-terminal: {cause}"));
         let (ours, held) = TTYPort::pair().map_err(|error| failed(error.description))?;
         let path = held.name().ok_or_else(|| failed("it has no name".to_owned()))?;
         let port = Port::new(path, Box::new(ours));
@@ -81,8 +83,8 @@ impl Line for Pty {
         let now = self.port.now();
         if now >= self.heard_at + GONE {
             self.heard_at = now;
-            // A program that was killed has not given back its exclusive use, and nobody else could
-            // open the path: closing any handle gives it back.
+            // A killed program has not released its exclusive use, so no other program could open
+            // the path. Closing any handle releases it.
             drop(self.held.try_clone_native());
         }
         let bytes = self.port.fill(until)?;
@@ -94,7 +96,7 @@ impl Line for Pty {
     }
 }
 
-/// Turns over bits at this rate.
+/// Flips bits at this rate.
 fn disturb(bytes: &mut [u8], rate: f64, rng: &mut Rng) {
     if rate > 0.0 {
         for byte in bytes {
@@ -115,7 +117,7 @@ mod tests {
     fn what_nobody_reads_is_gone_and_blocks_nobody() {
         let mut pty = Pty::pair(Faults { noise: 0.0, seed: 1 }).unwrap();
         for _ in 0..1000 {
-            // Many times what a pseudo-terminal holds.
+            // Many times the capacity of a pseudo-terminal.
             pty.send(&[0x55; 500]).unwrap();
             thread::sleep(Duration::from_micros(100));
         }

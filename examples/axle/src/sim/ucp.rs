@@ -14,7 +14,7 @@ use axlewire::{
 use super::{Faults, pty::Pty, say};
 use crate::{EXIT_CODES, failure::Failure, port::Line, signals::Signals};
 
-/// A rover: it reports, drives as it is told, and stops when it is told nothing
+/// Simulate a rover, which reports, drives as commanded, and stops without commands
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Args {
@@ -22,7 +22,7 @@ pub(super) struct Args {
     faults: Faults,
 }
 
-/// How often the rover is looked at: it reports every 20 ms.
+/// Interval between two checks of the rover, which reports every 20 ms.
 const STEP: Duration = Duration::from_millis(10);
 
 /// Runs the subcommand.
@@ -49,11 +49,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         let was_moving = is_moving;
         is_moving = rover.telemetry().rpm != [0; 4];
         if is_moving && !was_moving {
-            say(now, "moves")?;
+            say(now, "moving")?;
         }
         if was_moving && !is_moving {
             let (way, heading) = (rover.distance_m(), rover.heading_deg());
-            say(now, &format!("stands still after {way:.2} m, heading {heading:.0} deg"))?;
+            say(now, &format!("at rest after {way:.2} m, heading {heading:.0} deg"))?;
         }
     }
     let seen = robot.statistics();
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     say(last, &line)
 }
 
-/// Does what the host asks for, and says so.
+/// Does what the host requests, and returns a line about it.
 fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> Option<String> {
     Some(match event {
         RobotEvent::Motor(command) => describe(&command),
@@ -85,7 +85,7 @@ fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> 
         }
         RobotEvent::NetworkState(state) => format!("network state: {state:?}"),
         RobotEvent::UpdateRequested { version, .. } => {
-            format!("firmware update to version {version} asked for, and ignored")
+            format!("firmware update to version {version} requested and ignored")
         }
         _ => return None,
     })

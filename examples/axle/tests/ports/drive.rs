@@ -1,4 +1,4 @@
-//! `axle drive`: a rover drives, and stands still again before the tool ends.
+//! `axle drive`: drives a rover, and stops it before the tool exits.
 
 use std::{io::Write, thread, time::Duration};
 
@@ -19,7 +19,7 @@ fn drive_moves_the_rover_and_stops_it_at_the_end() {
         let (sim, port) = sim("ucp --noise 1e-5");
         let lines =
             Process::start(&format!("drive --port {port} --speed 50 --turn 20 --for 1")).success();
-        assert!(lines[0].ends_with("to drive: speed 50 %, turn 20 % right"), "{lines:?}");
+        assert!(lines[0].ends_with("target: speed 50 %, turn 20 % right"), "{lines:?}");
         let (stopped, driving) = lines[1..].split_last().unwrap();
         let last = driving.last().unwrap();
         let rpm: Vec<i32> =
@@ -29,7 +29,7 @@ fn drive_moves_the_rover_and_stops_it_at_the_end() {
 
         sim.line("command: speed 50 %, turn 20 % right");
         sim.line("command: speed 0 %, turn 0 %");
-        sim.line("stands still after");
+        sim.line("at rest after");
     });
 }
 
@@ -38,10 +38,10 @@ fn a_rover_whose_host_dies_stops_by_its_watchdog() {
     undisturbed(|| {
         let (sim, port) = sim("ucp");
         let drive = Process::start(&format!("drive --port {port} --speed 60 --turn 0 --for 600"));
-        sim.line("moves");
+        sim.line("moving");
         drive.kill();
         sim.line("watchdog");
-        sim.line("stands still");
+        sim.line("at rest");
     });
 }
 
@@ -53,8 +53,8 @@ fn a_rover_that_vanishes_is_reported_with_what_it_means() {
         sim.line("command: speed 60 %");
         sim.kill();
         let line = drive.complaint(1);
-        assert!(line.starts_with(&format!("port {port:?} has failed: it has vanished")), "{line}");
-        assert!(line.contains("cannot be told to stop any more"), "{line}");
+        assert!(line.starts_with(&format!("port {port:?} failed: disconnected")), "{line}");
+        assert!(line.contains("can no longer be told to stop"), "{line}");
     });
 }
 
@@ -65,7 +65,7 @@ fn a_robot_that_never_answers_is_never_told_to_move() {
         let drive = Process::start(&format!("drive --port {} --speed 60 --turn 0", line.path));
         let complaint = drive.complaint(1);
         assert!(complaint.starts_with("no robot answers on"), "{complaint}");
-        assert!(complaint.ends_with("nothing in 2 s"), "{complaint}");
+        assert!(complaint.ends_with("nothing received in 2 s"), "{complaint}");
 
         let heard = line.lock();
         let (mut commands, mut pings) = (0, 0);
@@ -93,7 +93,7 @@ fn a_robot_that_talks_garbage_is_no_robot() {
         let line = parrot(&[0xFD, 0xFF, 0x28, 0x00, 0x05, 0x00, 0xFD]);
         let drive = Process::start(&format!("drive --port {} --speed 60 --turn 0", line.path));
         let complaint = drive.complaint(1);
-        assert!(complaint.contains("bytes that are no message"), "{complaint}");
+        assert!(complaint.contains("bytes but no message received"), "{complaint}");
     });
 }
 
@@ -116,7 +116,7 @@ fn a_host_that_floods_is_still_served_afterwards() {
         let served: Vec<_> = lines.last().unwrap().split_whitespace().collect();
         let pings: u32 =
             served[served.iter().position(|word| *word == "pings,").unwrap() - 1].parse().unwrap();
-        assert!(pings >= 2000, "none was lost: {pings}");
+        assert!(pings >= 2000, "no ping was lost: {pings}");
     });
 }
 
@@ -139,14 +139,17 @@ fn turning_on_the_spot_counts_as_moving() {
         let args = format!("drive --port {} --speed 0 --turn 40 --for 0.3", line.path);
         let drive = Process::start(&args);
         wait_until("the drive", || line.lock().commands.contains(&(0, 40)));
-        // The mean of its wheels is 0.
+        // The mean of its wheel speeds is 0.
         line.lock().wheels = Some([28, -28, 28, -28]);
         let complaint = drive.complaint(1);
         assert!(complaint.starts_with("the robot was told "), "{complaint}");
-        assert!(complaint.ends_with(" times to stop, and its wheels still turn"), "{complaint}");
+        assert!(
+            complaint.ends_with(" times to stop, but its wheels are still turning"),
+            "{complaint}"
+        );
         let commands = line.lock().commands.clone();
         let stops = commands.iter().rev().take_while(|command| **command == (0, 0)).count();
-        assert!(stops >= 5, "again and again: {commands:?}");
+        assert!(stops >= 5, "stops are repeated: {commands:?}");
     });
 }
 
@@ -178,10 +181,10 @@ fn a_rover_that_falls_silent_may_be_moving_and_is_told_to_stop_all_the_same() {
         wait_until("the drive", || line.lock().commands.contains(&(60, 0)));
         line.lock().is_dumb = true;
         let complaint = drive.complaint(1);
-        assert!(complaint.ends_with("is not heard any more: it may be moving"), "{complaint}");
+        assert!(complaint.ends_with("is no longer heard: it may be moving"), "{complaint}");
         let commands = line.lock().commands.clone();
         let stops = commands.iter().rev().take_while(|command| **command == (0, 0)).count();
-        assert!(stops >= 5, "again and again: {commands:?}");
+        assert!(stops >= 5, "stops are repeated: {commands:?}");
     });
 }
 
@@ -196,7 +199,7 @@ fn a_rover_that_falls_silent_while_it_stops_may_be_moving() {
         wait_until("the stop", || line.lock().commands.last() == Some(&(0, 0)));
         line.lock().is_dumb = true;
         let complaint = drive.complaint(1);
-        assert!(complaint.ends_with("is not heard any more: it may be moving"), "{complaint}");
+        assert!(complaint.ends_with("is no longer heard: it may be moving"), "{complaint}");
     });
 }
 
@@ -214,9 +217,9 @@ fn in_reverse_the_nose_swings_the_other_way_and_the_tool_says_so() {
             let (sim, port) = sim("ucp");
             let lines = Process::start(&format!("drive --port {port} {args} --for 0.5")).success();
             assert!(lines[0].ends_with(expected), "{args}: {lines:?}");
-            let still = sim.line("stands still after");
+            let still = sim.line("at rest after");
             let heading: f64 = still.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
-            // A compass: left of north is just below 360.
+            // Compass headings: left of north is just below 360.
             let swung = if heading > 180.0 { heading - 360.0 } else { heading };
             assert!(swung * side > 3.0, "{args}: {still}");
         }

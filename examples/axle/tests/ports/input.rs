@@ -1,4 +1,4 @@
-//! Bad input is one clear line and an exit code.
+//! Invalid input gives one clear line and an exit code.
 
 use std::{
     fs::{self, Permissions},
@@ -21,7 +21,7 @@ fn a_wrong_value_is_explained_in_one_line_before_any_port_is_touched() {
             ("spin --port /none --node 1 --rps NaN", "NaN is not a finite number"),
             ("spin --port /none --node 1 --rps inf", "inf is not a finite number"),
             ("spin --port /none --node 1 --rps 1e39", "inf is not a finite number"),
-            ("spin --port /none --node 1 --rps fast", "it is no number"),
+            ("spin --port /none --node 1 --rps fast", "not a number"),
             ("spin --port /none --node 1 --revolutions nan", "NaN is not a finite number"),
             ("spin --port /none --node 1 --revolutions 32769", "outside -268443647..=268435455"),
             ("spin --port /none --node 0 --rps 1", "node id 0 is outside 1..=8"),
@@ -46,7 +46,7 @@ fn a_wrong_value_is_explained_in_one_line_before_any_port_is_touched() {
             ("sim", "requires a subcommand"),
             ("sim ikeya", "--node <N:MODE>"),
             ("sim ikeya --node 1", "N:MODE, as in 1:velocity"),
-            ("sim ikeya --node 1:torque", "a mode is velocity or position"),
+            ("sim ikeya --node 1:torque", "the mode must be velocity or position"),
             ("sim ikeya --node 9:velocity", "node id 9 is outside 1..=8"),
             ("sim ikeya --node 2:velocity --node 2:position", "node 2 is given twice"),
             ("sim ucp --noise 2", "2 is not within 0..=1"),
@@ -76,10 +76,10 @@ fn a_path_that_is_no_port_is_named() {
     undisturbed(|| {
         let file = support::file("no_port", b"");
         let cases = [
-            ("/no/such/port", "there is no such path"),
-            (env!("CARGO_TARGET_TMPDIR"), "it is no serial port"),
-            (file.to_str().unwrap(), "it is no serial port"),
-            ("/dev/null", "it is no serial port"),
+            ("/no/such/port", "no such path"),
+            (env!("CARGO_TARGET_TMPDIR"), "not a serial port"),
+            (file.to_str().unwrap(), "not a serial port"),
+            ("/dev/null", "not a serial port"),
         ];
         for (path, cause) in cases {
             for user in USERS {
@@ -100,7 +100,7 @@ fn a_port_that_may_not_be_opened_is_named() {
             let args: Vec<_> = args.split(' ').collect();
             let mut command = axle(&args);
             if fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0) {
-                // Root may open everything; nobody may not.
+                // Root can open everything; user `nobody` cannot.
                 command.uid(65_534);
             }
             let Ok(process) = Process::spawn(&mut command) else {

@@ -1,5 +1,5 @@
-//! Two processes on a pseudo-terminal: one plays what is on the line, the other is used as a
-//! newcomer would use it. Each test starts its own pair and ends both by their ids.
+//! Two processes on a pseudo-terminal: one simulates the devices on the line, the other is the tool
+//! as a new user would run it. Each test starts its own pair and ends both by process id.
 #![cfg(unix)]
 
 #[path = "../support/mod.rs"]
@@ -35,7 +35,7 @@ fn sim(args: &str) -> (Process, String) {
 
 const TWO_NODES: &str = "ikeya --node 1:velocity --node 3:position";
 
-/// The numbers in front of `unit` in lines that have one.
+/// The numbers before `unit` in lines that contain it.
 fn values(lines: &[String], unit: &str) -> Vec<f64> {
     let value = |line: &String| {
         let words: Vec<_> = line.split([' ', ',']).filter(|word| !word.is_empty()).collect();
@@ -45,11 +45,11 @@ fn values(lines: &[String], unit: &str) -> Vec<f64> {
     lines.iter().filter_map(value).collect()
 }
 
-/// Waits until something is so; far longer than it takes, even on a machine that is busy.
+/// Waits until a condition holds; the limit is generous, even for a busy machine.
 fn wait_until(what: &str, is_so: impl Fn() -> bool) {
     let start = Instant::now();
     while !is_so() {
-        assert!(start.elapsed() < Duration::from_secs(20), "{what} does not come");
+        assert!(start.elapsed() < Duration::from_secs(20), "{what} did not happen");
         thread::sleep(Duration::from_millis(2));
     }
 }

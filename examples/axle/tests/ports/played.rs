@@ -1,4 +1,5 @@
-//! Lines that a test plays itself, to hear every byte and to answer as no simulation would.
+//! Lines played by the test itself, to record every byte and to answer in ways that no simulation
+//! does.
 
 use std::{
     io::{Read, Write},
@@ -26,7 +27,7 @@ use super::{Process, wait_until};
 /// Longest wait for bytes; reports are due every 20 ms.
 const TICK: Duration = Duration::from_millis(5);
 
-/// A pseudo-terminal with a thread that plays what is on it.
+/// A pseudo-terminal with a thread that plays the devices on it.
 pub(crate) struct Line<T> {
     pub(crate) path: String,
     shared: Arc<Mutex<T>>,
@@ -36,7 +37,7 @@ pub(crate) struct Line<T> {
 }
 
 impl<T: Send + 'static> Line<T> {
-    /// `play` is given what was heard, perhaps nothing, and says what to answer.
+    /// `play` gets the received bytes, possibly none, and returns the answer.
     pub(crate) fn new(
         shared: T,
         mut play: impl FnMut(&Mutex<T>, &[u8]) -> Vec<u8> + Send + 'static,
@@ -69,7 +70,7 @@ impl<T> Drop for Line<T> {
     }
 }
 
-/// A line that says the same to whatever it hears; what it holds is all that was heard.
+/// A line that gives the same answer to all input; it holds all received bytes.
 pub(crate) fn parrot(answer: &'static [u8]) -> Line<Vec<u8>> {
     Line::new(Vec::new(), |heard, bytes| {
         heard.lock().unwrap().extend(bytes);
@@ -77,25 +78,25 @@ pub(crate) fn parrot(answer: &'static [u8]) -> Line<Vec<u8>> {
     })
 }
 
-/// A request of the tool.
+/// A request from the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Said {
     Read(u8),
-    /// As a speed and as a position: the bytes do not say.
+    /// As a speed and as a position, because the bytes do not distinguish them.
     Write(u8, f32, i32),
 }
 
-/// A node that is played.
+/// A played node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub(crate) id: u8,
     pub(crate) mode: Mode,
     pub(crate) rps: f32,
     pub(crate) counts: i32,
-    /// Does it do as it is told?
+    /// Whether it obeys commands.
     pub(crate) follows: bool,
     pub(crate) is_dumb: bool,
-    /// Time to an answer.
+    /// Response time.
     pub(crate) delay: Duration,
 }
 
@@ -124,16 +125,16 @@ impl Node {
     }
 }
 
-/// What was said on a bus, and how its nodes are.
+/// Traffic on a bus, and the state of its nodes.
 #[derive(Debug, Default)]
 pub(crate) struct BusState {
     pub(crate) nodes: Vec<Node>,
     pub(crate) said: Vec<(Said, Instant)>,
-    /// Bytes that were no request.
+    /// Number of bytes outside requests.
     pub(crate) strays: u64,
 }
 
-/// A bus whose nodes are played; `on_request` is called before a node reacts.
+/// A bus with played nodes; `on_request` is called before a node reacts.
 pub(crate) fn bus(
     nodes: &[Node],
     mut on_request: impl FnMut(Said, &mut BusState) + Send + 'static,
@@ -193,8 +194,8 @@ impl Line<BusState> {
     }
 }
 
-/// Starts `spin` on node 1 with 2 rps, and waits until the node has been told. On a machine that is
-/// very busy the tool may find nobody within its 60 ms, and is started again.
+/// Starts `spin` on node 1 with 2 rps, and waits until the node has received the command. On a very
+/// busy machine the tool may find no node within its 60 ms, and is started again.
 pub(crate) fn spin(line: &Line<BusState>, seconds: f32) -> Process {
     for _ in 0..5 {
         let args = format!("spin --port {} --node 1 --rps 2 --for {seconds}", line.path);
@@ -205,10 +206,10 @@ pub(crate) fn spin(line: &Line<BusState>, seconds: f32) -> Process {
             return spin;
         }
     }
-    panic!("never gets as far as a command");
+    panic!("spin never sends a command");
 }
 
-/// The speeds that a node was told.
+/// The speeds commanded to a node.
 pub(crate) fn speeds(said: &[Said]) -> Vec<f32> {
     let speed = |said: &Said| match said {
         Said::Write(_, rps, _) => Some(*rps),
@@ -217,7 +218,7 @@ pub(crate) fn speeds(said: &[Said]) -> Vec<f32> {
     said.iter().filter_map(speed).collect()
 }
 
-/// How often a stop of a velocity node was sent and followed by a READ of it.
+/// Number of stops sent to a velocity node and followed by a READ of it.
 pub(crate) fn confirmable_stops(said: &[Said], id: u8) -> usize {
     let is_of = |said: &&Said| matches!(said, Said::Read(it) | Said::Write(it, ..) if *it == id);
     let said: Vec<_> = said.iter().filter(is_of).collect();
@@ -225,20 +226,20 @@ pub(crate) fn confirmable_stops(said: &[Said], id: u8) -> usize {
     said.windows(2).filter(|pair| is_stop(pair[0]) && *pair[1] == Said::Read(id)).count()
 }
 
-/// What a rover that is played has heard, and how it is.
+/// Traffic received by a played rover, and its state.
 #[derive(Debug, Default)]
 pub(crate) struct RoverState {
     /// Speed and turn of each motor command.
     pub(crate) commands: Vec<(i16, i16)>,
-    /// Bytes that were no frame.
+    /// Number of bytes outside frames.
     pub(crate) strays: u64,
     pub(crate) bytes: usize,
-    /// What its wheels do whatever it is told; `None` for what it is told.
+    /// Wheel speeds regardless of commands; `None` to follow commands.
     pub(crate) wheels: Option<[i16; 4]>,
     pub(crate) is_dumb: bool,
 }
 
-/// A rover that is played, on the role of a robot.
+/// A played rover, built on the robot role.
 pub(crate) fn rover(wheels: Option<[i16; 4]>) -> Line<RoverState> {
     let start = Instant::now();
     let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);

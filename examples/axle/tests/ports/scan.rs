@@ -1,4 +1,4 @@
-//! `axle scan`: which nodes are on a bus.
+//! `axle scan`: lists the nodes of a bus.
 
 use std::time::Duration;
 
@@ -43,7 +43,7 @@ fn scan_finds_all_nodes_of_a_noisy_bus_every_time() {
         for _ in 0..5 {
             let table = Process::start(&format!("scan --port {port}")).success();
             assert_eq!(table.last().unwrap(), "8 nodes answer.");
-            // Node 8 has no switch under the reading that begins with 1 = 001.
+            // Node 8 has no switch setting under the reading in which 1 is 001.
             assert!(table[8].contains("1110") && table[8].contains("none"), "{table:?}");
         }
     });
@@ -73,7 +73,7 @@ fn a_node_that_answers_with_garbage_for_ever_is_named_and_does_not_hold_anybody_
         let spin = Process::start(&format!("spin --port {} --node 1 --rps 1", line.path));
         assert_eq!(spin.complaint(1), "node 1 does not answer; nodes that do: none");
         let heard = line.lock();
-        assert!(!heard.contains(&0xBB), "nobody was commanded");
+        assert!(!heard.contains(&0xBB), "no node was commanded");
     });
 }
 

@@ -1,4 +1,4 @@
-//! Signals: what moves is stopped before the tool ends or is suspended.
+//! Signals: motors are stopped before the tool exits or is suspended.
 
 use std::{
     sync::{Arc, Mutex},
@@ -13,18 +13,18 @@ use super::{
 };
 
 const SUSPENDED: &str =
-    "suspended by Ctrl-Z: what moved was told to stop first, and is not moved again";
+    "suspended by Ctrl-Z: everything that moved was told to stop first and stays stopped";
 
-/// Longer than what leads to a stop.
+/// Longer than the pause that leads to a stop.
 const LONG: Duration = Duration::from_millis(900);
 
-/// After its first stop a node was told nothing else. Before it there is what was sent until the
-/// signal had come, on a busy machine some of the set-points that are repeated every 20 ms.
+/// Checks that a node got only stops after the first stop. Before it come the commands sent until
+/// the signal arrived: on a busy machine, some of the set-points repeated every 20 ms.
 fn assert_stopped_for_good(said: &[Said]) {
     let speeds = speeds(said);
     let first = speeds.iter().position(|&rps| rps == 0.0).expect("a stop");
-    assert!(first <= 25, "driven on: {speeds:?}");
-    assert!(speeds[first..].iter().all(|&rps| rps == 0.0), "turned on again: {speeds:?}");
+    assert!(first <= 25, "kept turning: {speeds:?}");
+    assert!(speeds[first..].iter().all(|&rps| rps == 0.0), "turned again: {speeds:?}");
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn every_signal_that_can_be_caught_stops_the_motor_first() {
             ("QUIT", "6.00"),
             ("USR1", "7.00"),
             ("ALRM", "8.00"),
-            // A watchdog of a supervisor, limits, a failing power supply, real-time signals.
+            // Supervisor watchdogs, resource limits, a failing power supply, real-time signals.
             ("ABRT", "9.00"),
             ("XFSZ", "10.00"),
             ("PWR", "11.00"),
@@ -118,7 +118,7 @@ fn a_second_ctrl_c_does_not_abandon_the_stop() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let spin = played::spin(&line, 600.0);
-        // It runs out slowly.
+        // The motor coasts down slowly.
         line.change(|node| (node.rps, node.follows) = (2.0, false));
         for _ in 0..4 {
             spin.signal("INT");
@@ -136,7 +136,7 @@ fn ctrl_z_stops_the_motor_before_the_tool_is_suspended_and_nothing_moves_after_i
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let spin = played::spin(&line, 600.0);
-        // It runs out for a while, and the tool waits for that.
+        // The motor coasts for a while, and the tool waits for it.
         line.change(|node| node.follows = false);
         spin.signal("TSTP");
         let before = line.said().len();
@@ -148,14 +148,14 @@ fn ctrl_z_stops_the_motor_before_the_tool_is_suspended_and_nothing_moves_after_i
         let said = line.said();
         assert_stopped_for_good(&said[before..]);
         assert!(confirmable_stops(&said, 1) >= 2, "{:?}", speeds(&said[before..]));
-        // Others may use the line meanwhile.
+        // Other programs can use the line meanwhile.
         let scan = Process::start(&format!("scan --port {}", line.path)).success();
         assert_eq!(scan.last().unwrap(), "1 node answers.");
 
         let said = line.said().len();
         spin.signal("CONT");
         assert_eq!(spin.complaint(1), SUSPENDED);
-        assert_eq!(line.said().len(), said, "nothing is sent after it");
+        assert_eq!(line.said().len(), said, "nothing is sent afterwards");
     });
 }
 
@@ -165,7 +165,7 @@ fn ctrl_z_stops_the_rover_before_the_tool_is_suspended_and_nothing_moves_after_i
         let line = played::rover(None);
         let drive = Process::start(&format!("drive --port {} --speed 0 --turn 40", line.path));
         wait_until("the drive", || line.lock().commands.contains(&(0, 40)));
-        // It runs out for a while, turning on the spot.
+        // The rover coasts for a while, turning on the spot.
         line.lock().wheels = Some([20, -20, 20, -20]);
         drive.signal("TSTP");
         thread::sleep(Duration::from_millis(600));
@@ -177,7 +177,7 @@ fn ctrl_z_stops_the_rover_before_the_tool_is_suspended_and_nothing_moves_after_i
         let bytes = line.lock().bytes;
         drive.signal("CONT");
         assert_eq!(drive.complaint(1), SUSPENDED);
-        assert_eq!(line.lock().bytes, bytes, "nothing is sent after it");
+        assert_eq!(line.lock().bytes, bytes, "nothing is sent afterwards");
     });
 }
 
@@ -211,11 +211,11 @@ fn ctrl_z_before_anything_moves_suspends_at_once() {
         assert!(spin.complaints().is_empty());
         spin.signal("CONT");
         assert_eq!(spin.complaint(1), SUSPENDED);
-        assert!(speeds(&line.said()).is_empty(), "nobody was commanded");
+        assert!(speeds(&line.said()).is_empty(), "no node was commanded");
     });
 }
 
-/// The tool notices its absence by itself, before a dead-man does.
+/// The tool itself detects its absence, before a dead-man does.
 fn says_for_how_long(complaint: &str) -> bool {
     let time = complaint.strip_prefix("the tool did not run for ");
     time.is_some_and(|time| time.starts_with(|first: char| first.is_ascii_digit()))
@@ -233,16 +233,13 @@ fn after_a_stop_signal_that_cannot_be_caught_the_motor_is_stopped_and_not_turned
         spin.signal("CONT");
         let complaint = spin.complaint(1);
         assert!(says_for_how_long(&complaint), "{complaint}");
-        assert!(
-            complaint.ends_with("(suspended?); it was stopped and stands still"),
-            "{complaint}"
-        );
+        assert!(complaint.ends_with("(suspended?); it was stopped and is at rest"), "{complaint}");
         let said = line.said();
         assert_stopped_for_good(&said[before..]);
         assert_eq!(
             speeds(&said[before..])[0],
             0.0,
-            "not one more command: {:?}",
+            "no further command: {:?}",
             speeds(&said[before..])
         );
         assert!(confirmable_stops(&said[before..], 1) >= 2, "{:?}", speeds(&said[before..]));
@@ -265,7 +262,7 @@ fn after_a_stop_signal_that_cannot_be_caught_the_rover_is_stopped_and_not_driven
         assert!(says_for_how_long(&complaint), "{complaint}");
         let commands = line.lock().commands[before..].to_vec();
         assert!(commands.len() >= 3, "{commands:?}");
-        assert!(commands.iter().all(|command| *command == (0, 0)), "driven on: {commands:?}");
+        assert!(commands.iter().all(|command| *command == (0, 0)), "kept driving: {commands:?}");
     });
 }
 
@@ -274,7 +271,7 @@ fn a_position_node_holds_what_was_read_after_the_signal() {
     undisturbed(|| {
         let holds = Arc::new(Mutex::new(Vec::new()));
         let seen = Arc::clone(&holds);
-        // Under way: 100 counts further with each answer, until it is told to hold.
+        // Moving: 100 counts further with each answer, until told to hold.
         let line =
             played::bus(&[Node { follows: false, ..Node::position(1, 0) }], move |said, bus| {
                 let node = &mut bus.nodes[0];
@@ -297,7 +294,7 @@ fn a_position_node_holds_what_was_read_after_the_signal() {
         assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
         let holds = holds.lock().unwrap();
         let (held, measured) = holds[0];
-        assert_eq!(held, measured, "the position of the last answer");
+        assert_eq!(held, measured, "holds the position of the last answer");
         assert!(holds.len() >= 2 && holds.iter().all(|hold| *hold == holds[0]), "{holds:?}");
     });
 }
@@ -311,7 +308,7 @@ fn a_stop_that_is_itself_suspended_has_all_of_its_time_afterwards() {
         let drive =
             Process::start(&format!("drive --port {} --speed 50 --turn 0 --for 600", rover.path));
         wait_until("the drive", || rover.lock().commands.contains(&(50, 0)));
-        // Both run out for a while.
+        // Both coast for a while.
         bus.change(|node| node.follows = false);
         rover.lock().wheels = Some([9; 4]);
         for tool in [&spin, &drive] {

@@ -49,9 +49,9 @@ fn help_tells_what_a_kill_leaves_behind() {
             let help = words.join(" ");
             for expected in [
                 "kill -9, a SIGSTOP or a power cut",
-                "goes on turning, for ever, unless its slaves have watchdogs",
-                "a vendor robot stops 500 ms after the last byte on its line; any byte counts, also one \
-                 that another program sends",
+                "keeps turning indefinitely, unless its slaves have watchdogs",
+                "a vendor robot stops 500 ms after the last byte on its line; any byte counts, \
+                 including noise and bytes from other programs",
             ] {
                 assert!(help.contains(expected), "{subcommand}: {expected} is not in {help}");
             }

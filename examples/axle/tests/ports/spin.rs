@@ -1,4 +1,4 @@
-//! `axle spin`: one motor turns, and stands still again before the tool ends.
+//! `axle spin`: turns one motor, and stops it before the tool exits.
 
 use std::{
     io::{Read, Write},
@@ -23,7 +23,7 @@ fn spin_turns_the_motor_and_stops_it_at_the_end() {
         let (sim, port) = sim(TWO_NODES);
         let lines =
             Process::start(&format!("spin --port {port} --node 1 --rps -2.5 --for 1")).success();
-        assert!(lines[0].contains("node 1: to turn at -2.50 rps"), "{lines:?}");
+        assert!(lines[0].contains("node 1: target -2.50 rps"), "{lines:?}");
         let (stopped, measured) = lines[1..].split_last().unwrap();
         let measured = values(measured, "rps");
         assert!(!measured.is_empty() && measured.is_sorted_by(|a, b| a >= b), "{measured:?}");
@@ -32,7 +32,7 @@ fn spin_turns_the_motor_and_stops_it_at_the_end() {
 
         sim.line("node 1: command -2.50 rps");
         sim.line("node 1: command 0.00 rps");
-        sim.line("node 1: stands still");
+        sim.line("node 1: at rest");
         assert!(
             !sim.lines().iter().any(|line| line.contains("node 3")),
             "only node 1 was commanded"
@@ -47,9 +47,9 @@ fn a_position_node_goes_on_from_where_it_stands() {
         for expected in ["-0.7500", "-1.5000"] {
             let spin = format!("spin --port {port} --node 3 --revolutions -0.75 --for 1");
             let lines = Process::start(&spin).success();
-            assert!(lines[0].contains(&format!("to go to {expected} turns")), "{lines:?}");
+            assert!(lines[0].contains(&format!("target {expected} turns")), "{lines:?}");
             assert!(lines.last().unwrap().contains(expected), "{lines:?}");
-            sim.line(&format!("node 3: stands still at {expected} turns"));
+            sim.line(&format!("node 3: at rest at {expected} turns"));
         }
     });
 }
@@ -61,15 +61,17 @@ fn a_position_node_under_way_is_stopped_where_it_is() {
         let spin = format!("spin --port {port} --node 3 --revolutions 1000 --for 0.3");
         let ended = Process::start(&spin).end();
         let (lines, complaint) = (ended.stdout, &ended.stderr[0]);
-        let expected = "axle: node 3 was to go to 1000.0000 turns and is at ";
+        let expected = "axle: node 3 was at ";
         assert!(ended.code == Some(1) && complaint.starts_with(expected), "{complaint}");
-        assert!(complaint.ends_with("; it was stopped and stands still"), "{complaint}");
-        sim.line("node 3: stands still");
+        let expected = " turns when the time was up, target 1000.0000 turns; it was stopped and is \
+                        at rest";
+        assert!(complaint.ends_with(expected), "{complaint}");
+        sim.line("node 3: at rest");
         let commands: Vec<_> =
             sim.lines().into_iter().filter(|line| line.contains("command")).collect();
         let [goal, hold] = values(&commands, "turns")[..] else { panic!("{commands:?}") };
         assert_eq!(goal, 1000.0);
-        assert!(hold > 0.0 && hold < 900.0, "neither on to the goal nor back to 0: {hold}");
+        assert!(hold > 0.0 && hold < 900.0, "neither the goal nor back at 0: {hold}");
         assert_eq!(values(&lines[lines.len() - 1..], "turns"), [hold]);
     });
 }
@@ -96,7 +98,7 @@ fn a_port_that_vanishes_is_reported_with_what_it_means() {
         sim.line("node 1: command 2.00 rps");
         sim.kill();
         let line = spin.complaint(1);
-        assert!(line.starts_with(&format!("port {port:?} has failed: it has vanished")), "{line}");
+        assert!(line.starts_with(&format!("port {port:?} failed: disconnected")), "{line}");
         let end = "; node 1 was told to stop and has not confirmed it: it may be moving";
         assert!(line.ends_with(end), "{line}");
     });
@@ -133,8 +135,8 @@ fn the_watchdog_of_a_simulated_node_stops_it_when_its_master_dies() {
         sim.line("node 1: command 2.00 rps");
         spin.kill();
         sim.line("node 1: watchdog");
-        sim.line("node 1: stands still");
-        // What a killed program leaves behind does not keep the next one out.
+        sim.line("node 1: at rest");
+        // What a killed program leaves behind does not block the next one.
         let again = Process::start(&format!("scan --port {port}")).success();
         assert_eq!(again.last().unwrap(), "1 node answers.");
     });
@@ -163,8 +165,8 @@ fn a_motor_that_does_not_reach_its_speed_is_a_failure() {
         let spin = played::spin(&line, 0.3);
         wait_until("the stop", || speeds(&line.said()).contains(&0.0));
         line.change(|node| node.rps = 0.0);
-        let expected = "node 1 was to turn at 2.00 rps and is at 1.70 rps when the time is over; \
-                        it was stopped and stands still";
+        let expected = "node 1 was at 1.70 rps when the time was up, target 2.00 rps; it was stopped \
+                        and is at rest";
         assert_eq!(spin.complaint(1), expected);
     });
 }
@@ -176,7 +178,7 @@ fn a_motor_that_turns_on_after_its_stop_is_not_called_stopped() {
         line.change(|node| node.rps = 2.0);
         let args = format!("spin --port {} --node 1 --rps 2 --for 0.2", line.path);
         let ended = Process::start(&args).end();
-        let expected = "axle: node 1 has confirmed the stop, but still moves after 3 s: 2.00 rps";
+        let expected = "axle: node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
         assert_eq!((ended.code, &*ended.stderr), (Some(1), &[expected.to_owned()][..]));
         assert!(!ended.stdout.iter().any(|line| line.contains("stopped")), "{ended:?}");
     });
@@ -187,13 +189,13 @@ fn a_node_that_falls_silent_is_stopped_when_it_is_back() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let spin = played::spin(&line, 600.0);
-        // It neither hears nor answers for a while, and goes on as it was told last.
+        // It neither receives nor answers for a while, and continues with its last command.
         line.change(|node| (node.is_dumb, node.follows) = (true, false));
         let before = line.said().len();
         wait_until("the stop", || speeds(&line.said()[before..]).contains(&0.0));
         thread::sleep(Duration::from_millis(500));
         line.change(|node| (node.is_dumb, node.follows) = (false, true));
-        let expected = "node 1 does not answer any more; it was stopped and stands still";
+        let expected = "node 1 no longer answers; it was stopped and is at rest";
         assert_eq!(spin.complaint(1), expected);
         assert_eq!(line.lock().nodes[0].rps, 0.0);
     });
@@ -204,9 +206,9 @@ fn a_node_that_stays_silent_is_told_to_stop_all_the_same() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let spin = played::spin(&line, 600.0);
-        // It is not deaf, only dumb.
+        // It still receives, but no longer answers.
         line.change(|node| node.is_dumb = true);
-        let expected = "node 1 was told to stop and has not confirmed it (nothing is heard): it may \
+        let expected = "node 1 was told to stop and has not confirmed it (nothing received): it may \
                         be moving";
         assert_eq!(spin.complaint(1), expected);
         assert_eq!(line.lock().nodes[0].rps, 0.0);
@@ -234,25 +236,25 @@ fn a_node_that_changes_its_mode_is_stopped_in_the_new_one() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let spin = played::spin(&line, 600.0);
-        // A position that would be a speed if it were taken for one.
+        // A position whose bytes are also a valid speed.
         let before = {
             let mut bus = line.lock();
             let node = &mut bus.nodes[0];
-            // A command on its way does not move it: the hold is to be told from the speed.
+            // A command in flight does not move it, so that the hold can be told from the speed.
             (node.mode, node.counts, node.follows) = (Mode::Position, HELD, false);
             bus.said.len()
         };
         let complaint = spin.complaint(1);
-        // Whichever it hears of first.
+        // Depending on which it detects first.
         let is_mode =
             ["node 1 has answered in position mode", "node 1 has changed to position mode"]
                 .iter()
                 .any(|start| complaint.starts_with(start));
         assert!(is_mode, "{complaint}");
-        assert!(complaint.ends_with("it was stopped and stands still"), "{complaint}");
+        assert!(complaint.ends_with("it was stopped and is at rest"), "{complaint}");
         let writes = line.said()[before..].to_vec();
         let writes: Vec<_> = writes.iter().filter(|said| matches!(said, Said::Write(..))).collect();
-        // One command may have been on its way when the switch was moved.
+        // One command may have been in flight when the switch was moved.
         let from = usize::from(matches!(writes[0], Said::Write(1, 2.0, _)));
         let holds = &writes[from..];
         let is_hold = |said: &&Said| matches!(said, Said::Write(1, _, to) if *to == HELD);
@@ -260,14 +262,14 @@ fn a_node_that_changes_its_mode_is_stopped_in_the_new_one() {
     });
 }
 
-/// Where the node is that changes its mode.
+/// Position of the node that changes its mode.
 const HELD: i32 = 8192 * 16_000;
 
 #[test]
 fn a_node_that_changes_its_mode_while_it_is_stopped_is_stopped_in_the_new_one() {
     undisturbed(|| {
         let line = played::bus(&[Node { follows: false, ..Node::velocity(1) }], |said, bus| {
-            // With the first stop that it hears.
+            // On the first stop that it receives.
             if matches!(said, Said::Write(1, 0.0, 0)) {
                 (bus.nodes[0].mode, bus.nodes[0].counts) = (Mode::Position, HELD);
             }
@@ -287,7 +289,7 @@ fn a_stop_with_the_mode_in_doubt_is_not_called_stopped() {
         let line = played::bus(&[Node::velocity(1)], |said, bus| {
             let node = &mut bus.nodes[0];
             match said {
-                // With the first stop its mode changes. It says so once, and then no more.
+                // On the first stop its mode changes. It reports that once and then falls silent.
                 Said::Write(1, 0.0, 0) => (node.mode, node.counts) = (Mode::Position, HELD),
                 Said::Read(1) if node.mode == Mode::Position => {
                     node.is_dumb =
@@ -298,13 +300,12 @@ fn a_stop_with_the_mode_in_doubt_is_not_called_stopped() {
             }
         });
         let spin = played::spin(&line, 0.5);
-        let expected =
-            "the mode of node 1 is in doubt, so that it cannot be stopped: it may be moving";
+        let expected = "the mode of node 1 is in doubt, so it cannot be stopped: it may be moving";
         assert_eq!(spin.complaint(1), expected);
     });
 }
 
-/// A note that a test makes among the requests.
+/// A marker that a test adds among the requests.
 const IS_HEARD: Said = Said::Read(99);
 
 #[test]
@@ -316,7 +317,8 @@ fn a_reader_that_does_not_read_keeps_no_stop_from_being_sent() {
         let args: Vec<_> = args.split(' ').collect();
         let mut spin =
             axle(&args).stdout(writer.try_clone().unwrap()).stderr(Stdio::piped()).spawn().unwrap();
-        // The tool's first line comes before the motor turns. Then nobody reads, and the pipe is full.
+        // The tool's first line comes before the motor turns. After that nothing reads, and the
+        // pipe is full.
         wait_until("2 rps", || speeds(&line.said()).contains(&2.0));
         let flood = thread::spawn(move || writer.write_all(&[b' '; 1 << 20]));
         thread::sleep(Duration::from_millis(1500));
@@ -328,14 +330,14 @@ fn a_reader_that_does_not_read_keeps_no_stop_from_being_sent() {
         wait_until("the stop", || speeds(&line.said()).contains(&0.0));
         let after = speeds(&line.said()[before..]);
         let stop = after.iter().position(|&rps| rps == 0.0).expect("a stop");
-        assert!(stop <= 25, "at once, not when the output has been given up: {after:?}");
+        assert!(stop <= 25, "at once, not after the output has timed out: {after:?}");
         let status = spin.wait().unwrap();
         let mut complaint = String::new();
         spin.stderr.take().unwrap().read_to_string(&mut complaint).unwrap();
         assert_eq!(status.code(), Some(1), "{complaint}");
-        assert_eq!(complaint, "axle: cannot write the output: its reader does not read\n");
+        assert_eq!(complaint, "axle: cannot write the output: the reader has stalled\n");
         drop(reader);
-        assert!(flood.join().unwrap().is_err(), "its reader has gone");
+        assert!(flood.join().unwrap().is_err(), "the reader is gone");
     });
 }
 
@@ -344,13 +346,10 @@ fn a_speed_beyond_the_limit_is_a_typing_error() {
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
         let cases = [
-            (
-                "--rps 200",
-                "--rps 200 is faster than --max-rps 20: give a larger limit if you mean it",
-            ),
+            ("--rps 200", "--rps 200 is faster than --max-rps 20: raise the limit if you mean it"),
             ("--rps -20.5", "--rps -20.5 is faster than --max-rps 20"),
             ("--rps 2 --max-rps 1.5", "--rps 2 is faster than --max-rps 1.5"),
-            ("--rps 2 --max-rps 0", "a limit is above 0"),
+            ("--rps 2 --max-rps 0", "a limit must be above 0"),
             ("--rps 2 --max-rps NaN", "NaN is not a finite number"),
         ];
         for (args, expected) in cases {

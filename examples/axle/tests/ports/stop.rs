@@ -1,4 +1,4 @@
-//! `axle stop`: whatever answers on a line is stopped.
+//! `axle stop`: stops whatever answers on a line.
 
 use std::{
     thread,
@@ -28,7 +28,7 @@ fn stop_finds_what_a_killed_program_has_left_turning_and_stops_it() {
         for args in ["--node 1 --rps 3", "--node 3 --revolutions 1000"] {
             let spin = Process::start(&format!("spin --port {port} {args} --for 600"));
             let first = spin.line("node");
-            assert!(first.contains("to "), "{first}");
+            assert!(first.contains("target "), "{first}");
             sim.line(if args.contains("rps") {
                 "command 3.00 rps"
             } else {
@@ -42,8 +42,8 @@ fn stop_finds_what_a_killed_program_has_left_turning_and_stops_it() {
             lines[1].starts_with("node 3: ") && lines[1].ends_with("turns, stopped and confirmed")
         );
         assert_eq!(lines[2..], ["silent: 2, 4, 5, 6, 7, 8"]);
-        sim.line("node 1: stands still");
-        sim.line("node 3: stands still");
+        sim.line("node 1: at rest");
+        sim.line("node 3: at rest");
     });
 }
 
@@ -84,13 +84,13 @@ fn stop_waits_until_the_motor_stands_still() {
 #[test]
 fn stop_fails_when_a_node_never_confirms() {
     undisturbed(|| {
-        // It answers one READ, and then only listens.
+        // It answers one READ, and then only receives.
         let line = played::bus(&[Node::velocity(1), Node::velocity(4)], |said, bus| {
             bus.nodes[0].is_dumb |= matches!(said, Said::Write(1, ..));
         });
         line.lock().nodes[1].rps = 2.0;
         let ended = Process::start(&format!("stop --port {}", line.path)).end();
-        let expected = "axle: node 1 was told to stop and has not confirmed it (nothing is heard): it \
+        let expected = "axle: node 1 was told to stop and has not confirmed it (nothing received): it \
                         may be moving";
         assert_eq!((ended.code, &*ended.stderr), (Some(1), &[expected.to_owned()][..]));
         assert_eq!(ended.stdout[0], "node 4: 0.00 rps, stopped and confirmed");
@@ -104,7 +104,7 @@ fn stop_fails_when_a_motor_turns_on() {
         let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
         let line = played::bus(&[node], |_, _| {});
         let stop = Process::start(&format!("stop --port {} --protocol ikeya --node 1", line.path));
-        let expected = "node 1 has confirmed the stop, but still moves after 3 s: 2.00 rps";
+        let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
         assert_eq!(stop.complaint(1), expected);
     });
 }
@@ -146,7 +146,7 @@ fn a_node_with_only_damaged_answers_is_not_called_stopped() {
     undisturbed(|| {
         let line = parrot(&[0x55, 0x01, 0x55, 0xAA, 0x00, 0xFF, 0x56, 0x03]);
         let stop = Process::start(&format!("stop --port {} --protocol ikeya --node 1", line.path));
-        let expected = "id 1 gives only damaged answers: what is there may be moving";
+        let expected = "id 1 gives only damaged answers: its motor may be moving";
         assert_eq!(stop.complaint(1), expected);
     });
 }
@@ -174,7 +174,7 @@ fn stop_finds_a_rover_with_and_without_its_protocol() {
             let line = played::rover(Some([70, -70, 70, -70]));
             let stop = Process::start(&format!("stop --port {}{protocol}", line.path));
             wait_until("the stops", || line.lock().commands.len() >= 8);
-            assert!(stop.lines().is_empty(), "its wheels turn: {:?}", stop.lines());
+            assert!(stop.lines().is_empty(), "its wheels are turning: {:?}", stop.lines());
             line.lock().wheels = None;
             let lines = stop.success();
             assert!(lines[0].contains("rpm    0    0    0    0") && lines[0].ends_with("stopped"));
@@ -195,7 +195,7 @@ fn a_rover_that_turns_on_the_spot_is_not_called_stopped() {
         let line = played::rover(Some([70, -70, 70, -70]));
         let stop = Process::start(&format!("stop --port {} --protocol ucp", line.path));
         let complaint = stop.complaint(1);
-        assert!(complaint.ends_with("and its wheels still turn"), "{complaint}");
+        assert!(complaint.ends_with("but its wheels are still turning"), "{complaint}");
     });
 }
 
@@ -234,7 +234,7 @@ fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
 fn a_stop_that_waits_sends_the_stop_again_to_a_node_that_is_back() {
     undisturbed(|| {
         let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |said, bus| {
-            // The first stop is not heard, and the node is away for a moment.
+            // The first stop is lost, and the node is offline for a moment.
             if matches!(said, Said::Write(1, 0.0, _)) && speeds_said(bus) == 1 {
                 (bus.nodes[0].is_dumb, bus.nodes[0].follows) = (true, false);
             }

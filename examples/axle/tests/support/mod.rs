@@ -1,4 +1,4 @@
-//! Runs the real binary, and builds captures whose events are known beforehand.
+//! Runs the real binary, and builds captures with known events.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 pub(crate) mod process;
@@ -39,13 +39,13 @@ pub(crate) fn run_in_pieces(args: &[&str], input: &[u8], piece: usize) -> Output
         .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     thread::scope(|scope| {
-        // The tool may refuse its arguments and be gone before it has read anything.
+        // The tool may refuse its arguments and exit before reading anything.
         scope.spawn(move || input.chunks(piece).try_for_each(|piece| stdin.write_all(piece)));
         child.wait_with_output().unwrap()
     })
 }
 
-/// Standard output of a run that went well and complained of nothing.
+/// Standard output of a run that succeeded without any message.
 pub(crate) fn stdout(output: Output) -> String {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!((output.status.code(), &*stderr), (Some(0), ""));
@@ -67,21 +67,21 @@ pub(crate) fn decode(args: &[&str], input: &[u8]) -> (Vec<Value>, Value) {
     events(&stdout(run(&args, input)))
 }
 
-/// A file in the build folder with these bytes.
+/// A file with these bytes in the build directory.
 pub(crate) fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
     fs::write(&path, bytes).unwrap();
     path
 }
 
-/// Bytes from hex digits; spaces do not matter.
+/// Bytes from hex digits; spaces are ignored.
 pub(crate) fn bytes(hex: &str) -> Vec<u8> {
     let digits: Vec<u8> =
         hex.chars().filter_map(|c| c.to_digit(16)).map(|digit| digit as u8).collect();
     digits.chunks(2).map(|pair| pair[0] << 4 | pair[1]).collect()
 }
 
-/// A UCP stream and the events that it must give, known from how it was built.
+/// A UCP stream and the events that it must give, known from its construction.
 #[derive(Default)]
 pub(crate) struct Capture {
     pub(crate) bytes: Vec<u8>,
@@ -101,7 +101,7 @@ impl Capture {
                     capture.gap("header", &noise);
                 }
                 1 => {
-                    // No FD in it but its own, so only its first byte is a wrong CRC.
+                    // It has no FD but its first byte, so only that byte is skipped as a wrong CRC.
                     let mut frame = Ping {}.frame(index & 0x7F).as_bytes().to_vec();
                     frame[6] ^= 0x01;
                     if frame[6] != 0xFD && frame[7] != 0xFD {
@@ -145,7 +145,7 @@ impl Capture {
         self.bytes.extend(frame);
     }
 
-    /// A gap, or more of the gap that the capture ends in.
+    /// Adds a gap, or extends the gap at the end of the capture.
     fn gap(&mut self, reason: &str, bytes: &[u8]) {
         let offset = self.bytes.len();
         match self.events.last_mut() {
@@ -160,7 +160,7 @@ impl Capture {
     }
 }
 
-/// Xorshift: the same numbers on every machine.
+/// Xorshift, with the same numbers on every machine.
 struct Random(u64);
 
 impl Random {

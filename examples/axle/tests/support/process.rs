@@ -1,4 +1,4 @@
-//! The tool as a process that goes on: its lines as they come, and signals by its id.
+//! The tool as a running process, with its lines as they come, and signals by process id.
 
 use std::{
     io::{BufRead, BufReader, Read},
@@ -10,7 +10,7 @@ use std::{
 
 use super::axle;
 
-/// Far more than anything here takes, even on a machine that is busy.
+/// Far longer than any step here takes, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A running tool; killed when it is dropped.
@@ -20,7 +20,7 @@ pub(crate) struct Process {
     stderr: Lines,
 }
 
-/// How a tool has ended.
+/// How a tool has exited.
 #[derive(Debug)]
 pub(crate) struct Ended {
     pub(crate) code: Option<i32>,
@@ -58,37 +58,37 @@ impl Process {
         self.stdout.all()
     }
 
-    /// Sends a signal by its name, such as INT, to this process alone.
+    /// Sends a signal by name, such as INT, to this process only.
     pub(crate) fn signal(&self, name: &str) {
         let command = format!("kill -{name} {}", self.child.id());
         assert!(Command::new("sh").args(["-c", &command]).status().unwrap().success());
     }
 
-    /// The state of the process as the system shows it, such as `T` for suspended.
+    /// The process state as reported by the system, such as `T` for suspended.
     pub(crate) fn state(&self) -> char {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap();
         stat.rsplit(") ").next().unwrap().chars().next().unwrap()
     }
 
-    /// The complaints so far.
+    /// The error lines so far.
     pub(crate) fn complaints(&self) -> Vec<String> {
         self.stderr.all()
     }
 
-    /// As by a power cut.
+    /// Kills it, as a power cut would.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
 
-    /// Waits until it ends by itself.
+    /// Waits until it exits by itself.
     pub(crate) fn end(mut self) -> Ended {
         let start = Instant::now();
         let status = loop {
             match self.child.try_wait().unwrap() {
                 Some(status) => break status,
                 None if start.elapsed() > PATIENCE => {
-                    panic!("does not end; lines: {:?}", self.lines());
+                    panic!("does not exit; lines: {:?}", self.lines());
                 }
                 None => thread::sleep(Duration::from_millis(5)),
             }
@@ -97,30 +97,30 @@ impl Process {
         Ended { code: status.code(), stdout, stderr }
     }
 
-    /// Waits until it ends well, having complained of nothing; gives its lines.
+    /// Waits until it exits successfully without error lines; returns its lines.
     pub(crate) fn success(self) -> Vec<String> {
         let ended = self.end();
         assert_eq!((ended.code, &*ended.stderr), (Some(0), &[][..]), "{ended:?}");
         ended.stdout
     }
 
-    /// Waits until it ends with `code`; gives its one line of complaint.
+    /// Waits until it exits with `code`; returns its single error line.
     pub(crate) fn complaint(self, code: i32) -> String {
         let ended = self.end();
         assert_eq!((ended.code, ended.stderr.len()), (Some(code), 1), "{ended:?}");
-        ended.stderr[0].strip_prefix("axle: ").expect("the tool's name in front").to_owned()
+        ended.stderr[0].strip_prefix("axle: ").expect("the tool's name first").to_owned()
     }
 }
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended long ago.
+        // It may have exited long ago.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Lines of a stream, read by a thread.
+/// Lines of a stream, read by a separate thread.
 struct Lines {
     shared: Arc<(Mutex<Vec<String>>, Condvar)>,
     reader: Option<JoinHandle<()>>,
@@ -153,7 +153,7 @@ impl Lines {
         lines[..count].to_vec()
     }
 
-    /// All lines, when the stream has ended.
+    /// All lines, once the stream has ended.
     fn finish(&mut self) -> Vec<String> {
         self.reader.take().unwrap().join().unwrap();
         self.all()

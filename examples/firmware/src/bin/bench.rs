@@ -1,8 +1,8 @@
 //! Instructions per call on a Cortex-M4, counted by QEMU: one line `name value goal` per figure.
 //!
 //! With `-icount shift=0` an instruction takes one nanosecond of virtual time, and SysTick runs at
-//! 168 MHz of it. A figure is the mean of many calls, without call and return: a call of a function
-//! that does nothing is subtracted. A wrong answer ends the program with status 1.
+//! 168 MHz of virtual time. A figure is the mean of many calls, without call and return: the cost
+//! of calling an empty function is subtracted. A wrong result ends the program with status 1.
 
 #![no_std]
 #![no_main]
@@ -17,7 +17,7 @@ use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_semihosting::{debug, hprintln};
 use panic_halt as _;
 
-/// Calls per measurement: 168 ticks are 1000 instructions, so that a call is known to 0.006.
+/// Calls per measurement: 168 ticks are 1000 instructions, so the resolution per call is 0.006.
 const CALLS: u32 = 1000;
 
 #[cortex_m_rt::entry]
@@ -42,7 +42,7 @@ fn main() -> ! {
     loop {}
 }
 
-/// Frames that lie in memory. The cost of one more frame, and that of a slice with just one.
+/// Frames in memory: the cost of one more frame, and of a slice with a single one.
 fn from_slices(answer: &[u8], report: &[u8]) {
     let mut many = [0; 33 * 44];
     let answers = repeat(answer, &mut many);
@@ -59,7 +59,8 @@ fn from_slices(answer: &[u8], report: &[u8]) {
     print("ucp44_slice_alone", one, 0);
 }
 
-/// Frames that come byte by byte, as from a receive interrupt: all calls for one frame.
+/// Frames that arrive byte by byte, as from a receive interrupt: the cost of all calls for one
+/// frame.
 fn byte_by_byte(answer: &[u8], report: &[u8]) {
     let mut decoder = Decoder::<ToMaster, 8>::new();
     let spent = of_bytes(work::ikeya_byte, &mut decoder, answer, 1.0f32.to_bits() + 2);
@@ -70,7 +71,7 @@ fn byte_by_byte(answer: &[u8], report: &[u8]) {
     print("push", of_pushes(), 0);
 }
 
-/// Instructions of a pushed byte that completes nothing, as most do.
+/// Instructions for a pushed byte that completes no frame, as most do not.
 fn of_pushes() -> u32 {
     const PUSHES: u32 = 52;
     let ticks_of = |work: fn(&mut Decoder<Ucp, 64>, u8) -> u32| {
@@ -147,19 +148,20 @@ fn ram() {
     print("ram_robot", size_of::<Robot>() as u32, 0);
 }
 
-/// A loop of known length: if QEMU counts something else, no figure is worth printing.
+/// A loop of known length: if QEMU counts otherwise, all figures are worthless.
 fn calibrate() {
     let start = SYST::get_current();
     cortex_m::asm::delay(black_box(100_000));
     let counted = instructions(ticks_since(start));
-    // `delay` makes one turn more than asked, of two instructions each, plus a few around them.
+    // `delay` runs one iteration more than requested, two instructions each, plus a few around
+    // them.
     if !(200_002..200_040).contains(&counted) {
         hprintln!("200002 instructions were counted as {}", counted);
         fail("run it with -icount shift=0");
     }
 }
 
-/// Instructions of one call of `work` that must give `expected`.
+/// Instructions for one call of `work`, which must return `expected`.
 fn of_slice(work: fn(&[u8]) -> u32, bytes: &[u8], expected: u32) -> u32 {
     fn nothing(bytes: &[u8]) -> u32 {
         bytes.len() as u32
@@ -176,7 +178,7 @@ fn of_slice(work: fn(&[u8]) -> u32, bytes: &[u8], expected: u32) -> u32 {
     instructions(ticks_of(work, expected) - empty) / CALLS
 }
 
-/// Instructions of handing one frame to `work`, whose answers must add up to `expected`.
+/// Instructions for passing one frame to `work`, whose results must add up to `expected`.
 fn of_bytes<D>(work: fn(&mut D, u8) -> u32, decoder: &mut D, frame: &[u8], expected: u32) -> u32 {
     let mut ticks_of = |work: fn(&mut D, u8) -> u32, expected| {
         let (work, frame) = (black_box(work), black_box(frame));
@@ -191,7 +193,7 @@ fn of_bytes<D>(work: fn(&mut D, u8) -> u32, decoder: &mut D, frame: &[u8], expec
     instructions(ticks_of(work, expected) - empty) / CALLS
 }
 
-/// SysTick counts down, in 24 bits: good for 99 million instructions.
+/// SysTick counts down in 24 bits, enough for 99 million instructions.
 fn ticks_since(start: u32) -> u32 {
     start.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF
 }
@@ -200,7 +202,7 @@ fn instructions(ticks: u32) -> u32 {
     (u64::from(ticks) * 1000 / 168) as u32
 }
 
-/// Fills the front of `room` with 33 copies of `frame`.
+/// Fills the start of `room` with 33 copies of `frame`.
 fn repeat<'r>(frame: &[u8], room: &'r mut [u8]) -> &'r [u8] {
     let filled = &mut room[..33 * frame.len()];
     filled.chunks_exact_mut(frame.len()).for_each(|chunk| chunk.copy_from_slice(frame));

@@ -1,9 +1,8 @@
-//! The master of a motor bus: finds the nodes, lets each do something of its own, says what happens.
+//! The master of a motor bus: finds the nodes, gives each its own command, prints events.
 //!
-//! A velocity node turns at half a revolution per second times its id; a position node goes as many
-//! revolutions on from where it was found as its id says. A node that comes back is commanded anew.
-//! On the text port: a line for each event that is no measurement, and a line per second and per
-//! received byte.
+//! A velocity node turns at half a revolution per second times its id; a position node moves by its
+//! id in revolutions from where it was found. A node that comes back is commanded again. Text port:
+//! one line for each event except measurements, and one line per second and per received byte.
 
 #![no_std]
 #![no_main]
@@ -19,11 +18,10 @@ use axlewire_firmware::{
 on_panic!();
 serve_usarts!();
 
-/// How often each node is read, and its set-point repeated.
+/// Period at which each node is read and its set-point repeated.
 const CYCLE: Duration = Duration::from_millis(10);
 
-/// How often a line of counts is written, and how long after a discovery that found nobody the next
-/// one begins.
+/// Interval between lines of counts, and between a discovery without nodes and the next one.
 const REPORT: Duration = Duration::from_millis(1000);
 
 #[cortex_m_rt::entry]
@@ -80,16 +78,16 @@ fn run(mut board: Board) {
     }
 }
 
-/// What the nodes do.
+/// State of the example program.
 #[derive(Default)]
 struct Program {
-    /// Nodes whose command the master has dropped: a board that comes back after an unknown while
-    /// does not move by itself, and is stopped first.
+    /// Nodes whose command the master has dropped: a board that returns after an unknown time must
+    /// not move by itself, and is stopped first.
     dropped: NodeSet,
 }
 
 impl Program {
-    /// Commands a node once it is there, or there again and stopped after it was abnormal.
+    /// Commands a node when it is found, or when it is back from abnormal and stopped.
     fn react(&mut self, master: &mut Master, event: MasterEvent, now: Instant) {
         let (node, is_new) = match event {
             MasterEvent::Discovered { node, .. } | MasterEvent::ModeChanged { node, .. } => {
@@ -104,7 +102,7 @@ impl Program {
         };
         if is_new {
             self.dropped.remove(node);
-            // Refused only where the node has gone again, and then it will come again, too.
+            // Refused only if the node is gone again; it will be commanded when it returns.
             let _ = command(master, node, now);
         }
     }
@@ -126,7 +124,7 @@ fn command(master: &mut Master, node: NodeId, now: Instant) -> Result<(), Comman
     }
 }
 
-/// Says what happens; `false` for measurements, which come a hundred times a second.
+/// Describes an event; `false` for measurements, which come a hundred times a second.
 fn describe(line: &mut Line, event: MasterEvent) -> bool {
     let (what, node, how) = match event {
         MasterEvent::Discovered { node, mode } => ("discovered", node, name_of(mode)),
@@ -167,7 +165,7 @@ const fn name_of(mode: Mode) -> &'static str {
     }
 }
 
-/// What every node measures, and the counts.
+/// Measurements of every node, and the counts.
 fn report(line: &mut Line, master: &Master, exchanges: u32) {
     let statistics = master.statistics();
     line.count("reads", statistics.reads)

@@ -1,7 +1,7 @@
-//! A slave of a motor bus with one motor, or rather the model of one.
+//! A slave of a motor bus with a simulated motor.
 //!
-//! Answers what it is asked, turns as it is told, and stops half a second after the last command. On
-//! the text port: a line per second, and one for each received byte.
+//! Answers requests, turns as commanded, and stops half a second after the last command. Text port:
+//! one line per second, and one for each received byte.
 
 #![no_std]
 #![no_main]
@@ -18,23 +18,23 @@ use axlewire_firmware::{
 on_panic!();
 serve_usarts!();
 
-/// Where a board has four DIP switches: `0000` is node 1 in velocity mode (ruling I2).
+/// Replaces a board's four DIP switches: `0000` is node 1 in velocity mode (ruling I2).
 const DIP: u8 = 0b0000;
 const READING: IdReading = IdReading::ValuePlusOne;
 
-/// The motor stands still after this long without a command. The protocol document has no such time;
-/// a motor that nobody talks to any more had better stop.
+/// Time without a command after which the motor is stopped. The protocol document defines no such
+/// time, but a motor without commands should stop.
 const WATCHDOG: Duration = Duration::from_millis(500);
 
-/// How often the motor's model moves on, and the answers with it.
+/// Step of the motor model; the answers change with it.
 const STEP: Duration = Duration::from_millis(5);
 
-/// How often a line is written.
+/// Interval between lines of text.
 const REPORT: Duration = Duration::from_millis(1000);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    // The DIP constant is good, and the board is taken once.
+    // The DIP constant is valid, and the board is taken only once.
     if let (Some(board), Ok(dip)) = (Board::take(ikeya::BAUD), DipSwitch::from_bits(DIP))
         && let Ok(node) = dip.node_id(READING)
     {
@@ -49,8 +49,8 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(WATCHDOG);
     config.idle = board.patience(config.idle);
-    // A request may be found when the wait for the rest of a false packet is over: five such waits, as
-    // on a line of 500 kbit/s.
+    // A request may only be found after waiting for the rest of a false packet. Allow five such
+    // waits, as on a 500 kbit/s line.
     config.answer_within = config.answer_within.max(config.idle.saturating_mul(5));
     let mut motor = Motor::new();
     let mut slave: Slave = Slave::new(node, mode, config, Instant::from_micros(0));
@@ -60,8 +60,8 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
     let mut driver = Driver::new(slave, port, board.clock);
     let (mut report_at, mut stops) = (last, 0u32);
     loop {
-        // Answers are sent in here, from the wake-up on: nothing else stands in front of them.
-        // Neither the port nor the pin can fail.
+        // Answers are sent in here, right after wake-up and before anything else. Neither the port
+        // nor the pin can fail.
         let until = last + STEP;
         let _ = driver.run_until(until, |_, event, _| {
             if event == ikeya::slave::SlaveEvent::Watchdog {
@@ -81,7 +81,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
             let mut line = Line::new("slave");
             report(&mut line, slave, &motor, stops);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
-            // A reader who asks faster than lines can be sent gets fewer.
+            // Requests that come faster than lines can be sent are dropped.
             board.text.try_send(line.end());
             if !asked {
                 report_at = now + REPORT;
@@ -90,7 +90,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
     }
 }
 
-/// Everything that a test or a curious user wants to know.
+/// All values that a test or a user may want to see.
 fn report(line: &mut Line, slave: &Slave, motor: &Motor, stops: u32) {
     let SlaveStatistics { reads, writes, refused, foreign, replies, overtaken, expired, .. } =
         *slave.statistics();

@@ -1,4 +1,4 @@
-//! The checksum of any length.
+//! The checksum over any length.
 
 #![no_std]
 #![no_main]

@@ -1,4 +1,4 @@
-//! The program that all others are compared with.
+//! The empty program, the baseline for all others.
 
 #![no_std]
 #![no_main]

@@ -1,8 +1,8 @@
-//! Checks what QEMU's USART never does: overruns, framing errors, noise, a queue that runs full, and
-//! a last byte that takes its time. Ends with status 0, or says what is wrong.
+//! Checks cases that QEMU's USART never produces: overruns, framing errors, noise, a full queue,
+//! and a slow last byte. Exits with status 0, or prints the failed check.
 //!
-//! The driver of [`uart`](axlewire_firmware::uart) works on a register block in RAM here; SysTick is
-//! the hardware behind it. The mark on the stack is checked as well.
+//! The driver of [`uart`](axlewire_firmware::uart) here works on a register block in RAM, with
+//! SysTick playing the hardware. The stack measurement is checked as well.
 
 #![no_std]
 #![no_main]
@@ -36,14 +36,14 @@ const RXNE: u16 = 1 << 5;
 const TC: u16 = 1 << 6;
 const TXE: u16 = 1 << 7;
 
-/// SysTicks from the last byte that was fetched until its stop bit is out.
+/// SysTicks from fetching the last byte until its stop bit is out.
 const SHIFT_TICKS: u32 = 20;
 
 /// Registers in RAM.
 #[derive(Clone, Copy)]
 struct Registers(&'static RegisterBlock);
 
-// SAFETY: one thread and two interrupts of the same priority share them, by volatile accesses.
+// SAFETY: one thread and two interrupts of the same priority share them through volatile accesses.
 unsafe impl Send for Registers {}
 
 impl Deref for Registers {
@@ -56,7 +56,7 @@ impl Deref for Registers {
 
 static CHANNEL: Channel<Registers> = Channel::new(Interrupt::USART6);
 
-/// Where the registers are, for the interrupt that plays the hardware.
+/// Address of the registers, for the interrupt that plays the hardware.
 static REGISTERS: AtomicU32 = AtomicU32::new(0);
 
 /// SysTicks left until the data register and the shift register are empty; 0 when they are.
@@ -71,11 +71,12 @@ fn main() -> ! {
 }
 
 fn check_all() -> Option<()> {
-    // First: what has been in use already leaves no new mark.
+    // First, because stack that has already been in use leaves no new mark.
     the_stack_leaves_its_mark();
     let words = cortex_m::singleton!(: [u32; 16] = [0; 16])?;
     REGISTERS.store(ptr::from_mut(words).expose_provenance() as u32, Relaxed);
-    // SAFETY: the block is seven registers long, has the alignment of one, and any bits will do.
+    // SAFETY: the block is seven registers long, has the alignment of one, and any bit pattern is
+    // valid.
     let registers = Registers(unsafe { &*ptr::from_mut(words).cast() });
     let queues = [
         cortex_m::singleton!(: Queue = Queue::new())?,
@@ -107,7 +108,7 @@ fn received_bytes_and_what_went_wrong(registers: Registers, port: &mut Port<Regi
     arrive(registers, b'a', RXNE);
     expect("a good byte", port.poll_byte() == Some(b'a') && counts() == [0, 0, 0]);
     arrive(registers, b'b', RXNE | ORE);
-    expect("an overrun behind a byte", port.poll_byte() == Some(b'b') && counts() == [1, 0, 0]);
+    expect("an overrun after a byte", port.poll_byte() == Some(b'b') && counts() == [1, 0, 0]);
     arrive(registers, b'c', ORE);
     expect("an overrun without a byte", port.poll_byte().is_none() && counts() == [2, 0, 0]);
     arrive(registers, b'd', RXNE | FE);
@@ -132,10 +133,10 @@ fn the_counts_are_told() {
     expect("the line", line.losses(&CHANNEL).end() == b"check overruns 2 lost 4 damaged 2\r\n");
 }
 
-/// The driver-enable pin: it must not go off before the last stop bit is out.
+/// The driver-enable pin, which must not go off before the last stop bit is out.
 struct Pin;
 
-/// How often the pin went on and off, and how often it went off too early.
+/// Number of times the pin switched, and number of times it went off too early.
 static SWITCHES: AtomicU32 = AtomicU32::new(0);
 static EARLY: AtomicU32 = AtomicU32::new(0);
 
@@ -172,18 +173,18 @@ fn the_pin_stays_on_until_the_last_stop_bit(
     core.SYST.clear_current();
     core.SYST.enable_interrupt();
     core.SYST.enable_counter();
-    // SAFETY: there is no critical section by priority that this could break.
+    // SAFETY: there is no critical section based on priority that this could break.
     unsafe { NVIC::unmask(Interrupt::USART6) };
     let Ok(mut port) = Rs485::new(port, Pin);
     for frame in [&[1u8; 4][..], &[2; 8], &[3; 44]] {
         let before = SWITCHES.load(Relaxed);
-        // The data register is full, and stays so until the first tick.
+        // The data register is full, and remains so until the first tick.
         // SAFETY: RAM.
         unsafe { registers.sr().write(|w| w.bits(0)) };
         SHIFTING.store(SHIFT_TICKS, Relaxed);
         expect("a frame is queued", port.write(frame) == Ok(frame.len()));
-        expect("nothing has left", SHIFTING.load(Relaxed) > 0);
-        // A master talks over the answer, and its bytes are damaged and overrun each other.
+        expect("nothing has been sent", SHIFTING.load(Relaxed) > 0);
+        // A master talks over the answer: its bytes are damaged and overrun each other.
         arrive(registers, b'x', RXNE | ORE | FE);
         expect("flushed", port.flush() == Ok(()));
         expect("flush waits for the stop bit", SHIFTING.load(Relaxed) == 0);
@@ -194,7 +195,7 @@ fn the_pin_stays_on_until_the_last_stop_bit(
     Some(())
 }
 
-/// The hardware: empties the data register half way, and the shift register at the end.
+/// Plays the hardware: empties the data register halfway, and the shift register at the end.
 #[cortex_m_rt::exception]
 fn SysTick() {
     let left = SHIFTING.load(Relaxed);
@@ -208,7 +209,7 @@ fn SysTick() {
         _ => 0,
     };
     let register = ptr::with_exposed_provenance_mut::<u16>(REGISTERS.load(Relaxed) as usize);
-    // SAFETY: the first register, in RAM that stays.
+    // SAFETY: the first register, in static RAM.
     unsafe { register.write_volatile(status) };
     NVIC::pend(Interrupt::USART6);
 }

@@ -1,7 +1,7 @@
-//! The robot's end of a rover link, with the model of a rover.
+//! The robot side of a rover link, with a simulated rover.
 //!
-//! Answers pings, drives as it is told, stops 500 ms after the last command, reports 50 times a second,
-//! calibrates, lights its lamp, and refuses to be updated. On the text port: a line per second, and
+//! Answers pings, drives as commanded, stops 500 ms after the last command, reports 50 times a
+//! second, calibrates, switches its lamp, and refuses updates. Text port: one line per second, and
 //! one for each received byte.
 
 #![no_std]
@@ -21,13 +21,13 @@ use embedded_hal::digital::OutputPin;
 on_panic!();
 serve_usarts!();
 
-/// How often the rover's model moves on, and its telemetry with it.
+/// Step of the rover model; the telemetry changes with it.
 const STEP: Duration = Duration::from_millis(10);
 
-/// How often a line is written.
+/// Interval between lines of text.
 const REPORT: Duration = Duration::from_millis(1000);
 
-/// What a calibration of this robot finds: a model has no real biases.
+/// Results of a calibration; the model has no real biases.
 const ACC_BIAS: [i16; 3] = [12, -7, 3];
 const GYRO_BIAS: [i16; 3] = [-2, 4, 1];
 const MAG_BIAS: [i16; 3] = [150, -80, 25];
@@ -52,9 +52,9 @@ fn run(mut board: Board) {
     let mut shown = Shown::default();
     driver.role_mut().set_telemetry(&rover.telemetry(), last);
     loop {
-        // Commands act within a step; what the host asks for is answered in here, at once. The port
-        // cannot fail. A report is 44 bytes and takes 4 ms to send: what comes in meanwhile is
-        // received by the interrupt.
+        // Commands act within a step; requests of the host are answered in here, at once. The port
+        // cannot fail. A report is 44 bytes and takes 4 ms to send; the interrupt receives bytes
+        // meanwhile.
         let until = last + STEP;
         while let Ok(Some(event)) = driver.next_event(until) {
             let now = driver.now();
@@ -78,7 +78,7 @@ fn run(mut board: Board) {
             let mut line = Line::new("robot");
             report(&mut line, robot, &rover, &shown, now);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
-            // A reader who asks faster than lines can be sent gets fewer.
+            // Requests that come faster than lines can be sent are dropped.
             board.text.try_send(line.end());
             if !asked {
                 report_at = now + REPORT;
@@ -87,7 +87,7 @@ fn run(mut board: Board) {
     }
 }
 
-/// What the host has asked for besides driving.
+/// Requests of the host other than driving.
 #[derive(Default)]
 struct Shown {
     network: u32,
@@ -110,7 +110,7 @@ impl Shown {
             }
             RobotEvent::UpdateRequested { by, .. } => {
                 count(&mut self.updates_refused);
-                // This firmware has no boot loader. A motor command that asks gets no answer.
+                // This firmware has no boot loader. A request by motor command gets no answer.
                 if by == UpdateSource::Request {
                     robot.answer_update(OtaStatus::Forbidden, now);
                 }
@@ -122,7 +122,7 @@ impl Shown {
     }
 }
 
-/// Everything that a test or a curious user wants to know.
+/// All values that a test or a user may want to see.
 fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Instant) {
     let (command, (left, right)) = (robot.command(now), rover.rpm());
     let RobotStatistics {

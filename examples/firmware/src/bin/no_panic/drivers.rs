@@ -1,5 +1,5 @@
-//! Drivers, the driver-enable pin, frame readers and writers: over a port and a pin that may fail at
-//! any call, and a port that may say that it has moved more bytes than there were.
+//! Drivers, the driver-enable pin, frame readers and writers, over a port and a pin that may fail
+//! at any call, and a port that may report more bytes than requested.
 
 use axlewire::{drive::{Driver, Rs485}, endpoint::Endpoint, ikeya::{self, board::{Board, OneMotor, ThreeMotors}, master::{MasterConfig, NodeSet}, slave::SlaveConfig, Master, Mode, NodeId, Position, Rps, Slave}, io::{FrameReader, FrameWriter}, stream::Framing, time::Instant, ucp::{host::{HostConfig, MemoryStore}, message::CalibrationKind, robot::RobotConfig, Host, RawFrame, Robot, Ucp}};
 use embedded_hal::{
@@ -23,7 +23,7 @@ pub fn all() {
     writer();
 }
 
-/// A port that does anything.
+/// A port with arbitrary behaviour.
 struct Port;
 
 impl ErrorType for Port {
@@ -79,7 +79,7 @@ impl DelayNs for Delay {
     }
 }
 
-/// What every driver does.
+/// Calls common to all drivers.
 fn turn<R: Endpoint>(driver: &mut Driver<R, Port, fn() -> Instant>) {
     match any(0) {
         0 => keep(driver.service()),

@@ -1,9 +1,9 @@
-//! Calls everything in the crate with values that the compiler knows nothing about, and links only if
-//! no panic can be reached: see `on_panic!` and `no_panic.sh`. It is never run.
+//! Calls everything in the crate with values unknown to the compiler, and links only if no panic is
+//! reachable: see `on_panic!` and `no_panic.sh`. It is never run.
 //!
-//! Objects are opaque as well, not only arguments: what is proved holds in any state, even in one
-//! that cannot come about. Left out are `Debug` and `Display`, whose panics are those of `core::fmt`,
-//! and the async calls.
+//! Objects are opaque too, not only arguments: the proof holds in any state, even an impossible
+//! one. `Debug` and `Display`, whose panics are those of `core::fmt`, and the async calls are left
+//! out.
 
 #![no_std]
 #![no_main]
@@ -21,7 +21,7 @@ axlewire_firmware::on_panic!();
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    // The self test of the check: an index that may be out of bounds.
+    // For the self-test of the check: an index that may be out of bounds.
     #[cfg(feature = "planted-panic")]
     keep(input()[any(0)]);
 
@@ -34,7 +34,7 @@ fn main() -> ! {
     }
 }
 
-/// A value of this type: the compiler has to expect any.
+/// A value of this type that the compiler cannot predict.
 fn any<T>(value: T) -> T {
     black_box(value)
 }
@@ -44,17 +44,17 @@ fn keep<T>(value: T) {
     black_box(value);
 }
 
-/// Bytes, any, and any number of them.
+/// Any number of arbitrary bytes.
 fn input() -> &'static [u8] {
     any(&[])
 }
 
-/// Room for any number of bytes, none included.
+/// Room for any number of bytes, including zero.
 fn room(buffer: &mut [u8; 300]) -> &mut [u8] {
     buffer.get_mut(..any(0)).unwrap_or_default()
 }
 
-/// A time, before or after any other.
+/// An arbitrary time, before or after any other.
 fn now() -> Instant {
     Instant::from_micros(any(0))
 }

@@ -1,4 +1,4 @@
-//! The four roles, bare: called in any order, with any settings.
+//! The four roles without drivers, called in any order, with any settings.
 
 use axlewire::{endpoint::{Endpoint, Unsent}, ikeya::{board::{Board, OneMotor, ThreeMotors}, master::MasterConfig, slave::{DipSwitch, IdReading, SlaveConfig}, Master, Mode, NodeId, Position, Rps, Slave, Target}, ucp::{host::{BiasStore, HostConfig, MemoryStore, NoStore}, message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus}, robot::RobotConfig, Host, MotorControl, Robot, Telemetry}};
 
@@ -112,7 +112,7 @@ fn robot() {
     }
 }
 
-/// What every role does.
+/// Calls common to all roles.
 fn turn(role: &mut impl Endpoint) {
     match any(0) {
         0 => role.handle_input(input(), now()),

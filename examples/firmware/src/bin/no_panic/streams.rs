@@ -62,7 +62,7 @@ fn event<F: Framing>(event: Event<F::Frame<'_>>) {
     }
 }
 
-/// As a port writes, up to any length.
+/// Writes as a port does, up to any length.
 fn fill(spare: &mut [u8]) {
     let mut buffer = [0; 300];
     for (slot, byte) in spare.iter_mut().zip(room(&mut buffer)) {
