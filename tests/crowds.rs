@@ -12,7 +12,6 @@ mod oracle;
 
 use axlewire::{
     ikeya::{BothDirections, ToMaster, ToSlave, three},
-    stream::{Framing, Reason, Swept, Verdict},
     ucp::Ucp,
 };
 use checked_line::{Line, Op};
@@ -40,21 +39,7 @@ macro_rules! properties {
                 check_every_cut::<F, $max_len>();
             }
 
-            #[cfg(target_pointer_width = "64")]
-            #[test]
-            fn a_crowd_is_swept_up_to_its_last_places() {
-                let crowd = crowd(F::RULES, 200);
-                let swept = <F as Framing>::sweep(&crowd).len;
-                assert!((150..200).contains(&swept), "{swept}");
-                check_sweep::<F>(&crowd);
-            }
-
             proptest! {
-                #[test]
-                fn a_sweep_refuses_what_single_looks_refuse(stream in stream(F::RULES)) {
-                    (0..stream.len().min(12)).for_each(|at| check_sweep::<F>(&stream[at..]));
-                }
-
                 #[test]
                 fn a_crowd_gives_what_the_oracle_says(stream in stream(F::RULES)) {
                     check_slice::<F>(&stream);
@@ -155,21 +140,6 @@ fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
 fn check_slice<F: Known>(stream: &[u8]) {
     checked_line::check_slice::<F>(stream);
     checked_line::check_finished_slice::<F>(stream);
-}
-
-/// What a sweep refuses is what `judge` refuses at each place, and for the same reasons.
-fn check_sweep<F: Framing>(bytes: &[u8]) {
-    let swept = F::sweep(bytes);
-    let mut told = Swept { len: swept.len, ..Swept::default() };
-    for at in 0..swept.len {
-        match F::judge(&bytes[at..]) {
-            Verdict::Reject { reason: Reason::Crc, more: 0 } => told.crc += 1,
-            Verdict::Reject { reason: Reason::Length, more: 0 } => told.length += 1,
-            Verdict::Reject { reason: Reason::Header, .. } => {}
-            verdict => panic!("{verdict:?} at {at} of {}", swept.len),
-        }
-    }
-    assert_eq!(swept, told);
 }
 
 fn check_every_place<F: Known>() {

@@ -19,9 +19,7 @@ use axlewire::{
         self, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
         three,
     },
-    stream::{
-        Counters, Decoder, Event, Frames, Framing, GoodRun, Portable, Reason, Swept, Verdict,
-    },
+    stream::{Counters, Decoder, Event, Portable, Reason},
     ucp::{self, Body, Ucp},
 };
 use known_framings::Known;
@@ -32,26 +30,6 @@ fn check<F: Known>(stream: &[u8]) {
     checked_line::check_slice::<Portable<F>>(stream);
     checked_line::check_slice::<F>(stream);
     checked_line::check_finished_slice::<F>(stream);
-    check_run::<F>(stream, false);
-    check_run::<F>(stream, true);
-}
-
-/// A run is what `judge` finds one by one, on a processor without AVX2 as well, up to the first
-/// frame that there is no view of.
-fn check_run<F: Framing>(stream: &[u8], wide: bool) {
-    let run = F::good_run(stream, wide);
-    let (mut frames, mut at) = (0, 0);
-    while at < run.len {
-        let len = if F::is_short(&stream[at..]) { F::MIN_LEN } else { F::MAX_LEN };
-        let verdict = F::judge(&stream[at..]);
-        if F::view(&stream[at..at + len]).is_none() {
-            assert!(matches!(verdict, Verdict::Reject { .. }), "no view of a frame at {at}");
-            return;
-        }
-        assert_eq!(verdict, Verdict::Frame { len }, "at {at}");
-        (frames, at) = (frames + 1, at + len);
-    }
-    assert_eq!((frames, at), (run.frames, run.len));
 }
 
 /// Every framing that has something in lanes, and one that has nothing.
@@ -183,7 +161,7 @@ fn false_lengths_are_counted_as_such() {
 }
 
 #[test]
-fn a_decoder_that_sweeps_gives_what_one_that_does_not_gives() {
+fn a_decoder_with_batches_gives_what_one_without_them_gives() {
     let noise = [0xAA, 0x55, 0x00, 0xBB, 0x12].repeat(100);
     let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
     for chunk in [1, 64, 200, 5000] {
@@ -211,51 +189,6 @@ fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
     (events, decoder.counters())
 }
 
-/// A framing whose runs and sweeps are made up.
-struct Liar<const LIE: u8>;
-
-impl<const LIE: u8> Framing for Liar<LIE> {
-    type Frame<'a> = &'a [u8];
-    const MIN_LEN: usize = 2;
-    const MAX_LEN: usize = 4;
-
-    fn judge(bytes: &[u8]) -> Verdict {
-        match bytes.len() {
-            0..4 => Verdict::Partial { need: 4 },
-            _ if LIE.is_multiple_of(2) => Verdict::Reject { reason: Reason::Crc, more: 0 },
-            _ => Verdict::Frame { len: 4 },
-        }
-    }
-
-    fn view(frame: &[u8]) -> Option<&[u8]> {
-        Some(frame)
-    }
-
-    fn good_run(bytes: &[u8], _wide: bool) -> GoodRun {
-        let (frames, len) = match LIE / 2 {
-            0 => (usize::MAX, bytes.len()),
-            1 => (10, bytes.len() + 1),
-            2 => (10, 0),
-            3 => (0, 10),
-            4 => (1000, bytes.len() / 2 + 1),
-            _ => (1000, usize::MAX),
-        };
-        GoodRun { frames, len }
-    }
-
-    fn is_short(bytes: &[u8]) -> bool {
-        bytes.len().is_multiple_of(3)
-    }
-
-    fn sweep(bytes: &[u8]) -> Swept {
-        match LIE / 2 {
-            0 => Swept { len: bytes.len() + 1, length: usize::MAX, crc: usize::MAX },
-            1 => Swept { len: 0, length: 1, crc: 1 },
-            _ => Swept { len: 3, length: 7, crc: 7 },
-        }
-    }
-}
-
 #[test]
 fn a_packet_that_begins_inside_another_one_is_none() {
     // The second begins in the middle of the first, whose CRC is part of its payload.
@@ -268,38 +201,6 @@ fn a_packet_that_begins_inside_another_one_is_none() {
             check_all(&[reads, responses(count), both.to_vec(), responses(70)].concat());
         }
     }
-}
-
-#[test]
-fn a_framing_that_lies_about_runs_hangs_nothing() {
-    fn feed<const LIE: u8>() {
-        for len in 0..100 {
-            let bytes = vec![LIE; len];
-            let mut frames = Frames::<Liar<LIE>>::new(&bytes);
-            let mut found = 0;
-            frames.each(|_| {
-                found += 1;
-                assert!(found <= len / 2, "lie {LIE} is told for ever");
-            });
-            assert!(frames.next().is_none());
-            let mut decoder = Decoder::<Liar<LIE>, 4>::new();
-            let mut input = &bytes[..];
-            let events = std::iter::from_fn(|| decoder.decode(&mut input).map(drop));
-            assert!(events.take(2 * len + 1).count() <= 2 * len, "lie {LIE} is told for ever");
-        }
-    }
-    feed::<0>();
-    feed::<1>();
-    feed::<2>();
-    feed::<3>();
-    feed::<4>();
-    feed::<5>();
-    feed::<6>();
-    feed::<7>();
-    feed::<8>();
-    feed::<9>();
-    feed::<10>();
-    feed::<11>();
 }
 
 /// Long streams of everything, long runs of good frames among them.

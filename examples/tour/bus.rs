@@ -4,8 +4,9 @@ use std::error::Error;
 
 use axlewire::{
     ikeya::{
-        Health, Master, MasterConfig, MasterEvent, Mode, NodeId, Position, Rps, Schedule, Slave,
-        SlaveConfig, Status,
+        Master, Mode, NodeId, Position, Rps, Slave, Status,
+        master::{Health, MasterConfig, MasterEvent, Schedule},
+        slave::SlaveConfig,
     },
     sim::{Direction, Faults, Line, Motor, MotorNode, Who},
     time::{Duration, Instant},
@@ -26,10 +27,10 @@ pub(crate) fn run() -> Result<(), Box<dyn Error>> {
         let mode = if node <= NodeId::N4 { Mode::Velocity } else { Mode::Position };
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(100));
-        let slave = Slave::new(node, mode, config);
+        let slave = Slave::new(node, mode, config, Instant::from_micros(0));
         let tail = bus.add(MotorNode::from_parts(slave, Motor::new()));
         // Firmware delay between a request and the start of its answer.
-        bus.driver_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
+        bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(50);
     }
     *bus.pair_mut(Direction::ToTails) = Faults::noise(BIT_ERRORS);
     *bus.pair_mut(Direction::ToHead) = Faults::noise(BIT_ERRORS);
@@ -125,8 +126,8 @@ fn table(bus: &Bus) {
             counts.replies,
             counts.timeouts,
             counts.crc_errors,
-            counts.latency_min().as_micros(),
-            counts.latency_max().as_micros(),
+            counts.latency.min().map_or(0, Duration::as_micros),
+            counts.latency.max().map_or(0, Duration::as_micros),
         );
     }
 }

@@ -6,8 +6,10 @@ use axlewire::{
     sim::{Direction, Faults, Line, RoverNode},
     time::{Duration, Instant},
     ucp::{
-        BAUD, CalibrationKind, Host, HostConfig, HostEvent, ImuBias, MemoryStore, MotorControl,
-        NetworkState, RobotConfig, RobotEvent,
+        BAUD, Host, MotorControl,
+        host::{HostConfig, HostEvent, MemoryStore},
+        message::{CalibrationKind, ImuBias, NetworkState},
+        robot::{RobotConfig, RobotEvent},
     },
 };
 
@@ -75,7 +77,7 @@ fn tell(link: &mut Link, booted: &mut bool) {
             RobotEvent::NetworkState(state) if !*booted => {
                 line(at, "robot", &format!("network lamp: {state:?}"))
             }
-            RobotEvent::WatchdogStop => line(at, "robot", "no valid command for 500 ms: stopping"),
+            RobotEvent::Watchdog => line(at, "robot", "no valid command for 500 ms: stopping"),
             RobotEvent::CalibrationEnd(_) => {
                 line(
                     at,

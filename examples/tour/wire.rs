@@ -202,7 +202,7 @@ fn build_ikeya() -> Result<(), EncodeError> {
 }
 
 fn build_ucp() -> Result<(), EncodeError> {
-    use ucp::{CalibrationKind::Imu, ErrorCode::Fine, NetworkState::Connected, OtaStatus};
+    use ucp::message::{CalibrationKind::Imu, ErrorCode::Fine, NetworkState::Connected, OtaStatus};
 
     let telemetry = Telemetry { battery_pct: 87, voltage_dv: 119, ..Telemetry::default() };
     let (imu, mag) =
@@ -236,7 +236,7 @@ fn build_ucp() -> Result<(), EncodeError> {
     show("biases", ucp::message::Biases::new(imu, mag).frame(6).as_bytes());
     show("OTA request", ucp::message::OtaRequest::start_firmware_update(39).frame(7).as_bytes());
     show("OTA ack", ucp::message::OtaAck::new(OtaStatus::Forbidden).frame(0).as_bytes());
-    if let Some(state) = ucp::message::SetNetworkState::new(Connected) {
+    if let Ok(state) = ucp::message::SetNetworkState::new(Connected) {
         show("network state", state.frame(8).as_bytes());
     }
     let mut buffer = [0; ucp::MAX_LEN];

@@ -1,4 +1,4 @@
-//! Any bytes at any time, and any calls: no role panics, spins, or forgets what it promised.
+//! Any bytes at any time, and any calls: no role panics, spins, or breaks its contract.
 //!
 //! The data is a list of ops, one byte each with its arguments behind it; see the `match` in each
 //! role's loop.
@@ -20,8 +20,8 @@ pub use master::ikeya_master;
 pub use rover::{ucp_host, ucp_robot};
 pub use slave::ikeya_slave;
 
-/// Polls a role as its contract says, and checks what holds for every role. Returns the packets
-/// that it has sent.
+/// Polls a role as its contract requires, and checks the properties common to all roles. Returns
+/// the packets that it has sent.
 fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)) -> Vec<Vec<u8>> {
     if role.poll_timeout().is_some_and(|at| now >= at) {
         role.handle_timeout(now);
@@ -30,15 +30,15 @@ fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)
     while let Some(event) = role.poll_event() {
         told(event);
         events += 1;
-        assert!(events <= 64, "events without end");
+        assert!(events <= 64, "endless events");
     }
     let mut sent = Vec::new();
     while let Some(bytes) = role.poll_transmit(now) {
-        assert!(!bytes.is_empty(), "a packet of no bytes");
+        assert!(!bytes.is_empty(), "an empty packet");
         sent.push(bytes.to_vec());
-        assert!(sent.len() <= 64, "packets without end");
+        assert!(sent.len() <= 64, "endless packets");
     }
-    // A call too many does nothing.
+    // Spurious calls are harmless.
     role.handle_input(&[], now);
     assert!(role.poll_transmit(now).is_none());
     let next = role.poll_timeout();
@@ -46,7 +46,7 @@ fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)
     sent
 }
 
-/// The time: anywhere, also just before it wraps, and then forward only.
+/// The time: starts anywhere, including just before it wraps, and then only advances.
 struct Clock(Instant);
 
 impl Clock {
@@ -55,7 +55,7 @@ impl Clock {
         Ok(Self(Instant::from_micros(*u.choose(&begin)?)))
     }
 
-    /// A little time, or a lot.
+    /// A short or a long time.
     fn pass(&mut self, u: &mut Unstructured<'_>) -> Result<Instant> {
         let (step, scale): (u8, u8) = u.arbitrary()?;
         self.0 += Duration::from_micros(u32::from(step) << (scale % 16));
@@ -63,7 +63,7 @@ impl Clock {
     }
 }
 
-/// Up to 20 bytes as they come.
+/// Up to 20 raw bytes.
 fn raw<'a>(u: &mut Unstructured<'a>) -> Result<&'a [u8]> {
     let len = u.arbitrary_len::<u8>()?.min(20);
     u.bytes(len)

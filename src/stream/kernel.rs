@@ -58,3 +58,132 @@ pub struct Accepted {
     /// All of them together, bytes.
     pub(crate) len: usize,
 }
+
+#[cfg(all(test, feature = "std"))]
+pub(crate) mod tests {
+    use alloc::vec;
+
+    use super::*;
+    use crate::stream::{Batch, Decoder, Frames, Framing, Reason, Verdict};
+
+    /// A batch says what `judge` says one by one, with wide registers and with others.
+    pub(crate) fn check_batches<F: Framing>(bytes: &[u8]) {
+        check_rejected::<F>(bytes);
+        check_accepted::<F>(bytes, false);
+        check_accepted::<F>(bytes, true);
+    }
+
+    /// What a batch rejects is what `judge` rejects at each place, and for the same reasons.
+    fn check_rejected<F: Framing>(bytes: &[u8]) {
+        let rejected = F::Batch::reject_batch(bytes);
+        let mut told = Rejected { len: rejected.len, ..Rejected::default() };
+        for at in 0..rejected.len {
+            match F::judge(&bytes[at..]) {
+                Verdict::Reject { reason: Reason::Crc, more: 0 } => told.crc += 1,
+                Verdict::Reject { reason: Reason::Length, more: 0 } => told.length += 1,
+                Verdict::Reject { reason: Reason::Header, .. } => {}
+                verdict => panic!("{verdict:?} at {at} of {}", rejected.len),
+            }
+        }
+        assert_eq!(rejected, told);
+    }
+
+    /// What a batch accepts is what `judge` finds one by one, up to the first frame without a view.
+    fn check_accepted<F: Framing>(bytes: &[u8], is_wide: bool) {
+        let batch = F::Batch::accept_batch(bytes, is_wide);
+        let (mut frames, mut at) = (0, 0);
+        while at < batch.len {
+            let len = if F::Batch::is_short(&bytes[at..]) { F::MIN_LEN } else { F::MAX_LEN };
+            let verdict = F::judge(&bytes[at..]);
+            if F::view(&bytes[at..at + len]).is_none() {
+                assert!(matches!(verdict, Verdict::Reject { .. }), "no view of a frame at {at}");
+                return;
+            }
+            assert_eq!(verdict, Verdict::Frame { len }, "at {at}");
+            (frames, at) = (frames + 1, at + len);
+        }
+        assert_eq!((frames, at), (batch.frames, batch.len));
+    }
+
+    /// A framing whose batches are made up.
+    struct Liar<const LIE: u8>;
+
+    impl<const LIE: u8> Framing for Liar<LIE> {
+        type Frame<'a> = &'a [u8];
+        type Batch = Self;
+        const MIN_LEN: usize = 2;
+        const MAX_LEN: usize = 4;
+
+        fn judge(bytes: &[u8]) -> Verdict {
+            match bytes.len() {
+                0..4 => Verdict::Partial { need: 4 },
+                _ if LIE.is_multiple_of(2) => Verdict::Reject { reason: Reason::Crc, more: 0 },
+                _ => Verdict::Frame { len: 4 },
+            }
+        }
+
+        fn view(frame: &[u8]) -> Option<&[u8]> {
+            Some(frame)
+        }
+    }
+
+    impl<const LIE: u8> Batch for Liar<LIE> {}
+
+    impl<const LIE: u8> Kernel for Liar<LIE> {
+        fn accept_batch(bytes: &[u8], _is_wide: bool) -> Accepted {
+            let (frames, len) = match LIE / 2 {
+                0 => (usize::MAX, bytes.len()),
+                1 => (10, bytes.len() + 1),
+                2 => (10, 0),
+                3 => (0, 10),
+                4 => (1000, bytes.len() / 2 + 1),
+                _ => (1000, usize::MAX),
+            };
+            Accepted { frames, len }
+        }
+
+        fn is_short(bytes: &[u8]) -> bool {
+            bytes.len().is_multiple_of(3)
+        }
+
+        fn reject_batch(bytes: &[u8]) -> Rejected {
+            match LIE / 2 {
+                0 => Rejected { len: bytes.len() + 1, length: usize::MAX, crc: usize::MAX },
+                1 => Rejected { len: 0, length: 1, crc: 1 },
+                _ => Rejected { len: 3, length: 7, crc: 7 },
+            }
+        }
+    }
+
+    #[test]
+    fn a_batch_that_lies_hangs_nothing() {
+        fn feed<const LIE: u8>() {
+            for len in 0..100 {
+                let bytes = vec![LIE; len];
+                let mut frames = Frames::<Liar<LIE>>::new(&bytes);
+                let mut found = 0;
+                frames.each(|_| {
+                    found += 1;
+                    assert!(found <= len / 2, "lie {LIE} is told for ever");
+                });
+                assert!(frames.next().is_none());
+                let mut decoder = Decoder::<Liar<LIE>, 4>::new();
+                let mut input = &bytes[..];
+                let events = core::iter::from_fn(|| decoder.decode(&mut input).map(drop));
+                assert!(events.take(2 * len + 1).count() <= 2 * len, "lie {LIE} is told for ever");
+            }
+        }
+        feed::<0>();
+        feed::<1>();
+        feed::<2>();
+        feed::<3>();
+        feed::<4>();
+        feed::<5>();
+        feed::<6>();
+        feed::<7>();
+        feed::<8>();
+        feed::<9>();
+        feed::<10>();
+        feed::<11>();
+    }
+}

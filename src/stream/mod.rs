@@ -44,6 +44,8 @@ pub(crate) use decoder::Held;
 pub use event::Event;
 pub use frames::Frames;
 pub use framing::{Batch, Framing, OneByOne, Verdict};
+#[cfg(all(test, feature = "std", any(feature = "ikeya", feature = "ucp")))]
+pub(crate) use kernel::tests::check_batches;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) use kernel::{Accepted, Kernel, Rejected};
 pub use ledger::{Counters, Gap, Reason};

@@ -72,3 +72,50 @@ fn first(flags: [u8; PLACES]) -> usize {
     };
     zeros as usize / 8
 }
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use alloc::vec::Vec;
+
+    use proptest::{collection::vec, prelude::*, sample::select};
+
+    use super::{SyncBatch, reject_batch};
+    use crate::{
+        stream::{Kernel, check_batches},
+        ucp::Ucp,
+    };
+
+    /// Dense syncs with lengths of all sorts, whole frames, and thinner places.
+    fn stream() -> impl Strategy<Value = Vec<u8>> {
+        let half = select([0xFD, 0xFF].as_slice());
+        let byte = select([0xFD, 0xFF, 0xFD, 0xFF, 0, 1, 3, 4, 40, 60, 61, 252].as_slice());
+        let ping = Just([0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42].to_vec());
+        let piece = prop_oneof![
+            3 => vec(half, 0..60),
+            4 => vec(byte, 0..60),
+            1 => vec(any::<u8>(), 0..60),
+            2 => ping,
+        ];
+        vec(piece, 0..12).prop_map(|pieces| pieces.concat())
+    }
+
+    proptest! {
+        #[test]
+        fn a_batch_says_what_single_looks_say(stream in stream()) {
+            for at in 0..stream.len().min(12) {
+                check_batches::<Ucp>(&stream[at..]);
+                check_batches::<Ucp<4>>(&stream[at..]);
+                check_batches::<Ucp<252>>(&stream[at..]);
+            }
+        }
+    }
+
+    #[test]
+    fn dense_syncs_are_rejected_up_to_their_last_places() {
+        let dense = [0xFD, 0xFF].repeat(100);
+        let rejected = SyncBatch::<60>::reject_batch(&dense);
+        assert!((150..200).contains(&rejected.len), "{rejected:?}");
+        assert_eq!(rejected, reject_batch::<60>(&dense));
+        check_batches::<Ucp>(&dense);
+    }
+}

@@ -135,7 +135,7 @@ fn a_set_point_that_was_given_up_is_not_completed_by_the_next_header() {
             slave.handle_timeout(now);
         }
         slave.handle_input(&[byte], now);
-        let is_given_up = slave.command() == Some(Target::Velocity(target));
+        let is_given_up = slave.command(now) == Some(Target::Velocity(target));
         assert!(!is_given_up, "it has heard a set-point that was given up");
     }
     assert!(slave.statistics().reads > 100, "it hears the READs");

@@ -69,7 +69,7 @@ fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
         Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
     slave.handle_input(FIVE_RPS().as_bytes(), now);
     slave.set_mode(Mode::Position);
-    assert_eq!(slave.command(), None);
+    assert_eq!(slave.command(now), None);
     assert_eq!(slave.poll_event(), None, "a position node is handed a speed");
 }
 
@@ -82,13 +82,13 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
         wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
     wire.receive(FIVE_RPS().as_bytes());
     slave.service().unwrap();
-    assert!(slave.role().command().is_some());
+    assert!(slave.role().command(wire.now()).is_some());
     wire.pass(1000);
     wire.receive(FIVE_RPS().as_bytes());
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     wire.pass(10_000_000);
     slave.service().unwrap();
-    assert_eq!(slave.role().command(), None, "it turns on a command of ten seconds ago");
+    assert_eq!(slave.role().command(wire.now()), None, "it turns on a command of ten seconds ago");
     assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
     let events: Vec<_> = std::iter::from_fn(|| slave.poll_event()).collect();
     assert_eq!(events, [SlaveEvent::Watchdog]);
@@ -121,7 +121,11 @@ fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
             false => slave.service(),
         }
         .unwrap();
-        assert_eq!(slave.role().command(), None, "it turns on a command of ten seconds ago");
+        assert_eq!(
+            slave.role().command(wire.now()),
+            None,
+            "it turns on a command of ten seconds ago"
+        );
         assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
         assert_eq!(slave.role().statistics().expired, 1);
         assert_eq!(slave.poll_event(), Some(SlaveEvent::Watchdog));
@@ -139,7 +143,11 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
     // What is told before the rest has been taken in does not count.
     let _ = event.unwrap();
     wire.block_on(slave.service_async()).unwrap();
-    assert_eq!(slave.role().command(), None, "it turns on a command of three seconds ago");
+    assert_eq!(
+        slave.role().command(wire.now()),
+        None,
+        "it turns on a command of three seconds ago"
+    );
     assert_eq!(wire.world().sent, [], "it answers a request of three seconds ago");
 }
 
@@ -190,5 +198,5 @@ fn a_command_that_a_held_up_slave_finds_half_arrived_is_not_lost() {
     wire.receive_in(60, &FIVE_RPS().as_bytes()[5..]);
     wire.pass(60);
     slave.service().unwrap();
-    assert!(slave.role().command().is_some(), "a WRITE is cut in two by the hold-up");
+    assert!(slave.role().command(wire.now()).is_some(), "a WRITE is cut in two by the hold-up");
 }

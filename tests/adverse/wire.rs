@@ -164,7 +164,12 @@ impl Wire {
         world.inbox.extend(bytes.iter().map(|&byte| (at_us, byte)));
     }
 
-    /// Lets time pass while nobody calls the driver.
+    /// The time of the world.
+    pub(crate) fn now(&self) -> Instant {
+        Instant::from_micros(self.world().now_us)
+    }
+
+    /// Lets time pass without a call of the driver.
     pub(crate) fn pass(&self, micros: u64) {
         self.world().now_us += micros;
     }

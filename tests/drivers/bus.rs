@@ -78,8 +78,14 @@ fn set_points_have_been_sent_when_the_call_returns_and_reach_the_right_node() {
         for _ in 0..50 {
             story.world.step(20);
         }
-        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(to)));
-        assert_eq!(story.five.borrow().role().command(), Some(Target::Position(at)));
+        assert_eq!(
+            story.two.borrow().role().command(story.world.now()),
+            Some(Target::Velocity(to))
+        );
+        assert_eq!(
+            story.five.borrow().role().command(story.world.now()),
+            Some(Target::Position(at))
+        );
     }
 }
 
@@ -136,9 +142,12 @@ fn stop_and_stop_all_have_been_confirmed_when_they_return() {
         for _ in 0..50 {
             story.world.step(20);
         }
-        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+        assert_eq!(
+            story.two.borrow().role().command(story.world.now()),
+            Some(Target::Velocity(Rps::ZERO))
+        );
         let held = Target::Position(Position::new(7, 1));
-        assert_eq!(story.five.borrow().role().command(), Some(held));
+        assert_eq!(story.five.borrow().role().command(story.world.now()), Some(held));
 
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
         if is_async {
@@ -149,7 +158,10 @@ fn stop_and_stop_all_have_been_confirmed_when_they_return() {
         for _ in 0..50 {
             story.world.step(20);
         }
-        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+        assert_eq!(
+            story.two.borrow().role().command(story.world.now()),
+            Some(Target::Velocity(Rps::ZERO))
+        );
     }
 }
 
@@ -288,7 +300,10 @@ fn a_port_that_vanishes_is_an_error_of_every_call() {
         for _ in 0..50 {
             world.step(20);
         }
-        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(Rps::ZERO)));
+        assert_eq!(
+            story.two.borrow().role().command(story.world.now()),
+            Some(Target::Velocity(Rps::ZERO))
+        );
     }
 }
 
@@ -331,7 +346,10 @@ fn a_dropped_read_or_command_made_again_ends_the_same() {
         world.block_on(bus.set_velocity_async(NodeId::N2, rps(4.0))).unwrap();
         let read = world.block_on(bus.read_async(NodeId::N5));
         assert_eq!(read, Ok(Status::Position(Position::new(7, 1))), "after {polls} polls");
-        assert_eq!(story.two.borrow().role().command(), Some(Target::Velocity(rps(4.0))));
+        assert_eq!(
+            story.two.borrow().role().command(story.world.now()),
+            Some(Target::Velocity(rps(4.0)))
+        );
         for node in [&story.two, &story.five] {
             assert_eq!(node.borrow().role().counters().skipped(), 0, "after {polls} polls");
         }

@@ -9,6 +9,7 @@ use axlewire::{
         master::{MasterConfig, Polling},
         slave::SlaveConfig,
     },
+    time::Instant,
 };
 
 use crate::virtual_time::{End, VirtualClock, World};

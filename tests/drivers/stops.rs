@@ -45,7 +45,7 @@ fn drive_for(story: &mut Story, span: Duration, is_async: bool) -> Outcome {
 
 fn command(story: &Story) -> Option<Target<OneMotor>> {
     story.pass(1000);
-    story.two.borrow().role().command()
+    story.two.borrow().role().command(story.world.now())
 }
 
 const STOPPED: Option<Target<OneMotor>> = Some(Target::Velocity(Rps::ZERO));
@@ -109,7 +109,7 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
         assert_eq!(stopped, Err(DriveError::StopsOwed(silent)));
         assert_eq!(command(&story), STOPPED, "what answers is stopped");
         let held = Some(Target::Position(Position::new(7, 1)));
-        assert_eq!(story.five.borrow().role().command(), held);
+        assert_eq!(story.five.borrow().role().command(story.world.now()), held);
         let mut story = Story::new(only_two_and_five());
         let stopped = match is_async {
             true => story.world.block_on(story.bus.stop_all_async()),
@@ -320,7 +320,11 @@ fn a_position_that_is_withdrawn_because_its_call_fails_is_held_where_the_node_is
             story.bus.run_until(end, |_, _, _| ()).unwrap();
             story.pass(1000);
             let here = Target::Position(Position::new(7, 1));
-            assert_eq!(story.five.borrow().role().command(), Some(here), "after {taken} bytes");
+            assert_eq!(
+                story.five.borrow().role().command(story.world.now()),
+                Some(here),
+                "after {taken} bytes"
+            );
         }
     }
 }

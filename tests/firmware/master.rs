@@ -45,7 +45,7 @@ impl Nodes {
     }
 
     fn command(&self, index: usize) -> Option<Target> {
-        self.nodes[index].slave().command()
+        self.nodes[index].slave().command(Instant::from_micros(0))
     }
 }
 

@@ -160,9 +160,11 @@ fn latencies_are_measured_from_the_end_of_the_request_to_the_beginning_of_the_an
         desk.hear(80 + latency + 160, &velocity(NodeId::N1, 0.0));
     }
     let statistics = desk.master.node_statistics(NodeId::N1);
-    let found = [statistics.latency_min(), statistics.latency_mean(), statistics.latency_max()];
+    let latency = statistics.latency;
+    let found = [latency.min(), latency.mean(), latency.max()];
     // The discovery's answer took 50 us.
-    assert_eq!(found, [US(10), US((10 + 20 + 90 + 50) / 4), US(90)]);
+    assert_eq!(found, [US(10), US((10 + 20 + 90 + 50) / 4), US(90)].map(Some));
+    assert_eq!((latency.count(), latency.last()), (4, Some(US(90))));
     assert_eq!((statistics.requests, statistics.replies), (4, 4));
 }
 

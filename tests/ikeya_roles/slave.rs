@@ -58,7 +58,7 @@ fn a_slave_reads_a_write_in_its_own_mode() {
     moving.handle_input(&bytes, T0);
     let target = Target::Position(Position::new(0, 16_256));
     assert_eq!(moving.poll_event(), Some(SlaveEvent::Command(target)));
-    assert_eq!(moving.command(), Some(target));
+    assert_eq!(moving.command(T0), Some(target));
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn on_any_error_the_previous_command_stays() {
     }
     let nan = WriteRequest::position(NodeId::N2, Position::new(0, 0x7FC0));
     slave.handle_input(nan.as_bytes(), T0);
-    assert_eq!(slave.command(), Some(Target::Velocity(rps(1.0))));
+    assert_eq!(slave.command(T0), Some(Target::Velocity(rps(1.0))));
     assert_eq!((slave.poll_event(), slave.statistics().refused), (None, 1));
 }
 
@@ -114,10 +114,14 @@ fn the_watchdog_ends_a_command_and_tells_it_once() {
     slave.poll_event();
     let end = T0 + Duration::from_millis(100);
     assert_eq!(slave.poll_timeout(), Some(end));
-    slave.handle_timeout(Instant::from_micros(end.as_micros() - 1));
+    let last = Instant::from_micros(end.as_micros() - 1);
+    slave.handle_timeout(last);
     assert_eq!(slave.poll_event(), None);
+    // Right at any time, whether or not the timeout has been handled.
+    assert_eq!(slave.command(last), Some(Target::Velocity(rps(1.0))));
+    assert_eq!(slave.command(end), None);
     slave.handle_timeout(end);
-    assert_eq!((slave.poll_event(), slave.command()), (Some(SlaveEvent::Watchdog), None));
+    assert_eq!((slave.poll_event(), slave.command(end)), (Some(SlaveEvent::Watchdog), None));
     slave.handle_timeout(end + Duration::from_millis(100));
     assert_eq!((slave.poll_event(), slave.poll_timeout()), (None, None));
 }
@@ -230,7 +234,7 @@ fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
     // It is asked itself all the same, and obeys.
     let line = [trap(), write(NodeId::N2, 1.0), read(NodeId::N2)].concat();
     assert_eq!(answers(&mut slave, &line, T0).len(), 1);
-    assert_eq!(slave.command(), Some(Target::Velocity(rps(1.0))));
+    assert_eq!(slave.command(T0), Some(Target::Velocity(rps(1.0))));
     // Byte by byte as well.
     for &byte in &trap() {
         assert_eq!(answers(&mut slave, &[byte], T0), [[0; 0]; 0]);
@@ -259,7 +263,10 @@ fn a_speed_that_is_no_number_does_not_feed_the_watchdog() {
         slave.handle_input(WriteRequest::position(NodeId::N2, bad).as_bytes(), T0 + MS(99));
         assert_eq!((slave.statistics().refused, slave.poll_timeout()), (1, end));
         slave.handle_timeout(T0 + MS(100));
-        assert_eq!((slave.poll_event(), slave.command()), (Some(SlaveEvent::Watchdog), None));
+        assert_eq!(
+            (slave.poll_event(), slave.command(T0 + MS(100))),
+            (Some(SlaveEvent::Watchdog), None)
+        );
     }
 }
 
@@ -286,7 +293,7 @@ fn a_slave_that_was_held_up_obeys_old_bytes_as_of_when_they_may_have_come() {
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
     slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
-    assert_eq!(slave.command(), Some(Target::Velocity(rps(1.0))), "it is taken in");
+    assert_eq!(slave.command(now), Some(Target::Velocity(rps(1.0))), "it is taken in");
     assert_eq!(slave.poll_timeout(), Some(T0 + MS(100)), "70 ms have passed");
     // The master no longer waits for an answer to an old READ.
     slave.handle_old_input(&read(NodeId::N2), T0, now);

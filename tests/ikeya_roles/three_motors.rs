@@ -48,7 +48,7 @@ fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
     }
     assert!(heard > 5 && written > 5, "{heard} answers, {written} writes");
     let targets = Target::Velocity([rps(1.0), rps(-2.0), rps(3.0)]);
-    assert_eq!(slave.command(), Some(targets));
+    assert_eq!(slave.command(now), Some(targets));
     assert_eq!(master.node_statistics(NodeId::N1).timeouts, 0);
     assert_eq!(slave.statistics().replies, slave.statistics().reads + slave.statistics().writes);
 }

@@ -209,7 +209,7 @@ impl Site {
                 self.end_update();
             }
             Act::Hear(hear) => self.hear(hear)?,
-            Act::SetStore(fails) => self.host.store().fails = fails,
+            Act::SetStore(fails) => self.host.store_mut().fails = fails,
             Act::TakeEvent => {
                 self.take_event()?;
             }

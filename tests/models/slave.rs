@@ -183,23 +183,23 @@ impl<B: Kit> Line<B> {
         let number = |target| {
             if target == self.target(1) { 1 } else { u8::from(target == self.target(2)) * 2 }
         };
-        self.slave.command().map(number)
+        self.slave.command(self.now).map(number)
     }
 
     fn poll(&mut self, unsent: Option<Unsent>) -> Checked {
-        let was = self.slave.command();
+        let was = self.slave.command(self.now);
         self.slave.handle_timeout(self.now);
         let is_expired = self.command.is_some() && self.now >= self.commanded_at + WATCHDOG;
         let is_told = self.slave.poll_event() == Some(SlaveEvent::Watchdog);
         if self.is_open {
             // Found behind damage, or not: what counts is what the slave has taken.
             (self.command, self.is_open) = (self.found(), !self.is_in_step());
-            if self.slave.command() != was {
+            if self.slave.command(self.now) != was {
                 self.commanded_at = self.now;
             }
         } else if is_expired {
             self.command = None;
-            if self.slave.command().is_some() {
+            if self.slave.command(self.now).is_some() {
                 return Err("the watchdog did not fire".into());
             }
         } else if is_told {

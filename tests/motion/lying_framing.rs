@@ -2,7 +2,7 @@
 
 use std::{cell::Cell, panic::catch_unwind};
 
-use axlewire::stream::{Counters, Decoder, Frames, Framing, Reason, Verdict};
+use axlewire::stream::{Counters, Decoder, Frames, Framing, OneByOne, Reason, Verdict};
 
 thread_local! {
     static JUDGED: Cell<u32> = const { Cell::new(0) };
@@ -14,6 +14,7 @@ enum Boundless {}
 
 impl Framing for Boundless {
     type Frame<'a> = ();
+    type Batch = OneByOne;
     const MIN_LEN: usize = 2;
     const MAX_LEN: usize = 2;
 

@@ -8,7 +8,7 @@ use axlewire::{
         slave::SlaveConfig,
     },
     sim::{Direction, Line, Motor, MotorNode, Who},
-    time::{Duration, wire_time},
+    time::{Duration, Instant, wire_time},
 };
 
 use crate::talker::{at, us};

@@ -1,7 +1,7 @@
 //! Framings of others: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
-use axlewire::stream::{Decoder, Event, Frames, Framing, Reason, Verdict};
+use axlewire::stream::{Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict};
 
 /// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs
 /// nothing, a refusal of more than there is.
@@ -9,6 +9,7 @@ struct Liar<const LIE: u8>;
 
 impl<const LIE: u8> Framing for Liar<LIE> {
     type Frame<'a> = &'a [u8];
+    type Batch = OneByOne;
     const MIN_LEN: usize = 1;
     const MAX_LEN: usize = 4;
 
@@ -61,6 +62,7 @@ struct Patient;
 
 impl Framing for Patient {
     type Frame<'a> = &'a [u8];
+    type Batch = OneByOne;
     const MIN_LEN: usize = 3;
     const MAX_LEN: usize = 8;
 

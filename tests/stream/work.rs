@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use axlewire::{
-    stream::{Framing, Reason, Verdict},
+    stream::{Framing, OneByOne, Reason, Verdict},
     ucp::Ucp,
 };
 
@@ -24,6 +24,7 @@ struct Counted<F>(F);
 
 impl<F: Known> Framing for Counted<F> {
     type Frame<'a> = F::Frame<'a>;
+    type Batch = OneByOne;
     const MIN_LEN: usize = F::MIN_LEN;
     const MAX_LEN: usize = F::MAX_LEN;
 

@@ -2,6 +2,7 @@
 
 use axlewire::{
     encode::Encode,
+    error::EncodeError,
     ucp::{
         Body, Frame, Message, MessageId, Telemetry,
         message::{
@@ -105,7 +106,8 @@ fn a_network_state_is_sent_in_one_byte_or_not_at_all() {
         SetNetworkState::new(NetworkState::Other(255)).unwrap().state(),
         NetworkState::Other(255)
     );
-    assert_eq!(SetNetworkState::new(NetworkState::Other(256)), None);
+    let error = EncodeError::NetworkState { value: 256 };
+    assert_eq!(SetNetworkState::new(NetworkState::Other(256)), Err(error));
 }
 
 #[test]

@@ -359,13 +359,13 @@ fn biases_are_asked_for_every_1000_ms_from_boot_until_answered() {
 #[test]
 fn the_robots_boot_request_is_answered_only_if_all_biases_are_stored() {
     let mut rig = Rig::new(ms(0));
-    rig.host.store().imu = Some(imu_bias());
+    rig.host.store_mut().imu = Some(imu_bias());
     rig.run_for(2500);
     let missing = HostEvent::BiasesMissing { imu: false, mag: true };
     assert_eq!(rig.host_has_seen(&missing), 3);
     let biases = |event: &RobotEvent| matches!(event, RobotEvent::Biases(_));
     assert!(!rig.robot_events.iter().any(|(_, event)| biases(event)));
-    rig.host.store().mag = Some(mag_bias());
+    rig.host.store_mut().mag = Some(mag_bias());
     rig.run_for(5000);
     assert_eq!(rig.robot_has_seen(&RobotEvent::Biases(Biases::new(imu_bias(), mag_bias()))), 1);
     assert_eq!(rig.host_has_seen(&HostEvent::BiasesSent), 1);

@@ -1,6 +1,8 @@
 //! The link: when it is up or lost, what pings and reports tell, and what passes through raw (U9,
 //! U10, U12).
 
+use axlewire::error::EncodeError;
+
 use crate::rig::*;
 
 #[test]
@@ -199,5 +201,5 @@ fn the_network_state_is_sent_on_change_and_when_the_robot_may_have_forgotten_it(
     host.handle_input(&bytes(BiasRequest {}), ms(2100));
     assert_eq!(state(&mut host, ms(2100)), Some(NetworkState::Disconnected));
     let refused = host.set_network_state(NetworkState::Other(256), ms(2200));
-    assert_eq!(refused, Err(CommandError::NetworkState { state: 256 }));
+    assert_eq!(refused, Err(CommandError::Value(EncodeError::NetworkState { value: 256 })));
 }

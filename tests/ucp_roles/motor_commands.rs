@@ -160,7 +160,7 @@ fn the_first_frame_of_a_host_is_a_zero_motor_command_before_any_ping_or_answer()
     let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
     assert_eq!(host.poll_timeout(), Some(ms(0)), "due at once");
     // All that could be in its way: an acknowledgement, biases, a calibration, the lamp, a ping.
-    *host.store() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
+    *host.store_mut() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
     host.handle_input(&bytes(imu_bias()), ms(1));
     host.handle_input(&bytes(BiasRequest {}), ms(1));
     host.start_calibration(IMU, ms(1)).unwrap();

@@ -7,7 +7,7 @@ use crate::rig::*;
 fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
-        *host.store() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
+        *host.store_mut() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
         host.handle_input(&bytes(imu_bias()), ms(1));
         host.handle_input(&bytes(mag_bias()), ms(1));
         host.handle_input(&bytes(BiasRequest {}), ms(1));

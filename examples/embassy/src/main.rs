@@ -8,7 +8,15 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{drive::{Driver, WithDelay}, time::{Duration, Instant}, ucp::{message::OtaStatus, robot::{RobotConfig, RobotEvent}, Robot, Telemetry, BAUD}};
+use axlewire::{
+    drive::{Driver, WithDelay},
+    time::{Duration, Instant},
+    ucp::{
+        BAUD, Robot, Telemetry,
+        message::OtaStatus,
+        robot::{RobotConfig, RobotEvent},
+    },
+};
 use embassy_executor::Spawner;
 use embassy_stm32::{
     Config, Peri,

@@ -14,7 +14,10 @@ use panic_halt as _;
 mod app {
     use axlewire::{
         endpoint::Endpoint,
-        ikeya::{DipSwitch, IdReading, Position, Rps, Slave, SlaveConfig, SlaveEvent, Target},
+        ikeya::{
+            Position, Rps, Slave, Target,
+            slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
+        },
         time::{Duration, Wrapping32},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
@@ -55,8 +58,9 @@ mod app {
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(Duration::from_millis(500));
         // With the reading that covers ids 1 to 8, every switch setting is a valid id (ruling I2).
-        let slave = DipSwitch::from_bits(dip)
-            .and_then(|dip| Slave::from_dip(dip, IdReading::ValuePlusOne, config));
+        let slave = DipSwitch::from_bits(dip).and_then(|dip| {
+            Slave::from_dip(dip, IdReading::ValuePlusOne, config, Instant::from_micros(0))
+        });
         let Ok(mut slave) = slave else { panic!("every 4-bit switch setting has an id") };
         // The motor of this example starts at position 0.
         slave.set_position(Position::new(0, 0));

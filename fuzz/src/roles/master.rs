@@ -17,10 +17,10 @@ use axlewire::{
 
 use super::{Clock, raw, serve};
 
-/// The master of a motor bus of either kind of boards.
+/// The master of a motor bus, with either kind of board.
 pub fn ikeya_master(data: &[u8]) {
     let mut u = Unstructured::new(data);
-    let turn = Rps::new(1.0).expect("a number");
+    let turn = Rps::new(1.0).expect("finite");
     let place = Position::new(1, -1);
     let _ = match u.arbitrary() {
         Ok(true) => master::<ThreeMotors>(&mut u, [turn; 3], [place; 3], |id, mode| match mode {
@@ -41,11 +41,11 @@ fn packet(frame: &impl Encode) -> Vec<u8> {
     frame.encode(&mut buffer).expect("room").to_vec()
 }
 
-/// What the application wants of each node.
+/// Commands of the application for each node.
 struct Wishes<B: Board> {
-    /// The latest order, unless it is a stop or has been withdrawn.
+    /// The latest order, unless it is a stop or was withdrawn.
     orders: [Option<Target<B>>; 8],
-    /// Nodes whose stop was owed the last time.
+    /// Nodes whose stop was owed at the last check.
     owed: NodeSet,
 }
 
@@ -54,21 +54,24 @@ impl<B: Board> Wishes<B> {
         &mut self.orders[usize::from(id.get() - 1)]
     }
 
-    /// Takes in what the master has decided by itself: it never owes less than before unless a stop
-    /// is paid, and gives no node that is owed one anything else.
+    /// Checks and adopts the master's own decisions: it never owes less than before unless a stop
+    /// is paid, and a node that is owed a stop gets nothing else.
     fn follow(&mut self, master: &mut Master<B>, turn: B::Velocity, now: Instant) {
         let owed = master.stops_owed();
         for id in NodeId::ALL {
             let set_point = master.set_point(id);
             if owed.contains(id) {
                 *self.order(id) = None;
-                assert_eq!(set_point, None, "a set-point beside a stop");
+                assert_eq!(set_point, None, "a set-point despite an owed stop");
                 assert_eq!(master.stop_progress(id), StopProgress::Owed);
-                assert!(master.set_velocity(id, turn, now).is_err(), "taken, and the stop owed");
+                assert!(
+                    master.set_velocity(id, turn, now).is_err(),
+                    "accepted despite an owed stop"
+                );
             } else if self.owed.contains(id) && self.order(id).is_none() {
                 let progress = master.stop_progress(id);
                 let is_paid = matches!(progress, StopProgress::Paid | StopProgress::StandingStill);
-                assert!(is_paid, "a stop that is forgotten: {progress:?}");
+                assert!(is_paid, "a forgotten stop: {progress:?}");
             }
             let is_online = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
             assert!(is_online || set_point.is_none(), "a set-point for a node that is not online");
@@ -79,7 +82,7 @@ impl<B: Board> Wishes<B> {
         self.owed = owed;
     }
 
-    /// A WRITE is the latest order, in the mode of the node, or a stop: the nodes stand still at 0.
+    /// A WRITE is the latest order, in the mode of the node, or a stop: the nodes are at rest at 0.
     fn check(&mut self, sent: &[u8], master: &Master<B>, stop: &Stops) {
         let id = NodeId::new(sent[1]).expect("an id on the wire");
         let is_stop = [&stop.velocity, &stop.position]
@@ -88,18 +91,18 @@ impl<B: Board> Wishes<B> {
         if is_stop {
             return;
         }
-        let order = self.order(id).expect("nobody has asked for that");
+        let order = self.order(id).expect("an order that was not given");
         let expected = match order {
             Target::Velocity(to) => packet(&B::write_velocity(id, to)),
             Target::Position(to) => packet(&B::write_position(id, to)),
         };
         assert_eq!(sent, expected, "not the latest order");
-        assert_eq!(master.mode(id), Some(order.mode()), "in another mode");
-        assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "in doubt about the mode");
+        assert_eq!(master.mode(id), Some(order.mode()), "wrong mode");
+        assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "mode in doubt");
     }
 }
 
-/// What stops a node that stands still at 0, without the CRC.
+/// The stop command for a node at rest at 0, without the CRC.
 struct Stops {
     velocity: Vec<u8>,
     position: Vec<u8>,
@@ -129,7 +132,7 @@ fn master<B: Board>(
     let mut clock = Clock::new(u)?;
     let mut master = Master::<B>::new(config, clock.0);
     let mut wishes = Wishes { orders: [None; 8], owed: NodeSet::NONE };
-    // The node that was asked and may answer.
+    // The node that was read and may answer.
     let mut asked = None;
     while !u.is_empty() {
         let id = *u.choose(&NodeId::ALL)?;
@@ -159,7 +162,7 @@ fn master<B: Board>(
             6 => {
                 let owed = master.stops_owed();
                 master.release(id);
-                assert_eq!(master.stops_owed(), owed, "a release is no way out of a stop");
+                assert_eq!(master.stops_owed(), owed, "a release must not cancel a stop");
             }
             7 => drop(master.read(id, now)),
             8 => master.keep_alive(now),
@@ -171,7 +174,7 @@ fn master<B: Board>(
             11 => {
                 let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
                 master.handle_input(&answer(id, mode), now);
-                // Only the node that was asked can have answered.
+                // Only the node that was read can have answered.
                 statuses = u32::from(asked == Some(id));
             }
             _ => {
@@ -188,7 +191,7 @@ fn master<B: Board>(
             told += u32::from(matches!(event, MasterEvent::Status { .. }));
         });
         wishes.follow(&mut master, turn, now);
-        // Raw input may hold a good answer, too; it is as long as one then.
+        // Raw input may also contain a good answer if it is long enough.
         assert!(told <= statuses.max(1), "{told} answers to one request");
         for sent in sent {
             let id = NodeId::new(sent[1]).expect("an id on the wire");
@@ -220,11 +223,11 @@ fn check_counts<B: Board>(master: &Master<B>) {
         let node = master.node_statistics(id);
         let closed = u64::from(node.replies) + u64::from(node.timeouts);
         let requests = u64::from(node.requests);
-        assert!(closed <= requests, "an answer to no request: {node:?}");
-        // An answer that puts the mode in doubt closes its window as well.
+        assert!(closed <= requests, "an answer without a request: {node:?}");
+        // An answer that puts the mode in doubt also closes its window.
         let open = requests - closed;
         let doubtful = u64::from(node.other_mode);
-        assert!(open <= doubtful + 1, "a request without an end: {node:?}");
+        assert!(open <= doubtful + 1, "an unfinished request: {node:?}");
         let mode = master.status(id).map(|(status, _): (Status<B>, _)| status.mode());
         assert_eq!(mode, master.mode(id));
     }

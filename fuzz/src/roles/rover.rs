@@ -28,7 +28,7 @@ fn host(u: &mut Unstructured<'_>) -> Result<()> {
     let low_ids_only = config.low_ids_only;
     let mut clock = Clock::new(u)?;
     let mut host = Host::with_store(config, MemoryStore::default(), clock.0);
-    // Speed and turn of the last command, and whether an update may be under way.
+    // Speed and turn of the last command, and whether an update may be in progress.
     let (mut wanted, mut updating) = (None, false);
     let mut is_first = true;
     while !u.is_empty() {
@@ -70,10 +70,10 @@ fn host(u: &mut Unstructured<'_>) -> Result<()> {
                     let motion = (command.speed(), command.angular());
                     assert!(
                         motion == (0, 0) || Some(motion) == wanted,
-                        "{motion:?} was not asked for"
+                        "{motion:?} was not commanded"
                     );
                 }
-                Message::OtaRequest(_) => assert!(updating, "an update that nobody started"),
+                Message::OtaRequest(_) => assert!(updating, "an update that was not started"),
                 message => assert!(is_to_robot(&message), "{message:?} from a host (U13)"),
             }
         }
@@ -89,7 +89,7 @@ pub fn ucp_robot(data: &[u8]) {
 fn robot(u: &mut Unstructured<'_>) -> Result<()> {
     let mut clock = Clock::new(u)?;
     let mut robot = Robot::new(RobotConfig::default(), clock.0);
-    // What has been received, and when.
+    // Received bytes with their times.
     let mut history: Vec<(Instant, u8)> = Vec::new();
     while !u.is_empty() {
         let now = clock.pass(u)?;
@@ -126,7 +126,7 @@ fn unsent(u: &mut Unstructured<'_>) -> Result<Unsent> {
     Ok(*u.choose(&[Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed])?)
 }
 
-/// Has a whole motor command for this motion arrived in the last 500 ms?
+/// Whether a complete motor command for this motion has arrived in the last 500 ms.
 fn was_commanded(history: &[(Instant, u8)], motion: (i16, i16), now: Instant) -> bool {
     let recent = |window: &&[(Instant, u8)]| now - window[23].0 < Duration::from_millis(500);
     history.windows(24).filter(recent).any(|window| {
@@ -138,7 +138,7 @@ fn was_commanded(history: &[(Instant, u8)], motion: (i16, i16), now: Instant) ->
     })
 }
 
-/// A message that only a host may send, those of both directions left out.
+/// Whether only a host may send this message; excludes those of both directions.
 fn is_to_robot(message: &Message<'_>) -> bool {
     matches!(
         message,
@@ -177,13 +177,13 @@ fn from_robot(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     })
 }
 
-/// A good frame of a host, a careless one included.
+/// A good frame of a host, possibly a careless one.
 fn from_host(u: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     let index = u.arbitrary()?;
     Ok(match u.int_in_range(0..=7)? {
         0 => ucp::message::Ping {}.frame(index).as_bytes().to_vec(),
         1 | 2 => {
-            // Any sixteen bytes: also out of range, also a version that starts an update.
+            // Any sixteen bytes, including values out of range and versions that start an update.
             let body: [u8; 16] = u.arbitrary()?;
             let mut frame = vec![0xFD, 0xFF, 20, 0, 2, index];
             frame.extend(body);

@@ -9,12 +9,12 @@ use axlewire::{
         slave::SlaveConfig,
         three,
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use super::{Clock, raw, serve};
 
-/// A slave of a motor bus of either kind of boards.
+/// A slave of a motor bus, with either kind of board.
 pub fn ikeya_slave(data: &[u8]) {
     let mut u = Unstructured::new(data);
     let _ = match u.arbitrary() {
@@ -50,7 +50,7 @@ fn slave<B: Board>(
             3 => slave.set_velocity(B::ZERO),
             4 => slave.handle_unsent(*u.choose(&[Unsent::Untouched, Unsent::CutOff])?, now),
             5 => {
-                // The beginning of the next packet is enough.
+                // The start of the next packet is enough.
                 slave.handle_input(&request(id, None), now);
                 slave.handle_input(&[0xAA], now);
                 assert_eq!(slave.poll_transmit(now + config.turnaround_gap), None);
@@ -68,7 +68,7 @@ fn slave<B: Board>(
         let counts = slave.statistics();
         let asked = counts.reads + if B::ANSWERS_WRITE { counts.writes } else { 0 };
         assert!(counts.replies + counts.overtaken <= asked, "{counts:?}");
-        match slave.command() {
+        match slave.command(now) {
             None => {}
             Some(Target::Velocity(_)) => assert_eq!(slave.mode(), Mode::Velocity),
             Some(Target::Position(_)) => assert_eq!(slave.mode(), Mode::Position),

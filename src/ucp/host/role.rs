@@ -363,7 +363,10 @@ impl<S: BiasStore> Endpoint for Host<S> {
 #[cfg(all(test, any(feature = "embedded-io", feature = "embedded-io-async")))]
 mod tests {
     use super::*;
-    use crate::ucp::{Body, CalibrationStartAck, ErrorCode, MagBias};
+    use crate::ucp::{
+        Body,
+        message::{CalibrationStartAck, ErrorCode, MagBias},
+    };
 
     #[test]
     fn an_outcome_that_waits_for_room_can_be_taken_out_like_one_in_the_queue() {

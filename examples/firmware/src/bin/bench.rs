@@ -9,7 +9,17 @@
 
 use core::hint::black_box;
 
-use axlewire::{crc16, endpoint::Endpoint, ikeya::{slave::SlaveConfig, Master, Mode, NodeId, ReadRequest, Rps, Slave, ToMaster, VelocityResponse}, stream::Decoder, time::Instant, ucp::{message::FirmwareReport, Body, Host, Robot, Telemetry, Ucp}};
+use axlewire::{
+    crc16,
+    endpoint::Endpoint,
+    ikeya::{
+        Master, Mode, NodeId, ReadRequest, Rps, Slave, ToMaster, VelocityResponse,
+        slave::SlaveConfig,
+    },
+    stream::Decoder,
+    time::Instant,
+    ucp::{Body, Host, Robot, Telemetry, Ucp, message::FirmwareReport},
+};
 #[cfg(feature = "board")]
 use axlewire_firmware::stack::Stack;
 use axlewire_firmware::work;

@@ -7,7 +7,14 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{drive::{Clock as _, Driver, Rs485}, ikeya::{self, master::{Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling}, Master, Mode, NodeId, Position, Rps, Status}, time::{Duration, Instant}};
+use axlewire::{
+    drive::{Clock as _, Driver, Rs485},
+    ikeya::{
+        self, Master, Mode, NodeId, Position, Rps, Status,
+        master::{Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling},
+    },
+    time::{Duration, Instant},
+};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,

@@ -6,7 +6,14 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{drive::{Clock as _, Driver, Rs485}, ikeya::{self, slave::{DipSwitch, IdReading, SlaveConfig, SlaveStatistics}, Mode, NodeId, Slave, Target}, time::Duration};
+use axlewire::{
+    drive::{Clock as _, Driver, Rs485},
+    ikeya::{
+        self, Mode, NodeId, Slave, Target,
+        slave::{DipSwitch, IdReading, SlaveConfig, SlaveStatistics},
+    },
+    time::Duration,
+};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,

@@ -3,7 +3,10 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{time::Instant, ucp::{host::HostConfig, Host}};
+use axlewire::{
+    time::Instant,
+    ucp::{Host, host::HostConfig},
+};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

@@ -3,7 +3,10 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{ikeya::{master::MasterConfig, Master}, time::Instant};
+use axlewire::{
+    ikeya::{Master, master::MasterConfig},
+    time::Instant,
+};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

@@ -3,7 +3,10 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{time::Instant, ucp::{robot::RobotConfig, Robot}};
+use axlewire::{
+    time::Instant,
+    ucp::{Robot, robot::RobotConfig},
+};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

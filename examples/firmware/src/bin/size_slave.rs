@@ -3,7 +3,10 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{ikeya::{slave::SlaveConfig, Mode, NodeId, Slave}, time::Instant};
+use axlewire::{
+    ikeya::{Mode, NodeId, Slave, slave::SlaveConfig},
+    time::Instant,
+};
 use axlewire_firmware::work::drive;
 
 axlewire_firmware::size_program!(run);

@@ -7,7 +7,15 @@
 #![no_std]
 #![no_main]
 
-use axlewire::{drive::{Clock as _, Driver}, time::{Duration, Instant}, ucp::{self, message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus}, robot::{RobotConfig, RobotEvent, RobotStatistics, UpdateSource}, Robot}};
+use axlewire::{
+    drive::{Clock as _, Driver},
+    time::{Duration, Instant},
+    ucp::{
+        self, Robot,
+        message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus},
+        robot::{RobotConfig, RobotEvent, RobotStatistics, UpdateSource},
+    },
+};
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
@@ -125,9 +133,8 @@ impl Shown {
 /// All values that a test or a user may want to see.
 fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Instant) {
     let (command, (left, right)) = (robot.command(now), rover.rpm());
-    let RobotStatistics {
-        commands, watchdog, pings, pongs, reports, reports_skipped, ..
-    } = *robot.statistics();
+    let RobotStatistics { commands, watchdog, pings, pongs, reports, reports_skipped, .. } =
+        *robot.statistics();
     line.number("speed", command.speed().into())
         .number("angular", command.angular().into())
         .count("lamp", (command.front_led() != 0).into())

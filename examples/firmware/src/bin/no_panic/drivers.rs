@@ -1,7 +1,25 @@
 //! Drivers, the driver-enable pin, frame readers and writers, over a port and a pin that may fail
 //! at any call, and a port that may report more bytes than requested.
 
-use axlewire::{drive::{Driver, Rs485}, endpoint::Endpoint, ikeya::{self, board::{Board, OneMotor, ThreeMotors}, master::{MasterConfig, NodeSet}, slave::SlaveConfig, Master, Mode, NodeId, Position, Rps, Slave}, io::{FrameReader, FrameWriter}, stream::Framing, time::Instant, ucp::{host::{HostConfig, MemoryStore}, message::CalibrationKind, robot::RobotConfig, Host, RawFrame, Robot, Ucp}};
+use axlewire::{
+    drive::{Driver, Rs485},
+    endpoint::Endpoint,
+    ikeya::{
+        self, Master, Mode, NodeId, Position, Rps, Slave,
+        board::{Board, OneMotor, ThreeMotors},
+        master::{MasterConfig, NodeSet},
+        slave::SlaveConfig,
+    },
+    io::{FrameReader, FrameWriter},
+    stream::Framing,
+    time::Instant,
+    ucp::{
+        Host, RawFrame, Robot, Ucp,
+        host::{HostConfig, MemoryStore},
+        message::CalibrationKind,
+        robot::RobotConfig,
+    },
+};
 use embedded_hal::{
     delay::DelayNs,
     digital::{self, OutputPin},
@@ -118,7 +136,12 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 #[inline(never)]
 fn slave<B: Board>() {
     let config = any(SlaveConfig::direct());
-    let mut driver = driver(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
+    let mut driver = driver(Slave::<B>::new(
+        any(NodeId::N1),
+        any(Mode::Velocity),
+        config,
+        Instant::from_micros(0),
+    ));
     while any(true) {
         match any(0) {
             0 => keep(driver.next_command(now())),

@@ -1,6 +1,20 @@
 //! The four roles without drivers, called in any order, with any settings.
 
-use axlewire::{endpoint::{Endpoint, Unsent}, ikeya::{board::{Board, OneMotor, ThreeMotors}, master::MasterConfig, slave::{DipSwitch, IdReading, SlaveConfig}, Master, Mode, NodeId, Position, Rps, Slave, Target}, ucp::{host::{BiasStore, HostConfig, MemoryStore, NoStore}, message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus}, robot::RobotConfig, Host, MotorControl, Robot, Telemetry}};
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Master, Mode, NodeId, Position, Rps, Slave, Target,
+        board::{Board, OneMotor, ThreeMotors},
+        master::MasterConfig,
+        slave::{DipSwitch, IdReading, SlaveConfig},
+    },
+    ucp::{
+        Host, MotorControl, Robot, Telemetry,
+        host::{BiasStore, HostConfig, MemoryStore, NoStore},
+        message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus},
+        robot::RobotConfig,
+    },
+};
 
 use crate::{any, input, keep, now};
 
@@ -54,7 +68,8 @@ fn slave<B: Board>(velocity: B::Velocity, position: B::Position) {
     if let Ok(dip) = DipSwitch::from_bits(any(0)) {
         keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config, Instant::from_micros(0)));
     }
-    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
+    let mut slave =
+        any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
     while any(true) {
         match any(0) {
             0 => slave.set_velocity(any(velocity)),
@@ -86,7 +101,7 @@ fn host<S: BiasStore>(store: S) {
                 keep((round_trip.min(), round_trip.mean(), round_trip.max()));
             }
             9 => keep((host.statistics(), host.counters(), host.config().calibration_bound())),
-            10 => keep(host.store().load()),
+            10 => keep(host.store_mut().load()),
             11 => keep((host.take_report(), host.is_stop_sent(), host.calibration_outcome())),
             _ => turn(&mut host),
         }

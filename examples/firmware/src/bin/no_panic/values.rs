@@ -1,6 +1,26 @@
 //! Checksums, numbers, packets and frames.
 
-use axlewire::{crc16, encode::Encode, ikeya::{board::ThreeMotors, master::Schedule, slave::{DipSwitch, IdReading}, three, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest}, time::{wire_time, Duration, Wrapping32}, ucp::{message::{BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind, CalibrationStart, CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck, MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Ping, Pong, Report, SetNetworkState}, Body, Frame, Message, MessageId, MotorControl, RawFrame, Telemetry}};
+use axlewire::{
+    crc16,
+    encode::Encode,
+    ikeya::{
+        Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
+        board::ThreeMotors,
+        master::Schedule,
+        slave::{DipSwitch, IdReading},
+        three,
+    },
+    time::{Duration, Wrapping32, wire_time},
+    ucp::{
+        Body, Frame, Message, MessageId, MotorControl, RawFrame, Telemetry,
+        message::{
+            BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind,
+            CalibrationStart, CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport,
+            ImuBias, ImuBiasAck, MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus,
+            Ping, Pong, Report, SetNetworkState,
+        },
+    },
+};
 
 use crate::{any, duration, input, keep, now, room};
 
