@@ -22,14 +22,6 @@ mod blocking;
 /// The nodes that are online, in the order of their ids, and their modes.
 pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
 
-/// The READs of a node that were over when a call began.
-#[derive(Clone, Copy)]
-struct ReadMark {
-    node: NodeId,
-    replies: u32,
-    failures: u32,
-}
-
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// When a call has taken too long: a discovery may be under way in front of it, each takes no
     /// longer than a read may, and a driver on a host comes late now and then.
@@ -116,27 +108,19 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// Asks for a READ; what was heard before is not its answer.
-    fn begin_read(&mut self, node: NodeId) -> Result<ReadMark, CommandError> {
+    fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
         let now = self.now();
         self.drop_readings();
-        self.role.read(node, now)?;
-        let statistics = self.role.node_statistics(node);
-        let (replies, failures) = (statistics.replies, statistics.failures);
-        Ok(ReadMark { node, replies, failures })
+        self.role.read(node, now)
     }
 
     /// The answer of a node, or why there is none.
-    fn answer<E>(&mut self, mark: ReadMark) -> Option<Result<Status<B>, DriveError<E>>> {
-        let ReadMark { node, .. } = mark;
+    fn answer<E>(&mut self, node: NodeId) -> Option<Result<Status<B>, DriveError<E>>> {
         self.drop_readings();
-        let statistics = self.role.node_statistics(node);
-        if statistics.replies != mark.replies {
+        let outcome = self.role.read_outcome(node)?;
+        let Err(cause) = outcome else {
             return self.role.status(node).map(|(status, _)| Ok(status));
-        }
-        if statistics.failures == mark.failures {
-            return None;
-        }
-        let cause = self.role.last_failure(node)?;
+        };
         self.role.retain_events(
             |event| !matches!(event, MasterEvent::ReadFailed { node: failed, .. } if *failed == node),
         );

@@ -55,15 +55,10 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
             .retain_events(|event| !matches!(event, HostEvent::Report(_) | HostEvent::Pong { .. }));
     }
 
-    fn pongs(&self) -> u32 {
-        self.role.statistics().round_trip.count()
-    }
-
-    /// The round trip of a pong that came after `before` others.
-    fn pong(&mut self, before: u32) -> Option<Duration> {
+    /// The round trip of the next pong; call it once before, to forget the one that is there.
+    fn pong(&mut self) -> Option<Duration> {
         self.drop_routine();
-        let round_trip = self.role.statistics().round_trip;
-        round_trip.last().filter(|_| round_trip.count() != before)
+        self.role.take_round_trip()
     }
 
     fn report(&mut self) -> Option<ReceivedReport> {

@@ -157,7 +157,7 @@ fn a_command_out_of_range_is_refused_and_the_one_before_stays() {
     rover.drive(20, 0).unwrap();
     let error = rover.drive(101, 0).unwrap_err();
     assert!(matches!(error, DriveError::Rover(CommandError::Value(_))), "{error:?}");
-    assert_eq!(error.to_string(), "motor command is out of range");
+    assert_eq!(error.to_string(), "the value is out of range");
     assert_eq!(rover.role().command(), Some(MotorControl::new(20, 0).unwrap()));
 }
 

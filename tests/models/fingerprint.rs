@@ -26,19 +26,29 @@ pub(crate) struct Merge {
 
 /// Counters, settings that never change, and what has been handed out.
 #[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS: &[&str] =
-    &["config", "last_failure", "ledger", "lost", "packet", "reported", "sent", "statistics"];
+pub(crate) const COUNTERS: &[&str] = &[
+    "chunk_len",
+    "config",
+    "ledger",
+    "lost",
+    "packet",
+    "read_outcome",
+    "sent",
+    "since",
+    "statistics",
+];
 
 /// The same, and the last answer where no stop may hold its position.
 #[cfg(feature = "ikeya")]
 pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
+    "chunk_len",
     "config",
-    "last_failure",
     "ledger",
     "lost",
     "packet",
-    "reported",
+    "read_outcome",
     "sent",
+    "since",
     "statistics",
     "status",
 ];

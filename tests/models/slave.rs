@@ -199,7 +199,7 @@ impl<B: Kit> Line<B> {
             }
         } else if is_expired {
             self.command = None;
-            if self.slave.command(self.now).is_some() {
+            if !is_told {
                 return Err("the watchdog did not fire".into());
             }
         } else if is_told {
@@ -231,9 +231,10 @@ impl<B: Kit> Line<B> {
     }
 
     fn check_command(&self) -> Checked {
+        let command = self.command.filter(|_| self.now < self.commanded_at + WATCHDOG);
         match self.found() {
-            found if self.is_open || found == self.command => Ok(()),
-            found => Err(format!("the command is {found:?} instead of {:?}", self.command)),
+            found if self.is_open || found == command => Ok(()),
+            found => Err(format!("the command is {found:?} instead of {command:?}")),
         }
     }
 }

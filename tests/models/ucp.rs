@@ -25,22 +25,24 @@ pub(crate) enum Fate {
 }
 
 /// Counters, settings that never change, and what has been handed out.
-const SKIPPED: [&str; 10] = [
+const SKIPPED: [&str; 12] = [
     "config",
     "stats",
     "lost",
     "outgoing",
     "index",
     "round_trip",
+    "new_round_trip",
     "last_report",
-    "reported",
+    "chunk_len",
     "framed",
+    "decoder",
     "inbox",
 ];
 
 /// An empty inbox is left out: all that it knows then is when bytes came last.
 pub(crate) fn merge(now: Instant, counters: &Counters) -> Merge {
-    let len = SKIPPED.len() - usize::from(pending(counters) > 0);
+    let len = SKIPPED.len() - 2 * usize::from(pending(counters) > 0);
     Merge { now, skipped: &SKIPPED[..len] }
 }
 

@@ -146,9 +146,9 @@ where
     /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
     /// online, and those of the port.
     pub async fn read_async(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
-        let mark = self.begin_read(node)?;
+        self.begin_read(node)?;
         let bound = self.bound();
-        let answer = self.until_async(bound, |driver| driver.answer(mark)).await?;
+        let answer = self.until_async(bound, |driver| driver.answer(node)).await?;
         answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
     }
 

@@ -140,9 +140,9 @@ where
     /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
     /// online, and those of the port.
     pub fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
-        let mark = self.begin_read(node)?;
+        self.begin_read(node)?;
         let bound = self.bound();
-        let answer = self.until(bound, |driver| driver.answer(mark))?;
+        let answer = self.until(bound, |driver| driver.answer(node))?;
         answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
     }
 

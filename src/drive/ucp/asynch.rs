@@ -32,8 +32,8 @@ where
         &mut self,
         deadline: Instant,
     ) -> Result<Duration, DriveError<P::Error>> {
-        let before = self.pongs();
-        let pong = self.until_async(deadline, |driver| driver.pong(before)).await?;
+        let _old = self.pong();
+        let pong = self.until_async(deadline, |driver| driver.pong()).await?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 

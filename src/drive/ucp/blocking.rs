@@ -27,8 +27,8 @@ where
     ///
     /// [`DriveError::Timeout`] at `deadline`, and those of the port.
     pub fn ping(&mut self, deadline: Instant) -> Result<Duration, DriveError<P::Error>> {
-        let before = self.pongs();
-        let pong = self.until(deadline, |driver| driver.pong(before))?;
+        let _old = self.pong();
+        let pong = self.until(deadline, |driver| driver.pong())?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 

@@ -45,7 +45,8 @@ pub(super) struct Node<B: Board> {
     pub(super) is_asked: bool,
     /// Requests in the discovery under way.
     pub(super) scans: u8,
-    pub(super) last_failure: Option<Cause>,
+    /// What the latest READ has come to.
+    pub(super) read_outcome: Option<Result<(), Cause>>,
     pub(super) stop: Option<Stop<B>>,
     pub(super) set_point: Option<SetPoint<B>>,
     /// Not to be asked before then: a late answer may be on its way.
@@ -70,7 +71,7 @@ impl<B: Board> Node<B> {
             stop: None,
             standstill: Standstill::Unwatched,
             status: None,
-            last_failure: None,
+            read_outcome: None,
             strikes: 0,
             attempt: 0,
             is_asked: false,

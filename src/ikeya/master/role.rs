@@ -244,7 +244,7 @@ impl<B: Board> Master<B> {
         if !it.is_online() {
             return Err(CommandError::NotOnline { node });
         }
-        it.is_asked = true;
+        (it.is_asked, it.read_outcome) = (true, None);
         Ok(())
     }
 

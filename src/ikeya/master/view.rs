@@ -100,10 +100,11 @@ impl<B: Board> Master<B> {
         self.node(node).set_point.is_some_and(|set_point| !set_point.is_new)
     }
 
-    /// Why the last READ of a node that was given up has failed; `None` if none has.
+    /// What the latest READ of a node has come to: an answer, or why it was given up. `None` before
+    /// the first, and from a call of [`read`](Self::read) until that has come to something.
     #[must_use]
-    pub fn last_failure(&self, node: NodeId) -> Option<Cause> {
-        self.node(node).last_failure
+    pub fn read_outcome(&self, node: NodeId) -> Option<Result<(), Cause>> {
+        self.node(node).read_outcome
     }
 
     /// Whether a command would be taken now.

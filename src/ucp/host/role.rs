@@ -258,6 +258,11 @@ impl<S: BiasStore> Host<S> {
         self.state.last_report.filter(|_| is_new)
     }
 
+    /// The round trip of the latest pong, if no call of this has returned it yet.
+    pub const fn take_round_trip(&mut self) -> Option<Duration> {
+        self.state.new_round_trip.take()
+    }
+
     /// What the latest calibration request has come to; `None` while it is unanswered, and before
     /// the first.
     #[must_use]

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     events::Events,
     stats::count,
-    time::{Instant, reached},
+    time::{Duration, Instant, reached},
     ucp::{
         body::{ImuBias, MagBias, Pong, SetNetworkState},
         codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
@@ -54,6 +54,8 @@ pub(super) struct State<S> {
     pub(super) last_report: Option<ReceivedReport>,
     /// The latest report has not been taken.
     pub(super) is_report_new: bool,
+    /// Round trip of the latest pong, until it is taken.
+    pub(super) new_round_trip: Option<Duration>,
     /// Index of the report before, where there is one to count from.
     last_index: Option<u8>,
     pub(super) imu: Results<ImuBias>,
@@ -100,6 +102,7 @@ impl<S: BiasStore> State<S> {
             network: None,
             last_report: None,
             is_report_new: false,
+            new_round_trip: None,
             last_index: None,
             imu: Results::new(),
             mag: Results::new(),
@@ -254,6 +257,7 @@ impl<S: BiasStore> State<S> {
             count(&mut self.stats.pings_damaged);
         }
         self.stats.round_trip.add(round_trip);
+        self.new_round_trip = Some(round_trip);
         self.events.push_frequent(HostEvent::Pong { round_trip, err });
     }
 
