@@ -129,6 +129,8 @@ mod inbox;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
 mod machine;
+#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
+mod outbox;
 // A page, not code. Its examples use the features named here.
 #[cfg(all(
     any(doc, doctest),

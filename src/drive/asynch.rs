@@ -10,7 +10,10 @@ use embedded_hal_async::delay::DelayNs;
 use embedded_io_async::{Read, Write};
 
 use super::{
-    CHUNK_LEN, Driver, FRAMES, Needs, READS, clock::Clock, error::DriveError, outbox::FRAME_LEN,
+    clock::Clock,
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
+    error::DriveError,
+    sending::FRAME_LEN,
 };
 use crate::{
     endpoint::Endpoint,
@@ -65,7 +68,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 break;
             }
         }
-        if self.outbox.needs_flush() {
+        if self.sending.needs_flush() {
             let flushed = self.flush_async().await;
             result = result.and(flushed);
         }
@@ -156,21 +159,21 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     }
 
     async fn send_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        while !self.outbox.rest().is_empty() {
+        while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
-            let waited = self.outbox.write_wait.begin(now);
+            let waited = self.sending.write_wait.begin(now);
             let patience_us = self.patience_us(waited);
-            let writing = self.port.write(self.outbox.rest());
+            let writing = self.port.write(self.sending.rest());
             let written = first(writing, self.clock.delay_us(patience_us)).await;
-            self.outbox.write_wait.end();
+            self.sending.write_wait.end();
             let Some(written) = written else {
                 self.reclaim();
                 return self.stalled_async().await;
             };
             self.after_write(written)?;
         }
-        if self.outbox.is_in_doubt() {
+        if self.sending.is_in_doubt() {
             self.flush_async().await?;
         }
         Ok(())
@@ -178,10 +181,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
-        let waited = self.outbox.flush_wait.begin(now);
+        let waited = self.sending.flush_wait.begin(now);
         let patience_us = self.patience_us(waited);
         let flushed = first(self.port.flush(), self.clock.delay_us(patience_us)).await;
-        self.outbox.flush_wait.end();
+        self.sending.flush_wait.end();
         match flushed {
             Some(flushed) => self.after_flush(flushed),
             None => self.stalled_async().await,

@@ -2,7 +2,11 @@
 
 use embedded_io::{Read, ReadReady, Write};
 
-use super::{CHUNK_LEN, Driver, FRAMES, Needs, READS, clock::Clock, error::DriveError};
+use super::{
+    clock::Clock,
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
+    error::DriveError,
+};
 use crate::{endpoint::Endpoint, time::Instant};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
@@ -37,7 +41,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                 break;
             }
         }
-        if self.outbox.needs_flush() {
+        if self.sending.needs_flush() {
             let flushed = self.port.flush();
             result = result.and(self.after_flush(flushed));
         }
@@ -130,15 +134,15 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// sending.
     fn send(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
-        while !self.outbox.rest().is_empty() {
+        while !self.sending.rest().is_empty() {
             self.before_write();
-            let written = self.port.write(self.outbox.rest());
+            let written = self.port.write(self.sending.rest());
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));
             }
             received = received.and(self.receive());
         }
-        if self.outbox.is_in_doubt() {
+        if self.sending.is_in_doubt() {
             let flushed = self.port.flush();
             return (received, self.after_flush(flushed));
         }

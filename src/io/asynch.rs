@@ -2,7 +2,7 @@
 
 use embedded_io_async::{Read, Write};
 
-use super::{FrameReader, FrameWriter, WriteError};
+use super::{error::WriteError, reader::FrameReader, writer::FrameWriter};
 use crate::{
     encode::Encode,
     stream::{Event, Framing},
@@ -59,10 +59,10 @@ impl<W: Write, const N: usize> FrameWriter<W, N> {
     }
 
     async fn send_async(&mut self) -> Result<(), WriteError<W::Error>> {
-        while !self.unsent.is_empty() {
-            match self.port.write(&self.unsent).await.map_err(WriteError::Port)? {
+        while !self.outbox.is_empty() {
+            match self.port.write(self.outbox.unsent()).await.map_err(WriteError::Port)? {
                 0 => return Err(WriteError::Zero),
-                count => self.sent(count),
+                count => self.outbox.taken(count),
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use embedded_io::{Read, Write};
 
-use super::{FrameReader, FrameWriter, WriteError};
+use super::{error::WriteError, reader::FrameReader, writer::FrameWriter};
 use crate::{
     encode::Encode,
     stream::{Event, Framing},
@@ -54,10 +54,10 @@ impl<W: Write, const N: usize> FrameWriter<W, N> {
     }
 
     fn send(&mut self) -> Result<(), WriteError<W::Error>> {
-        while !self.unsent.is_empty() {
-            match self.port.write(&self.unsent).map_err(WriteError::Port)? {
+        while !self.outbox.is_empty() {
+            match self.port.write(self.outbox.unsent()).map_err(WriteError::Port)? {
                 0 => return Err(WriteError::Zero),
-                count => self.sent(count),
+                count => self.outbox.taken(count),
             }
         }
         Ok(())

@@ -1,8 +1,9 @@
 //! The decoder of the roles: less code, by way of the buffer alone.
 
+#[cfg(any(test, feature = "ikeya"))]
+use super::event::Event;
 use super::{
     decoder::{Decoder, Held},
-    event::Event,
     framing::Framing,
 };
 
@@ -12,6 +13,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     ///
     /// Slower for long inputs, and some 700 bytes of flash less: for the roles, which get a few
     /// bytes at a time.
+    #[cfg(any(test, feature = "ikeya"))]
     pub(crate) fn decode_buffered(&mut self, input: &mut &[u8]) -> Option<Event<F::Frame<'_>>> {
         let held = self.advance_buffered(input)?;
         self.held_event(held)

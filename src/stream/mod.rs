@@ -39,15 +39,17 @@ mod search;
 #[cfg(feature = "alloc")]
 pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
-#[cfg(any(feature = "ikeya", feature = "ucp"))]
+#[cfg(feature = "ucp")]
 pub(crate) use decoder::Held;
 pub use event::Event;
 pub use frames::Frames;
 pub use framing::{Batch, Framing, OneByOne, Verdict};
+#[cfg(feature = "ikeya")]
+pub(crate) use kernel::Accepted;
 #[cfg(all(test, feature = "std", any(feature = "ikeya", feature = "ucp")))]
 pub(crate) use kernel::tests::check_batches;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
-pub(crate) use kernel::{Accepted, Kernel, Rejected};
+pub(crate) use kernel::{Kernel, Rejected};
 pub use ledger::{Counters, Gap, Reason};
 #[cfg(feature = "simd")]
 pub use portable::Portable;

@@ -104,6 +104,7 @@ mod frame;
 mod framing;
 mod header;
 pub mod host;
+mod inbox;
 pub mod message;
 mod motor;
 mod report;

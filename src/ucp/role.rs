@@ -1,11 +1,7 @@
 //! What both roles are made of: received bytes and the frame going out.
 
 use super::{frame::Body, header::MAX_LEN, message::Message};
-use crate::{
-    encode::Encode,
-    inbox::{AfterIdle, Inbox},
-    time::{Duration, Instant, wire_time},
-};
+use crate::{encode::Encode, time::Duration};
 
 /// Shortest period or timeout that a role keeps: a shorter one would make its driver spin.
 pub(super) const SHORTEST: Duration = Duration::from_millis(1);
@@ -13,11 +9,6 @@ pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 /// Longest pause inside a frame that is sent: a robot of this crate gives one up soon after. Ruling U16
 /// has 20 ms.
 pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(5);
-
-/// An inbox in which a pause of two byte times and `margin` cuts a frame off.
-pub(super) fn inbox(baud: u32, margin: Duration, now: Instant) -> Inbox {
-    Inbox::new((wire_time(2, baud) + margin).max(SHORTEST), AfterIdle::GiveUpAll, now)
-}
 
 /// Writes a frame to the front of `buffer` and says how long it is.
 pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {

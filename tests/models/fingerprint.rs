@@ -26,32 +26,13 @@ pub(crate) struct Merge {
 
 /// Counters, settings that never change, and what has been handed out.
 #[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS: &[&str] = &[
-    "chunk_len",
-    "config",
-    "ledger",
-    "lost",
-    "packet",
-    "read_outcome",
-    "sent",
-    "since",
-    "statistics",
-];
+pub(crate) const COUNTERS: &[&str] =
+    &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics"];
 
 /// The same, and the last answer where no stop may hold its position.
 #[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
-    "chunk_len",
-    "config",
-    "ledger",
-    "lost",
-    "packet",
-    "read_outcome",
-    "sent",
-    "since",
-    "statistics",
-    "status",
-];
+pub(crate) const COUNTERS_AND_STATUS: &[&str] =
+    &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics", "status"];
 
 impl Merge {
     pub(crate) fn fingerprint(self, state: &impl Debug) -> u64 {

@@ -1,9 +1,9 @@
 //! The async motor-bus calls.
 
-use super::OnlineNodes;
-use crate::drive::{Driver, error::DriveError};
+use super::calls::OnlineNodes;
+use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{Needs, clock::Clock, error::Operation},
+    drive::{clock::Clock, driver::Needs, error::Operation},
     ikeya::{
         NodeId,
         board::{Board, Status, Target},

@@ -1,8 +1,8 @@
 //! The blocking rover-link calls.
 
-use crate::drive::{Driver, error::DriveError};
+use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{Needs, clock::Clock, error::Operation},
+    drive::{clock::Clock, driver::Needs, error::Operation},
     time::{Duration, Instant},
     ucp::{
         MotorControl,

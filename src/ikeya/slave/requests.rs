@@ -39,8 +39,8 @@ impl<B: Board> Requests<B> {
     }
 
     /// See [`Inbox::receive`].
-    pub(super) const fn receive(&mut self, chunk: &[u8], at: Instant, now: Instant) {
-        self.inbox.receive(chunk, at, now);
+    pub(super) const fn receive(&mut self, at: Instant, now: Instant) {
+        self.inbox.receive(at, now);
     }
 
     /// See [`Inbox::settle`].
@@ -98,6 +98,8 @@ impl<B: Board> Requests<B> {
         }
     }
 
+    // One copy: flash matters more than the call.
+    #[inline(never)]
     const fn pending(&self) -> usize {
         match &self.decoder {
             AnyDecoder::FourWire(decoder) => decoder.pending(),

@@ -309,7 +309,7 @@ impl<B: Board> Endpoint for Slave<B> {
         if !bytes.is_empty() {
             self.sent = None;
             self.overtake();
-            self.requests.receive(bytes, since, now);
+            self.requests.receive(since, now);
             self.receive(bytes, since);
         }
     }

@@ -11,15 +11,14 @@ use super::{
 };
 use crate::{
     endpoint::{Endpoint, Unsent},
-    inbox::Inbox,
     stream::Counters,
     time::{Duration, Instant, earliest, wire_time},
     ucp::{
         codes::{CalibrationKind, NetworkState},
-        framing::Decoder,
         header::MAX_LEN,
+        inbox::Inbox,
         motor::MotorControl,
-        role::{FRAME_PAUSE, inbox},
+        role::FRAME_PAUSE,
     },
 };
 
@@ -82,7 +81,6 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 pub struct Host<S = NoStore> {
-    decoder: Decoder,
     inbox: Inbox,
     outgoing: [u8; MAX_LEN],
     state: State<S>,
@@ -102,8 +100,7 @@ impl<S: BiasStore> Host<S> {
     pub fn with_store(config: HostConfig, store: S, now: Instant) -> Self {
         let config = config.sane();
         Self {
-            decoder: Decoder::new(),
-            inbox: inbox(config.baud, config.idle_margin, now),
+            inbox: Inbox::new(config.baud, config.idle_margin, now),
             outgoing: [0; MAX_LEN],
             state: State::new(config, store, now),
         }
@@ -279,7 +276,7 @@ impl<S: BiasStore> Host<S> {
     /// Where every received byte went.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        self.decoder.counters()
+        self.inbox.counters()
     }
 
     /// Events refused because nobody took the older ones out.
@@ -296,7 +293,7 @@ impl<S: BiasStore> Host<S> {
 
     /// Takes in the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8]) {
-        while let Some((frame, at)) = self.inbox.next(&mut self.decoder, &mut bytes) {
+        while let Some((frame, at)) = self.inbox.next(&mut bytes) {
             self.state.receive(frame, at);
         }
     }
@@ -325,8 +322,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        while self.inbox.settle(self.decoder.pending(), now) {
-            self.decoder.idle();
+        while self.inbox.settle(now) {
             self.receive(&[]);
         }
         self.state.expire(now);
@@ -361,7 +357,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        earliest(&[self.inbox.deadline(self.decoder.pending()), self.state.deadline()])
+        earliest(&[self.inbox.deadline(), self.state.deadline()])
     }
 }
 

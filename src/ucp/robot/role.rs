@@ -3,17 +3,16 @@
 use super::{config::RobotConfig, event::RobotEvent, state::State, statistics::RobotStatistics};
 use crate::{
     endpoint::{Endpoint, Unsent},
-    inbox::Inbox,
     stream::Counters,
     time::{Duration, Instant, earliest, reached, wire_time},
     ucp::{
         body::{ImuBias, MagBias},
         codes::{CalibrationKind, NetworkState, OtaStatus},
-        framing::Decoder,
         header::MAX_LEN,
+        inbox::Inbox,
         motor::MotorControl,
         report::Telemetry,
-        role::{FRAME_PAUSE, inbox},
+        role::FRAME_PAUSE,
     },
 };
 
@@ -55,7 +54,6 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 pub struct Robot {
-    decoder: Decoder,
     inbox: Inbox,
     outgoing: [u8; MAX_LEN],
     state: State,
@@ -67,8 +65,7 @@ impl Robot {
     pub fn new(config: RobotConfig, now: Instant) -> Self {
         let config = config.sane();
         Self {
-            decoder: Decoder::new(),
-            inbox: inbox(config.baud, config.idle_margin, now),
+            inbox: Inbox::new(config.baud, config.idle_margin, now),
             outgoing: [0; MAX_LEN],
             state: State::new(config, now),
         }
@@ -153,12 +150,12 @@ impl Robot {
     /// Where every received byte went.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        self.decoder.counters()
+        self.inbox.counters()
     }
 
     /// Takes in the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8], now: Instant) {
-        while let Some((frame, at)) = self.inbox.next(&mut self.decoder, &mut bytes) {
+        while let Some((frame, at)) = self.inbox.next(&mut bytes) {
             self.state.receive(frame, at, now);
         }
     }
@@ -184,8 +181,7 @@ impl Endpoint for Robot {
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        while self.inbox.settle(self.decoder.pending(), now) {
-            self.decoder.idle();
+        while self.inbox.settle(now) {
             self.receive(&[], now);
         }
         self.state.watch(now);
@@ -227,6 +223,6 @@ impl Endpoint for Robot {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        earliest(&[self.inbox.deadline(self.decoder.pending()), self.state.deadline()])
+        earliest(&[self.inbox.deadline(), self.state.deadline()])
     }
 }

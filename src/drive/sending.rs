@@ -1,10 +1,9 @@
 //! The frame that is being sent, and whether it is still worth sending.
 
-use heapless::Vec;
-
 use super::error::DriveError;
 use crate::{
     endpoint::Unsent,
+    outbox::Outbox,
     time::{Duration, Instant},
 };
 
@@ -13,8 +12,8 @@ pub(super) const FRAME_LEN: usize = 64;
 
 /// What is left of a frame.
 #[derive(Clone, Debug)]
-pub(super) struct Outbox {
-    rest: Vec<u8, FRAME_LEN>,
+pub(super) struct Sending {
+    outbox: Outbox<FRAME_LEN>,
     /// When the latest write began.
     asked_at: Instant,
     /// The frame, if a byte of it has left.
@@ -72,11 +71,11 @@ enum Flush {
     Failed,
 }
 
-impl Outbox {
+impl Sending {
     pub(super) const fn new() -> Self {
         let asked_at = Instant::from_micros(0);
         Self {
-            rest: Vec::new(),
+            outbox: Outbox::new(),
             asked_at,
             begun: None,
             flush: Flush::Done,
@@ -89,15 +88,13 @@ impl Outbox {
 
     /// Bytes that the port has not taken yet.
     pub(super) fn rest(&self) -> &[u8] {
-        &self.rest
+        self.outbox.unsent()
     }
 
     /// Takes in the next frame.
     pub(super) fn load<E>(&mut self, frame: &[u8]) -> Result<(), DriveError<E>> {
         let (length, limit) = (frame.len(), FRAME_LEN);
-        self.rest
-            .extend_from_slice(frame)
-            .map_err(|_| DriveError::FrameTooLong { length, limit })?;
+        self.outbox.extend(frame).ok_or(DriveError::FrameTooLong { length, limit })?;
         self.begun = None;
         Ok(())
     }
@@ -116,7 +113,7 @@ impl Outbox {
         now: Instant,
         silence: Duration,
     ) -> Option<Unsent> {
-        self.rest.drain(..count.min(self.rest.len()));
+        self.outbox.taken(count);
         self.flush = Flush::Due;
         let asked_at = self.asked_at;
         let before = self.begun.unwrap_or(Begun {
@@ -138,24 +135,24 @@ impl Outbox {
 
     /// Has all of a frame been taken, and only a flush in time shows that it had no pause?
     pub(super) fn is_in_doubt(&self) -> bool {
-        self.rest.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
+        self.outbox.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
     }
 
     /// Gives up what is no longer worth sending, for the role to decide anew: a frame of which
     /// nothing has left, and one that was cut off too long ago.
     pub(super) fn reclaim(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         match self.begun {
-            Some(frame) if !self.rest.is_empty() && now <= frame.left_at + silence => None,
+            Some(frame) if !self.outbox.is_empty() && now <= frame.left_at + silence => None,
             _ => self.give_up(),
         }
     }
 
     /// Gives up the frame.
     pub(super) fn give_up(&mut self) -> Option<Unsent> {
-        if self.rest.is_empty() && !self.is_in_doubt() {
+        if self.outbox.is_empty() && !self.is_in_doubt() {
             return None;
         }
-        self.rest.clear();
+        self.outbox.discard();
         Some(self.begun.take().map_or(Unsent::Untouched, |_| Unsent::CutOff))
     }
 

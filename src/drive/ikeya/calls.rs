@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{Driver, clock::Clock, error::DriveError};
+use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
     endpoint::Endpoint,
     ikeya::{
@@ -14,36 +14,31 @@ use crate::{
     time::{Duration, Instant},
 };
 
-#[cfg(feature = "embedded-io-async")]
-mod asynch;
-#[cfg(feature = "embedded-io")]
-mod blocking;
-
 /// The nodes that are online, in the order of their ids, and their modes.
 pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
 
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// When a call has taken too long: a discovery may be under way in front of it, each takes no
     /// longer than a read may, and a driver on a host comes late now and then.
-    fn bound(&mut self) -> Instant {
+    pub(super) fn bound(&mut self) -> Instant {
         self.now() + self.role.read_bound().saturating_mul(4)
     }
 
-    fn stop_deadline(&mut self) -> Instant {
+    pub(super) fn stop_deadline(&mut self) -> Instant {
         self.now() + self.role.stop_bound()
     }
 
-    fn is_online(&self, node: NodeId) -> bool {
+    pub(super) fn is_online(&self, node: NodeId) -> bool {
         matches!(self.role.health(node), Some(Health::Online | Health::Suspect(_)))
     }
 
-    fn begin_discovery(&mut self) {
+    pub(super) fn begin_discovery(&mut self) {
         let now = self.now();
         self.role.discover(now);
     }
 
     /// The nodes that are online, once the discovery is over; takes out what it has told.
-    fn discovered(&mut self) -> Option<OnlineNodes> {
+    pub(super) fn discovered(&mut self) -> Option<OnlineNodes> {
         self.role.retain_events(|event| {
             !matches!(
                 event,
@@ -66,11 +61,11 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// The role has the latest reading of each node.
-    fn drop_readings(&mut self) {
+    pub(super) fn drop_readings(&mut self) {
         self.role.retain_events(|event| !matches!(event, MasterEvent::Status { .. }));
     }
 
-    fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
+    pub(super) fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
         let now = self.now();
         match target {
             Target::Velocity(velocity) => self.role.set_velocity(node, velocity, now),
@@ -79,7 +74,11 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// Whether the set-point has left, once that is settled: it may be dropped while it waits.
-    fn aimed(&mut self, node: NodeId, target: Target<B>) -> Option<Result<(), CommandError>> {
+    pub(super) fn aimed(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+    ) -> Option<Result<(), CommandError>> {
         self.drop_readings();
         if let Err(error) = self.still_aimed(node, target) {
             return Some(Err(error));
@@ -90,8 +89,8 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// A call that fails leaves no set-point behind, nor the rest of a packet, which would make a cut
     /// set-point whole. The node may have heard it all the same, and its order before is gone: it is
     /// owed a stop.
-    fn withdraw(&mut self, node: NodeId) {
-        let cut_off = self.outbox.give_up();
+    pub(super) fn withdraw(&mut self, node: NodeId) {
+        let cut_off = self.sending.give_up();
         self.tell_unsent(cut_off);
         if self.role.set_point(node).is_some() {
             self.begin_stop(node);
@@ -99,7 +98,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// Whether a node still has this set-point, and why not.
-    fn still_aimed(&self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
+    pub(super) fn still_aimed(&self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
         if self.role.set_point(node) == Some(target) {
             return Ok(());
         }
@@ -108,14 +107,14 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// Asks for a READ; what was heard before is not its answer.
-    fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
+    pub(super) fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
         let now = self.now();
         self.drop_readings();
         self.role.read(node, now)
     }
 
     /// The answer of a node, or why there is none.
-    fn answer<E>(&mut self, node: NodeId) -> Option<Result<Status<B>, DriveError<E>>> {
+    pub(super) fn answer<E>(&mut self, node: NodeId) -> Option<Result<Status<B>, DriveError<E>>> {
         self.drop_readings();
         let outcome = self.role.read_outcome(node)?;
         let Err(cause) = outcome else {
@@ -127,24 +126,24 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         Some(Err(DriveError::ReadFailed { node, cause }))
     }
 
-    fn begin_stop(&mut self, node: NodeId) {
+    pub(super) fn begin_stop(&mut self, node: NodeId) {
         let now = self.now();
         self.role.stop(node, now);
     }
 
-    fn begin_stop_all(&mut self) {
+    pub(super) fn begin_stop_all(&mut self) {
         let now = self.now();
         self.role.stop_all(now);
     }
 
     /// Of these nodes, those whose stop is still owed.
-    fn owed(&mut self, nodes: NodeSet) -> NodeSet {
+    pub(super) fn owed(&mut self, nodes: NodeSet) -> NodeSet {
         self.drop_readings();
         self.role.stops_owed().and(nodes)
     }
 
     /// Of these nodes, those that have not been measured standing still.
-    fn moving(&mut self, nodes: NodeSet) -> NodeSet {
+    pub(super) fn moving(&mut self, nodes: NodeSet) -> NodeSet {
         self.drop_readings();
         let mut moving = nodes;
         for node in nodes.iter() {
@@ -160,7 +159,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     }
 
     /// A sign of life; says when to give the next one, well before the dead-man.
-    fn keep_alive(&mut self) -> Instant {
+    pub(super) fn keep_alive(&mut self) -> Instant {
         let now = self.now();
         self.role.keep_alive(now);
         let limit = self.role.config().dead_man.map_or(u32::MAX, |limit| limit.as_micros() / 2);
@@ -170,7 +169,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
 
 impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
     /// A command; or its absence, whose event stays to be taken out.
-    fn command(&mut self) -> Option<Option<Target<B>>> {
+    pub(super) fn command(&mut self) -> Option<Option<Target<B>>> {
         match *self.role.peek_event()? {
             SlaveEvent::Command(target) => {
                 self.role.poll_event();

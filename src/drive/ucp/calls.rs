@@ -1,6 +1,6 @@
 //! High-level rover-link calls: what the blocking and the async ones have in common.
 
-use super::{Driver, clock::Clock, error::DriveError};
+use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
     time::{Duration, Instant},
     ucp::{
@@ -11,16 +11,11 @@ use crate::{
     },
 };
 
-#[cfg(feature = "embedded-io-async")]
-mod asynch;
-#[cfg(feature = "embedded-io")]
-mod blocking;
-
 /// Time in which a stop has to be flushed: the period of motor commands (ruling U16).
 const STOP_BOUND: Duration = Duration::from_millis(100);
 
 impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
-    fn command(&mut self, speed: i16, angular: i16) -> Result<(), CommandError> {
+    pub(super) fn command(&mut self, speed: i16, angular: i16) -> Result<(), CommandError> {
         let now = self.now();
         let is_lit = self.role.command().is_some_and(|command| command.front_led() != 0);
         let command = MotorControl::new(speed, angular).map_err(CommandError::Value)?;
@@ -29,44 +24,44 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
 
     /// When to say a command again that is to go on: long before the host takes its application for
     /// dead.
-    fn renew_at(&mut self) -> Instant {
+    pub(super) fn renew_at(&mut self) -> Instant {
         let half_us = self.role.config().dead_man.as_micros() / 2;
         self.now() + Duration::from_micros(half_us.max(1))
     }
 
-    fn begin_stop(&mut self) {
+    pub(super) fn begin_stop(&mut self) {
         let now = self.now();
         self.role.stop(now);
     }
 
-    fn stop_deadline(&mut self) -> Instant {
+    pub(super) fn stop_deadline(&mut self) -> Instant {
         self.now() + STOP_BOUND
     }
 
     /// Has the stop left the port?
-    fn stopped(&mut self) -> Option<()> {
+    pub(super) fn stopped(&mut self) -> Option<()> {
         self.drop_routine();
         (self.role.is_stop_sent() && self.is_sent()).then_some(())
     }
 
     /// The host has the latest report, and counts both.
-    fn drop_routine(&mut self) {
+    pub(super) fn drop_routine(&mut self) {
         self.role
             .retain_events(|event| !matches!(event, HostEvent::Report(_) | HostEvent::Pong { .. }));
     }
 
     /// The round trip of the next pong; call it once before, to forget the one that is there.
-    fn pong(&mut self) -> Option<Duration> {
+    pub(super) fn pong(&mut self) -> Option<Duration> {
         self.drop_routine();
         self.role.take_round_trip()
     }
 
-    fn report(&mut self) -> Option<ReceivedReport> {
+    pub(super) fn report(&mut self) -> Option<ReceivedReport> {
         self.drop_routine();
         self.role.take_report()
     }
 
-    fn begin_calibration(
+    pub(super) fn begin_calibration(
         &mut self,
         step: CalibrationStep,
         kind: CalibrationKind,
@@ -82,7 +77,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         }
     }
 
-    fn drop_calibration_events(&mut self) {
+    pub(super) fn drop_calibration_events(&mut self) {
         self.role.retain_events(|event| {
             !matches!(
                 event,
@@ -94,7 +89,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     }
 
     /// What the request has come to. There is one at a time, so it is that of this call.
-    fn calibration<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
+    pub(super) fn calibration<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
         self.drop_routine();
         let outcome = self.role.calibration_outcome()?;
         // It is returned instead of told.
@@ -104,7 +99,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
 }
 
 impl<P, C: Clock> Driver<Robot, P, C> {
-    fn new_command(&mut self) -> Option<MotorControl> {
+    pub(super) fn new_command(&mut self) -> Option<MotorControl> {
         let now = self.now();
         self.role
             .retain_events(|event| !matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog));

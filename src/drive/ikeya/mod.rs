@@ -1,0 +1,9 @@
+//! High-level motor-bus calls, blocking and async.
+
+#[cfg(feature = "embedded-io-async")]
+mod asynch;
+#[cfg(feature = "embedded-io")]
+mod blocking;
+mod calls;
+
+pub use calls::OnlineNodes;
