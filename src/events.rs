@@ -2,7 +2,9 @@
 
 use heapless::Deque;
 
+#[cfg(feature = "ikeya")]
 use crate::stats::count;
+use crate::stats::count_apart;
 
 /// A queue of at most `N` events, in their order.
 ///
@@ -27,14 +29,14 @@ impl<E, const N: usize> Events<E, N> {
     /// Queues a rare event that nobody can keep or repeat.
     pub(crate) fn push(&mut self, event: E) {
         if self.keep(event).is_err() {
-            count(&mut self.lost);
+            count_apart(&mut self.lost);
         }
     }
 
     /// Queues an event that comes all the time, or again by itself.
     pub(crate) fn push_frequent(&mut self, event: E) {
         if self.is_reserved() {
-            count(&mut self.lost);
+            count_apart(&mut self.lost);
         } else {
             self.push(event);
         }
@@ -50,7 +52,7 @@ impl<E, const N: usize> Events<E, N> {
         match newest {
             Some(newest) if is_reserved => {
                 *newest = event;
-                count(&mut self.lost);
+                count_apart(&mut self.lost);
             }
             _ => self.push(event),
         }

@@ -3,6 +3,7 @@
 #![cfg_attr(target_pointer_width = "64", allow(dead_code, reason = "a host uses the lanes only"))]
 
 /// `x^15 + x + 1`, a factor of the polynomial.
+#[cfg(any(test, target_pointer_width = "64", feature = "ikeya"))]
 pub(crate) const TRINOMIAL: u16 = 0xC001;
 
 /// Zero for a good frame of 4 bytes, one word. Has no branches, so it can be done in lanes.

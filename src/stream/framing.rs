@@ -76,7 +76,8 @@ pub enum Verdict {
 /// let mut input = &bytes[..];
 /// assert!(matches!(decoder.decode(&mut input), Some(Event::Skipped(gap)) if gap.len == 1));
 /// assert_eq!(decoder.decode(&mut input), Some(Event::Frame(&[10, 20][..])));
-/// assert_eq!((decoder.decode(&mut input), decoder.pending()), (None, 2));
+/// assert_eq!(decoder.decode(&mut input), None);
+/// assert_eq!(decoder.pending(), 2);
 /// ```
 ///
 /// A `judge` that breaks its contract can neither make these loop nor panic, and the account holds. A

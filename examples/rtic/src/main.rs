@@ -18,7 +18,7 @@ mod app {
             Position, Rps, Slave, Target,
             slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
         },
-        time::{Duration, Wrapping32},
+        time::{Duration, Instant, Wrapping32},
     };
     use heapless::spsc::{Consumer, Producer, Queue};
     use rtic_sync::signal::{Signal, SignalReader, SignalWriter};

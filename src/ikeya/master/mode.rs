@@ -12,7 +12,7 @@ use crate::{
         board::{Board, Status, Target},
         units::{Mode, NodeId},
     },
-    stats::count,
+    stats::count_apart,
 };
 
 /// What an answer says about the mode.
@@ -46,7 +46,7 @@ impl<B: Board> Node<B> {
     /// Puts the mode in doubt. A position that was held is to be measured anew. Says whether that
     /// ends a confirmation.
     fn doubt_mode(&mut self) -> bool {
-        count(&mut self.statistics.other_mode);
+        count_apart(&mut self.statistics.other_mode);
         if self.doubt.is_some() {
             return false;
         }

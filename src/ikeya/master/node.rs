@@ -14,7 +14,7 @@ use crate::{
         board::{Board, Status, Target},
         units::{Mode, NodeId},
     },
-    stats::count,
+    stats::count_apart,
     time::Instant,
 };
 
@@ -219,9 +219,9 @@ impl<B: Board> Node<B> {
     /// A request that it is to answer has been sent.
     #[inline(never)]
     pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
-        count(&mut self.statistics.requests);
+        count_apart(&mut self.statistics.requests);
         if self.attempt > 0 {
-            count(&mut self.statistics.retries);
+            count_apart(&mut self.statistics.retries);
         }
         (self.is_asked, self.is_written) = (false, false);
         let is_lost = !self.is_online();

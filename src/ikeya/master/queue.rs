@@ -31,7 +31,7 @@ use crate::{
         units::NodeId,
         wire::ReadRequest,
     },
-    stats::{count, uncount},
+    stats::{count_apart, uncount},
     time::{Duration, Instant, wire_time},
 };
 
@@ -184,7 +184,7 @@ impl<B: Board> Master<B> {
             Request::Read => &mut self.statistics.reads,
             Request::Write(_) => &mut self.statistics.writes,
         };
-        count(counter);
+        count_apart(counter);
         let index = index & 7;
         if matches!(request, Request::Write(_)) {
             self.nodes[index].wrote();

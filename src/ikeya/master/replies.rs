@@ -15,7 +15,7 @@ use crate::{
         units::NodeId,
         wire::ReadRequest,
     },
-    stats::{add, count},
+    stats::{add, count_apart},
     stream::Event,
     time::{Duration, Instant, wire_time},
 };
@@ -67,7 +67,7 @@ impl<B: Board> Master<B> {
                 // No line is that fast, even if the clock is a little coarse.
                 if now < window.request_end + half_answer && !accepts_early {
                     window.heard = Heard::Others;
-                    count(&mut statistics.early);
+                    count_apart(&mut statistics.early);
                     return self.hear_mode_outside_window(id, status.mode());
                 }
                 let request_end = window.request_end;
@@ -80,7 +80,7 @@ impl<B: Board> Master<B> {
                 if let Some(window) = window {
                     window.heard = Heard::Others;
                 }
-                count(&mut statistics.late);
+                count_apart(&mut statistics.late);
                 self.hear_mode_outside_window(id, status.mode());
             }
         }

@@ -18,7 +18,7 @@ use crate::{
         board::{Board, OneMotor, PACKET_LEN, Status, Target},
         units::NodeId,
     },
-    stats::{add, count},
+    stats::{add, count_apart},
     stream::{Decoder, Framing},
     time::{Duration, Instant, wire_time},
 };
@@ -301,7 +301,7 @@ impl<B: Board> Master<B> {
 
     pub(super) fn expire_commands(&mut self, now: Instant) {
         if self.dead_man_at().is_some_and(|at| now >= at) {
-            count(&mut self.statistics.dead_man);
+            count_apart(&mut self.statistics.dead_man);
             self.tell(MasterEvent::DeadMan);
             for id in NodeId::ALL {
                 if self.node(id).is_under_order {

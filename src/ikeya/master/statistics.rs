@@ -1,7 +1,7 @@
 //! Counts of a line and of its nodes.
 
 use crate::{
-    stats::{Latency, count},
+    stats::{Latency, count_apart},
     time::Duration,
 };
 
@@ -69,7 +69,7 @@ impl NodeStatistics {
     };
 
     pub(super) fn reply(&mut self, latency: Duration) {
-        count(&mut self.replies);
+        count_apart(&mut self.replies);
         self.latency.add(latency);
     }
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     ikeya::{board::Board, units::NodeId},
-    stats::count,
+    stats::count_apart,
     time::{Duration, Instant},
 };
 
@@ -26,9 +26,9 @@ impl<B: Board> Master<B> {
         let (attempts, guard) = (self.config.attempts.max(1), self.config.late_guard);
         let node = self.node_mut(id);
         node.guarded_until = Some(deadline + guard);
-        count(&mut node.statistics.timeouts);
+        count_apart(&mut node.statistics.timeouts);
         if cause == Cause::Damaged {
-            count(&mut node.statistics.crc_errors);
+            count_apart(&mut node.statistics.crc_errors);
         }
         if let Some(stop) = &mut node.stop {
             // The WRITE may be what was lost: it is repeated.
@@ -48,7 +48,7 @@ impl<B: Board> Master<B> {
         let mut is_unconfirmed = false;
         if is_failed {
             (node.attempt, node.read_outcome) = (0, Some(Err(cause)));
-            count(&mut node.statistics.failures);
+            count_apart(&mut node.statistics.failures);
             is_unconfirmed =
                 core::mem::replace(&mut node.confirm, Confirm::Unasked) != Confirm::Unasked;
         }

@@ -98,8 +98,6 @@ impl<B: Board> Requests<B> {
         }
     }
 
-    // One copy: flash matters more than the call.
-    #[inline(never)]
     const fn pending(&self) -> usize {
         match &self.decoder {
             AnyDecoder::FourWire(decoder) => decoder.pending(),

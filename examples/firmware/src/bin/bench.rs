@@ -116,7 +116,8 @@ fn checksums(answer: &[u8], report: &[u8]) {
 /// From the last byte of a READ to the answer. The goal is 50 µs at 168 MHz (ruling I9), at 1.5
 /// cycles per instruction.
 fn read_to_answer() {
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
+    let mut slave: Slave =
+        Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
     slave.set_velocity(rps(1.0));
     let request = ReadRequest::new(NodeId::N2);
     let expected = VelocityResponse::new(NodeId::N2, rps(1.0));

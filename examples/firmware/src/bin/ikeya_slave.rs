@@ -77,7 +77,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
         });
         let now = driver.now();
         let slave = driver.role_mut();
-        motor.obey(slave.command(), mode);
+        motor.obey(slave.command(now), mode);
         motor.step(now - last);
         slave.set_velocity(motor.velocity());
         slave.set_position(motor.position());
@@ -86,7 +86,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
         let asked = board.text.poll_byte().is_some();
         if asked || now >= report_at {
             let mut line = Line::new("slave");
-            report(&mut line, slave, &motor, stops);
+            report(&mut line, slave, &motor, stops, now);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             // Requests that come faster than lines can be sent are dropped.
             board.text.try_send(line.end());
@@ -98,11 +98,11 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
 }
 
 /// All values that a test or a user may want to see.
-fn report(line: &mut Line, slave: &Slave, motor: &Motor, stops: u32) {
+fn report(line: &mut Line, slave: &Slave, motor: &Motor, stops: u32, now: Instant) {
     let SlaveStatistics { reads, writes, refused, foreign, replies, overtaken, expired, .. } =
         *slave.statistics();
     line.count("node", slave.node().get().into());
-    match slave.command() {
+    match slave.command(now) {
         Some(Target::Velocity(to)) => line.thousandths("target_mrps", to.get()),
         Some(Target::Position(to)) => line.number("target_counts", to.counts()),
         None => line.word("target none"),

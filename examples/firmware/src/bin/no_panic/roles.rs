@@ -54,8 +54,8 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
             15 => keep((master.lost_events(), master.counters())),
             10 => {
                 let statistics = master.node_statistics(node);
-                keep((statistics.latency_min(), statistics.latency_max()));
-                keep((statistics.latency_mean(), master.statistics()));
+                keep((statistics.latency.min(), statistics.latency.max()));
+                keep((statistics.latency.mean(), master.statistics()));
             }
             _ => turn(&mut master),
         }
@@ -66,16 +66,15 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 fn slave<B: Board>(velocity: B::Velocity, position: B::Position) {
     let config = any(SlaveConfig::at(any(0)));
     if let Ok(dip) = DipSwitch::from_bits(any(0)) {
-        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config, Instant::from_micros(0)));
+        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config, now()));
     }
-    let mut slave =
-        any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, Instant::from_micros(0)));
+    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, now()));
     while any(true) {
         match any(0) {
             0 => slave.set_velocity(any(velocity)),
             1 => slave.set_position(any(position)),
             2 => slave.set_mode(any(Mode::Position)),
-            3 => keep((slave.node(), slave.mode(), slave.command())),
+            3 => keep((slave.node(), slave.mode(), slave.command(now()))),
             4 => keep((slave.statistics(), slave.counters())),
             _ => turn(&mut slave),
         }
