@@ -152,6 +152,7 @@ impl Sub for Instant {
 /// assert_eq!((after - before).as_micros(), 0x20);
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Wrapping32 {
     last: u64,
 }

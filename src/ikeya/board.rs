@@ -124,6 +124,7 @@ const fn is_still_on_wire(payload: [u8; 4]) -> bool {
 
 /// What a motor is to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Target<B: Board = OneMotor> {
     /// Turn, revolutions per second.
     Velocity(B::Velocity),
@@ -156,6 +157,7 @@ impl<B: Board> Target<B> {
 
 /// What a node measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status<B: Board = OneMotor> {
     /// Of a velocity node, revolutions per second: any `f32`.
     Velocity(B::RawVelocity),

@@ -4,6 +4,7 @@ use super::{kernel::Kernel, ledger::Reason};
 
 /// What the front of a slice is.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
     /// A whole frame with the right CRC.
     Frame {

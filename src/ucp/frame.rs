@@ -108,6 +108,7 @@ impl Frame {
 
 /// A received frame to be sent on byte for byte; see [`Frame::relay_unchecked`].
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayedFrame<'a>(&'a Frame);
 
 impl Encode for RelayedFrame<'_> {

@@ -1,10 +1,11 @@
 //! Framings of others: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
-use axlewire::stream::{Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict};
+use axlewire::stream::{
+    Counters, Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict, decode_capture,
+};
 
-/// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs
-/// nothing, a refusal of more than there is.
+/// A framing that breaks its contract.
 struct Liar<const LIE: u8>;
 
 impl<const LIE: u8> Framing for Liar<LIE> {
@@ -14,47 +15,123 @@ impl<const LIE: u8> Framing for Liar<LIE> {
     const MAX_LEN: usize = 4;
 
     fn judge(bytes: &[u8]) -> Verdict {
+        let reason = Reason::Crc;
         match LIE {
-            _ if bytes.is_empty() => Verdict::Partial { need: 1 },
+            // A frame longer than the bytes, of no bytes, of more than any length.
             0 => Verdict::Frame { len: bytes.len() + 1 },
-            1 => Verdict::Partial { need: 0 },
-            2 => Verdict::Reject { reason: Reason::Crc, more: bytes.len() + 5 },
-            _ => Verdict::Partial { need: usize::MAX },
+            1 => Verdict::Frame { len: 0 },
+            2 => Verdict::Frame { len: usize::MAX },
+            // A candidate that needs nothing, what it has, everything, one more for ever.
+            3 => Verdict::Partial { need: 0 },
+            4 => Verdict::Partial { need: bytes.len() },
+            5 => Verdict::Partial { need: usize::MAX },
+            6 => Verdict::Partial { need: bytes.len() + 1 },
+            // A rejection of more than there is, and of an empty slice.
+            7 => Verdict::Reject { reason, more: bytes.len() + 5 },
+            8 => Verdict::Reject { reason, more: usize::MAX },
+            // Behind a rejection: a frame longer than the bytes, of no bytes.
+            9 if bytes.first() == Some(&9) => Verdict::Reject { reason, more: 0 },
+            9 => Verdict::Frame { len: bytes.len() + 1 },
+            10 if bytes.first() == Some(&9) => Verdict::Reject { reason, more: 0 },
+            10 => Verdict::Frame { len: 0 },
+            // A frame longer than `MAX_LEN`, and one without a view.
+            11 => Verdict::Frame { len: bytes.len() },
+            _ => Verdict::Frame { len: bytes.len().min(2) },
         }
     }
 
     fn view(frame: &[u8]) -> Option<&[u8]> {
-        Some(frame)
+        (LIE < 12).then_some(frame)
     }
 }
 
-#[test]
-fn a_framing_that_lies_hangs_nothing() {
-    fn feed<const LIE: u8>() {
-        let mut decoder = Decoder::<Liar<LIE>, 4>::new();
-        let mut most = 1000;
-        let mut drain = |decoder: &mut Decoder<Liar<LIE>, 4>, mut input: &[u8]| {
-            while decoder.decode(&mut input).is_some() || decoder.poll().is_some() {
-                most -= 1;
-                assert!(most > 0, "lie {LIE} is told for ever");
-            }
-        };
-        drain(&mut decoder, &[1; 10]);
-        for byte in 0..9 {
-            decoder.push(byte);
-            drain(&mut decoder, &[]);
+/// Stops a test that does not end.
+struct Limit(u32);
+
+impl Limit {
+    fn step(&mut self) {
+        self.0 = self.0.checked_sub(1).expect("the lie is told for ever");
+    }
+}
+
+fn check_account(counters: Counters, pending: usize) {
+    assert_eq!(counters.received, counters.framed + counters.skipped() + pending as u64);
+}
+
+fn feed_decoder<const LIE: u8, const N: usize>(bytes: &[u8], chunk: usize) {
+    let mut limit = Limit(1000);
+    let mut decoder = Decoder::<Liar<LIE>, N>::new();
+    for mut input in bytes.chunks(chunk) {
+        while decoder.decode(&mut input).is_some() {
+            limit.step();
         }
-        decoder.spare().fill(3);
-        decoder.commit(4);
-        drain(&mut decoder, &[4; 3]);
+    }
+    for &byte in bytes {
+        if decoder.push(byte) {
+            while decoder.poll().is_some() {
+                limit.step();
+            }
+        }
+    }
+    let room = decoder.spare();
+    let len = room.len();
+    room.fill(9);
+    decoder.commit(len);
+    while decoder.poll().is_some() {
+        limit.step();
+    }
+    check_account(decoder.counters(), decoder.pending());
+    while decoder.pending() > 0 {
+        limit.step();
         decoder.idle();
-        drain(&mut decoder, &[5; 9]);
-        assert!(Frames::<Liar<LIE>>::new(&[6; 9]).take(10).count() <= 1);
+        while decoder.poll().is_some() {
+            limit.step();
+        }
+    }
+    check_account(decoder.counters(), 0);
+}
+
+fn feed_slice<const LIE: u8>(bytes: &[u8]) {
+    let mut limit = Limit(1000);
+    let mut frames = Frames::<Liar<LIE>>::new(bytes);
+    while !frames.rest().is_empty() {
+        limit.step();
+        frames.by_ref().for_each(|_| limit.step());
+        check_account(frames.counters(), frames.rest().len());
+        frames.idle();
+    }
+    let mut each = Frames::<Liar<LIE>>::new(bytes);
+    each.each(|_| limit.step());
+    check_account(each.counters(), each.rest().len());
+    let (_, counters) = decode_capture::<Liar<LIE>>(bytes);
+    check_account(counters, 0);
+    assert_eq!(counters.received, bytes.len() as u64);
+}
+
+#[test]
+fn a_framing_that_breaks_its_contract_neither_loops_nor_panics_and_the_account_holds() {
+    fn feed<const LIE: u8>() {
+        for bytes in [&[1; 10][..], &[9, 1, 9, 9, 1, 1, 9, 1, 1, 1], &[9; 7], &[0], &[]] {
+            for chunk in [1, 2, 3, 5, 100] {
+                feed_decoder::<LIE, 4>(bytes, chunk);
+                feed_decoder::<LIE, 9>(bytes, chunk);
+            }
+            feed_slice::<LIE>(bytes);
+        }
     }
     feed::<0>();
     feed::<1>();
     feed::<2>();
     feed::<3>();
+    feed::<4>();
+    feed::<5>();
+    feed::<6>();
+    feed::<7>();
+    feed::<8>();
+    feed::<9>();
+    feed::<10>();
+    feed::<11>();
+    feed::<12>();
 }
 
 /// Frames of three bytes that begin with F, but judged only when eight bytes are there.

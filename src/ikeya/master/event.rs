@@ -10,6 +10,7 @@ use crate::ikeya::{
 
 /// What the master tells its application.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MasterEvent<B: Board = OneMotor> {
     /// A node has answered for the first time.

@@ -12,7 +12,7 @@ use axlewire::{
         self, Mode, NodeId, Slave, Target,
         slave::{DipSwitch, IdReading, SlaveConfig, SlaveStatistics},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 use axlewire_firmware::{
     board::{BUS, Board},
