@@ -5,7 +5,7 @@ use clap::ValueEnum;
 
 /// The port of a subcommand.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Line {
+pub(crate) struct PortArgs {
     /// The serial port, such as /dev/ttyUSB0
     #[arg(long, value_name = "PATH")]
     pub(crate) port: String,

@@ -15,7 +15,7 @@ use axlewire::{
 use crate::{
     args,
     failure::Failure,
-    port::{Line, Port},
+    port::{Port, Transport},
     signals::{ABSENCE, Awake, Signals},
 };
 
@@ -43,7 +43,7 @@ const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 #[derive(Debug, clap::Args)]
 pub(crate) struct MasterArgs {
     #[command(flatten)]
-    line: args::Line,
+    line: args::PortArgs,
 
     /// Wait 500 us for an answer, as the protocol specifies, instead of the 20 ms that a USB
     /// adapter may need; for a UART built into this machine
@@ -116,7 +116,7 @@ impl Bus {
 }
 
 impl<B: Boards> Bus<B> {
-    pub(crate) fn open_with(line: &args::Line, config: MasterConfig) -> Result<Self, Failure> {
+    pub(crate) fn open_with(line: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
         let port = Port::open(line, ikeya::BAUD)?;
         let mut config = config;
         config.baud = line.baud.unwrap_or(ikeya::BAUD);

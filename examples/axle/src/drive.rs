@@ -8,7 +8,7 @@ use axlewire::{
 use crate::{
     MOTION_HELP, args,
     failure::Failure,
-    port::Line,
+    port::Transport,
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
@@ -27,7 +27,7 @@ use crate::{
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
-    line: args::Line,
+    line: args::PortArgs,
 
     /// Speed, -100 to 100 percent; positive is forward
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = percent())]
@@ -116,14 +116,14 @@ impl Drive {
                 break;
             }
             let driven = self.rover.host.drive(command, now);
-            driven.map_err(|error| Failure::Undone(error.to_string()))?;
+            driven.map_err(|error| Failure::Failed(error.to_string()))?;
             self.rover.round((now + CALL_PERIOD).min(end).min(print_at))?;
             attendance.check(self.rover.port.now())?;
             if self.rover.has_dead_man_fired {
-                return Err(Failure::Undone(DEAD_MAN.to_owned()));
+                return Err(Failure::Failed(DEAD_MAN.to_owned()));
             }
             if self.rover.host.link() == Link::Down {
-                return Err(Failure::Undone("the robot is no longer heard".to_owned()));
+                return Err(Failure::Failed("the robot is no longer heard".to_owned()));
             }
             if self.rover.port.now() >= print_at {
                 print_at = self.rover.port.now() + PRINT_PERIOD;

@@ -26,7 +26,7 @@ pub(crate) enum Failure {
     /// rover.
     PortLost { path: String, cause: String, moving: Option<String> },
     /// The operation failed.
-    Undone(String),
+    Failed(String),
 }
 
 impl Failure {
@@ -52,7 +52,7 @@ impl Failure {
     /// Adds `besides` to the message of a failed operation.
     pub(crate) fn and(self, besides: &str) -> Self {
         match self {
-            Self::Undone(line) => Self::Undone(format!("{line}; {besides}")),
+            Self::Failed(line) => Self::Failed(format!("{line}; {besides}")),
             other => other,
         }
     }
@@ -78,7 +78,7 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(line) | Self::Undone(line) => f.write_str(line),
+            Self::Usage(line) | Self::Failed(line) => f.write_str(line),
             Self::Open { path, error } => write!(f, "cannot open {path:?}: {error}"),
             Self::Directory { path } => write!(f, "cannot read {path:?}: it is a directory"),
             Self::Read { path: Some(path), error } => write!(f, "cannot read {path:?}: {error}"),

@@ -23,7 +23,7 @@ use serialport::{
 
 use crate::{
     bus::{Bus, Halt},
-    port::{Line, Port},
+    port::{Port, Transport},
     rover::Rover,
 };
 

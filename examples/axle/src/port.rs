@@ -41,7 +41,7 @@ pub(crate) struct NotSent {
 }
 
 /// Bytes in both directions, and a clock.
-pub(crate) trait Line {
+pub(crate) trait Transport {
     /// The time since the line was opened.
     fn now(&self) -> Instant;
 
@@ -106,7 +106,7 @@ pub(crate) struct Port {
 
 impl Port {
     /// Opens a port for exclusive use, and discards bytes received before.
-    pub(crate) fn open(line: &args::Line, default_baud: u32) -> Result<Self, Failure> {
+    pub(crate) fn open(line: &args::PortArgs, default_baud: u32) -> Result<Self, Failure> {
         let (path, baud) = (&line.port, line.baud.unwrap_or(default_baud));
         let refused = |cause| Failure::Port { path: path.clone(), cause };
         let tty =
@@ -135,7 +135,7 @@ impl Port {
         is_pseudo_terminal(&self.path)
     }
 
-    /// Like [`Line::receive`], but the bytes are mutable.
+    /// Like [`Transport::receive`], but the bytes are mutable.
     pub(crate) fn fill(&mut self, until: Instant) -> Result<&mut [u8], Failure> {
         let wait = Duration::from_micros((until - self.now()).as_micros().into()).min(PATIENCE);
         self.set_timeout(wait)?;
@@ -165,7 +165,7 @@ impl Port {
     }
 }
 
-impl Line for Port {
+impl Transport for Port {
     fn now(&self) -> Instant {
         Instant::from_micros(self.start.elapsed().as_micros() as u64)
     }

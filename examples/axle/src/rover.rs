@@ -14,7 +14,7 @@ use axlewire::{
 use crate::{
     args,
     failure::Failure,
-    port::{Line, Port},
+    port::{Port, Transport},
     signals::Awake,
 };
 
@@ -53,7 +53,7 @@ pub(crate) struct Rover {
 }
 
 impl Rover {
-    pub(crate) fn open(line: &args::Line) -> Result<Self, Failure> {
+    pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
         let port = Port::open(line, ucp::BAUD)?;
         let mut config = HostConfig::default();
         config.baud = line.baud.unwrap_or(ucp::BAUD);
@@ -75,7 +75,7 @@ impl Rover {
                     0 => "nothing".to_owned(),
                     bytes => format!("{bytes} bytes but no message"),
                 };
-                return Err(Failure::Undone(format!(
+                return Err(Failure::Failed(format!(
                     "no robot answers on {path:?}: {heard} received in {seconds} s"
                 )));
             }
@@ -129,7 +129,7 @@ impl Rover {
             return Err(failure.while_moving(OUT_OF_REACH));
         }
         let sent = self.host.statistics().commands.saturating_sub(sent);
-        Err(Failure::Undone(match self.host.link() {
+        Err(Failure::Failed(match self.host.link() {
             Link::Up => {
                 format!("the robot was told {sent} times to stop, but its wheels are still turning")
             }

@@ -74,7 +74,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     let mut bus = Bus::open(&args.bus)?;
     if !bus.discover(&signals)? {
-        return Err(Failure::Undone("interrupted before all ids were asked".to_owned()));
+        return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
     }
     let print = if args.json { print_json } else { print_table };
     print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)

@@ -88,7 +88,7 @@ impl Signals {
         if self.suspend.load(Ordering::SeqCst) {
             return Ok(());
         }
-        Err(Failure::Undone("interrupted before anything moved".to_owned()))
+        Err(Failure::Failed("interrupted before anything moved".to_owned()))
     }
 
     /// Returns `result` if Ctrl-Z was not pressed. Otherwise prints its failure, suspends the
@@ -109,7 +109,7 @@ impl Signals {
         let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
         let line =
             "suspended by Ctrl-Z: everything that moved was told to stop first and stays stopped";
-        Err(Failure::Undone(line.to_owned()))
+        Err(Failure::Failed(line.to_owned()))
     }
 }
 
@@ -118,7 +118,7 @@ fn listen_to(signals: &[i32], flag: &Arc<AtomicBool>) -> Result<(), Failure> {
     signals
         .iter()
         .try_for_each(register)
-        .map_err(|error: io::Error| Failure::Undone(format!("cannot listen for signals: {error}")))
+        .map_err(|error: io::Error| Failure::Failed(format!("cannot listen for signals: {error}")))
 }
 
 /// Time for which the tool was running, for deadlines: a suspended stop still gets all of its time
@@ -169,6 +169,6 @@ impl Attendance {
             return Ok(());
         }
         let seconds = f64::from(away.as_micros()) / 1e6;
-        Err(Failure::Undone(format!("the tool did not run for {seconds:.1} s (suspended?)")))
+        Err(Failure::Failed(format!("the tool did not run for {seconds:.1} s (suspended?)")))
     }
 }

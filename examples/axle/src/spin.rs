@@ -10,7 +10,7 @@ use crate::{
     MOTION_HELP, args,
     bus::{self, Boards, Bus},
     failure::Failure,
-    port::Line,
+    port::Transport,
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
 };
@@ -106,7 +106,7 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
         return signals.interrupted();
     }
     if bus.master.is_mode_in_doubt(node) {
-        return Err(Failure::Undone(format!("the mode of node {node} is in doubt")));
+        return Err(Failure::Failed(format!("the mode of node {node} is in doubt")));
     }
     let target = choose(args, &bus, status)?;
     let start = bus.port.now();
@@ -125,7 +125,7 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
 /// The target for this node, if it answers and is in the right mode.
 fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Target, Failure> {
     let node = args.node;
-    let refuse = |line: String| Err(Failure::Undone(line));
+    let refuse = |line: String| Err(Failure::Failed(line));
     match (status, args.goal.rps, args.goal.revolutions) {
         (Some(Status::Velocity(_)), Some(rps), _) => Ok(Target::Velocity(rps)),
         (Some(Status::Position(at)), _, Some(way)) => {
@@ -209,7 +209,7 @@ impl Spin {
             Target::Velocity(rps) => master.set_velocity(node, rps, self.start),
             Target::Position(position) => master.set_position(node, position, self.start),
         }
-        .map_err(|error| Failure::Undone(error.to_string()))
+        .map_err(|error| Failure::Failed(error.to_string()))
     }
 
     /// Fails if the node no longer follows its command.
@@ -219,7 +219,7 @@ impl Spin {
         while let Some(event) = bus.master.poll_event() {
             has_dead_man_fired |= event == MasterEvent::DeadMan;
         }
-        let refuse = |line: String| Err(Failure::Undone(line));
+        let refuse = |line: String| Err(Failure::Failed(line));
         match bus.master.mode(node) {
             _ if !bus.is_online(node) => refuse(format!("node {node} no longer answers")),
             Some(mode) if mode != target.mode() => {
@@ -253,7 +253,7 @@ impl Spin {
             }
             None => format!("node {node} has no current measurement at the end of the time"),
         };
-        Err(Failure::Undone(line))
+        Err(Failure::Failed(line))
     }
 
     /// Stops the motor and waits until it is at rest (rulings I6, I12).
@@ -266,7 +266,7 @@ impl Spin {
         };
         Err(match failure {
             Some(failure) => failure.while_moving(&complaint),
-            None => Failure::Undone(complaint),
+            None => Failure::Failed(complaint),
         })
     }
 

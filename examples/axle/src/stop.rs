@@ -36,7 +36,7 @@ use crate::{
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
-    line: args::Line,
+    line: args::PortArgs,
 
     /// Protocol of the line; by default ikeya is tried first, then ucp
     #[arg(long, value_enum)]
@@ -70,7 +70,7 @@ fn stop_whatever(args: &Args) -> Result<(), Failure> {
         return bus.judge();
     }
     stop_rover(&args.line).map_err(|failure| match failure {
-        Failure::Undone(line) => Failure::Undone(format!("{}; {line}", bus.nothing())),
+        Failure::Failed(line) => Failure::Failed(format!("{}; {line}", bus.nothing())),
         other => other,
     })
 }
@@ -97,7 +97,7 @@ impl Stopped {
         };
         Err(match self.failure {
             Some(failure) => failure.while_moving(&complaint),
-            None => Failure::Undone(complaint),
+            None => Failure::Failed(complaint),
         })
     }
 
@@ -139,7 +139,7 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
     Ok(stopped)
 }
 
-fn stop_rover(line: &args::Line) -> Result<(), Failure> {
+fn stop_rover(line: &args::PortArgs) -> Result<(), Failure> {
     let mut rover = Rover::open(line)?;
     // The host's first frames are stops, whether or not the robot is heard.
     rover.find(|| false)?;

@@ -18,7 +18,7 @@ use crate::{
     decode::BUFFER_LEN,
     failure::Failure,
     human,
-    port::{Line, Port},
+    port::{Port, Transport},
     record::{Frame, Summary},
     signals::Signals,
 };
@@ -35,7 +35,7 @@ use crate::{
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
-    line: args::Line,
+    line: args::PortArgs,
 
     /// Protocol of the line
     #[arg(long, value_enum)]

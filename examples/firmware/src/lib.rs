@@ -3,7 +3,7 @@
 //! * `board`: clocks, pins and the two USARTs, set up once at the start;
 //! * `clock`: microseconds, and sleeping until an event;
 //! * `uart`: an interrupt-driven USART with one queue per direction;
-//! * `line`: a line of text without `core::fmt`;
+//! * `text_line`: a line of text without `core::fmt`;
 //! * `stack`: deepest use of the stack;
 //! * `motor`, `rover`, `lag`: models of the driven hardware;
 //! * `work`: the code that `bench` measures.
@@ -19,13 +19,13 @@ pub mod clock;
 #[cfg(feature = "board")]
 pub mod lag;
 #[cfg(feature = "board")]
-pub mod line;
-#[cfg(feature = "board")]
 pub mod motor;
 #[cfg(feature = "board")]
 pub mod rover;
 #[cfg(feature = "board")]
 pub mod stack;
+#[cfg(feature = "board")]
+pub mod text_line;
 #[cfg(feature = "board")]
 pub mod uart;
 pub mod work;

@@ -61,7 +61,7 @@ struct Scripted {
     last: Vec<u8>,
 }
 
-impl Line for Scripted {
+impl Transport for Scripted {
     fn now(&self) -> Instant {
         Instant::from_micros(0)
     }
@@ -79,7 +79,7 @@ impl Line for Scripted {
 const NOW: Instant = Instant::from_micros(0);
 
 fn vanished() -> Failure {
-    Failure::Undone("vanished".to_owned())
+    Failure::Failed("vanished".to_owned())
 }
 
 #[test]

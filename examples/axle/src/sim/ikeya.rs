@@ -11,7 +11,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, args, failure::Failure, port::Line, signals::Signals};
+use crate::{EXIT_CODES, args, failure::Failure, port::Transport, signals::Signals};
 
 /// Simulate motors on a bus, which answer and turn as commanded
 #[derive(Debug, clap::Args)]

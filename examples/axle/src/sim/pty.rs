@@ -11,7 +11,7 @@ use serialport::{ClearBuffer, SerialPort, TTYPort};
 use super::Faults;
 use crate::{
     failure::Failure,
-    port::{Line, NotSent, Port},
+    port::{NotSent, Port, Transport},
 };
 
 /// Number of bytes that may wait for a reader. On a wire, unread bytes are lost; here they would
@@ -48,7 +48,7 @@ impl Pty {
 
     fn pair(faults: Faults) -> Result<Self, Failure> {
         let failed =
-            |cause: String| Failure::Undone(format!("cannot open a pseudo-terminal: {cause}"));
+            |cause: String| Failure::Failed(format!("cannot open a pseudo-terminal: {cause}"));
         let (ours, held) = TTYPort::pair().map_err(|error| failed(error.description))?;
         let path = held.name().ok_or_else(|| failed("it has no name".to_owned()))?;
         let port = Port::new(path, Box::new(ours));
@@ -64,7 +64,7 @@ impl Pty {
     }
 }
 
-impl Line for Pty {
+impl Transport for Pty {
     fn now(&self) -> Instant {
         self.port.now()
     }
@@ -111,7 +111,7 @@ fn disturb(bytes: &mut [u8], rate: f64, rng: &mut Rng) {
 mod tests {
     use std::{thread, time::Duration};
 
-    use super::{Faults, Line, Pty, Rng, disturb};
+    use super::{Faults, Pty, Rng, Transport, disturb};
 
     #[test]
     fn what_nobody_reads_is_gone_and_blocks_nobody() {

@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, failure::Failure, port::Line, signals::Signals};
+use crate::{EXIT_CODES, failure::Failure, port::Transport, signals::Signals};
 
 /// Simulate a rover, which reports, drives as commanded, and stops without commands
 #[derive(Debug, clap::Args)]

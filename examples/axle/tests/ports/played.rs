@@ -28,7 +28,7 @@ use super::{Process, wait_until};
 const TICK: Duration = Duration::from_millis(5);
 
 /// A pseudo-terminal with a thread that plays the devices on it.
-pub(crate) struct Line<T> {
+pub(crate) struct PlayedLine<T> {
     pub(crate) path: String,
     shared: Arc<Mutex<T>>,
     done: Arc<AtomicBool>,
@@ -36,7 +36,7 @@ pub(crate) struct Line<T> {
     _held: TTYPort,
 }
 
-impl<T: Send + 'static> Line<T> {
+impl<T: Send + 'static> PlayedLine<T> {
     /// `play` gets the received bytes, possibly none, and returns the answer.
     pub(crate) fn new(
         shared: T,
@@ -63,7 +63,7 @@ impl<T: Send + 'static> Line<T> {
     }
 }
 
-impl<T> Drop for Line<T> {
+impl<T> Drop for PlayedLine<T> {
     fn drop(&mut self) {
         self.done.store(true, Ordering::SeqCst);
         let _ = self.thread.take().unwrap().join();
@@ -71,8 +71,8 @@ impl<T> Drop for Line<T> {
 }
 
 /// A line that gives the same answer to all input; it holds all received bytes.
-pub(crate) fn parrot(answer: &'static [u8]) -> Line<Vec<u8>> {
-    Line::new(Vec::new(), |heard, bytes| {
+pub(crate) fn parrot(answer: &'static [u8]) -> PlayedLine<Vec<u8>> {
+    PlayedLine::new(Vec::new(), |heard, bytes| {
         heard.lock().unwrap().extend(bytes);
         if bytes.is_empty() { Vec::new() } else { answer.to_vec() }
     })
@@ -138,10 +138,10 @@ pub(crate) struct BusState {
 pub(crate) fn bus(
     nodes: &[Node],
     mut on_request: impl FnMut(Said, &mut BusState) + Send + 'static,
-) -> Line<BusState> {
+) -> PlayedLine<BusState> {
     let mut decoder = ikeya::Decoder::<ToSlave>::new();
     let state = BusState { nodes: nodes.to_vec(), ..BusState::default() };
-    Line::new(state, move |shared, mut bytes| {
+    PlayedLine::new(state, move |shared, mut bytes| {
         let mut answers = Vec::new();
         while let Some(event) = decoder.decode(&mut bytes) {
             let mut bus = shared.lock().unwrap();
@@ -177,7 +177,7 @@ pub(crate) fn bus(
     })
 }
 
-impl Line<BusState> {
+impl PlayedLine<BusState> {
     /// All requests so far.
     pub(crate) fn said(&self) -> Vec<Said> {
         self.lock().said.iter().map(|(said, _)| *said).collect()
@@ -196,7 +196,7 @@ impl Line<BusState> {
 
 /// Starts `spin` on node 1 with 2 rps, and waits until the node has received the command. On a very
 /// busy machine the tool may find no node within its 60 ms, and is started again.
-pub(crate) fn spin(line: &Line<BusState>, seconds: f32) -> Process {
+pub(crate) fn spin(line: &PlayedLine<BusState>, seconds: f32) -> Process {
     for _ in 0..5 {
         let args = format!("spin --port {} --node 1 --rps 2 --for {seconds}", line.path);
         let spin = Process::start(&args);
@@ -240,13 +240,13 @@ pub(crate) struct RoverState {
 }
 
 /// A played rover, built on the robot role.
-pub(crate) fn rover(wheels: Option<[i16; 4]>) -> Line<RoverState> {
+pub(crate) fn rover(wheels: Option<[i16; 4]>) -> PlayedLine<RoverState> {
     let start = Instant::now();
     let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);
     let mut robot = Robot::new(RobotConfig::default(), now());
     let mut decoder = ucp::Decoder::new();
     let state = RoverState { wheels, ..RoverState::default() };
-    Line::new(state, move |shared, bytes| {
+    PlayedLine::new(state, move |shared, bytes| {
         let mut rover = shared.lock().unwrap();
         rover.bytes += bytes.len();
         let mut rest = bytes;

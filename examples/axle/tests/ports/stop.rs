@@ -208,7 +208,7 @@ fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
         let mut slave =
             Slave::<ThreeMotors>::new(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
         slave.set_velocity([Rps::new(2.0).unwrap(); 3]);
-        let line = played::Line::new(Vec::new(), move |told, bytes| {
+        let line = played::PlayedLine::new(Vec::new(), move |told, bytes| {
             slave.handle_input(bytes, now());
             while let Some(event) = slave.poll_event() {
                 if let SlaveEvent::Command(Target::Velocity(speeds)) = event {

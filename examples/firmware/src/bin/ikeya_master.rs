@@ -18,8 +18,8 @@ use axlewire::{
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
-    line::Line,
     on_panic, serve_usarts,
+    text_line::TextLine,
 };
 
 on_panic!();
@@ -60,7 +60,7 @@ fn run(mut board: Board) {
             }
             let now = driver.now();
             program.react(driver.role_mut(), event, now);
-            let mut line = Line::new("event");
+            let mut line = TextLine::new("event");
             if describe(&mut line, event) {
                 board.text.try_send(line.end());
             }
@@ -69,7 +69,7 @@ fn run(mut board: Board) {
         let now = driver.now();
         if asked || now >= report_at {
             let master = driver.role_mut();
-            let mut line = Line::new("master");
+            let mut line = TextLine::new("master");
             report(&mut line, master, exchanges);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             board.text.try_send(line.end());
@@ -132,7 +132,7 @@ fn command(master: &mut Master, node: NodeId, now: Instant) -> Result<(), Comman
 }
 
 /// Describes an event; `false` for measurements, which come a hundred times a second.
-fn describe(line: &mut Line, event: MasterEvent) -> bool {
+fn describe(line: &mut TextLine, event: MasterEvent) -> bool {
     let (what, node, how) = match event {
         MasterEvent::Discovered { node, mode } => ("discovered", node, name_of(mode)),
         MasterEvent::Health { node, health } => {
@@ -173,7 +173,7 @@ const fn name_of(mode: Mode) -> &'static str {
 }
 
 /// Measurements of every node, and the counts.
-fn report(line: &mut Line, master: &Master, exchanges: u32) {
+fn report(line: &mut TextLine, master: &Master, exchanges: u32) {
     let statistics = master.statistics();
     line.count("reads", statistics.reads)
         .count("writes", statistics.writes)

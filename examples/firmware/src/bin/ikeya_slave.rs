@@ -17,9 +17,9 @@ use axlewire::{
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
-    line::Line,
     motor::Motor,
     on_panic, serve_usarts,
+    text_line::TextLine,
 };
 
 on_panic!();
@@ -85,7 +85,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
 
         let asked = board.text.poll_byte().is_some();
         if asked || now >= report_at {
-            let mut line = Line::new("slave");
+            let mut line = TextLine::new("slave");
             report(&mut line, slave, &motor, stops, now);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             // Requests that come faster than lines can be sent are dropped.
@@ -98,7 +98,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
 }
 
 /// All values that a test or a user may want to see.
-fn report(line: &mut Line, slave: &Slave, motor: &Motor, stops: u32, now: Instant) {
+fn report(line: &mut TextLine, slave: &Slave, motor: &Motor, stops: u32, now: Instant) {
     let SlaveStatistics { reads, writes, refused, foreign, replies, overtaken, expired, .. } =
         *slave.statistics();
     line.count("node", slave.node().get().into());

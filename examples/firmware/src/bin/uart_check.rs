@@ -17,8 +17,8 @@ use core::{
 
 use axlewire::drive::Rs485;
 use axlewire_firmware::{
-    line::Line,
     stack::Stack,
+    text_line::TextLine,
     uart::{Channel, Port, Queue},
 };
 use cortex_m::peripheral::{NVIC, syst::SystClkSource};
@@ -129,7 +129,7 @@ fn a_full_queue_loses_the_newest(registers: Registers, port: &mut Port<Registers
 }
 
 fn the_counts_are_told() {
-    let mut line = Line::new("check");
+    let mut line = TextLine::new("check");
     expect("the line", line.losses(&CHANNEL).end() == b"check overruns 2 lost 4 damaged 2\r\n");
 }
 

@@ -19,10 +19,10 @@ use axlewire::{
 use axlewire_firmware::{
     board::{BUS, Board},
     clock::milliseconds,
-    line::Line,
     on_panic,
     rover::Rover,
     serve_usarts,
+    text_line::TextLine,
 };
 use embedded_hal::digital::OutputPin;
 
@@ -83,7 +83,7 @@ fn run(mut board: Board) {
 
         let asked = board.text.poll_byte().is_some();
         if asked || now >= report_at {
-            let mut line = Line::new("robot");
+            let mut line = TextLine::new("robot");
             report(&mut line, robot, &rover, &shown, now);
             line.count("stack", board.stack.used()).count("ms", milliseconds(now));
             // Requests that come faster than lines can be sent are dropped.
@@ -131,7 +131,7 @@ impl Shown {
 }
 
 /// All values that a test or a user may want to see.
-fn report(line: &mut Line, robot: &Robot, rover: &Rover, shown: &Shown, now: Instant) {
+fn report(line: &mut TextLine, robot: &Robot, rover: &Rover, shown: &Shown, now: Instant) {
     let (command, (left, right)) = (robot.command(now), rover.rpm());
     let RobotStatistics { commands, watchdog, pings, pongs, reports, reports_skipped, .. } =
         *robot.statistics();

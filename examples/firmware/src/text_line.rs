@@ -15,9 +15,9 @@ const LEN: usize = 500;
 
 /// A line being built. Words that do not fit are left out as a whole.
 #[derive(Debug)]
-pub struct Line(String<LEN>);
+pub struct TextLine(String<LEN>);
 
-impl Line {
+impl TextLine {
     /// A line that begins with this word.
     pub fn new(first: &str) -> Self {
         let mut line = Self(String::new());
