@@ -186,7 +186,12 @@ pub(crate) fn earliest(deadlines: &[Option<Instant>]) -> Option<Instant> {
 }
 
 /// Has this deadline been reached?
-#[cfg(any(feature = "ikeya", feature = "ucp"))]
+#[cfg(any(
+    feature = "ikeya",
+    feature = "ucp",
+    feature = "embedded-io",
+    feature = "embedded-io-async"
+))]
 pub(crate) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
     deadline.is_some_and(|at| at <= now)
 }

@@ -3,7 +3,7 @@
 use super::{clock::Clock, error::DriveError, sending::Sending};
 use crate::{
     endpoint::{Endpoint, Unsent},
-    time::{Duration, Instant, earliest},
+    time::{Duration, Instant, earliest, reached},
 };
 
 /// Bytes read at once at the most.
@@ -204,7 +204,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Lets time pass.
     pub(super) fn expire(&mut self) {
         let now = self.now();
-        if self.role.poll_timeout().is_some_and(|at| now >= at) {
+        if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);
         }
     }
