@@ -1,4 +1,4 @@
-//! The checksum against the `crc` crate, and what it promises to detect (ruling B1).
+//! The checksum against the `crc` crate, and the errors it is required to detect (ruling B1).
 
 use axlewire::crc16::{check, compute};
 use crc::{CRC_16_MODBUS, Crc, Table};
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 const ORACLE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
 
-/// A small generator of fixed streams, for data whose content does not matter.
+/// A small generator of fixed byte streams, for data whose content does not matter.
 struct Random(u64);
 
 impl Random {
@@ -86,7 +86,7 @@ fn less_than_a_crc_is_never_good() {
         assert!(!check(&[byte]));
     }
     let good: Vec<u16> = (0..=u16::MAX).filter(|crc| check(&crc.to_le_bytes())).collect();
-    assert_eq!(good, [0xFFFF], "two bytes are good when they are the CRC of nothing");
+    assert_eq!(good, [0xFFFF], "two bytes are good only if they are the CRC of an empty message");
 }
 
 proptest! {
@@ -102,7 +102,7 @@ proptest! {
     }
 }
 
-/// Every length that a frame of either protocol can have, up to the longest known, in bytes.
+/// Every possible frame length of either protocol, up to the longest known, in bytes.
 fn legal_lengths() -> impl Iterator<Item = usize> {
     [4].into_iter().chain(8..=44)
 }

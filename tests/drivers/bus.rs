@@ -74,7 +74,7 @@ fn set_points_have_been_sent_when_the_call_returns_and_reach_the_right_node() {
             story.bus.set_velocity(NodeId::N2, to).unwrap();
             story.bus.set_position(NodeId::N5, at).unwrap();
         }
-        // What is on the line arrives, whether or not the master is called again.
+        // Bytes already on the line arrive whether or not the master is called again.
         for _ in 0..50 {
             story.world.step(20);
         }
@@ -95,12 +95,12 @@ fn a_read_gives_what_the_node_measures_now() {
         for config in [MasterConfig::direct(), manual()] {
             let mut story = Story::new(config).discovered();
             for turn in 0..20 {
-                // An older reading lies about.
+                // An older reading is available.
                 story.bus.next_event(story.world.now()).unwrap();
                 let (speed, place) = (rps(turn as f32), Position::new(turn, 0));
                 story.two.borrow_mut().role_mut().set_velocity(speed);
                 story.five.borrow_mut().role_mut().set_position(place);
-                // What was on its way before this moment has arrived.
+                // Anything that was in flight has arrived by now.
                 let pause = story.world.now() + Duration::from_millis(1);
                 story.bus.run_until(pause, |_, _, _| {}).unwrap();
                 let mut read = |node| match is_async {
@@ -194,7 +194,7 @@ fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
                 assert!(story.bus.read(NodeId::N2).is_err());
                 story.world.step(1000);
             }
-            // The third READ is on the line, and nothing else can be until its window closes.
+            // The third READ is on the line, and nothing else can be sent until its window closes.
             story.ask(NodeId::N2);
             story.bus.service().unwrap();
             assert_eq!(story.bus.role().health(NodeId::N2), Some(Health::Suspect(2)));
@@ -228,7 +228,7 @@ fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
         assert_eq!(error, DriveError::ReadFailed { node: NodeId::N2, cause: Cause::Silent });
         assert_eq!(error.to_string(), "node 2 did not answer: nothing was heard");
         assert!(story.world.now() - start < Duration::from_millis(10));
-        // What the read was not about has been kept, in order; readings have not.
+        // Events unrelated to the read have been kept, in order; readings have not.
         let told: Vec<_> = core::iter::from_fn(|| story.bus.poll_event()).collect();
         let health = |health| MasterEvent::Health { node: NodeId::N2, health };
         let expected = [Health::Suspect(1), Health::Suspect(2), Health::Abnormal].map(health);
@@ -260,7 +260,7 @@ fn events_come_in_the_order_in_which_they_happened_whoever_has_kept_them() {
 #[test]
 fn events_that_find_no_room_are_counted() {
     let mut story = Story::new(MasterConfig::direct()).discovered();
-    // Node 2 comes and goes, and nobody takes out the news.
+    // Node 2 comes and goes, and the events are not taken.
     for _ in 0..10 {
         story.two.borrow_mut().port().unplugged.set(true);
         assert!(story.bus.read(NodeId::N2).is_err());
@@ -269,7 +269,7 @@ fn events_that_find_no_room_are_counted() {
     }
     let kept = core::iter::from_fn(|| story.bus.poll_event()).count();
     assert_eq!(kept, 16);
-    // Three bad news and one good per turn; of the last turn some may still be in the role.
+    // Four events per turn; some of the last turn may still be in the role.
     assert!(story.bus.role().lost_events() >= 40 - 16 - 1, "{}", story.bus.role().lost_events());
 }
 
@@ -294,7 +294,7 @@ fn a_port_that_vanishes_is_an_error_of_every_call() {
             assert_eq!(bus.set_velocity(NodeId::N2, rps(1.0)), Err(gone));
             assert_eq!(bus.stop_all(), Err(owed));
         }
-        // It comes back: the driver goes on, and the last command is the one that counts.
+        // The port comes back: the driver continues, and the last command is the one in force.
         unplugged.set(false);
         assert_eq!(bus.discover(), Ok(FOUND.into_iter().collect()));
         for _ in 0..50 {
@@ -380,7 +380,7 @@ fn a_slaves_next_command_comes_in_time_or_not_at_all() {
         embedded_io::Write::write(&mut far, write.as_bytes()).unwrap();
         assert_eq!(next(Instant::from_millis(100)), Ok(Some(Target::Velocity(rps(1.5)))));
         assert_eq!(world.now(), Instant::from_micros(2160));
-        // Then the watchdog ends the wait, and its event is there.
+        // Then the watchdog ends the wait and is reported as an event.
         assert_eq!(next(Instant::from_millis(100)), Ok(None));
         assert_eq!(world.now(), Instant::from_micros(7160));
         assert_eq!(driver.poll_event(), Some(SlaveEvent::Watchdog));

@@ -1,4 +1,4 @@
-//! Clocks: one that goes backwards, that of `std`, and one that is joined to a delay.
+//! Clocks: one that goes backwards, that of `std`, and one combined with a delay.
 
 use std::cell::RefCell;
 
@@ -19,12 +19,12 @@ fn a_clock_that_goes_backwards_goes_on_for_the_role_from_where_it_was() {
     let mut readings = [100, 50, 70, 120].into_iter().cycle();
     let clock = move || Instant::from_micros(readings.next().unwrap());
     let flood = (0..100).map(|_| bytes(1));
-    // The recorder itself asserts the order of times.
+    // The recorder itself asserts that time never goes backwards.
     let mut driver = Driver::new(Recorder::default(), Script::reading(flood), clock);
     driver.service().unwrap();
     assert_eq!(driver.role().received.len(), 64);
 
-    // One reading is an hour ahead: the steps before and after it count all the same.
+    // One reading is an hour ahead: the steps before and after it still count.
     let hour = 3_600_000_000;
     let mut readings = [1000, hour + 1000, 1500, 2500, 2400, 2700].into_iter();
     let clock = move || Instant::from_micros(readings.next().unwrap());

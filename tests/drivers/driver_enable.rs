@@ -1,5 +1,4 @@
-//! Driver enable of a port by itself: on before the first byte, off after the last, off on every
-//! error.
+//! Driver enable of a port alone: on before the first byte, off after the last, off on every error.
 
 use std::error::Error;
 
@@ -24,7 +23,7 @@ fn the_pin_is_on_from_before_the_first_byte_until_after_the_flush() {
         assert_eq!(flush(&mut port, is_async), Ok(()));
         assert!(!port.is_on());
         assert_eq!(drain(&log), "on write write flush off");
-        // Without bytes nothing is switched.
+        // Without bytes, the pin does not change.
         assert_eq!(flush(&mut port, is_async), Ok(()));
         assert_eq!(write(&mut port, is_async, b""), Ok(0));
         assert_eq!(drain(&log), "flush");
@@ -86,10 +85,10 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
         refused(write(&mut port, is_async, b"2"));
         assert_eq!(drain(&log), "on write write flush off");
-        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost), "it cannot know");
-        assert_eq!(flush(&mut port, is_async), Ok(()), "told once");
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost), "bytes may be lost");
+        assert_eq!(flush(&mut port, is_async), Ok(()), "reported once");
 
-        // Or by the flush behind, if that fails itself.
+        // Or by the following flush, if that one fails.
         port.port_mut().writes.extend(steps());
         port.port_mut().flushes.extend([Step::Error, Step::Error]);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
@@ -136,7 +135,7 @@ fn a_cancelled_write_keeps_the_pin_until_it_is_finished_or_given_up() {
     let cancelled = |port: &mut Port<Delay>, bytes: &[u8]| {
         assert!(poll(std::pin::pin!(embedded_io_async::Write::write(port, bytes))).is_pending());
     };
-    cancelled(&mut port, b"12"); // in the delay in front, which is then waited for again
+    cancelled(&mut port, b"12"); // in the delay before the write, which is then repeated
     assert_eq!(write(&mut port, true, b"12"), Ok(1));
     assert_eq!(drain(&log), "off on 5000 ns 5000 ns write");
     cancelled(&mut port, b"2");

@@ -1,4 +1,4 @@
-//! Driver enable under a driver: whatever fails, stalls or is dropped, the pin goes off.
+//! Driver enable under a driver: whatever fails, stalls or is dropped, the pin is switched off.
 
 use axlewire::drive::{DriveError, Driver, Rs485Error};
 
@@ -80,10 +80,10 @@ fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_fails_beside
                         pin.failures.set(failures);
                     }
                     let _ = if is_async { ready(driver.service_async()) } else { driver.service() };
-                    // The rest of the frame may be given up meanwhile.
+                    // The rest of the frame may be dropped meanwhile.
                     world.step(25_000);
                 }
-                assert_eq!(pin.failures.get() % failures, 0, "it is tried again");
+                assert_eq!(pin.failures.get() % failures, 0, "not retried");
                 assert!(!is_on(&log) && !driver.port_mut().is_on(), "{write:?} {calls}");
             }
         }

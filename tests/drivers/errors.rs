@@ -1,4 +1,4 @@
-//! Errors of a driver: each is one line, and has what failed as its source.
+//! Errors of a driver: each message is one line, and the cause is its source.
 
 use std::error::Error;
 

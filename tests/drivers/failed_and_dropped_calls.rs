@@ -1,4 +1,4 @@
-//! Ports that fail and calls that are dropped: the next call goes on where this one has ended.
+//! Ports that fail and calls that are dropped: the next call continues where this one ended.
 
 use axlewire::drive::{DriveError, Driver};
 
@@ -77,7 +77,7 @@ fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_f
     let incoming: Vec<u8> = (0..40).collect();
     let frames: [&[u8]; 3] = [b"first", b"second", b"third"];
     let whole = frames.concat();
-    // A write that is ready at the second poll never gets further with one.
+    // A write that is ready only on the second poll never completes if polled once.
     for polls in 2..200 {
         let world = World::default();
         let (mut near, mut far) = End::pair(&world, 20);
@@ -88,7 +88,7 @@ fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_f
         let mut driver = Driver::new(role, near, VirtualClock(world.clone()));
         let mut events = vec![];
         let mut dropped = 0;
-        // Every call is dropped after so many polls, and again, and again.
+        // Every call is dropped after this many polls, again and again.
         for _ in 0..1000 {
             match world.poll_times(polls, driver.next_event_async(at_ms(1000))) {
                 Some(event) => events.extend(event.unwrap()),

@@ -1,4 +1,4 @@
-//! A round of a driver, over any role: what is done in which order, and that there is an end to it.
+//! A round of a driver, over any role: what is done in which order, and that it ends.
 
 use axlewire::{
     drive::{DriveError, Driver},
@@ -61,7 +61,7 @@ fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
             let arrived = |&(at, _): &(u64, u8)| Instant::from_micros(at) <= time.now();
             !inbox.borrow().front().is_some_and(arrived)
         }));
-        // The other end sends all the time.
+        // The other end sends continuously.
         let mut count = 0_u8;
         world.add(move || {
             embedded_io::Write::write(&mut far, &[count]).unwrap();
@@ -83,8 +83,8 @@ fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
 
 #[test]
 fn a_receiver_without_a_buffer_loses_nothing_while_the_sender_sends_byte_by_byte() {
-    /// Sends and receives one byte at a time, and loses what is not taken before the next one: a
-    /// model of a UART without a buffer. The scripted port keeps its bytes for as long as need be.
+    /// Sends and receives one byte at a time, and loses a byte not taken before the next one: a
+    /// model of a UART without a buffer. The scripted port keeps its bytes as long as necessary.
     #[derive(Default)]
     struct Bufferless {
         held: Option<u8>,
@@ -152,7 +152,7 @@ fn a_round_is_bounded_whatever_port_and_role_do() {
         let mut driver = scripted(Recorder::sending(&frames), Script::reading(flood));
         assert_eq!(round(&mut driver), Some(Ok(())));
         assert_eq!(driver.port().written.len(), 8 * 5);
-        // 64 in front of each frame, and what comes while it is sent.
+        // 64 before each frame, plus those that arrive while it is sent.
         let reads = 2000 - driver.port().reads.len();
         assert!((8 * 64..=9 * 64).contains(&reads), "{reads}");
     }

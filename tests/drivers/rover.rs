@@ -21,10 +21,10 @@ use crate::{
 type Rover = Driver<Host, End, VirtualClock>;
 type Far = Rc<RefCell<Driver<Robot, End, VirtualClock>>>;
 
-/// A byte at 115,200 bit/s, microseconds.
+/// Time of one byte at 115,200 bit/s, microseconds.
 const BYTE_US: u64 = 87;
 
-/// A host and a robot that reports its battery. The robot acts whenever the world does.
+/// A host and a robot that reports its battery. The robot runs whenever virtual time advances.
 fn story() -> (World, Rover, Far) {
     story_with(|_| ())
 }
@@ -64,11 +64,11 @@ fn a_ping_comes_back_with_its_round_trip() {
         } else {
             rover.ping(deadline)
         };
-        // 8 bytes there, 9 back, and up to a report in front of the pong.
+        // 8 bytes there, 9 back, and up to one report before the pong.
         let micros = u64::from(trip.unwrap().as_micros());
         assert!((17 * BYTE_US..70 * BYTE_US).contains(&micros), "{micros}");
         assert_eq!(rover.role().link(), Link::Up);
-        // What the ping was not about has been kept.
+        // Events unrelated to the ping have been kept.
         assert_eq!(rover.poll_event(), Some(HostEvent::LinkUp));
     }
 }
@@ -121,12 +121,12 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
         } else {
             rover.drive(60, -20).unwrap();
         }
-        // The host's first frame, which says zero, and the command: 48 bytes.
+        // The host's first frame, which is zero, and the command: 48 bytes.
         for _ in 0..400 {
             world.step(20);
         }
         assert_eq!((commanded().speed(), commanded().angular()), (60, -20));
-        // Without the driver being called again.
+        // Without calling the driver again.
         if is_async {
             world.block_on(rover.stop_async()).unwrap();
         } else {
@@ -224,7 +224,7 @@ fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
         assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
         assert_eq!(error.to_string(), "calibration of Imu was not begun: no answer to 3 requests");
         assert!(world.now() < deadline);
-        // With a deadline before that, the deadline counts.
+        // An earlier deadline takes precedence.
         let deadline = after(&world, 50);
         let error = if is_async {
             world.block_on(rover.end_calibration_async(kind, deadline)).unwrap_err()
@@ -275,7 +275,7 @@ fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
     assert_eq!(world.block_on(rover.drive_async(10, 0)), Err(gone));
     assert_eq!(world.block_on(rover.next_report_async(deadline)), Err(gone));
     assert_eq!(world.now(), Instant::from_micros(0));
-    // A stop is tried for 100 ms.
+    // A stop is retried for 100 ms.
     assert_eq!(rover.stop(), Err(gone));
     assert!((100_000..102_000).contains(&world.now().as_micros()), "{:?}", world.now());
     assert_eq!(world.block_on(rover.stop_async()), Err(gone));
@@ -317,7 +317,7 @@ fn a_stop_goes_through_errors_of_the_port_and_is_on_the_line_when_it_returns() {
             rover.stop().unwrap();
         }
         assert!(world.now() < Instant::from_millis(80), "{:?}", world.now());
-        // Without the driver being called again.
+        // Without calling the driver again.
         (0..500).for_each(|_| world.step(20));
         assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
     }
@@ -356,7 +356,7 @@ fn a_drive_that_is_dropped_leaves_a_stop_that_the_next_call_sends() {
         let (world, mut rover, robot) = story();
         let span = Duration::from_millis(60_000);
         let done = world.poll_times(polls, rover.drive_for_async(40, 0, span));
-        assert!(done.is_none(), "it was dropped");
+        assert!(done.is_none(), "not dropped");
         assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
         rover.service().unwrap();
         (0..500).for_each(|_| world.step(20));
@@ -375,7 +375,7 @@ fn a_stop_behind_a_cut_off_frame_goes_twice_although_the_port_refused_one_of_the
     let mut driver = Driver::with(host, port, VirtualClock(world.clone()));
     assert!(driver.service().is_err(), "one byte of the first stop leaves");
     world.step(6_000);
-    assert!(driver.service().is_err(), "it is given up, and no byte of the next leaves");
+    assert!(driver.service().is_err(), "it is dropped, and no byte of the next leaves");
     driver.stop().unwrap();
     let is_stop = |bytes: &&[u8]| bytes[..5] == [0xFD, 0xFF, 0x14, 0, 2];
     assert_eq!(driver.port().written.windows(24).filter(is_stop).count(), 2);

@@ -1,4 +1,4 @@
-//! Ports that fail: what is sent all the same, and what goes back to its role (I12, U16).
+//! Ports that fail: what is still sent, and what goes back to its role (I12, U16).
 
 use std::{
     pin::pin,
@@ -88,7 +88,7 @@ fn a_frame_of_which_no_byte_has_left_goes_back_to_its_role() {
             assert_eq!(round(&mut driver), Some(Err(error)));
             assert_eq!(driver.role().unsent(), [Unsent::Untouched]);
             assert!(driver.unsent().is_empty());
-            // It decides anew.
+            // It decides again.
             driver.role_mut().frames.push_back(b"new".into());
             assert_eq!(round(&mut driver), Some(Ok(())));
             assert_eq!(driver.port().written, b"new");
@@ -143,7 +143,7 @@ fn a_role_is_told_of_a_failed_flush_once_for_what_was_written_since_the_last() {
         let mut driver = scripted(Recorder::sending(&[b"12"]), port);
         assert_eq!(round(&mut driver), Some(Err(GONE)));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
-        assert_eq!(round(&mut driver), Some(Err(GONE)), "tried again");
+        assert_eq!(round(&mut driver), Some(Err(GONE)), "retried");
         assert_eq!(driver.role().unsent().len(), 1);
         driver.role_mut().frames.push_back(b"34".into());
         assert_eq!(round(&mut driver), Some(Err(GONE)));
@@ -167,7 +167,7 @@ fn what_is_given_up_is_told_to_the_role() {
         assert_eq!((driver.discard(), driver.discard()), (3, 0));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed, Unsent::CutOff]);
     }
-    // A frame that an async call has not got rid of, and a flush that it has not made.
+    // A frame that an async call could not send, and a flush that it did not make.
     let stalls = Script { writes: [Step::Stall].into(), ..Script::default() };
     let mut driver = scripted(Recorder::sending(&[b"12345"]), stalls);
     assert_eq!(ASYNC(&mut driver), None);
@@ -215,7 +215,7 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
 
 #[test]
 fn a_read_that_fails_while_the_driver_waits_yields_as_well() {
-    // The first read finds nothing, the one that waits fails.
+    // The first read finds nothing, the waiting one fails.
     let reads = [Step::Stall, Step::Error];
     let mut driver = scripted(Recorder::default(), Script::reading(reads));
     let wakes = Arc::new(Wakes::default());

@@ -1,4 +1,4 @@
-//! Waiting for events: until the deadline and not longer, and awake for the role in between.
+//! Waiting for events: until the deadline and no longer, serving the role in between.
 
 use axlewire::{
     drive::Driver,
@@ -20,7 +20,7 @@ fn on_a_silent_line_the_next_event_is_waited_for_until_the_deadline_and_not_long
     assert_eq!(world.now(), at_ms(10));
     assert_eq!(world.block_on(driver.next_event_async(at_ms(20))), Ok(None));
     assert_eq!(world.now(), at_ms(20));
-    // No deadline in the past costs time, and none leaves out the round.
+    // A deadline in the past takes no time, but still runs a round.
     driver.role_mut().frames.push_back(b"12".into());
     assert_eq!(driver.next_event(at_ms(0)), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 2);
@@ -39,7 +39,7 @@ fn a_waiting_driver_wakes_for_its_role() {
     assert_eq!(world.block_on(driver.next_event_async(at_ms(10))), Ok(None));
     let calls = &driver.role().calls;
     assert_eq!(calls.iter().filter(|call| **call == Call::Timeout).count(), 1);
-    // Asleep but for the role: a round at first, at 5 ms and at the end.
+    // Wakes only for the role: a round at the start, at 5 ms and at the end.
     assert_eq!(calls.len(), 4, "{calls:?}");
 }
 
@@ -62,7 +62,7 @@ fn every_event_is_handed_out_until_the_deadline() {
     assert_eq!(driver.port().outboxes[0].borrow().len(), 3);
 }
 
-/// A role with nothing but what it has to have.
+/// A role with only the required methods.
 #[derive(Default)]
 struct Plain {
     heard: Vec<(Vec<u8>, Instant)>,

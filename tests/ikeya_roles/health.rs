@@ -98,5 +98,5 @@ fn looking_for_abnormal_nodes_costs_no_more_than_its_share() {
         }
         desk.told();
     }
-    assert!((20_000..=50_000).contains(&probing), "{probing} us of a second, 5 % are allowed");
+    assert!((20_000..=50_000).contains(&probing), "{probing} us per second, 5 % is allowed");
 }

@@ -1,4 +1,4 @@
-//! The schedule of a bus tells its rate before it is wired.
+//! The schedule gives the rate of a bus before it is wired.
 
 use axlewire::ikeya::{board::ThreeMotors, master::Schedule};
 

@@ -71,7 +71,7 @@ fn a_confirmed_write_is_told_after_the_read_that_followed_it() {
     assert_eq!(desk.told().last(), Some(&confirmed));
     desk.turn();
     desk.hear(450, &velocity(NodeId::N1, 0.5));
-    assert!(!desk.told().contains(&confirmed), "told once");
+    assert!(!desk.told().contains(&confirmed), "reported once");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn a_flood_of_set_points_does_not_keep_the_others_from_being_read() {
     assert!(reads[1] >= 40 && reads[3] >= 40, "{reads:?}");
 }
 
-/// Sets a node's speed and asks for the confirmation of that.
+/// Sets a node's speed and requests its confirmation.
 fn confirming() -> Desk {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -129,7 +129,7 @@ fn a_confirmation_always_ends_in_one_event() {
         for sent in 0..2 {
             let mut desk = confirming();
             if sent == 1 {
-                // The WRITE is on its way.
+                // The WRITE is on the line.
                 assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
             }
             story(&mut desk);

@@ -42,12 +42,12 @@ fn a_node_that_is_asked_for_is_read_at_once_whatever_its_period() {
     assert!(desk.now < asked_at + US(500), "at once");
 }
 
-/// A bus with one node that is read every 10 ms; the READ at the time returned has been answered.
+/// A bus with one node that is read every 10 ms; the READ at the returned time has been answered.
 fn read_every_10_ms() -> (Desk, Instant) {
     let mut config = direct();
     config.polling = Polling::Every(MS(10));
     let mut desk = Desk::with_nodes(config, &[N1]);
-    // The first is late: it was due while the discovery went on.
+    // The first is late: it was due during the discovery.
     desk.turn();
     desk.hear(290, &velocity(NodeId::N1, 0.0));
     desk.turn();
@@ -56,7 +56,7 @@ fn read_every_10_ms() -> (Desk, Instant) {
     (desk, begin)
 }
 
-/// When the next READ is sent by a driver that is called at this time and then in time.
+/// When the next READ is sent by a driver that is called at this time and punctually afterwards.
 fn next_read(desk: &mut Desk, called_at: Instant) -> Instant {
     desk.now = called_at;
     desk.master.handle_timeout(desk.now);
@@ -148,7 +148,7 @@ fn a_turnaround_gap_is_kept_behind_requests_and_answers() {
     assert_eq!(desk.now, sent + US(160 + 100));
 }
 
-/// A desk whose line gives back what is sent, at the beginning of a discovery.
+/// A master on a line that echoes, at the beginning of a discovery.
 fn discovering_on_an_echoing_line() -> Desk {
     let mut config = direct();
     config.removes_echo = true;
@@ -241,7 +241,7 @@ fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     }
     assert_eq!(desk.master.lost_events(), 12);
     let events = desk.told();
-    assert_eq!(events.len(), 8, "readings leave half of the room to rarer events");
+    assert_eq!(events.len(), 8, "readings leave half of the queue for rarer events");
     let status = Status::Velocity(0.0);
     assert_eq!(events[0], MasterEvent::Status { node: NodeId::N1, status });
     assert_eq!(
@@ -339,7 +339,7 @@ fn an_answer_from_before_the_line_could_carry_it_is_taken_where_the_settings_say
         let early = desk.master.node_statistics(NodeId::N1).early;
         assert_eq!(early, u32::from(!accepts_early));
     }
-    // The line needs 80 us for the READ and 160 us for the answer; half of that is forgiven.
+    // The line needs 80 us for the READ and 160 us for the answer; half of the answer is tolerated.
     for (after, is_taken) in [(80 + 79, false), (80 + 80, true)] {
         let mut desk = Desk::with_nodes(direct(), &[N1]);
         desk.turn();

@@ -1,4 +1,4 @@
-//! A framing that refuses more bytes than there are does not take a decoder beyond its input.
+//! A framing that rejects more bytes than are available does not make a decoder run past its input.
 
 use std::{cell::Cell, panic::catch_unwind};
 
@@ -8,7 +8,7 @@ thread_local! {
     static JUDGED: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Refuses everything behind two bytes, however much there will be.
+/// Rejects everything after two bytes, without limit.
 #[derive(Debug)]
 enum Boundless {}
 
@@ -20,7 +20,7 @@ impl Framing for Boundless {
 
     fn judge(bytes: &[u8]) -> Verdict {
         JUDGED.set(JUDGED.get() + 1);
-        assert!(JUDGED.get() < 1000, "the search does not get on");
+        assert!(JUDGED.get() < 1000, "the search makes no progress");
         match bytes.len() {
             len @ 0..2 => Verdict::Partial { need: len + 1 },
             _ => Verdict::Reject { reason: Reason::Crc, more: usize::MAX },
@@ -42,7 +42,7 @@ fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_slice() {
         let mut frames = Frames::<Boundless>::new(&[1, 2, 3]);
         frames.next().is_none() && has_refused(frames.counters(), 3)
     });
-    assert!(matches!(searched, Ok(true)), "the length of a refusal overflows in a slice");
+    assert!(matches!(searched, Ok(true)), "the length of a rejection overflows in a slice");
 }
 
 #[test]
@@ -60,6 +60,6 @@ fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_chunk() {
             let counters = decoder.counters();
             (counters.received, counters.skipped()) == (6, 6)
         });
-        assert!(matches!(searched, Ok(true)), "the length of a refusal overflows in a decoder");
+        assert!(matches!(searched, Ok(true)), "the length of a rejection overflows in a decoder");
     }
 }

@@ -1,4 +1,4 @@
-//! Faults of a line and of its stubs: each is there as often as asked, and where it was asked for.
+//! Faults of a line and of its stubs: each occurs at the requested rate and place.
 
 use std::collections::BTreeSet;
 
@@ -115,7 +115,7 @@ fn an_echoing_adapter_hears_its_own_bytes() {
     line.stub_mut(Who::Head).echo = true;
     line.stub_mut(Who::Head).unplugged = true;
     line.run_for(us(1000)).unwrap();
-    assert_eq!(line.head().bytes(), b"own"); // the adapter is well, the cable is not
+    assert_eq!(line.head().bytes(), b"own"); // the adapter works, the cable does not
     assert_eq!(line.tail(0).bytes(), b"");
 }
 

@@ -1,4 +1,5 @@
-//! A line without faults: how long bytes take, who hears whom, and what its trace and its seed say.
+//! A line without faults: how long bytes take, which stations receive them, and what its trace and
+//! its seed give.
 
 use axlewire::{
     sim::{Direction, Faults, Line, Who},
@@ -82,7 +83,7 @@ fn what_is_injected_stands_on_the_line_as_if_it_had_been_sent() {
 #[test]
 fn nothing_ever_happens_on_a_line_without_talk() {
     let mut line: Line<Talker, Talker> = Line::new(500_000, 0, Talker::default());
-    assert_eq!(line.step(), Ok(Some(at(0)))); // everybody is asked once
+    assert_eq!(line.step(), Ok(Some(at(0)))); // every station is asked once
     assert_eq!(line.step(), Ok(None));
     line.run_for(Duration::from_millis(1_000_000)).unwrap();
     assert_eq!(line.polls(Who::Head), 1);

@@ -1,5 +1,4 @@
-//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and what does not
-//! fit.
+//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and overflow.
 
 use axlewire::{
     ikeya,

@@ -1,4 +1,4 @@
-//! False headers, damage and frames inside of frames: no good frame is lost, none is invented.
+//! False headers, damage and nested frames: no good frame is lost, none is invented.
 
 use axlewire::{
     ikeya::{self, NodeId, Position, three},

@@ -1,10 +1,10 @@
-//! Framings of others: one that breaks its contract hangs nothing, one that asks for more than it
+//! Foreign framings: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
 use axlewire::stream::{Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict};
 
-/// A framing that breaks its contract: a frame longer than the bytes, a candidate that needs
-/// nothing, a refusal of more than there is.
+/// A framing that breaks its contract: a frame longer than its bytes, a candidate that needs
+/// nothing, a rejection of more bytes than there are.
 struct Liar<const LIE: u8>;
 
 impl<const LIE: u8> Framing for Liar<LIE> {
@@ -36,7 +36,7 @@ fn a_framing_that_lies_hangs_nothing() {
         let mut drain = |decoder: &mut Decoder<Liar<LIE>, 4>, mut input: &[u8]| {
             while decoder.decode(&mut input).is_some() || decoder.poll().is_some() {
                 most -= 1;
-                assert!(most > 0, "lie {LIE} is told for ever");
+                assert!(most > 0, "lie {LIE} repeats forever");
             }
         };
         drain(&mut decoder, &[1; 10]);
@@ -57,7 +57,7 @@ fn a_framing_that_lies_hangs_nothing() {
     feed::<3>();
 }
 
-/// Frames of three bytes that begin with F, but judged only when eight bytes are there.
+/// Frames of three bytes that begin with F, but are judged only when eight bytes are available.
 struct Patient;
 
 impl Framing for Patient {

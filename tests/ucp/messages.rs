@@ -1,4 +1,4 @@
-//! Messages: which ids and bodies are known, and what their values say.
+//! Messages: which ids and bodies are known, and the meaning of their values.
 
 use axlewire::{
     encode::Encode,
@@ -51,7 +51,7 @@ fn every_id_and_body_length_is_its_message_or_unknown_and_never_misread() {
     }
 }
 
-/// Ruling U4, written down a second time.
+/// Ruling U4, written again independently.
 const KNOWN: [(u8, usize); 19] = [
     (1, 0),
     (1, 1),

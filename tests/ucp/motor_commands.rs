@@ -1,5 +1,5 @@
-//! Motor commands: their range, what the wheels make of them, and that none starts an update by
-//! mistake.
+//! Motor commands: their range, the resulting wheel speeds, and that none starts an update by
+//! accident.
 
 use axlewire::{
     encode::Encode,
@@ -90,7 +90,7 @@ fn a_received_command_becomes_one_to_be_sent_only_if_it_is_in_range_and_starts_n
         if received(10, 20, 100, version).starts_update() {
             assert_eq!(command, Err(EncodeError::StartsUpdate { version }));
         } else {
-            // And nothing of its reserved fields is left.
+            // And nothing of its reserved fields remains.
             assert_eq!(command, MotorControl::new(10, 20).map(|it| it.with_front_led(true)));
         }
     }
@@ -144,7 +144,7 @@ fn a_yaw_swings_the_nose_to_its_side_whatever_the_direction_of_travel() {
 fn the_wheels_turn_as_the_vendors_do_and_not_at_all_in_the_dead_bands() {
     let wheels = |speed, angular| MotorControl::new(speed, angular).unwrap().wheels_pct();
     for (speed, angular, expected) in [
-        // Run in the vendor's motor.c (ruling U6).
+        // From a run of the vendor's motor.c (ruling U6).
         (60, 50, (81, 39)),
         (-60, 50, (-81, -39)),
         (100, 100, (100, 30)),
@@ -161,7 +161,7 @@ fn the_wheels_turn_as_the_vendors_do_and_not_at_all_in_the_dead_bands() {
     for (speed, angular) in (-100..=100).flat_map(|s| (-100..=100).map(move |a| (s, a))) {
         let (left, right) = wheels(speed, angular);
         assert!(left.abs() <= 100 && right.abs() <= 100, "({speed}, {angular})");
-        assert_eq!(wheels(speed, -angular), (right, left), "the other way: the sides change");
+        assert_eq!(wheels(speed, -angular), (right, left), "the other way: the sides are swapped");
         if speed.abs() > 5 {
             assert_eq!(wheels(-speed, angular), (-left, -right), "in reverse: the same, backward");
             assert_eq!(left.signum() * right.signum(), 1, "no side stops or turns back");

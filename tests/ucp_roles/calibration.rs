@@ -101,7 +101,7 @@ fn a_calibration_request_that_arrives_damaged_is_sent_again_at_once_and_fails_in
     host.end_calibration(IMU, ms(0)).unwrap();
     for at in [0, 1, 2] {
         assert_eq!(sent(&mut host, ms(at)).len(), 1);
-        // Shipped robots tell an old kind here.
+        // Shipped robots report an old kind here.
         let ack = CalibrationEndAck::new(MAG, ErrorCode::Damaged);
         host.handle_input(&bytes(ack), ms(at + 1));
     }
@@ -164,7 +164,7 @@ fn a_start_that_nobody_answered_may_have_begun_its_kind_and_an_end_changes_nothi
     let mut host = host_after(CalibrationStep::End);
     let before = host.statistics().acks_unasked;
     host.handle_input(&ack, ms(2002));
-    assert_eq!(host.statistics().acks_unasked, before + 1, "it was the IMU's that was begun");
+    assert_eq!(host.statistics().acks_unasked, before + 1, "the IMU calibration was the one begun");
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn results_are_repeated_every_1000_ms_until_acknowledged() {
     assert_eq!(sent(&mut robot, ms(300)), [bytes(imu_bias()), bytes(mag_bias())]);
     let times: Vec<_> = wait(&mut robot, ms(3400)).iter().map(|(at, _)| at.as_micros()).collect();
     assert_eq!(times, [1_300_000, 1_300_000, 2_300_000, 2_300_000, 3_300_000, 3_300_000]);
-    // One that says damaged does not end it.
+    // An acknowledgement with `Damaged` does not end it.
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Damaged)), ms(3500));
     robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Damaged)), ms(3500));
     assert_eq!(events(&mut robot), []);
@@ -209,7 +209,7 @@ fn results_are_repeated_every_1000_ms_until_acknowledged() {
     assert_eq!(wait(&mut robot, ms(5000)).len(), 1);
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(5000));
     assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken]);
-    assert_eq!(robot.poll_timeout(), None, "nothing is left to do");
+    assert_eq!(robot.poll_timeout(), None, "nothing more is due");
     assert_eq!(robot.statistics().acks_refused, 2);
 }
 
@@ -288,7 +288,7 @@ fn the_acknowledgement_of_an_end_tells_the_kind_asked_for_or_that_of_the_last_st
     for (asked, told, counts) in [
         (MAG, MAG, true),
         (IMU, IMU, true),
-        (IMU, MAG, true), // as shipped robots tell it
+        (IMU, MAG, true), // as shipped robots report it
         (MAG, IMU, false),
         (MAG, CalibrationKind::Other(0), false),
     ] {

@@ -1,4 +1,4 @@
-//! What holds for host and robot alike: floods, full queues, unplugging, time that wraps, deadlines
+//! Properties common to host and robot: floods, full queues, unplugging, time that wraps, deadlines
 //! and memory.
 
 use crate::rig::*;
@@ -16,7 +16,7 @@ fn a_host_that_floods_gets_one_answer_of_each_sort_at_a_time() {
     assert_eq!(sent(&mut robot, ms(0)).len(), 2);
     assert_eq!((robot.statistics().pings, robot.statistics().pongs), (1000, 1));
     assert_eq!(events(&mut robot).len(), 16);
-    // A repeated start waits in the queue already; a request without room is not lost unseen.
+    // A repeated start is already queued; a request without room is not lost unnoticed.
     assert_eq!((robot.lost_events(), robot.statistics().without_room), (0, 1000 - 15));
 }
 
@@ -26,7 +26,7 @@ fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
     for at in 0..=50_u64 {
         robot.handle_input(&bytes(go(at as i16 + 1)), ms(at));
     }
-    assert_eq!(robot.command(ms(50)).speed(), 51, "the motors do not depend on it");
+    assert_eq!(robot.command(ms(50)).speed(), 51, "the motors do not depend on the queue");
     let seen = events(&mut robot);
     assert_eq!(seen[0], RobotEvent::Motor(go(1)));
     assert_eq!((seen.len() as u32) + robot.lost_events(), 51);
@@ -36,7 +36,7 @@ fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
         let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
         host.handle_input(report.as_bytes(), ms(index.into()));
     }
-    assert_eq!(host.last_report().unwrap().index, 49, "the latest is kept apart");
+    assert_eq!(host.last_report().unwrap().index, 49, "the latest is kept separately");
     let seen = events(&mut host);
     assert_eq!(seen[0], HostEvent::LinkUp);
     assert_eq!((seen.len() as u32) + host.lost_events(), 51);
@@ -164,7 +164,7 @@ fn periods_of_nothing_do_not_make_a_driver_spin() {
         robot.calibration_result_imu(imu_bias(), ms(0));
         sent(&mut host, ms(0));
         sent(&mut robot, ms(0));
-        // Two sorts of frames, at most one of each in a millisecond.
+        // Two kinds of frames, at most one of each per millisecond.
         assert!(wait(&mut host, ms(100)).len() <= 250);
         assert!(wait(&mut robot, ms(100)).len() <= 310);
     }
@@ -179,7 +179,7 @@ fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_n
     let at_once = sent(&mut host, ms(0));
     assert_eq!(at_once.iter().map(|it| speed(it)).collect::<Vec<_>>(), [Some(1)], "no stop yet");
     host.drive(go(2), ms(0)).unwrap();
-    assert_eq!(wait(&mut host, us(999)), [], "not two in one moment");
+    assert_eq!(wait(&mut host, us(999)), [], "not two at one time");
     host.drive(go(2), us(999)).unwrap();
     assert_eq!(speeds(&wait(&mut host, ms(1))), [(1000, 2)]);
     assert_eq!(speeds(&wait(&mut host, us(1999))), [(1999, 0)], "the dead-man");
@@ -238,7 +238,7 @@ fn the_roles_fit_into_small_memories() {
     assert!(robot_event <= 24, "{robot_event}");
 }
 
-/// The frame of a start request, on which the computed bound rests.
+/// The frame of a start request, from which the bound is computed.
 #[test]
 fn the_calibration_bound_is_that_of_the_frames_that_are_sent() {
     assert_eq!(FrameOf::<CalibrationStart>::LEN, FrameOf::<CalibrationEnd>::LEN);
