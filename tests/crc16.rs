@@ -31,7 +31,7 @@ fn assert_equal_to_oracle(message: &[u8]) {
 }
 
 #[test]
-fn the_catalogued_check_value_is_met() {
+fn the_catalogued_check_value_matches() {
     assert_eq!(compute(b"123456789"), 0x4B37);
     assert_eq!(CRC_16_MODBUS.check, 0x4B37);
     assert_eq!(compute(b""), 0xFFFF);
@@ -80,7 +80,7 @@ fn every_one_hot_message_up_to_300_bytes_agrees() {
 }
 
 #[test]
-fn less_than_a_crc_is_never_good() {
+fn fewer_bytes_than_a_crc_are_never_good() {
     assert!(!check(&[]));
     for byte in 0..=u8::MAX {
         assert!(!check(&[byte]));
@@ -96,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_judged_as_the_oracle_does(bytes in prop::collection::vec(any::<u8>(), 2..64)) {
+    fn any_bytes_are_judged_like_the_oracle(bytes in prop::collection::vec(any::<u8>(), 2..64)) {
         let (body, crc) = bytes.split_at(bytes.len() - 2);
         prop_assert_eq!(check(&bytes), ORACLE.checksum(body).to_le_bytes() == crc);
     }

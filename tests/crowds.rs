@@ -30,23 +30,23 @@ macro_rules! properties {
             type F = $framing;
 
             #[test]
-            fn a_packet_is_found_at_every_place_of_a_crowd() {
+            fn a_packet_is_found_at_every_position_among_dense_headers() {
                 check_every_place::<F>();
             }
 
             #[test]
-            fn a_crowd_may_be_cut_anywhere() {
+            fn dense_headers_may_be_cut_anywhere() {
                 check_every_cut::<F, $max_len>();
             }
 
             proptest! {
                 #[test]
-                fn a_crowd_gives_what_the_oracle_says(stream in stream(F::RULES)) {
+                fn dense_headers_match_the_oracle(stream in stream(F::RULES)) {
                     check_slice::<F>(&stream);
                 }
 
                 #[test]
-                fn chunks_of_a_crowd_do_not_matter(
+                fn chunks_of_dense_headers_do_not_matter(
                     stream in stream(F::RULES),
                     chunks in vec(0..150_usize, 1..6),
                 ) {

@@ -87,7 +87,7 @@ fn play(body: fn(&[u8])) {
 }
 
 #[test]
-fn any_bytes_have_the_crc_that_one_bit_after_the_other_gives() {
+fn any_bytes_have_the_same_crc_as_bit_by_bit() {
     play(bodies::crc16);
 }
 

@@ -158,7 +158,7 @@ fn a_position_splits_so_that_both_parts_have_the_sign_of_the_total() {
 }
 
 #[test]
-fn a_position_splits_with_a_count_of_0_to_8191_where_asked() {
+fn a_position_splits_with_a_count_of_0_to_8191_on_request() {
     for (counts, count, rotation) in
         [(-4096, 4096, -1), (-1, 8191, -1), (-8192, 0, -1), (8193, 1, 1)]
     {
@@ -212,7 +212,7 @@ fn revolutions_and_radians_go_to_the_nearest_count_and_back() {
 }
 
 #[test]
-fn dip_switches_are_read_as_told_and_never_guessed() {
+fn dip_switches_are_read_as_configured_and_never_guessed() {
     let value = |digits: &str| digits.parse::<DipSwitch>().unwrap().node_id(IdReading::Value);
     let plus_one =
         |digits: &str| digits.parse::<DipSwitch>().unwrap().node_id(IdReading::ValuePlusOne);

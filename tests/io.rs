@@ -127,7 +127,7 @@ fn an_end_of_file_in_the_middle_of_a_frame_loses_nothing_when_the_file_grows() {
 }
 
 #[test]
-fn at_a_final_end_of_file_idle_frees_what_a_false_header_hides() {
+fn at_a_final_end_of_file_idle_releases_frames_hidden_by_a_false_header() {
     for next in CALLS {
         // Two nested length fields of 64 bytes, followed by a whole ping.
         let mut line = vec![0xFD, 0xFF, 60, 0, 0xFD, 0xFF, 60, 0];

@@ -318,7 +318,7 @@ proptest! {
     }
 
     #[test]
-    fn no_set_point_is_applied_that_nobody_sent(weather in weather()) {
+    fn no_spurious_set_point_is_applied(weather in weather()) {
         let (mut line, _) = run(&weather);
         for (_, tail, event) in line.take_tail_events() {
             let SlaveEvent::Command(Target::Position(target)) = event else { panic!("{event:?}") };

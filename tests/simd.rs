@@ -71,7 +71,7 @@ fn pings(count: u8) -> Vec<u8> {
 }
 
 #[test]
-fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
+fn damage_at_any_byte_of_a_run_costs_the_same_as_without_simd() {
     for clean in [responses(50), exchanges(20), pings(50)] {
         let mut stream = clean.clone();
         for at in 0..clean.len() {
@@ -87,7 +87,7 @@ fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
 }
 
 #[test]
-fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_what_it_costs_without_simd() {
+fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_the_same_as_without_simd() {
     for clean in [responses(40), exchanges(16)] {
         for at in 0..clean.len() {
             let (head, tail) = clean.split_at(at);
@@ -161,7 +161,7 @@ fn false_lengths_are_counted_as_such() {
 }
 
 #[test]
-fn a_decoder_with_batches_gives_what_one_without_them_gives() {
+fn decoders_with_and_without_batches_agree() {
     let noise = [0xAA, 0x55, 0x00, 0xBB, 0x12].repeat(100);
     let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
     for chunk in [1, 64, 200, 5000] {
@@ -190,7 +190,7 @@ fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
 }
 
 #[test]
-fn a_packet_that_begins_inside_another_one_is_none() {
+fn a_packet_that_begins_inside_another_one_is_not_delivered() {
     // The second begins in the middle of the first, whose CRC is part of its payload.
     let mut both = [0x55, 3, 0x12, 0x34, 0x55, 5, 0, 0, 0x56, 0x78, 0, 0];
     oracle::seal(&mut both[..8]);

@@ -74,7 +74,7 @@ fn a_mode_that_changes_under_a_set_point_owes_a_stop() {
 }
 
 #[test]
-fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
+fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
     let mut bus = wire.master(|_| ());
     bus.discover().unwrap();
@@ -103,7 +103,7 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
 }
 
 #[test]
-fn a_position_stop_is_paid_in_a_loop_that_always_comes_too_late_for_its_write() {
+fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
     for (loop_us, gap_us) in [(1000, 50), (25_000, 50), (25_000, 1000), (59_000, 5000)] {
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
         let mut bus = wire.master(|config| {

@@ -107,7 +107,7 @@ fn a_stop_that_a_port_cut_in_two_is_sent_again() {
 }
 
 #[test]
-fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_says_so() {
+fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
     for is_async in [false, true] {
         let (wire, mut host) = host();
         wire.world().is_deaf = true;

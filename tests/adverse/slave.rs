@@ -16,7 +16,7 @@ const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
 
 #[test]
-fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
+fn a_cut_off_answer_does_not_continue_in_another_nodes_exchange() {
     let wire = Wire::bus(vec![]);
     let mut slave = wire.driver(|now| -> Slave {
         Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now)

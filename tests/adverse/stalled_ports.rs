@@ -13,7 +13,7 @@ use axlewire::{
 use crate::{motor::Motor, wire::Wire};
 
 #[test]
-fn an_async_port_that_never_gets_ready_does_not_hold_up_a_stop_for_ever() {
+fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
         let mut bus = wire.master(|_| ());
@@ -65,7 +65,7 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
 }
 
 #[test]
-fn a_port_that_was_not_asked_for_a_while_after_a_dropped_call_has_not_stalled() {
+fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
     let mut bus = wire.master(|_| ());
     bus.discover().unwrap();

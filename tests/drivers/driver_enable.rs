@@ -31,7 +31,7 @@ fn the_pin_is_on_from_before_the_first_byte_until_after_the_flush() {
 }
 
 #[test]
-fn the_delays_stand_between_pin_and_bytes() {
+fn the_delays_are_between_pin_and_bytes() {
     for is_async in [false, true] {
         let (mut port, log) = delayed(Script::default(), 0);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
@@ -63,7 +63,7 @@ fn the_pin_is_off_after_every_error_of_the_port() {
 }
 
 #[test]
-fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_told_to_be_lost() {
+fn bytes_taken_before_a_failed_write_leave_before_the_pin_goes_off_or_are_reported_as_lost() {
     for (is_async, refusal) in
         [false, true].into_iter().flat_map(|it| [(it, Step::Error), (it, Step::Zero)])
     {
@@ -104,7 +104,7 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
 }
 
 #[test]
-fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
+fn a_failing_pin_sends_nothing_and_is_retried() {
     for is_async in [false, true] {
         let (mut port, log, pin) = undelayed(Script::default());
         drain(&log);
@@ -125,7 +125,7 @@ fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
 }
 
 #[test]
-fn a_cancelled_write_keeps_the_pin_until_it_is_finished_or_given_up() {
+fn a_cancelled_write_keeps_the_pin_on_until_it_is_finished_or_dropped() {
     let stalled = Script {
         writes: [Step::Bytes(vec![0]), Step::Stall].into(),
         flushes: [Step::Stall].into(),
@@ -163,7 +163,7 @@ fn reading_does_not_touch_the_pin() {
 }
 
 #[test]
-fn a_write_of_no_bytes_puts_the_pin_off() {
+fn an_empty_write_switches_the_pin_off() {
     for is_async in [false, true] {
         let (mut port, log, pin) = undelayed(Script::default());
         assert_eq!(write(&mut port, is_async, b""), Ok(0));
@@ -179,7 +179,7 @@ fn a_write_of_no_bytes_puts_the_pin_off() {
 }
 
 #[test]
-fn the_error_tells_port_and_pin_apart() {
+fn the_error_distinguishes_port_and_pin() {
     let (port, pin) = (Rs485Error::Port(Unplugged), Rs485Error::Pin(Stuck));
     let (port, pin): (Rs485Error<Unplugged, Stuck>, Rs485Error<Unplugged, Stuck>) = (port, pin);
     assert_eq!(port.to_string(), "unplugged");

@@ -34,7 +34,7 @@ fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {
 }
 
 #[test]
-fn time_passes_only_when_the_role_has_asked_for_it() {
+fn timeouts_are_handled_only_when_the_role_has_requested_them() {
     for round in ROUNDS {
         let mut role = Recorder::default();
         role.timeout = Some(at_ms(1));
@@ -50,7 +50,7 @@ fn time_passes_only_when_the_role_has_asked_for_it() {
 }
 
 #[test]
-fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
+fn bytes_arriving_while_a_frame_is_sent_are_taken_in_before_the_next_one() {
     for is_async in [false, true] {
         let world = World::default();
         let (mut near, mut far) = End::pair(&world, 20);
@@ -145,7 +145,7 @@ fn reads_and_writes_of_every_size_move_every_byte_once() {
 }
 
 #[test]
-fn a_round_is_bounded_whatever_port_and_role_do() {
+fn a_round_is_bounded_whatever_the_port_and_the_role_do() {
     for round in ROUNDS {
         let flood = (0..2000).map(|_| bytes(64));
         let frames = vec![&b"frame"[..]; 1000];
@@ -159,7 +159,7 @@ fn a_round_is_bounded_whatever_port_and_role_do() {
 }
 
 #[test]
-fn a_frame_that_no_driver_has_room_for_is_refused() {
+fn a_frame_too_large_for_a_driver_is_refused() {
     for round in ROUNDS {
         let mut driver = scripted(Recorder::sending(&[&[7; 65], &[8; 64]]), Script::default());
         let error = DriveError::FrameTooLong { length: 65, limit: 64 };

@@ -74,7 +74,7 @@ fn a_ping_comes_back_with_its_round_trip() {
 }
 
 #[test]
-fn a_pong_from_before_is_not_the_answer_to_a_ping() {
+fn an_earlier_pong_is_not_the_answer_to_a_ping() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();
         for _ in 0..500 {
@@ -140,7 +140,7 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
 }
 
 #[test]
-fn driving_leaves_the_lamp_as_it_is() {
+fn driving_does_not_change_the_lamp() {
     let (world, mut rover, _) = story();
     let lit = MotorControl::new(10, 0).unwrap().with_front_led(true);
     rover.role_mut().drive(lit, world.now()).unwrap();
@@ -152,7 +152,7 @@ fn driving_leaves_the_lamp_as_it_is() {
 }
 
 #[test]
-fn a_command_out_of_range_is_refused_and_the_one_before_stays() {
+fn a_command_out_of_range_is_refused_and_the_previous_one_stays() {
     let (_, mut rover, _) = story();
     rover.drive(20, 0).unwrap();
     let error = rover.drive(101, 0).unwrap_err();
@@ -208,7 +208,7 @@ fn a_calibration_is_begun_and_ended_when_the_calls_return() {
 }
 
 #[test]
-fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
+fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();
         robot.borrow_mut().port().unplugged.set(true);
@@ -263,7 +263,7 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
 }
 
 #[test]
-fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
+fn a_vanished_port_is_an_error_of_every_call_of_the_host() {
     let (world, mut rover, _) = story();
     rover.port().unplugged.set(true);
     let gone = DriveError::Port(Unplugged);
@@ -382,7 +382,7 @@ fn a_stop_behind_a_cut_off_frame_goes_twice_although_the_port_refused_one_of_the
 }
 
 #[test]
-fn calls_take_out_what_comes_all_the_time_and_what_they_return_and_nothing_else() {
+fn calls_take_only_frequent_events_and_those_that_they_return() {
     for is_async in [false, true] {
         let (world, mut rover, _) = story();
         let kind = CalibrationKind::Imu;

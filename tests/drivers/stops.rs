@@ -83,7 +83,7 @@ fn a_stop_that_is_not_paid_is_an_error_at_its_stated_deadline_and_stays_owed() {
 }
 
 #[test]
-fn a_stop_goes_on_through_errors_of_the_port() {
+fn a_stop_continues_through_errors_of_the_port() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
@@ -135,7 +135,7 @@ fn drive_for_keeps_the_command_for_its_time_and_ends_with_a_paid_stop() {
 }
 
 #[test]
-fn drive_for_is_a_sign_of_life_all_the_while_however_quiet_the_bus_is() {
+fn drive_for_is_a_constant_sign_of_life_even_on_a_quiet_bus() {
     for limit in [Duration::from_micros(1), MS(1), MS(20)] {
         for is_async in [false, true] {
             let mut config = manual();
@@ -155,7 +155,7 @@ fn drive_for_is_a_sign_of_life_all_the_while_however_quiet_the_bus_is() {
 }
 
 #[test]
-fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_tells_the_error() {
+fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_returns_the_error() {
     for (after, span) in [(0, 5), (1, 5), (20, 1), (20, 5)] {
         for is_async in [false, true] {
             let mut story = Story::new(MasterConfig::direct()).discovered();
@@ -171,7 +171,7 @@ fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_tells_the_erro
 }
 
 #[test]
-fn drive_for_of_a_node_that_is_lost_ends_with_the_stop_that_is_owed() {
+fn drive_for_of_a_lost_node_ends_with_the_owed_stop() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         let (world, two) = (story.world.clone(), story.two.clone());
@@ -241,7 +241,7 @@ fn a_dropped_stop_is_owed_and_the_next_call_sends_it() {
 }
 
 #[test]
-fn standstill_is_waited_for_until_the_deadline_and_the_moving_nodes_are_named() {
+fn await_standstill_waits_until_the_deadline_and_names_the_moving_nodes() {
     for config in [MasterConfig::direct(), manual()] {
         for is_async in [false, true] {
             let mut story = Story::new(config).discovered();

@@ -12,7 +12,7 @@ use crate::{
 };
 
 #[test]
-fn on_a_silent_line_the_next_event_is_waited_for_until_the_deadline_and_not_longer() {
+fn on_a_silent_line_next_event_waits_until_the_deadline_and_no_longer() {
     let world = World::default();
     let (near, _far) = End::pair(&world, 20);
     let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
@@ -87,7 +87,7 @@ impl Endpoint for Plain {
 }
 
 #[test]
-fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
+fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
     let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
     let world = World::default();
     let mut driver = Driver::new(late, End::new(&world, 20), VirtualClock(world.clone()));
@@ -96,7 +96,7 @@ fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
 }
 
 #[test]
-fn as_provided_a_role_takes_old_bytes_for_new_ones_and_frames_may_pause_for_20_ms() {
+fn by_default_a_role_treats_old_bytes_as_new_and_frames_may_pause_for_20_ms() {
     let mut role = Plain::default();
     role.handle_old_input(b"12", at_ms(1), at_ms(9));
     assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);

@@ -69,7 +69,7 @@ pub(crate) fn bursts(log: &str) -> Vec<Vec<u8>> {
             // Once, when the port is created.
             (Access::PinOff, None) => assert!(bursts.is_empty(), "off twice"),
             (Access::Sleep, None) => sleeps += 1,
-            (Access::Sleep, Some(sent)) => panic!("asleep with the pin on behind {sent:02X?}"),
+            (Access::Sleep, Some(sent)) => panic!("asleep with the pin on after {sent:02X?}"),
         }
     }
     // Cut off when QEMU ended, at most inside one burst.

@@ -52,7 +52,7 @@ fn keep(bus: &mut Bus, board: &mut Board, speed: f32, readings: u32) {
 }
 
 #[test]
-fn a_motor_on_a_noisy_bus_keeps_each_speed_and_gets_no_command_that_nobody_gave() {
+fn a_motor_on_a_noisy_bus_keeps_each_speed_and_gets_no_spurious_command() {
     undisturbed(|| {
         const SPEEDS: [f32; 3] = [2.0, -1.5, 3.25];
         let Some(mut board) = Board::start(Program::Slave) else { return };

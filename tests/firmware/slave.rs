@@ -83,7 +83,7 @@ fn discovery_finds_the_board_and_its_motor_turns_and_stops_as_commanded() {
 }
 
 #[test]
-fn a_paid_stop_is_two_commands_that_are_each_followed_by_an_answer_and_the_motor_stands_still() {
+fn a_paid_stop_is_two_commands_each_followed_by_an_answer_and_the_motor_is_at_rest() {
     undisturbed(|| {
         let Some((mut board, mut bus)) = discovered() else { return };
         bus.set_velocity(NODE, rps(3.0)).unwrap();
@@ -113,7 +113,7 @@ fn a_paid_stop_is_two_commands_that_are_each_followed_by_an_answer_and_the_motor
 }
 
 #[test]
-fn a_motor_that_is_read_but_not_commanded_any_more_stops() {
+fn a_motor_that_is_read_but_no_longer_commanded_stops() {
     undisturbed(|| {
         let Some((mut board, mut bus)) = discovered() else { return };
         bus.set_velocity(NODE, rps(3.0)).unwrap();

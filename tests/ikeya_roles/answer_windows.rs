@@ -11,7 +11,7 @@ use axlewire::{
 use crate::rig::*;
 
 #[test]
-fn the_window_is_the_timeout_and_the_wire_time_behind_the_end_of_the_request() {
+fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.turn();
     // 80 us of request, 500 us of patience, 160 us of answer.
@@ -68,7 +68,7 @@ fn a_stray_byte_before_every_answer_costs_nothing() {
 }
 
 #[test]
-fn an_answer_of_another_node_is_counted_and_never_taken() {
+fn an_answer_of_another_node_is_counted_and_never_accepted() {
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     assert_eq!(desk.turn(), read(NodeId::N1));
     desk.hear(290, &position(NodeId::N3, Position::new(1, 1)));

@@ -30,7 +30,7 @@ fn has_died(desk: &mut Desk) -> bool {
 }
 
 #[test]
-fn a_master_has_no_dead_man_unless_it_is_asked_for() {
+fn a_master_has_no_dead_man_by_default() {
     let (mut desk, _) = turning(direct());
     for _ in 0..100 {
         // For hours, with a dead application.
@@ -67,7 +67,7 @@ fn a_silent_application_stops_every_node_whose_latest_order_is_no_stop() {
 }
 
 #[test]
-fn the_deadline_of_the_dead_man_is_told_and_kept_to_the_microsecond() {
+fn the_deadline_of_the_dead_man_is_reported_and_kept_to_the_microsecond() {
     let mut config = armed();
     config.polling = Polling::Manual;
     let (mut desk, told) = turning(config);
@@ -81,7 +81,7 @@ fn the_deadline_of_the_dead_man_is_told_and_kept_to_the_microsecond() {
 }
 
 #[test]
-fn a_driver_that_comes_late_sends_no_set_point_of_a_dead_application() {
+fn a_late_driver_sends_no_set_point_of_a_dead_application() {
     let (mut desk, told) = turning(armed());
     // Not even handle_timeout was called.
     desk.now = told + MS(100);
@@ -112,7 +112,7 @@ fn a_set_point_a_stop_and_keep_alive_are_signs_of_life() {
 }
 
 #[test]
-fn a_refused_set_point_is_no_sign_of_life_nor_is_anything_else_that_is_asked() {
+fn a_refused_set_point_or_a_query_is_not_a_sign_of_life() {
     let (mut desk, told) = turning(armed());
     let refused = CommandError::NotOnline { node: NodeId::N2 };
     while desk.now < told + MS(110) {

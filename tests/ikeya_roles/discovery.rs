@@ -63,7 +63,7 @@ fn a_second_discovery_asks_only_nodes_that_are_not_online_and_lets_stops_through
 }
 
 #[test]
-fn a_discovery_that_is_asked_for_again_joins_the_one_under_way() {
+fn a_repeated_discovery_joins_the_running_one() {
     let mut desk = Desk::new(direct());
     desk.master.discover(desk.now);
     for id in 1..=8 {
@@ -124,7 +124,7 @@ fn an_application_that_discovers_all_the_time_does_not_keep_a_lost_node_from_bei
 }
 
 #[test]
-fn an_application_that_discovers_all_the_time_finds_a_node_that_is_owed_a_stop_wherever_it_is() {
+fn continuous_discoveries_find_every_node_that_is_owed_a_stop() {
     // Node 2 is asked in every discovery, and is never there.
     let mut desk = Desk::with_nodes(only(&[NodeId::N1, NodeId::N2]), &[N1]);
     desk.master.stop(NodeId::N5, desk.now);

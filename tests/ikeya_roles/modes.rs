@@ -8,7 +8,7 @@ use axlewire::ikeya::{
 use crate::rig::*;
 
 #[test]
-fn a_mode_that_changes_at_run_time_is_believed_the_second_time_and_ends_the_set_point() {
+fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.turn();
@@ -65,7 +65,7 @@ fn in_doubt_set_points_of_either_mode_are_refused_and_not_kept() {
 }
 
 #[test]
-fn an_answer_in_the_mode_on_record_settles_the_doubt_and_the_set_point_goes_on() {
+fn an_answer_in_the_recorded_mode_settles_the_doubt_and_the_set_point_continues() {
     let mut desk = in_doubt_at(turns(7));
     desk.answer(NodeId::N1, Answer::Velocity(0.5));
     assert_eq!(desk.packets(1), [read(NodeId::N1)]);
@@ -130,7 +130,7 @@ fn an_early_answer_in_another_mode_puts_the_mode_in_doubt() {
 }
 
 #[test]
-fn a_mode_that_nobody_has_heard_yet_is_not_in_doubt() {
+fn a_mode_that_was_never_heard_is_not_in_doubt() {
     let mut desk = Desk::new(manual());
     desk.hear(1000, &position(NodeId::N1, turns(7)));
     desk.hear(1000, &velocity(NodeId::N1, 1.0));
@@ -215,7 +215,7 @@ fn what_was_written_in_doubt_does_not_pay_the_stop_of_a_node_that_is_in_its_old_
 }
 
 #[test]
-fn a_stop_that_six_exchanges_could_not_unblock_is_told_and_read_for_at_the_pace_of_the_search() {
+fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_search_rate() {
     for (has_stop, event) in [
         (true, MasterEvent::StopBlocked { node: NodeId::N1 }),
         (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
@@ -241,7 +241,7 @@ fn a_stop_that_six_exchanges_could_not_unblock_is_told_and_read_for_at_the_pace_
 }
 
 #[test]
-fn a_stop_that_is_asked_for_when_the_doubt_is_old_is_told_to_be_blocked_at_once() {
+fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
     let mut config = direct();
     config.stops_abnormal = false;
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -255,7 +255,7 @@ fn a_stop_that_is_asked_for_when_the_doubt_is_old_is_told_to_be_blocked_at_once(
 }
 
 #[test]
-fn a_hold_is_measured_anew_after_the_mode_was_in_doubt() {
+fn a_hold_is_measured_again_after_the_mode_was_in_doubt() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     desk.master.stop(NodeId::N3, desk.now);
@@ -271,7 +271,7 @@ fn a_hold_is_measured_anew_after_the_mode_was_in_doubt() {
 }
 
 #[test]
-fn a_hold_whose_confirmation_was_asked_for_is_not_confirmed_when_the_mode_is_in_doubt() {
+fn a_hold_is_not_confirmed_when_the_mode_is_in_doubt() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.master.stop(NodeId::N3, desk.now);
     desk.run(MS(10));
@@ -313,7 +313,7 @@ fn a_set_point_that_has_not_left_when_the_doubt_begins_is_not_sent() {
 }
 
 #[test]
-fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_comes() {
+fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_is() {
     let mut desk = in_doubt_at(turns(7));
     desk.turn();
     desk.silence();

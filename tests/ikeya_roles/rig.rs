@@ -254,7 +254,7 @@ impl Desk {
     }
 
     /// A driver that sleeps until the next deadline misses nothing. A packet handed out behind a
-    /// WRITE that is still leaving would not leave sooner.
+    /// WRITE that is still leaving would not leave any earlier.
     fn check_sleep(&self, next: Instant) {
         if self.is_behind_write {
             return;

@@ -5,7 +5,7 @@ use axlewire::ikeya::{board::ThreeMotors, master::Schedule};
 use crate::rig::*;
 
 #[test]
-fn the_schedule_tells_the_rate_of_a_bus_before_it_is_wired() {
+fn the_schedule_gives_the_rate_of_a_bus_before_it_is_wired() {
     let plan = Schedule::new(8);
     assert_eq!((plan.cycle_time(), plan.cycles_per_second(), plan.busy_pct()), (US(3600), 277, 88));
     let mut reading = plan;

@@ -69,7 +69,7 @@ fn stops_go_before_set_points_set_points_before_discovery_and_discovery_before_t
 }
 
 #[test]
-fn a_stop_of_a_silent_node_has_one_attempt_per_round_and_holds_up_nobody() {
+fn a_stop_of_a_silent_node_has_one_attempt_per_round_and_delays_no_other_node() {
     let mut desk = Desk::with_nodes(mixed(), &MIXED);
     desk.answer(NodeId::N1, Answer::Silence);
     desk.master.stop(NodeId::N1, desk.now);
@@ -177,7 +177,7 @@ fn behind_a_write_that_is_leaving_only_reads_and_stops_are_handed_out() {
 }
 
 #[test]
-fn where_positions_can_be_written_at_once_velocity_nodes_still_go_first() {
+fn even_if_positions_can_be_written_at_once_velocity_nodes_go_first() {
     let mut config = mixed();
     config.hold_age = MS(1000);
     let mut desk = Desk::with_nodes(config, &MIXED);

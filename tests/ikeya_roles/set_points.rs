@@ -60,7 +60,7 @@ fn nodes_are_visited_in_turn_with_a_write_before_each_read() {
 }
 
 #[test]
-fn a_confirmed_write_is_told_after_the_read_that_followed_it() {
+fn a_confirmed_write_is_reported_after_the_read_that_followed_it() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
@@ -75,7 +75,7 @@ fn a_confirmed_write_is_told_after_the_read_that_followed_it() {
 }
 
 #[test]
-fn a_write_that_cannot_be_confirmed_is_told_with_its_cause() {
+fn a_write_that_cannot_be_confirmed_is_reported_with_its_cause() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.master.confirm(NodeId::N1, desk.now).unwrap();

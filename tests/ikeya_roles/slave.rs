@@ -105,7 +105,7 @@ fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
 }
 
 #[test]
-fn the_watchdog_ends_a_command_and_tells_it_once() {
+fn the_watchdog_ends_a_command_and_reports_it_once() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
@@ -136,7 +136,7 @@ fn a_position_node_does_not_answer_before_it_knows_where_it_is() {
 }
 
 #[test]
-fn a_slave_takes_id_and_mode_from_its_switch_as_told() {
+fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
     let dip: DipSwitch = "0101".parse().unwrap();
     let slave: Slave = Slave::from_dip(
         dip,
@@ -169,7 +169,7 @@ fn a_turnaround_gap_holds_the_answer_back() {
 }
 
 #[test]
-fn a_read_that_comes_to_light_with_the_next_bytes_is_not_answered_any_more() {
+fn a_read_found_only_with_the_next_bytes_is_not_answered() {
     let mut slave = slave(Mode::Velocity);
     // A false header before a READ, and no call when the line is quiet.
     let line = [&[0xBB][..], &read(NodeId::N2)].concat();
@@ -243,14 +243,14 @@ fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
 }
 
 #[test]
-fn on_four_wires_a_slave_hears_no_answers_and_looks_for_requests_alone() {
+fn on_four_wires_a_slave_hears_no_answers_and_searches_only_for_requests() {
     let mut slave = slave(Mode::Velocity);
     answers(&mut slave, &trap(), T0);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (0, 1));
 }
 
 #[test]
-fn a_speed_that_is_no_number_does_not_feed_the_watchdog() {
+fn a_nan_speed_does_not_feed_the_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
     for bad in [Position::new(0, 0x7FC0), Position::new(0, 0x7F80), Position::new(1, -128)] {
@@ -287,7 +287,7 @@ fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
 }
 
 #[test]
-fn a_slave_that_was_held_up_obeys_old_bytes_as_of_when_they_may_have_come() {
+fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
@@ -317,7 +317,7 @@ fn an_old_request_that_a_false_header_held_back_is_not_answered() {
 }
 
 #[test]
-fn a_slave_gives_up_an_answer_that_pauses_for_five_byte_times() {
+fn a_slave_drops_an_answer_that_pauses_for_five_byte_times() {
     assert_eq!(slave(Mode::Velocity).frame_pause(), US(100));
     assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
     let mut config = SlaveConfig::direct();
@@ -327,7 +327,7 @@ fn a_slave_gives_up_an_answer_that_pauses_for_five_byte_times() {
 }
 
 #[test]
-fn a_slave_has_no_deadline_where_nothing_is_pending() {
+fn a_slave_has_no_deadline_when_nothing_is_pending() {
     let mut slave = slave(Mode::Velocity);
     assert_eq!(slave.poll_timeout(), None);
     slave.handle_input(&[0x55, 0x00, 0x01], T0);
@@ -340,7 +340,7 @@ fn a_slave_has_no_deadline_where_nothing_is_pending() {
 }
 
 #[test]
-fn an_answer_of_which_no_byte_has_left_is_given_within_its_time() {
+fn an_answer_of_which_no_byte_has_left_is_sent_within_its_time() {
     let answer = velocity(NodeId::N2, 0.0);
     for (unsent, is_due) in
         [(Unsent::Untouched, true), (Unsent::CutOff, false), (Unsent::Unflushed, false)]

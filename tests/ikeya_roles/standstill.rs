@@ -23,7 +23,7 @@ fn paid_by(answer: Answer) -> Desk {
 }
 
 #[test]
-fn a_speed_below_a_twentieth_of_a_turn_per_second_is_standing_still_in_either_direction() {
+fn a_speed_below_a_twentieth_of_a_turn_per_second_is_a_standstill_in_either_direction() {
     let (below, limit) = (0.05_f32.next_down(), 0.05);
     for (speed, is_still) in [
         (0.0, true),
@@ -48,7 +48,7 @@ fn a_speed_below_a_twentieth_of_a_turn_per_second_is_standing_still_in_either_di
 }
 
 #[test]
-fn a_speed_that_is_no_number_is_not_standing_still() {
+fn a_nan_speed_is_not_a_standstill() {
     let mut desk = paid_by(Answer::Velocity(3.0));
     desk.news();
     for bits in [0x7FC0_0000_u32, 0x7F80_0000, 0xFF80_0000] {
@@ -63,7 +63,7 @@ fn a_speed_that_is_no_number_is_not_standing_still() {
 }
 
 #[test]
-fn standing_still_is_told_once_and_when_it_is_so() {
+fn standstill_is_reported_once_and_only_when_true() {
     let mut desk = paid_by(Answer::Velocity(3.0));
     desk.news();
     let mut told = vec![];
@@ -79,7 +79,7 @@ fn standing_still_is_told_once_and_when_it_is_so() {
 }
 
 #[test]
-fn two_positions_within_8_counts_and_20_ms_apart_are_standing_still() {
+fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
     let place = |counts: i32| Position::from_counts(counts).unwrap();
     for (pause_us, way, is_still) in [
         (20_000, 8, true),

@@ -14,7 +14,7 @@ const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 const STOPPED_3: MasterEvent = MasterEvent::Stopped { node: NodeId::N3 };
 
 #[test]
-fn stop_means_zero_for_velocity_and_hold_for_position_never_go_to_zero() {
+fn stop_means_zero_for_velocity_and_hold_for_position_but_never_go_to_zero() {
     let mut desk = Desk::with_nodes(only(&[NodeId::N1, NodeId::N3]), &[N1, N3]);
     desk.master.stop_all(desk.now);
     let mut written = writes(&desk.run(MS(20)));
@@ -69,7 +69,7 @@ fn a_position_stop_reads_first_and_holds_what_this_read_returned() {
 }
 
 #[test]
-fn a_position_that_was_being_read_when_the_stop_was_asked_for_is_not_held() {
+fn a_position_being_read_when_the_stop_was_requested_is_not_held() {
     let mut desk = Desk::with_nodes(manual(), &[N3]);
     desk.master.read(NodeId::N3, desk.now).unwrap();
     desk.turn();
@@ -82,7 +82,7 @@ fn a_position_that_was_being_read_when_the_stop_was_asked_for_is_not_held() {
 }
 
 #[test]
-fn hold_age_says_how_old_a_position_may_be_that_is_held_without_a_read() {
+fn hold_age_is_the_maximum_age_of_a_position_held_without_a_read() {
     for (age_us, is_held) in [(999, true), (1000, false), (1001, false)] {
         let mut config = manual();
         config.hold_age = US(1000);
@@ -120,7 +120,7 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
 }
 
 #[test]
-fn a_hold_is_measured_anew_after_the_node_was_abnormal() {
+fn a_hold_is_measured_again_after_the_node_was_abnormal() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     desk.master.stop(NodeId::N3, desk.now);
@@ -135,7 +135,7 @@ fn a_hold_is_measured_anew_after_the_node_was_abnormal() {
 }
 
 #[test]
-fn a_repeated_stop_joins_the_one_that_is_owed() {
+fn a_repeated_stop_joins_the_owed_one() {
     for (node, way) in [(N1, 4), (N3, 5)] {
         let mut desk = Desk::with_nodes(manual(), &[node]);
         let mut sent = vec![];
@@ -199,7 +199,7 @@ fn a_release_does_not_cancel_a_stop() {
 }
 
 #[test]
-fn a_stop_is_paid_though_nobody_takes_out_the_events() {
+fn a_stop_is_paid_even_if_no_events_are_taken() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for turn in 0..100 {
         let request = desk.packet();

@@ -72,7 +72,7 @@ fn a_stop_that_waits_survives_the_third_strike() {
 }
 
 #[test]
-fn a_stop_that_was_paid_once_begins_anew_with_a_node_that_was_abnormal() {
+fn a_half_paid_stop_starts_over_after_its_node_was_abnormal() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     desk.packets(2);
@@ -104,7 +104,7 @@ fn a_node_that_becomes_abnormal_under_a_set_point_is_owed_a_stop() {
 }
 
 #[test]
-fn a_released_node_that_becomes_abnormal_is_owed_a_stop_too() {
+fn a_released_node_that_becomes_abnormal_is_also_owed_a_stop() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
     desk.packets(2);
@@ -162,7 +162,7 @@ fn a_search_share_of_0_looks_for_nodes_that_are_owed_a_stop_alone_at_1_percent()
 }
 
 #[test]
-fn a_node_that_comes_back_during_its_stop_pays_it_and_stands() {
+fn a_node_that_comes_back_during_its_stop_pays_it_and_stays_at_rest() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.lose_by_hand(NodeId::N1);
     desk.master.stop(NodeId::N1, desk.now);
@@ -197,7 +197,7 @@ fn a_search_share_above_50_percent_counts_as_50() {
 }
 
 #[test]
-fn a_stopped_node_that_is_lost_is_no_longer_known_to_stand() {
+fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
     let mut config = direct();
     config.stops_abnormal = false;
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -219,7 +219,7 @@ fn hold_age_does_not_hold_for_a_node_that_is_lost() {
 }
 
 #[test]
-fn a_doubt_gives_a_lost_node_no_attempt_beyond_the_pace_of_the_search() {
+fn a_doubt_does_not_let_a_lost_node_exceed_the_search_rate() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.packets(2);
@@ -233,11 +233,11 @@ fn a_doubt_gives_a_lost_node_no_attempt_beyond_the_pace_of_the_search() {
     }
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
     assert_eq!(desk.turn(), read(NodeId::N1));
-    assert!(desk.now > attempted_at + MS(10), "sooner than the search rate");
+    assert!(desk.now > attempted_at + MS(10), "faster than the search rate");
 }
 
 #[test]
-fn a_node_that_is_lost_again_under_the_same_stop_gets_an_attempt_at_once_again() {
+fn a_node_that_is_lost_again_under_the_same_stop_gets_another_immediate_attempt() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     for _ in 0..3 {

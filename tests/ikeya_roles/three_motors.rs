@@ -17,7 +17,7 @@ use crate::rig::*;
 const T0: Instant = Instant::from_micros(5_000);
 
 #[test]
-fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
+fn a_three_motor_board_answers_writes_and_its_master_waits_for_the_answer() {
     let mut master: Master<ThreeMotors> = Master::new(direct(), T0);
     let mut slave: Slave<ThreeMotors> =
         Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
@@ -130,7 +130,7 @@ fn a_write_waits_for_a_late_answer_because_it_is_answered_itself() {
 }
 
 #[test]
-fn turning_on_the_spot_is_not_standing_still() {
+fn turning_on_the_spot_is_not_a_standstill() {
     for (speeds, is_still) in [
         ([0.04, -0.04, 0.0], true),
         ([1.0, -1.0, 0.0], false),
@@ -183,7 +183,7 @@ fn all_three_positions_have_to_stay_within_8_counts() {
 }
 
 #[test]
-fn in_doubt_positions_may_be_written_that_all_read_as_standstill() {
+fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
     // Sent as count x 3, then rotation x 3; read as f32 x 3: (count 1, count 2), (count 3, rotation
     // 1), (rotation 2, rotation 3), low half first.
     for (places, may) in [
@@ -231,7 +231,7 @@ fn the_longest_echo_is_removed() {
 }
 
 #[test]
-fn a_stop_has_one_attempt_per_round_where_its_write_is_answered() {
+fn a_stop_has_one_attempt_per_round_if_its_write_is_answered() {
     let mut boards = Boards::new(direct());
     boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
     boards.master.stop(NodeId::N8, boards.now);

@@ -104,7 +104,7 @@ fn after_a_failed_flush_an_answer_does_not_pay_for_the_write_in_front_of_its_rea
 }
 
 #[test]
-fn after_a_failed_flush_all_set_points_are_new_again_those_of_paid_stops_too() {
+fn after_a_failed_flush_all_set_points_are_new_again_including_paid_stops() {
     let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
     desk.master.stop(NodeId::N1, desk.now);
     desk.packets(9);
@@ -117,7 +117,7 @@ fn after_a_failed_flush_all_set_points_are_new_again_those_of_paid_stops_too() {
 }
 
 #[test]
-fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_behind_it() {
+fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_after_it() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
         let mut desk = Desk::with_nodes(manual(), &[N1]);
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -133,7 +133,7 @@ fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_behind_it() {
 }
 
 #[test]
-fn a_discovery_on_a_port_that_fails_skips_nobody() {
+fn a_discovery_on_a_failing_port_skips_no_node() {
     let mut desk = Desk::new(direct());
     NodeId::ALL.into_iter().for_each(|node| desk.answer(node, Answer::Velocity(0.0)));
     desk.master.discover(desk.now);
@@ -148,7 +148,7 @@ fn a_discovery_on_a_port_that_fails_skips_nobody() {
 }
 
 #[test]
-fn the_attempt_that_an_abnormal_node_gets_at_once_is_not_used_up_by_a_port_that_fails() {
+fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.packets(2);
@@ -198,7 +198,7 @@ fn a_frame_that_left_is_not_taken_back_twice() {
 }
 
 #[test]
-fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
+fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     let begin = desk.now;
@@ -223,7 +223,7 @@ fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
 }
 
 #[test]
-fn a_node_that_is_looked_for_is_asked_again_at_once_when_its_read_did_not_leave() {
+fn a_node_in_the_search_is_asked_again_at_once_when_its_read_did_not_leave() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.turn();
@@ -233,7 +233,7 @@ fn a_node_that_is_looked_for_is_asked_again_at_once_when_its_read_did_not_leave(
 }
 
 #[test]
-fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
+fn a_discovery_of_silent_nodes_on_a_failing_port_makes_all_its_attempts() {
     let mut desk = Desk::new(direct());
     desk.master.discover(desk.now);
     let mut asked = 0;
@@ -247,7 +247,7 @@ fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
 }
 
 #[test]
-fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out() {
+fn the_silence_after_a_cut_off_read_begins_when_the_write_before_it_has_left() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     let begin = desk.now;
@@ -260,7 +260,7 @@ fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out
 }
 
 #[test]
-fn a_write_of_a_set_point_is_outdated_once_that_is_dropped_or_replaced() {
+fn the_write_of_a_dropped_or_replaced_set_point_is_outdated() {
     let fresh = |config| {
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();

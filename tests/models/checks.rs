@@ -138,7 +138,7 @@ impl<B: Kit> Bus<B> {
         if timeout.is_some_and(|at| at <= self.now) {
             return Err("a deadline in the past".into());
         }
-        // A packet handed out behind a WRITE that is still leaving would not leave sooner.
+        // A packet handed out behind a WRITE that is still leaving would not leave any earlier.
         if timeout.is_none_or(|at| at > self.line_free) {
             check_sleep(&self.master, self.now)?;
         }

@@ -270,7 +270,7 @@ impl Account {
         }
     }
 
-    /// The port is flushed: nothing comes back any more.
+    /// The port is flushed: nothing can come back now.
     pub(crate) fn flushed(&mut self) {
         self.is_unflushed = false;
         self.motion.flushed();

@@ -128,7 +128,7 @@ impl World for Counter {
 }
 
 #[test]
-fn a_violation_is_told_with_the_shortest_way_to_it() {
+fn a_violation_is_reported_with_the_shortest_path_to_it() {
     let violation = explore(Counter(0), Limits { depth: 9, states: 100 }).unwrap_err();
     assert_eq!(violation.actions.len(), 3, "{violation}");
     assert_eq!(violation.invariant, "seven");

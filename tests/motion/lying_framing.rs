@@ -37,7 +37,7 @@ fn has_refused(counters: Counters, len: u64) -> bool {
 }
 
 #[test]
-fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_slice() {
+fn a_framing_that_rejects_without_bound_stops_at_the_end_of_the_slice() {
     let searched = catch_unwind(|| {
         let mut frames = Frames::<Boundless>::new(&[1, 2, 3]);
         frames.next().is_none() && has_refused(frames.counters(), 3)
@@ -46,7 +46,7 @@ fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_slice() {
 }
 
 #[test]
-fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_chunk() {
+fn a_framing_that_rejects_without_bound_stops_at_the_end_of_the_chunk() {
     for chunk in 1..=6 {
         let searched = catch_unwind(|| {
             let mut decoder = Decoder::<Boundless, 8>::new();

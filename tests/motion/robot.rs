@@ -104,7 +104,7 @@ fn flood(robot: &mut Robot, now: Instant) {
 }
 
 #[test]
-fn biases_are_asked_for_until_the_application_will_find_them() {
+fn biases_are_requested_until_the_application_will_find_them() {
     let mut robot = robot(ms(0));
     let biases = Biases::new(ImuBias::new([1; 3], [2; 3]), MagBias::new([3; 3]));
     assert!(!sent(&mut robot, ms(0)).is_empty(), "it sends a request");

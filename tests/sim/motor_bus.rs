@@ -142,7 +142,7 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 }
 
 #[test]
-fn a_node_without_commands_stands_still_after_its_watchdog() {
+fn a_node_without_commands_stops_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));

@@ -50,7 +50,7 @@ fn wheels(commands: &[(i16, i16)]) -> (i16, i16) {
 }
 
 #[test]
-fn a_rover_mixes_as_the_vendors_motor_c_does() {
+fn a_rover_mixes_like_the_vendors_motor_c() {
     assert_eq!(wheels(&[(60, 50)]), (81, 39));
     assert_eq!(wheels(&[(60, -50)]), (39, 81));
     assert_eq!(wheels(&[(-60, 50)]), (-81, -39), "in reverse the nose swings left");

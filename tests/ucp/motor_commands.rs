@@ -84,7 +84,7 @@ fn received(speed: i16, angular: i16, front_led: i16, version: u16) -> RawMotorC
 }
 
 #[test]
-fn a_received_command_becomes_one_to_be_sent_only_if_it_is_in_range_and_starts_no_update() {
+fn a_received_command_can_be_sent_only_if_it_is_in_range_and_starts_no_update() {
     for version in 0..=u16::MAX {
         let command = MotorControl::try_from(received(10, 20, 100, version));
         if received(10, 20, 100, version).starts_update() {
@@ -108,7 +108,7 @@ fn a_received_command_becomes_one_to_be_sent_only_if_it_is_in_range_and_starts_n
 }
 
 #[test]
-fn foreign_bytes_are_relayed_only_by_the_call_that_says_so() {
+fn foreign_bytes_are_relayed_only_by_an_explicit_call() {
     let bytes = frame(2, zerocopy::IntoBytes::as_bytes(&received(130, -500, 7, 99)));
     let mut buffer = [0; 64];
     let view = Frame::parse(&bytes).unwrap();
@@ -141,7 +141,7 @@ fn a_yaw_swings_the_nose_to_its_side_whatever_the_direction_of_travel() {
 }
 
 #[test]
-fn the_wheels_turn_as_the_vendors_do_and_not_at_all_in_the_dead_bands() {
+fn the_wheels_turn_like_the_vendors_and_not_at_all_in_the_dead_bands() {
     let wheels = |speed, angular| MotorControl::new(speed, angular).unwrap().wheels_pct();
     for (speed, angular, expected) in [
         // From a run of the vendor's motor.c (ruling U6).

@@ -165,7 +165,7 @@ proptest! {
     }
 
     #[test]
-    fn a_robot_loses_nothing_that_it_acknowledges_or_asks_for_no_more(
+    fn a_robot_loses_nothing_that_it_acknowledges_or_stops_requesting(
         calls in vec(to_robot(), 1..120),
     ) {
         let mut now = ms(0);

@@ -149,7 +149,7 @@ fn the_newest_motor_event_is_the_latest_command_however_full_the_queue_is() {
 }
 
 #[test]
-fn biases_end_the_asking_only_when_their_event_has_room() {
+fn biases_end_their_request_only_if_their_event_has_room() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     sent(&mut robot, ms(0));
     // Other requests of the host, until the queue is full.
@@ -194,7 +194,7 @@ fn a_calibration_request_is_acknowledged_only_when_its_event_has_room() {
 }
 
 #[test]
-fn biases_are_those_of_the_store_at_the_moment_they_are_sent() {
+fn biases_are_read_from_the_store_when_they_are_sent() {
     let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
     let mut host = Host::with_store(quiet_config(), store, ms(0));
     sent(&mut host, ms(0));
@@ -210,7 +210,7 @@ fn biases_are_those_of_the_store_at_the_moment_they_are_sent() {
 }
 
 #[test]
-fn a_calibration_ends_when_its_result_has_been_acknowledged_and_the_next_start_is_told() {
+fn a_calibration_ends_when_its_result_is_acknowledged_and_the_next_start_is_reported() {
     for kind in [IMU, MAG] {
         let mut robot = quiet_robot();
         robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
@@ -276,7 +276,7 @@ fn the_end_of_a_calibration_request_waits_for_room() {
 }
 
 #[test]
-fn a_start_that_comes_again_is_told_with_a_flag() {
+fn a_repeated_start_is_reported_with_a_flag() {
     let mut robot = quiet_robot();
     let start = bytes(CalibrationStart::new(IMU));
     robot.handle_input(&start, ms(1));
@@ -352,7 +352,7 @@ fn the_latest_command_and_network_state_have_getters_and_are_the_newest_of_their
 }
 
 #[test]
-fn roles_can_be_cloned_and_go_on_alike() {
+fn cloned_roles_behave_alike() {
     let mut rig = Rig::new(ms(0));
     rig.robot.set_telemetry(&Telemetry::default(), ms(0));
     rig.host.drive(go(10), ms(0)).unwrap();

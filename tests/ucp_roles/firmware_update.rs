@@ -3,7 +3,7 @@
 use crate::rig::*;
 
 #[test]
-fn a_firmware_update_is_asked_for_once_and_followed_by_silence() {
+fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     host.start_calibration(IMU, ms(0)).unwrap();
     assert_eq!(host.start_firmware_update(40, ms(0)), Err(CommandError::Calibrating));
@@ -80,7 +80,7 @@ fn an_update_is_refused_until_the_stop_has_been_sent() {
 }
 
 #[test]
-fn one_more_stop_goes_in_front_of_an_update_request() {
+fn one_more_stop_precedes_an_update_request() {
     let mut host = driving();
     let mut robot = quiet_robot();
     robot.handle_input(&bytes(go(60)), ms(30));

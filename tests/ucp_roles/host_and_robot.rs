@@ -4,7 +4,7 @@
 use crate::rig::*;
 
 #[test]
-fn a_host_that_floods_gets_one_answer_of_each_sort_at_a_time() {
+fn a_flooding_host_gets_one_answer_of_each_kind_at_a_time() {
     let mut robot = quiet_robot();
     let mut flood = Vec::new();
     for version in 0..1000 {
@@ -43,7 +43,7 @@ fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
 }
 
 #[test]
-fn garbage_for_ever_is_reported_as_a_lost_link() {
+fn endless_garbage_is_reported_as_a_lost_link() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     let mut seed = 1_u32;
     for at in 0..5000 {
@@ -60,7 +60,7 @@ fn garbage_for_ever_is_reported_as_a_lost_link() {
 }
 
 #[test]
-fn unplugging_stops_the_robot_and_is_reported_and_plugging_in_goes_on() {
+fn unplugging_stops_the_robot_and_is_reported_and_replugging_resumes() {
     let mut rig = Rig::new(ms(0));
     rig.robot.set_telemetry(&Telemetry::default(), rig.now);
     rig.host.set_network_state(NetworkState::Connected, rig.now).unwrap();
@@ -116,7 +116,7 @@ fn a_session_goes_the_same_way_over_the_wrap_of_time() {
 }
 
 #[test]
-fn a_call_too_many_does_nothing() {
+fn spurious_calls_do_nothing() {
     let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     host.drive(go(10), ms(0)).unwrap();
@@ -137,7 +137,7 @@ fn a_call_too_many_does_nothing() {
 }
 
 #[test]
-fn periods_of_nothing_do_not_make_a_driver_spin() {
+fn zero_periods_do_not_make_a_driver_spin() {
     let mut config = HostConfig::default();
     config.command_period = Duration::ZERO;
     config.command_gap = Duration::ZERO;
@@ -171,7 +171,7 @@ fn periods_of_nothing_do_not_make_a_driver_spin() {
 }
 
 #[test]
-fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_never() {
+fn zero_durations_in_the_settings_mean_a_millisecond() {
     let mut config = quiet_config();
     (config.command_gap, config.dead_man) = (Duration::ZERO, Duration::ZERO);
     let mut host = Host::new(config, ms(0));
@@ -186,7 +186,7 @@ fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_n
 }
 
 #[test]
-fn a_host_whose_settings_say_nothing_pings_and_asks_once_a_millisecond() {
+fn a_host_with_zero_periods_pings_and_requests_once_a_millisecond() {
     let mut config = quiet_config();
     (config.ping_period, config.ack_timeout) = (Some(Duration::ZERO), Duration::ZERO);
     let mut host = Host::new(config, ms(0));

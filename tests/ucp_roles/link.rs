@@ -46,7 +46,7 @@ fn a_robot_that_never_answers_is_reported_after_500_ms() {
 }
 
 #[test]
-fn an_echoing_line_is_no_robot() {
+fn an_echoing_line_is_not_a_robot() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     for now in (0..2000).step_by(10) {
         host.handle_timeout(ms(now));
@@ -61,7 +61,7 @@ fn an_echoing_line_is_no_robot() {
 }
 
 #[test]
-fn a_pong_tells_the_round_trip_time() {
+fn a_pong_gives_the_round_trip_time() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     for (turn, micros) in [(0, 3000), (1, 1000), (2, 2000)] {
         let at = ms(turn * 200);

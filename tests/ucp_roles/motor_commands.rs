@@ -59,7 +59,7 @@ fn a_stop_goes_out_at_once_and_before_everything_else() {
 }
 
 #[test]
-fn a_stop_leaves_the_lamp_as_it_was() {
+fn a_stop_does_not_change_the_lamp() {
     let mut host = quiet_host();
     host.drive(go(40).with_front_led(true), ms(0)).unwrap();
     host.stop(ms(1));
@@ -69,7 +69,7 @@ fn a_stop_leaves_the_lamp_as_it_was() {
 }
 
 #[test]
-fn stop_called_without_end_does_not_flood_the_line() {
+fn stop_called_endlessly_does_not_flood_the_line() {
     let mut host = quiet_host();
     let mut count = 0;
     for now in 0..1000 {

@@ -68,7 +68,7 @@ fn the_first_command_is_an_event_even_if_it_changes_nothing() {
 }
 
 #[test]
-fn a_repeated_command_is_no_event() {
+fn a_repeated_command_is_not_an_event() {
     let mut robot = quiet_robot();
     for at in (0..2000).step_by(100) {
         robot.handle_timeout(ms(at));
@@ -79,7 +79,7 @@ fn a_repeated_command_is_no_event() {
 }
 
 #[test]
-fn out_of_range_is_cut_as_the_vendor_firmware_does() {
+fn out_of_range_values_are_clamped_like_in_the_vendor_firmware() {
     let mut robot = quiet_robot();
     robot.handle_input(&careless(i16::MIN, 360, 0x0101, 0), ms(0));
     let command = robot.command(ms(0));

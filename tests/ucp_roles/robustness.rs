@@ -215,7 +215,7 @@ fn holds_another(bytes: &[u8], frame: &[u8]) -> bool {
 }
 
 #[test]
-fn a_line_whose_damage_the_crc_cannot_see_is_told_from_others() {
+fn damage_that_the_crc_cannot_detect_is_recognised() {
     let command = |crc: [u8; 2]| {
         let mut frame = [0_u8; 24];
         frame[..8].copy_from_slice(&[0xFD, 0xFF, 0x14, 0, 2, 0x18, 0xCE, 0xFF]);
@@ -258,7 +258,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
 
     #[test]
-    fn over_a_bad_line_nothing_is_done_that_was_not_asked_for_and_nothing_hangs(
+    fn over_a_bad_line_nothing_unrequested_is_done_and_nothing_hangs(
         acts in vec(act(), 1..25),
         seed in any::<u64>(),
         per_mille in 0..200_u64,

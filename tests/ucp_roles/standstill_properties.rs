@@ -145,7 +145,7 @@ proptest! {
     /// A robot receives the rest of the frames. Once the line works again and the application has
     /// requested a stop, one round and the time on the wire are enough.
     #[test]
-    fn after_any_failures_a_stop_is_at_the_robot_after_one_round(
+    fn after_any_failures_a_stop_reaches_the_robot_in_one_round(
         acts in vec(act(), 1..60),
         start in begin(),
         wait in 0..100_000_u32,

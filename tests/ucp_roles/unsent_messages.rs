@@ -45,7 +45,7 @@ fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
 }
 
 #[test]
-fn a_calibration_request_that_never_left_is_no_attempt() {
+fn a_calibration_request_that_never_left_does_not_count_as_an_attempt() {
     let mut host = begun();
     host.start_calibration(IMU, ms(10)).unwrap();
     for at in 10..30 {
@@ -136,7 +136,7 @@ fn a_repetition_that_did_not_leave_leaves_the_result_sent() {
 }
 
 #[test]
-fn reports_that_were_skipped_are_counted_once_though_the_next_did_not_leave() {
+fn skipped_reports_are_counted_once_even_if_the_next_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut robot = quiet_robot();
         robot.set_telemetry(&Telemetry::default(), ms(0));
@@ -167,7 +167,7 @@ fn a_failed_flush_repeats_no_acknowledgement() {
 }
 
 #[test]
-fn a_failed_flush_repeats_no_update_request_where_no_stop_can_be_lost_with_it() {
+fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
     let mut host = quiet_host();
     host.start_firmware_update(50, ms(3)).unwrap();
     assert_eq!(sent(&mut host, ms(3)).len(), 1);
@@ -200,7 +200,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
 }
 
 #[test]
-fn a_robot_whose_flush_failed_says_results_and_requests_again_at_once() {
+fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     robot.calibration_result_imu(imu_bias(), ms(0));
     robot.calibration_result_mag(mag_bias(), ms(0));

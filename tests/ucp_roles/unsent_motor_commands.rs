@@ -52,7 +52,7 @@ fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
 }
 
 #[test]
-fn both_frames_behind_one_that_was_cut_off_go_at_once_though_the_command_changes_in_between() {
+fn both_frames_after_a_cut_off_one_are_sent_at_once_even_if_the_command_changes_in_between() {
     let mut host = begun();
     host.drive(go(10), ms(20)).unwrap();
     sent(&mut host, ms(20));
@@ -81,7 +81,7 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
 }
 
 #[test]
-fn a_stop_asked_for_after_the_failure_is_sent_at_once_and_alone() {
+fn a_stop_requested_after_the_failure_is_sent_at_once_and_alone() {
     for unsent in EVERY {
         let mut host = begun();
         host.drive(go(40), ms(30)).unwrap();
@@ -131,7 +131,7 @@ fn a_first_frame_that_may_not_have_been_flushed_comes_first_again() {
 }
 
 #[test]
-fn the_first_frame_is_zero_also_when_the_flush_of_it_and_of_a_command_fails() {
+fn the_first_frame_is_zero_even_when_its_flush_and_that_of_a_command_fail() {
     let mut host = fresh_host();
     host.drive(go(60), ms(0)).unwrap();
     for at in 0..5 {
@@ -148,7 +148,7 @@ fn the_first_frame_is_zero_also_when_the_flush_of_it_and_of_a_command_fails() {
 }
 
 #[test]
-fn a_call_of_handle_unsent_too_many_only_repeats_the_motor_command() {
+fn a_spurious_handle_unsent_only_repeats_the_motor_command() {
     let mut host = begun();
     host.handle_unsent(Unsent::Untouched, ms(1));
     host.handle_unsent(Unsent::Untouched, ms(1));
