@@ -25,7 +25,7 @@ use axlewire::{
 use known_framings::Known;
 use proptest::{collection::vec, prelude::*};
 
-/// One by one, together, and together by SIMD: the frames of the oracle, and its counters.
+/// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {
     checked_line::check_slice::<Portable<F>>(stream);
     checked_line::check_slice::<F>(stream);

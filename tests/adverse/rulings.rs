@@ -186,7 +186,7 @@ impl Node {
         }
     }
 
-    /// The WRITE with this number has left whole.
+    /// The WRITE with this number has left completely.
     pub(crate) fn sent(&mut self, write: &Write, number: u64) {
         if self.is_stopped() {
             self.unanswered.push(number);

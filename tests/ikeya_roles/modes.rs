@@ -14,7 +14,7 @@ fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point(
     desk.turn();
     let at = Position::new(5, 6);
     desk.hear(450, &position(NodeId::N1, at));
-    assert_eq!(desk.told(), [], "not believed yet");
+    assert_eq!(desk.told(), [], "not accepted yet");
     desk.turn();
     desk.hear(450, &position(NodeId::N1, at));
     let changed = MasterEvent::ModeChanged { node: NodeId::N1, mode: Mode::Position };

@@ -162,7 +162,7 @@ impl Account {
         }
     }
 
-    /// A frame goes out.
+    /// A frame is sent.
     pub(crate) fn frame(&mut self, bytes: &[u8], shelf: &Shelf, now: Instant) -> Checked {
         let frame = Frame::parse(bytes).map_err(|error| format!("not a frame: {error:?}"))?;
         let message = frame.message();

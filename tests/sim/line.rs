@@ -1,5 +1,4 @@
-//! A line without faults: how long bytes take, which stations receive them, and what its trace and
-//! its seed give.
+//! A line without faults: how long bytes take, which stations receive them, its trace and its seed.
 
 use axlewire::{
     sim::{Direction, Faults, Line, Who},

@@ -264,7 +264,7 @@ pub(crate) fn check_slice<F: Known>(stream: &[u8]) {
     check_each::<F>(stream, &told);
 }
 
-/// Taken all together they are the same, whatever was taken one by one before.
+/// `each` gives the same frames, whatever was taken one by one before.
 fn check_each<F: Known>(stream: &[u8], told: &oracle::Answer) {
     let place = |frame| place_in(stream, F::bytes(&frame));
     for before in [0, 1, told.frames().len() / 3] {
