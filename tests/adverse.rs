@@ -1,8 +1,8 @@
-//! Roles and drivers when ports, clocks, switches and applications misbehave: a stop that is said
-//! to be paid has reached its motor, and nothing moves on an order that was given up or is too old.
+//! Roles and drivers with misbehaving ports, clocks, switches and applications: a stop reported as
+//! paid has reached its motor, and nothing moves on a withdrawn or outdated order.
 //!
-//! The stories are told in virtual time, by drivers on a line with motors of the tests' own. The
-//! random campaign plays masters against a model of what the rulings let each node be told.
+//! The scenarios run in virtual time, with drivers on a line of simulated motors. The random
+//! campaign runs masters against a model of what the rulings allow.
 
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
@@ -15,10 +15,10 @@ mod kit;
 /// Stops and set-points of a master when everything around it misbehaves.
 #[path = "adverse/master.rs"]
 mod master;
-/// Motors of a bus, for the stories.
+/// Motors of a bus, for the scenarios.
 #[path = "adverse/motor.rs"]
 mod motor;
-/// Packets that a port takes in parts, with pauses.
+/// Ports that take a packet in parts, with pauses.
 #[path = "adverse/paused_packets.rs"]
 mod paused_packets;
 #[path = "support/port.rs"]
@@ -31,18 +31,18 @@ mod random_masters;
 #[cfg(feature = "ucp")]
 #[path = "adverse/rover.rs"]
 mod rover;
-/// What the rulings let a master send.
+/// What the rulings allow a master to send.
 #[path = "adverse/rulings.rs"]
 mod rulings;
 /// Slaves that are called late.
 #[path = "adverse/slave.rs"]
 mod slave;
-/// Ports that never get ready.
+/// Ports that never become ready.
 #[path = "adverse/stalled_ports.rs"]
 mod stalled_ports;
 /// A line in virtual time.
 #[path = "adverse/wire.rs"]
 mod wire;
-/// Clocks that are wrong once.
+/// Clocks with one wrong reading.
 #[path = "adverse/wrong_clocks.rs"]
 mod wrong_clocks;

@@ -1,7 +1,8 @@
 //! A stop at a random moment on a line with every fault at once: how long and how far each motor
-//! still moves, against the bounds of the safety page.
+//! still moves, compared with the bounds on the safety page.
 //!
-//! A few hundred episodes run with the other tests. All 50,000 of each kind, and the table:
+//! A few hundred episodes run with the other tests. To run all 50,000 of each kind and print the
+//! table:
 //!
 //! ```sh
 //! cargo test --release --test campaign -- --ignored --nocapture
@@ -27,7 +28,7 @@ use axlewire::{
 };
 use results::{Run, Table};
 
-/// Every fault at once, each of a random strength.
+/// Every fault at once, each of random strength.
 fn faults(rng: &mut Rng, longest_delay_us: u64) -> Faults {
     let mut faults = Faults::noise(part(rng) * 1e-3);
     faults.lost = part(rng) * 2e-4;
@@ -76,7 +77,7 @@ fn every_rover_stops_within_its_bound() {
 
 #[test]
 #[cfg(feature = "ikeya")]
-#[ignore = "takes minutes: see the head of this file"]
+#[ignore = "takes minutes: see the top of this file"]
 fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
     let table = run(0..50_000, bus::episode);
     println!("{table}");
@@ -85,7 +86,7 @@ fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
 
 #[test]
 #[cfg(feature = "ucp")]
-#[ignore = "takes minutes: see the head of this file"]
+#[ignore = "takes minutes: see the top of this file"]
 fn every_rover_stops_within_its_bound_50_000_times() {
     let table = run(0..50_000, rover::episode);
     println!("{table}");

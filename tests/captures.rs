@@ -1,4 +1,4 @@
-//! The captures that the tour shows: what stands in them, and where every byte goes.
+//! The captures shown in the tour: their contents, and where every byte goes.
 
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "alloc"))]
 

@@ -1,4 +1,4 @@
-//! The checksum against the `crc` crate, and what it promises to detect (ruling B1).
+//! The checksum against the `crc` crate, and the errors it is required to detect (ruling B1).
 
 use axlewire::crc16::{check, compute};
 use crc::{CRC_16_MODBUS, Crc, Table};
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 const ORACLE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_MODBUS);
 
-/// A small generator of fixed streams, for data whose content does not matter.
+/// A small generator of fixed byte streams, for data whose content does not matter.
 struct Random(u64);
 
 impl Random {
@@ -31,7 +31,7 @@ fn assert_equal_to_oracle(message: &[u8]) {
 }
 
 #[test]
-fn the_catalogued_check_value_is_met() {
+fn the_catalogued_check_value_matches() {
     assert_eq!(compute(b"123456789"), 0x4B37);
     assert_eq!(CRC_16_MODBUS.check, 0x4B37);
     assert_eq!(compute(b""), 0xFFFF);
@@ -80,13 +80,13 @@ fn every_one_hot_message_up_to_300_bytes_agrees() {
 }
 
 #[test]
-fn less_than_a_crc_is_never_good() {
+fn fewer_bytes_than_a_crc_are_never_good() {
     assert!(!check(&[]));
     for byte in 0..=u8::MAX {
         assert!(!check(&[byte]));
     }
     let good: Vec<u16> = (0..=u16::MAX).filter(|crc| check(&crc.to_le_bytes())).collect();
-    assert_eq!(good, [0xFFFF], "two bytes are good when they are the CRC of nothing");
+    assert_eq!(good, [0xFFFF], "two bytes are good only if they are the CRC of an empty message");
 }
 
 proptest! {
@@ -96,13 +96,13 @@ proptest! {
     }
 
     #[test]
-    fn any_bytes_are_judged_as_the_oracle_does(bytes in prop::collection::vec(any::<u8>(), 2..64)) {
+    fn any_bytes_are_judged_like_the_oracle(bytes in prop::collection::vec(any::<u8>(), 2..64)) {
         let (body, crc) = bytes.split_at(bytes.len() - 2);
         prop_assert_eq!(check(&bytes), ORACLE.checksum(body).to_le_bytes() == crc);
     }
 }
 
-/// Every length that a frame of either protocol can have, up to the longest known, in bytes.
+/// Every possible frame length of either protocol, up to the longest known, in bytes.
 fn legal_lengths() -> impl Iterator<Item = usize> {
     [4].into_iter().chain(8..=44)
 }

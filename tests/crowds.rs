@@ -1,4 +1,4 @@
-//! Crowds of headers, where candidates are refused many at a time, against the slow oracle.
+//! Dense headers, where candidates are rejected in batches, against the slow oracle.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 #[path = "support/checked_line.rs"]
@@ -19,7 +19,7 @@ use known_framings::Known;
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
 
-/// `x^15 + x + 1`: added to a good CRC it leaves a multiple of it, of odd parity.
+/// `x^15 + x + 1`: added to a good CRC, it leaves a multiple of itself, of odd parity.
 const TRINOMIAL: u16 = 0xC001;
 
 macro_rules! properties {
@@ -30,23 +30,23 @@ macro_rules! properties {
             type F = $framing;
 
             #[test]
-            fn a_packet_is_found_at_every_place_of_a_crowd() {
+            fn a_packet_is_found_at_every_position_among_dense_headers() {
                 check_every_place::<F>();
             }
 
             #[test]
-            fn a_crowd_may_be_cut_anywhere() {
+            fn dense_headers_may_be_cut_anywhere() {
                 check_every_cut::<F, $max_len>();
             }
 
             proptest! {
                 #[test]
-                fn a_crowd_gives_what_the_oracle_says(stream in stream(F::RULES)) {
+                fn dense_headers_match_the_oracle(stream in stream(F::RULES)) {
                     check_slice::<F>(&stream);
                 }
 
                 #[test]
-                fn chunks_of_a_crowd_do_not_matter(
+                fn chunks_of_dense_headers_do_not_matter(
                     stream in stream(F::RULES),
                     chunks in vec(0..150_usize, 1..6),
                 ) {
@@ -73,8 +73,8 @@ properties! {
     ucp_with_the_largest_cap: Ucp<252>, 256;
 }
 
-/// Whole frames, and what is nearly one: of a node that cannot exist, of a length that no frame
-/// has, of odd parity, plainly damaged.
+/// Whole frames and near misses: a node that cannot exist, an impossible length, odd parity, plain
+/// damage.
 fn packets(rules: Rules) -> Vec<Vec<u8>> {
     let mut starts: Vec<(Vec<u8>, usize)> = Vec::new();
     match rules {
@@ -104,7 +104,7 @@ fn packets(rules: Rules) -> Vec<Vec<u8>> {
     packets
 }
 
-/// What a frame may begin with.
+/// Bytes that can begin a frame.
 fn headers(rules: Rules) -> Vec<u8> {
     match rules {
         Rules::Ikeya { .. } => vec![0xAA, 0xBB, 0x55, 0x56],
@@ -112,7 +112,7 @@ fn headers(rules: Rules) -> Vec<u8> {
     }
 }
 
-/// So many bytes of them in no order.
+/// This many of them, shuffled.
 fn crowd(rules: Rules, len: usize) -> Vec<u8> {
     let headers = headers(rules);
     let mut state = 1_u32;
@@ -123,7 +123,7 @@ fn crowd(rules: Rules, len: usize) -> Vec<u8> {
     (0..len).map(|_| next()).collect()
 }
 
-/// Crowds with packets in them and with thinner places, 0 to some 400 bytes.
+/// Dense headers with packets and sparser stretches, 0 to about 400 bytes.
 fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
     let header = select(headers(rules));
     let byte = prop_oneof![3 => header.clone(), 1 => select(vec![0, 1, 2, 4, 9, 0x28, 0xFC])];

@@ -1,5 +1,5 @@
 //! Drivers over ports that fail, end, stall and stutter, in virtual time: nothing is lost, nothing
-//! hangs, every error says what it is.
+//! hangs, every error is specific.
 
 #![cfg(all(feature = "ikeya", feature = "std"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
@@ -7,25 +7,25 @@
 /// High-level calls on a motor bus.
 #[path = "drivers/bus.rs"]
 mod bus;
-/// The bus of the stories.
+/// The bus of the scenarios.
 #[path = "drivers/bus_rig.rs"]
 mod bus_rig;
 /// Clocks and delays.
 #[path = "drivers/clocks.rs"]
 mod clocks;
-/// The driver-enable pin of a port by itself.
+/// The driver-enable pin of a port alone.
 #[path = "drivers/driver_enable.rs"]
 mod driver_enable;
 /// The driver-enable pin under a driver.
 #[path = "drivers/driver_enable_in_a_driver.rs"]
 mod driver_enable_in_a_driver;
-/// A pin that writes down what it does.
+/// A pin that records its changes.
 #[path = "drivers/driver_enable_rig.rs"]
 mod driver_enable_rig;
-/// The texts and sources of errors.
+/// The messages and sources of errors.
 #[path = "drivers/errors.rs"]
 mod errors;
-/// Calls that fail or are dropped, and the next one.
+/// Calls that fail or are dropped, and the call after them.
 #[path = "drivers/failed_and_dropped_calls.rs"]
 mod failed_and_dropped_calls;
 #[path = "support/port.rs"]

@@ -1,13 +1,13 @@
 //! The roles on a Cortex-M4: the programs of `examples/firmware` in QEMU, against the roles on this
 //! machine and against each other, over sockets and in real time.
 //!
-//! Order and content are asserted, never how long something takes: QEMU runs beside whatever else
-//! this machine does. Waits end after 30 s. Where the machine halts QEMU for 100 ms inside a
-//! packet, the packet is lost, as on a real line; so one test runs at a time, and one that fails
-//! while the machine was busy is run again.
+//! Order and content are asserted, never durations: QEMU shares this machine with other work. Waits
+//! end after 30 s. If the machine halts QEMU for 100 ms inside a packet, the packet is lost, as on
+//! a real line; so one test runs at a time, and a test that fails while the machine was busy is run
+//! again.
 //!
-//! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Where they are
-//! missing the tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
+//! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Without them the
+//! tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
 
 #![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
 

@@ -1,5 +1,5 @@
-//! What the fuzz targets run, on stable: over their seeds, every truncation of a seed, and a few
-//! hundred damaged copies of it.
+//! Runs the fuzz targets on stable: over their seeds, every truncation of a seed, and a few hundred
+//! damaged copies of it.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 #[path = "../fuzz/src/bodies.rs"]
@@ -29,7 +29,7 @@ fn run(target: &str, body: fn(&[u8])) {
             }
             body(&damaged);
         }
-        // The tail of one seed behind the head of another.
+        // The tail of one seed after the head of another.
         let other = &seeds[dice.below(seeds.len())];
         let (head, tail) = (dice.below(seed.len() + 1), dice.below(other.len() + 1));
         body(&[&seed[..head], &other[tail..]].concat());
@@ -76,7 +76,7 @@ fn ucp_streams_give_what_the_oracle_says() {
     run("ucp_stream", bodies::ucp_stream);
 }
 
-/// Roles have no seeds: their scripts are as good when they are drawn.
+/// Roles have no seeds: random scripts are as good.
 fn play(body: fn(&[u8])) {
     let mut dice = Dice(0x5EED);
     for len in 0..600 {
@@ -87,7 +87,7 @@ fn play(body: fn(&[u8])) {
 }
 
 #[test]
-fn any_bytes_have_the_crc_that_one_bit_after_the_other_gives() {
+fn any_bytes_have_the_same_crc_as_bit_by_bit() {
     play(bodies::crc16);
 }
 

@@ -1,4 +1,4 @@
-//! Ikeya MD values and packets, exhaustively where that is possible.
+//! Ikeya MD values and packets, exhaustively where possible.
 
 #![cfg(feature = "ikeya")]
 
@@ -91,14 +91,14 @@ fn every_count_and_every_rotation_survives_the_wire() {
 fn unusual_floats_decode_and_only_finite_ones_encode() {
     let floats = [
         0x7FC0_0000_u32, // NaN
-        0xFFFF_FFFF,     // NaN with every bit
+        0xFFFF_FFFF,     // NaN with all bits set
         0x7F80_0001,     // signalling NaN
         0x7F80_0000,     // +infinity
         0xFF80_0000,     // -infinity
         0x8000_0000,     // -0.0
         0x0000_0001,     // smallest subnormal
         0x807F_FFFF,     // largest negative subnormal
-        0x7F7F_FFFF,     // largest number
+        0x7F7F_FFFF,     // largest finite number
         0xFF7F_FFFF,
     ];
     for bits in floats {
@@ -144,7 +144,7 @@ fn a_speed_converts_between_its_units() {
 
 #[test]
 fn a_position_splits_so_that_both_parts_have_the_sign_of_the_total() {
-    // The public master's own: -pi, -3 pi, and one count less than a turn.
+    // From the public master itself: -pi, -3 pi, and one count less than a turn.
     for (counts, count, rotation) in [
         (-4096, -4096, 0),
         (-12_288, -4096, -1),
@@ -158,7 +158,7 @@ fn a_position_splits_so_that_both_parts_have_the_sign_of_the_total() {
 }
 
 #[test]
-fn a_position_splits_with_a_count_of_0_to_8191_where_asked() {
+fn a_position_splits_with_a_count_of_0_to_8191_on_request() {
     for (counts, count, rotation) in
         [(-4096, 4096, -1), (-1, 8191, -1), (-8192, 0, -1), (8193, 1, 1)]
     {
@@ -212,11 +212,11 @@ fn revolutions_and_radians_go_to_the_nearest_count_and_back() {
 }
 
 #[test]
-fn dip_switches_are_read_as_told_and_never_guessed() {
+fn dip_switches_are_read_as_configured_and_never_guessed() {
     let value = |digits: &str| digits.parse::<DipSwitch>().unwrap().node_id(IdReading::Value);
     let plus_one =
         |digits: &str| digits.parse::<DipSwitch>().unwrap().node_id(IdReading::ValuePlusOne);
-    // The document's two examples, each of which needs another reading.
+    // The document's two examples, each of which needs a different interpretation.
     assert_eq!(value("0010"), Ok(NodeId::N1));
     assert_eq!(plus_one("0101"), Ok(NodeId::N3));
     assert_eq!("0010".parse::<DipSwitch>().unwrap().mode(), Mode::Velocity);

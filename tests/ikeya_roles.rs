@@ -1,11 +1,11 @@
-//! Master and slave, called by hand: one story per sentence of rulings I2, I3 and I6 to I14.
+//! Master and slave, called by hand: one scenario per sentence of rulings I2, I3 and I6 to I14.
 
 #![cfg(feature = "ikeya")]
 
 /// Which packet counts as an answer.
 #[path = "ikeya_roles/answer_windows.rs"]
 mod answer_windows;
-/// An application that falls silent.
+/// An application that goes silent.
 #[path = "ikeya_roles/dead_man.rs"]
 mod dead_man;
 /// Finding the nodes of a bus.
@@ -20,10 +20,10 @@ mod modes;
 /// A master called by hand.
 #[path = "ikeya_roles/rig.rs"]
 mod rig;
-/// The rate of a bus.
+/// The cycle rate of a bus.
 #[path = "ikeya_roles/schedule.rs"]
 mod schedule;
-/// What is sent first, and how long the rest waits.
+/// Sending order and longest waits.
 #[path = "ikeya_roles/sending_order.rs"]
 mod sending_order;
 /// The same for boards with three motors.
@@ -38,7 +38,7 @@ mod settings;
 /// The slave.
 #[path = "ikeya_roles/slave.rs"]
 mod slave;
-/// Standing still is measured.
+/// Measured standstill.
 #[path = "ikeya_roles/standstill.rs"]
 mod standstill;
 /// Stops of nodes that answer.

@@ -21,7 +21,7 @@ use axlewire::{
 };
 use port::{Script, Step, Unplugged, poll};
 
-/// Polls once, and drops the future if it is not ready: what a timeout does.
+/// Polls once, and drops the future if it is not ready, like a timeout.
 fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
     match poll(pin!(future)) {
         Poll::Ready(output) => Some(output),
@@ -29,7 +29,7 @@ fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {
     }
 }
 
-/// An event without its borrow.
+/// An event that borrows nothing.
 fn owned<F: Framing>(event: Event<F::Frame<'_>>, bytes: impl Fn(F::Frame<'_>) -> Vec<u8>) -> Owned {
     match event {
         Event::Frame(frame) => Owned::Frame(bytes(frame)),
@@ -65,7 +65,7 @@ fn next_async(reader: &mut FrameReader<Script, Ucp, 64>) -> Owned {
 
 type NextEvent = fn(&mut FrameReader<Script, Ucp, 64>) -> Owned;
 
-/// Both kinds of call, for the stories that hold for both.
+/// Both kinds of call, for scenarios that apply to both.
 const CALLS: [NextEvent; 2] = [next_blocking, next_async];
 
 fn ping(index: u8) -> Vec<u8> {
@@ -127,9 +127,9 @@ fn an_end_of_file_in_the_middle_of_a_frame_loses_nothing_when_the_file_grows() {
 }
 
 #[test]
-fn at_a_final_end_of_file_idle_frees_what_a_false_header_hides() {
+fn at_a_final_end_of_file_idle_releases_frames_hidden_by_a_false_header() {
     for next in CALLS {
-        // Two nested promises of 64 bytes, and a whole ping behind them.
+        // Two nested length fields of 64 bytes, followed by a whole ping.
         let mut line = vec![0xFD, 0xFF, 60, 0, 0xFD, 0xFF, 60, 0];
         line.extend(ping(1));
         let mut reader = FrameReader::new(Script::file([Step::Bytes(line)]));
@@ -226,7 +226,7 @@ fn a_write_error_in_the_middle_of_a_frame_leaves_the_rest_for_the_next_call() {
                 let mut writer = Writer::new(Script::writing(steps));
                 assert_eq!(write(&mut writer, 1), Err(error));
                 assert_eq!(writer.unsent(), &ping(1)[cut..]);
-                // The second frame is refused as long as the first cannot be finished.
+                // The second frame is refused until the first has been sent.
                 assert_eq!(write(&mut writer, 2), Err(error));
                 assert_eq!(writer.unsent(), &ping(1)[cut..]);
                 assert_eq!(write(&mut writer, 3), Ok(()));

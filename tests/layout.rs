@@ -67,7 +67,7 @@ fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
 }
 
 #[test]
-fn ikeya_fields_stand_where_the_document_says() {
+fn ikeya_fields_have_the_documented_offsets() {
     let id = NodeId::N7;
     let rps = |bits| Rps::new(f32::from_bits(bits)).unwrap();
     let position = Position::new(0x1234, 0x5678);

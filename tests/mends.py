@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Takes out the mends of what a review of motion found, one at a time, and shows that each is found again.
+"""Reverts the fixes of a motion review one at a time, and shows that a test detects each revert.
 
-    tests/mends.py            all of them, on a copy of the tree; prints which test finds which
+    tests/mends.py            all fixes, on a copy of the tree; prints the test that detects each
     tests/mends.py 3 5        only these findings
-    tests/mends.py --check    only that each mend is still where this file looks for it
+    tests/mends.py --check    only checks that each fix is still found in its file
 
-Each is searched for by the models first; where these do not look, by the tests that do. Takes some ten
-minutes. Exit status 1 when a mend can be taken out unseen.
+The models run first; for faults outside their scope, the other tests named. Takes about ten
+minutes. Exit status 1 if a fix can be reverted undetected.
 """
 
 import os
@@ -19,17 +19,17 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 COPY = ROOT / "target" / "mends"
-# With its build. A test that goes on for longer waits for what the defect keeps from happening.
+# Including the build. A test that runs longer waits for something that the defect prevents.
 PATIENCE_S = 300
 
-# A number, what happens without its mend, file, the mend, what is put in its place, other tests that look.
+# Number, effect without the fix, file, the fix, its replacement, other tests to run.
 MENDS = [
-    ("1", "a position node is stopped where it was long ago", "src/ikeya/master/role.rs",
+    ("1", "a position node is stopped at an old position", "src/ikeya/master/role.rs",
      "node.status.filter(|&(_, at)| now - at < hold_age)", "node.status.filter(|_| hold_age >= Duration::ZERO)", []),
     ("1b", "a stop holds a position that was measured before the stop was asked for", "src/ikeya/master/stop.rs",
      "if let (Status::Position(position), None, true) = (status, self.hold, self.is_asked) {",
      "if let (Status::Position(position), None) = (status, self.hold) {", []),
-    ("2", "a set-point is sent in the old mode when the other one has been heard", "src/ikeya/master/mode.rs",
+    ("2", "a set-point is sent in the old mode after an answer in the other one", "src/ikeya/master/mode.rs",
      "(Some(known), None) if known != mode => Decision::Doubtful,",
      "(Some(known), None) if known != mode => Decision::Agreed,", []),
     ("3", "a stop is forgotten when its node becomes abnormal", "src/ikeya/master/strikes.rs",
@@ -37,76 +37,76 @@ MENDS = [
      "        if node.stop.take().is_some() {\n        } else if", []),
     ("3b", "a node that becomes abnormal under a set-point is owed nothing", "src/ikeya/master/strikes.rs",
      "} else if stops && was_commanded {", "} else if stops && was_commanded && false {", []),
-    ("4", "a receiver that fails blocks all sending", "src/drive/blocking.rs",
+    ("4", "a failing receiver blocks all sending", "src/drive/blocking.rs",
      "let mut result = self.receive();", "self.receive()?;\n        let mut result = Ok(());", []),
     ("4b", "the same in async calls", "src/drive/asynch.rs",
      "result = result.and(self.receive_async().await);", "self.receive_async().await?;", []),
     ("5", "the driver-enable pin stays on when the port fails", "src/drive/rs485.rs",
      "        let _ = self.release();\n        Err(Rs485Error::Port(error))",
      "        Err(Rs485Error::Port(error))", []),
-    ("5b", "nothing is flushed behind a receiver that fails", "src/drive/blocking.rs",
+    ("5b", "nothing is flushed after a receive error", "src/drive/blocking.rs",
      "        if self.sending.needs_flush() {", "        if result.is_ok() && self.sending.needs_flush() {", []),
-    ("6", "a robot's application is told old commands", "src/ucp/robot/state.rs",
+    ("6", "a robot's application is given old commands", "src/ucp/robot/state.rs",
      "(self.command, self.is_command_new) = (self.command.halted(), true);",
      "self.command = self.command.halted();", ["drivers", "ucp_roles"]),
     ("7", "three motors: new set-points of one node starve the others", "src/ikeya/master/turns.rs",
      "Reason::SetPoint => self.had_set_point,", "Reason::SetPoint => 0,", ["ikeya_roles"]),
     ("8", "a host acknowledges a result that it has not kept", "src/ucp/host/state.rs",
      "let kept = self.events.keep(event).is_ok();", "let kept = self.events.keep(event).is_ok() || true;", []),
-    ("8b", "a robot acknowledges a start that it has not told", "src/ucp/robot/state.rs",
+    ("8b", "a robot acknowledges a start that it has not reported", "src/ucp/robot/state.rs",
      "(repeated && waits) || self.events.keep(event).is_ok()",
      "(repeated && waits) || self.events.keep(event).is_ok() || true", []),
-    ("8c", "a robot ends its asking for biases that it has not told", "src/ucp/robot/state.rs",
+    ("8c", "a robot ends its bias request although it has not reported the biases", "src/ucp/robot/state.rs",
      "if self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok() {\n            self.bias_request.end();",
      "if self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok() || true {\n            self.bias_request.end();", []),
     ("9", "a calibration of a robot does not end with its result", "src/ucp/robot/state.rs",
      "self.calibration = self.calibration.filter(|it| it.kind != kind || !it.has_result);", "", []),
     ("10", "an old answer counts for a new calibration request", "src/ucp/host/calibration.rs",
      "if step != self.step || self.attempts == 0 || !is_its_kind {", "if self.attempts == 0 || !is_its_kind {", []),
-    ("11", "biases are those of the moment at which they were asked for", 3 * ["src/ucp/host/state.rs"] + ["src/ucp/host/send.rs"],
+    ("11", "biases are read when requested, not when sent", 3 * ["src/ucp/host/state.rs"] + ["src/ucp/host/send.rs"],
      ["    pub(super) biases_told: bool,", "            biases_told: false,", "            self.biases_due = Some(at);",
       "let stored = self.store.load();"],
      ["    pub(super) biases_told: bool,\n    pub(super) asked: (Option<ImuBias>, Option<MagBias>),",
       "            biases_told: false,\n            asked: (None, None),",
       "            self.biases_due = Some(at);\n            self.asked = self.store.load();",
       "let stored = self.asked;"], []),
-    ("12", "a slave answers although more has been heard", "src/ikeya/slave/role.rs",
+    ("12", "a slave answers although more bytes have arrived", "src/ikeya/slave/role.rs",
      "            if !is_last {\n                self.overtake();\n            }", "            let _ = is_last;", []),
     ("12b", "a slave answers an hour late", "src/ikeya/slave/role.rs",
      "if now > answer.until {", "if now > answer.until && false {", []),
-    ("12c", "what is left of an answer is sent behind another request", "src/ikeya/slave/role.rs",
+    ("12c", "the rest of an answer is sent after another request", "src/ikeya/slave/role.rs",
      "        self.sent.is_none()\n", "        false\n", ["adverse"]),
-    ("13", "a frame of which no byte has left is sent however late", "src/drive/sending.rs",
+    ("13", "a frame of which no byte has left is sent, however late", "src/drive/sending.rs",
      "            Some(frame) if !self.outbox.is_empty() && now <= frame.left_at + silence => None,",
      "            None => None,\n            Some(frame) if !self.outbox.is_empty() && now <= frame.left_at + silence => None,", []),
-    ("13b", "what is left of a set-point is sent behind a stop", "src/ikeya/master/role.rs",
+    ("13b", "the rest of a set-point is sent after a stop", "src/ikeya/master/role.rs",
      "        self.has_sent_old_set_point()", "        self.has_sent_old_set_point() && false", ["adverse"]),
-    ("13c", "what is left of a motor command is sent behind a stop", "src/ucp/host/role.rs",
+    ("13c", "the rest of a motor command is sent after a stop", "src/ucp/host/role.rs",
      "        self.state.has_sent_old_command()", "        self.state.has_sent_old_command() && false", ["adverse"]),
-    ("14", "a stop on UCP is said to be sent before it is flushed", "src/drive/ucp/calls.rs",
+    ("14", "a stop on UCP is reported as sent before it is flushed", "src/drive/ucp/calls.rs",
      "(self.role.is_stop_sent() && self.is_sent()).then_some(())", "self.role.is_stop_sent().then_some(())", []),
-    ("15", "an echo that is longer than 64 bytes counts as an error", "src/ikeya/master/echo.rs",
+    ("15", "an echo longer than 64 bytes counts as an error", "src/ikeya/master/echo.rs",
      "const LEN: usize = 8 * (8 + 8) + 4;", "const LEN: usize = 64;", ["ikeya_roles"]),
-    ("16", "an answer counts that is whole before its request has left", "src/ikeya/master/replies.rs",
+    ("16", "an answer counts although it is complete before its request has left", "src/ikeya/master/replies.rs",
      "if now < window.request_end + half_answer && !accepts_early {",
      "if now < window.request_end + half_answer && !accepts_early && false {", ["ikeya_roles"]),
     ("17", "a report is returned late, from a queue", "src/ucp/host/state.rs",
      "(self.last_report, self.is_report_new) = (Some(report), true);",
      "if !self.is_report_new {\n            (self.last_report, self.is_report_new) = (Some(report), true);\n        }", ["drivers", "ucp_roles"]),
-    ("18", "a confirmation of a set-point that is dropped never ends", "src/ikeya/master/role.rs",
+    ("18", "the confirmation of a dropped set-point never ends", "src/ikeya/master/role.rs",
      "        if self.node_mut(node).drop_set_point() {", "        if self.node_mut(node).drop_set_point() && false {", []),
-    ("20", "on two wires a slave obeys what stands in another node's answer", "src/ikeya/slave/requests.rs",
+    ("20", "on two wires a slave obeys bytes inside another node's answer", "src/ikeya/slave/requests.rs",
      "let decoder = if is_two_wire {", "let decoder = if is_two_wire && false {", ["ikeya_roles"]),
     ("21", "an async port that fails at once does not let other tasks run", "src/drive/asynch.rs",
      "        if result.is_err() {\n            yield_once().await;\n        }\n        result\n    }\n\n    async fn round_async",
      "        result\n    }\n\n    async fn round_async", []),
-    ("21b", "set-points go on when the application has died", "src/ikeya/master/role.rs",
+    ("21b", "set-points continue after the application has died", "src/ikeya/master/role.rs",
      "                if self.node(id).is_under_order {", "                if self.node(id).is_under_order && false {", []),
     ("22", "a motor command that starts an update is framed like any other", "src/ucp/motor.rs",
      "        if received.starts_update() {", "        if received.starts_update() && false {", ["ucp"]),
     ("U16", "a host begins with a ping instead of a stop", "src/ucp/host/motor.rs",
      "let command = if self.first == First::Due { latest.halted() } else { latest };", "let command = latest;", []),
-    ("U16b", "behind a frame that was cut off a stop goes once", "src/ucp/host/motor.rs",
+    ("U16b", "after a cut-off frame a stop is sent only once", "src/ucp/host/motor.rs",
      "const BOTH: Self = Self::Due(2);", "const BOTH: Self = Self::Due(1);", []),
     ("I12", "a stop is paid by one answer", "src/ikeya/master/stop.rs",
      "const PAYMENTS: u8 = 2;", "const PAYMENTS: u8 = 1;", []),
@@ -114,20 +114,20 @@ MENDS = [
 
 
 def without(mend):
-    """Its files, and what they are without the mend."""
+    """The files of a fix, with their text without it."""
     number, _, files, olds, news, _ = mend
     if isinstance(files, str):
         files, olds, news = [files], [olds], [news]
     texts = {file: (ROOT / file).read_text() for file in files}
     for file, old, new in zip(files, olds, news, strict=True):
         if texts[file].count(old) != 1:
-            sys.exit(f"{number}: {file} has its mend {texts[file].count(old)} times: {old!r}")
+            sys.exit(f"{number}: {file} contains its fix {texts[file].count(old)} times: {old!r}")
         texts[file] = texts[file].replace(old, new)
     return texts
 
 
 def copy_tree():
-    """A copy of what git knows, beside the build of the copies before."""
+    """Copies the files known to git, next to the build directory of earlier copies."""
     tree = COPY / "tree"
     shutil.rmtree(tree, ignore_errors=True)
     files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
@@ -139,7 +139,7 @@ def copy_tree():
 
 
 def failing(tree, target):
-    """The first test of this file that fails; None when all pass."""
+    """The first failing test of this target; None if all pass."""
     command = ["cargo", "test", "--quiet", "-p", "axlewire", "--test", target]
     command += ["--target-dir", COPY / "target"]
     with subprocess.Popen(
@@ -152,7 +152,7 @@ def failing(tree, target):
             return "a test that does not end"
     if "error: could not compile" in err:
         sys.exit(err)
-    # The list at the end of the output.
+    # The list of failures at the end of the output.
     names = re.findall(r"^    ([a-z0-9_:]+)$", out, re.MULTILINE)
     if (run.returncode != 0) != bool(names):
         sys.exit(out + err)
@@ -162,11 +162,11 @@ def failing(tree, target):
 def main(wanted):
     mends = [(mend, without(mend)) for mend in MENDS]
     if wanted == ["--check"]:
-        return print(f"{len(mends)} mends are where they are looked for")
+        return print(f"{len(mends)} fixes are in place")
     tree = copy_tree()
     for target in {target for mend in MENDS for target in ["models", *mend[-1]]}:
         if failing(tree, target):
-            sys.exit(f"tests/{target}.rs fails with all mends in")
+            sys.exit(f"tests/{target}.rs fails with all fixes in place")
     unseen = 0
     for (number, what, _, _, _, others), texts in mends:
         if wanted and number not in wanted:
@@ -179,7 +179,7 @@ def main(wanted):
         print(f"{number:>4}  {what}: {found or 'NOT FOUND'}", flush=True)
         for file in texts:
             shutil.copyfile(ROOT / file, tree / file)
-    sys.exit(f"{unseen} can be taken out unseen" if unseen else None)
+    sys.exit(f"{unseen} can be reverted undetected" if unseen else None)
 
 
 main(sys.argv[1:])

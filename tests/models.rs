@@ -1,46 +1,45 @@
 //! Models: a master and a slave of a motor bus, and a host and a robot of UCP, in every order of
 //! calls, answers and faults, up to a stated depth.
 //!
-//! A world is a role, what it talks to, and an account of its own: what was called, sent and heard,
-//! and what therefore may and must be sent (rulings I6 to I14 and U6 to U16). A search tries all
+//! A world is a role, its peers, and an independent account of what was called, sent and received,
+//! and therefore of what may and must be sent (rulings I6 to I14 and U6 to U16). A search tries all
 //! sequences of actions, shortest first, merges states that differ only in absolute time and in
 //! counters, and prints the shortest sequence that breaks an invariant.
 //!
-//! # What happens
+//! # Actions
 //!
 //! * Calls: set-point, stop, stop of all, release, confirm, read, discovery, sign of life.
-//! * Packets: arrive, are lost, are not taken by the port, cut off, or not flushed.
-//! * Answers: right, missing, late, damaged, of another node, left from an older request, in
-//!   another mode because the switch was moved.
-//! * Nodes restart; time passes a little, up to a deadline, 1 us past it, 10 s.
+//! * Packets: arrive, are lost, are refused by the port, cut off, or not flushed.
+//! * Answers: correct, missing, late, damaged, from another node, left over from an older request,
+//! in another mode because the switch was moved.
+//! * Nodes restart; time passes: briefly, up to a deadline, 1 us past it, 10 s.
 //!
 //! On UCP:
 //!
 //! * Calls of a host: two motor commands, one of them on the spot, zero, stop, start and end of a
 //!   calibration, lamp, firmware update and its end; of a robot: its command, reports, results, the
 //!   end of a calibration, the answer to an update.
-//! * Frames: every message of the other side, right, unasked, repeated, damaged, in halves, held
-//!   back behind a false header, old, our own echo, of no known message.
-//! * Frames that come back untouched or cut off, and flushes that fail, at once or after other
-//!   calls.
-//! * A store that fails, or keeps nothing; events that nobody takes out, up to a full queue.
+//! * Frames: every message of the other side, correct, unsolicited, repeated, damaged, in halves,
+//! held back by a false header, old, our own echo, of no known message.
+//! * Frames handed back unsent or cut off, and failing flushes, immediately or after other calls.
+//! * A store that fails, or keeps nothing; events that are never taken, up to a full queue.
 //!
-//! # What is not in the models
+//! # Outside the models
 //!
-//! An answer that is later than `late_guard`, which nothing can tell from the next one; more than
-//! two nodes; answers that a master receives in pieces (`roles.rs` has them).
+//! An answer later than `late_guard`, which cannot be distinguished from the next one; more than
+//! two nodes; answers that a master receives in pieces (covered by `roles.rs`).
 //!
-//! On UCP: other settings than `sends_first_stop`, `low_ids_only` and the robot's asking for
-//! biases; what reports and pongs say beyond their arrival (`ucp_roles.rs` has it); a host and a
-//! robot that talk to each other.
+//! On UCP: settings other than `sends_first_stop`, `low_ids_only` and the robot's bias requests;
+//! the content of reports and pongs (covered by `ucp_roles.rs`); a host and a robot talking to each
+//! other.
 //!
 //! # Depths
 //!
-//! A plain run tries 2 or 3 actions in a row from each of some ninety prepared states: an abnormal
-//! node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run,
-//! `tests/models/deep.sh`, goes further, and prints each world with its depth, states and time:
+//! A normal run tries 2 or 3 consecutive actions from each of about ninety prepared states: an
+//! abnormal node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run,
+//! `tests/models/deep.sh`, goes further, and prints the depth, states and time of each world:
 //!
-//! | Worlds, of both kinds of boards | Actions in a row | States in each |
+//! | World, for both kinds of boards | Consecutive actions | States in each |
 //! |---|---|---|
 //! | a fresh master of one node, in small steps | 7 | 62,000 to 73,000 |
 //! | a fresh master of two nodes, in small steps | 6 | 85,000 to 87,000 |
@@ -50,13 +49,13 @@
 //! | one node whose mode stays in doubt | 4 | 2,900 to 5,600 |
 //! | one node, with other settings | 6 | 43,000 to 323,000 |
 //! | two nodes, an exchange at a time | 4 | 10,000 to 50,000 |
-//! | two nodes that are commanded and stopped all the time | 9 | 143,000 to 214,000 |
+//! | two nodes that are commanded and stopped continuously | 9 | 143,000 to 214,000 |
 //! | a slave | 4 | 18,000 to 26,000 |
 //!
-//! A plain run tries 2 or 3 actions in a row from each of some thirty states of a host and a robot,
-//! 85 to 2,000 states in each. The deep run:
+//! A normal run tries 2 or 3 consecutive actions from each of about thirty states of a host and a
+//! robot, with 85 to 2,000 states each. The deep run:
 //!
-//! | Worlds of UCP | Actions in a row | States in each |
+//! | UCP world | Consecutive actions | States in each |
 //! |---|---|---|
 //! | a host and its motor commands | 6 | 72,000 to 125,000 |
 //! | a host and firmware updates | 5 | 18,000 to 58,000 |
@@ -65,10 +64,10 @@
 //! | a robot and its motor commands | 5 | 160,000 to 181,000 |
 //! | a robot and all other requests | 4 | 20,000 to 74,000 |
 //!
-//! Drivers, of one kind of boards; a plain run tries 1 or 2 actions. What is called, and what the
-//! port, the pin and the clock do, is in `models/drive/action.rs`:
+//! Drivers, for one kind of board; a normal run tries 1 or 2 actions. The possible calls and the
+//! behaviour of port, pin and clock are in `models/drive/action.rs`:
 //!
-//! | Worlds of drivers | Actions in a row | States in each |
+//! | Driver world | Consecutive actions | States in each |
 //! |---|---|---|
 //! | a blocking driver of a master, commanded | 4 | 142,000 |
 //! | the same in other states and settings | 3 | 4,700 to 10,500 |
@@ -160,7 +159,7 @@ mod ucp;
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 use run::Run;
 
-/// A shallow and a deep test of each group of worlds.
+/// A shallow and a deep test for each group of worlds.
 macro_rules! models {
     ($($name:ident $deep:ident: $($group:literal, $worlds:expr);+;)+) => {$(
         #[test]

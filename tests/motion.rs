@@ -1,8 +1,8 @@
-//! What must hold before a motor is connected: nothing moves that was not told to, and what was
-//! told to stop does stop.
+//! What must hold before a motor is connected: nothing moves without a command, and everything that
+//! is told to stop does stop.
 //!
-//! A test that is marked `Fails today` says what is right and expects the message of its own
-//! assertion. Once the crate does what is right, the mark and `should_panic` go.
+//! A test marked `Fails today` asserts the correct behaviour and expects the message of its own
+//! assertion. Once the crate is correct, the mark and `should_panic` go.
 
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]

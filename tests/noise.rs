@@ -1,18 +1,18 @@
 //! Every frame that survives a noisy line is delivered, and nothing else is.
 //!
-//! Streams of 10,000 frames with a fixed seed. The generator knows which frames it has left whole
-//! and where they lie; the decoder has to find exactly those. Frames go missing for one reason
-//! only: they share a byte with one accepted before (ruling B2), as when a frame that has lost its
-//! last byte is completed by the equal first byte of the next.
+//! Streams of 10,000 frames with a fixed seed. The generator knows which frames are intact and
+//! where they are; the decoder has to find exactly those. Frames go missing for one reason only:
+//! they share a byte with one accepted before (ruling B2), as when a frame that has lost its last
+//! byte is completed by the identical first byte of the next.
 //!
 //! `cargo test --test noise -- --nocapture` prints the figures.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 #[path = "support/known_framings.rs"]
-#[allow(dead_code, reason = "only the bytes of frames are of interest here")]
+#[allow(dead_code, reason = "only the bytes of frames matter here")]
 mod known_framings;
 #[path = "support/oracle.rs"]
-#[allow(dead_code, reason = "a stream this long is too much for it")]
+#[allow(dead_code, reason = "too slow for a stream this long")]
 mod oracle;
 
 use std::collections::HashSet;
@@ -29,19 +29,19 @@ use known_framings::Known;
 
 const FRAMES: usize = 10_000;
 
-/// What the line does.
+/// The faults of a line.
 #[derive(Clone, Copy, Debug)]
 enum Noise {
     None,
-    /// Flips one bit in so many.
+    /// Flips one bit in this many.
     BitErrors(usize),
-    /// Inserts or deletes a byte at one in so many.
+    /// Inserts or deletes a byte at one in this many.
     Slips(usize),
-    /// Sends 1 to 64 random bytes in front of one frame in so many.
+    /// Sends 1 to 64 random bytes before one frame in this many.
     Bursts(usize),
-    /// Sends 1 to 16 bytes that look like headers in front of one frame in so many.
+    /// Sends 1 to 16 bytes that look like headers before one frame in this many.
     HeaderBursts(usize),
-    /// Cuts one frame in so many.
+    /// Truncates one frame in this many.
     Truncation(usize),
 }
 
@@ -169,14 +169,14 @@ fn survive<F: Known, const N: usize>(
             assert!(before.is_some(), "{name}, {noise:?}: frame of {len} at {offset} is lost");
             shared += 1;
         }
-        assert!(shared <= 3, "{name}, {noise:?}: {shared} frames lost to others is no accident");
+        assert!(shared <= 3, "{name}, {noise:?}: {shared} frames lost to others is too many");
         if matches!(noise, Noise::None) {
             assert_eq!(delivered, intact, "{name}: a clean line");
         }
     }
 }
 
-/// The bytes that arrive, and place and length of every frame that arrives whole.
+/// The bytes that arrive, with position and length of every frame that arrives whole.
 fn transmit(
     sent: &[Vec<u8>],
     noise: Noise,
@@ -211,7 +211,7 @@ fn transmit(
                 }
                 Noise::Slips(rate) if dice.one_in(rate) => {
                     if dice.one_in(2) {
-                        // A byte too many in front of the first one harms nobody.
+                        // An extra byte before the first one is harmless.
                         start += usize::from(index == 0);
                         whole &= index == 0;
                         stream.extend([dice.below(256) as u8, byte]);
@@ -229,8 +229,8 @@ fn transmit(
     (stream, intact)
 }
 
-/// Place and length of every frame that a decoder finds in chunks of any size; the slice iterator
-/// has to find the same.
+/// Position and length of every frame that a decoder finds in chunks of any size; the slice
+/// iterator has to find the same.
 fn delivered<F: Known, const N: usize>(stream: &[u8], dice: &mut Dice) -> Vec<(usize, usize)> {
     let mut decoder = Decoder::<F, N>::new();
     let (mut places, mut frames) = (Vec::new(), Frames::<F>::new(stream));

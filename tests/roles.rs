@@ -1,8 +1,8 @@
-//! Properties of the motor bus roles under any faults of the line: no answer of another node or of
-//! another request, no set-point that nobody sent or that is stopped by now, no READ without an
-//! end, no stop that is forgotten.
+//! Properties of the motor bus roles under any faults of the line: no answer from another node or
+//! to another request, no set-point that was never sent or is stopped by now, no READ without an
+//! end, no forgotten stop.
 //!
-//! Stories, one per sentence of the rulings, stand in `ikeya_roles.rs`; those of the rover in
+//! The scenarios, one per sentence of the rulings, are in `ikeya_roles.rs`; those of the rover in
 //! `ucp_roles.rs`.
 
 #![cfg(all(feature = "ikeya", feature = "sim"))]
@@ -24,7 +24,8 @@ use proptest::{
     test_runner::{Config, RngSeed},
 };
 
-/// A position node that counts: each answer tells its id and how many READs it has heard.
+/// A position node that counts: each answer contains its id and the number of READs it has
+/// received.
 struct Counting {
     slave: Slave,
     /// When each answer was sent, by its number.
@@ -77,17 +78,17 @@ impl Endpoint for Counting {
     }
 }
 
-/// A master that remembers when it has asked, and commands now and then.
+/// A master that remembers its request times, and gives occasional commands.
 struct Watched {
     master: Master,
     rng: Rng,
-    /// When each node was asked last, and since when it is being asked without an answer.
+    /// Time of each node's last request, and since when it has been asked without an answer.
     asked: [Option<Instant>; 8],
     open: [Option<Instant>; 8],
     longest: Duration,
-    /// Set-points that have been given to each node.
+    /// Set-points given to each node.
     given: [Vec<Position>; 8],
-    /// The latest order of each node, unless that is a stop.
+    /// The latest order of each node, unless it is a stop.
     order: [Option<Position>; 8],
     /// Nodes that are owed a stop.
     owed: NodeSet,
@@ -118,7 +119,7 @@ impl Watched {
         }
     }
 
-    /// Takes the events as they happen, with the time of the request that they belong to.
+    /// Takes the events as they happen, with the time of the request to which they belong.
     fn note(&mut self, now: Instant) {
         while let Some(event) = self.master.poll_event() {
             let node = match event {
@@ -165,7 +166,7 @@ impl Watched {
         self.owed = owed;
     }
 
-    /// What is written is the latest order, or a stop: to hold where the node was measured.
+    /// Every WRITE is the latest order, or a stop: hold at the measured position.
     fn check_write(&self, packet: &[u8]) {
         let Some(write) = packet.first_chunk().and_then(|it| WriteRequest::parse(it).ok()) else {
             return;
@@ -216,7 +217,7 @@ impl Endpoint for Watched {
     }
 }
 
-/// What is wrong with the line, and for how long it runs.
+/// The line's faults, and the duration of the run.
 #[derive(Clone, Debug)]
 struct Weather {
     seed: u64,
@@ -227,7 +228,7 @@ struct Weather {
     stray: Option<u8>,
     delay_us: u32,
     jitter_us: u32,
-    /// Nodes that are unplugged and plugged in again, by turns of 20 ms.
+    /// Nodes that are unplugged and plugged in again, in turns of 20 ms.
     loose: Vec<NodeId>,
     by_pieces: bool,
 }
@@ -256,7 +257,7 @@ fn line(weather: &Weather) -> Line<Watched, Counting> {
     let mut config = MasterConfig::direct();
     config.baud = weather.baud;
     if weather.by_pieces {
-        // What comes in pieces comes later, by the pause that ends a piece.
+        // Bytes that come in pieces come later, by the pause that ends a piece.
         config.reply_timeout = config.reply_timeout.saturating_add(wire_time(2, weather.baud));
     }
     let mut line = Line::new(weather.baud, weather.seed, Watched::new(config, weather.seed));
@@ -270,7 +271,7 @@ fn line(weather: &Weather) -> Line<Watched, Counting> {
         (faults.duplicated, faults.inserted) = (doubled, inserted);
         faults.stray = weather.stray;
     }
-    // An answer is late by at most the window and the guard: a later one cannot be told apart.
+    // An answer is late by at most the window and the guard: a later one cannot be distinguished.
     let faults = line.pair_mut(Direction::ToHead);
     faults.delay = Duration::from_micros(weather.delay_us);
     faults.jitter = Duration::from_micros(weather.jitter_us);
@@ -281,10 +282,10 @@ fn line(weather: &Weather) -> Line<Watched, Counting> {
     line
 }
 
-/// An event, and when its node had been asked last.
+/// An event, and the time of its node's last request.
 type Told = (MasterEvent, Option<Instant>);
 
-/// Runs the line for 200 ms of its time, and gives back what the master was told.
+/// Runs the line for 200 ms of its time, and returns what the master reported.
 fn run(weather: &Weather) -> (Line<Watched, Counting>, Vec<Told>) {
     let mut line = line(weather);
     let mut events = vec![];
@@ -317,12 +318,12 @@ proptest! {
     }
 
     #[test]
-    fn no_set_point_is_applied_that_nobody_sent(weather in weather()) {
+    fn no_spurious_set_point_is_applied(weather in weather()) {
         let (mut line, _) = run(&weather);
         for (_, tail, event) in line.take_tail_events() {
             let SlaveEvent::Command(Target::Position(target)) = event else { panic!("{event:?}") };
             let node = weather.nodes[tail];
-            // A stop holds where the node itself has said that it is.
+            // A stop holds at a position that the node itself has reported.
             let is_hold = target.rotation() == i16::from(node.get())
                 && usize::from(target.count() as u16) < line.tail(tail).answered.len();
             let given = &line.head().given[index(node)];
@@ -343,7 +344,7 @@ proptest! {
             prop_assert!(counts.requests <= closed + counts.other_mode + 1, "{node}: {counts:?}");
         }
         prop_assert!(line.head().longest <= master.read_bound(), "{:?}", line.head().longest);
-        // The clean cases are not empty ones.
+        // The clean cases are not empty.
         if weather.rates[0] < 500 && weather.loose.is_empty() {
             let answers = events.iter().filter(|(event, _)| matches!(event, MasterEvent::Status { .. }));
             prop_assert!(answers.count() > 5);

@@ -1,4 +1,4 @@
-//! The safety page promises nothing without a test: every test that it names exists.
+//! Every claim of the safety page has a test: every test that it names exists.
 
 #![cfg(not(target_os = "none"))]
 
@@ -14,7 +14,7 @@ const PAGE: &str = include_str!("../src/safety.md");
 fn tests_below(folder: &Path, found: &mut HashSet<String>) {
     let entries: Vec<PathBuf> = match fs::read_dir(folder) {
         Ok(entries) => entries.map(|entry| entry.unwrap().path()).collect(),
-        // A published crate comes without the tool and the firmware.
+        // A published crate does not include the tool and the firmware.
         Err(_) => return,
     };
     for path in entries {

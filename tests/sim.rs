@@ -1,4 +1,4 @@
-//! The simulated line and what hangs on it: what it does to bytes, to time and to roles.
+//! The simulated line and its stations: what it does to bytes, to time and to roles.
 #![cfg(feature = "sim")]
 
 /// How a station is driven, and endpoints that break the contract.
@@ -22,6 +22,6 @@ mod motor_bus;
 #[cfg(feature = "ucp")]
 #[path = "sim/rover.rs"]
 mod rover;
-/// An endpoint that says what a test tells it to.
+/// An endpoint that sends what a test tells it to.
 #[path = "sim/talker.rs"]
 mod talker;

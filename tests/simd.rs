@@ -1,17 +1,17 @@
-//! Frames that are judged together, and bytes that are refused together, with SIMD and without,
-//! against the slow oracle: streams long enough for lanes, damaged everywhere.
+//! Frames judged together, and bytes rejected together, with and without SIMD, against the slow
+//! oracle: streams long enough for lanes, damaged everywhere.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 #[path = "support/checked_line.rs"]
-#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+#[allow(dead_code, reason = "stream.rs uses more of it")]
 mod checked_line;
 #[path = "support/hostile_streams.rs"]
-#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+#[allow(dead_code, reason = "stream.rs uses more of it")]
 mod hostile_streams;
 #[path = "support/known_framings.rs"]
 mod known_framings;
 #[path = "support/oracle.rs"]
-#[allow(dead_code, reason = "the stories of stream.rs use more of it")]
+#[allow(dead_code, reason = "stream.rs uses more of it")]
 mod oracle;
 
 use axlewire::{
@@ -25,14 +25,14 @@ use axlewire::{
 use known_framings::Known;
 use proptest::{collection::vec, prelude::*};
 
-/// One by one, together, and together by SIMD: the frames of the oracle, and its counters.
+/// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {
     checked_line::check_slice::<Portable<F>>(stream);
     checked_line::check_slice::<F>(stream);
     checked_line::check_finished_slice::<F>(stream);
 }
 
-/// Every framing that has something in lanes, and one that has nothing.
+/// Every framing that uses lanes, and one that does not.
 fn check_all(stream: &[u8]) {
     check::<ikeya::ToSlave>(stream);
     check::<ikeya::ToMaster>(stream);
@@ -71,7 +71,7 @@ fn pings(count: u8) -> Vec<u8> {
 }
 
 #[test]
-fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
+fn damage_at_any_byte_of_a_run_costs_the_same_as_without_simd() {
     for clean in [responses(50), exchanges(20), pings(50)] {
         let mut stream = clean.clone();
         for at in 0..clean.len() {
@@ -87,7 +87,7 @@ fn damage_at_any_byte_of_a_run_costs_what_it_costs_without_simd() {
 }
 
 #[test]
-fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_what_it_costs_without_simd() {
+fn a_lost_or_doubled_byte_anywhere_in_a_run_costs_the_same_as_without_simd() {
     for clean in [responses(40), exchanges(16)] {
         for at in 0..clean.len() {
             let (head, tail) = clean.split_at(at);
@@ -126,7 +126,7 @@ fn a_stream_may_end_anywhere() {
 
 #[test]
 fn a_frame_behind_noise_of_any_length_is_found() {
-    // Bytes that are headers, that are none, and that are half a sync.
+    // Bytes that are headers, that are not, and that are half a sync.
     for noise in [&[0xAA][..], &[0xBB, 1], &[0x55, 0x56, 0xAA, 0xBB], &[0], &[0xFD], &[0xFD, 0xFF]]
     {
         for len in 0..300 {
@@ -144,7 +144,7 @@ fn a_frame_behind_noise_of_any_length_is_found() {
 fn half_a_sync_is_found_beside_bytes_of_any_value() {
     for value in 0..=u8::MAX {
         for len in 0..20 {
-            // What stands behind the first FD looks like one where eight bytes are judged together.
+            // The bytes after the first FD look like one when eight bytes are judged together.
             let half =
                 [&vec![value; len][..], &[0xFD], &[value ^ 1; 3], &[0xFD, 0xFC, 0xFD]].concat();
             check::<Ucp>(&[&half[..], &pings(2)].concat());
@@ -161,7 +161,7 @@ fn false_lengths_are_counted_as_such() {
 }
 
 #[test]
-fn a_decoder_with_batches_gives_what_one_without_them_gives() {
+fn decoders_with_and_without_batches_agree() {
     let noise = [0xAA, 0x55, 0x00, 0xBB, 0x12].repeat(100);
     let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
     for chunk in [1, 64, 200, 5000] {
@@ -190,7 +190,7 @@ fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
 }
 
 #[test]
-fn a_packet_that_begins_inside_another_one_is_none() {
+fn a_packet_that_begins_inside_another_one_is_not_delivered() {
     // The second begins in the middle of the first, whose CRC is part of its payload.
     let mut both = [0x55, 3, 0x12, 0x34, 0x55, 5, 0, 0, 0x56, 0x78, 0, 0];
     oracle::seal(&mut both[..8]);
@@ -203,7 +203,7 @@ fn a_packet_that_begins_inside_another_one_is_none() {
     }
 }
 
-/// Long streams of everything, long runs of good frames among them.
+/// Long streams of everything, with long runs of good frames.
 fn long_stream(rules: oracle::Rules) -> impl Strategy<Value = Vec<u8>> {
     let run = vec(hostile_streams::frame(rules), 0..60).prop_map(|frames| frames.concat());
     let noise = vec(any::<u8>(), 0..200);

@@ -1,4 +1,4 @@
-//! The stream layer: against the slow oracle on hostile streams, and as stories told by hand.
+//! The stream layer: against the slow oracle on hostile streams, and as single scenarios.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 /// The buffer of a decoder.
@@ -6,10 +6,10 @@
 mod buffer;
 #[path = "support/checked_line.rs"]
 mod checked_line;
-/// False headers, damage and frames inside of frames.
+/// False headers, damage and nested frames.
 #[path = "stream/false_starts.rs"]
 mod false_starts;
-/// Framings that are not of this crate.
+/// Framings from outside this crate.
 #[path = "stream/foreign_framings.rs"]
 mod foreign_framings;
 #[path = "support/hostile_streams.rs"]
@@ -24,7 +24,7 @@ mod properties;
 /// Delay and silence.
 #[path = "stream/quiet_line.rs"]
 mod quiet_line;
-/// Packets for the stories, and what a decoder makes of them.
+/// Packets for the scenarios, and a decoder's output for them.
 #[path = "stream/rig.rs"]
 mod rig;
 /// How often a candidate is judged.

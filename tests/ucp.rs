@@ -1,8 +1,8 @@
-//! UCP messages and frames: what is read, what is built, and what is refused.
+//! UCP messages and frames: what is parsed, what is built, and what is refused.
 
 #![cfg(feature = "ucp")]
 
-/// A frame by hand.
+/// A hand-made frame.
 #[path = "ucp/by_hand.rs"]
 mod by_hand;
 /// Parsing and encoding.
@@ -11,6 +11,6 @@ mod frames;
 /// Ids, bodies and values.
 #[path = "ucp/messages.rs"]
 mod messages;
-/// Range, wheels, and no update by mistake.
+/// Range, wheels, and no accidental update.
 #[path = "ucp/motor_commands.rs"]
 mod motor_commands;

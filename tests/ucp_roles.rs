@@ -1,8 +1,8 @@
-//! Host and robot: one story per sentence of rulings U6 to U16, in virtual time.
+//! Host and robot: one scenario per sentence of rulings U6 to U16, in virtual time.
 //!
-//! The two talk over a line in memory that takes 10 bit times per byte and does what a test wants
-//! with the frames. After every step the rig asks both roles for their next deadline: it must lie
-//! ahead, or a driver would spin.
+//! The two talk over a line in memory that takes 10 bit times per byte and handles frames as the
+//! test requires. After every step the rig asks both roles for their next deadline: it must be in
+//! the future, or a driver would spin.
 #![cfg(feature = "ucp")]
 
 /// Properties: nothing acknowledged is lost.
@@ -20,7 +20,7 @@ mod firmware_hangs;
 /// Firmware updates.
 #[path = "ucp_roles/firmware_update.rs"]
 mod firmware_update;
-/// What holds for host and robot alike.
+/// Properties common to host and robot.
 #[path = "ucp_roles/host_and_robot.rs"]
 mod host_and_robot;
 /// The link, pings and reports.
@@ -29,7 +29,7 @@ mod link;
 /// Motor commands and the dead-man.
 #[path = "ucp_roles/motor_commands.rs"]
 mod motor_commands;
-/// Roles alone, and two roles on one line.
+/// Helpers: roles alone, and two roles on one line.
 #[path = "ucp_roles/rig.rs"]
 mod rig;
 /// The robot.
@@ -38,7 +38,7 @@ mod robot;
 /// Properties: any calls, bytes and times.
 #[path = "ucp_roles/robustness.rs"]
 mod robustness;
-/// Properties: what should stand still does.
+/// Properties: everything that should be stopped is.
 #[path = "ucp_roles/standstill_properties.rs"]
 mod standstill_properties;
 /// Other messages that did not reach the line.

@@ -55,7 +55,7 @@ fn bits(value: &Value) -> u32 {
     u32::from_str_radix(value.as_str().unwrap(), 16).unwrap()
 }
 
-/// Checks that a speed that may be sent encodes as `encode` says, and that no other can be.
+/// Checks that a finite speed encodes as `encode` does, and that no other can be sent.
 fn sent_if_finite<T>(speeds: &[f32], encode: impl FnOnce(Vec<Rps>) -> T) -> Option<T> {
     let values: Result<Vec<_>, _> = speeds.iter().map(|&rps| Rps::new(rps)).collect();
     let all_finite = speeds.iter().all(|rps| rps.is_finite());
@@ -108,7 +108,7 @@ fn every_ikeya_vector_decodes_to_its_fields_and_encodes_back() {
     assert_eq!((standard, three_motor, refused), (66, 17, 10));
 }
 
-/// No frame, and the first byte skipped for this reason.
+/// Not a frame, and the first byte is skipped for this reason.
 fn is_refused<F: Framing>(vector: &Vector, reason: Reason) {
     let mut frames = Frames::<F>::new(&vector.bytes);
     assert!(frames.next().is_none());
@@ -346,7 +346,7 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
         Message::Unknown(raw) => {
             let hex: String = raw.body.iter().map(|byte| format!("{byte:02x}")).collect();
             assert_eq!(fields["body"].as_str().unwrap(), hex);
-            // A known id with a body that no message has: delivered, never sent (U3, U13).
+            // A known id with an invalid body: delivered, never sent (U3, U13).
             let refusal = RawFrame { ..raw }.encode(&mut [0; 64]).unwrap_err();
             assert_eq!(refusal, EncodeError::KnownId { id: frame.id() });
             ("Unknown", frame.as_bytes().to_vec())
@@ -357,7 +357,7 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
     name
 }
 
-/// Constructors build what is legal and refuse what is not (U7); a copy keeps every field.
+/// Constructors build legal values and refuse illegal ones (U7); a copy keeps every field.
 fn motor_control(command: &ucp::message::RawMotorControl, fields: &Value, index: u8) -> Vec<u8> {
     let (speed, angular) = (int::<i16>(&fields["speed"]), int::<i16>(&fields["angular"]));
     assert_eq!((command.speed(), command.angular()), (speed, angular));

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! byte 0       framing and buffer size
-//! byte 1       low two bits: which CRCs are repaired; upper six: number of ops that follow
+//! byte 1       low two bits: which CRCs are repaired; upper six bits: number of ops that follow
 //! then         ops, one byte each: actions on the decoder, in order (see `op`)
 //! then         the stream
 //! ```
@@ -20,18 +20,18 @@ use axlewire::{
 };
 
 #[path = "../../tests/support/checked_line.rs"]
-#[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
+#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod checked_line;
 #[path = "../../tests/support/known_framings.rs"]
 mod known_framings;
 #[path = "../../tests/support/oracle.rs"]
-#[allow(dead_code, reason = "the stories of tests/stream.rs use more of it")]
+#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
 
 use checked_line::{Line, Op};
 use known_framings::Known;
 
-/// Checks any stream, chunked and interrupted in any way, against the oracle: the six Ikeya
+/// Checks any stream, with any chunks and interruptions, against the oracle: the six Ikeya
 /// framings.
 pub fn ikeya_stream(data: &[u8]) {
     let Some(script) = Script::read(data) else { return };
@@ -51,7 +51,7 @@ pub fn ikeya_stream(data: &[u8]) {
     }
 }
 
-/// The same for UCP, with the default cap, the smallest and the largest.
+/// The same for UCP, with the default, smallest and largest cap.
 pub fn ucp_stream(data: &[u8]) {
     let Some(script) = Script::read(data) else { return };
     match script.choice % 6 {
@@ -71,7 +71,7 @@ struct Script<'a> {
     stream: &'a [u8],
 }
 
-/// Which candidates get a correct CRC, since a fuzzer does not guess it.
+/// Which candidates get a correct CRC, since a fuzzer cannot guess it.
 #[derive(Clone, Copy)]
 enum Repair {
     None,
@@ -172,7 +172,7 @@ pub fn crc16(data: &[u8]) {
     }
 }
 
-/// Any value of any packet or message must survive encoding and decoding.
+/// Any value of any packet or message survives encoding and decoding.
 pub fn roundtrip(data: &[u8]) {
     // Too few bytes for a value are not a finding.
     let _ = roundtrip_of(&mut Unstructured::new(data));
@@ -388,7 +388,7 @@ fn ucp_report(u: &mut Unstructured<'_>) -> Result<()> {
     Ok(())
 }
 
-/// U3: frames without a known message pass through unchanged.
+/// U3: frames without a known message are relayed unchanged.
 fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     let (id, index) = (u.arbitrary()?, u.arbitrary()?);
     let raw = RawFrame { id, index, body: u.bytes(u.len().min(70))? };

@@ -1,6 +1,6 @@
-//! Any bytes at any time, and any calls: no role panics, spins, or breaks its contract.
+//! Any bytes at any time, and any calls: no role panics, spins or breaks its contract.
 //!
-//! The data is a list of ops, one byte each with its arguments behind it; see the `match` in each
+//! The data is a list of ops, one byte each, followed by its arguments; see the `match` in each
 //! role's loop.
 
 use arbitrary::{Result, Unstructured};
@@ -46,7 +46,7 @@ fn serve<R: Endpoint>(role: &mut R, now: Instant, mut told: impl FnMut(R::Event)
     sent
 }
 
-/// The time: starts anywhere, including just before it wraps, and then only advances.
+/// The time: starts anywhere, including just before it wraps, and then only moves forward.
 struct Clock(Instant);
 
 impl Clock {

@@ -1,4 +1,4 @@
-//! Packets of which a part has left when the port fails: what the node makes of the rest.
+//! Packets partly sent when the port fails: what the node makes of the rest.
 
 use axlewire::{
     drive::{Driver, Rs485},
@@ -21,8 +21,8 @@ fn rps(value: f32) -> Rps {
     Rps::new(value).unwrap()
 }
 
-/// A motor that stands still, with a set-point of 10 rps of which so many bytes have left. The node
-/// waits for the rest for 20 ms.
+/// A motor at rest, with a set-point of 10 rps of which this many bytes have left. The node waits
+/// 20 ms for the rest.
 fn cut_after(count: usize) -> (Wire, Bus) {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
     wire.world().motors[0].idle_us = 20_000;
@@ -45,7 +45,7 @@ fn a_cut_off_set_point_that_is_released_is_not_completed() {
     wire.pass(10_000);
     wire.write_all();
     run(&mut bus, 1000);
-    assert_eq!(wire.rps(), 0.0, "it runs on a set-point that was given up, for ever");
+    assert_eq!(wire.rps(), 0.0, "it runs on a withdrawn set-point");
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn a_cut_off_set_point_is_not_completed_after_a_stop() {
     // Room for the rest, then the port fails again.
     wire.write_only(3);
     run(&mut bus, 1000);
-    assert_eq!(wire.rps(), 0.0, "it stood still when it was stopped, and runs since");
+    assert_eq!(wire.rps(), 0.0, "it was at rest when stopped, and runs now");
 }
 
 #[test]
@@ -69,8 +69,8 @@ fn a_cut_off_set_point_is_not_completed_by_the_call_that_stops() {
             true => wire.block_on(bus.stop_async(NodeId::N1)).unwrap(),
             false => bus.stop(NodeId::N1).unwrap(),
         }
-        assert_eq!(wire.turns(), 0.0, "it stood still when it was stopped, and has turned");
-        // One that still counts is completed.
+        assert_eq!(wire.turns(), 0.0, "it was at rest when stopped, and has turned");
+        // A set-point still in force is completed.
         let (wire, mut bus) = cut_after(5);
         wire.write_all();
         wire.pass(50);
@@ -94,11 +94,11 @@ fn a_cut_off_set_point_is_not_completed_while_the_mode_is_in_doubt() {
     let world = wire.world();
     let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
     let is_completed = payloads.any(|payload| payload == 10.0_f32.to_le_bytes());
-    assert!(!is_completed, "10 rps are a position that nobody has asked for");
+    assert!(!is_completed, "10 rps is a position that was never requested");
 }
 
 #[test]
-fn a_port_that_takes_a_byte_now_and_then_does_not_complete_a_set_point_after_a_stop() {
+fn a_port_that_takes_a_byte_occasionally_does_not_complete_a_set_point_after_a_stop() {
     let (wire, mut bus) = cut_after(2);
     let now = bus.now();
     bus.role_mut().stop(NodeId::N1, now);
@@ -136,13 +136,13 @@ fn a_set_point_that_was_given_up_is_not_completed_by_the_next_header() {
         }
         slave.handle_input(&[byte], now);
         let is_given_up = slave.command(now) == Some(Target::Velocity(target));
-        assert!(!is_given_up, "it has heard a set-point that was given up");
+        assert!(!is_given_up, "it has received a withdrawn set-point");
     }
-    assert!(slave.statistics().reads > 100, "it hears the READs");
+    assert!(slave.statistics().reads > 100, "it receives the READs");
     assert_eq!(wire.rps(), 0.0);
 }
 
-/// A port that cuts every WRITE in two: it takes a byte, fails, then takes the rest.
+/// A port that cuts every WRITE in two: it takes one byte, fails, then takes the rest.
 fn cut_in_two() -> impl FnMut(&[u8]) -> Write {
     let mut fails = false;
     move |bytes| match (core::mem::take(&mut fails), bytes.len()) {
@@ -171,7 +171,7 @@ fn a_stop_write_that_a_port_cut_in_two_pays_nothing() {
                 false => bus.stop(NodeId::N1),
             };
             let rps = wire.rps();
-            assert!(stopped.is_err() || rps == 0.0, "stopped, and turns at {rps} rps");
+            assert!(stopped.is_err() || rps == 0.0, "reported as stopped, but turns at {rps} rps");
             wire.write_all();
             run(&mut bus, 100);
             assert_eq!(wire.rps(), 0.0, "the stop stays owed");
@@ -210,7 +210,7 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
             false => bus.stop(NodeId::N1),
         };
         let rps = wire.rps();
-        assert!(stopped.is_err() || rps == 0.0, "stopped, and turns at {rps} rps");
+        assert!(stopped.is_err() || rps == 0.0, "reported as stopped, but turns at {rps} rps");
         assert!(stopped.is_ok() || !is_heard, "{stopped:?}");
         wire.write_all();
         assert_eq!((bus.stop(NodeId::N1), wire.rps()), (Ok(()), 0.0));

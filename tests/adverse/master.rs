@@ -1,4 +1,4 @@
-//! A master's stops and set-points when switches move, ports fail and applications fall silent.
+//! A master's stops and set-points when switches move, ports fail and applications go silent.
 
 use axlewire::{
     drive::DriveError,
@@ -35,7 +35,7 @@ fn turned(polling: Polling) -> (Wire, Bus) {
     (wire, bus)
 }
 
-/// How far the motor turns when its switch is moved to positions, turns.
+/// Distance that the motor turns when its switch is moved to position mode, turns.
 fn way_after_switch(wire: &Wire, bus: &mut Bus) -> f64 {
     let before = wire.turns();
     let now_us = wire.world().now_us;
@@ -52,9 +52,9 @@ fn a_mode_that_changes_under_a_paid_stop_owes_another_one() {
         bus.stop(NodeId::N1).unwrap();
         run(&mut bus, 500);
         assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
-        // The repeat of 0 rps that is on its way is "go to 0" now.
+        // The pending repeat of 0 rps now means "go to 0".
         let way = way_after_switch(&wire, &mut bus);
-        assert!(way < 1.0, "{polling:?}: a stopped motor turns {way} times");
+        assert!(way < 1.0, "{polling:?}: a stopped motor makes {way} turns");
         assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
     }
 }
@@ -63,15 +63,18 @@ fn a_mode_that_changes_under_a_paid_stop_owes_another_one() {
 fn a_mode_that_changes_under_a_set_point_owes_a_stop() {
     for polling in POLLINGS {
         let (wire, mut bus) = turned(polling);
-        // 5 rps are a position far away.
+        // 5 rps is a position far away.
         let way = way_after_switch(&wire, &mut bus);
-        assert!(way < 1.0, "{polling:?}: the motor turns {way} times to nobody's position");
+        assert!(
+            way < 1.0,
+            "{polling:?}: the motor makes {way} turns to a position that was never requested"
+        );
         assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
     }
 }
 
 #[test]
-fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
+fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
     let mut bus = wire.master(|_| ());
     bus.discover().unwrap();
@@ -91,7 +94,7 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
     }
     run(&mut bus, 5000);
     let before = wire.turns();
-    assert!(before > 100.0, "{before}: it is on its way");
+    assert!(before > 100.0, "{before}: it is still moving");
     wire.write_all();
     bus.stop(NodeId::N1).unwrap();
     run(&mut bus, 10_000);
@@ -100,7 +103,7 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_anew() {
 }
 
 #[test]
-fn a_position_stop_is_paid_in_a_loop_that_always_comes_too_late_for_its_write() {
+fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
     for (loop_us, gap_us) in [(1000, 50), (25_000, 50), (25_000, 1000), (59_000, 5000)] {
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
         let mut bus = wire.master(|config| {
@@ -117,7 +120,7 @@ fn a_position_stop_is_paid_in_a_loop_that_always_comes_too_late_for_its_write() 
             bus.service().unwrap();
             wire.pass(loop_us);
             rounds += 1;
-            assert!(rounds < 40, "not paid in a loop of {loop_us} us with a gap of {gap_us} us");
+            assert!(rounds < 40, "not paid with a loop of {loop_us} us and a gap of {gap_us} us");
         }
     }
 }
@@ -159,7 +162,7 @@ fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
         run(&mut bus, 100);
         let world = wire.world();
         let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
-        assert!(payloads.all(|payload| payload == [0; 4]), "sent ten seconds after it had failed");
+        assert!(payloads.all(|payload| payload == [0; 4]), "sent ten seconds after it failed");
     }
 }
 
@@ -190,7 +193,10 @@ fn a_late_sign_of_life_does_not_revive_a_command_that_is_too_old() {
         assert!(master.poll_transmit(now).is_some());
         now += MS(3_600_000);
         sign(&mut master, now);
-        assert!(master.stops_owed().contains(NodeId::N1), "sign {index}: an hour is forgiven");
+        assert!(
+            master.stops_owed().contains(NodeId::N1),
+            "sign {index}: an hour of silence is ignored"
+        );
         assert_eq!(master.statistics().dead_man, 1, "sign {index}");
     }
 }

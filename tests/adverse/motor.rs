@@ -1,4 +1,4 @@
-//! Motors of a bus as the document describes them, for the stories of this folder.
+//! Motors of a bus as documented, for the scenarios in this folder.
 
 use axlewire::{
     ikeya::{
@@ -7,24 +7,24 @@ use axlewire::{
     stream::Event,
 };
 
-/// Counts of a turn.
+/// Counts per turn.
 pub(crate) const TURN: f64 = 8192.0;
 
-/// Speed at which a position node goes to its goal, rps.
+/// Speed at which a position node moves to its target, rps.
 const TOP_RPS: f64 = 20.0;
 
-/// A motor with its node: it does the last that it was told, for ever.
+/// A motor with its node: it follows its last command indefinitely.
 pub(crate) struct Motor {
     node: NodeId,
     mode: Mode,
     rps: f32,
-    /// Where it is, counts.
+    /// Current position, counts.
     counts: f64,
-    /// Where a position node goes, counts.
+    /// Target of a position node, counts.
     goal: Option<i32>,
-    /// How far its motion has been followed, microseconds.
+    /// Time up to which its motion has been simulated, microseconds.
     moved_us: u64,
-    /// Silence after which it gives up the start of a packet, microseconds.
+    /// Silence after which it drops a partial packet, microseconds.
     pub(crate) idle_us: u64,
     heard_us: u64,
     decoder: Decoder<ToSlave>,
@@ -54,7 +54,7 @@ impl Motor {
         self.rps
     }
 
-    /// Where it is, turns.
+    /// Current position, turns.
     pub(crate) fn turns(&self) -> f64 {
         self.counts / TURN
     }
@@ -72,13 +72,13 @@ impl Motor {
         }
     }
 
-    /// Somebody moves the switch: the motor rests until the next WRITE.
+    /// Moves the switch: the motor rests until the next WRITE.
     pub(crate) fn switch(&mut self, mode: Mode, now_us: u64) {
         self.move_on(now_us);
         (self.mode, self.rps, self.goal) = (mode, 0.0, None);
     }
 
-    /// Takes in a byte; gives its answer to a READ.
+    /// Takes in a byte; returns its answer to a READ.
     pub(crate) fn hear(&mut self, byte: u8, now_us: u64) -> Option<Vec<u8>> {
         self.move_on(now_us);
         if now_us - self.heard_us > self.idle_us {

@@ -1,4 +1,4 @@
-//! Ports that take a packet in parts: whether the pauses between them have ended it (I12, U16).
+//! Ports that take a packet in parts: whether the pauses in between have ended it (I12, U16).
 
 use std::pin::pin;
 
@@ -16,8 +16,8 @@ use crate::{
     wire::{Bus, Wire, Write, run},
 };
 
-/// A motor at 10 rps behind a port that from now on treats the parts of each WRITE in turn like
-/// this. The node gives a packet up after five byte times of silence.
+/// A motor at 10 rps behind a port that from now on handles successive parts of each WRITE like
+/// this. The node drops a packet after five byte times of silence.
 fn turning(parts: impl Fn(usize) -> Write + 'static) -> (Wire, Bus) {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
     let mut bus = wire.master(|config| config.polling = Polling::Manual);
@@ -50,13 +50,17 @@ fn stop(wire: &Wire, bus: &mut Bus, is_async: bool) -> Result<(), DriveError<Unp
     }
 }
 
-/// The stop counts as paid only if the motor has heard it; a port that is well again stops it. Says
-/// whether it is paid by the blocking call and by the async one.
+/// The stop counts as paid only if the motor has received it; once the port works again, it is
+/// stopped. Returns whether it is paid by the blocking call and by the async one.
 fn is_paid(parts: impl Fn(usize) -> Write + Copy + 'static) -> [bool; 2] {
     [false, true].map(|is_async| {
         let (wire, mut bus) = turning(parts);
         let stopped = stop(&wire, &mut bus, is_async);
-        assert!(stopped.is_err() || wire.rps() == 0.0, "stopped, and turns at {}", wire.rps());
+        assert!(
+            stopped.is_err() || wire.rps() == 0.0,
+            "reported as stopped, but turns at {}",
+            wire.rps()
+        );
         wire.write_all();
         run(&mut bus, 100);
         assert_eq!((wire.rps(), bus.role().stops_owed()), (0.0, NodeSet::NONE));
@@ -68,7 +72,7 @@ fn is_paid(parts: impl Fn(usize) -> Write + Copy + 'static) -> [bool; 2] {
 fn a_stop_whose_write_comes_back_late_in_the_middle_of_the_packet_pays_nothing() {
     for (count, late_us) in [(1, 130), (4, 130), (4, 300), (7, 130), (7, 1000)] {
         let late = move |part| if part == 0 { Write::Out(count, late_us) } else { Write::All };
-        assert_eq!(is_paid(late), [false; 2], "a pause of {late_us} us behind {count} bytes");
+        assert_eq!(is_paid(late), [false; 2], "a pause of {late_us} us after {count} bytes");
         let late = move |part| match part {
             0 => Write::Some(count),
             _ => Write::Late(20 * count as u64 + late_us, 8),
@@ -125,10 +129,10 @@ fn a_packet_in_doubt_is_flushed_before_the_next_one_is_sent() {
     bus.role_mut().stop(NodeId::N1, now);
     bus.service().unwrap();
     let packet = before + WriteRequest::LEN;
-    assert_eq!(wire.world().sent.len(), packet, "a READ follows a WRITE that was cut");
+    assert_eq!(wire.world().sent.len(), packet, "a READ follows a cut-off WRITE");
     wire.pass(50);
     bus.service().unwrap();
-    assert_eq!(wire.world().sent.len(), packet, "no silence behind a WRITE that was cut");
+    assert_eq!(wire.world().sent.len(), packet, "no silence after a cut-off WRITE");
 }
 
 #[test]

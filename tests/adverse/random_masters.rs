@@ -1,6 +1,6 @@
-//! Random masters on random buses, against the model of `rulings.rs`: answers get lost, late,
-//! damaged and cut, switches are moved, nodes die, ports fail, and applications order whatever they
-//! like. Then the bus is well, and every stop has to be paid.
+//! Random masters on random buses, against the model of `rulings.rs`: answers are lost, late,
+//! damaged and cut, switches are moved, nodes die, ports fail, and applications give arbitrary
+//! orders. Then the faults end, and every stop has to be paid.
 
 #[path = "random_orders.rs"]
 mod random_orders;
@@ -26,7 +26,7 @@ use crate::{
 /// Steps with faults.
 const STEPS: usize = 300;
 
-/// Time in which a bus that is well has to pay all stops.
+/// Time in which a healthy bus has to pay all stops.
 const RECOVERY: Duration = Duration::from_millis(500);
 
 const US: fn(u32) -> Duration = Duration::from_micros;
@@ -35,7 +35,7 @@ const US: fn(u32) -> Duration = Duration::from_micros;
 struct Arrival {
     at: Instant,
     bytes: Vec<u8>,
-    /// Which node answers with them to which packet, if they are an answer that can be read.
+    /// The answering node and the packet answered, if the bytes are a readable answer.
     answer: Option<(Reply, u64)>,
 }
 
@@ -45,20 +45,20 @@ struct Episode<B: Kit> {
     config: MasterConfig,
     nodes: Vec<Node>,
     dead_man: DeadMan,
-    /// What each node is in truth: its mode, and whether it answers.
+    /// True state of each node: its mode, and whether it answers.
     modes: Vec<Mode>,
     alive: Vec<bool>,
     air: VecDeque<Arrival>,
     now: Instant,
-    /// When the line is free.
+    /// Time at which the line is free.
     line_free: Instant,
-    /// Packets that have been sent.
+    /// Number of packets sent.
     number: u64,
-    /// Positions that have been measured; the rotation of all.
+    /// Number of positions measured; the rotation shared by all.
     count: i16,
     rotation: i16,
     is_well: bool,
-    /// Now and then nobody calls the master for up to an hour.
+    /// Occasionally the master is not called for up to an hour.
     is_lazy: bool,
     is_told: bool,
 }
@@ -95,7 +95,7 @@ impl<B: Kit> Episode<B> {
         let mode = |_| if rng.chance(0.5) { Mode::Velocity } else { Mode::Position };
         Self {
             modes: (0..count).map(mode).collect(),
-            // Some positions are no standstill when they are read as a speed.
+            // Some positions are not a standstill when read as a speed.
             rotation: if rng.chance(0.3) { 12_300 } else { 3 },
             is_lazy: rng.chance(0.3),
             rng,
@@ -124,13 +124,13 @@ impl<B: Kit> Episode<B> {
         while !self.master.stops_owed().is_empty() {
             self.step()?;
             if self.now > end {
-                return Err(format!("not paid on a good bus: {:?}", self.master.stops_owed()));
+                return Err(format!("not paid on a healthy bus: {:?}", self.master.stops_owed()));
             }
         }
         for (node, id) in self.nodes.iter().zip(NodeId::ALL) {
             let kept = self.master.set_point(id).is_some();
             if kept && !node.is_stopped() && node.aim.is_none() {
-                return Err(format!("{id} keeps a set-point that is not in force"));
+                return Err(format!("{id} keeps a set-point that is no longer in force"));
             }
         }
         Ok(())
@@ -142,7 +142,7 @@ impl<B: Kit> Episode<B> {
         }
     }
 
-    /// Follows what the master says of its nodes.
+    /// Follows what the master reports about its nodes.
     fn follow(&mut self) -> Result<(), String> {
         for (node, id) in self.nodes.iter_mut().zip(NodeId::ALL) {
             let seen = Seen {
@@ -188,7 +188,7 @@ impl<B: Kit> Episode<B> {
         }
         let is_owed = !self.master.stops_owed().is_empty();
         match is_owed && self.master.poll_timeout().is_none() {
-            true => Err("it waits for nothing while stops are owed".into()),
+            true => Err("no deadline while stops are owed".into()),
             false => Ok(()),
         }
     }
@@ -197,7 +197,7 @@ impl<B: Kit> Episode<B> {
         self.rng.below(self.nodes.len() as u64) as usize
     }
 
-    /// Lets time pass, most often until something is due.
+    /// Lets time pass, usually until something is due.
     fn pass(&mut self) {
         let arrival = self.air.iter().map(|it| it.at).min();
         let due = [self.master.poll_timeout(), arrival].into_iter().flatten().min();
@@ -230,7 +230,7 @@ impl<B: Kit> Episode<B> {
         Ok(())
     }
 
-    /// Sends what there is to send; says whether the port took it all.
+    /// Sends what is due; returns whether the port took all of it.
     fn send(&mut self) -> Result<bool, String> {
         let mut sent = 0;
         loop {
@@ -239,7 +239,7 @@ impl<B: Kit> Episode<B> {
             let Some(packet) = packet else { break };
             sent += 1;
             if sent > 20 {
-                return Err("it never stops to send".into());
+                return Err("it never stops sending".into());
             }
             if !self.send_packet(&packet)? {
                 return Ok(false);
@@ -254,7 +254,7 @@ impl<B: Kit> Episode<B> {
         Ok(true)
     }
 
-    /// Says whether the port took it.
+    /// Returns whether the port took it.
     fn send_packet(&mut self, packet: &[u8]) -> Result<bool, String> {
         let sent = Sent::read::<B>(packet);
         self.tell(|| format!("sends {sent:?}"));
@@ -290,7 +290,7 @@ impl<B: Kit> Episode<B> {
         Ok(true)
     }
 
-    /// A node answers the packet that was just sent, or something goes wrong.
+    /// A node answers the packet just sent, or something goes wrong.
     fn answer(&mut self, node: NodeId, end: Instant) {
         let mode = self.modes[index(node)];
         self.count = (self.count + 1) % 8000;
@@ -315,7 +315,7 @@ impl<B: Kit> Episode<B> {
         self.air.push_back(Arrival { at, bytes, answer });
     }
 
-    /// Nothing is left to do until a deadline that is not over.
+    /// Nothing is left to do until a deadline in the future.
     fn rest(&mut self) -> Result<(), String> {
         let is_over = |it: &Self| it.master.poll_timeout().is_some_and(|at| at <= it.now);
         if is_over(self) {
@@ -325,7 +325,7 @@ impl<B: Kit> Episode<B> {
                 return Err("it sends after it had nothing to send".into());
             }
             if is_over(self) && !self.air.iter().any(|it| it.at <= self.now) {
-                return Err("its deadline is over and nothing is to be done".into());
+                return Err("its deadline has passed and nothing is due".into());
             }
         }
         Ok(())
@@ -343,7 +343,7 @@ const fn other(mode: Mode) -> Mode {
     }
 }
 
-/// Plays these seeds; the first that breaks a rule is told in full.
+/// Runs these seeds; the first one that breaks a rule is reported in full.
 fn play<B: Kit>(seeds: core::ops::Range<u64>) {
     for seed in seeds {
         if Episode::<B>::new(seed, false).run().is_err() {

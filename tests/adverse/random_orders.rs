@@ -6,7 +6,7 @@ use super::{Episode, index};
 use crate::{kit::Kit, rulings::Aim};
 
 impl<B: Kit> Episode<B> {
-    /// The application orders something now and then.
+    /// The application occasionally gives an order.
     pub(super) fn order(&mut self) -> Result<(), String> {
         if self.is_well || !self.rng.chance(0.12) {
             return Ok(());
@@ -59,7 +59,7 @@ impl<B: Kit> Episode<B> {
         self.follow()
     }
 
-    /// A sign of life, which must not revive what is too old.
+    /// A sign of life, which must not revive outdated orders.
     fn alive(&mut self, call: impl FnOnce(&mut Self) -> Result<(), String>) -> Result<(), String> {
         let expired = self.dead_man.expire(&mut self.nodes, self.now);
         call(self)?;
@@ -67,7 +67,7 @@ impl<B: Kit> Episode<B> {
         let owed = self.master.stops_owed();
         match expired.iter().all(|id| owed.contains(id)) {
             true => Ok(()),
-            false => Err(format!("a dead-man is forgiven: {expired:?}, owed {owed:?}")),
+            false => Err(format!("an expired dead-man is ignored: {expired:?}, owed {owed:?}")),
         }
     }
 

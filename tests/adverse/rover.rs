@@ -1,4 +1,4 @@
-//! A rover's link: stops that a port cuts, receivers and transmitters that fail, robots held up.
+//! A rover's link: stops cut by a port, failing receivers and transmitters, robots held up.
 
 use axlewire::{
     drive::{DriveError, Driver},
@@ -16,7 +16,7 @@ use crate::{
     wire::{Wire, Write},
 };
 
-/// A host that has driven, and an instant later.
+/// A host that has driven, and a moment later.
 fn host() -> (Wire, Driver<Host, Wire, Wire>) {
     let wire = Wire::link();
     let mut host = wire.driver(|now| Host::new(HostConfig::default(), now));
@@ -37,7 +37,7 @@ fn drive() -> Vec<u8> {
     MotorControl::new(60, 0).unwrap().frame(0).as_bytes().to_vec()
 }
 
-/// How long after the last byte that was sent a robot that hears all of it still drives.
+/// How long after the last byte sent a robot that receives all of it still drives.
 fn robot_drives_on(wire: &Wire) -> Duration {
     let sent = &wire.world().sent;
     let mut robot = Robot::new(RobotConfig::default(), Instant::from_micros(0));
@@ -55,7 +55,7 @@ fn robot_drives_on(wire: &Wire) -> Duration {
             drove = now;
         }
     }
-    assert!(drove > Instant::from_micros(0), "it has driven at all");
+    assert!(drove > Instant::from_micros(0), "it never drove");
     drove - Instant::from_micros(last)
 }
 
@@ -73,7 +73,7 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
         }
         let sent: Vec<u8> = wire.world().sent[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
-        assert_eq!(sent.len(), 2 * stop, "the rest of the command, or one stop alone");
+        assert_eq!(sent.len(), 2 * stop, "the rest of the command was sent, or only one stop");
         for frame in sent.chunks(stop) {
             assert_eq!(frame[..5], [0xFD, 0xFF, 20, 0, 2]);
             assert_eq!(frame[6..10], [0; 4]);
@@ -101,13 +101,13 @@ fn a_stop_that_a_port_cut_in_two_is_sent_again() {
             };
             let drives_on = robot_drives_on(&wire);
             let is_true = stopped.is_err() || drives_on <= Duration::from_millis(1);
-            assert!(is_true, "{steps:?}: {stopped:?}, and it drives on for {drives_on:?}");
+            assert!(is_true, "{steps:?}: {stopped:?}, but it keeps driving for {drives_on:?}");
         }
     }
 }
 
 #[test]
-fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_says_so() {
+fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
     for is_async in [false, true] {
         let (wire, mut host) = host();
         wire.world().is_deaf = true;
@@ -117,7 +117,7 @@ fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_says_so() {
             false => host.stop(),
         };
         assert_eq!(stopped, Ok(()), "it was written and flushed");
-        assert!(wire.world().now_us - begin_us < 10_000, "at once");
+        assert!(wire.world().now_us - begin_us < 10_000, "not immediate");
         assert!(robot_drives_on(&wire) <= Duration::from_millis(1));
     }
 }
@@ -155,8 +155,8 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
                 }
             }
         }
-        assert!(errors > 0, "the transmitter fails");
-        assert_eq!(speeds, [60, 0], "the application hears of the stop");
+        assert!(errors > 0, "the transmitter never failed");
+        assert_eq!(speeds, [60, 0], "the application is not told of the stop");
     }
 }
 
@@ -173,7 +173,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
             false => robot.next_command(by),
         };
         let speed = command.unwrap().map_or(0, |command| command.speed());
-        assert_eq!(speed, 0, "it drives on a command of ten seconds ago");
+        assert_eq!(speed, 0, "it drives on a ten-second-old command");
     }
 }
 
@@ -197,12 +197,12 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
             false => robot.run_until(by, speed),
         }
         .unwrap();
-        assert_eq!(robot.role().statistics().commands, 1, "it was a valid one");
+        assert_eq!(robot.role().statistics().commands, 1, "it was valid");
         assert_eq!(robot.role().statistics().watchdog, 1);
     }
 }
 
-/// The next command of a robot that is called all the time, for 5 ms.
+/// The next command of a robot that is called continuously, for 5 ms.
 fn next(wire: &Wire, robot: &mut Driver<Robot, Wire, Wire>, is_async: bool) {
     let by = robot.now() + Duration::from_millis(5);
     let command = match is_async {
@@ -221,7 +221,7 @@ fn reporting(wire: &Wire, is_async: bool) -> Driver<Robot, Wire, Wire> {
     robot
 }
 
-/// How long after a moment the robot drives at the last, with calls all the time, microseconds.
+/// How long after a moment the robot still drives at most, with continuous calls, microseconds.
 fn drives_until(
     wire: &Wire,
     robot: &mut Driver<Robot, Wire, Wire>,
@@ -251,8 +251,8 @@ fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
         // The next report is due within 20 ms.
         wire.receive_in(25_000, &drive());
         let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
-        assert!(wire.world().sent.len() > sent, "it has reported");
-        assert!(wire.world().now_us > begin_us + stall_us, "the write has stalled");
+        assert!(wire.world().sent.len() > sent, "no report was sent");
+        assert!(wire.world().now_us > begin_us + stall_us, "the write did not stall");
         assert!(drove_us <= 525_000, "async {is_async}: until {drove_us} us after the command");
     }
 }
@@ -267,7 +267,7 @@ fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up()
         let bytes = drive().repeat(count);
         wire.block_on_held(robot.next_command_async(by), &bytes, 3_000_000).unwrap();
         let drove_us = drives_until(&wire, &mut robot, true, begin_us);
-        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they came");
+        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
 }
 
@@ -280,11 +280,11 @@ fn more_commands_than_a_round_takes_in_are_all_as_old_as_the_hold_up() {
         wire.receive(&drive().repeat(count));
         wire.pass(10_000_000);
         let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
-        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they came");
+        assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
 }
 
-/// A robot that neither reports nor asks for biases.
+/// A robot that neither reports nor requests biases.
 fn silent(wire: &Wire) -> Driver<Robot, Wire, Wire> {
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
@@ -302,7 +302,7 @@ fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
         wire.receive(&drive());
         wire.pass(10_000_000);
         let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
-        assert_eq!(drove_us, 0, "async {is_async}: it drives on a command of ten seconds ago");
+        assert_eq!(drove_us, 0, "async {is_async}: it drives on a ten-second-old command");
     }
 }
 
@@ -337,7 +337,7 @@ fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
     wire.receive(&stop[10..]);
     robot.service().unwrap();
     let now = robot.now();
-    assert!(robot.role().command(now).stands_still(), "a stop is cut in two by the hold-up");
+    assert!(robot.role().command(now).stands_still(), "the delay cut a stop in two");
 }
 
 #[test]
@@ -353,7 +353,11 @@ fn one_wrong_reading_of_the_clock_does_not_end_the_watchdog_of_a_robot() {
     wire.pass(60_000_000);
     robot.service().unwrap();
     let now = robot.now();
-    assert_eq!(robot.role().command(now).speed(), 0, "a minute after the last command");
+    assert_eq!(
+        robot.role().command(now).speed(),
+        0,
+        "still driving a minute after the last command"
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! What a master may tell its nodes, by the rulings alone: I6 (a stop holds what was measured after
-//! it), I11 (doubt), I12 (debts) and I13 (dead-man).
+//! What a master may send to its nodes, by the rulings alone: I6 (a stop holds a position measured
+//! after it), I11 (doubt), I12 (debts) and I13 (dead-man).
 
 use axlewire::{
     ikeya::{Mode, master::NodeSet},
@@ -34,16 +34,16 @@ impl Aim {
     }
 }
 
-/// A position that a node has answered with.
+/// A position that a node has reported.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     place: (i16, i16),
-    /// When the node measured it, and when the master heard of it.
+    /// When the node measured it, and when the master received it.
     at: Instant,
     heard_at: Option<Instant>,
 }
 
-/// What the master says of a node: its own debts and doubts are followed, its packets judged.
+/// What the master reports about a node: its own debts and doubts are followed, its packets judged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Seen {
     pub(crate) mode: Option<Mode>,
@@ -56,18 +56,18 @@ pub(crate) struct Seen {
 pub(crate) struct Node {
     /// The set-point in force.
     pub(crate) aim: Option<Aim>,
-    /// Since when its latest order is a stop.
+    /// Time since which its latest order is a stop.
     stopped_at: Option<Instant>,
-    /// It is under an order that a change of its mode would turn into another one.
+    /// It is under an order that a mode change would reinterpret.
     is_commanded: bool,
     /// The mode of the latest answer.
     heard: Option<Mode>,
     measured: Vec<Measured>,
     /// The position that it was last told to hold.
     held: Option<(i16, i16)>,
-    /// Numbers of the packets of stop WRITEs that no answer has followed.
+    /// Packet numbers of stop WRITEs not yet followed by an answer.
     unanswered: Vec<u64>,
-    /// Stop WRITEs that an answer has followed.
+    /// Number of stop WRITEs that an answer has followed.
     answered: u32,
     seen: Seen,
 }
@@ -99,10 +99,10 @@ impl Node {
     /// The master has accepted a set-point.
     pub(crate) fn accept(&mut self, aim: Aim) -> Result<(), String> {
         if self.seen.is_owed {
-            return Err("a set-point is accepted while a stop is owed".into());
+            return Err("a set-point was accepted while a stop is owed".into());
         }
         if self.heard != Some(aim.mode()) || self.seen.is_in_doubt {
-            return Err("a set-point is accepted for a mode that was not heard last".into());
+            return Err("a set-point was accepted in a mode other than the last one heard".into());
         }
         (self.aim, self.stopped_at, self.is_commanded) = (Some(aim), None, true);
         Ok(())
@@ -110,16 +110,16 @@ impl Node {
 
     pub(crate) fn release(&mut self) {
         self.aim = None;
-        // A stop that is owed stays in force.
+        // An owed stop stays in force.
         self.is_commanded &= !self.is_stopped() || self.seen.is_owed;
     }
 
-    /// The node answers a request that has ended at `at`.
+    /// The node answers a request that ended at `at`.
     pub(crate) fn measure(&mut self, place: (i16, i16), at: Instant) {
         self.measured.push(Measured { place, at, heard_at: None });
     }
 
-    /// The master hears the answer to the packet of this number.
+    /// The master receives the answer to this packet number.
     pub(crate) fn hear(&mut self, mode: Mode, place: (i16, i16), number: u64, now: Instant) {
         self.heard = Some(mode);
         for measured in self.measured.iter_mut().filter(|measured| measured.place == place) {
@@ -127,11 +127,11 @@ impl Node {
         }
         let waiting = self.unanswered.len();
         self.unanswered.retain(|&write| write > number);
-        // However many WRITEs came before: an answer pays once.
+        // One answer pays once, however many WRITEs came before.
         self.answered += u32::from(self.unanswered.len() < waiting);
     }
 
-    /// Follows what the master says; it may not forget a debt.
+    /// Follows what the master reports; it must not forget a debt.
     pub(crate) fn follow(&mut self, seen: Seen, now: Instant) -> Result<(), String> {
         let before = core::mem::replace(&mut self.seen, seen);
         if before.is_owed && !seen.is_owed && self.answered < 2 {
@@ -140,7 +140,7 @@ impl Node {
         if before.mode.is_some() && before.mode != seen.mode {
             self.aim = None;
             if self.is_commanded && !seen.is_owed {
-                return Err("the mode changes under an order, and no stop is owed".into());
+                return Err("the mode changed under an order, but no stop is owed".into());
             }
         }
         if seen.is_owed && !before.is_owed {
@@ -152,7 +152,7 @@ impl Node {
         Ok(())
     }
 
-    /// May this WRITE be sent?
+    /// Whether this WRITE may be sent.
     pub(crate) fn judge(&self, write: &Write, is_three: bool, now: Instant) -> Result<(), String> {
         let Seen { mode, is_in_doubt, is_owed, .. } = self.seen;
         let Some(stopped_at) = self.stopped_at else {
@@ -162,7 +162,7 @@ impl Node {
             let is_sure = self.heard == Some(aim.mode()) && mode == self.heard && !is_in_doubt;
             return match is_sure && !is_owed {
                 true => Ok(()),
-                false => Err("a set-point in another mode or under a debt".into()),
+                false => Err("a set-point in another mode or while a stop is owed".into()),
             };
         };
         let mut held = self.measured.iter().filter(|it| it.place == write.place);
@@ -186,7 +186,7 @@ impl Node {
         }
     }
 
-    /// The WRITE with this number has left whole.
+    /// The WRITE with this number has left completely.
     pub(crate) fn sent(&mut self, write: &Write, number: u64) {
         if self.is_stopped() {
             self.unanswered.push(number);
@@ -208,7 +208,7 @@ pub(crate) struct DeadMan {
 }
 
 impl DeadMan {
-    /// Stops the nodes whose set-points are too old; they have to be owed a stop from now on.
+    /// Stops the nodes with outdated set-points; from now on they must be owed a stop.
     pub(crate) fn expire(&self, nodes: &mut [Node], now: Instant) -> NodeSet {
         let mut expired = NodeSet::NONE;
         if self.limit.is_some_and(|limit| now > self.alive_at + limit) {

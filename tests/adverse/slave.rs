@@ -1,4 +1,4 @@
-//! A slave that is called late, or whose switch is moved, neither obeys nor sends what is too old.
+//! A slave that is called late, or whose switch is moved, neither obeys nor sends outdated data.
 
 use axlewire::{
     drive::Driver,
@@ -16,7 +16,7 @@ const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
 
 #[test]
-fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
+fn a_cut_off_answer_does_not_continue_in_another_nodes_exchange() {
     let wire = Wire::bus(vec![]);
     let mut slave = wire.driver(|now| -> Slave {
         Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now)
@@ -29,7 +29,7 @@ fn an_answer_that_was_cut_off_does_not_go_on_in_another_nodes_exchange() {
     wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
     wire.write_all();
     slave.service().unwrap();
-    assert_eq!(wire.world().sent.len(), 3, "it speaks when it is node 2's turn");
+    assert_eq!(wire.world().sent.len(), 3, "it talks during node 2's turn");
     assert_eq!(slave.unsent(), []);
 }
 
@@ -49,8 +49,8 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
             true => wire.block_on(slave.service_async()).unwrap(),
             false => slave.service().unwrap(),
         }
-        assert_eq!(wire.world().sent.len(), 4, "it speaks when it is node 2's turn");
-        // Nothing was heard: the rest may go.
+        assert_eq!(wire.world().sent.len(), 4, "it talks during node 2's turn");
+        // Nothing was received: the rest may be sent.
         let mut slave =
             wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
@@ -70,7 +70,7 @@ fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
     slave.handle_input(FIVE_RPS().as_bytes(), now);
     slave.set_mode(Mode::Position);
     assert_eq!(slave.command(now), None);
-    assert_eq!(slave.poll_event(), None, "a position node is handed a speed");
+    assert_eq!(slave.poll_event(), None, "a position node is given a speed");
 }
 
 #[test]
@@ -88,13 +88,13 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     wire.pass(10_000_000);
     slave.service().unwrap();
-    assert_eq!(slave.role().command(wire.now()), None, "it turns on a command of ten seconds ago");
-    assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
+    assert_eq!(slave.role().command(wire.now()), None, "it turns on a ten-second-old command");
+    assert_eq!(wire.world().sent, [], "it answers a ten-second-old request");
     let events: Vec<_> = std::iter::from_fn(|| slave.poll_event()).collect();
     assert_eq!(events, [SlaveEvent::Watchdog]);
 }
 
-/// A slave that has heard nothing yet, and its watchdog.
+/// A slave that has received nothing yet, and its watchdog.
 fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
     let mut slave =
         wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
@@ -121,12 +121,8 @@ fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
             false => slave.service(),
         }
         .unwrap();
-        assert_eq!(
-            slave.role().command(wire.now()),
-            None,
-            "it turns on a command of ten seconds ago"
-        );
-        assert_eq!(wire.world().sent, [], "it answers a request of ten seconds ago");
+        assert_eq!(slave.role().command(wire.now()), None, "it turns on a ten-second-old command");
+        assert_eq!(wire.world().sent, [], "it answers a ten-second-old request");
         assert_eq!(slave.role().statistics().expired, 1);
         assert_eq!(slave.poll_event(), Some(SlaveEvent::Watchdog));
     }
@@ -140,15 +136,11 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
         [FIVE_RPS().as_bytes().repeat(20), ReadRequest::new(NodeId::N1).as_bytes().to_vec()];
     let by = slave.now() + Duration::from_millis(1000);
     let event = wire.block_on_held(slave.next_event_async(by), &bytes.concat(), 3_000_000);
-    // What is told before the rest has been taken in does not count.
+    // Events reported before the rest has been taken in do not count.
     let _ = event.unwrap();
     wire.block_on(slave.service_async()).unwrap();
-    assert_eq!(
-        slave.role().command(wire.now()),
-        None,
-        "it turns on a command of three seconds ago"
-    );
-    assert_eq!(wire.world().sent, [], "it answers a request of three seconds ago");
+    assert_eq!(slave.role().command(wire.now()), None, "it turns on a three-second-old command");
+    assert_eq!(wire.world().sent, [], "it answers a three-second-old request");
 }
 
 #[test]
@@ -166,7 +158,7 @@ fn an_idle_slave_answers_a_request_after_a_long_silence() {
         .unwrap();
         assert_eq!(wire.world().sent.len(), 8, "async {is_async}");
         let delay_us = wire.world().sent[0].0 - begin_us - 2_345_678;
-        assert!(delay_us < 200, "async {is_async}: it has answered after {delay_us} us");
+        assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");
     }
 }
 
@@ -180,7 +172,7 @@ fn a_slave_that_is_called_when_its_driver_asks_for_it_or_bytes_come_answers() {
         let at_us = slave.poll_timeout().unwrap().as_micros();
         let now_us = wire.world().now_us;
         let bytes_us = Some(read_us).filter(|&at| at > now_us).unwrap_or(u64::MAX);
-        // A timer of 1 ms is up to a millisecond late, the interrupt of the receiver is not.
+        // A 1 ms timer is up to a millisecond late; the receive interrupt is not.
         let wake_us = bytes_us.min(at_us.next_multiple_of(1000) + 1000);
         wire.pass(wake_us.saturating_sub(now_us).max(1));
         slave.service().unwrap();
@@ -198,5 +190,5 @@ fn a_command_that_a_held_up_slave_finds_half_arrived_is_not_lost() {
     wire.receive_in(60, &FIVE_RPS().as_bytes()[5..]);
     wire.pass(60);
     slave.service().unwrap();
-    assert!(slave.role().command(wire.now()).is_some(), "a WRITE is cut in two by the hold-up");
+    assert!(slave.role().command(wire.now()).is_some(), "the delay cut a WRITE in two");
 }

@@ -1,4 +1,4 @@
-//! Ports that never get ready: a call gives up after a second, and a later stop is sent anew.
+//! Ports that never become ready: a call gives up after a second, and a later stop is sent again.
 
 use std::{
     pin::pin,
@@ -13,7 +13,7 @@ use axlewire::{
 use crate::{motor::Motor, wire::Wire};
 
 #[test]
-fn an_async_port_that_never_gets_ready_does_not_hold_up_a_stop_for_ever() {
+fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
         let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
         let mut bus = wire.master(|_| ());
@@ -27,7 +27,7 @@ fn an_async_port_that_never_gets_ready_does_not_hold_up_a_stop_for_ever() {
         assert!(took_us < 1_500_000, "it gives up after {took_us} us");
         let stalled = wire.block_on(bus.service_async());
         assert_eq!(stalled, Err(DriveError::Stalled), "flushes hang: {flushes_hang}");
-        // The port is well again: the stop is sent anew.
+        // The port works again: the stop is sent again.
         (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
         assert_eq!(wire.block_on(bus.stop_async(NodeId::N1)), Ok(()));
         assert_eq!(wire.rps(), 0.0);
@@ -52,7 +52,7 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
                 continue;
             }
             wire.pass(100_100);
-            // As whoever yields is polled again at once.
+            // A task that yielded is polled again at once.
             let _ = call.as_mut().poll(&mut context);
             if let Poll::Ready(result) = call.as_mut().poll(&mut context) {
                 assert_eq!(result, Err(DriveError::Stalled));
@@ -65,7 +65,7 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
 }
 
 #[test]
-fn a_port_that_was_not_asked_for_a_while_after_a_dropped_call_has_not_stalled() {
+fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
     let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
     let mut bus = wire.master(|_| ());
     bus.discover().unwrap();
@@ -75,7 +75,7 @@ fn a_port_that_was_not_asked_for_a_while_after_a_dropped_call_has_not_stalled() 
     let mut context = Context::from_waker(Waker::noop());
     assert!(pin!(bus.service_async()).poll(&mut context).is_pending());
     wire.pass(10_000_000);
-    // It takes its time, and no more.
+    // It takes its time, but no longer.
     let mut call = pin!(bus.service_async());
     assert!(call.as_mut().poll(&mut context).is_pending());
     wire.pass(2000);

@@ -1,7 +1,7 @@
-//! A line in virtual time, with a port and a clock that do what a test says.
+//! A line in virtual time, with a port and a clock that follow the test's instructions.
 //!
-//! Unlike with the scripted port of `support/port.rs`, bytes take their time, motors answer what
-//! has reached them, and a write may depend on its bytes and on the moment.
+//! Unlike the scripted port of `support/port.rs`, bytes take time, motors answer what has reached
+//! them, and a write may depend on its bytes and on the time.
 
 use std::{
     cell::{RefCell, RefMut},
@@ -31,14 +31,14 @@ const ANSWER_US: u64 = 50;
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Write {
     All,
-    /// Takes that many bytes at the most.
+    /// Takes at most this many bytes.
     Some(usize),
     Error,
-    /// Takes all, but fails while bytes are still being sent.
+    /// Takes all bytes, but fails while some are still being sent.
     OneAtATime,
-    /// Blocks for as long, microseconds, then takes that many bytes at the most.
+    /// Blocks for this long, microseconds, then takes at most this many bytes.
     Late(u64, usize),
-    /// Takes that many bytes at the most, waits until they are out, and for as long again,
+    /// Takes at most this many bytes, waits until they are out, and then for this long,
     /// microseconds.
     Out(usize, u64),
 }
@@ -49,15 +49,15 @@ type Writer = Box<dyn FnMut(&[u8]) -> Write>;
 pub(crate) struct World {
     pub(crate) now_us: u64,
     pub(crate) motors: Vec<Motor>,
-    /// Time of a byte on the line, microseconds.
+    /// Time of one byte on the line, microseconds.
     byte_us: u64,
-    /// When the last byte sent has left, microseconds.
+    /// When the last byte sent will have left, microseconds.
     line_free_us: u64,
-    /// What was sent, each byte with the time at which it has left.
+    /// Bytes sent, each with the time at which it left.
     pub(crate) sent: Vec<(u64, u8)>,
-    /// Behind a driver-enable pin: what is still in the transmitter.
+    /// Behind a driver-enable pin: bytes still in the transmitter.
     leaving: Option<VecDeque<(u64, u8)>>,
-    /// What is received, each byte with the time at which it arrives.
+    /// Bytes received, each with the time at which it arrives.
     inbox: VecDeque<(u64, u8)>,
     writer: Writer,
     /// Every read fails.
@@ -66,11 +66,11 @@ pub(crate) struct World {
     pub(crate) writes_hang: bool,
     /// Async flushes are never ready.
     pub(crate) flushes_hang: bool,
-    /// After so many readings one is wrong, by so many microseconds.
+    /// After this many readings, one is wrong by this many microseconds.
     pub(crate) glitch: Option<(u32, u64)>,
 }
 
-/// The port and the clock of a driver. Clones are the same port, clock and line.
+/// The port and the clock of a driver. Clones share the port, clock and line.
 #[derive(Clone)]
 pub(crate) struct Wire(Rc<RefCell<World>>);
 
@@ -124,7 +124,7 @@ impl Wire {
         Driver::with(role, self.clone(), self.clone())
     }
 
-    /// From now on the port treats each write like this.
+    /// From now on the port handles each write like this.
     pub(crate) fn write_with(&self, writer: impl FnMut(&[u8]) -> Write + 'static) {
         self.world().writer = Box::new(writer);
     }
@@ -134,7 +134,7 @@ impl Wire {
         self.write_with(|_| Write::All);
     }
 
-    /// The port takes so many bytes more, then it fails.
+    /// The port takes this many more bytes, then it fails.
     pub(crate) fn write_only(&self, mut count: usize) {
         self.write_with(move |bytes| match count {
             0 => Write::Error,
@@ -146,7 +146,7 @@ impl Wire {
         });
     }
 
-    /// The next writes go like this, the others well.
+    /// The next writes behave like this, later ones normally.
     pub(crate) fn write_as(&self, steps: impl IntoIterator<Item = Write>) {
         let mut steps: VecDeque<_> = steps.into_iter().collect();
         self.write_with(move |_| steps.pop_front().unwrap_or(Write::All));
@@ -157,7 +157,7 @@ impl Wire {
         self.receive_in(0, bytes);
     }
 
-    /// These bytes arrive after so many microseconds.
+    /// These bytes arrive after this many microseconds.
     pub(crate) fn receive_in(&self, micros: u64, bytes: &[u8]) {
         let mut world = self.world();
         let at_us = world.now_us + micros;
@@ -169,17 +169,17 @@ impl Wire {
         Instant::from_micros(self.world().now_us)
     }
 
-    /// Lets time pass without a call of the driver.
+    /// Lets time pass without calling the driver.
     pub(crate) fn pass(&self, micros: u64) {
         self.world().now_us += micros;
     }
 
-    /// How fast the first motor turns, rps.
+    /// Speed of the first motor, rps.
     pub(crate) fn rps(&self) -> f32 {
         self.world().motors[0].rps()
     }
 
-    /// Where the first motor is, turns.
+    /// Position of the first motor, turns.
     pub(crate) fn turns(&self) -> f64 {
         let mut world = self.world();
         let now_us = world.now_us;
@@ -187,7 +187,7 @@ impl Wire {
         world.motors[0].turns()
     }
 
-    /// Runs a future to its end; time passes while it waits, up to a minute.
+    /// Runs a future to completion; time passes while it waits, up to a minute.
     pub(crate) fn block_on<T>(&self, future: impl Future<Output = T>) -> T {
         let mut future = pin!(future);
         for _ in 0..600_000 {
@@ -200,7 +200,7 @@ impl Wire {
     }
 
     /// The same; as soon as the future waits, these bytes arrive, and then another task holds the
-    /// executor for so long.
+    /// executor for this long.
     pub(crate) fn block_on_held<T>(
         &self,
         future: impl Future<Output = T>,
@@ -217,7 +217,7 @@ impl Wire {
     }
 }
 
-/// Runs a driver for as long, through errors of its port.
+/// Runs a driver for this long, through errors of its port.
 pub(crate) fn run<R: Endpoint>(driver: &mut Driver<R, Wire, Wire>, millis: u32) {
     let end = driver.now() + Duration::from_millis(millis);
     while driver.now() < end {
@@ -238,7 +238,7 @@ impl World {
         }
     }
 
-    /// A byte has left: the motors hear it.
+    /// A byte has left: the motors receive it.
     fn carry(&mut self, at: u64, byte: u8) {
         for motor in &mut self.motors {
             let answer = motor.hear(byte, at).unwrap_or_default();
@@ -247,7 +247,7 @@ impl World {
         }
     }
 
-    /// Behind a driver-enable pin: what has left by now.
+    /// Behind a driver-enable pin: delivers what has left by now.
     fn carry_on(&mut self) {
         while let Some(leaving) = &mut self.leaving {
             let Some(&(at, byte)) = leaving.front().filter(|it| it.0 <= self.now_us) else { break };
@@ -337,7 +337,7 @@ impl embedded_hal_async::delay::DelayNs for Wire {
     }
 }
 
-/// The pin of the transceiver: off, it keeps what is still in the transmitter from the line.
+/// The transceiver's pin: when off, bytes still in the transmitter do not reach the line.
 impl embedded_hal::digital::OutputPin for Wire {
     fn set_low(&mut self) -> Result<(), Self::Error> {
         let mut world = self.world();

@@ -1,4 +1,4 @@
-//! A clock that is wrong once: it holds up no stop, and no call idles for longer.
+//! A clock with one wrong reading: it delays no stop, and no call idles longer.
 
 use axlewire::{
     drive::DriveError,
@@ -26,7 +26,7 @@ fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
         let took_us = wire.world().now_us - begin_us;
         let bound_us = u64::from(bus.role().stop_bound().as_micros());
         assert!(took_us <= bound_us + 1000, "reading {readings}: stopped after {took_us} us");
-        // A deadline may seem to be over: then the stop is owed, and the next call pays it.
+        // A deadline may seem to have passed: then the stop is owed, and the next call pays it.
         if stopped.is_err() {
             assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
             assert_eq!(bus.stop(NodeId::N1), Ok(()), "reading {readings}");
@@ -48,5 +48,5 @@ fn one_wrong_reading_of_the_clock_does_not_make_a_call_idle_longer() {
     let end = bus.now() + Duration::from_millis(5);
     bus.run_until(end, |_, _, _| ()).unwrap();
     let took_us = wire.world().now_us - begin_us;
-    assert!((5000..6000).contains(&took_us), "5 ms take {took_us} us");
+    assert!((5000..6000).contains(&took_us), "5 ms took {took_us} us");
 }

@@ -13,14 +13,14 @@ use axlewire::{
 
 use crate::{faults, millis, part, results::Run};
 
-/// Fastest that a motor is told to turn, and fastest that it goes to a position, rps.
+/// Highest commanded speed of a motor, and highest speed when moving to a position, rps.
 const FASTEST_RPS: f64 = 10.0;
 const POSITION_RPS: f64 = 5.0;
 
 /// Time in which a motor loses 63 % of its speed.
 const TIME_CONSTANT: Duration = Duration::from_millis(50);
 
-/// Time to fall from the fastest to standing still, 0.05 rps: ln(200) time constants.
+/// Time to fall from full speed to standstill, 0.05 rps: ln(200) time constants.
 const RUN_OUT_MS: f64 = 5.3 * 50.0;
 
 type Bus = Line<Master, MotorNode>;
@@ -60,7 +60,7 @@ impl Episode {
         Self { bus, nodes }
     }
 
-    /// Finds the nodes, through the noise.
+    /// Discovers the nodes through the noise.
     fn discover(&mut self) {
         while self.nodes.iter().any(|(node, _)| self.bus.head().mode(*node).is_none()) {
             if !self.bus.head().is_discovering() {
@@ -73,7 +73,7 @@ impl Episode {
 
     fn pass(&mut self, millis: u32) {
         self.bus.run_for(Duration::from_millis(millis)).unwrap();
-        // A motor runs up to the time of the last call of its node, heard or not.
+        // A motor is simulated up to the last call of its node, whether or not bytes arrived.
         let now = self.bus.now();
         for tail in 0..self.nodes.len() {
             self.bus.tail_mut(tail).handle_input(&[], now);
@@ -82,7 +82,7 @@ impl Episode {
         self.bus.take_tail_events();
     }
 
-    /// Sets all nodes going. A command may be refused: a node has just missed three answers.
+    /// Starts all nodes. A command may be refused if a node has just missed three answers.
     fn command(&mut self, rng: &mut Rng) {
         let now = self.bus.now();
         for &(node, mode) in &self.nodes {
@@ -98,8 +98,7 @@ impl Episode {
         }
     }
 
-    /// Asks for the readings by which a standstill is seen: with [`Polling::Manual`] nothing else
-    /// does.
+    /// Requests the readings that show a standstill: with [`Polling::Manual`] nothing else does.
     fn read_stopped(&mut self) {
         let now = self.bus.now();
         for &(node, _) in &self.nodes {
@@ -122,7 +121,7 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
     episode.command(&mut rng);
     episode.pass(1 + rng.below(200) as u32);
 
-    // A plug that falls out before, at or after the stop, and is put in again.
+    // A plug that falls out before, at or after the stop, and is plugged in again.
     let loose = rng.chance(0.3).then(|| rng.below(episode.nodes.len() as u64) as usize);
     let out_at = episode.bus.now() + millis(&mut rng, 0, 60);
     let in_at = out_at + millis(&mut rng, 0, 300);
@@ -154,7 +153,7 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
     }
     let bound_ms = f64::from(bound.as_micros()) / 1e3;
     let runs = episode.nodes.iter().zip(&watches).map(|(&(node, mode), watch)| {
-        // One that has become abnormal since is owed another stop.
+        // A node that has since become abnormal is owed another stop.
         let progress = episode.bus.head().stop_progress(node);
         let is_good = watch.has_stood && progress != StopProgress::NotAsked;
         let complaint = (!is_good).then(|| format!("node {node} is {progress:?} at the end"));
@@ -182,7 +181,7 @@ struct Watch {
     start: Option<f64>,
     time_ms: f64,
     way: f64,
-    /// The master has seen it standing still.
+    /// The master has seen it at standstill.
     has_stood: bool,
 }
 

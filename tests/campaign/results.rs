@@ -7,19 +7,19 @@ use std::{collections::BTreeMap, fmt};
 pub(crate) struct Run {
     pub(crate) kind: &'static str,
     pub(crate) seed: u64,
-    /// From the stop, or from the moment when the motor was connected again, to standstill, ms.
+    /// Time from the stop, or from when the motor was reconnected, to standstill, ms.
     pub(crate) time_ms: f64,
     /// Its bound, ms.
     pub(crate) time_bound_ms: f64,
-    /// The way made in that time, in `unit`.
+    /// Distance covered in that time, in `unit`.
     pub(crate) way: f64,
     pub(crate) way_bound: f64,
     pub(crate) unit: &'static str,
-    /// What else is wrong, if anything.
+    /// What else went wrong, if anything.
     pub(crate) complaint: Option<String>,
 }
 
-/// The runs, sorted by their kind.
+/// The runs, grouped by kind.
 pub(crate) struct Table(BTreeMap<&'static str, Vec<Run>>);
 
 impl Table {
@@ -31,7 +31,7 @@ impl Table {
         Self(kinds)
     }
 
-    /// No run is beyond its bound, and there are runs of each kind.
+    /// No run exceeds its bound, and there are runs of each kind.
     pub(crate) fn check(&self) {
         assert!(!self.0.is_empty(), "no motor was ever stopped");
         let is_good = |run: &Run| {

@@ -9,14 +9,14 @@ use axlewire::{
 
 use crate::{faults, millis, results::Run};
 
-/// The robot's watchdog, and as much again for the frames and loops on the way (ruling U10).
+/// The robot's watchdog, plus the same again for frames and loops along the way (ruling U10).
 const BOUND_MS: f64 = 500.0 + 20.0;
 
-/// Time for a wheel to fall from 120 rpm to half a one, which a report rounds to 0: ln(240) time
+/// Time for a wheel to fall from 120 rpm to 0.5 rpm, which a report rounds to 0: ln(240) time
 /// constants of 150 ms.
 const RUN_OUT_MS: f64 = 5.5 * 150.0;
 
-/// Fastest that the rover goes: 2 turns a second of a wheel of 0.4 m.
+/// Full speed of the rover: 2 turns per second of a wheel with a circumference of 0.4 m.
 const FASTEST_M_PER_S: f64 = 0.8;
 
 pub(crate) fn episode(seed: u64) -> Vec<Run> {
@@ -52,7 +52,7 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
         link.run_for(Duration::from_millis(1)).unwrap();
         link.take_head_events();
         link.take_tail_events();
-        // A rover runs up to the time of the last call of its robot, heard or not.
+        // A rover is simulated up to the last call of its robot, whether or not bytes arrived.
         let now = link.now();
         link.tail_mut(0).handle_input(&[], now);
         if link.now() > stop_at {

@@ -18,7 +18,7 @@ use crate::{
 };
 
 #[test]
-fn discovery_finds_who_is_there_within_its_bound() {
+fn discovery_finds_all_nodes_within_its_bound() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct());
         let bound = story.bus.role().read_bound();
@@ -33,7 +33,7 @@ fn discovery_finds_who_is_there_within_its_bound() {
 }
 
 #[test]
-fn a_bus_with_nobody_on_it_is_discovered_as_empty() {
+fn an_empty_bus_is_discovered_as_empty() {
     for is_async in [false, true] {
         let world = World::default();
         let master = |now| Master::<OneMotor>::new(MasterConfig::direct(), now);
@@ -44,7 +44,7 @@ fn a_bus_with_nobody_on_it_is_discovered_as_empty() {
 }
 
 #[test]
-fn a_discovery_does_not_list_a_node_that_was_there_and_is_gone() {
+fn a_discovery_does_not_list_a_node_that_has_gone() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         story.two.borrow().port().unplugged.set(true);
@@ -74,7 +74,7 @@ fn set_points_have_been_sent_when_the_call_returns_and_reach_the_right_node() {
             story.bus.set_velocity(NodeId::N2, to).unwrap();
             story.bus.set_position(NodeId::N5, at).unwrap();
         }
-        // What is on the line arrives, whether or not the master is called again.
+        // Bytes already on the line arrive whether or not the master is called again.
         for _ in 0..50 {
             story.world.step(20);
         }
@@ -95,12 +95,12 @@ fn a_read_gives_what_the_node_measures_now() {
         for config in [MasterConfig::direct(), manual()] {
             let mut story = Story::new(config).discovered();
             for turn in 0..20 {
-                // An older reading lies about.
+                // An older reading is available.
                 story.bus.next_event(story.world.now()).unwrap();
                 let (speed, place) = (rps(turn as f32), Position::new(turn, 0));
                 story.two.borrow_mut().role_mut().set_velocity(speed);
                 story.five.borrow_mut().role_mut().set_position(place);
-                // What was on its way before this moment has arrived.
+                // Anything that was in flight has arrived by now.
                 let pause = story.world.now() + Duration::from_millis(1);
                 story.bus.run_until(pause, |_, _, _| {}).unwrap();
                 let mut read = |node| match is_async {
@@ -166,7 +166,7 @@ fn stop_and_stop_all_have_been_confirmed_when_they_return() {
 }
 
 #[test]
-fn a_command_that_cannot_be_is_refused_with_the_node_and_the_reason() {
+fn an_impossible_command_is_refused_with_the_node_and_the_reason() {
     let mut story = Story::new(MasterConfig::direct()).discovered();
     let error = story.bus.set_velocity(NodeId::N5, rps(1.0)).unwrap_err();
     let wrong = CommandError::WrongMode { node: NodeId::N5, mode: Mode::Position };
@@ -194,7 +194,7 @@ fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
                 assert!(story.bus.read(NodeId::N2).is_err());
                 story.world.step(1000);
             }
-            // The third READ is on the line, and nothing else can be until its window closes.
+            // The third READ is on the line, and nothing else can be sent until its window closes.
             story.ask(NodeId::N2);
             story.bus.service().unwrap();
             assert_eq!(story.bus.role().health(NodeId::N2), Some(Health::Suspect(2)));
@@ -214,7 +214,7 @@ fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
 }
 
 #[test]
-fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
+fn a_read_of_an_unplugged_node_fails_with_its_id_and_its_health_is_reported() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         while story.bus.poll_event().is_some() {}
@@ -228,7 +228,7 @@ fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
         assert_eq!(error, DriveError::ReadFailed { node: NodeId::N2, cause: Cause::Silent });
         assert_eq!(error.to_string(), "node 2 did not answer: nothing was heard");
         assert!(story.world.now() - start < Duration::from_millis(10));
-        // What the read was not about has been kept, in order; readings have not.
+        // Events unrelated to the read have been kept, in order; readings have not.
         let told: Vec<_> = core::iter::from_fn(|| story.bus.poll_event()).collect();
         let health = |health| MasterEvent::Health { node: NodeId::N2, health };
         let expected = [Health::Suspect(1), Health::Suspect(2), Health::Abnormal].map(health);
@@ -237,7 +237,7 @@ fn an_unplugged_node_is_a_failed_read_that_names_it_and_its_health_is_told() {
 }
 
 #[test]
-fn events_come_in_the_order_in_which_they_happened_whoever_has_kept_them() {
+fn events_come_in_the_order_in_which_they_happened_wherever_they_were_kept() {
     let mut story = Story::new(manual()).discovered();
     story.two.borrow().port().unplugged.set(true);
     for _ in 0..3 {
@@ -258,9 +258,9 @@ fn events_come_in_the_order_in_which_they_happened_whoever_has_kept_them() {
 }
 
 #[test]
-fn events_that_find_no_room_are_counted() {
+fn events_without_room_are_counted() {
     let mut story = Story::new(MasterConfig::direct()).discovered();
-    // Node 2 comes and goes, and nobody takes out the news.
+    // Node 2 comes and goes, and the events are not taken.
     for _ in 0..10 {
         story.two.borrow_mut().port().unplugged.set(true);
         assert!(story.bus.read(NodeId::N2).is_err());
@@ -269,12 +269,12 @@ fn events_that_find_no_room_are_counted() {
     }
     let kept = core::iter::from_fn(|| story.bus.poll_event()).count();
     assert_eq!(kept, 16);
-    // Three bad news and one good per turn; of the last turn some may still be in the role.
+    // Four events per turn; some of the last turn may still be in the role.
     assert!(story.bus.role().lost_events() >= 40 - 16 - 1, "{}", story.bus.role().lost_events());
 }
 
 #[test]
-fn a_port_that_vanishes_is_an_error_of_every_call() {
+fn a_vanished_port_is_an_error_of_every_call() {
     for is_async in [false, true] {
         let mut story = Story::new(only_two_and_five()).discovered();
         let unplugged = story.bus.port().unplugged.clone();
@@ -294,7 +294,7 @@ fn a_port_that_vanishes_is_an_error_of_every_call() {
             assert_eq!(bus.set_velocity(NodeId::N2, rps(1.0)), Err(gone));
             assert_eq!(bus.stop_all(), Err(owed));
         }
-        // It comes back: the driver goes on, and the last command is the one that counts.
+        // The port comes back: the driver continues, and the last command is the one in force.
         unplugged.set(false);
         assert_eq!(bus.discover(), Ok(FOUND.into_iter().collect()));
         for _ in 0..50 {
@@ -308,7 +308,7 @@ fn a_port_that_vanishes_is_an_error_of_every_call() {
 }
 
 #[test]
-fn a_dropped_discovery_made_again_finds_the_same_and_cuts_no_packet() {
+fn a_repeated_discovery_has_the_same_result_after_a_drop_and_cuts_no_packet() {
     let mut polls = 0;
     loop {
         let mut story = Story::new(manual());
@@ -331,7 +331,7 @@ fn a_dropped_discovery_made_again_finds_the_same_and_cuts_no_packet() {
 }
 
 #[test]
-fn a_dropped_read_or_command_made_again_ends_the_same() {
+fn a_repeated_read_or_command_has_the_same_result_after_a_drop() {
     let mut polls = 0;
     loop {
         let mut story = Story::new(manual()).discovered();
@@ -362,7 +362,7 @@ fn a_dropped_read_or_command_made_again_ends_the_same() {
 }
 
 #[test]
-fn a_slaves_next_command_comes_in_time_or_not_at_all() {
+fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
     for is_async in [false, true] {
         let world = World::default();
         let (mut far, near) = End::pair(&world, 20);
@@ -380,7 +380,7 @@ fn a_slaves_next_command_comes_in_time_or_not_at_all() {
         embedded_io::Write::write(&mut far, write.as_bytes()).unwrap();
         assert_eq!(next(Instant::from_millis(100)), Ok(Some(Target::Velocity(rps(1.5)))));
         assert_eq!(world.now(), Instant::from_micros(2160));
-        // Then the watchdog ends the wait, and its event is there.
+        // Then the watchdog ends the wait and is reported as an event.
         assert_eq!(next(Instant::from_millis(100)), Ok(None));
         assert_eq!(world.now(), Instant::from_micros(7160));
         assert_eq!(driver.poll_event(), Some(SlaveEvent::Watchdog));
@@ -388,7 +388,7 @@ fn a_slaves_next_command_comes_in_time_or_not_at_all() {
 }
 
 #[test]
-fn what_was_not_done_in_time_says_which_node() {
+fn a_timeout_names_the_node() {
     let error = DriveError::<Unplugged>::Timeout(Operation::Read { node: NodeId::N3 });
     assert_eq!(error.to_string(), "node 3 was not read in time");
 }

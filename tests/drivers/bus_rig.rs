@@ -1,4 +1,4 @@
-//! A master and two slaves, each behind a driver, on one line: the bus of the stories.
+//! A master and two slaves, each behind a driver, on one line: the bus of the scenarios.
 
 use std::{cell::RefCell, rc::Rc};
 
@@ -17,7 +17,7 @@ use crate::virtual_time::{End, VirtualClock, World};
 pub(crate) type Bus = Driver<Master, End, VirtualClock>;
 pub(crate) type Node = Rc<RefCell<Driver<Slave, End, VirtualClock>>>;
 
-/// Node 2 turns, node 5 goes to positions. They act whenever the world does.
+/// Node 2 is in velocity mode, node 5 in position mode. They run whenever virtual time advances.
 pub(crate) struct Story {
     pub(crate) world: World,
     pub(crate) bus: Bus,
@@ -58,13 +58,13 @@ impl Story {
         self
     }
 
-    /// Has a node read once more.
+    /// Reads a node once more.
     pub(crate) fn ask(&mut self, node: NodeId) {
         let now = self.bus.now();
         self.bus.role_mut().read(node, now).unwrap();
     }
 
-    /// Lets time pass while nobody calls the master's driver.
+    /// Lets time pass without calling the master's driver.
     pub(crate) fn pass(&self, micros: u64) {
         (0..micros.div_ceil(20)).for_each(|_| self.world.step(20));
     }
@@ -77,7 +77,7 @@ pub(crate) fn rps(value: f32) -> Rps {
     Rps::new(value).unwrap()
 }
 
-/// Settings of a bus without further nodes.
+/// Settings of a bus that has no other nodes.
 pub(crate) fn only_two_and_five() -> MasterConfig {
     let mut config = MasterConfig::direct();
     config.nodes = [NodeId::N2, NodeId::N5].into_iter().collect();

@@ -1,4 +1,4 @@
-//! Clocks: one that goes backwards, that of `std`, and one that is joined to a delay.
+//! Clocks: one that goes backwards, that of `std`, and one combined with a delay.
 
 use std::cell::RefCell;
 
@@ -15,16 +15,16 @@ use crate::{
 };
 
 #[test]
-fn a_clock_that_goes_backwards_goes_on_for_the_role_from_where_it_was() {
+fn role_time_continues_after_a_clock_goes_backwards() {
     let mut readings = [100, 50, 70, 120].into_iter().cycle();
     let clock = move || Instant::from_micros(readings.next().unwrap());
     let flood = (0..100).map(|_| bytes(1));
-    // The recorder itself asserts the order of times.
+    // The recorder itself asserts that time never goes backwards.
     let mut driver = Driver::new(Recorder::default(), Script::reading(flood), clock);
     driver.service().unwrap();
     assert_eq!(driver.role().received.len(), 64);
 
-    // One reading is an hour ahead: the steps before and after it count all the same.
+    // One reading is an hour ahead: the steps before and after it still count.
     let hour = 3_600_000_000;
     let mut readings = [1000, hour + 1000, 1500, 2500, 2400, 2700].into_iter();
     let clock = move || Instant::from_micros(readings.next().unwrap());
@@ -34,7 +34,7 @@ fn a_clock_that_goes_backwards_goes_on_for_the_role_from_where_it_was() {
 }
 
 #[test]
-fn the_clock_of_std_naps_for_less_than_a_deadline_and_never_past_one_that_is_over() {
+fn the_clock_of_std_never_sleeps_past_a_deadline() {
     let mut clock = StdClock::default();
     let start = clock.now();
     clock.idle_until(start);
@@ -46,7 +46,7 @@ fn the_clock_of_std_naps_for_less_than_a_deadline_and_never_past_one_that_is_ove
 }
 
 #[test]
-fn a_clock_and_a_delay_are_joined_and_each_does_its_part() {
+fn a_clock_and_a_delay_can_be_combined() {
     let said = RefCell::new(vec![]);
     struct Says<'a>(&'a RefCell<Vec<String>>);
     impl Clock for Says<'_> {

@@ -1,5 +1,4 @@
-//! Driver enable of a port by itself: on before the first byte, off after the last, off on every
-//! error.
+//! Driver enable of a port alone: on before the first byte, off after the last, off on every error.
 
 use std::error::Error;
 
@@ -24,7 +23,7 @@ fn the_pin_is_on_from_before_the_first_byte_until_after_the_flush() {
         assert_eq!(flush(&mut port, is_async), Ok(()));
         assert!(!port.is_on());
         assert_eq!(drain(&log), "on write write flush off");
-        // Without bytes nothing is switched.
+        // Without bytes, the pin does not change.
         assert_eq!(flush(&mut port, is_async), Ok(()));
         assert_eq!(write(&mut port, is_async, b""), Ok(0));
         assert_eq!(drain(&log), "flush");
@@ -32,7 +31,7 @@ fn the_pin_is_on_from_before_the_first_byte_until_after_the_flush() {
 }
 
 #[test]
-fn the_delays_stand_between_pin_and_bytes() {
+fn the_delays_are_between_pin_and_bytes() {
     for is_async in [false, true] {
         let (mut port, log) = delayed(Script::default(), 0);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
@@ -64,7 +63,7 @@ fn the_pin_is_off_after_every_error_of_the_port() {
 }
 
 #[test]
-fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_told_to_be_lost() {
+fn bytes_taken_before_a_failed_write_leave_before_the_pin_goes_off_or_are_reported_as_lost() {
     for (is_async, refusal) in
         [false, true].into_iter().flat_map(|it| [(it, Step::Error), (it, Step::Zero)])
     {
@@ -86,10 +85,10 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
         refused(write(&mut port, is_async, b"2"));
         assert_eq!(drain(&log), "on write write flush off");
-        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost), "it cannot know");
-        assert_eq!(flush(&mut port, is_async), Ok(()), "told once");
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost), "bytes may be lost");
+        assert_eq!(flush(&mut port, is_async), Ok(()), "reported once");
 
-        // Or by the flush behind, if that fails itself.
+        // Or by the following flush, if that one fails.
         port.port_mut().writes.extend(steps());
         port.port_mut().flushes.extend([Step::Error, Step::Error]);
         assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
@@ -105,7 +104,7 @@ fn what_a_port_has_taken_before_a_write_fails_is_out_before_the_pin_goes_off_or_
 }
 
 #[test]
-fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
+fn a_failing_pin_sends_nothing_and_is_retried() {
     for is_async in [false, true] {
         let (mut port, log, pin) = undelayed(Script::default());
         drain(&log);
@@ -126,7 +125,7 @@ fn a_pin_that_fails_sends_nothing_and_is_tried_again() {
 }
 
 #[test]
-fn a_cancelled_write_keeps_the_pin_until_it_is_finished_or_given_up() {
+fn a_cancelled_write_keeps_the_pin_on_until_it_is_finished_or_dropped() {
     let stalled = Script {
         writes: [Step::Bytes(vec![0]), Step::Stall].into(),
         flushes: [Step::Stall].into(),
@@ -136,7 +135,7 @@ fn a_cancelled_write_keeps_the_pin_until_it_is_finished_or_given_up() {
     let cancelled = |port: &mut Port<Delay>, bytes: &[u8]| {
         assert!(poll(std::pin::pin!(embedded_io_async::Write::write(port, bytes))).is_pending());
     };
-    cancelled(&mut port, b"12"); // in the delay in front, which is then waited for again
+    cancelled(&mut port, b"12"); // in the delay before the write, which is then repeated
     assert_eq!(write(&mut port, true, b"12"), Ok(1));
     assert_eq!(drain(&log), "off on 5000 ns 5000 ns write");
     cancelled(&mut port, b"2");
@@ -164,7 +163,7 @@ fn reading_does_not_touch_the_pin() {
 }
 
 #[test]
-fn a_write_of_no_bytes_puts_the_pin_off() {
+fn an_empty_write_switches_the_pin_off() {
     for is_async in [false, true] {
         let (mut port, log, pin) = undelayed(Script::default());
         assert_eq!(write(&mut port, is_async, b""), Ok(0));
@@ -180,7 +179,7 @@ fn a_write_of_no_bytes_puts_the_pin_off() {
 }
 
 #[test]
-fn the_error_tells_port_and_pin_apart() {
+fn the_error_distinguishes_port_and_pin() {
     let (port, pin) = (Rs485Error::Port(Unplugged), Rs485Error::Pin(Stuck));
     let (port, pin): (Rs485Error<Unplugged, Stuck>, Rs485Error<Unplugged, Stuck>) = (port, pin);
     assert_eq!(port.to_string(), "unplugged");

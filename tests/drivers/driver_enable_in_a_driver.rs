@@ -1,4 +1,4 @@
-//! Driver enable under a driver: whatever fails, stalls or is dropped, the pin goes off.
+//! Driver enable under a driver: whatever fails, stalls or is dropped, the pin is switched off.
 
 use axlewire::drive::{DriveError, Driver, Rs485Error};
 
@@ -10,7 +10,7 @@ use crate::{
 };
 
 #[test]
-fn a_driver_switches_once_per_round_and_lets_go_when_its_port_fails() {
+fn a_driver_switches_the_pin_once_per_round_and_releases_it_when_its_port_fails() {
     for is_async in [false, true] {
         let (port, log, _) = undelayed(Script::writing([Step::Bytes(vec![0; 2])]));
         drain(&log);
@@ -66,7 +66,7 @@ fn the_pin_is_off_after_every_call_whatever_fails() {
 }
 
 #[test]
-fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_fails_besides() {
+fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_else_fails() {
     let one = || Step::Bytes(vec![0]);
     for write in [vec![], vec![Step::Error], vec![one(), Step::Error, Step::Error]] {
         for (calls, failures) in (0..4).flat_map(|calls| [(calls, 1), (calls, 2)]) {
@@ -80,10 +80,10 @@ fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_fails_beside
                         pin.failures.set(failures);
                     }
                     let _ = if is_async { ready(driver.service_async()) } else { driver.service() };
-                    // The rest of the frame may be given up meanwhile.
+                    // The rest of the frame may be dropped meanwhile.
                     world.step(25_000);
                 }
-                assert_eq!(pin.failures.get() % failures, 0, "it is tried again");
+                assert_eq!(pin.failures.get() % failures, 0, "not retried");
                 assert!(!is_on(&log) && !driver.port_mut().is_on(), "{write:?} {calls}");
             }
         }
@@ -91,7 +91,7 @@ fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_fails_beside
 }
 
 #[test]
-fn the_pin_that_a_dropped_call_has_left_on_goes_off_with_the_next_one() {
+fn a_pin_left_on_by_a_dropped_call_goes_off_with_the_next_one() {
     let one = || Step::Bytes(vec![0]);
     for (writes, flushes) in [
         (vec![Step::Stall], vec![]),

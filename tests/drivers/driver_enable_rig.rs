@@ -1,4 +1,4 @@
-//! A driver-enable pin and a delay that write down what they do, around a scripted port.
+//! A driver-enable pin and a delay that record their calls, around a scripted port.
 
 use std::{cell::Cell, rc::Rc, task::Poll};
 
@@ -12,7 +12,7 @@ use crate::port::{Log, Script, Unplugged, poll};
 #[derive(Clone, Default)]
 pub(crate) struct Pin {
     pub(crate) log: Log,
-    /// The next so many calls fail.
+    /// The next calls fail, this many of them.
     pub(crate) failures: Rc<Cell<usize>>,
 }
 
@@ -53,7 +53,7 @@ impl embedded_hal::digital::OutputPin for Pin {
 
 pub(crate) struct Delay {
     log: Log,
-    /// Async delays stay for ever, so many times.
+    /// Async delays never finish, this many times.
     stalls: usize,
 }
 
@@ -75,7 +75,7 @@ impl embedded_hal_async::delay::DelayNs for Delay {
 
 pub(crate) type Port<D> = Rs485<Script, Pin, D>;
 
-/// A port that writes down its calls here.
+/// A port that records its calls here.
 pub(crate) fn logged(script: Script, log: &Log) -> Script {
     Script { log: log.clone(), ..script }
 }
@@ -100,7 +100,7 @@ pub(crate) fn drain(log: &Log) -> String {
     entries.join(" ")
 }
 
-/// An async call that is ready at once, or has yielded because it fails.
+/// An async call that is ready at once, or has yielded once because it fails.
 pub(crate) fn ready<T>(future: impl Future<Output = T>) -> T {
     let mut future = std::pin::pin!(future);
     for _ in 0..2 {
@@ -141,7 +141,7 @@ where
     }
 }
 
-/// Is the pin on, as far as it has done what it was told?
+/// Whether the pin is on, as far as it has followed its calls.
 pub(crate) fn is_on(log: &Log) -> bool {
     let log = log.borrow();
     log.iter().rev().find(|entry| ["on", "off"].contains(&entry.as_str())).unwrap() == "on"

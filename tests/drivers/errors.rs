@@ -1,4 +1,4 @@
-//! Errors of a driver: each is one line, and has what failed as its source.
+//! Errors of a driver: each message is one line, and the cause is its source.
 
 use std::error::Error;
 
@@ -29,7 +29,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
 
 #[cfg(feature = "ucp")]
 #[test]
-fn a_refused_value_is_the_source_of_the_refusal_and_that_of_the_error() {
+fn a_refused_value_is_the_source_of_the_refusal_which_is_the_source_of_the_error() {
     let value = ucp::MotorControl::new(101, 0).unwrap_err();
     let rover = ucp::host::CommandError::Value(value);
     assert_eq!(rover.source().unwrap().to_string(), value.to_string());

@@ -1,4 +1,4 @@
-//! Ports that fail and calls that are dropped: the next call goes on where this one has ended.
+//! Ports that fail and calls that are dropped: the next call continues where this one ended.
 
 use axlewire::drive::{DriveError, Driver};
 
@@ -33,7 +33,7 @@ fn a_write_that_fails_inside_a_frame_leaves_the_rest_for_the_next_call() {
 }
 
 #[test]
-fn what_is_unsent_can_be_given_up() {
+fn unsent_frames_can_be_discarded() {
     for round in ROUNDS {
         let steps = [bytes(2), Step::Error];
         let mut driver = scripted(Recorder::sending(&[b"12345", b"67"]), Script::writing(steps));
@@ -45,7 +45,7 @@ fn what_is_unsent_can_be_given_up() {
 }
 
 #[test]
-fn a_flush_that_fails_is_made_again_by_the_next_call() {
+fn a_failed_flush_is_retried_by_the_next_call() {
     for round in ROUNDS {
         let port = Script { flushes: [Step::Error].into(), ..Script::default() };
         let mut driver = scripted(Recorder::sending(&[b"12"]), port);
@@ -56,7 +56,7 @@ fn a_flush_that_fails_is_made_again_by_the_next_call() {
 }
 
 #[test]
-fn a_read_that_fails_or_ends_is_told_after_what_came_before_and_loses_nothing() {
+fn a_read_that_fails_or_ends_is_reported_after_earlier_bytes_and_loses_nothing() {
     for (failure, error) in
         [(Step::Error, DriveError::Port(Unplugged)), (Step::Zero, DriveError::Closed)]
     {
@@ -73,11 +73,11 @@ fn a_read_that_fails_or_ends_is_told_after_what_came_before_and_loses_nothing() 
 }
 
 #[test]
-fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_frame() {
+fn an_async_call_dropped_at_any_await_and_repeated_loses_no_byte_and_cuts_no_frame() {
     let incoming: Vec<u8> = (0..40).collect();
     let frames: [&[u8]; 3] = [b"first", b"second", b"third"];
     let whole = frames.concat();
-    // A write that is ready at the second poll never gets further with one.
+    // A write that is ready only on the second poll never completes if polled once.
     for polls in 2..200 {
         let world = World::default();
         let (mut near, mut far) = End::pair(&world, 20);
@@ -88,7 +88,7 @@ fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_f
         let mut driver = Driver::new(role, near, VirtualClock(world.clone()));
         let mut events = vec![];
         let mut dropped = 0;
-        // Every call is dropped after so many polls, and again, and again.
+        // Every call is dropped after this many polls, again and again.
         for _ in 0..1000 {
             match world.poll_times(polls, driver.next_event_async(at_ms(1000))) {
                 Some(event) => events.extend(event.unwrap()),
@@ -105,7 +105,7 @@ fn an_async_call_dropped_at_any_await_and_made_again_loses_no_byte_and_cuts_no_f
 }
 
 #[test]
-fn a_stalled_write_or_flush_that_is_dropped_is_made_good_by_the_next_call() {
+fn a_dropped_write_or_flush_that_stalled_is_completed_by_the_next_call() {
     let port = Script {
         writes: [bytes(3), Step::Stall, bytes(1), Step::Stall].into(),
         flushes: [Step::Stall, Step::Stall].into(),

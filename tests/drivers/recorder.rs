@@ -13,7 +13,7 @@ use crate::{
     virtual_time::{VirtualClock, World},
 };
 
-/// Some bytes to be read, or room for as many to be written.
+/// Bytes to be read, or room for some to be written.
 pub(crate) fn bytes(count: usize) -> Step {
     Step::Bytes(vec![0; count])
 }
@@ -31,7 +31,7 @@ pub(crate) enum Call {
     Unsent(Unsent),
 }
 
-/// Sends what it is told to, and writes down every call. Each byte received is an event.
+/// Sends what it is given, and records every call. Each received byte is an event.
 #[derive(Default)]
 pub(crate) struct Recorder {
     pub(crate) frames: VecDeque<Vec<u8>>,
@@ -43,7 +43,7 @@ pub(crate) struct Recorder {
     pub(crate) events: VecDeque<u8>,
     last: Instant,
     packet: Vec<u8>,
-    /// Looked at before each transmission: nothing may wait to be taken in.
+    /// Checked before each transmission: no received bytes may be waiting.
     pub(crate) nothing_waits: Option<Rc<dyn Fn() -> bool>>,
 }
 
@@ -110,7 +110,7 @@ pub(crate) fn scripted(role: Recorder, port: Script) -> Scripted {
     Driver::new(role, port, VirtualClock(World::default()))
 }
 
-/// A round, blocking or async; `None` for an async one that was dropped because it stalled.
+/// A round, blocking or async; `None` for an async one that stalled and was dropped.
 pub(crate) type Round = fn(&mut Scripted) -> Option<Result<(), DriveError<Unplugged>>>;
 
 fn round_blocking(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>>> {
@@ -128,7 +128,7 @@ fn round_async(driver: &mut Scripted) -> Option<Result<(), DriveError<Unplugged>
     None
 }
 
-/// Both kinds of call, for the stories that hold for both.
+/// Both kinds of call, for scenarios that apply to both.
 pub(crate) const ROUNDS: [Round; 2] = [round_blocking, round_async];
 pub(crate) const ASYNC: Round = round_async;
 

@@ -1,4 +1,4 @@
-//! A round of a driver, over any role: what is done in which order, and that there is an end to it.
+//! A round of a driver, over any role: what is done in which order, and that it ends.
 
 use axlewire::{
     drive::{DriveError, Driver},
@@ -34,7 +34,7 @@ fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {
 }
 
 #[test]
-fn time_passes_only_when_the_role_has_asked_for_it() {
+fn timeouts_are_handled_only_when_the_role_has_requested_them() {
     for round in ROUNDS {
         let mut role = Recorder::default();
         role.timeout = Some(at_ms(1));
@@ -50,7 +50,7 @@ fn time_passes_only_when_the_role_has_asked_for_it() {
 }
 
 #[test]
-fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
+fn bytes_arriving_while_a_frame_is_sent_are_taken_in_before_the_next_one() {
     for is_async in [false, true] {
         let world = World::default();
         let (mut near, mut far) = End::pair(&world, 20);
@@ -61,7 +61,7 @@ fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
             let arrived = |&(at, _): &(u64, u8)| Instant::from_micros(at) <= time.now();
             !inbox.borrow().front().is_some_and(arrived)
         }));
-        // The other end sends all the time.
+        // The other end sends continuously.
         let mut count = 0_u8;
         world.add(move || {
             embedded_io::Write::write(&mut far, &[count]).unwrap();
@@ -83,8 +83,8 @@ fn what_arrives_while_a_frame_is_sent_is_taken_in_before_the_next_one() {
 
 #[test]
 fn a_receiver_without_a_buffer_loses_nothing_while_the_sender_sends_byte_by_byte() {
-    /// Sends and receives one byte at a time, and loses what is not taken before the next one: a
-    /// model of a UART without a buffer. The scripted port keeps its bytes for as long as need be.
+    /// Sends and receives one byte at a time, and loses a byte not taken before the next one: a
+    /// model of a UART without a buffer. The scripted port keeps its bytes as long as necessary.
     #[derive(Default)]
     struct Bufferless {
         held: Option<u8>,
@@ -145,21 +145,21 @@ fn reads_and_writes_of_every_size_move_every_byte_once() {
 }
 
 #[test]
-fn a_round_is_bounded_whatever_port_and_role_do() {
+fn a_round_is_bounded_whatever_the_port_and_the_role_do() {
     for round in ROUNDS {
         let flood = (0..2000).map(|_| bytes(64));
         let frames = vec![&b"frame"[..]; 1000];
         let mut driver = scripted(Recorder::sending(&frames), Script::reading(flood));
         assert_eq!(round(&mut driver), Some(Ok(())));
         assert_eq!(driver.port().written.len(), 8 * 5);
-        // 64 in front of each frame, and what comes while it is sent.
+        // 64 before each frame, plus those that arrive while it is sent.
         let reads = 2000 - driver.port().reads.len();
         assert!((8 * 64..=9 * 64).contains(&reads), "{reads}");
     }
 }
 
 #[test]
-fn a_frame_that_no_driver_has_room_for_is_refused() {
+fn a_frame_too_large_for_a_driver_is_refused() {
     for round in ROUNDS {
         let mut driver = scripted(Recorder::sending(&[&[7; 65], &[8; 64]]), Script::default());
         let error = DriveError::FrameTooLong { length: 65, limit: 64 };

@@ -21,10 +21,10 @@ use crate::{
 type Rover = Driver<Host, End, VirtualClock>;
 type Far = Rc<RefCell<Driver<Robot, End, VirtualClock>>>;
 
-/// A byte at 115,200 bit/s, microseconds.
+/// Time of one byte at 115,200 bit/s, microseconds.
 const BYTE_US: u64 = 87;
 
-/// A host and a robot that reports its battery. The robot acts whenever the world does.
+/// A host and a robot that reports its battery. The robot runs whenever virtual time advances.
 fn story() -> (World, Rover, Far) {
     story_with(|_| ())
 }
@@ -64,17 +64,17 @@ fn a_ping_comes_back_with_its_round_trip() {
         } else {
             rover.ping(deadline)
         };
-        // 8 bytes there, 9 back, and up to a report in front of the pong.
+        // 8 bytes there, 9 back, and up to one report before the pong.
         let micros = u64::from(trip.unwrap().as_micros());
         assert!((17 * BYTE_US..70 * BYTE_US).contains(&micros), "{micros}");
         assert_eq!(rover.role().link(), Link::Up);
-        // What the ping was not about has been kept.
+        // Events unrelated to the ping have been kept.
         assert_eq!(rover.poll_event(), Some(HostEvent::LinkUp));
     }
 }
 
 #[test]
-fn a_pong_from_before_is_not_the_answer_to_a_ping() {
+fn an_earlier_pong_is_not_the_answer_to_a_ping() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();
         for _ in 0..500 {
@@ -121,12 +121,12 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
         } else {
             rover.drive(60, -20).unwrap();
         }
-        // The host's first frame, which says zero, and the command: 48 bytes.
+        // The host's first frame, which is zero, and the command: 48 bytes.
         for _ in 0..400 {
             world.step(20);
         }
         assert_eq!((commanded().speed(), commanded().angular()), (60, -20));
-        // Without the driver being called again.
+        // Without calling the driver again.
         if is_async {
             world.block_on(rover.stop_async()).unwrap();
         } else {
@@ -140,7 +140,7 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
 }
 
 #[test]
-fn driving_leaves_the_lamp_as_it_is() {
+fn driving_does_not_change_the_lamp() {
     let (world, mut rover, _) = story();
     let lit = MotorControl::new(10, 0).unwrap().with_front_led(true);
     rover.role_mut().drive(lit, world.now()).unwrap();
@@ -152,7 +152,7 @@ fn driving_leaves_the_lamp_as_it_is() {
 }
 
 #[test]
-fn a_command_out_of_range_is_refused_and_the_one_before_stays() {
+fn a_command_out_of_range_is_refused_and_the_previous_one_stays() {
     let (_, mut rover, _) = story();
     rover.drive(20, 0).unwrap();
     let error = rover.drive(101, 0).unwrap_err();
@@ -208,7 +208,7 @@ fn a_calibration_is_begun_and_ended_when_the_calls_return() {
 }
 
 #[test]
-fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
+fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();
         robot.borrow_mut().port().unplugged.set(true);
@@ -224,7 +224,7 @@ fn a_calibration_without_an_answer_fails_by_its_role_and_says_so() {
         assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
         assert_eq!(error.to_string(), "calibration of Imu was not begun: no answer to 3 requests");
         assert!(world.now() < deadline);
-        // With a deadline before that, the deadline counts.
+        // An earlier deadline takes precedence.
         let deadline = after(&world, 50);
         let error = if is_async {
             world.block_on(rover.end_calibration_async(kind, deadline)).unwrap_err()
@@ -263,7 +263,7 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
 }
 
 #[test]
-fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
+fn a_vanished_port_is_an_error_of_every_call_of_the_host() {
     let (world, mut rover, _) = story();
     rover.port().unplugged.set(true);
     let gone = DriveError::Port(Unplugged);
@@ -275,7 +275,7 @@ fn a_port_that_vanishes_is_an_error_of_every_call_of_the_host() {
     assert_eq!(world.block_on(rover.drive_async(10, 0)), Err(gone));
     assert_eq!(world.block_on(rover.next_report_async(deadline)), Err(gone));
     assert_eq!(world.now(), Instant::from_micros(0));
-    // A stop is tried for 100 ms.
+    // A stop is retried for 100 ms.
     assert_eq!(rover.stop(), Err(gone));
     assert!((100_000..102_000).contains(&world.now().as_micros()), "{:?}", world.now());
     assert_eq!(world.block_on(rover.stop_async()), Err(gone));
@@ -317,7 +317,7 @@ fn a_stop_goes_through_errors_of_the_port_and_is_on_the_line_when_it_returns() {
             rover.stop().unwrap();
         }
         assert!(world.now() < Instant::from_millis(80), "{:?}", world.now());
-        // Without the driver being called again.
+        // Without calling the driver again.
         (0..500).for_each(|_| world.step(20));
         assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
     }
@@ -356,7 +356,7 @@ fn a_drive_that_is_dropped_leaves_a_stop_that_the_next_call_sends() {
         let (world, mut rover, robot) = story();
         let span = Duration::from_millis(60_000);
         let done = world.poll_times(polls, rover.drive_for_async(40, 0, span));
-        assert!(done.is_none(), "it was dropped");
+        assert!(done.is_none(), "not dropped");
         assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
         rover.service().unwrap();
         (0..500).for_each(|_| world.step(20));
@@ -375,14 +375,14 @@ fn a_stop_behind_a_cut_off_frame_goes_twice_although_the_port_refused_one_of_the
     let mut driver = Driver::with(host, port, VirtualClock(world.clone()));
     assert!(driver.service().is_err(), "one byte of the first stop leaves");
     world.step(6_000);
-    assert!(driver.service().is_err(), "it is given up, and no byte of the next leaves");
+    assert!(driver.service().is_err(), "it is dropped, and no byte of the next leaves");
     driver.stop().unwrap();
     let is_stop = |bytes: &&[u8]| bytes[..5] == [0xFD, 0xFF, 0x14, 0, 2];
     assert_eq!(driver.port().written.windows(24).filter(is_stop).count(), 2);
 }
 
 #[test]
-fn calls_take_out_what_comes_all_the_time_and_what_they_return_and_nothing_else() {
+fn calls_take_only_frequent_events_and_those_that_they_return() {
     for is_async in [false, true] {
         let (world, mut rover, _) = story();
         let kind = CalibrationKind::Imu;

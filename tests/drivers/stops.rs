@@ -50,7 +50,7 @@ fn command(story: &Story) -> Option<Target<OneMotor>> {
 
 const STOPPED: Option<Target<OneMotor>> = Some(Target::Velocity(Rps::ZERO));
 
-/// From this moment on the port fails, for as long.
+/// From now on the port fails, for this long.
 fn fail_port(story: &Story, from: Instant, span: Duration) {
     let (world, unplugged) = (story.world.clone(), story.bus.port().unplugged.clone());
     story.world.add(move || {
@@ -71,7 +71,7 @@ fn a_stop_that_is_not_paid_is_an_error_at_its_stated_deadline_and_stays_owed() {
         let took = story.world.now() - begin;
         assert!(took >= bound && took < bound + MS(1), "{took:?} of {bound:?}");
         assert_eq!(story.bus.role().stops_owed(), only(NodeId::N2));
-        // The next calls go on with it.
+        // The next calls continue it.
         story.two.borrow().port().unplugged.set(false);
         let end = story.world.now() + MS(100);
         story.bus.run_until(end, |_, _, _| ()).unwrap();
@@ -83,7 +83,7 @@ fn a_stop_that_is_not_paid_is_an_error_at_its_stated_deadline_and_stays_owed() {
 }
 
 #[test]
-fn a_stop_goes_on_through_errors_of_the_port() {
+fn a_stop_continues_through_errors_of_the_port() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
@@ -107,7 +107,7 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
         silent.remove(NodeId::N2);
         silent.remove(NodeId::N5);
         assert_eq!(stopped, Err(DriveError::StopsOwed(silent)));
-        assert_eq!(command(&story), STOPPED, "what answers is stopped");
+        assert_eq!(command(&story), STOPPED, "nodes that answer are stopped");
         let held = Some(Target::Position(Position::new(7, 1)));
         assert_eq!(story.five.borrow().role().command(story.world.now()), held);
         let mut story = Story::new(only_two_and_five());
@@ -115,7 +115,7 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
             true => story.world.block_on(story.bus.stop_all_async()),
             false => story.bus.stop_all(),
         };
-        assert_eq!(stopped, Ok(()), "nobody has to be discovered first");
+        assert_eq!(stopped, Ok(()), "no discovery is needed first");
     }
 }
 
@@ -130,12 +130,12 @@ fn drive_for_keeps_the_command_for_its_time_and_ends_with_a_paid_stop() {
         assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::Paid);
         assert_eq!(command(&story), STOPPED);
         let writes = story.two.borrow().role().statistics().writes;
-        assert!(writes > 20, "{writes}: it is repeated");
+        assert!(writes > 20, "only {writes} writes: the command is not repeated");
     }
 }
 
 #[test]
-fn drive_for_is_a_sign_of_life_all_the_while_however_quiet_the_bus_is() {
+fn drive_for_is_a_constant_sign_of_life_even_on_a_quiet_bus() {
     for limit in [Duration::from_micros(1), MS(1), MS(20)] {
         for is_async in [false, true] {
             let mut config = manual();
@@ -145,7 +145,8 @@ fn drive_for_is_a_sign_of_life_all_the_while_however_quiet_the_bus_is() {
                 assert_eq!(drive_for(&mut story, MS(100), is_async), Ok(()));
                 assert_eq!(story.bus.role().statistics().dead_man, 0);
             } else {
-                // No clock of this world is that fine: the dead-man is right, and the call ends.
+                // The virtual clock is too coarse for this: the dead-man fires rightly, and the
+                // call ends.
                 assert!(drive_for(&mut story, MS(100), is_async).is_err());
             }
             assert_eq!(command(&story), STOPPED);
@@ -154,7 +155,7 @@ fn drive_for_is_a_sign_of_life_all_the_while_however_quiet_the_bus_is() {
 }
 
 #[test]
-fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_tells_the_error() {
+fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_returns_the_error() {
     for (after, span) in [(0, 5), (1, 5), (20, 1), (20, 5)] {
         for is_async in [false, true] {
             let mut story = Story::new(MasterConfig::direct()).discovered();
@@ -162,7 +163,7 @@ fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_tells_the_erro
             fail_port(&story, begin + MS(after), MS(span));
             let driven = drive_for(&mut story, MS(50), is_async);
             assert_eq!(driven, Err(DriveError::Port(Unplugged)), "{after} ms");
-            assert!(story.world.now() < begin + MS(45), "it does not drive on");
+            assert!(story.world.now() < begin + MS(45), "it kept driving");
             assert_eq!(story.bus.role().stops_owed(), NodeSet::NONE);
             assert_eq!(command(&story), STOPPED);
         }
@@ -170,7 +171,7 @@ fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_tells_the_erro
 }
 
 #[test]
-fn drive_for_of_a_node_that_is_lost_ends_with_the_stop_that_is_owed() {
+fn drive_for_of_a_lost_node_ends_with_the_owed_stop() {
     for is_async in [false, true] {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         let (world, two) = (story.world.clone(), story.two.clone());
@@ -178,7 +179,7 @@ fn drive_for_of_a_node_that_is_lost_ends_with_the_stop_that_is_owed() {
         let unplugged: Rc<Cell<bool>> = two.borrow().port().unplugged.clone();
         story.world.add(move || unplugged.set(world.now() >= lost));
         assert_eq!(drive_for(&mut story, MS(5000), is_async), Err(OWED_2));
-        assert!(story.world.now() < lost + MS(500), "at once, not when its time is over");
+        assert!(story.world.now() < lost + MS(500), "at once, not at the end of its time");
     }
 }
 
@@ -217,7 +218,7 @@ fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
         let was_told = story.two.borrow().role().statistics().writes > 0;
         assert_eq!(command(&story), STOPPED.filter(|_| was_told), "after {polls} polls");
         assert!(was_told || polls == 0);
-        // A WRITE of the set-point that had begun is not completed.
+        // A set-point WRITE that had begun is not completed.
         assert!(story.two.borrow().role().counters().skipped() < WriteRequest::LEN as u64);
         if is_done {
             break;
@@ -240,7 +241,7 @@ fn a_dropped_stop_is_owed_and_the_next_call_sends_it() {
 }
 
 #[test]
-fn standstill_is_waited_for_until_the_deadline_and_the_moving_nodes_are_named() {
+fn await_standstill_waits_until_the_deadline_and_names_the_moving_nodes() {
     for config in [MasterConfig::direct(), manual()] {
         for is_async in [false, true] {
             let mut story = Story::new(config).discovered();
@@ -250,7 +251,7 @@ fn standstill_is_waited_for_until_the_deadline_and_the_moving_nodes_are_named() 
                 false => story.bus.await_standstill(nodes, deadline),
             };
             stop(&mut story, is_async).unwrap();
-            // Node 2 says that it still turns at 0.5 rps, and nobody has stopped node 5.
+            // Node 2 reports that it still turns at 0.5 rps, and node 5 has not been stopped.
             let deadline = story.world.now() + MS(50);
             assert_eq!(wait(&mut story, deadline), Ok(nodes));
             assert!(story.world.now() >= deadline);
@@ -273,7 +274,7 @@ fn set(story: &mut Story, is_async: bool) -> Outcome {
     }
 }
 
-/// How a port fails a set-point: it takes so many bytes of it, or all and fails to flush.
+/// How a port fails a set-point: it takes this many bytes, or all bytes and fails to flush.
 fn fail_packet(story: &mut Story, taken: usize) {
     match taken {
         8 => story.bus.port_mut().fails_flush = true,
@@ -293,7 +294,7 @@ fn a_set_point_that_is_withdrawn_because_its_call_fails_owes_the_node_a_stop() {
             fail_packet(&mut story, taken);
             assert_eq!(set(&mut story, is_async), Err(DriveError::Port(Unplugged)));
             assert_eq!(story.bus.role().set_point(NodeId::N2), None);
-            assert!(story.bus.unsent().is_empty(), "its rest would make it whole");
+            assert!(story.bus.unsent().is_empty(), "the rest would complete it");
             assert_eq!(story.bus.role().stops_owed(), only(NodeId::N2), "after {taken} bytes");
             let end = story.world.now() + MS(20);
             story.bus.run_until(end, |_, _, _| ()).unwrap();

@@ -1,4 +1,4 @@
-//! Ports that fail: what is sent all the same, and what goes back to its role (I12, U16).
+//! Ports that fail: what is still sent, and what goes back to its role (I12, U16).
 
 use std::{
     pin::pin,
@@ -30,7 +30,7 @@ fn frames_of(driver: &Scripted) -> usize {
 }
 
 #[test]
-fn a_receive_error_is_told_after_what_is_due_has_been_sent_and_flushed() {
+fn a_receive_error_is_returned_after_due_frames_have_been_sent_and_flushed() {
     for (failure, error) in [(Step::Error, GONE), (Step::Zero, DriveError::Closed)] {
         for round in ROUNDS {
             let mut role = Recorder::sending(&[b"stop", b"stop again"]);
@@ -64,7 +64,7 @@ fn a_receiver_that_fails_while_a_frame_is_sent_does_not_cut_it() {
 }
 
 #[test]
-fn of_several_errors_the_first_is_told() {
+fn of_several_errors_the_first_is_returned() {
     for round in ROUNDS {
         let port = Script {
             reads: [Step::Zero].into(),
@@ -88,7 +88,7 @@ fn a_frame_of_which_no_byte_has_left_goes_back_to_its_role() {
             assert_eq!(round(&mut driver), Some(Err(error)));
             assert_eq!(driver.role().unsent(), [Unsent::Untouched]);
             assert!(driver.unsent().is_empty());
-            // It decides anew.
+            // It decides again.
             driver.role_mut().frames.push_back(b"new".into());
             assert_eq!(round(&mut driver), Some(Ok(())));
             assert_eq!(driver.port().written, b"new");
@@ -98,7 +98,7 @@ fn a_frame_of_which_no_byte_has_left_goes_back_to_its_role() {
 }
 
 #[test]
-fn a_frame_that_was_cut_off_goes_on_within_20_ms_and_is_given_up_after() {
+fn a_cut_off_frame_continues_within_20_ms_and_is_dropped_after() {
     for (late_us, goes_on) in [(0, true), (20_000, true), (20_001, false), (1_000_000, false)] {
         for round in ROUNDS {
             let world = World::default();
@@ -120,7 +120,7 @@ fn a_frame_that_was_cut_off_goes_on_within_20_ms_and_is_given_up_after() {
 }
 
 #[test]
-fn the_patience_with_a_cut_off_frame_begins_anew_with_each_byte_that_leaves() {
+fn the_time_limit_of_a_cut_off_frame_restarts_with_each_byte_that_leaves() {
     for round in ROUNDS {
         let world = World::default();
         let steps = (0..4).flat_map(|_| [bytes(1), Step::Error]);
@@ -136,14 +136,14 @@ fn the_patience_with_a_cut_off_frame_begins_anew_with_each_byte_that_leaves() {
 }
 
 #[test]
-fn a_role_is_told_of_a_failed_flush_once_for_what_was_written_since_the_last() {
+fn a_role_is_told_of_a_failed_flush_once_for_everything_written_since_the_last() {
     for round in ROUNDS {
         let flushes = [Step::Error, Step::Error, Step::Error];
         let port = Script { flushes: flushes.into(), ..Script::default() };
         let mut driver = scripted(Recorder::sending(&[b"12"]), port);
         assert_eq!(round(&mut driver), Some(Err(GONE)));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
-        assert_eq!(round(&mut driver), Some(Err(GONE)), "tried again");
+        assert_eq!(round(&mut driver), Some(Err(GONE)), "retried");
         assert_eq!(driver.role().unsent().len(), 1);
         driver.role_mut().frames.push_back(b"34".into());
         assert_eq!(round(&mut driver), Some(Err(GONE)));
@@ -154,7 +154,7 @@ fn a_role_is_told_of_a_failed_flush_once_for_what_was_written_since_the_last() {
 }
 
 #[test]
-fn what_is_given_up_is_told_to_the_role() {
+fn a_role_is_told_of_discarded_frames() {
     for round in ROUNDS {
         let port = Script {
             writes: [bytes(2), Step::Error].into(),
@@ -167,7 +167,7 @@ fn what_is_given_up_is_told_to_the_role() {
         assert_eq!((driver.discard(), driver.discard()), (3, 0));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed, Unsent::CutOff]);
     }
-    // A frame that an async call has not got rid of, and a flush that it has not made.
+    // A frame that an async call could not send, and a flush that it did not make.
     let stalls = Script { writes: [Step::Stall].into(), ..Script::default() };
     let mut driver = scripted(Recorder::sending(&[b"12345"]), stalls);
     assert_eq!(ASYNC(&mut driver), None);
@@ -214,8 +214,8 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
 }
 
 #[test]
-fn a_read_that_fails_while_the_driver_waits_yields_as_well() {
-    // The first read finds nothing, the one that waits fails.
+fn a_read_that_fails_while_the_driver_waits_also_yields() {
+    // The first read finds nothing, the waiting one fails.
     let reads = [Step::Stall, Step::Error];
     let mut driver = scripted(Recorder::default(), Script::reading(reads));
     let wakes = Arc::new(Wakes::default());

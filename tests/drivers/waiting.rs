@@ -1,4 +1,4 @@
-//! Waiting for events: until the deadline and not longer, and awake for the role in between.
+//! Waiting for events: until the deadline and no longer, serving the role in between.
 
 use axlewire::{
     drive::Driver,
@@ -12,7 +12,7 @@ use crate::{
 };
 
 #[test]
-fn on_a_silent_line_the_next_event_is_waited_for_until_the_deadline_and_not_longer() {
+fn on_a_silent_line_next_event_waits_until_the_deadline_and_no_longer() {
     let world = World::default();
     let (near, _far) = End::pair(&world, 20);
     let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
@@ -20,7 +20,7 @@ fn on_a_silent_line_the_next_event_is_waited_for_until_the_deadline_and_not_long
     assert_eq!(world.now(), at_ms(10));
     assert_eq!(world.block_on(driver.next_event_async(at_ms(20))), Ok(None));
     assert_eq!(world.now(), at_ms(20));
-    // No deadline in the past costs time, and none leaves out the round.
+    // A deadline in the past takes no time, but still runs a round.
     driver.role_mut().frames.push_back(b"12".into());
     assert_eq!(driver.next_event(at_ms(0)), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 2);
@@ -39,7 +39,7 @@ fn a_waiting_driver_wakes_for_its_role() {
     assert_eq!(world.block_on(driver.next_event_async(at_ms(10))), Ok(None));
     let calls = &driver.role().calls;
     assert_eq!(calls.iter().filter(|call| **call == Call::Timeout).count(), 1);
-    // Asleep but for the role: a round at first, at 5 ms and at the end.
+    // Wakes only for the role: a round at the start, at 5 ms and at the end.
     assert_eq!(calls.len(), 4, "{calls:?}");
 }
 
@@ -62,7 +62,7 @@ fn every_event_is_handed_out_until_the_deadline() {
     assert_eq!(driver.port().outboxes[0].borrow().len(), 3);
 }
 
-/// A role with nothing but what it has to have.
+/// A role with only the required methods.
 #[derive(Default)]
 struct Plain {
     heard: Vec<(Vec<u8>, Instant)>,
@@ -87,7 +87,7 @@ impl Endpoint for Plain {
 }
 
 #[test]
-fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
+fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
     let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
     let world = World::default();
     let mut driver = Driver::new(late, End::new(&world, 20), VirtualClock(world.clone()));
@@ -96,7 +96,7 @@ fn a_role_whose_deadline_is_always_over_does_not_keep_its_driver_for_ever() {
 }
 
 #[test]
-fn as_provided_a_role_takes_old_bytes_for_new_ones_and_frames_may_pause_for_20_ms() {
+fn by_default_a_role_treats_old_bytes_as_new_and_frames_may_pause_for_20_ms() {
     let mut role = Plain::default();
     role.handle_old_input(b"12", at_ms(1), at_ms(9));
     assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);

@@ -1,23 +1,23 @@
 //! The driver-enable pin, from QEMU's log of every access to a register: the images as shipped.
 
-/// What matters of an access.
+/// The relevant kinds of access.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Access {
     /// PA8, the driver-enable pin.
     PinOn,
     PinOff,
-    /// A byte into the data register of USART1.
+    /// A byte is written to the data register of USART1.
     Sent(u8),
-    /// The interrupt has nothing left to send, or has been asked to send.
+    /// The interrupt has nothing left to send, or is asked to send.
     Fed,
-    /// The status of USART1 is read: is the last stop bit out?
+    /// The status of USART1 is read: has the last stop bit left?
     Status,
-    /// The alarm is set, in front of a sleep.
+    /// The alarm is set, before a sleep.
     Sleep,
 }
 
 impl Access {
-    /// From a line such as
+    /// Parses a line such as
     /// `memory_region_ops_write cpu 0 mr 0x.. addr 0x40011004 value 0x55 size 4`.
     fn parse(line: &str) -> Option<Self> {
         let mut words = line.split_ascii_whitespace();
@@ -44,35 +44,35 @@ impl Access {
     }
 }
 
-/// What was sent each time that the pin was on.
+/// The bytes sent each time the pin was on.
 ///
 /// # Panics
 ///
-/// Where the pin was off while a byte was sent, on while nothing was, went off before the USART
-/// was asked whether the last stop bit is out, or was left on when the processor went to sleep.
+/// If the pin was off while a byte was sent, on while nothing was sent, went off before the USART
+/// was asked whether the last stop bit had left, or was still on when the processor went to sleep.
 pub(crate) fn bursts(log: &str) -> Vec<Vec<u8>> {
     let mut bursts = Vec::new();
     let (mut burst, mut is_asked, mut sleeps) = (None, false, 0);
     for access in log.lines().filter_map(Access::parse) {
         match (access, &mut burst) {
             (Access::PinOn, None) => (burst, is_asked) = (Some(Vec::new()), false),
-            (Access::PinOn, Some(sent)) => panic!("switched on again behind {sent:02X?}"),
+            (Access::PinOn, Some(sent)) => panic!("switched on again after {sent:02X?}"),
             (Access::Sent(byte), Some(sent)) => sent.push(byte),
             (Access::Sent(byte), None) => panic!("{byte:02X} sent with the pin off"),
             (Access::Fed, _) => is_asked = false,
             (Access::Status, _) => is_asked = true,
             (Access::PinOff, Some(sent)) => {
-                assert!(!sent.is_empty(), "on for nothing, behind {} bursts", bursts.len());
-                assert!(is_asked, "off without a look at the last stop bit of {sent:02X?}");
+                assert!(!sent.is_empty(), "on without a byte, after {} bursts", bursts.len());
+                assert!(is_asked, "off without checking the last stop bit of {sent:02X?}");
                 bursts.push(burst.take().unwrap());
             }
-            // Once, when the port is made.
+            // Once, when the port is created.
             (Access::PinOff, None) => assert!(bursts.is_empty(), "off twice"),
             (Access::Sleep, None) => sleeps += 1,
-            (Access::Sleep, Some(sent)) => panic!("asleep with the pin on behind {sent:02X?}"),
+            (Access::Sleep, Some(sent)) => panic!("asleep with the pin on after {sent:02X?}"),
         }
     }
-    // Cut off by the end of QEMU, in the middle of a burst at the most.
-    assert!(sleeps > 0, "the log shows nothing");
+    // Cut off when QEMU ended, at most inside one burst.
+    assert!(sleeps > 0, "the log is empty");
     bursts
 }

@@ -21,17 +21,17 @@ use crate::{
     wire::{Wire, WireClock},
 };
 
-/// Two nodes that hear everything. One of them can lose its voice and its ears.
+/// Two nodes that receive everything. One of them can be muted and deafened.
 pub(crate) struct Nodes {
     pub(crate) nodes: [MotorNode; 2],
     is_mute: bool,
-    /// Where the position node said that it was.
+    /// Where the position node reported itself.
     pub(crate) told: HashSet<i32>,
 }
 
 impl Nodes {
     pub(crate) fn new() -> Self {
-        // As on a USB adapter: bytes come when this machine has time for them.
+        // As on a USB adapter: bytes arrive when this machine gets to them.
         let node = |id, mode| {
             let slave = Slave::new(id, mode, SlaveConfig::usb_adapter(), Instant::from_micros(0));
             MotorNode::from_parts(slave, Motor::new())
@@ -79,13 +79,17 @@ impl Endpoint for Nodes {
     }
 }
 
-/// Lets the nodes work until the board has written these lines in this order.
+/// Runs the nodes until the board has written these lines in this order.
 fn written(board: &Board, bus: &mut Driver<Nodes, Wire, WireClock>, wanted: &[&str]) {
     let end = std::time::Instant::now() + PATIENCE;
     while !board.has_written(wanted) {
         let pause = bus.now() + Duration::from_millis(20);
         bus.run_until(pause, |_, _, _| {}).unwrap();
-        assert!(std::time::Instant::now() < end, "never {wanted:?}: {:#?}", board.lines());
+        assert!(
+            std::time::Instant::now() < end,
+            "timed out waiting for {wanted:?}: {:#?}",
+            board.lines()
+        );
     }
 }
 
@@ -102,7 +106,8 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
             "event discovery done online 2",
         ];
         written(&board, &mut bus, &found);
-        // Half a revolution per second times the id; as many revolutions on as the id says.
+        // Per node: half a revolution per second times the id; a move of as many revolutions as the
+        // id.
         let (turn, go) = (Rps::new(1.0).unwrap(), Position::from_revolutions(5.0).unwrap());
         let wanted = [Some(Target::Velocity(turn)), Some(Target::Position(go))];
         let end = std::time::Instant::now() + PATIENCE;
@@ -116,7 +121,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
         written(&board, &mut bus, &["event health node 2 abnormal"]);
         let answers_when_lost = bus.role().nodes[0].slave().statistics().replies;
         bus.role_mut().is_mute = false;
-        // What node 2 is told from now on, and how often it had answered by then.
+        // What node 2 receives from now on, and its number of answers by then.
         let mut heard: Vec<(Target, u32)> = Vec::new();
         let end = std::time::Instant::now() + PATIENCE;
         while heard.last().is_none_or(|&(target, _)| target != Target::Velocity(turn)) {
@@ -127,7 +132,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
                 }
             })
             .unwrap();
-            assert!(std::time::Instant::now() < end, "not commanded anew: {:#?}", board.lines());
+            assert!(std::time::Instant::now() < end, "not commanded again: {:#?}", board.lines());
         }
         // It is stopped first: two stops, each followed by an answer, and then its command.
         let commanded =
@@ -147,7 +152,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
         written(&board, &mut bus, &told);
         assert_eq!(bus.role().command(0), wanted[0]);
         board.report_when("told", |_| true).assert_nothing_lost();
-        // The master's driver is on while it talks, and no longer.
+        // The master's driver is on only while it sends.
         let bursts = driver_enable_pin::bursts(&board.accesses());
         assert!(bursts.len() > 20, "{}", bursts.len());
         for burst in bursts {
@@ -162,7 +167,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
     });
 }
 
-/// Carries what one board says to the other, until either has gone.
+/// Passes bytes between the two boards until either has ended.
 fn relay(mut from: UnixStream, mut to: UnixStream) {
     thread::spawn(move || io::copy(&mut from, &mut to));
 }

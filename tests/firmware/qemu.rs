@@ -15,13 +15,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long anything may take before it counts as never.
+/// Time limit for any single wait.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The program that checks its own USART.
 const UART_CHECK: &str = "uart_check";
 
-/// The programs.
+/// The firmware programs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Program {
     Slave,
@@ -38,7 +38,7 @@ impl Program {
         }
     }
 
-    /// How much stack it may use, bytes: what was measured and half of it on top.
+    /// Stack limit, bytes: the measured use plus half.
     const fn stack_limit(self) -> i64 {
         match self {
             Self::Slave => 2560,
@@ -48,16 +48,16 @@ impl Program {
     }
 }
 
-/// The folder with the images, or why there is none. They are built once per run.
+/// The folder with the images, or the reason for having none. They are built once per run.
 ///
-/// `AXLEWIRE_FIRMWARE_IMAGES` names a folder with images that are built already.
+/// `AXLEWIRE_FIRMWARE_IMAGES` names a folder with images already built.
 fn images() -> &'static Result<PathBuf, String> {
     static IMAGES: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     IMAGES.get_or_init(|| {
         let found = find_images();
         if let Err(reason) = &found {
             assert!(!is_required(), "the firmware cannot be tested: {reason}");
-            // Not by eprintln!, which is kept back where a test passes.
+            // Not with eprintln!, whose output is hidden when a test passes.
             let _ = writeln!(std::io::stderr(), "SKIPPED, the firmware is not tested: {reason}");
         }
         found
@@ -74,12 +74,12 @@ fn find_images() -> Result<PathBuf, String> {
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/firmware/run.sh");
     if !script.is_file() {
-        return Err("its sources are not here".to_owned());
+        return Err("its sources are missing".to_owned());
     }
     let programs = [Program::Slave, Program::Master, Program::Robot];
     let mut build = Command::new("bash");
     build.arg(script).arg("--build").args(programs.map(Program::name)).arg(UART_CHECK);
-    // Cargo sets these for this test; the other compiler is to find its own.
+    // Cargo sets these for this test; the other compiler has to find its own.
     for name in ["LD_LIBRARY_PATH", "RUSTC", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         build.env_remove(name);
     }
@@ -95,7 +95,7 @@ fn find_images() -> Result<PathBuf, String> {
     first.map(Path::to_owned).ok_or("the build names no image".to_owned())
 }
 
-/// Runs the program that checks its own USART, and gives its status and what it says.
+/// Runs the program that checks its own USART; returns its status and output.
 pub(crate) fn check_uart() -> Option<(bool, String)> {
     let image = images().as_ref().ok()?.join(UART_CHECK);
     let run = Command::new("qemu-system-arm")
@@ -109,7 +109,7 @@ pub(crate) fn check_uart() -> Option<(bool, String)> {
     Some((run.status.success(), String::from_utf8_lossy(&said).into_owned()))
 }
 
-/// A board that runs a program. It ends, and its sockets go, when this is dropped.
+/// A board that runs a program. Dropping it ends the board and closes its sockets.
 pub(crate) struct Board {
     program: Program,
     qemu: Child,
@@ -121,9 +121,9 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// Starts a board; `None` where it cannot be tested.
+    /// Starts a board; `None` if it cannot be tested.
     ///
-    /// It runs from the moment when both of its sockets are connected, so that nothing is missed.
+    /// It starts running once both of its sockets are connected, so that nothing is missed.
     pub(crate) fn start(program: Program) -> Option<Self> {
         Self::start_with(program, &[])
     }
@@ -134,15 +134,15 @@ impl Board {
         Self::start_with(program, &kinds)
     }
 
-    /// Ends the board, and gives the log of every access to a register.
+    /// Ends the board, and returns the log of every register access.
     pub(crate) fn accesses(mut self) -> String {
-        // Asked to end, so that it writes out what it has logged.
+        // A request to end, so that it writes its log.
         self.signal("-TERM");
         self.qemu.wait().unwrap();
         fs::read_to_string(self.folder.join("accesses")).unwrap()
     }
 
-    /// Halts the board, as an operating system does that has others to serve. Its time goes on.
+    /// Halts the board, like an operating system with other work. Its time continues.
     pub(crate) fn halt(&self, span: Duration) {
         self.signal("-STOP");
         thread::sleep(span);
@@ -190,22 +190,22 @@ impl Board {
         Some(board)
     }
 
-    /// A USART that has not been started drops what it hears.
+    /// A USART that has not been started drops incoming bytes.
     fn await_first_line(&mut self) {
         let end = Instant::now() + PATIENCE;
         while self.lines.lock().unwrap().is_empty() {
             assert_runs(&mut self.qemu, &self.folder);
-            assert!(Instant::now() < end, "the firmware says nothing");
+            assert!(Instant::now() < end, "the firmware prints nothing");
             thread::sleep(Duration::from_millis(5));
         }
     }
 
-    /// The line of the board; a new connection, when the one before has gone.
+    /// The line of the board; a new connection if the previous one has closed.
     pub(crate) fn bus(&mut self) -> UnixStream {
         self.bus.take().unwrap_or_else(|| connect(&self.folder.join("bus"), &mut self.qemu))
     }
 
-    /// Asks for a report and does not wait for it: a role that is under way goes on.
+    /// Requests a report without waiting for it: a running role continues.
     pub(crate) fn ask(&mut self) {
         self.text.write_all(b"?").unwrap();
     }
@@ -220,7 +220,7 @@ impl Board {
         self.lines.lock().unwrap().clone()
     }
 
-    /// Asks for reports until one is as it should be.
+    /// Requests reports until one matches.
     pub(crate) fn report_when(&mut self, what: &str, done: impl Fn(&Report) -> bool) -> Report {
         let end = Instant::now() + PATIENCE;
         let mut seen = self.lines().len();
@@ -235,18 +235,22 @@ impl Board {
                 }
             }
             seen = lines.len();
-            assert!(Instant::now() < end, "never {what}; the last lines: {:#?}", tail(&lines));
+            assert!(
+                Instant::now() < end,
+                "timed out waiting for: {what}; the last lines: {:#?}",
+                tail(&lines)
+            );
         }
     }
 
-    /// The stack stays within its limit. Printed as well: `check.sh` shows it.
+    /// The stack stays within its limit. Also printed: `check.sh` shows it.
     fn assert_stack(&self, report: &Report) {
         let (used, limit) = (report.at("stack"), self.program.stack_limit());
         println!("stack {} {used}", self.program.name());
         assert!((1..=limit).contains(&used), "{:?} uses {used} bytes of stack", self.program);
     }
 
-    /// Has the firmware written these lines in this order, whatever lies between?
+    /// Whether the firmware has written these lines in this order, ignoring lines in between.
     pub(crate) fn has_written(&self, wanted: &[&str]) -> bool {
         let lines = self.lines();
         let mut lines = lines.iter();
@@ -291,7 +295,7 @@ fn connect(path: &Path, qemu: &mut Child) -> UnixStream {
 pub(crate) struct Report(HashMap<String, i64>);
 
 impl Report {
-    /// `None` for a line that tells an event.
+    /// `None` for a line that reports an event.
     fn parse(line: &str) -> Option<Self> {
         let mut words = line.split(' ').peekable();
         if !["slave", "master", "robot"].contains(&words.next()?) {
@@ -306,12 +310,12 @@ impl Report {
         Some(Self(values))
     }
 
-    /// The number behind a name, if it is there.
+    /// The number after a name, if present.
     pub(crate) fn get(&self, name: &str) -> Option<i64> {
         self.0.get(name).copied()
     }
 
-    /// The number behind a name that is always there.
+    /// The number after a name that is always present.
     pub(crate) fn at(&self, name: &str) -> i64 {
         self.get(name).unwrap_or_else(|| panic!("no {name} in {self:?}"))
     }

@@ -25,7 +25,7 @@ fn linked() -> Option<(Board, Rover)> {
     linked_by(Wire::new, patient())
 }
 
-/// QEMU answers when this machine has time for it.
+/// QEMU answers when this machine gets to it.
 pub(crate) fn patient() -> HostConfig {
     let mut config = HostConfig::default();
     config.ack_timeout = Duration::from_millis(3000);
@@ -35,7 +35,7 @@ pub(crate) fn patient() -> HostConfig {
     config
 }
 
-/// A board, and a host at the other end of the wire that is made for it.
+/// A board, and a host at the other end of a wire made for it.
 pub(crate) fn linked_by(
     wire: impl FnOnce(UnixStream) -> Wire,
     config: HostConfig,
@@ -52,7 +52,7 @@ pub(crate) fn end_of(rover: &mut Rover) -> axlewire::time::Instant {
     rover.now() + Duration::from_millis(PATIENCE.as_millis() as u32)
 }
 
-/// Lets the host talk, and drive if it is told to, until an event is as it should be.
+/// Runs the host, driving if requested, until an event matches.
 fn event_when(
     rover: &mut Rover,
     what: &str,
@@ -62,7 +62,7 @@ fn event_when(
     let end = end_of(rover);
     loop {
         let now = rover.now();
-        assert!(now < end, "never {what}");
+        assert!(now < end, "timed out waiting for: {what}");
         if let Some(command) = command {
             rover.role_mut().drive(command, now).unwrap();
         }
@@ -79,7 +79,7 @@ pub(crate) fn wheels_turn_at(event: &HostEvent, wanted: [i16; 2]) -> bool {
     [left, right] == wanted
 }
 
-/// Reports that were due by the robot's own clock; one more or less may be on its way.
+/// Reports due by the robot's own clock; one more or fewer may be in flight.
 fn assert_fifty_reports_a_second(told: &Report) {
     let due = told.at("ms") / 20;
     assert!((told.at("reports") + told.at("late") - due).abs() <= 2, "{told:?}");
@@ -120,7 +120,7 @@ fn the_robot_drives_as_commanded_and_stops_when_the_host_goes_silent() {
         let Some((mut board, mut rover)) = linked() else { return };
         let ahead = MotorControl::turn_right(50, 10).unwrap().with_front_led(true);
         event_when(&mut rover, "at speed", Some(ahead), |event| wheels_turn_at(event, [64, 55]));
-        // The host is there, but says nothing any more: not even its dead-man's stop.
+        // The host is connected but silent: it does not even send its dead-man's stop.
         let told = board.report_when("stopped", |report| {
             report.at("stops") >= 1 && report.at("left_rpm") == 0 && report.at("right_rpm") == 0
         });
@@ -129,13 +129,13 @@ fn the_robot_drives_as_commanded_and_stops_when_the_host_goes_silent() {
         assert_fifty_reports_a_second(&told);
         told.assert_nothing_lost();
 
-        // What the host did not read is read now; the next command drives again.
+        // Bytes that the host did not read are read now; the next command drives again.
         let back = MotorControl::new(-100, 0).unwrap();
         event_when(&mut rover, "driving back", Some(back), |event| {
             wheels_turn_at(event, [-120; 2])
         });
         // The application is silent, the host is not: its dead-man stops the robot.
-        event_when(&mut rover, "a dead man", None, |event| *event == HostEvent::DeadMan);
+        event_when(&mut rover, "the dead-man", None, |event| *event == HostEvent::DeadMan);
         event_when(&mut rover, "standing", None, |event| wheels_turn_at(event, [0; 2]));
     });
 }
@@ -154,7 +154,7 @@ fn the_robot_stands_still_500_ms_after_the_last_valid_command_whatever_else_arri
         let last = board.report_when("commanded", |report| report.at("commands") == 50);
         assert_eq!((last.at("angular"), last.at("stops")), (60, 0), "{last:?}");
 
-        // No command any more, but pings, damaged commands, and noise.
+        // No more commands, only pings, damaged commands and noise.
         let mut rng = Rng::new(31);
         let end = std::time::Instant::now() + std::time::Duration::from_secs(3);
         let mut index = 50u8;
@@ -174,7 +174,7 @@ fn the_robot_stands_still_500_ms_after_the_last_valid_command_whatever_else_arri
         assert!(told.at("skipped") > 0 && told.at("pings") > 10, "{told:?}");
         let state = ["speed", "left_rpm", "right_rpm"].map(|name| told.at(name));
         assert_eq!(state, [0; 3], "{told:?}");
-        // By the robot's own clock: the last command was there when this was first said.
+        // By the robot's own clock: the last command had arrived when this was first reported.
         let reports = board.reports();
         let heard = reports.iter().find(|it| it.at("commands") == 50).unwrap().at("ms");
         let (mut moving, mut still) = (0, 0);
@@ -206,7 +206,7 @@ fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
         let (imu, mag) = (ImuBias::new([12, -7, 3], [-2, 4, 1]), MagBias::new([150, -80, 25]));
         let store = *rover.role_mut().store();
         assert_eq!(store, MemoryStore { imu: Some(imu), mag: Some(mag) });
-        // The robot asks for its biases until it has them.
+        // The robot requests its biases until it has them.
         event_when(&mut rover, "asked", None, |event| *event == HostEvent::BiasesSent);
 
         let now = rover.now();
@@ -225,7 +225,7 @@ fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
     });
 }
 
-/// Lets the host talk until the robot's report is as it should be.
+/// Runs the host until the robot's report matches.
 pub(crate) fn board_shows(
     board: &mut Board,
     rover: &mut Rover,

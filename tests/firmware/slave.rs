@@ -39,7 +39,7 @@ pub(crate) fn master_on(wire: Wire, mut config: MasterConfig) -> Bus {
 fn discovered() -> Option<(Board, Bus)> {
     let mut board = Board::start(Program::Slave)?;
     let mut config = MasterConfig::direct();
-    // QEMU answers when this machine has time for it.
+    // QEMU answers when this machine gets to it.
     (config.reply_timeout, config.attempts) = (Duration::from_millis(150), 2);
     config.polling = Polling::Every(Duration::from_millis(10));
     config.nodes = NODE.into();
@@ -48,7 +48,7 @@ fn discovered() -> Option<(Board, Bus)> {
     Some((board, bus))
 }
 
-/// Lets the master talk until an event is as it should be.
+/// Runs the master until an event matches.
 fn event_when(bus: &mut Bus, what: &str, done: impl Fn(&MasterEvent) -> bool) {
     let end = bus.now() + Duration::from_millis(PATIENCE.as_millis() as u32);
     while let Some(event) = bus.next_event(end).unwrap() {
@@ -56,7 +56,7 @@ fn event_when(bus: &mut Bus, what: &str, done: impl Fn(&MasterEvent) -> bool) {
             return;
         }
     }
-    panic!("never {what}");
+    panic!("timed out waiting for: {what}");
 }
 
 pub(crate) fn is_turning_at(event: &MasterEvent, wanted: f32) -> bool {
@@ -75,7 +75,7 @@ fn discovery_finds_the_board_and_its_motor_turns_and_stops_as_commanded() {
             event_when(&mut bus, "at speed", |event| is_turning_at(event, speed));
         }
         bus.stop_all().unwrap();
-        event_when(&mut bus, "standing still", |event| is_turning_at(event, 0.0));
+        event_when(&mut bus, "at rest", |event| is_turning_at(event, 0.0));
         let told = board.report_when("stopped", |report| report.at("mrps").abs() <= 10);
         assert!(told.at("counts") != 0 && told.at("writes") >= 3, "{told:?}");
         told.assert_nothing_lost();
@@ -83,7 +83,7 @@ fn discovery_finds_the_board_and_its_motor_turns_and_stops_as_commanded() {
 }
 
 #[test]
-fn a_paid_stop_is_two_commands_that_are_each_followed_by_an_answer_and_the_motor_stands_still() {
+fn a_paid_stop_is_two_commands_each_followed_by_an_answer_and_the_motor_is_at_rest() {
     undisturbed(|| {
         let Some((mut board, mut bus)) = discovered() else { return };
         bus.set_velocity(NODE, rps(3.0)).unwrap();
@@ -96,12 +96,12 @@ fn a_paid_stop_is_two_commands_that_are_each_followed_by_an_answer_and_the_motor
         assert!(told.at("writes") >= before.at("writes") + 2, "{before:?} {told:?}");
         assert!(bus.role().node_statistics(NODE).replies >= answers + 2);
         assert!(told.at("replies") >= before.at("replies") + 2, "{before:?} {told:?}");
-        // A command to stop, and not the board's own watchdog.
+        // A stop command, not the board's own watchdog.
         assert_eq!(told.at("stops"), 0, "{told:?}");
 
         let deadline = bus.now() + Duration::from_millis(PATIENCE.as_millis() as u32);
         assert!(bus.await_standstill(NODE.into(), deadline).unwrap().is_empty());
-        let here = board.report_when("standing still", |report| report.at("mrps") == 0);
+        let here = board.report_when("at rest", |report| report.at("mrps") == 0);
         let end = bus.now() + Duration::from_millis(300);
         bus.run_until(end, |_, _, _| {}).unwrap();
         let there = board.report_when("read again", |report| report.at("reads") > here.at("reads"));
@@ -113,13 +113,13 @@ fn a_paid_stop_is_two_commands_that_are_each_followed_by_an_answer_and_the_motor
 }
 
 #[test]
-fn a_motor_that_is_read_but_not_commanded_any_more_stops() {
+fn a_motor_that_is_read_but_no_longer_commanded_stops() {
     undisturbed(|| {
         let Some((mut board, mut bus)) = discovered() else { return };
         bus.set_velocity(NODE, rps(3.0)).unwrap();
         event_when(&mut bus, "at speed", |event| is_turning_at(event, 3.0));
         bus.role_mut().release(NODE);
-        event_when(&mut bus, "standing still", |event| is_turning_at(event, 0.0));
+        event_when(&mut bus, "at rest", |event| is_turning_at(event, 0.0));
         let told = board.report_when("stopped", |report| report.at("mrps").abs() <= 10);
         assert_eq!((told.at("stops"), told.get("target_mrps")), (1, None));
     });
@@ -143,9 +143,9 @@ fn an_unplugged_board_is_abnormal_stops_and_does_not_move_when_it_comes_back() {
         bus.port_mut().plug(stream);
         let online = MasterEvent::Health { node: NODE, health: Health::Online };
         event_when(&mut bus, "online again", |event| *event == online);
-        // It was lost under a set-point, so it is stopped before it may be commanded again.
+        // It was lost under a set-point, so it is stopped before it accepts commands again.
         event_when(&mut bus, "stopped", |event| *event == MasterEvent::Stopped { node: NODE });
-        // Twenty readings on, it still stands.
+        // After twenty readings it is still at rest.
         for _ in 0..20 {
             event_when(&mut bus, "read", |event| matches!(event, MasterEvent::Status { .. }));
         }
@@ -158,8 +158,7 @@ fn an_unplugged_board_is_abnormal_stops_and_does_not_move_when_it_comes_back() {
     });
 }
 
-/// A master that is nothing but its packets: it sends when it is told to and waits for as
-/// long as it takes.
+/// A bare packet sender: it sends on request and waits as long as necessary.
 struct Bare {
     board: Board,
     wire: Wire,
@@ -176,7 +175,7 @@ impl Bare {
         self.wire.send(&packet(&WriteRequest::velocity(NODE, rps(speed))));
     }
 
-    /// What the board says once it has answered so often.
+    /// The board's report after this many answers.
     fn told(&mut self, replies: i64) -> Report {
         self.board.report_when("answered", |report| report.at("replies") >= replies)
     }
@@ -190,7 +189,7 @@ impl Bare {
         heard
     }
 
-    /// Asks, and gives the speed that is answered. Bytes that are no answer fail the test.
+    /// Requests and returns the speed. Bytes that are not an answer fail the test.
     fn read(&mut self) -> f32 {
         self.wire.send(&packet(&ReadRequest::new(NODE)));
         loop {
@@ -218,14 +217,13 @@ fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
         const EXCHANGES: u32 = 10_000;
         let Some(mut board) = Board::start(Program::Slave) else { return };
         let mut config = MasterConfig::direct();
-        // Longer than this machine ever leaves QEMU waiting, and no second try that would
-        // hide a loss.
+        // Longer than this machine ever keeps QEMU waiting, and no retry that would hide a loss.
         (config.reply_timeout, config.attempts) = (Duration::from_millis(400), 1);
         config.polling = Polling::Manual;
         let mut bus = master_on(Wire::new(board.bus()), config);
         assert_eq!(bus.discover().unwrap(), [(NODE, Mode::Velocity)]);
         for turn in 0..EXCHANGES {
-            // A WRITE, and a READ behind it.
+            // A WRITE, followed by a READ.
             let now = bus.now();
             bus.role_mut().set_velocity(NODE, rps((turn % 7) as f32), now).unwrap();
             match bus.read(NODE).unwrap() {
@@ -234,7 +232,7 @@ fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
             }
         }
         let (node, line) = (bus.role().node_statistics(NODE), bus.role().statistics());
-        // One more is the discovery; it asked seven nodes that are not there.
+        // One more is the discovery; it asked seven absent nodes.
         assert_eq!((node.requests, node.replies), (EXCHANGES + 1, EXCHANGES + 1));
         assert_eq!((node.timeouts, node.late, line.stale_bytes), (0, 0, 0));
         assert_eq!((line.reads, line.writes), (EXCHANGES + 8, EXCHANGES));
@@ -256,7 +254,7 @@ fn noise_costs_no_intact_packet_and_commands_nothing() {
         let mut master = Bare::new(board);
         let mut rng = Rng::new(7);
         for _ in 0..ROUNDS {
-            // Stray bytes, often false headers; then a command with one bit turned.
+            // Stray bytes, often false headers; then a command with one bit flipped.
             let strays = (0..rng.below(6)).map(|_| match rng.below(4) {
                 0 => 0xAA,
                 1 => 0xBB,
@@ -269,7 +267,7 @@ fn noise_costs_no_intact_packet_and_commands_nothing() {
             let bit = rng.below(64) as usize;
             damaged[bit / 8] ^= 1 << (bit % 8);
             master.wire.send(&damaged);
-            // And what is meant.
+            // Then the intended command.
             master.write(1.0);
             master.wire.send(&strays);
             let speed = master.read();
@@ -293,10 +291,10 @@ fn answers_that_are_overtaken_or_late_are_dropped_and_counted() {
         let end = std::time::Instant::now() + PATIENCE;
         let (mut asked, mut answered) = (0, 0);
         let told = loop {
-            // Overtaken: the next request is there before the board has answered.
+            // Overtaken: the next request arrives before the board has answered.
             master.wire.send(&read.repeat(20));
-            // Late: behind a false header the request is found after 100 ms. The board
-            // halts meanwhile.
+            // Late: after a false header the request is found after 100 ms. The board halts
+            // meanwhile.
             answered += master.heard_in_silence();
             master.wire.send(&[&[0xBB], &read[..]].concat());
             std::thread::sleep(std::time::Duration::from_millis(30));
@@ -323,7 +321,7 @@ fn the_driver_enable_pin_is_on_while_an_answer_is_sent_and_off_otherwise() {
         let mut rng = Rng::new(21);
         let mut answers = 0;
         for round in 0..60 {
-            // A quiet line, one with damage, and a master that talks over the answers.
+            // A quiet line, a damaged one, and a master that talks over the answers.
             if round % 3 == 1 {
                 let mut damaged = packet(&WriteRequest::velocity(NODE, rps(90.0)));
                 damaged[rng.below(8) as usize] ^= 1 << rng.below(8);
@@ -341,7 +339,7 @@ fn the_driver_enable_pin_is_on_while_an_answer_is_sent_and_off_otherwise() {
         assert_eq!(8 * told.at("replies"), answers, "{told:?}");
         assert!(told.at("overtaken") > 0 && told.at("skipped") > 0, "{told:?}");
 
-        // Mostly one answer each time; where requests lie in wait, the next one on its heels.
+        // Usually one answer per burst; with waiting requests, the next answer follows directly.
         let mut sent = 0;
         for burst in driver_enable_pin::bursts(&master.board.accesses()) {
             let mut answers = Frames::<ToMaster>::new(&burst);

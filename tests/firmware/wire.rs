@@ -1,6 +1,6 @@
 //! The wire between a role on this machine and a board: a port, a clock, noise, and a loose plug.
 //!
-//! A socket in real time; nothing of it is scripted.
+//! A socket in real time; nothing is scripted.
 
 use std::{
     collections::VecDeque,
@@ -17,8 +17,8 @@ use std::{
 
 use axlewire::{drive, sim::Rng, time::Instant};
 
-/// What disturbs the bytes of one direction: about one in 60 has a bit turned, and in front of
-/// about one in 100 stands a stray byte, half of the time one that begins a packet.
+/// Disturbs the bytes of one direction: flips a bit in about one byte in 60, and inserts a stray
+/// byte before about one in 100, half of the time one that begins a packet.
 #[derive(Debug)]
 pub(crate) struct Noise {
     rng: Rng,
@@ -26,12 +26,12 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// With the headers of a motor bus among the strays.
+    /// Stray bytes include the headers of a motor bus.
     pub(crate) const fn ikeya(seed: u64) -> Self {
         Self { rng: Rng::new(seed), headers: &[0xAA, 0xBB, 0x55, 0x56] }
     }
 
-    /// With the header of a rover link among the strays.
+    /// Stray bytes include the header of a rover link.
     pub(crate) const fn ucp(seed: u64) -> Self {
         Self { rng: Rng::new(seed), headers: &[0xFD, 0xFF] }
     }
@@ -55,7 +55,7 @@ impl Noise {
     }
 }
 
-/// Received bytes, and who waits for them.
+/// Received bytes, and the task waiting for them.
 #[derive(Debug, Default)]
 struct Inbox {
     bytes: Mutex<VecDeque<u8>>,
@@ -77,14 +77,14 @@ impl Wire {
         Self::disturbed(stream, None)
     }
 
-    /// A wire that is disturbed in both directions.
+    /// A wire with noise in both directions.
     pub(crate) fn noisy(stream: UnixStream, noise: Noise) -> Self {
         let mut wire = Self::disturbed(stream, Some(noise));
         wire.disturb();
         wire
     }
 
-    /// A wire that is disturbed from [`disturb`](Self::disturb) on, if there is noise.
+    /// A wire with noise, if any, from [`disturb`](Self::disturb) on.
     pub(crate) fn disturbed(stream: UnixStream, noise: Option<Noise>) -> Self {
         let (inbox, is_noisy) = (Arc::default(), Arc::default());
         let mut wire = Self { stream: None, inbox, noise, is_noisy };
@@ -92,7 +92,7 @@ impl Wire {
         wire
     }
 
-    /// From now on there is noise.
+    /// Enables the noise.
     pub(crate) fn disturb(&mut self) {
         self.is_noisy.store(true, Relaxed);
     }
@@ -117,7 +117,7 @@ impl Wire {
         });
     }
 
-    /// Pulls it out: what is sent goes nowhere, and nothing comes.
+    /// Unplugs it: sent bytes are discarded, and nothing arrives.
     pub(crate) fn unplug(&mut self) {
         if let Some(stream) = self.stream.take() {
             stream.shutdown(Shutdown::Both).unwrap();

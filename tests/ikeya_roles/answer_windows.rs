@@ -11,19 +11,22 @@ use axlewire::{
 use crate::rig::*;
 
 #[test]
-fn the_window_is_the_timeout_and_the_wire_time_behind_the_end_of_the_request() {
+fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.turn();
     // 80 us of request, 500 us of patience, 160 us of answer.
     assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(740)));
     desk.hear(740, &velocity(NodeId::N1, 1.0));
-    assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]), "at the deadline is in time");
+    assert!(
+        matches!(desk.told()[..], [MasterEvent::Status { .. }]),
+        "at the deadline counts as in time"
+    );
 
     desk.turn();
     desk.hear(741, &velocity(NodeId::N1, 1.0));
     desk.master.handle_timeout(desk.now);
     let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
-    assert_eq!(desk.told(), [suspect], "behind it is not");
+    assert_eq!(desk.told(), [suspect], "after it does not");
     assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
 }
 
@@ -65,7 +68,7 @@ fn a_stray_byte_before_every_answer_costs_nothing() {
 }
 
 #[test]
-fn an_answer_of_another_node_is_counted_and_never_taken() {
+fn an_answer_of_another_node_is_counted_and_never_accepted() {
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     assert_eq!(desk.turn(), read(NodeId::N1));
     desk.hear(290, &position(NodeId::N3, Position::new(1, 1)));
@@ -85,7 +88,7 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.turn();
     desk.silence();
-    // The node is not asked again before the guard is over, and the late answer meets no window.
+    // The node is not asked again before the guard ends, and the late answer meets no window.
     desk.hear(400, &velocity(NodeId::N1, 9.0));
     assert_eq!(desk.master.poll_transmit(desk.now), None);
     desk.turn();

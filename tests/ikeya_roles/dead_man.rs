@@ -30,10 +30,10 @@ fn has_died(desk: &mut Desk) -> bool {
 }
 
 #[test]
-fn a_master_has_no_dead_man_unless_it_is_asked_for() {
+fn a_master_has_no_dead_man_by_default() {
     let (mut desk, _) = turning(direct());
     for _ in 0..100 {
-        // Hours, and an application that has died.
+        // For hours, with a dead application.
         desk.now += MS(360_000);
         let written = writes(&desk.packets(10));
         assert!(written.iter().all(|it| *it == write(NodeId::N1, 5.0)) && !written.is_empty());
@@ -51,14 +51,14 @@ fn a_silent_application_stops_every_node_whose_latest_order_is_no_stop() {
             last = Some(desk.now);
         }
     }
-    assert!(last.unwrap() < told + MS(100), "no set-point outlives its application");
+    assert!(last.unwrap() < told + MS(100), "a set-point outlives its application");
     assert!(desk.now < told + MS(102));
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into(), "node 3 was never told to move");
     let written = writes(&desk.run(MS(50)));
     assert!(written.len() > 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
     assert_eq!(desk.master.statistics().dead_man, 1);
-    assert!(!has_died(&mut desk), "told once");
-    // It is back.
+    assert!(!has_died(&mut desk), "reported once");
+    // The application is back.
     assert_eq!(desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now), Ok(()));
     desk.run(MS(90));
     assert!(!has_died(&mut desk));
@@ -67,7 +67,7 @@ fn a_silent_application_stops_every_node_whose_latest_order_is_no_stop() {
 }
 
 #[test]
-fn the_deadline_of_the_dead_man_is_told_and_kept_to_the_microsecond() {
+fn the_deadline_of_the_dead_man_is_reported_and_kept_to_the_microsecond() {
     let mut config = armed();
     config.polling = Polling::Manual;
     let (mut desk, told) = turning(config);
@@ -81,7 +81,7 @@ fn the_deadline_of_the_dead_man_is_told_and_kept_to_the_microsecond() {
 }
 
 #[test]
-fn a_driver_that_comes_late_sends_no_set_point_of_a_dead_application() {
+fn a_late_driver_sends_no_set_point_of_a_dead_application() {
     let (mut desk, told) = turning(armed());
     // Not even handle_timeout was called.
     desk.now = told + MS(100);
@@ -112,7 +112,7 @@ fn a_set_point_a_stop_and_keep_alive_are_signs_of_life() {
 }
 
 #[test]
-fn a_refused_set_point_is_no_sign_of_life_nor_is_anything_else_that_is_asked() {
+fn a_refused_set_point_or_a_query_is_not_a_sign_of_life() {
     let (mut desk, told) = turning(armed());
     let refused = CommandError::NotOnline { node: NodeId::N2 };
     while desk.now < told + MS(110) {
@@ -121,7 +121,7 @@ fn a_refused_set_point_is_no_sign_of_life_nor_is_anything_else_that_is_asked() {
         desk.master.read(NodeId::N1, desk.now).unwrap();
         let _ = desk.master.confirm(NodeId::N1, desk.now);
         assert!(desk.master.status(NodeId::N1).is_some());
-        // Takes out the events as well.
+        // Also takes the events.
         desk.exchange();
     }
     assert!(has_died(&mut desk));

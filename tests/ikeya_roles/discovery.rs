@@ -1,4 +1,4 @@
-//! Discovery: which nodes are asked, how often, and what goes first.
+//! Discovery: which nodes are asked, how often, and what takes precedence.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -59,11 +59,11 @@ fn a_second_discovery_asks_only_nodes_that_are_not_online_and_lets_stops_through
     desk.silence();
     let stop = write(NodeId::N1, 0.0);
     let expected = [stop.clone(), read(NodeId::N1), stop, read(NodeId::N3), read(NodeId::N1)];
-    assert_eq!(desk.packets(5), expected, "a stop does not wait, nor does it hold up the others");
+    assert_eq!(desk.packets(5), expected, "a stop neither waits nor delays the others");
 }
 
 #[test]
-fn a_discovery_that_is_asked_for_again_joins_the_one_under_way() {
+fn a_repeated_discovery_joins_the_running_one() {
     let mut desk = Desk::new(direct());
     desk.master.discover(desk.now);
     for id in 1..=8 {
@@ -78,7 +78,7 @@ fn a_discovery_that_is_asked_for_again_joins_the_one_under_way() {
         desk.silence();
         asked += 1;
     }
-    assert_eq!(asked, 3 * 8, "as often as without the calls");
+    assert_eq!(asked, 3 * 8, "as often as without the extra calls");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn an_application_that_discovers_all_the_time_does_not_keep_the_nodes_from_being
             longest = longest.max(*since);
         }
     }
-    // Two discoveries of six silent ids in three attempts, and the turns of both nodes.
+    // Two discoveries of six silent ids with three attempts each, and the turns of both nodes.
     assert!((36..=36 + 16).contains(&longest), "{longest} packets without a READ of a node");
     desk.answer(NodeId::N1, Answer::Silence);
     for _ in 0..4 * 52 {
@@ -116,7 +116,7 @@ fn an_application_that_discovers_all_the_time_does_not_keep_a_lost_node_from_bei
             desk.master.discover(desk.now);
             stops += usize::from(desk.exchange().unwrap() == write(NodeId::N1, 0.0));
         }
-        // At the pace of the search: 5 % of the time, a window each.
+        // At the search rate: 5 % of the time, one window each.
         let window = config.reply_timeout.as_micros();
         let expected = 2_000_000 / (20 * (window + 400));
         assert!(stops as u32 > expected / 2, "{stops} blind stops instead of {expected}");
@@ -124,8 +124,8 @@ fn an_application_that_discovers_all_the_time_does_not_keep_a_lost_node_from_bei
 }
 
 #[test]
-fn an_application_that_discovers_all_the_time_finds_a_node_that_is_owed_a_stop_wherever_it_is() {
-    // Node 2 is asked by every discovery, and never there.
+fn continuous_discoveries_find_every_node_that_is_owed_a_stop() {
+    // Node 2 is asked in every discovery, and is never there.
     let mut desk = Desk::with_nodes(only(&[NodeId::N1, NodeId::N2]), &[N1]);
     desk.master.stop(NodeId::N5, desk.now);
     for _ in 0..500 {
@@ -137,7 +137,7 @@ fn an_application_that_discovers_all_the_time_finds_a_node_that_is_owed_a_stop_w
     while desk.master.stop_progress(NodeId::N5) != StopProgress::Paid {
         desk.master.discover(desk.now);
         desk.exchange().unwrap();
-        assert!(desk.now < back + MS(100), "its stop is owed for ever");
+        assert!(desk.now < back + MS(100), "its stop stays owed");
     }
 }
 
@@ -166,7 +166,7 @@ fn a_driver_that_sleeps_between_a_discovery_and_the_turns_that_go_first_is_never
         let mut reads = 0;
         for _ in 0..1000 {
             desk.master.discover(desk.now);
-            // The desk looks whether anything was due before.
+            // The rig checks whether anything was due earlier.
             reads += usize::from(desk.exchange().unwrap() == read(NodeId::N1));
         }
         assert!(reads > 100, "{reads} of {period:?}");

@@ -78,7 +78,7 @@ fn garbage_in_the_window_is_a_strike_that_names_its_cause() {
 }
 
 #[test]
-fn looking_for_abnormal_nodes_costs_no_more_than_its_share() {
+fn the_search_for_abnormal_nodes_costs_no_more_than_its_share() {
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     while desk.master.health(NodeId::N3) != Some(Health::Abnormal) {
         match desk.turn()[1] {
@@ -98,5 +98,5 @@ fn looking_for_abnormal_nodes_costs_no_more_than_its_share() {
         }
         desk.told();
     }
-    assert!((20_000..=50_000).contains(&probing), "{probing} us of a second, 5 % are allowed");
+    assert!((20_000..=50_000).contains(&probing), "{probing} us per second, 5 % is allowed");
 }

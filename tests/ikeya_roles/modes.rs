@@ -8,13 +8,13 @@ use axlewire::ikeya::{
 use crate::rig::*;
 
 #[test]
-fn a_mode_that_changes_at_run_time_is_believed_the_second_time_and_ends_the_set_point() {
+fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.turn();
     let at = Position::new(5, 6);
     desk.hear(450, &position(NodeId::N1, at));
-    assert_eq!(desk.told(), [], "not believed yet");
+    assert_eq!(desk.told(), [], "not accepted yet");
     desk.turn();
     desk.hear(450, &position(NodeId::N1, at));
     let changed = MasterEvent::ModeChanged { node: NodeId::N1, mode: Mode::Position };
@@ -45,9 +45,9 @@ fn in_doubt_the_node_is_read_at_once_and_gets_no_write() {
     assert_eq!(desk.packet(), read(NodeId::N1));
     assert_eq!(desk.now, doubted);
     desk.silence();
-    // The guard, and a READ again, whatever the polling.
+    // The guard, then another READ, whatever the polling.
     assert_eq!(desk.packet(), read(NodeId::N1));
-    assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Velocity), "nothing is decided");
+    assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Velocity), "not decided yet");
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn in_doubt_set_points_of_either_mode_are_refused_and_not_kept() {
     assert_eq!(refused.to_string(), "the mode of node 1 is in doubt");
     assert_eq!(desk.master.set_velocity(NodeId::N1, rps(2.0), desk.now), Err(refused));
     assert_eq!(desk.master.set_position(NodeId::N1, turns(2), desk.now), Err(refused));
-    // The mode has changed, and that ended the set-point: the node is stopped where it is.
+    // The mode has changed, which ended the set-point: the node is stopped where it is.
     let hold = WriteRequest::position(NodeId::N1, turns(7)).as_bytes().to_vec();
     let writes = writes(&desk.run(MS(20)));
     assert!(!writes.is_empty() && writes.iter().all(|write| *write == hold), "{writes:02x?}");
@@ -65,7 +65,7 @@ fn in_doubt_set_points_of_either_mode_are_refused_and_not_kept() {
 }
 
 #[test]
-fn an_answer_in_the_mode_on_record_settles_the_doubt_and_the_set_point_goes_on() {
+fn an_answer_in_the_recorded_mode_settles_the_doubt_and_the_set_point_continues() {
     let mut desk = in_doubt_at(turns(7));
     desk.answer(NodeId::N1, Answer::Velocity(0.5));
     assert_eq!(desk.packets(1), [read(NodeId::N1)]);
@@ -110,7 +110,11 @@ fn a_late_answer_in_another_mode_puts_the_mode_in_doubt_and_decides_nothing() {
         assert!(desk.master.is_mode_in_doubt(NodeId::N1));
         assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Velocity));
     }
-    assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(0.0), "nor is it taken");
+    assert_eq!(
+        desk.master.status(NodeId::N1).unwrap().0,
+        Status::Velocity(0.0),
+        "the late answer is not taken"
+    );
     assert_eq!(desk.packets(1), [read(NodeId::N1)]);
     assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
 }
@@ -126,7 +130,7 @@ fn an_early_answer_in_another_mode_puts_the_mode_in_doubt() {
 }
 
 #[test]
-fn a_mode_that_nobody_has_heard_yet_is_not_in_doubt() {
+fn a_mode_that_was_never_heard_is_not_in_doubt() {
     let mut desk = Desk::new(manual());
     desk.hear(1000, &position(NodeId::N1, turns(7)));
     desk.hear(1000, &velocity(NodeId::N1, 1.0));
@@ -148,17 +152,17 @@ fn in_doubt_a_stop_may_write_a_position_that_a_velocity_node_reads_as_standstill
     ] {
         let mut desk = in_doubt_at(at);
         desk.master.stop(NodeId::N1, desk.now);
-        // The READ that the stop waits for is damaged in the mode alone: the doubt stays.
+        // The READ for which the stop waits is damaged in the mode only: the doubt stays.
         desk.turn();
         desk.silence();
-        // One answer would decide. A late one does not, nor is it measured.
+        // One more answer would decide. A late one neither decides nor measures.
         desk.hear(10, &position(NodeId::N1, at));
         assert_eq!(kinds(&desk.packets(1)), [(READ, 1)], "{at:?}");
         assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
         let first = writes(&desk.packets(4))[0].clone();
-        assert_eq!(first, hold(NodeId::N1, at), "decided, it is held wherever it is");
+        assert_eq!(first, hold(NodeId::N1, at), "once decided, it is held wherever it is");
 
-        // A stop that was asked for before the doubt began is measured by the doubtful answer.
+        // A stop requested before the doubt began is measured by the doubtful answer.
         let mut desk = Desk::with_nodes(manual(), &[N1]);
         desk.answer(NodeId::N1, Answer::Position(at));
         desk.master.stop(NodeId::N1, desk.now);
@@ -211,7 +215,7 @@ fn what_was_written_in_doubt_does_not_pay_the_stop_of_a_node_that_is_in_its_old_
 }
 
 #[test]
-fn a_stop_that_six_exchanges_could_not_unblock_is_told_and_read_for_at_the_pace_of_the_search() {
+fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_search_rate() {
     for (has_stop, event) in [
         (true, MasterEvent::StopBlocked { node: NodeId::N1 }),
         (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
@@ -231,13 +235,13 @@ fn a_stop_that_six_exchanges_could_not_unblock_is_told_and_read_for_at_the_pace_
         assert!(desk.news().contains(&event), "after the sixth");
         let begin = desk.now;
         assert_eq!(kinds(&desk.packets(4)), [(READ, 1); 4]);
-        assert!(desk.now - begin > US(3 * 14_000), "at the pace of the search");
-        assert_eq!(desk.news(), [], "told once");
+        assert!(desk.now - begin > US(3 * 14_000), "faster than the search rate");
+        assert_eq!(desk.news(), [], "reported once");
     }
 }
 
 #[test]
-fn a_stop_that_is_asked_for_when_the_doubt_is_old_is_told_to_be_blocked_at_once() {
+fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
     let mut config = direct();
     config.stops_abnormal = false;
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -251,7 +255,7 @@ fn a_stop_that_is_asked_for_when_the_doubt_is_old_is_told_to_be_blocked_at_once(
 }
 
 #[test]
-fn a_hold_is_measured_anew_after_the_mode_was_in_doubt() {
+fn a_hold_is_measured_again_after_the_mode_was_in_doubt() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     desk.master.stop(NodeId::N3, desk.now);
@@ -260,14 +264,14 @@ fn a_hold_is_measured_anew_after_the_mode_was_in_doubt() {
     while !desk.master.is_mode_in_doubt(NodeId::N3) {
         desk.exchange();
     }
-    assert_eq!(desk.master.stops_owed(), NodeId::N3.into(), "it may have been given up");
+    assert_eq!(desk.master.stops_owed(), NodeId::N3.into(), "the hold may have been lost");
     desk.answer(NodeId::N3, Answer::Position(turns(30)));
     let written = writes(&desk.run(MS(10)));
     assert!(written.len() > 2 && written.iter().all(|it| *it == hold(NodeId::N3, turns(30))));
 }
 
 #[test]
-fn a_hold_whose_confirmation_was_asked_for_is_not_confirmed_when_the_mode_is_in_doubt() {
+fn a_hold_is_not_confirmed_when_the_mode_is_in_doubt() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.master.stop(NodeId::N3, desk.now);
     desk.run(MS(10));
@@ -293,7 +297,7 @@ fn a_node_that_comes_back_in_another_mode_is_stopped_in_that_one() {
     let back = sent.iter().position(|it| *it == hold(NodeId::N1, turns(-3))).unwrap();
     let written = writes(&sent[back..]);
     assert!(written.iter().all(|it| *it == hold(NodeId::N1, turns(-3))), "{written:02x?}");
-    // Until it has spoken it was stopped in the mode on record.
+    // Until it answers, it is stopped in the recorded mode.
     let blind = writes(&sent[..back]);
     assert!(blind.iter().all(|it| *it == write(NodeId::N1, 0.0)));
     assert!(desk.news().contains(&MasterEvent::Stopped { node: NodeId::N1 }));
@@ -309,7 +313,7 @@ fn a_set_point_that_has_not_left_when_the_doubt_begins_is_not_sent() {
 }
 
 #[test]
-fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_comes() {
+fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_is() {
     let mut desk = in_doubt_at(turns(7));
     desk.turn();
     desk.silence();
@@ -346,7 +350,7 @@ fn a_node_whose_answers_alternate_between_the_modes_is_never_said_to_be_stopped(
         let mut reads = first;
         while reads < 60 {
             desk.answer(NodeId::N1, answers[reads % 2]);
-            let packet = desk.exchange().expect("it is read");
+            let packet = desk.exchange().expect("no READ");
             if packet[0] == WRITE {
                 // The latter means standstill in both modes.
                 let stops = [write(NodeId::N1, 0.0), hold(NodeId::N1, turns(7))];

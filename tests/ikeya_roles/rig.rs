@@ -1,4 +1,4 @@
-//! A master called by hand, in a time that the test makes.
+//! A master called by hand, in time controlled by the test.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -56,7 +56,7 @@ pub(crate) fn manual() -> MasterConfig {
     config
 }
 
-/// Settings of a bus that has these nodes and no others.
+/// Settings of a bus with these nodes only.
 pub(crate) fn only(nodes: &[NodeId]) -> MasterConfig {
     let mut config = direct();
     config.nodes = nodes.iter().copied().collect();
@@ -79,7 +79,7 @@ pub(crate) fn writes(packets: &[Vec<u8>]) -> Vec<Vec<u8>> {
     packets.iter().filter(|packet| packet[0] == WRITE).cloned().collect()
 }
 
-/// What a node answers.
+/// A node's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Answer {
     Silence,
@@ -97,7 +97,7 @@ impl Answer {
     }
 }
 
-/// A master, the time, what the nodes answer, and what the master has sent and told.
+/// A master, the time, the nodes' answers, and what the master has sent and reported.
 #[derive(Clone)]
 pub(crate) struct Desk {
     pub(crate) master: Master,
@@ -125,8 +125,8 @@ impl Desk {
         }
     }
 
-    /// A master that knows these nodes and has told so. They answer 0 rps, or 7 turns and 3 counts,
-    /// wherever the test leaves the answering to the desk.
+    /// A master that has discovered these nodes and reported it. They answer 0 rps, or 7 turns and
+    /// 3 counts, unless the test answers itself.
     pub(crate) fn with_nodes(config: MasterConfig, nodes: &[(NodeId, Mode)]) -> Self {
         let mut desk = Self::new(config);
         for &(node, mode) in nodes {
@@ -147,12 +147,12 @@ impl Desk {
         desk
     }
 
-    /// A node answers this from now on.
+    /// From now on a node answers this.
     pub(crate) fn answer(&mut self, node: NodeId, answer: Answer) {
         self.answers[usize::from(node.get()) - 1] = answer;
     }
 
-    /// Answers a READ as the node would, or lets its window close.
+    /// Answers a READ like the node, or lets its window close.
     fn reply(&mut self, request: &[u8], after_us: u32) {
         let node = NodeId::new(request[1]).unwrap();
         match self.answers[usize::from(request[1]) - 1].packet(node) {
@@ -161,7 +161,7 @@ impl Desk {
         }
     }
 
-    /// Goes on to the next packet, and past its answer or the end of its window if it is a READ;
+    /// Advances to the next packet, and, for a READ, past its answer or the end of its window;
     /// `None` if there is nothing to do.
     pub(crate) fn exchange(&mut self) -> Option<Vec<u8>> {
         while self.master.poll_timeout().is_some() {
@@ -179,11 +179,11 @@ impl Desk {
         None
     }
 
-    /// When the answer to the READ that has just been handed out is whole: 100 us after the READ
-    /// has left, which may have packets in front of it, and its own 160 us.
+    /// When the answer to the READ just handed out is complete: 100 us after the READ has left,
+    /// which may have packets before it, plus its own 160 us.
     fn answer_us(&self) -> u32 {
         let deadline = self.master.poll_timeout().expect("a window");
-        // It may be the dead-man's, which is not waited for.
+        // It may be the dead-man's deadline, which is not waited for.
         (deadline - self.now).as_micros().saturating_sub(400).max(340)
     }
 
@@ -192,7 +192,7 @@ impl Desk {
         core::iter::from_fn(|| self.exchange()).take(most).collect()
     }
 
-    /// Goes on for this long, as the nodes answer; returns the packets.
+    /// Runs for this long while the nodes answer; returns the packets.
     pub(crate) fn run(&mut self, span: Duration) -> Vec<Vec<u8>> {
         let (end, mut sent) = (self.now + span, vec![]);
         while self.now < end {
@@ -205,11 +205,11 @@ impl Desk {
         sent
     }
 
-    /// A node falls silent; goes on until it is abnormal.
+    /// A node goes silent; runs until it is abnormal.
     pub(crate) fn lose(&mut self, node: NodeId) {
         self.answer(node, Answer::Silence);
         while self.master.health(node) != Some(Health::Abnormal) {
-            self.exchange().expect("it is asked");
+            self.exchange().expect("nothing is sent");
         }
     }
 
@@ -217,11 +217,11 @@ impl Desk {
     pub(crate) fn lose_by_hand(&mut self, node: NodeId) {
         self.answer(node, Answer::Silence);
         while self.master.read(node, self.now).is_ok() {
-            self.exchange().expect("it is asked");
+            self.exchange().expect("nothing is sent");
         }
     }
 
-    /// Goes on to the next READ and returns it; what was sent before it is in `sent`.
+    /// Advances to the next READ and returns it; packets sent before it are in `sent`.
     pub(crate) fn turn(&mut self) -> Vec<u8> {
         loop {
             let packet = self.packet();
@@ -232,7 +232,7 @@ impl Desk {
         }
     }
 
-    /// Goes on to the next packet and returns it, unanswered.
+    /// Advances to the next packet and returns it, unanswered.
     pub(crate) fn packet(&mut self) -> Vec<u8> {
         for _ in 0..100 {
             if let Some(bytes) = self.master.poll_transmit(self.now) {
@@ -244,7 +244,7 @@ impl Desk {
         panic!("nothing is sent");
     }
 
-    /// Goes on to the master's next deadline.
+    /// Advances to the master's next deadline.
     fn expire(&mut self) {
         let next = self.master.poll_timeout().expect("something to do");
         assert!(next > self.now, "a busy loop at {next:?}");
@@ -253,8 +253,8 @@ impl Desk {
         self.master.handle_timeout(self.now);
     }
 
-    /// A driver that sleeps until the next deadline misses nothing. What could be handed out behind
-    /// a WRITE that is still leaving would not leave sooner.
+    /// A driver that sleeps until the next deadline misses nothing. A packet handed out behind a
+    /// WRITE that is still leaving would not leave any earlier.
     fn check_sleep(&self, next: Instant) {
         if self.is_behind_write {
             return;
@@ -265,7 +265,7 @@ impl Desk {
         assert_eq!(asleep.poll_transmit(just_before), None, "it was due before {next:?}");
     }
 
-    /// Lets time pass and then hands in these bytes.
+    /// Lets time pass and then passes in these bytes.
     pub(crate) fn hear(&mut self, after_us: u32, bytes: &[u8]) {
         self.now += US(after_us);
         self.master.handle_input(bytes, self.now);
@@ -283,7 +283,7 @@ impl Desk {
         }
     }
 
-    /// What has been told since this was asked last.
+    /// Everything reported since the last call.
     pub(crate) fn told(&mut self) -> Vec<MasterEvent> {
         self.keep_events();
         std::mem::take(&mut self.events)

@@ -1,11 +1,11 @@
-//! The schedule of a bus tells its rate before it is wired.
+//! The schedule gives the rate of a bus before it is wired.
 
 use axlewire::ikeya::{board::ThreeMotors, master::Schedule};
 
 use crate::rig::*;
 
 #[test]
-fn the_schedule_tells_the_rate_of_a_bus_before_it_is_wired() {
+fn the_schedule_gives_the_rate_of_a_bus_before_it_is_wired() {
     let plan = Schedule::new(8);
     assert_eq!((plan.cycle_time(), plan.cycles_per_second(), plan.busy_pct()), (US(3600), 277, 88));
     let mut reading = plan;

@@ -1,4 +1,4 @@
-//! The order in which packets are sent, and how long each of them waits at most (I13).
+//! The order in which packets are sent, and the longest wait of each (I13).
 
 use axlewire::{
     endpoint::Endpoint,
@@ -30,7 +30,7 @@ fn stops_of_velocity_nodes_go_first_then_positions_in_turn() {
     let first_of = |node| sent.iter().position(|it| kind(it) == (WRITE, node)).unwrap();
     let first_read = |node| sent.iter().position(|it| kind(it) == (READ, node)).unwrap();
     for node in [1, 3] {
-        assert_eq!(first_of(node), first_read(node) + 1, "what was measured is written next");
+        assert_eq!(first_of(node), first_read(node) + 1, "a measured position is written next");
     }
     // Each is read once before any is read again.
     let reads: Vec<u8> = sent.iter().filter(|it| it[0] == READ).map(|it| it[1]).take(4).collect();
@@ -60,7 +60,7 @@ fn stops_go_before_set_points_set_points_before_discovery_and_discovery_before_t
     let sent = kinds(&desk.packets(7));
     let stop = [(WRITE, 4), (READ, 4), (WRITE, 4)];
     assert_eq!(sent[..3], stop);
-    assert_eq!(sent[3..5], [(WRITE, 2), (READ, 5)], "a round ends with one of the others");
+    assert_eq!(sent[3..5], [(WRITE, 2), (READ, 5)], "a round ends with one of the rest");
     assert_eq!(sent[5..], [(READ, 4), (READ, 6)]);
     while desk.master.is_discovering() {
         let packet = desk.exchange().unwrap();
@@ -69,7 +69,7 @@ fn stops_go_before_set_points_set_points_before_discovery_and_discovery_before_t
 }
 
 #[test]
-fn a_stop_of_a_silent_node_has_one_attempt_per_round_and_holds_up_nobody() {
+fn a_stop_of_a_silent_node_has_one_attempt_per_round_and_delays_no_other_node() {
     let mut desk = Desk::with_nodes(mixed(), &MIXED);
     desk.answer(NodeId::N1, Answer::Silence);
     desk.master.stop(NodeId::N1, desk.now);
@@ -86,8 +86,8 @@ fn a_stop_of_a_silent_node_has_one_attempt_per_round_and_holds_up_nobody() {
     assert!(!twice, "{sent:02x?}");
 }
 
-/// Eight nodes; all but the last get a new set-point before each packet, and are stopped now and
-/// then. The longest that anything of node 8 has waited, in exchanges and in other WRITEs.
+/// Eight nodes; all but the last get a new set-point before each packet, and are stopped
+/// occasionally. The longest wait of anything for node 8, in exchanges and in other WRITEs.
 fn longest_wait(
     mode: Mode,
     begin: impl Fn(&mut Desk),
@@ -123,7 +123,7 @@ fn longest_wait(
             }
             exchanges += usize::from(has_begun && packet[0] == READ);
             other_writes += usize::from(has_begun && packet[0] == WRITE);
-            assert!(turn < 599, "it waits for ever");
+            assert!(turn < 599, "it waits forever");
         }
         longest = (longest.0.max(exchanges), longest.1.max(other_writes));
     }
@@ -169,7 +169,7 @@ fn behind_a_write_that_is_leaving_only_reads_and_stops_are_handed_out() {
     desk.master.set_velocity(NodeId::N2, rps(2.0), desk.now).unwrap();
     let begin = desk.now;
     assert_eq!(desk.packet(), write(NodeId::N2, 2.0));
-    assert_eq!(desk.master.poll_transmit(desk.now), None, "set-points do not add up in the port");
+    assert_eq!(desk.master.poll_transmit(desk.now), None, "set-points do not pile up in the port");
     desk.master.stop(NodeId::N1, desk.now);
     assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
     assert_eq!(desk.packet(), read(NodeId::N1));
@@ -177,7 +177,7 @@ fn behind_a_write_that_is_leaving_only_reads_and_stops_are_handed_out() {
 }
 
 #[test]
-fn where_positions_can_be_written_at_once_velocity_nodes_still_go_first() {
+fn even_if_positions_can_be_written_at_once_velocity_nodes_go_first() {
     let mut config = mixed();
     config.hold_age = MS(1000);
     let mut desk = Desk::with_nodes(config, &MIXED);
@@ -188,7 +188,7 @@ fn where_positions_can_be_written_at_once_velocity_nodes_still_go_first() {
     assert_eq!(sent, [(WRITE, 2), (WRITE, 4), (WRITE, 1), (WRITE, 3)]);
 }
 
-/// Eight velocity nodes, of which node 2 is gone, and an application that sets all the time.
+/// Eight velocity nodes, node 2 of them lost, and an application that sets continuously.
 fn one_is_gone(change: impl Fn(&mut MasterConfig)) -> Desk {
     let mut config = direct();
     change(&mut config);
@@ -200,7 +200,7 @@ fn one_is_gone(change: impl Fn(&mut MasterConfig)) -> Desk {
     desk
 }
 
-/// A new set-point for every node that takes one, and the next packet.
+/// A new set-point for every node that accepts one, and the next packet.
 fn set_all(desk: &mut Desk) -> (u8, u8) {
     for node in NodeId::ALL {
         let _ = desk.master.set_velocity(node, rps(1.0), desk.now);
@@ -223,7 +223,7 @@ fn the_search_for_a_node_that_is_gone_keeps_no_other_from_being_read_whatever_it
                 longest = longest.max(*since);
             }
         }
-        // Seven turns of the others, one more of the search, and seven WRITEs in front of each.
+        // Seven turns of the others, one more of the search, and seven WRITEs before each.
         assert!(longest <= 7 * 8 + 8 * 9, "{share} %, {gap} us: {longest} packets without a READ");
         assert!(sought > 5, "{share} %, {gap} us: {sought} attempts");
 

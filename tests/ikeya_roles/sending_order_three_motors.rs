@@ -1,4 +1,4 @@
-//! How long each packet waits at most on a bus of boards with three motors, where each WRITE is an
+//! The longest wait of each packet on a bus of boards with three motors, where each WRITE is an
 //! exchange (I13).
 
 use axlewire::{
@@ -14,7 +14,7 @@ use axlewire::{
 
 use crate::rig::*;
 
-/// Eight boards that answer at once whatever they are asked, and their master.
+/// Eight boards that answer every request at once, and their master.
 struct Boards {
     master: Master<ThreeMotors>,
     now: Instant,
@@ -32,7 +32,7 @@ impl Boards {
         boards
     }
 
-    /// The next request; it has been answered.
+    /// The next request, already answered.
     fn exchange(&mut self) -> Vec<u8> {
         let sent = loop {
             if let Some(packet) = self.master.poll_transmit(self.now) {
@@ -64,7 +64,7 @@ impl Boards {
 }
 
 /// All but node 8 get a new set-point before each packet, and are stopped often, rarely or never.
-/// The most exchanges in front of something of node 8 that `begin` begins, its own left out.
+/// The most exchanges before something of node 8 that `begin` starts, not counting its own.
 fn longest_wait(
     modes: [Mode; 8],
     begin: impl Fn(&mut Boards),
@@ -93,7 +93,7 @@ fn longest_wait(
             if packet[1] != 8 {
                 waited = waited.map(|count| count + 1);
             }
-            assert!(turn < 999, "it waits for ever");
+            assert!(turn < 999, "it waits forever");
         }
         longest = longest.max(waited.unwrap());
     }

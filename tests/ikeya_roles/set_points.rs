@@ -60,7 +60,7 @@ fn nodes_are_visited_in_turn_with_a_write_before_each_read() {
 }
 
 #[test]
-fn a_confirmed_write_is_told_after_the_read_that_followed_it() {
+fn a_confirmed_write_is_reported_after_the_read_that_followed_it() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
@@ -71,11 +71,11 @@ fn a_confirmed_write_is_told_after_the_read_that_followed_it() {
     assert_eq!(desk.told().last(), Some(&confirmed));
     desk.turn();
     desk.hear(450, &velocity(NodeId::N1, 0.5));
-    assert!(!desk.told().contains(&confirmed), "told once");
+    assert!(!desk.told().contains(&confirmed), "reported once");
 }
 
 #[test]
-fn a_write_that_cannot_be_confirmed_is_told_with_its_cause() {
+fn a_write_that_cannot_be_confirmed_is_reported_with_its_cause() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
@@ -105,7 +105,7 @@ fn a_flood_of_set_points_does_not_keep_the_others_from_being_read() {
     assert!(reads[1] >= 40 && reads[3] >= 40, "{reads:?}");
 }
 
-/// Sets a node's speed and asks for the confirmation of that.
+/// Sets a node's speed and requests its confirmation.
 fn confirming() -> Desk {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -129,7 +129,7 @@ fn a_confirmation_always_ends_in_one_event() {
         for sent in 0..2 {
             let mut desk = confirming();
             if sent == 1 {
-                // The WRITE is on its way.
+                // The WRITE is on the line.
                 assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
             }
             story(&mut desk);

@@ -13,7 +13,7 @@ use axlewire::{
 use crate::rig::*;
 
 #[test]
-fn polling_every_so_often_keeps_its_period_without_drift() {
+fn periodic_polling_keeps_its_period_without_drift() {
     let mut config = direct();
     config.polling = Polling::Every(Duration::from_millis(10));
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -29,7 +29,7 @@ fn polling_every_so_often_keeps_its_period_without_drift() {
 }
 
 #[test]
-fn a_node_that_is_asked_for_is_read_at_once_whatever_its_period() {
+fn a_requested_node_is_read_at_once_whatever_its_period() {
     let mut config = direct();
     config.polling = Polling::Every(Duration::from_millis(100));
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -42,12 +42,12 @@ fn a_node_that_is_asked_for_is_read_at_once_whatever_its_period() {
     assert!(desk.now < asked_at + US(500), "at once");
 }
 
-/// A bus with one node that is read every 10 ms; the READ at the time returned has been answered.
+/// A bus with one node that is read every 10 ms; the READ at the returned time has been answered.
 fn read_every_10_ms() -> (Desk, Instant) {
     let mut config = direct();
     config.polling = Polling::Every(MS(10));
     let mut desk = Desk::with_nodes(config, &[N1]);
-    // The first is late: it was due while the discovery went on.
+    // The first is late: it was due during the discovery.
     desk.turn();
     desk.hear(290, &velocity(NodeId::N1, 0.0));
     desk.turn();
@@ -56,7 +56,7 @@ fn read_every_10_ms() -> (Desk, Instant) {
     (desk, begin)
 }
 
-/// When the next READ is sent by a driver that is called at this time and then in time.
+/// When the next READ is sent by a driver that is called at this time and punctually afterwards.
 fn next_read(desk: &mut Desk, called_at: Instant) -> Instant {
     desk.now = called_at;
     desk.master.handle_timeout(desk.now);
@@ -89,7 +89,7 @@ fn after_a_pause_of_whole_periods_there_is_one_read_and_then_the_period() {
 }
 
 #[test]
-fn a_read_that_is_asked_for_does_not_cost_the_next_turn() {
+fn a_requested_read_does_not_cost_the_next_turn() {
     let (mut desk, begin) = read_every_10_ms();
     desk.now = begin + MS(4);
     desk.master.read(NodeId::N1, desk.now).unwrap();
@@ -99,7 +99,7 @@ fn a_read_that_is_asked_for_does_not_cost_the_next_turn() {
 }
 
 #[test]
-fn a_read_without_an_answer_is_tried_again_right_behind_the_guard_whatever_the_polling() {
+fn an_unanswered_read_is_retried_right_after_the_guard_whatever_the_polling() {
     for polling in [Polling::Manual, Polling::Every(MS(100)), Polling::Fastest] {
         let mut config = direct();
         config.polling = polling;
@@ -133,7 +133,7 @@ fn manual_polling_reads_when_asked_and_writes_when_told() {
 }
 
 #[test]
-fn a_turnaround_gap_is_kept_behind_requests_and_answers() {
+fn a_turnaround_gap_is_kept_after_requests_and_answers() {
     let mut config = direct();
     config.turnaround_gap = US(100);
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -148,7 +148,7 @@ fn a_turnaround_gap_is_kept_behind_requests_and_answers() {
     assert_eq!(desk.now, sent + US(160 + 100));
 }
 
-/// A desk whose line gives back what is sent, at the beginning of a discovery.
+/// A master on a line that echoes, at the beginning of a discovery.
 fn discovering_on_an_echoing_line() -> Desk {
     let mut config = direct();
     config.removes_echo = true;
@@ -158,7 +158,7 @@ fn discovering_on_an_echoing_line() -> Desk {
 }
 
 #[test]
-fn an_echoing_line_is_freed_of_its_echo() {
+fn the_echo_of_an_echoing_line_is_removed() {
     let mut desk = discovering_on_an_echoing_line();
     for node in NodeId::ALL {
         let request = desk.turn();
@@ -224,7 +224,7 @@ fn a_wrong_echo_is_one_error_and_the_next_one_is_removed_again() {
 }
 
 #[test]
-fn a_line_without_the_echo_that_was_promised_still_works() {
+fn a_line_without_the_configured_echo_still_works() {
     let mut config = direct();
     config.removes_echo = true;
     let desk = Desk::with_nodes(config, &[N1]);
@@ -241,7 +241,7 @@ fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     }
     assert_eq!(desk.master.lost_events(), 12);
     let events = desk.told();
-    assert_eq!(events.len(), 8, "readings leave half of the room to rarer events");
+    assert_eq!(events.len(), 8, "readings leave half of the queue for rarer events");
     let status = Status::Velocity(0.0);
     assert_eq!(events[0], MasterEvent::Status { node: NodeId::N1, status });
     assert_eq!(
@@ -311,7 +311,7 @@ fn the_defaults_of_a_master_are_those_of_the_rulings() {
 }
 
 #[test]
-fn rare_events_have_room_however_many_readings_nobody_has_taken() {
+fn rare_events_have_room_however_many_readings_are_waiting() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for _ in 0..100 {
         desk.turn();
@@ -328,7 +328,7 @@ fn rare_events_have_room_however_many_readings_nobody_has_taken() {
 }
 
 #[test]
-fn an_answer_from_before_the_line_could_carry_it_is_taken_where_the_settings_say_so() {
+fn an_answer_earlier_than_the_line_allows_is_accepted_if_configured() {
     for accepts_early in [false, true] {
         let mut config = direct();
         config.accepts_early = accepts_early;
@@ -339,7 +339,7 @@ fn an_answer_from_before_the_line_could_carry_it_is_taken_where_the_settings_say
         let early = desk.master.node_statistics(NodeId::N1).early;
         assert_eq!(early, u32::from(!accepts_early));
     }
-    // The line needs 80 us for the READ and 160 us for the answer; half of that is forgiven.
+    // The line needs 80 us for the READ and 160 us for the answer; half of the answer is tolerated.
     for (after, is_taken) in [(80 + 79, false), (80 + 80, true)] {
         let mut desk = Desk::with_nodes(direct(), &[N1]);
         desk.turn();
@@ -353,7 +353,7 @@ fn an_answer_from_before_the_line_could_carry_it_is_taken_where_the_settings_say
 }
 
 #[test]
-fn a_discovery_asks_the_nodes_of_the_settings_alone() {
+fn a_discovery_asks_only_the_nodes_in_the_settings() {
     let nodes = [NodeId::N2, NodeId::N7];
     let mut desk = Desk::new(only(&nodes));
     desk.master.discover(desk.now);

@@ -71,7 +71,7 @@ fn on_any_error_the_previous_command_stays() {
         let mut bad = good.clone();
         bad[bit / 8] ^= 1 << (bit % 8);
         slave.handle_input(&bad, T0);
-        // A quiet line ends what the damage has begun.
+        // A quiet line ends the partial packet.
         while let Some(at) = slave.poll_timeout() {
             slave.handle_timeout(at);
         }
@@ -88,7 +88,7 @@ fn a_request_overtaken_by_another_packet_is_not_answered() {
     let both = [read(NodeId::N2), read(NodeId::N5)].concat();
     assert_eq!(answers(&mut slave, &both, T0), Vec::<Vec<u8>>::new());
     let twice = [read(NodeId::N2), read(NodeId::N2)].concat();
-    assert_eq!(answers(&mut slave, &twice, T0).len(), 1, "one answer for the last");
+    assert_eq!(answers(&mut slave, &twice, T0).len(), 1, "one answer, to the last");
     assert_eq!(slave.statistics().overtaken, 2);
 }
 
@@ -105,11 +105,11 @@ fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
 }
 
 #[test]
-fn the_watchdog_ends_a_command_and_tells_it_once() {
+fn the_watchdog_ends_a_command_and_reports_it_once() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
-    assert_eq!(slave.poll_timeout(), None, "nothing moves yet");
+    assert_eq!(slave.poll_timeout(), None, "nothing is moving yet");
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     slave.poll_event();
     let end = T0 + Duration::from_millis(100);
@@ -117,7 +117,7 @@ fn the_watchdog_ends_a_command_and_tells_it_once() {
     let last = Instant::from_micros(end.as_micros() - 1);
     slave.handle_timeout(last);
     assert_eq!(slave.poll_event(), None);
-    // Right at any time, whether or not the timeout has been handled.
+    // Correct at any time, whether or not the timeout has been handled.
     assert_eq!(slave.command(last), Some(Target::Velocity(rps(1.0))));
     assert_eq!(slave.command(end), None);
     slave.handle_timeout(end);
@@ -136,7 +136,7 @@ fn a_position_node_does_not_answer_before_it_knows_where_it_is() {
 }
 
 #[test]
-fn a_slave_takes_id_and_mode_from_its_switch_as_told() {
+fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
     let dip: DipSwitch = "0101".parse().unwrap();
     let slave: Slave = Slave::from_dip(
         dip,
@@ -169,9 +169,9 @@ fn a_turnaround_gap_holds_the_answer_back() {
 }
 
 #[test]
-fn a_read_that_comes_to_light_with_the_next_bytes_is_not_answered_any_more() {
+fn a_read_found_only_with_the_next_bytes_is_not_answered() {
     let mut slave = slave(Mode::Velocity);
-    // A false header in front of a READ, and nobody who calls when the line is quiet.
+    // A false header before a READ, and no call when the line is quiet.
     let line = [&[0xBB][..], &read(NodeId::N2)].concat();
     assert_eq!(answers(&mut slave, &line, T0), Vec::<Vec<u8>>::new());
     let late = T0 + Duration::from_millis(90);
@@ -213,7 +213,7 @@ fn a_slave_drops_its_answer_after_answer_within_and_not_earlier() {
             let mut late = asked();
             assert_eq!(late.poll_transmit(last + US(1)), None);
             assert_eq!((late.statistics().expired, late.statistics().replies), (1, 0));
-            assert_eq!(late.poll_timeout(), None, "it is not asked for it again");
+            assert_eq!(late.poll_timeout(), None, "no deadline remains");
         }
     }
 }
@@ -231,11 +231,11 @@ fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &trap(), T0), [[0; 0]; 0]);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (1, 0));
-    // It is asked itself all the same, and obeys.
+    // It still obeys and answers its own requests.
     let line = [trap(), write(NodeId::N2, 1.0), read(NodeId::N2)].concat();
     assert_eq!(answers(&mut slave, &line, T0).len(), 1);
     assert_eq!(slave.command(T0), Some(Target::Velocity(rps(1.0))));
-    // Byte by byte as well.
+    // Byte by byte, too.
     for &byte in &trap() {
         assert_eq!(answers(&mut slave, &[byte], T0), [[0; 0]; 0]);
     }
@@ -243,14 +243,14 @@ fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
 }
 
 #[test]
-fn on_four_wires_a_slave_hears_no_answers_and_looks_for_requests_alone() {
+fn on_four_wires_a_slave_hears_no_answers_and_searches_only_for_requests() {
     let mut slave = slave(Mode::Velocity);
     answers(&mut slave, &trap(), T0);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (0, 1));
 }
 
 #[test]
-fn a_speed_that_is_no_number_does_not_feed_the_watchdog() {
+fn a_nan_speed_does_not_feed_the_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
     for bad in [Position::new(0, 0x7FC0), Position::new(0, 0x7F80), Position::new(1, -128)] {
@@ -287,13 +287,13 @@ fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
 }
 
 #[test]
-fn a_slave_that_was_held_up_obeys_old_bytes_as_of_when_they_may_have_come() {
+fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(MS(100));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
     slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
-    assert_eq!(slave.command(now), Some(Target::Velocity(rps(1.0))), "it is taken in");
+    assert_eq!(slave.command(now), Some(Target::Velocity(rps(1.0))), "it is accepted");
     assert_eq!(slave.poll_timeout(), Some(T0 + MS(100)), "70 ms have passed");
     // The master no longer waits for an answer to an old READ.
     slave.handle_old_input(&read(NodeId::N2), T0, now);
@@ -311,23 +311,23 @@ fn an_old_request_that_a_false_header_held_back_is_not_answered() {
         assert_eq!(slave.poll_timeout(), Some(now + US(100)), "the rest may still come");
         slave.handle_timeout(now + US(100));
         slave.poll_transmit(now + US(100));
-        assert_eq!(slave.statistics().reads, 1, "it comes to light");
+        assert_eq!(slave.statistics().reads, 1, "it is found");
         assert_eq!(slave.statistics().replies, replies);
     }
 }
 
 #[test]
-fn a_slave_gives_up_an_answer_that_pauses_for_five_byte_times() {
+fn a_slave_drops_an_answer_that_pauses_for_five_byte_times() {
     assert_eq!(slave(Mode::Velocity).frame_pause(), US(100));
     assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
     let mut config = SlaveConfig::direct();
     config.idle = MS(3);
     let patient: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
-    assert_eq!(patient.frame_pause(), MS(3), "as long as it waits itself");
+    assert_eq!(patient.frame_pause(), MS(3), "as long as its own wait");
 }
 
 #[test]
-fn a_slave_has_no_deadline_where_nothing_is_pending() {
+fn a_slave_has_no_deadline_when_nothing_is_pending() {
     let mut slave = slave(Mode::Velocity);
     assert_eq!(slave.poll_timeout(), None);
     slave.handle_input(&[0x55, 0x00, 0x01], T0);
@@ -336,11 +336,11 @@ fn a_slave_has_no_deadline_where_nothing_is_pending() {
     let idle = T0 + US(100);
     assert_eq!(slave.poll_timeout(), Some(idle), "it may be a WRITE");
     slave.handle_timeout(idle);
-    assert_eq!(slave.poll_timeout(), None, "it was none");
+    assert_eq!(slave.poll_timeout(), None, "it was not");
 }
 
 #[test]
-fn an_answer_of_which_no_byte_has_left_is_given_within_its_time() {
+fn an_answer_of_which_no_byte_has_left_is_sent_within_its_time() {
     let answer = velocity(NodeId::N2, 0.0);
     for (unsent, is_due) in
         [(Unsent::Untouched, true), (Unsent::CutOff, false), (Unsent::Unflushed, false)]
@@ -352,7 +352,7 @@ fn an_answer_of_which_no_byte_has_left_is_given_within_its_time() {
         assert_eq!(again, is_due.then(|| answer.clone()), "{unsent:?}");
         assert_eq!(slave.statistics().replies, 1);
     }
-    // Not later, and not when the master has gone on.
+    // Not later, and not when the master has moved on.
     let mut late = slave(Mode::Velocity);
     answers(&mut late, &read(NodeId::N2), T0);
     late.handle_unsent(Unsent::Untouched, T0 + US(10));

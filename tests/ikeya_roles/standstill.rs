@@ -1,4 +1,4 @@
-//! Standing still is measured, and told apart from a stop that is paid (I12).
+//! Standstill is measured, separately from a paid stop (I12).
 
 use axlewire::{
     endpoint::Endpoint,
@@ -13,7 +13,7 @@ use crate::rig::*;
 const STILL_1: MasterEvent = MasterEvent::StandingStill { node: NodeId::N1 };
 const STILL_3: MasterEvent = MasterEvent::StandingStill { node: NodeId::N3 };
 
-/// A node of which nothing is known but this answer, whose stop has been paid by it.
+/// A node known only by this answer, which has paid its stop.
 fn paid_by(answer: Answer) -> Desk {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.answer(NodeId::N1, answer);
@@ -23,7 +23,7 @@ fn paid_by(answer: Answer) -> Desk {
 }
 
 #[test]
-fn a_speed_below_a_twentieth_of_a_turn_per_second_is_standing_still_in_either_direction() {
+fn a_speed_below_a_twentieth_of_a_turn_per_second_is_a_standstill_in_either_direction() {
     let (below, limit) = (0.05_f32.next_down(), 0.05);
     for (speed, is_still) in [
         (0.0, true),
@@ -48,7 +48,7 @@ fn a_speed_below_a_twentieth_of_a_turn_per_second_is_standing_still_in_either_di
 }
 
 #[test]
-fn a_speed_that_is_no_number_is_not_standing_still() {
+fn a_nan_speed_is_not_a_standstill() {
     let mut desk = paid_by(Answer::Velocity(3.0));
     desk.news();
     for bits in [0x7FC0_0000_u32, 0x7F80_0000, 0xFF80_0000] {
@@ -63,14 +63,14 @@ fn a_speed_that_is_no_number_is_not_standing_still() {
 }
 
 #[test]
-fn standing_still_is_told_once_and_when_it_is_so() {
+fn standstill_is_reported_once_and_only_when_true() {
     let mut desk = paid_by(Answer::Velocity(3.0));
     desk.news();
     let mut told = vec![];
     for speed in [2.0, 1.0, 0.01, 0.0, 4.0, 0.0] {
         desk.answer(NodeId::N1, Answer::Velocity(speed));
         desk.master.read(NodeId::N1, desk.now).unwrap();
-        // The stop is repeated in front of each READ.
+        // The stop is repeated before each READ.
         assert_eq!(desk.packets(2), [write(NodeId::N1, 0.0), read(NodeId::N1)]);
         told.push(desk.news());
     }
@@ -79,7 +79,7 @@ fn standing_still_is_told_once_and_when_it_is_so() {
 }
 
 #[test]
-fn two_positions_within_8_counts_and_20_ms_apart_are_standing_still() {
+fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
     let place = |counts: i32| Position::from_counts(counts).unwrap();
     for (pause_us, way, is_still) in [
         (20_000, 8, true),
@@ -129,7 +129,7 @@ fn a_new_set_point_ends_the_watch_for_standstill() {
     desk.packets(1);
     desk.answer(NodeId::N1, Answer::Velocity(0.0));
     desk.master.read(NodeId::N1, desk.now).unwrap();
-    assert_eq!(desk.packets(2).len(), 1, "a READ that is answered");
+    assert_eq!(desk.packets(2).len(), 1, "one answered READ");
     assert_eq!(desk.news(), []);
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::NotAsked);
     assert!(desk.master.poll_event().is_none());

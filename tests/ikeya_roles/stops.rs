@@ -1,4 +1,4 @@
-//! Stops of nodes that answer: a debt until it is confirmed twice (I6, I12).
+//! Stops of nodes that answer: owed until confirmed twice (I6, I12).
 
 use axlewire::{
     endpoint::Endpoint,
@@ -14,7 +14,7 @@ const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 const STOPPED_3: MasterEvent = MasterEvent::Stopped { node: NodeId::N3 };
 
 #[test]
-fn stop_means_zero_for_velocity_and_hold_for_position_never_go_to_zero() {
+fn stop_means_zero_for_velocity_and_hold_for_position_but_never_go_to_zero() {
     let mut desk = Desk::with_nodes(only(&[NodeId::N1, NodeId::N3]), &[N1, N3]);
     desk.master.stop_all(desk.now);
     let mut written = writes(&desk.run(MS(20)));
@@ -34,12 +34,12 @@ fn a_stop_is_paid_by_two_writes_that_have_each_been_followed_by_an_answer() {
     assert_eq!(desk.packets(2), [stop.clone(), read.clone()]);
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
     assert_eq!(desk.news(), []);
-    // The next WRITE may be lost together with its READ: it counts for nothing.
+    // The next WRITE may be lost together with its READ: it does not count.
     desk.answer(NodeId::N1, Answer::Silence);
     assert_eq!(desk.packets(2), [stop.clone(), read.clone()]);
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
     desk.answer(NodeId::N1, Answer::Velocity(3.0));
-    assert_eq!(desk.packets(9), [stop, read], "and then there is nothing more to do");
+    assert_eq!(desk.packets(9), [stop, read], "and then nothing more is due");
     assert_eq!(desk.news(), [STOPPED_1]);
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Paid);
     assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
@@ -69,7 +69,7 @@ fn a_position_stop_reads_first_and_holds_what_this_read_returned() {
 }
 
 #[test]
-fn a_position_that_was_being_read_when_the_stop_was_asked_for_is_not_held() {
+fn a_position_being_read_when_the_stop_was_requested_is_not_held() {
     let mut desk = Desk::with_nodes(manual(), &[N3]);
     desk.master.read(NodeId::N3, desk.now).unwrap();
     desk.turn();
@@ -82,7 +82,7 @@ fn a_position_that_was_being_read_when_the_stop_was_asked_for_is_not_held() {
 }
 
 #[test]
-fn hold_age_says_how_old_a_position_may_be_that_is_held_without_a_read() {
+fn hold_age_is_the_maximum_age_of_a_position_held_without_a_read() {
     for (age_us, is_held) in [(999, true), (1000, false), (1001, false)] {
         let mut config = manual();
         config.hold_age = US(1000);
@@ -103,14 +103,14 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     desk.master.stop(NodeId::N3, desk.now);
     let mut written = writes(&desk.packets(5));
-    // A shaft that is pushed is not held where it was pushed to.
+    // A shaft that is pushed is not held at the new position.
     for drift in 41..60 {
         desk.answer(NodeId::N3, Answer::Position(turns(drift)));
         written.extend(writes(&desk.packets(2)));
     }
     assert_eq!(desk.master.set_point(NodeId::N3), Some(Target::Position(turns(40))));
     assert!(written.len() > 15 && written.iter().all(|it| *it == hold(NodeId::N3, turns(40))));
-    // Nor by a stop that is asked for once more.
+    // Nor after another stop call.
     desk.news();
     desk.master.stop(NodeId::N3, desk.now);
     assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Owed);
@@ -120,7 +120,7 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
 }
 
 #[test]
-fn a_hold_is_measured_anew_after_the_node_was_abnormal() {
+fn a_hold_is_measured_again_after_the_node_was_abnormal() {
     let mut desk = Desk::with_nodes(direct(), &[N3]);
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     desk.master.stop(NodeId::N3, desk.now);
@@ -135,7 +135,7 @@ fn a_hold_is_measured_anew_after_the_node_was_abnormal() {
 }
 
 #[test]
-fn a_repeated_stop_joins_the_one_that_is_owed() {
+fn a_repeated_stop_joins_the_owed_one() {
     for (node, way) in [(N1, 4), (N3, 5)] {
         let mut desk = Desk::with_nodes(manual(), &[node]);
         let mut sent = vec![];
@@ -172,7 +172,7 @@ fn while_a_stop_is_owed_set_points_are_refused_and_not_kept() {
     let written = writes(&desk.run(MS(20)));
     let places = [write(NodeId::N1, 0.0), hold(NodeId::N3, Position::new(7, 3))];
     assert!(written.len() == 4 && written.iter().all(|it| places.contains(it)), "{written:02x?}");
-    // Once it is paid they are taken again.
+    // Once it is paid, they are accepted again.
     assert_eq!(desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now), Ok(()));
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::NotAsked);
     assert_eq!(desk.packets(1), [write(NodeId::N1, 1.0)]);
@@ -199,7 +199,7 @@ fn a_release_does_not_cancel_a_stop() {
 }
 
 #[test]
-fn a_stop_is_paid_though_nobody_takes_out_the_events() {
+fn a_stop_is_paid_even_if_no_events_are_taken() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for turn in 0..100 {
         let request = desk.packet();
@@ -221,7 +221,7 @@ fn a_stop_is_paid_though_nobody_takes_out_the_events() {
         }
     }
     assert_eq!(written, 2);
-    assert!(desk.master.lost_events() > lost, "its event had no room");
+    assert!(desk.master.lost_events() > lost, "there was room for its event");
 }
 
 #[test]
@@ -255,7 +255,7 @@ fn a_stop_of_all_on_a_fresh_master_stops_whatever_answers_and_lists_the_silent_i
     let written = writes(&sent);
     assert!(written.contains(&write(NodeId::N1, 0.0)));
     assert!(written.contains(&hold(NodeId::N3, turns(9))));
-    // One that is plugged in later is stopped then.
+    // A node that is plugged in later is stopped then.
     desk.news();
     desk.answer(NodeId::N6, Answer::Velocity(2.0));
     let written = writes(&desk.run(MS(200)));
@@ -289,7 +289,7 @@ fn all_nodes_are_stopped_before_the_next_exchange() {
     desk.sent.sort();
     stops.sort();
     assert_eq!(desk.sent, stops);
-    // Handed out together, they leave one behind the other.
+    // Handed out together, they leave one after the other.
     assert_eq!(desk.now, begin);
     assert_eq!(desk.master.poll_timeout(), Some(begin + US(8 * 160 + 740)));
 }

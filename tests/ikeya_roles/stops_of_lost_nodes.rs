@@ -1,4 +1,4 @@
-//! Stops of nodes that do not answer, and nodes that are lost while they move (I12, I13).
+//! Stops of nodes that do not answer, and nodes that are lost while moving (I12, I13).
 
 use axlewire::{
     endpoint::Endpoint,
@@ -12,7 +12,7 @@ use crate::rig::*;
 
 const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 
-/// Window of a READ, and the pause of the search behind it: 5 % of the time.
+/// Window of a READ, and the pause of the search after it: 5 % of the time.
 const WINDOW_US: u32 = 740;
 const PAUSE_US: u32 = 100 / 5 * WINDOW_US;
 
@@ -20,7 +20,7 @@ const PAUSE_US: u32 = 100 / 5 * WINDOW_US;
 fn an_abnormal_velocity_node_is_stopped_blind_at_once_and_then_at_the_pace_of_the_search() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
-    // It has just been looked for, without success.
+    // The search has just failed to find it.
     desk.packets(2);
     desk.now += US(500);
     desk.master.stop(NodeId::N1, desk.now);
@@ -36,8 +36,8 @@ fn an_abnormal_velocity_node_is_stopped_blind_at_once_and_then_at_the_pace_of_th
         }
     }
     let kinds: Vec<_> = attempts.iter().map(|it| it.0).collect();
-    assert_eq!(kinds, [(WRITE, 1), (READ, 1)].repeat(3), "it may still hear");
-    assert_eq!(attempts[0].1, 0, "at once");
+    assert_eq!(kinds, [(WRITE, 1), (READ, 1)].repeat(3), "it may still receive");
+    assert_eq!(attempts[0].1, 0, "the first attempt is immediate");
     let pause = attempts[4].1 - attempts[2].1;
     assert!((PAUSE_US..PAUSE_US + WINDOW_US).contains(&pause), "{pause} us");
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
@@ -49,7 +49,7 @@ fn an_abnormal_position_node_is_stopped_after_its_next_good_answer() {
     desk.lose(NodeId::N3);
     desk.now += MS(3_600_000);
     desk.master.stop(NodeId::N3, desk.now);
-    assert_eq!(desk.packet(), read(NodeId::N3), "asked at once");
+    assert_eq!(desk.packet(), read(NodeId::N3), "read at once");
     desk.silence();
     assert_eq!(writes(&desk.packets(10)), [[0; 0]; 0], "an old position is not held");
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
@@ -72,14 +72,15 @@ fn a_stop_that_waits_survives_the_third_strike() {
 }
 
 #[test]
-fn a_stop_that_was_paid_once_begins_anew_with_a_node_that_was_abnormal() {
+fn a_half_paid_stop_starts_over_after_its_node_was_abnormal() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     desk.packets(2);
     desk.lose(NodeId::N1);
     desk.answer(NodeId::N1, Answer::Velocity(5.0));
     desk.news();
-    // The answer that brings it back may follow a WRITE that it has heard, and pays for that one.
+    // The answer that brings it back may follow a WRITE that it has received, and pays for that
+    // one.
     let written = writes(&desk.run(MS(50)));
     assert!(written.len() >= 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
     assert_eq!(desk.news(), [STOPPED_1]);
@@ -97,13 +98,13 @@ fn a_node_that_becomes_abnormal_under_a_set_point_is_owed_a_stop() {
     let written = writes(&desk.run(MS(50)));
     assert!(written.len() > 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
     assert!(desk.news().contains(&STOPPED_1));
-    // It does not move until somebody says so.
+    // It does not move without a new set-point.
     assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(0.0))));
     assert_eq!(desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now), Ok(()));
 }
 
 #[test]
-fn a_released_node_that_becomes_abnormal_is_owed_a_stop_too() {
+fn a_released_node_that_becomes_abnormal_is_also_owed_a_stop() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
     desk.packets(2);
@@ -131,9 +132,9 @@ fn without_stops_abnormal_a_node_that_comes_back_gets_no_write_at_all() {
     desk.lose(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
     desk.answer(NodeId::N1, Answer::Velocity(5.0));
-    assert_eq!(writes(&desk.run(MS(50))), [[0; 0]; 0], "the set-point is gone all the same");
+    assert_eq!(writes(&desk.run(MS(50))), [[0; 0]; 0], "the set-point is dropped anyway");
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
-    // A stop that the application asks for is owed all the same.
+    // A stop requested by the application is still owed.
     desk.master.stop(NodeId::N1, desk.now);
     desk.lose(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
@@ -145,7 +146,7 @@ fn a_search_share_of_0_looks_for_nodes_that_are_owed_a_stop_alone_at_1_percent()
     config.recovery_share_pct = 0;
     let mut desk = Desk::with_nodes(config, &[N1]);
     desk.lose(NodeId::N1);
-    assert_eq!(desk.exchange(), None, "nobody is looked for");
+    assert_eq!(desk.exchange(), None, "no node is searched for");
     desk.master.stop(NodeId::N1, desk.now);
     let mut asked = vec![];
     for _ in 0..10 {
@@ -161,7 +162,7 @@ fn a_search_share_of_0_looks_for_nodes_that_are_owed_a_stop_alone_at_1_percent()
 }
 
 #[test]
-fn a_node_that_comes_back_during_its_stop_pays_it_and_stands() {
+fn a_node_that_comes_back_during_its_stop_pays_it_and_stays_at_rest() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.lose_by_hand(NodeId::N1);
     desk.master.stop(NodeId::N1, desk.now);
@@ -196,7 +197,7 @@ fn a_search_share_above_50_percent_counts_as_50() {
 }
 
 #[test]
-fn a_stopped_node_that_is_lost_is_no_longer_known_to_stand() {
+fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
     let mut config = direct();
     config.stops_abnormal = false;
     let mut desk = Desk::with_nodes(config, &[N1]);
@@ -218,25 +219,25 @@ fn hold_age_does_not_hold_for_a_node_that_is_lost() {
 }
 
 #[test]
-fn a_doubt_gives_a_lost_node_no_attempt_beyond_the_pace_of_the_search() {
+fn a_doubt_does_not_let_a_lost_node_exceed_the_search_rate() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.packets(2);
     desk.now += US(500);
     desk.master.stop(NodeId::N1, desk.now);
-    assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (READ, 1)], "at once");
+    assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (READ, 1)], "the first attempt is immediate");
     let attempted_at = desk.now;
     for _ in 0..5 {
-        // Late, in the other mode.
+        // Late, and in the other mode.
         desk.hear(100, &position(NodeId::N1, turns(7)));
     }
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
     assert_eq!(desk.turn(), read(NodeId::N1));
-    assert!(desk.now > attempted_at + MS(10), "at the pace of the search");
+    assert!(desk.now > attempted_at + MS(10), "faster than the search rate");
 }
 
 #[test]
-fn a_node_that_is_lost_again_under_the_same_stop_gets_an_attempt_at_once_again() {
+fn a_node_that_is_lost_again_under_the_same_stop_gets_another_immediate_attempt() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     for _ in 0..3 {
@@ -247,9 +248,9 @@ fn a_node_that_is_lost_again_under_the_same_stop_gets_an_attempt_at_once_again()
         let begin = desk.now;
         assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
         assert_eq!(desk.packet(), read(NodeId::N1));
-        assert!(desk.now - begin < US(1000), "at once, and not at the pace of the search");
+        assert!(desk.now - begin < US(1000), "immediately, not at the search rate");
         desk.silence();
-        // It answers once, in the course of the search, which pays half of the stop.
+        // It answers once, during the search, which pays half of the stop.
         desk.turn();
         desk.hear(450, &velocity(NodeId::N1, 1.0));
         assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));

@@ -17,7 +17,7 @@ use crate::rig::*;
 const T0: Instant = Instant::from_micros(5_000);
 
 #[test]
-fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
+fn a_three_motor_board_answers_writes_and_its_master_waits_for_the_answer() {
     let mut master: Master<ThreeMotors> = Master::new(direct(), T0);
     let mut slave: Slave<ThreeMotors> =
         Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
@@ -53,7 +53,7 @@ fn a_three_motor_board_answers_writes_and_its_master_waits_for_that() {
     assert_eq!(slave.statistics().replies, slave.statistics().reads + slave.statistics().writes);
 }
 
-/// Boards 1 and 8 in velocity mode at these speeds; the packets to them are answered.
+/// Boards 1 and 8 in velocity mode at these speeds; their packets are answered.
 struct Boards {
     master: Master<ThreeMotors>,
     now: Instant,
@@ -130,7 +130,7 @@ fn a_write_waits_for_a_late_answer_because_it_is_answered_itself() {
 }
 
 #[test]
-fn turning_on_the_spot_is_not_standing_still() {
+fn turning_on_the_spot_is_not_a_standstill() {
     for (speeds, is_still) in [
         ([0.04, -0.04, 0.0], true),
         ([1.0, -1.0, 0.0], false),
@@ -172,10 +172,10 @@ fn all_three_positions_have_to_stay_within_8_counts() {
         for expected in [READ, WRITE, WRITE] {
             assert_eq!(answer(&mut master, [0; 3]).0, Some(expected));
         }
-        // The answer that paid the stop is compared with the next.
+        // The answer that paid the stop is compared with the next one.
         let (_, at) = answer(&mut master, [0; 3]);
         master.read(NodeId::N1, at).unwrap();
-        assert_eq!(answer(&mut master, moved).0, Some(WRITE), "the hold, repeated");
+        assert_eq!(answer(&mut master, moved).0, Some(WRITE), "the hold is repeated");
         let events = core::iter::from_fn(|| master.poll_event());
         let told = events.filter(|it| matches!(it, MasterEvent::StandingStill { .. })).count();
         assert_eq!(told == 1, is_still, "{moved:?}");
@@ -183,9 +183,9 @@ fn all_three_positions_have_to_stay_within_8_counts() {
 }
 
 #[test]
-fn in_doubt_positions_may_be_written_that_all_read_as_standstill() {
+fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
     // Sent as count x 3, then rotation x 3; read as f32 x 3: (count 1, count 2), (count 3, rotation
-    // 1), (rotation 2, rotation 3), the lower half first.
+    // 1), (rotation 2, rotation 3), low half first.
     for (places, may) in [
         ([(0, 0), (0, 0), (0, 0)], true),
         ([(-1, 12_287), (12_287, -1), (-1, 12_287)], true),
@@ -202,13 +202,13 @@ fn in_doubt_positions_may_be_written_that_all_read_as_standstill() {
         assert_eq!(harmless, may, "the table agrees with the packet");
         let mut boards = Boards::new(manual());
         boards.master.stop(NodeId::N1, boards.now);
-        // Its WRITE of 0 rps is answered as a position node would.
+        // Its WRITE of 0 rps is answered like a position node's.
         assert!(boards.master.poll_transmit(boards.now).is_some());
         boards.now += US(700);
         let answer = PositionResponse::new(NodeId::N1, places);
         boards.master.handle_input(answer.as_bytes(), boards.now);
         assert!(boards.master.is_mode_in_doubt(NodeId::N1));
-        // It has had its turn in this round; the round ends, because nothing else is due.
+        // It has had its turn in this round; the round ends because nothing else is due.
         let next = boards.master.poll_transmit(boards.now).map(<[u8]>::to_vec);
         let expected = if may { packet.as_bytes().to_vec() } else { read(NodeId::N1) };
         assert_eq!(next, Some(expected), "{places:?}");
@@ -231,7 +231,7 @@ fn the_longest_echo_is_removed() {
 }
 
 #[test]
-fn a_stop_has_one_attempt_per_round_where_its_write_is_answered() {
+fn a_stop_has_one_attempt_per_round_if_its_write_is_answered() {
     let mut boards = Boards::new(direct());
     boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
     boards.master.stop(NodeId::N8, boards.now);
@@ -241,15 +241,15 @@ fn a_stop_has_one_attempt_per_round_where_its_write_is_answered() {
     assert!(rest.contains(&(WRITE, 8)), "{rest:02x?}");
 }
 
-/// A control loop that has a new speed for seven boards before each packet, and one board under way
-/// in position mode: node 1, 100 counts further with each answer.
+/// A control loop with a new speed for seven boards before each packet, and one moving board in
+/// position mode: node 1, 100 counts further with each answer.
 struct Busy {
     master: Master<ThreeMotors>,
     now: Instant,
     counts: i32,
     commands: u16,
     answer_us: u32,
-    /// Node 1 has lost its power.
+    /// Node 1 has lost power.
     is_dead: bool,
 }
 
@@ -265,7 +265,7 @@ impl Busy {
         busy
     }
 
-    /// The next packet, with the position of its answer if that is one.
+    /// The next packet, with the position in its answer, if any.
     fn exchange(&mut self) -> (Vec<u8>, i32) {
         loop {
             self.commands += 1;
@@ -321,10 +321,10 @@ fn a_position_is_held_right_behind_its_read_however_many_set_points_wait() {
                     _ => others += 1,
                 }
             };
-            assert!(others <= 24, "{others} exchanges before the read");
+            assert!(others <= 24, "{others} exchanges before the READ");
             let positions = [Position::from_counts(measured).unwrap(); 3];
             let hold = WriteRequest::position(NodeId::N1, positions).as_bytes().to_vec();
-            assert_eq!(busy.exchange().0, hold, "the answer is held, and nothing comes between");
+            assert_eq!(busy.exchange().0, hold, "the answer is held, with no packet in between");
             let begin = busy.now;
             while busy.master.stop_progress(NodeId::N1) == StopProgress::Owed {
                 busy.exchange();
@@ -344,7 +344,7 @@ fn a_dead_board_is_found_within_the_read_bound_however_busy_the_others_are() {
         busy.is_dead = true;
         while busy.master.node_statistics(NodeId::N1).failures == failures {
             busy.exchange();
-            assert!(busy.now - begin <= bound, "it is not given up within {bound:?}");
+            assert!(busy.now - begin <= bound, "not abnormal within {bound:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Frames that did not reach the line: the master decides anew (I12).
+//! Frames that did not reach the line: the master decides again (I12).
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
@@ -12,7 +12,7 @@ use crate::rig::*;
 
 const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 
-/// What was handed out last did not leave.
+/// The last packet handed out did not leave.
 fn fail(desk: &mut Desk, unsent: Unsent) {
     desk.master.handle_unsent(unsent, desk.now);
 }
@@ -29,7 +29,7 @@ fn a_read_that_did_not_leave_opens_no_window_and_is_sent_again() {
             fail(&mut desk, unsent);
             desk.now += MS(1);
         }
-        // Ten failures of the port are no strike of the node.
+        // Ten port failures are not a strike of the node.
         assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
         assert_eq!(*desk.master.node_statistics(NodeId::N1), before);
         assert_eq!(desk.master.statistics().reads, reads);
@@ -62,7 +62,7 @@ fn a_set_point_that_did_not_leave_is_never_sent_once_it_is_dropped() {
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         let mut released = desk.clone();
-        // The driver learns of the failure late, and the application is quicker.
+        // The driver learns of the failure late, after the application has acted.
         desk.master.stop(NodeId::N1, desk.now);
         fail(&mut desk, unsent);
         let sent = writes(&desk.packets(9));
@@ -97,14 +97,14 @@ fn after_a_failed_flush_an_answer_does_not_pay_for_the_write_in_front_of_its_rea
     assert_eq!(kind(&desk.packet()), (WRITE, 1));
     assert_eq!(kind(&desk.packet()), (READ, 1));
     fail(&mut desk, Unsent::Unflushed);
-    // The READ has left all the same.
+    // The READ still left.
     desk.hear(450, &velocity(NodeId::N1, 9.0));
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
     assert_eq!(writes(&desk.packets(9)).len(), 2);
 }
 
 #[test]
-fn after_a_failed_flush_all_set_points_are_new_again_those_of_paid_stops_too() {
+fn after_a_failed_flush_all_set_points_are_new_again_including_paid_stops() {
     let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
     desk.master.stop(NodeId::N1, desk.now);
     desk.packets(9);
@@ -117,7 +117,7 @@ fn after_a_failed_flush_all_set_points_are_new_again_those_of_paid_stops_too() {
 }
 
 #[test]
-fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_behind_it() {
+fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_after_it() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
         let mut desk = Desk::with_nodes(manual(), &[N1]);
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -125,14 +125,15 @@ fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_behind_it() {
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         fail(&mut desk, unsent);
         let sent = desk.packets(9);
-        let at = sent.iter().position(|it| *it == write(NodeId::N1, 1.0)).expect("it goes again");
+        let at =
+            sent.iter().position(|it| *it == write(NodeId::N1, 1.0)).expect("it is sent again");
         assert!(sent[at..].contains(&read(NodeId::N1)));
         assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }], "{unsent:?}");
     }
 }
 
 #[test]
-fn a_discovery_on_a_port_that_fails_skips_nobody() {
+fn a_discovery_on_a_failing_port_skips_no_node() {
     let mut desk = Desk::new(direct());
     NodeId::ALL.into_iter().for_each(|node| desk.answer(node, Answer::Velocity(0.0)));
     desk.master.discover(desk.now);
@@ -147,7 +148,7 @@ fn a_discovery_on_a_port_that_fails_skips_nobody() {
 }
 
 #[test]
-fn the_attempt_that_an_abnormal_node_gets_at_once_is_not_used_up_by_a_port_that_fails() {
+fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.packets(2);
@@ -162,7 +163,7 @@ fn the_attempt_that_an_abnormal_node_gets_at_once_is_not_used_up_by_a_port_that_
     assert_eq!(desk.packet(), read(NodeId::N1));
     fail(&mut desk, Unsent::Untouched);
     assert_eq!(kind(&desk.packet()), (READ, 1));
-    // What the port has taken of a packet is out after 160 us, and 200 us of silence follow; then
+    // The bytes already taken by the port are out after 160 us, followed by 200 us of silence and
     // the time of the WRITE.
     assert_eq!(desk.now, begin + US(160 + 200 + 160), "when the WRITE has left");
 }
@@ -197,14 +198,14 @@ fn a_frame_that_left_is_not_taken_back_twice() {
 }
 
 #[test]
-fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
+fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     let begin = desk.now;
     assert_eq!(kind(&desk.packet()), (WRITE, 1));
     assert_eq!(kind(&desk.packet()), (READ, 1));
     fail(&mut desk, Unsent::Untouched);
-    // The WRITE takes 160 us, the READ behind it 80.
+    // The WRITE takes 160 us, the READ after it 80.
     assert_eq!(desk.packet(), read(NodeId::N1));
     assert_eq!(desk.master.poll_timeout(), Some(begin + US(160 + 740)));
     let mut config = manual();
@@ -216,13 +217,13 @@ fn a_frame_that_did_not_leave_gives_the_line_to_what_is_still_leaving() {
     fail(&mut desk, Unsent::CutOff);
     let cut = desk.now;
     desk.turn();
-    // Twice five byte times behind what is on its way, so that no slave takes the next packet for
-    // the rest.
+    // Ten byte times after the bytes in flight, so that no slave takes the next packet for the
+    // rest.
     assert_eq!((cut, desk.now), (heard, cut + US(80 + 100 + 200)), "the gap is kept");
 }
 
 #[test]
-fn a_node_that_is_looked_for_is_asked_again_at_once_when_its_read_did_not_leave() {
+fn a_node_in_the_search_is_asked_again_at_once_when_its_read_did_not_leave() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.lose(NodeId::N1);
     desk.turn();
@@ -232,7 +233,7 @@ fn a_node_that_is_looked_for_is_asked_again_at_once_when_its_read_did_not_leave(
 }
 
 #[test]
-fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
+fn a_discovery_of_silent_nodes_on_a_failing_port_makes_all_its_attempts() {
     let mut desk = Desk::new(direct());
     desk.master.discover(desk.now);
     let mut asked = 0;
@@ -246,7 +247,7 @@ fn a_discovery_of_silent_nodes_on_a_port_that_fails_makes_all_its_attempts() {
 }
 
 #[test]
-fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out() {
+fn the_silence_after_a_cut_off_read_begins_when_the_write_before_it_has_left() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.stop(NodeId::N1, desk.now);
     let begin = desk.now;
@@ -259,7 +260,7 @@ fn the_silence_behind_a_cut_off_read_begins_when_the_write_in_front_of_it_is_out
 }
 
 #[test]
-fn a_write_of_a_set_point_is_outdated_once_that_is_dropped_or_replaced() {
+fn the_write_of_a_dropped_or_replaced_set_point_is_outdated() {
     let fresh = |config| {
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -278,7 +279,7 @@ fn a_write_of_a_set_point_is_outdated_once_that_is_dropped_or_replaced() {
     for mut desk in [fresh(manual()), repeated()] {
         let now = desk.now;
         desk.master.set_velocity(NodeId::N1, rps(1.0), now).unwrap();
-        assert!(!desk.master.is_outdated(), "the same once more");
+        assert!(!desk.master.is_outdated(), "the same value again");
         let mut other = desk.clone();
         other.master.set_velocity(NodeId::N1, rps(2.0), now).unwrap();
         assert!(other.master.is_outdated());

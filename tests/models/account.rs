@@ -1,16 +1,17 @@
-//! What a master may do to a node, kept by the test from what was called, sent and heard.
+//! What a master may do to a node, derived by the test from calls, sent packets and received
+//! packets.
 //!
-//! Nothing here looks into the master. The rulings are I6 (hold), I8 (confirmation), I11 (doubt),
+//! Nothing here looks inside the master. The rulings are I6 (hold), I8 (confirmation), I11 (doubt),
 //! I12 (debts) and I13 (order).
 
 use axlewire::{ikeya::Mode, time::Instant};
 
 use super::kit::Write;
 
-/// Windows without the answer after which a node is abnormal.
+/// Number of windows without the answer after which a node is abnormal.
 pub(crate) const STRIKES: u8 = 3;
 
-/// Exchanges with a node in doubt after which the application is told.
+/// Number of exchanges with a node in doubt after which the application is notified.
 const UNDECIDED: u8 = 6;
 
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -19,53 +20,53 @@ pub(crate) enum Confirm {
     Unasked,
     AfterWrite,
     AfterAnswer,
-    /// It is to end now, like this.
+    /// Has to end now, with this result.
     Succeeds,
     Fails,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Account {
-    /// The mode heard last, unless it is in doubt.
+    /// The last mode received, unless it is in doubt.
     pub(crate) record: Option<Mode>,
     pub(crate) is_in_doubt: bool,
-    /// Exchanges in doubt that decided nothing.
+    /// Number of exchanges in doubt without a decision.
     pub(crate) undecided: u8,
-    /// The application was told that the doubt does not end, and that a stop waits for it.
+    /// The unresolved doubt, and a stop waiting for it, have been reported.
     pub(crate) is_doubt_told: bool,
     pub(crate) is_block_told: bool,
-    /// Windows in a row without the answer.
+    /// Consecutive windows without the answer.
     pub(crate) misses: u8,
     /// The set-point that was accepted and not dropped since: its number, 1 or 2.
     pub(crate) target: Option<u8>,
-    /// The number of the last one that was accepted.
+    /// The number of the last accepted set-point.
     pub(crate) last_target: u8,
-    /// It has not been sent.
+    /// The set-point has not been sent.
     pub(crate) is_target_new: bool,
     /// The last order was a set-point.
     pub(crate) is_under_order: bool,
     /// The last order was a stop.
     pub(crate) is_halted: bool,
-    /// The mode has changed since: the last WRITE of that stop may have been read in the new one.
+    /// The mode has changed since: the stop's last WRITE may have been read in the new one.
     pub(crate) is_halted_in_other_mode: bool,
-    /// Changes with each first stop after a set-point, so that a position tells for which one it
+    /// Toggles with each first stop after a set-point, so that a position shows for which stop it
     /// was measured.
     pub(crate) is_odd_stop: bool,
     pub(crate) is_owed: bool,
-    /// A stop WRITE is to be sent, or again.
+    /// A stop WRITE has to be sent or resent.
     pub(crate) is_stop_due: bool,
     /// A stop WRITE has been sent and nothing was missed since.
     pub(crate) is_stop_written: bool,
     pub(crate) paid: u8,
-    /// Where the node was told to hold, and whether it may be told another place.
+    /// The position that the node was told to hold, and whether another one is allowed.
     pub(crate) hold: Option<(i16, i16)>,
     pub(crate) may_hold_anew: bool,
-    /// Stop WRITEs since the call that the node may not have got, or has forgotten.
+    /// Stop WRITEs since the call that the node may have missed or forgotten.
     pub(crate) stops_missed: u8,
     pub(crate) confirm: Confirm,
-    /// Not to be asked before then.
+    /// The node must not be asked before this time.
     pub(crate) guard_until: Option<Instant>,
-    /// Exchanges of others while it had something urgent due, and while its turn in the cycle was.
+    /// Exchanges of other nodes while it had an urgent one due, and while its cycle turn was due.
     pub(crate) waits: u8,
     pub(crate) cycle_waits: u8,
 }
@@ -75,7 +76,7 @@ impl Account {
         self.record.is_some() && self.misses < STRIKES
     }
 
-    /// The rotation that a READ handed out now measures.
+    /// The rotation that a READ handed out now will return.
     pub(crate) fn rotation(&self) -> i16 {
         if self.is_halted { 20 + i16::from(self.is_odd_stop) } else { 10 }
     }
@@ -107,7 +108,7 @@ impl Account {
         self.owe_again();
     }
 
-    /// The same stop is owed, or owed once more.
+    /// The same stop is owed, or owed again.
     pub(crate) fn owe_again(&mut self) {
         self.is_halted_in_other_mode = false;
         if !self.is_owed {
@@ -116,20 +117,20 @@ impl Account {
         }
     }
 
-    /// Nothing that was paid or measured counts any more.
+    /// All payments and measurements are discarded.
     fn restart_stop(&mut self) {
         (self.paid, self.is_stop_written, self.is_stop_due) = (0, false, self.is_owed);
         self.may_hold_anew = true;
     }
 
-    /// A WRITE is handed out: may it be?
+    /// A WRITE is handed out: checks whether it is allowed.
     pub(crate) fn write(&mut self, write: Write, is_three: bool) -> Result<(), String> {
         let zero = write.speed == 0;
         let speed = self.target.map(|number| f32::from(number).to_bits());
         let place = self.target.map(|number| (7, 100 + i16::from(number)));
         let is_measured = |place: (i16, i16)| place.1 % 1000 == self.rotation();
         match (self.record, self.is_in_doubt) {
-            (None, _) => return Err("a WRITE to a node that was never heard".into()),
+            (None, _) => return Err("a WRITE to a node that has never answered".into()),
             (Some(_), true) => {
                 let is_still = (0..=12287).contains(&write.place.1)
                     && (!is_three || (0..=12287).contains(&write.place.0));
@@ -142,16 +143,18 @@ impl Account {
             (Some(Mode::Position), _) if self.is_halted && is_measured(write.place) => {}
             (Some(Mode::Position), _) if !self.is_halted && Some(write.place) == place => {}
             (Some(mode), _) if self.is_halted => {
-                return Err(format!("after a stop, this to a {mode} node: {write:?}"));
+                return Err(format!("after a stop, a {mode} node gets: {write:?}"));
             }
             (Some(mode), _) => {
-                return Err(format!("not the set-point of a {mode} node: {write:?}"));
+                return Err(format!(
+                    "a {mode} node gets something other than its set-point: {write:?}"
+                ));
             }
         }
         let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
         if is_hold {
             if self.hold.is_some_and(|hold| hold != write.place) && !self.may_hold_anew {
-                return Err("another position to hold".into());
+                return Err("a different position to hold".into());
             }
             (self.hold, self.may_hold_anew) = (Some(write.place), false);
         }
@@ -164,12 +167,12 @@ impl Account {
         Ok(())
     }
 
-    /// The WRITE handed out last did not leave, or perhaps not.
+    /// The last WRITE handed out did not leave, or possibly did not.
     pub(crate) fn take_back_write(&mut self) {
         self.is_target_new = self.target.is_some();
         if self.is_owed {
             (self.is_stop_written, self.is_stop_due) = (false, true);
-            // The node may never have heard where to hold: it may be measured anew.
+            // The node may never have received the position to hold: it may be measured again.
             self.may_hold_anew = true;
         } else if self.confirm == Confirm::AfterAnswer {
             self.confirm = Confirm::AfterWrite;
@@ -180,7 +183,7 @@ impl Account {
         if !self.is_in_doubt {
             (self.is_in_doubt, self.undecided) = (true, 0);
             (self.is_doubt_told, self.is_block_told) = (false, false);
-            // A place that is held is to be measured anew: that ends the set-point of a paid stop.
+            // A held position has to be measured again: that ends the set-point of a paid stop.
             let is_hold = self.is_halted && self.record == Some(Mode::Position);
             if is_hold && self.confirm != Confirm::Unasked {
                 self.confirm = Confirm::Fails;
@@ -193,14 +196,14 @@ impl Account {
         }
     }
 
-    /// A whole answer was heard outside its window: it may begin a doubt.
+    /// A complete answer arrived outside its window: it may begin a doubt.
     pub(crate) fn hear_outside(&mut self, mode: Mode) {
         if self.record.is_some_and(|record| record != mode) {
             self.begin_doubt();
         }
     }
 
-    /// The answer was heard in its window.
+    /// The answer arrived in its window.
     pub(crate) fn hear_answer(&mut self, mode: Mode) {
         (self.misses, self.guard_until) = (0, None);
         match self.record {
@@ -249,26 +252,26 @@ impl Account {
         }
     }
 
-    /// Is there an urgent exchange with it to be made, and may it be made?
+    /// Whether an urgent exchange with it is due and allowed.
     pub(crate) fn is_urgent(&self, now: Instant) -> bool {
         let is_readable = self.is_in_doubt && self.undecided < UNDECIDED;
         let has_work = (self.is_owed || self.is_target_new) && !self.is_in_doubt;
         self.is_askable(now) && (is_readable || has_work)
     }
 
-    /// May it be asked?
+    /// Whether it may be asked.
     pub(crate) fn is_askable(&self, now: Instant) -> bool {
         self.is_online() && self.guard_until.is_none_or(|until| now >= until)
     }
 
-    /// Is a doubt without a decision yet to be told?
+    /// Whether a doubt without a decision still has to be reported.
     pub(crate) fn untold(&self) -> Option<&'static str> {
         if !self.is_in_doubt || self.undecided < UNDECIDED {
             return None;
         }
         match self.is_owed {
-            true if !self.is_block_told => Some("StopBlocked was not told"),
-            false if !self.is_doubt_told => Some("ModeInDoubt was not told"),
+            true if !self.is_block_told => Some("StopBlocked was not reported"),
+            false if !self.is_doubt_told => Some("ModeInDoubt was not reported"),
             _ => None,
         }
     }

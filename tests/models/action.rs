@@ -1,24 +1,24 @@
-//! What can happen on a motor bus, in small steps or one exchange at a time.
+//! Actions on a motor bus, in small steps or one exchange at a time.
 
 use axlewire::ikeya::NodeId;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Action {
     Call(Call),
-    /// The next packet is handed out; this becomes of it.
+    /// The next packet is handed out, with this fate.
     Send(Fate),
     /// The node that was asked answers.
     Answer(Answer),
     /// An answer that was too late arrives.
     LateAnswer,
-    /// Somebody moves the mode switch.
+    /// The mode switch is moved.
     Switch(NodeId),
     /// The node restarts.
     Reset(NodeId),
     Wait(Wait),
-    /// A set-point, and an exchange that is answered.
+    /// A set-point, followed by an answered exchange.
     Command(NodeId),
-    /// Everything up to the end of the next window, in one go.
+    /// Everything up to the end of the next window, in one action.
     Exchange(Exchange),
 }
 
@@ -35,32 +35,32 @@ pub(crate) enum Call {
     KeepAlive,
 }
 
-/// What becomes of a packet.
+/// The fate of a packet.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Fate {
     Arrives,
-    /// On the wire; nobody knows.
+    /// Lost on the wire, undetected.
     Lost,
     /// The port took no byte of it.
     Untouched,
     /// The port took a part of it.
     CutOff,
-    /// The port took it and failed to flush, and yet it arrives.
+    /// The port took it and failed to flush, but it arrives.
     UnflushedArrives,
-    /// The same, and it does not.
+    /// The same, but it does not arrive.
     UnflushedLost,
 }
 
-/// What becomes of an answer. Silence is none at all.
+/// The kind of answer. Silence is no answer at all.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Answer {
     Right,
     Late,
     Damaged,
-    /// Another node speaks in its place.
+    /// Another node answers in its place.
     OfAnother,
-    /// An older answer of the same node is whole 1 µs after the request was handed out, before the
-    /// line could have carried it.
+    /// An older answer of the same node is complete 1 µs after the request was handed out, before
+    /// the line could have carried it.
     Leftover,
 }
 
@@ -72,7 +72,7 @@ pub(crate) enum Wait {
     Long,
 }
 
-/// What becomes of an exchange and of the WRITEs before it.
+/// The fate of an exchange and of the WRITEs before it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Exchange {
     Right,
@@ -80,7 +80,7 @@ pub(crate) enum Exchange {
     Damaged,
     OfAnother,
     Late,
-    /// A leftover, and then the right answer.
+    /// A leftover answer, then the right one.
     Leftover,
     /// The WRITEs are lost, the READ is answered.
     WritesLost,
@@ -107,14 +107,14 @@ impl Exchange {
     }
 }
 
-/// What a world offers.
+/// The actions of a world.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Menu {
     /// One exchange at a time, instead of small steps.
     pub(crate) is_coarse: bool,
-    /// Set-points, stops, and exchanges that are answered or not, nothing else: a busy queue.
+    /// Only set-points, stops, and exchanges that are answered or not: a busy queue.
     pub(crate) is_queue: bool,
-    /// The configuration polls all the time: a node in the cycle waits for a bounded time.
+    /// The configuration polls continuously: a node in the cycle has a bounded wait.
     pub(crate) polls_fastest: bool,
 }
 

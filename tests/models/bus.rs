@@ -1,8 +1,8 @@
 //! A master, its application, a line and one or two nodes.
 //!
-//! The nodes are this test's own: a switch, a shaft that is somewhere else each time it is
-//! measured, and an answer that may be late. One that is later than its deadline and `late_guard`
-//! is lost: the protocol has no numbers by which a master could tell it from the next one.
+//! The nodes are simulated here: a switch, a shaft that is somewhere else at each measurement, and
+//! an answer that may be late. An answer later than its deadline plus `late_guard` is lost: the
+//! protocol has no sequence numbers by which a master could distinguish it from the next one.
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
@@ -18,26 +18,26 @@ use super::{
     search::World,
 };
 
-/// What can be wrong with it is said in words.
+/// A broken invariant is described in words.
 pub(crate) type Checked = Result<(), String>;
 
 #[derive(Clone, Debug)]
 pub(super) struct Motor {
     pub(super) mode: Mode,
-    /// The last WRITE that it got was a stop.
+    /// The last WRITE that it received was a stop.
     pub(super) is_told_to_stop: bool,
     pub(super) is_odd_place: bool,
 }
 
-/// A READ, or a WRITE that is answered, whose window is open.
+/// A READ, or an answered WRITE, whose window is open.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Asked {
     pub(super) node: NodeId,
     pub(super) end: Instant,
     pub(super) deadline: Instant,
-    /// The node has heard it and has not answered yet.
+    /// The node has received it and has not answered yet.
     pub(super) is_heard: bool,
-    /// What a position node measures for it.
+    /// The position that a position node measures for it.
     pub(super) rotation: i16,
 }
 
@@ -58,15 +58,15 @@ pub(crate) struct Bus<B: Kit> {
     pub(super) line_free: Instant,
     /// The last sign of life of the application.
     alive_at: Instant,
-    /// The application takes events out.
+    /// The application takes its events.
     pub(crate) takes_events: bool,
-    /// Position nodes are at 13,000 turns and more: no velocity node would stand still at that.
+    /// Position nodes are at 13,000 turns or more: read as a speed, that is not a standstill.
     pub(crate) is_far: bool,
     pub(crate) menu: Menu,
 }
 
 impl<B: Kit> Bus<B> {
-    /// Nodes 1 and so on, in these modes, and a master that knows none of them.
+    /// Nodes 1 and up, in these modes, and a master that knows none of them.
     pub(crate) fn new(modes: &[Mode], mut config: MasterConfig, menu: Menu) -> Self {
         config.nodes = NodeId::ALL[..modes.len()].iter().copied().collect();
         let now = Instant::from_micros(1_000_000);
@@ -86,7 +86,7 @@ impl<B: Kit> Bus<B> {
         }
     }
 
-    /// Goes these steps to a prepared state.
+    /// Runs these actions to reach a prepared state.
     pub(crate) fn after(mut self, actions: &[Action]) -> Self {
         for &action in actions {
             self.step(action).unwrap_or_else(|broken| panic!("{action:?}: {broken}"));
@@ -144,8 +144,8 @@ impl<B: Kit> Bus<B> {
         Ok(())
     }
 
-    /// A new set-point in the mode that the application believes in. A refused one has the number
-    /// of the next one, which is never sent.
+    /// A new set-point in the mode assumed by the application. A refused one has the number of the
+    /// next one, which is never sent.
     fn set(&mut self, node: NodeId) -> Checked {
         self.expire_orders();
         let mode = self.master.mode(node).unwrap_or(Mode::Velocity);
@@ -162,7 +162,7 @@ impl<B: Kit> Bus<B> {
         if set.is_ok() {
             let account = self.account(node);
             if !account.is_online() || account.is_owed || account.is_in_doubt {
-                return Err("a set-point was accepted that has to be refused".into());
+                return Err("a set-point was accepted but had to be refused".into());
             }
             *account = after;
             self.alive_at = self.now;
@@ -170,7 +170,7 @@ impl<B: Kit> Bus<B> {
         Ok(())
     }
 
-    /// Hands out the next packet; says whether it is to be answered.
+    /// Hands out the next packet; returns whether an answer is expected.
     pub(super) fn send(&mut self, fate: Fate) -> Result<Option<bool>, String> {
         self.pass_time()?;
         let Some(bytes) = self.master.poll_transmit(self.now) else {
@@ -209,7 +209,7 @@ impl<B: Kit> Bus<B> {
         Ok(Some(is_exchange))
     }
 
-    /// What the driver tells of a port that could not send.
+    /// The driver's report of a port that could not send.
     fn port_fails(&mut self, fate: Fate, sent: &Sent, start: Instant) {
         let unsent = match fate {
             Fate::Arrives | Fate::Lost => return,
@@ -237,7 +237,7 @@ impl<B: Kit> Bus<B> {
         let at = self.now.max(asked.end + self.answer_time() + Duration::from_micros(50));
         match answer {
             Answer::Right => self.hear(reply, at)?,
-            // Later than that it could not be told from the right one.
+            // Any later, it could not be distinguished from the right one.
             Answer::Leftover if self.now >= asked.end => {}
             Answer::Leftover => {
                 let place = (reply.place.0, 10);
@@ -268,7 +268,7 @@ impl<B: Kit> Bus<B> {
         Ok(())
     }
 
-    /// What a node measures now.
+    /// The current measurement of a node.
     fn reply(&mut self, node: NodeId, rotation: i16) -> Reply {
         let motor = &mut self.motors[usize::from(node.get()) - 1];
         motor.is_odd_place = !motor.is_odd_place && motor.mode == Mode::Position;
@@ -277,7 +277,7 @@ impl<B: Kit> Bus<B> {
         Reply { node, mode: motor.mode, place: (count, rotation + far) }
     }
 
-    /// The master hears a whole answer.
+    /// The master receives a complete answer.
     pub(super) fn hear(&mut self, reply: Reply, at: Instant) -> Checked {
         self.now = at;
         let earliest = Duration::from_micros(self.answer_time().as_micros() / 2);
@@ -288,7 +288,7 @@ impl<B: Kit> Bus<B> {
         self.master.handle_input(&reply.bytes::<B>(), at);
         let heard_after = self.master.status(reply.node).map(|(_, at)| at);
         if heard_after != heard_before && !is_in_window {
-            return Err("an answer outside its window was taken".into());
+            return Err("an answer outside its window was accepted".into());
         }
         if is_in_window {
             self.asked = None;
@@ -300,7 +300,7 @@ impl<B: Kit> Bus<B> {
         self.take_events()
     }
 
-    /// The dead-man: what comes too late does not revive an order.
+    /// The dead-man: a late sign of life does not revive an order.
     fn expire_orders(&mut self) {
         let limit = self.master.config().dead_man;
         if limit.is_some_and(|limit| self.now >= self.alive_at + limit) {
@@ -308,7 +308,7 @@ impl<B: Kit> Bus<B> {
         }
     }
 
-    /// What a driver does first: time, then events.
+    /// A driver's first steps: time, then events.
     pub(super) fn pass_time(&mut self) -> Checked {
         let config = *self.master.config();
         self.master.handle_timeout(self.now);

@@ -1,4 +1,4 @@
-//! What must hold on a motor bus, after every step.
+//! Invariants of a motor bus, after every step.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -16,17 +16,17 @@ use super::{
     sleep::check_sleep,
 };
 
-/// Exchanges of the other node that an urgent one waits for at the most.
+/// Most exchanges of the other node for which an urgent one waits.
 const URGENT_WAITS: u8 = 4;
 
 /// The same in the cycle.
 const CYCLE_WAITS: u8 = 10;
 
-/// The search comes back to a node that is owed a stop in this time at the latest: a window at 1 %.
+/// Longest time until the search returns to a node that is owed a stop: one window at 1 %.
 const LONGEST_PAUSE: Duration = Duration::from_millis(150);
 
 impl<B: Kit> Bus<B> {
-    /// Nobody waits longer than `queue.rs` says, here for two nodes.
+    /// No node waits longer than stated in `queue.rs`, here for two nodes.
     pub(super) fn check_order(&mut self, sent: &Sent) -> Checked {
         let (now, is_discovering) = (self.now, self.master.is_discovering());
         let is_exchange = sent.is_exchange::<B>();
@@ -34,7 +34,9 @@ impl<B: Kit> Bus<B> {
         for (account, node) in self.accounts.iter_mut().zip(NodeId::ALL) {
             if node == sent.node {
                 if is_exchange && account.guard_until.is_some_and(|until| now < until) {
-                    return Err(format!("node {node} is asked while a late answer may come"));
+                    return Err(format!(
+                        "node {node} is asked while a late answer may still arrive"
+                    ));
                 }
                 (account.waits, account.cycle_waits) = (0, 0);
                 continue;
@@ -52,13 +54,13 @@ impl<B: Kit> Bus<B> {
                 account.cycle_waits += 1;
             }
             if account.waits > URGENT_WAITS || account.cycle_waits > CYCLE_WAITS {
-                return Err(format!("node {node} waits for too long"));
+                return Err(format!("node {node} waits too long"));
             }
         }
         Ok(())
     }
 
-    /// What was told has happened, and what has happened is told.
+    /// Every reported event has happened, and every event is reported.
     pub(super) fn take_events(&mut self) -> Checked {
         while let Some(event) = self.takes_events.then(|| self.master.poll_event()).flatten() {
             match event {
@@ -69,7 +71,7 @@ impl<B: Kit> Bus<B> {
                         return Err(format!("Stopped, with {} payments", account.paid));
                     }
                     if account.stops_missed < 2 && !motor.is_told_to_stop {
-                        return Err("Stopped, and the node was not told to".into());
+                        return Err("Stopped, but the node got no stop".into());
                     }
                 }
                 MasterEvent::Confirmed { node } => {
@@ -93,7 +95,7 @@ impl<B: Kit> Bus<B> {
         self.check_accounts()
     }
 
-    /// The master owes what is owed, and knows who is there.
+    /// The master owes the same stops, and agrees on which nodes are present.
     fn check_accounts(&mut self) -> Checked {
         let owed = self.master.stops_owed();
         for (index, account) in self.accounts.iter_mut().enumerate() {
@@ -105,18 +107,18 @@ impl<B: Kit> Bus<B> {
                 (account.is_owed, account.is_stop_due) = (false, false);
             }
             if !account.is_owed && owed.contains(node) {
-                // A stop that was paid is owed once more after the node was abnormal or in doubt, or has
-                // changed its mode.
+                // A paid stop is owed again after the node was abnormal or in doubt, or has changed
+                // its mode.
                 let is_renewed =
                     account.is_in_doubt || !account.is_online() || account.is_halted_in_other_mode;
                 if !(account.is_halted && is_renewed) {
-                    return Err(format!("node {node}: a stop that nobody has asked for"));
+                    return Err(format!("node {node}: a stop that was not requested"));
                 }
                 account.owe_again();
             }
             if self.takes_events {
                 if let Confirm::Succeeds | Confirm::Fails = account.confirm {
-                    return Err(format!("node {node}: no end of a confirmation was told"));
+                    return Err(format!("node {node}: the end of a confirmation was not reported"));
                 }
                 if let Some(untold) = account.untold() {
                     return Err(format!("node {node}: {untold}"));
@@ -130,23 +132,23 @@ impl<B: Kit> Bus<B> {
         Ok(())
     }
 
-    /// The master has nothing to send: there is a time to come at which it has.
+    /// If the master has nothing to send, there is a future deadline at which it will.
     pub(super) fn check_rest(&self) -> Checked {
         let timeout = self.master.poll_timeout();
         if timeout.is_some_and(|at| at <= self.now) {
             return Err("a deadline in the past".into());
         }
-        // What could be handed out behind a WRITE that is still leaving would not leave sooner.
+        // A packet handed out behind a WRITE that is still leaving would not leave any earlier.
         if timeout.is_none_or(|at| at > self.line_free) {
             check_sleep(&self.master, self.now)?;
         }
         let is_owed = self.accounts.iter().any(|account| account.is_owed);
         let is_waiting = self.accounts.iter().any(|account| account.confirm != Confirm::Unasked);
         if timeout.is_none() && (is_owed || is_waiting) {
-            return Err("a stop or a confirmation is owed, and no deadline is given".into());
+            return Err("a stop or a confirmation is owed, but there is no deadline".into());
         }
         if is_owed && timeout.is_some_and(|at| at > self.now + LONGEST_PAUSE) {
-            return Err("a stop is owed, and nobody is asked for it".into());
+            return Err("a stop is owed, but no node is asked for it".into());
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Steps that are made of small ones: time passes, or a whole exchange happens.
+//! Composite steps: time passes, or a whole exchange happens.
 
 use axlewire::{endpoint::Endpoint, time::Duration};
 
@@ -21,7 +21,7 @@ impl<B: Kit> Bus<B> {
         Ok(())
     }
 
-    /// Everything up to the end of the next request that is answered, in one action.
+    /// Everything up to the end of the next answered request, in one action.
     pub(super) fn exchange(&mut self, exchange: Exchange) -> Checked {
         let (fate, answer) = exchange.parts();
         let mut write_fate = Some(fate);

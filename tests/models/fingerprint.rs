@@ -1,22 +1,21 @@
-//! The fingerprint of a role: what two states have in common that differ only in absolute time and
-//! in counters.
+//! The fingerprint of a role: equal for states that differ only in absolute time and in counters.
 //!
-//! It is made of the role's `{:?}`: every `Instant` becomes its distance to now, and the fields
-//! that cannot change what happens next are left out. So no private field is opened.
+//! It is built from the role's `{:?}`: every `Instant` becomes its distance to now, and fields that
+//! cannot affect the future are left out. So no private field has to be exposed.
 
 use std::fmt::{Debug, Write};
 
 use axlewire::time::Instant;
 
-/// What is older has happened long ago. No role looks back further than this, microseconds: the
-/// longest limit in these models is the 20 ms between two positions that show a standstill. The
-/// roles of UCP keep the ends of their waits, which lie ahead.
+/// Older times are equivalent. No role looks back further than this, microseconds: the longest
+/// limit in these models is the 20 ms between two positions that show a standstill. The roles of
+/// UCP keep the ends of their waits, which are in the future.
 const LONG_AGO: i64 = -100_000;
 
-/// Times before which something is not to be done. Once they have passed it does not matter when.
+/// Times before which something must not happen. Once they have passed, their value is irrelevant.
 const EARLIEST: [&str; 5] = ["guarded_until", "line_free", "next_at", "read_due", "guard_until"];
 
-/// How the states of a kind of world are told apart.
+/// How states of one kind of world are distinguished.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Merge {
     pub(crate) now: Instant,
@@ -24,12 +23,12 @@ pub(crate) struct Merge {
     pub(crate) skipped: &'static [&'static str],
 }
 
-/// Counters, settings that never change, and what has been handed out.
+/// Counters, settings that never change, and data already handed out.
 #[cfg(feature = "ikeya")]
 pub(crate) const COUNTERS: &[&str] =
     &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics"];
 
-/// The same, and the last answer where no stop may hold its position.
+/// The same, and the last answer if no stop may hold its position.
 #[cfg(feature = "ikeya")]
 pub(crate) const COUNTERS_AND_STATUS: &[&str] =
     &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics", "status"];
@@ -60,7 +59,7 @@ fn hash(word: &[u8]) -> u64 {
     word.iter().fold(0, |hash, &byte| with_byte(hash, byte))
 }
 
-/// Five bits further: digits differ in four, letters in five.
+/// Five more bits: digits differ in four, letters in five.
 const fn with_byte(hash: u64, byte: u8) -> u64 {
     hash.rotate_left(5) ^ byte as u64
 }
@@ -72,16 +71,16 @@ struct Reader {
     skipped: Vec<u64>,
     earliest: [u64; 5],
     hash: u64,
-    /// What is being read belongs to a field of [`EARLIEST`].
+    /// The current word belongs to a field of [`EARLIEST`].
     is_earliest: bool,
     /// It belongs to an `Instant`.
     is_instant: bool,
 }
 
 impl Reader {
-    // Plain loops: without optimization, which a test has, anything else takes most of the time.
+    // Plain loops: in an unoptimized test build, anything else would dominate the run time.
     fn read(&mut self, text: &[u8]) {
-        // Brackets that are open, and those around the field that is left out.
+        // Depth of open brackets, and of those around the field that is left out.
         let (mut depth, mut skipped_at) = (0_u32, None);
         let (mut word, mut start, mut at) = (0, 0, 0);
         while at < text.len() {
@@ -116,7 +115,7 @@ impl Reader {
         }
     }
 
-    /// Takes in a word; says whether it is the name of a field that is left out.
+    /// Takes in a word; returns whether it names a field that is left out.
     fn is_skipped(&mut self, hash: u64, word: &[u8], delimiter: u8) -> bool {
         if delimiter == b':' {
             if word != b"micros" {

@@ -1,4 +1,4 @@
-//! A host, its application, its port, and a robot that says anything at any time.
+//! A host, its application, its port, and a robot that sends anything at any time.
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
@@ -18,7 +18,7 @@ use super::{
     ucp::{Checked, Fate, Feed, check_kept, merge, ms, queue},
 };
 
-/// What a robot says.
+/// A message from the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Hear {
     Report,
@@ -30,11 +30,11 @@ pub(crate) enum Hear {
     BiasRequest,
     UpdateAnswer(OtaStatus),
     Unknown,
-    /// An acknowledgement of a start, with a bit turned over.
+    /// An acknowledgement of a start, with one bit flipped.
     Damaged,
     /// A motor command: our own, on a line that echoes.
     Echo,
-    /// The front of an IMU result, and the rest of it.
+    /// The first part of an IMU result, and the rest of it.
     Front,
     Rest,
 }
@@ -52,23 +52,23 @@ pub(crate) enum Act {
     /// The store works, or fails.
     SetStore(bool),
     TakeEvent,
-    /// The driver does all that is due.
+    /// The driver does everything that is due.
     Round(Fate),
-    /// One frame is handed out; `handle_timeout` was not called before.
+    /// One frame is handed out, without a prior `handle_timeout`.
     One,
-    /// The frame that was handed out last comes back, or the flush behind it fails.
+    /// The last frame handed out comes back, or the flush after it fails.
     Fail(Unsent),
     Wait(u32),
-    /// As long as the deadline says, and this many microseconds longer.
+    /// Until the deadline, plus this many microseconds.
     ToDeadline(u32),
     /// The driver runs for this long, milliseconds.
     Run(u32),
 }
 
-/// Room for events.
+/// Capacity of the event queue.
 pub(super) const ROOM: usize = 16;
 
-/// Firmware that is on offer.
+/// Firmware version on offer.
 pub(super) const VERSION: i16 = 41;
 
 #[derive(Clone, Debug)]
@@ -78,11 +78,11 @@ pub(crate) struct Site {
     pub(super) menu: &'static [Act],
     pub(super) account: Account,
     pub(super) feed: Feed<Hear>,
-    /// The driver takes out the events.
+    /// The driver takes the events.
     pub(super) takes_events: bool,
-    /// Events that were taken out in this step.
+    /// Events taken in this step.
     pub(super) popped: Vec<HostEvent>,
-    /// The application was found to be silent in this step.
+    /// The application was found silent in this step.
     is_halted: bool,
 }
 
@@ -110,7 +110,7 @@ impl Site {
         }
     }
 
-    /// The state behind these actions, none of which breaks anything.
+    /// The state after these actions, none of which breaks an invariant.
     pub(crate) fn after(mut self, actions: &[Act]) -> Self {
         for &action in actions {
             self.step(action).unwrap_or_else(|broken| panic!("{action:?}: {broken}"));
@@ -118,7 +118,7 @@ impl Site {
         self
     }
 
-    /// Takes out an event; what it tells has happened.
+    /// Takes an event; checks that what it reports has happened.
     fn take_event(&mut self) -> Result<bool, String> {
         let Some(event) = self.host.poll_event() else { return Ok(false) };
         self.told(&event)?;
@@ -129,7 +129,7 @@ impl Site {
     fn take_events(&mut self) -> Checked {
         while self.take_event()? {}
         match self.account.untold.first() {
-            Some(end) => Err(format!("the end of a request is not told: {end:?}")),
+            Some(end) => Err(format!("the end of a request is not reported: {end:?}")),
             None => Ok(()),
         }
     }
@@ -147,7 +147,7 @@ impl Site {
         self.check_calibration()
     }
 
-    /// Hands out a frame; says whether there was one.
+    /// Hands out a frame; returns whether there was one.
     fn one(&mut self) -> Result<bool, String> {
         let (shelf, now) = (self.host.store().clone(), self.now);
         self.is_halted |= self.account.motion.expire(now);
@@ -174,7 +174,7 @@ impl Site {
                 return Ok(());
             }
             if frames > 16 {
-                return Err("it never ends to send".into());
+                return Err("it never stops sending".into());
             }
         }
         if fate == Fate::NotFlushed && self.account.is_unflushed {
@@ -185,7 +185,7 @@ impl Site {
         self.check_rest()
     }
 
-    /// The driver runs, and wakes up as the role says.
+    /// The driver runs, and wakes at the role's deadlines.
     fn run(&mut self, millis: u32) -> Checked {
         let end = self.now + ms(millis);
         while let Some(at) = self.host.poll_timeout().filter(|&at| at <= end) {
@@ -246,7 +246,7 @@ impl World for Site {
         let after = queue(&self.host);
         let is_told = self.popped.iter().chain(&after).any(|it| *it == HostEvent::DeadMan);
         if self.is_halted && !is_told && after.len() < ROOM {
-            return Err("the dead-man has fired, and nobody is told".into());
+            return Err("the dead-man has fired without an event".into());
         }
         check_kept(&before, &self.popped, &after, |event| !is_frequent(event))?;
         self.check(&after)

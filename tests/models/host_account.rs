@@ -1,4 +1,4 @@
-//! The account of a host: what was called and heard, what may be sent, and what is owed.
+//! The account of a host: what was called and received, what may be sent, and what is owed.
 
 use axlewire::{
     endpoint::Unsent,
@@ -20,7 +20,7 @@ use super::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Update {
     None,
-    /// The request goes behind one more stop, if the robot has been told anything.
+    /// The request goes after one more stop, if the robot has been sent anything.
     Asked {
         version: i16,
         needs_stop: bool,
@@ -29,7 +29,7 @@ pub(crate) enum Update {
     Silent,
 }
 
-/// What the last frame carries.
+/// The content of the last frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Last {
     Motor,
@@ -53,9 +53,9 @@ pub(crate) struct Account {
     link_until: Option<Instant>,
     pub(crate) update: Update,
     pub(crate) request: Option<Request>,
-    /// What the latest request has come to.
+    /// The outcome of the latest request.
     pub(crate) settled: Option<bool>,
-    /// Ends of requests that have not been taken out.
+    /// Ends of requests whose events have not been taken.
     pub(crate) untold: Vec<(CalibrationStep, CalibrationKind, bool)>,
     pub(crate) imu: Results,
     pub(crate) mag: Results,
@@ -63,7 +63,7 @@ pub(crate) struct Account {
     pub(crate) network: Option<u32>,
     pub(crate) is_network_due: bool,
     last: Option<Last>,
-    /// Frames that a failing flush may have lost.
+    /// A failing flush may still lose frames.
     pub(crate) is_unflushed: bool,
     index: u8,
 }
@@ -93,7 +93,7 @@ impl Account {
         }
     }
 
-    /// The robot has said something.
+    /// The robot has sent something.
     pub(crate) fn heard(&mut self, now: Instant) {
         self.link_until = Some(now + ms(500));
         if self.link != Link::Up {
@@ -115,8 +115,8 @@ impl Account {
         }
     }
 
-    /// An acknowledgement: a good one has to name the kind asked for; a robot that refuses may
-    /// name another.
+    /// An acknowledgement: a good one has to name the requested kind; a refusing robot may name
+    /// another.
     pub(crate) fn acknowledged(
         &mut self,
         step: CalibrationStep,
@@ -162,9 +162,9 @@ impl Account {
         }
     }
 
-    /// A frame goes out.
+    /// A frame is sent.
     pub(crate) fn frame(&mut self, bytes: &[u8], shelf: &Shelf, now: Instant) -> Checked {
-        let frame = Frame::parse(bytes).map_err(|error| format!("no frame: {error:?}"))?;
+        let frame = Frame::parse(bytes).map_err(|error| format!("not a frame: {error:?}"))?;
         let message = frame.message();
         if frame.index() != self.index || bytes.len() > 64 {
             return Err(format!("index {}, {} bytes", frame.index(), bytes.len()));
@@ -228,7 +228,7 @@ impl Account {
             _ => (false, Last::Ping),
         };
         self.last = Some(last);
-        if is_right { Ok(()) } else { Err(format!("{message:?} is not to be sent")) }
+        if is_right { Ok(()) } else { Err(format!("{message:?} must not be sent")) }
     }
 
     fn asks(&mut self, step: CalibrationStep, kind: CalibrationKind, now: Instant) -> bool {
@@ -270,13 +270,13 @@ impl Account {
         }
     }
 
-    /// The port is flushed: nothing comes back any more.
+    /// The port is flushed: nothing can come back now.
     pub(crate) fn flushed(&mut self) {
         self.is_unflushed = false;
         self.motion.flushed();
     }
 
-    /// When something has to happen at the latest.
+    /// The latest time for the next action.
     pub(crate) fn owed(&self, now: Instant) -> Option<Instant> {
         if self.update == Update::Silent {
             return self.link_until;

@@ -1,4 +1,4 @@
-//! The calls of a host's application, and which of them are refused.
+//! The calls of a host's application, and those that are refused.
 
 use axlewire::ucp::{
     host::{CalibrationStep, CommandError},
@@ -12,7 +12,7 @@ use super::{
 };
 
 impl Site {
-    /// A call and its answer.
+    /// A call and its result.
     pub(super) fn call(&mut self, act: Act) -> Checked {
         let is_updating = self.account.update != Update::None;
         let (now, room_is_over) = (self.now, queue(&self.host).len() > ROOM);

@@ -1,4 +1,4 @@
-//! What a host hears, and what must hold after every step.
+//! What a host receives, and the invariants after every step.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -29,7 +29,7 @@ fn mag(value: i16) -> MagBias {
     MagBias::new([value; 3])
 }
 
-/// Bytes in front of the pause inside a frame that comes in halves.
+/// Number of bytes before the pause inside a frame that comes in halves.
 const HALF: usize = 11;
 
 fn wire(hear: Hear) -> Vec<u8> {
@@ -51,7 +51,7 @@ fn wire(hear: Hear) -> Vec<u8> {
     }
 }
 
-/// Events that come all the time or again by themselves, and those of which the latest counts.
+/// Events that recur by themselves, and those of which only the latest counts.
 pub(crate) fn is_frequent(event: &HostEvent) -> bool {
     matches!(
         event,
@@ -69,7 +69,7 @@ pub(crate) fn is_frequent(event: &HostEvent) -> bool {
 }
 
 impl Site {
-    /// The robot says something.
+    /// The robot sends something.
     pub(super) fn hear(&mut self, hear: Hear) -> Checked {
         let before = queue(&self.host);
         let bytes = wire(hear);
@@ -123,7 +123,7 @@ impl Site {
         Ok(())
     }
 
-    /// A result is acknowledged if, and only if, the application will find it (ruling U15).
+    /// A result is acknowledged if and only if the application will find it (ruling U15).
     fn result(&mut self, hear: Hear, before: &[HostEvent]) -> Checked {
         let events = queue(&self.host);
         let shelf = self.host.store().clone();
@@ -140,7 +140,7 @@ impl Site {
         };
         let is_told = events.contains(&event) || results.popped.as_ref() == Some(&event);
         results.is_kept = if shelf.is_open { is_told } else { is_stored };
-        // A new link is told first, and may take the last room.
+        // A new link is reported first, and may take the last free slot.
         let has_excuse = shelf.fails || shelf.is_open && events.len() >= ROOM;
         let is_doubtful = shelf.fails || before.len() >= ROOM;
         results.ack = match results.is_kept {
@@ -155,7 +155,7 @@ impl Site {
         Ok(())
     }
 
-    /// An event is taken out: what it tells has happened, and is told once.
+    /// An event is taken: what it reports has happened, and is reported once.
     pub(super) fn told(&mut self, event: &HostEvent) -> Checked {
         let end = match event {
             HostEvent::CalibrationStarted(kind) => (CalibrationStep::Start, *kind, true),
@@ -184,9 +184,10 @@ impl Site {
         Ok(())
     }
 
-    /// All that is due has been sent and flushed: nothing is owed now, and the deadline lies ahead.
+    /// Everything due has been sent and flushed: nothing is owed now, and the deadline is in the
+    /// future.
     pub(super) fn check_rest(&mut self) -> Checked {
-        // What was to be decided at the moment of sending is decided.
+        // Decisions made at the time of sending have been made.
         for ack in [&mut self.account.imu.ack, &mut self.account.mag.ack, &mut self.account.biases]
         {
             if *ack == Ack::May && self.account.update != Update::Silent {
@@ -204,7 +205,7 @@ impl Site {
         Ok(())
     }
 
-    /// What holds at any time.
+    /// Invariants at any time.
     pub(super) fn check(&self, events: &[HostEvent]) -> Checked {
         let account = &self.account;
         let wake_up = self.host.poll_timeout();
@@ -224,7 +225,7 @@ impl Site {
             matches!(event, HostEvent::Report(_) | HostEvent::Pong { .. } | HostEvent::Unknown(_))
         };
         if events.iter().filter(comes_often).count() > ROOM / 2 {
-            return Err("what comes all the time takes the room of what is rare".into());
+            return Err("frequent events take the room of rare ones".into());
         }
         let is_end = |event: &&HostEvent| {
             matches!(
@@ -240,7 +241,7 @@ impl Site {
         self.check_calibration()
     }
 
-    /// A request comes to its end as the robot says, or at its time.
+    /// A request ends as the robot answers, or by its timeout.
     pub(super) fn check_calibration(&self) -> Checked {
         let outcome = self.host.calibration_outcome().map(|outcome| outcome.is_ok());
         if outcome != self.account.settled {

@@ -1,4 +1,4 @@
-//! The account of a host's motor commands: what may be sent, and what has to be (U10, U16).
+//! The account of a host's motor commands: what may be sent, and what must be sent (U10, U16).
 
 use axlewire::{
     endpoint::Unsent,
@@ -16,28 +16,28 @@ enum Greeting {
     Handed,
     /// Flushed, and no motor command since.
     Flushed,
-    /// In doubt once more although it was flushed: it may come again.
+    /// In doubt again although it was flushed: it may be sent again.
     May,
     Done,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    /// What the robot is to do: the latest call, halted 500 ms after it.
+    /// The motion wanted of the robot: the latest call, halted 500 ms after it.
     pub(crate) wanted: Option<MotorControl>,
     pub(crate) dead_man: Option<Instant>,
-    /// What the last motor frame says, unless it is in doubt.
+    /// The content of the last motor frame, unless it is in doubt.
     told: Option<MotorControl>,
     /// There was a call since.
     pub(crate) is_called: bool,
     gap_until: Instant,
     repeat_at: Instant,
-    /// How many of the two frames behind one that was cut off have gone out, until both are flushed.
+    /// Number of motor frames sent of the two after a cut-off frame, until both are flushed.
     behind_cut: Option<u8>,
-    /// The last frame of all was a motor frame.
+    /// The last frame of any kind was a motor frame.
     is_motor_last: bool,
     greeting: Greeting,
-    /// The frame that was handed out last is the first of all.
+    /// The last frame handed out is the very first one.
     is_greeting_last: bool,
 }
 
@@ -66,7 +66,7 @@ impl Motion {
         self.call(self.wanted.map_or(MotorControl::STOP, halted), now);
     }
 
-    /// The application has been silent for 500 ms; says whether that is new.
+    /// The application has been silent for 500 ms; returns whether that is new.
     pub(crate) fn expire(&mut self, now: Instant) -> bool {
         let is_silent = self.dead_man.is_some_and(|at| at <= now);
         if is_silent {
@@ -75,7 +75,7 @@ impl Motion {
         is_silent
     }
 
-    /// When the next motor frame has to go at the latest.
+    /// The latest time for the next motor frame.
     pub(crate) fn due(&self, now: Instant) -> Option<Instant> {
         let wanted = self.wanted?;
         let Some(told) = self.told else { return Some(now) };
@@ -91,7 +91,7 @@ impl Motion {
         self.due(now).is_some_and(|at| at <= now)
     }
 
-    /// Has the robot been told to stand still, and nothing else since?
+    /// Whether the robot has been told to stop, and nothing else since.
     pub(crate) fn is_stop_sent(&self) -> bool {
         let stands_still =
             |command: Option<MotorControl>| command.is_some_and(|it| it.stands_still());
@@ -102,17 +102,17 @@ impl Motion {
         self.behind_cut.is_some_and(|out| out < 2)
     }
 
-    /// A motor frame goes out.
+    /// A motor frame is sent.
     pub(crate) fn frame(&mut self, sent: &RawMotorControl, now: Instant) -> Checked {
         let Some(wanted) = self.wanted else {
-            return Err("a motor frame, and nobody has asked for one".into());
+            return Err("a motor frame that was not requested".into());
         };
         if self.dead_man.is_some_and(|at| at <= now) {
             return Err("a motor frame 500 ms after the last call".into());
         }
         let is_zero = *sent == RawMotorControl::from(halted(wanted));
         let has_to_be_zero = self.greeting == Greeting::Due;
-        // One zero command more than needed harms nobody.
+        // One zero command more than needed is harmless.
         let is_extra = matches!(self.greeting, Greeting::Handed | Greeting::May) && is_zero;
         let is_wanted = *sent == RawMotorControl::from(wanted);
         if has_to_be_zero && !is_zero || !has_to_be_zero && !is_wanted && !is_extra {
@@ -132,13 +132,13 @@ impl Motion {
             } else if self.greeting == Greeting::Flushed {
                 self.greeting = Greeting::Done;
             }
-            // What has been waiting behind the first frame goes out right behind it.
+            // A command that waited for the first frame is sent right after it.
             self.is_called &= self.told != self.wanted;
         }
         Ok(())
     }
 
-    /// Some other frame goes out.
+    /// Some other frame is sent.
     pub(crate) const fn other_frame(&mut self) {
         (self.is_greeting_last, self.is_motor_last) = (false, false);
     }
@@ -150,7 +150,7 @@ impl Motion {
         self.behind_cut = self.behind_cut.filter(|&out| out < 2);
     }
 
-    /// Whatever the robot was told before, it is told again, twice behind half a frame (U16).
+    /// Whatever the robot was told before is sent again, twice after half a frame (U16).
     pub(crate) fn unsent(&mut self, unsent: Unsent) {
         self.told = None;
         self.greeting = match (self.greeting, unsent) {
@@ -161,7 +161,7 @@ impl Motion {
         };
         self.behind_cut = match (unsent, self.behind_cut) {
             (Unsent::CutOff, _) => Some(0),
-            // Of those that were not flushed nobody knows.
+            // The state of unflushed frames is unknown.
             (Unsent::Unflushed, Some(_)) => Some(0),
             (Unsent::Untouched, Some(out)) if self.is_motor_last => Some(out.saturating_sub(1)),
             (_, as_before) => as_before,

@@ -1,4 +1,4 @@
-//! What a host has asked a robot for, and what it has been given.
+//! A host's requests to a robot, and the results it has received.
 
 use axlewire::{
     time::{Instant, wire_time},
@@ -11,17 +11,17 @@ use axlewire::{
 
 use super::ucp::ms;
 
-/// A calibration request: sent three times at the most, 200 ms apart.
+/// A calibration request: sent at most three times, 200 ms apart.
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
     pub(crate) step: CalibrationStep,
     pub(crate) kind: CalibrationKind,
     pub(crate) attempts: u8,
-    /// `None`: to be sent now.
+    /// `None`: has to be sent now.
     pub(crate) until: Option<Instant>,
 }
 
-/// May a result be acknowledged (U15)?
+/// Whether a result may be acknowledged (U15).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Ack {
     No,
@@ -33,9 +33,9 @@ pub(crate) enum Ack {
 #[derive(Clone, Debug)]
 pub(crate) struct Results {
     pub(crate) ack: Ack,
-    /// The latest one is in the store, or its event is told.
+    /// The latest one is in the store, or its event is queued.
     pub(crate) is_kept: bool,
-    /// The latest event that was taken out since the calibration began.
+    /// The latest event taken since the calibration began.
     pub(crate) popped: Option<HostEvent>,
 }
 
@@ -44,7 +44,7 @@ impl Request {
         Self { step, kind, attempts: 0, until: None }
     }
 
-    /// It goes out; says whether it may.
+    /// The request is sent; returns whether that is allowed.
     pub(crate) fn frame(
         &mut self,
         step: CalibrationStep,

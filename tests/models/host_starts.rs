@@ -1,4 +1,4 @@
-//! The worlds of a host, and the states in which they start.
+//! The worlds of a host, and their initial states.
 
 use axlewire::{
     endpoint::Unsent,
@@ -25,7 +25,7 @@ const LOST: Act = Act::Round(Fate::NotFlushed);
 const BACK: Act = Act::Round(Fate::First(Unsent::Untouched));
 const CUT: Act = Act::Round(Fate::First(Unsent::CutOff));
 
-/// What moves the robot, and all that can happen to the frames.
+/// Everything that moves the robot, and every fate of the frames.
 const MOTION: &[Act] = &[
     Act::Go(1),
     Act::Go(2),
@@ -48,7 +48,7 @@ const MOTION: &[Act] = &[
     Act::Run(1_100),
 ];
 
-/// A firmware update, between commands and answers.
+/// A firmware update, among commands and answers.
 const UPDATE: &[Act] = &[
     Act::Go(1),
     Act::Stop,
@@ -73,7 +73,7 @@ const UPDATE: &[Act] = &[
     Act::Run(600),
 ];
 
-/// Calibrations, results and biases, with answers of all sorts.
+/// Calibrations, results and biases, with all kinds of answers.
 const CALIBRATION: &[Act] = &[
     Act::Go(2),
     Act::Calibrate(START, IMU),
@@ -151,7 +151,7 @@ fn low_ids_only(menu: &'static [Act]) -> Site {
 /// A queue with room for `room` rare events, and a store that keeps nothing.
 fn full(room: usize) -> Site {
     let mut site = Site::new(HostConfig::default(), true, CALIBRATION).undrained();
-    // The first of them is told with the new link.
+    // The first of them is reported along with the new link.
     for value in 0..15 - room {
         site = site.after(&[Act::Hear(Hear::Mag(100 + value as i16)), DONE]);
     }
@@ -168,27 +168,27 @@ pub(crate) fn motion(run: &mut Run) {
 
 pub(crate) fn updates(run: &mut Run) {
     run.world("standing", Depth(2, 5), site(UPDATE).after(&[DONE]));
-    run.world("asked for", Depth(2, 5), site(UPDATE).after(&[DONE, Act::Update]));
+    run.world("requested", Depth(2, 5), site(UPDATE).after(&[DONE, Act::Update]));
     let silent = [DONE, Act::Update, DONE];
     run.world("updating", Depth(2, 5), site(UPDATE).after(&silent));
     let in_flight = [DONE, Act::Update, Act::One, Act::One];
     let asking = site(UPDATE).after(&in_flight);
-    run.world("stopped while asking", Depth(2, 5), asking.clone().after(&[Act::Stop]));
-    run.world("asking for it", Depth(2, 5), asking);
+    run.world("stopped while requesting", Depth(2, 5), asking.clone().after(&[Act::Stop]));
+    run.world("requesting", Depth(2, 5), asking);
     run.world("listening", Depth(2, 5), listening(UPDATE));
     run.world("low ids only", Depth(2, 5), low_ids_only(UPDATE));
 }
 
 pub(crate) fn calibrations(run: &mut Run) {
     let asked = [DONE, Act::Calibrate(START, IMU), DONE];
-    run.world("asked for", Depth(2, 4), site(CALIBRATION).after(&asked));
+    run.world("requested", Depth(2, 4), site(CALIBRATION).after(&asked));
     let started = Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine));
     let running = site(CALIBRATION).after(&asked).after(&[started, DONE]);
-    run.world("under way", Depth(2, 4), running.clone());
+    run.world("running", Depth(2, 4), running.clone());
     let results = [Act::Hear(Hear::Imu(1)), Act::Hear(Hear::Mag(1)), DONE];
     let stored = running.after(&results);
     let requested = [Act::Hear(Hear::BiasRequest)];
-    run.world("biases asked for", Depth(2, 4), stored.clone().after(&requested));
+    run.world("biases requested", Depth(2, 4), stored.clone().after(&requested));
     run.world("both stored", Depth(2, 4), stored);
     let low_ids_only = low_ids_only(CALIBRATION).after(&[DONE]).after(&results);
     run.world("low ids only", Depth(2, 4), low_ids_only);
@@ -201,7 +201,7 @@ pub(crate) fn queues(run: &mut Run) {
     let last_room = full(1).after(&[Act::Hear(Hear::Imu(1))]);
     run.world("an acknowledgement is due", Depth(2, 4), last_room);
     let asked = [Act::Calibrate(START, IMU), DONE];
-    run.world("full, and asked", Depth(2, 4), full(0).after(&asked));
+    run.world("full, with a request", Depth(2, 4), full(0).after(&asked));
     let reports = [Act::Hear(Hear::Report)].repeat(8);
     let busy = site(CALIBRATION).undrained().after(&[DONE]).after(&reports);
     run.world("reports are left", Depth(2, 4), busy);
@@ -211,14 +211,14 @@ pub(crate) fn queues(run: &mut Run) {
 #[test]
 fn hosts_that_differ_in_time_and_counters_alone_have_the_same_fingerprint() {
     let silent = site(MOTION).after(&[Act::Run(3_000)]);
-    // Two motor commands and two pings later, as many as their periods have in common.
+    // Two motor commands and two pings later, a common multiple of their periods.
     let later = silent.clone().after(&[Act::Run(1_000)]);
     assert_ne!(format!("{:?}", silent.host), format!("{:?}", later.host));
     assert_eq!(silent.fingerprint(), later.fingerprint());
     for act in [Act::Go(1), Act::Stop, Act::Show(1), Act::One, Act::Wait(1_000)] {
         let other = silent.clone().after(&[act]);
         let is_new = other.fingerprint() != silent.fingerprint();
-        // A poll with nothing to give changes nothing.
+        // A poll without a result changes nothing.
         assert_eq!(is_new, !matches!(act, Act::One), "{act:?}");
     }
 }

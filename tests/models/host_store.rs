@@ -1,4 +1,4 @@
-//! A store of biases that fails when it is told to.
+//! A store of biases that fails on request.
 
 use axlewire::ucp::{
     host::{BiasStore, NotStored},

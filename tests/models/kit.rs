@@ -1,4 +1,4 @@
-//! Packets of both kinds of boards, read and written in the test's own way.
+//! Packets of both kinds of boards, read and written independently of the library.
 
 use axlewire::{
     encode::Encode,
@@ -8,9 +8,9 @@ use axlewire::{
     },
 };
 
-/// What a kind of board needs to be put into a world. Three motors are always told the same.
+/// What a world needs of a kind of board. All three motors always get the same command.
 pub(crate) trait Kit: Board {
-    /// Where the rotation of the first motor begins in a packet.
+    /// Offset of the first motor's rotation in a packet.
     const ROTATION_AT: usize;
 
     fn speed(rps: f32) -> Self::Velocity;
@@ -45,7 +45,7 @@ impl Kit for ThreeMotors {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sent {
     pub(crate) node: NodeId,
-    /// What is written, in both readings; `None` for a READ.
+    /// The written value, in both readings; `None` for a READ.
     pub(crate) write: Option<Write>,
     pub(crate) len: usize,
 }

@@ -1,4 +1,4 @@
-//! The fingerprint itself: what it merges, and what it tells apart.
+//! The fingerprint itself: which states it merges, and which it separates.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -72,7 +72,7 @@ fn every_difference_in_what_a_master_will_do_changes_the_fingerprint() {
             fingerprint(&after, now)
         })
         .collect();
-    // Discovery ends at once where everybody is online: it leaves an event behind.
+    // Discovery ends at once if all nodes are online: it leaves an event behind.
     assert_eq!(all.len(), changes.len());
 }
 

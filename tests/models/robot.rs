@@ -1,4 +1,4 @@
-//! A robot, its application, its port, and a host that says anything at any time.
+//! A robot, its application, its port, and a host that sends anything at any time.
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
@@ -17,7 +17,7 @@ use super::{
     ucp::{Checked, Fate, Feed, check_kept, halted, merge, ms, queue},
 };
 
-/// What a host says.
+/// A message from the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Hear {
     /// 1: ahead, with the lamp on. 2: on the spot. 3: a zero command. 4: out of range.
@@ -36,10 +36,10 @@ pub(crate) enum Hear {
     Unknown,
     /// A pong: our own, on a line that echoes.
     Echo,
-    /// The front of motor command 1, and the rest of it.
+    /// The first part of motor command 1, and the rest of it.
     Front,
     Rest,
-    /// The front of a frame that is longer than two motor commands.
+    /// The first part of a frame longer than two motor commands.
     LongFront,
 }
 
@@ -48,7 +48,7 @@ pub(crate) enum Act {
     Hear(Hear),
     /// It arrived up to 400 ms ago: the driver was held up.
     HearOld(Hear),
-    /// The application asks for a new command.
+    /// The application polls for a new command.
     TakeCommand,
     Telemetry(u16),
     /// A calibration has its result.
@@ -57,25 +57,25 @@ pub(crate) enum Act {
     Abort,
     AnswerUpdate(OtaStatus),
     TakeEvent,
-    /// All of them, and the clock is looked at.
+    /// Takes all events, and handles the time.
     TakeEvents,
-    /// The driver does all that is due.
+    /// The driver does everything that is due.
     Round(Fate),
-    /// One frame is handed out; `handle_timeout` was not called before.
+    /// One frame is handed out, without a prior `handle_timeout`.
     One,
-    /// The frame that was handed out last comes back, or the flush behind it fails.
+    /// The last frame handed out comes back, or the flush after it fails.
     Fail(Unsent),
     Wait(u32),
-    /// As long as the deadline says, and this many microseconds longer.
+    /// Until the deadline, plus this many microseconds.
     ToDeadline(u32),
     /// The driver runs for this long, milliseconds.
     Run(u32),
 }
 
-/// Room for events.
+/// Capacity of the event queue.
 pub(super) const ROOM: usize = 16;
 
-/// Firmware that is on offer.
+/// Firmware version on offer.
 pub(super) const UPDATE_TO: i16 = 39;
 
 #[derive(Clone, Debug)]
@@ -85,9 +85,9 @@ pub(crate) struct Rover {
     menu: &'static [Act],
     pub(super) account: Account,
     pub(super) feed: Feed<Hear>,
-    /// The driver takes out the events.
+    /// The driver takes the events.
     takes_events: bool,
-    /// Events that were taken out in this step.
+    /// Events taken in this step.
     popped: Vec<RobotEvent>,
 }
 
@@ -110,7 +110,7 @@ impl Rover {
         self
     }
 
-    /// The state behind these actions, none of which breaks anything.
+    /// The state after these actions, none of which breaks an invariant.
     pub(crate) fn after(mut self, actions: &[Act]) -> Self {
         for &action in actions {
             self.step(action).unwrap_or_else(|broken| panic!("{action:?}: {broken}"));
@@ -118,7 +118,7 @@ impl Rover {
         self
     }
 
-    /// The robot stands still for want of a command, and knows it.
+    /// The robot stopped for lack of a command, and has registered that.
     fn watch(&mut self, now: Instant) {
         if self.account.until.is_some_and(|until| until <= now) {
             (self.account.command, self.account.until) = (halted(self.account.command), None);
@@ -149,7 +149,7 @@ impl Rover {
         Ok(())
     }
 
-    /// Hands out a frame; says whether there was one.
+    /// Hands out a frame; returns whether there was one.
     fn one(&mut self) -> Result<bool, String> {
         let Some(frame) = self.robot.poll_transmit(self.now) else { return Ok(false) };
         self.account.frame(frame, self.now)?;
@@ -174,7 +174,7 @@ impl Rover {
                 return Ok(());
             }
             if frames > 16 {
-                return Err("it never ends to send".into());
+                return Err("it never stops sending".into());
             }
         }
         if fate == Fate::NotFlushed && self.account.is_unflushed {
@@ -185,7 +185,7 @@ impl Rover {
         self.check_rest()
     }
 
-    /// The driver runs, and wakes up as the role says.
+    /// The driver runs, and wakes at the role's deadlines.
     fn run(&mut self, millis: u32) -> Checked {
         let end = self.now + ms(millis);
         while let Some(at) = self.robot.poll_timeout().filter(|&at| at <= end) {

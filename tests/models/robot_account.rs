@@ -1,4 +1,4 @@
-//! The account of a robot: what it was told and asked, what may be sent, and what is owed.
+//! The account of a robot: its commands and requests, what may be sent, and what is owed.
 
 use axlewire::{
     endpoint::Unsent,
@@ -19,9 +19,9 @@ use super::{
 #[derive(Clone, Debug)]
 pub(crate) struct Repeat {
     pub(crate) what: Option<i16>,
-    /// Not before.
+    /// Earliest time.
     earliest: Instant,
-    /// Not later.
+    /// Latest time.
     latest: Instant,
     sendings: u8,
 }
@@ -46,7 +46,7 @@ impl Repeat {
     fn frame(&mut self, is_it: impl Fn(i16) -> bool, now: Instant) -> bool {
         let is_right = self.what.is_some_and(is_it) && self.earliest <= now;
         (self.earliest, self.latest) = (now + ms(1000), now + ms(1000));
-        // More of them make no difference.
+        // Larger counts make no difference.
         self.sendings = (self.sendings + 1).min(2);
         is_right
     }
@@ -70,16 +70,16 @@ enum Last {
     Imu,
     Mag,
     BiasRequest,
-    /// When it was due.
+    /// Its due time.
     Report(Instant),
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Account {
-    /// The last valid command, and until when it holds.
+    /// The last valid command, and the time until which it holds.
     pub(crate) command: MotorControl,
     pub(crate) until: Option<Instant>,
-    /// As `take_command` and as the events have told it.
+    /// As reported by `take_command` and by the events.
     pub(crate) taken: MotorControl,
     pub(crate) told: MotorControl,
     pub(crate) start_ack: Option<CalibrationKind>,
@@ -88,7 +88,7 @@ pub(crate) struct Account {
     /// `false`: it may have left.
     pub(crate) update_answer: Option<(OtaStatus, bool)>,
     pub(crate) is_update_asked: bool,
-    /// With `true` once its result is in.
+    /// `true` once its result is available.
     pub(crate) calibrating: Option<(CalibrationKind, bool)>,
     pub(crate) imu: Repeat,
     pub(crate) mag: Repeat,
@@ -126,12 +126,12 @@ impl Account {
         }
     }
 
-    /// A valid command arrived then.
+    /// A valid command arrived at this time.
     pub(crate) fn commanded(&mut self, command: MotorControl, at: Instant) {
         (self.command, self.until) = (command, Some(at + ms(500)));
     }
 
-    /// What the robot does now: nothing, 500 ms after the last valid command.
+    /// The robot's current motion: none, 500 ms after the last valid command.
     pub(crate) fn expected(&self, now: Instant) -> MotorControl {
         if self.until.is_some_and(|until| now < until) {
             self.command
@@ -140,9 +140,9 @@ impl Account {
         }
     }
 
-    /// A frame goes out.
+    /// A frame is sent.
     pub(crate) fn frame(&mut self, bytes: &[u8], now: Instant) -> Checked {
-        let frame = Frame::parse(bytes).map_err(|error| format!("no frame: {error:?}"))?;
+        let frame = Frame::parse(bytes).map_err(|error| format!("not a frame: {error:?}"))?;
         let message = frame.message();
         self.is_unflushed = true;
         let is_fine = |err| err == ErrorCode::Fine;
@@ -183,7 +183,7 @@ impl Account {
         };
         self.last = Some(last);
         let is_right = is_right && (frame.index() == 0 || matches!(last, Last::Report(_)));
-        if is_right { Ok(()) } else { Err(format!("{message:?} is not to be sent: {self:?}")) }
+        if is_right { Ok(()) } else { Err(format!("{message:?} must not be sent: {self:?}")) }
     }
 
     /// The last frame comes back, or a flush has failed.
@@ -191,7 +191,7 @@ impl Account {
         let last = self.last.take();
         let is_lost = unsent != Unsent::Unflushed;
         match last {
-            // An update is asked for once: its answer is said again if it may be lost.
+            // An update is requested once: its answer is repeated if it may be lost.
             Some(Last::UpdateAnswer(status)) if !self.is_update_asked => {
                 self.update_answer.get_or_insert((status, is_lost));
             }
@@ -219,7 +219,7 @@ impl Account {
         }
     }
 
-    /// When something has to happen at the latest.
+    /// The latest time for the next action.
     pub(crate) fn owed(&self, now: Instant) -> Option<Instant> {
         let is_due = self.pong
             || self.start_ack.is_some()

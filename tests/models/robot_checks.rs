@@ -1,4 +1,4 @@
-//! What a robot hears, and what must hold after every step.
+//! What a robot receives, and the invariants after every step.
 
 use axlewire::{
     crc16,
@@ -42,7 +42,7 @@ fn motor((speed, angular, lamp): (i16, i16, i16), version: i16) -> Vec<u8> {
     frame
 }
 
-/// What the robot makes of a received command: out of range is cut.
+/// The robot's reading of a received command: out-of-range values are clamped.
 fn command(number: u8) -> MotorControl {
     let (speed, angular, lamp) = COMMANDS[usize::from(number) - 1];
     let command = MotorControl::new(speed.clamp(-100, 100), angular.clamp(-100, 100)).unwrap();
@@ -53,7 +53,7 @@ fn biases() -> Biases {
     Biases::new(imu(9), mag(9))
 }
 
-/// Bytes in front of the pause inside a frame that comes in halves.
+/// Number of bytes before the pause inside a frame that comes in halves.
 const HALF: usize = 11;
 
 fn wire(hear: Hear) -> Vec<u8> {
@@ -74,7 +74,7 @@ fn wire(hear: Hear) -> Vec<u8> {
         Hear::Echo => bytes(Pong::new(ErrorCode::Fine)),
         Hear::Front => first[..HALF].to_vec(),
         Hear::Rest => first[HALF..].to_vec(),
-        // The front of the longest frame there is holds back two whole ones.
+        // The first part of the longest possible frame holds back two whole ones.
         Hear::LongFront => vec![0xFD, 0xFF, 60, 0, 2, 0, 0, 0, 0, 0, 0],
     }
 }
@@ -89,7 +89,7 @@ pub(crate) const fn is_frequent(event: &RobotEvent) -> bool {
 }
 
 impl Rover {
-    /// The host says something, this long ago.
+    /// The host sends something, this long ago.
     pub(super) fn hear(&mut self, hear: Hear, since: Instant) -> Checked {
         let before = queue(&self.robot);
         let bytes = wire(hear);
@@ -160,7 +160,7 @@ impl Rover {
         self.rare(event, before)
     }
 
-    /// What is to be told counts if, and only if, it found room (ruling U15).
+    /// An event counts if and only if it found room (ruling U15).
     fn rare(&mut self, event: RobotEvent, before: &[RobotEvent]) -> Checked {
         let after = queue(&self.robot);
         let is_same_sort = |other: &&RobotEvent| {
@@ -171,7 +171,7 @@ impl Rover {
         let is_pushed = after.iter().skip(before.len()).any(|other| *other == event);
         if !(is_pushed || waits) {
             let is_full = before.len() >= ROOM;
-            return if is_full { Ok(()) } else { Err(format!("{event:?} is not told")) };
+            return if is_full { Ok(()) } else { Err(format!("{event:?} is not reported")) };
         }
         let account = &mut self.account;
         match event {
@@ -204,7 +204,7 @@ impl Rover {
         Ok(())
     }
 
-    /// An event is taken out.
+    /// An event is taken.
     pub(super) fn told(&mut self, event: &RobotEvent) {
         match event {
             RobotEvent::Motor(command) => self.account.told = *command,
@@ -213,16 +213,17 @@ impl Rover {
         }
     }
 
-    /// All events are out: they tell what the robot does now.
+    /// All events are taken: they match the robot's current motion.
     pub(super) fn check_told(&self) -> Checked {
         let (told, expected) = (self.account.told, self.account.expected(self.now));
         if (told.speed(), told.angular()) != (expected.speed(), expected.angular()) {
-            return Err(format!("the events tell {told:?} instead of {expected:?}"));
+            return Err(format!("the events report {told:?} instead of {expected:?}"));
         }
         Ok(())
     }
 
-    /// All that is due has been sent and flushed: nothing is owed now, and the deadline lies ahead.
+    /// Everything due has been sent and flushed: nothing is owed now, and the deadline is in the
+    /// future.
     pub(super) fn check_rest(&self) -> Checked {
         if self.account.owed(self.now).is_some_and(|at| at <= self.now) {
             return Err(format!("owed and not sent: {:?}", self.account));
@@ -231,12 +232,12 @@ impl Rover {
         Ok(())
     }
 
-    /// What holds at any time.
+    /// Invariants at any time.
     pub(super) fn check(&self, events: &[RobotEvent]) -> Checked {
         let (account, now) = (&self.account, self.now);
-        // Of two sorts, each may have one more.
+        // Each of two kinds may have one more.
         if events.iter().filter(|event| is_frequent(event)).count() > ROOM / 2 + 2 {
-            return Err("what comes all the time takes the room of what is rare".into());
+            return Err("frequent events take the room of rare ones".into());
         }
         let (command, expected) = (self.robot.command(now), account.expected(now));
         if command != expected {

@@ -1,4 +1,4 @@
-//! The worlds of a robot, and the states in which they start.
+//! The worlds of a robot, and their initial states.
 
 use axlewire::{
     endpoint::Unsent,
@@ -22,7 +22,7 @@ const LOST: Act = Act::Round(Fate::NotFlushed);
 const BACK: Act = Act::Round(Fate::First(Unsent::Untouched));
 const CUT: Act = Act::Round(Fate::First(Unsent::CutOff));
 
-/// Motor commands of all sorts, damaged, old and in halves, and what must not count as one.
+/// Motor commands of all kinds, damaged, old and in halves, and frames that must not count as one.
 const MOTION: &[Act] = &[
     Act::Hear(Hear::Motor(1)),
     Act::Hear(Hear::Motor(2)),
@@ -50,7 +50,7 @@ const MOTION: &[Act] = &[
     Act::Run(600),
 ];
 
-/// All that a host can ask for, and what becomes of the answers.
+/// Everything that a host can request, and every fate of the answers.
 const ANSWERS: &[Act] = &[
     Act::Hear(Hear::Motor(2)),
     Act::Hear(Hear::MotorUpdate),
@@ -91,7 +91,7 @@ fn rover(menu: &'static [Act]) -> Rover {
     Rover::new(RobotConfig::default(), menu)
 }
 
-/// A robot that asks for nothing.
+/// A robot that requests nothing.
 fn quiet(menu: &'static [Act]) -> Rover {
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
@@ -126,7 +126,7 @@ pub(crate) fn answers(run: &mut Run) {
     let due = [Hear::Ping, Hear::Start(IMU), Hear::End(IMU), Hear::End(MAG)].map(Act::Hear);
     run.world("answers are due", Depth(2, 4), rover(ANSWERS).after(&[DONE]).after(&due));
     let asked = [Act::Hear(Hear::Update), DONE];
-    run.world("an update is asked for", Depth(2, 4), rover(ANSWERS).after(&asked));
+    run.world("an update is requested", Depth(2, 4), rover(ANSWERS).after(&asked));
 }
 
 pub(crate) fn queues(run: &mut Run) {

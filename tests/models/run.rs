@@ -1,21 +1,21 @@
-//! Runs of the worlds, shallow and deep, with a line for each.
+//! Runs of the worlds, shallow and deep, with one line for each.
 
 use std::{env, time::Instant};
 
 use super::search::{Limits, World, explore};
 
-/// How deep a world is searched: in every test run, and by `deep.sh`.
+/// Search depth of a world: in every test run, and in `deep.sh`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Depth(pub(crate) usize, pub(crate) usize);
 
-/// States of one world at the most, some 3 GB.
+/// Most states of one world, about 3 GB.
 const STATES: usize = 1_000_000;
 
 #[derive(Debug)]
 pub(crate) struct Run {
     group: &'static str,
     pub(crate) is_deep: bool,
-    /// `MODELS_DEPTH`, for all worlds alike.
+    /// `MODELS_DEPTH`, overriding the depth of all worlds.
     all_depths: Option<usize>,
     violations: Vec<String>,
 }

@@ -1,47 +1,48 @@
 //! A breadth-first search over cloned worlds.
 //!
-//! Our own in one page, because `stateright` brings 44 packages, a web server among them, states no
-//! MSRV, and wants a state that is `Hash` and `Eq`, which a role with counters and a clock is not.
+//! Written here, in one page, because `stateright` brings 44 packages, including a web server,
+//! states no MSRV, and needs a state that is `Hash` and `Eq`, which a role with counters and a
+//! clock is not.
 
 use std::{
     collections::HashSet,
     fmt::{self, Debug, Write as _},
 };
 
-/// A role, what it talks to, and an independent account of what it may do.
+/// A role, its peers, and an independent account of what it may do.
 pub(crate) trait World: Clone {
-    /// One thing that can happen.
+    /// A single action.
     type Action: Copy + Debug;
 
-    /// What can happen now. One that changes nothing costs time and no state.
+    /// The possible actions. One that changes nothing costs time but no state.
     fn actions(&self) -> Vec<Self::Action>;
 
-    /// Lets it happen; `Err` says which invariant is broken.
+    /// Performs the action; `Err` names the broken invariant.
     fn step(&mut self, action: Self::Action) -> Result<(), String>;
 
-    /// The same for two worlds that go on in the same way.
+    /// Equal for two worlds that behave the same from now on.
     fn fingerprint(&self) -> u64;
 }
 
 /// When to end a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Actions in a row.
+    /// Most consecutive actions.
     pub(crate) depth: usize,
-    /// States; the level in which they are reached is not finished.
+    /// Most states; the level in which they are reached is not finished.
     pub(crate) states: usize,
 }
 
-/// What was explored without a violation.
+/// The part explored without a violation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Explored {
-    /// Depth up to which every sequence of actions was tried.
+    /// Depth to which every sequence of actions was tried.
     pub(crate) depth: usize,
     pub(crate) states: usize,
     pub(crate) transitions: usize,
 }
 
-/// The shortest way to a broken invariant.
+/// The shortest path to a broken invariant.
 #[derive(Debug)]
 pub(crate) struct Violation {
     pub(crate) actions: Vec<String>,
@@ -61,7 +62,7 @@ impl fmt::Display for Violation {
 /// Tries everything, shortest sequences first.
 pub(crate) fn explore<W: World>(start: W, limits: Limits) -> Result<Explored, Violation> {
     let mut visited = HashSet::from([start.fingerprint()]);
-    // For each state the one before it and the action in between; the start has none.
+    // For each state, its predecessor and the action in between; the start has none.
     let mut parents: Vec<Option<(usize, W::Action)>> = vec![None];
     let mut frontier = vec![(0, start)];
     let mut explored = Explored { depth: 0, states: 1, transitions: 0 };
@@ -127,7 +128,7 @@ impl World for Counter {
 }
 
 #[test]
-fn a_violation_is_told_with_the_shortest_way_to_it() {
+fn a_violation_is_reported_with_the_shortest_path_to_it() {
     let violation = explore(Counter(0), Limits { depth: 9, states: 100 }).unwrap_err();
     assert_eq!(violation.actions.len(), 3, "{violation}");
     assert_eq!(violation.invariant, "seven");

@@ -1,4 +1,4 @@
-//! A slave, node 1, and everything that can be heard on its line.
+//! A slave, node 1, and everything that can be received on its line.
 
 use axlewire::{
     encode::Encode,
@@ -32,11 +32,11 @@ enum Hear {
     Read,
     FirstHalfOfRead,
     SecondHalfOfRead,
-    /// A READ with a byte behind it, in one piece.
+    /// A READ followed by one more byte, in one piece.
     ReadAndByte,
     DamagedRead,
     Write,
-    /// The same as far as its bytes go, but it is no number.
+    /// Like a WRITE, but the value is not a number.
     Nan,
     ForeignRead,
     AnswerFront,
@@ -47,14 +47,13 @@ enum Hear {
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Hear(Hear),
-    /// The driver looks, and sends what is due, if it can.
+    /// The driver runs, and sends what is due, if possible.
     Poll(Option<Unsent>),
     Wait(u32),
     SetMode,
 }
 
-/// Times to wait: a little, past `idle`, up to the end of `answer_within` and past it, past the
-/// watchdog.
+/// Wait times: short, past `idle`, up to the end of `answer_within` and past it, past the watchdog.
 const WAITS: [u32; 5] = [40, 110, 500, 501, 30_000];
 
 const WATCHDOG: Duration = Duration::from_millis(20);
@@ -65,20 +64,20 @@ struct Line<B: Kit> {
     now: Instant,
     config: SlaveConfig,
     mode: Mode,
-    /// The last bytes that were received.
+    /// The last bytes received.
     tail: Vec<u8>,
     heard_at: Instant,
-    /// What was received last is the front of a packet of another node.
+    /// The last bytes received are the first part of another node's packet.
     is_inside: bool,
-    /// It was complete in itself, with nothing open before it, and may be answered once.
+    /// They were a complete request, with nothing open before it, and may be answered once.
     is_clean: bool,
     is_answered: bool,
-    /// The last thing that was received is a WRITE of a board that answers it.
+    /// The last packet received is a WRITE to a board that answers it.
     is_answered_write: bool,
     command: Option<u8>,
     last_command: u8,
     commanded_at: Instant,
-    /// A WRITE that may still be found behind damage.
+    /// A WRITE that may still be found after damaged bytes.
     is_open: bool,
 }
 
@@ -124,7 +123,7 @@ impl<B: Kit> Line<B> {
         .to_vec()
     }
 
-    /// A position whose bytes are no number, in every group of four.
+    /// A position whose bytes are not a number, in every group of four.
     fn nan() -> Vec<u8> {
         let mut buffer = [0; 16];
         let place = B::place(Position::new(0x7FC0, 0x7FC0));
@@ -178,7 +177,7 @@ impl<B: Kit> Line<B> {
         }
     }
 
-    /// What the slave was told last, as a number; 0 for the position in [`Hear::Nan`].
+    /// The slave's last command, as a number; 0 for the position in [`Hear::Nan`].
     fn found(&self) -> Option<u8> {
         let number = |target| {
             if target == self.target(1) { 1 } else { u8::from(target == self.target(2)) * 2 }
@@ -192,7 +191,7 @@ impl<B: Kit> Line<B> {
         let is_expired = self.command.is_some() && self.now >= self.commanded_at + WATCHDOG;
         let is_told = self.slave.poll_event() == Some(SlaveEvent::Watchdog);
         if self.is_open {
-            // Found behind damage, or not: what counts is what the slave has taken.
+            // Found after damage, or not: the slave's own view counts.
             (self.command, self.is_open) = (self.found(), !self.is_in_step());
             if self.slave.command(self.now) != was {
                 self.commanded_at = self.now;
@@ -215,7 +214,7 @@ impl<B: Kit> Line<B> {
             return check_sleep(&self.slave, self.now);
         };
         if !is_last {
-            return Err("an answer, and the last thing heard is no request for it".into());
+            return Err("an answer, but the last packet received is not a request for it".into());
         }
         if self.is_inside {
             return Err("an answer to what is inside another node's packet".into());
@@ -259,7 +258,7 @@ impl<B: Kit> World for Line<B> {
             Act::Poll(unsent) => self.poll(unsent)?,
             Act::Wait(micros) => {
                 self.now += Duration::from_micros(micros);
-                // Behind a silence the slave looks anew at what it holds.
+                // After a silence the slave searches its buffer again.
                 self.is_inside &= self.now < self.heard_at + self.config.idle;
             }
             Act::SetMode => {

@@ -5,8 +5,8 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-/// A driver that sleeps until the role's deadline misses nothing: just before it, and for ten minutes
-/// where there is none, the role has nothing to send.
+/// A driver that sleeps until the role's deadline misses nothing: just before it, or for ten
+/// minutes if there is none, the role has nothing to send.
 pub(crate) fn check_sleep<R: Endpoint + Clone>(role: &R, now: Instant) -> Result<(), String> {
     let last = match role.poll_timeout() {
         Some(at) if at <= now => return Err("a deadline in the past".into()),

@@ -1,4 +1,4 @@
-//! The worlds of the motor bus, and the states in which they start.
+//! The worlds of the motor bus, and their initial states.
 
 use axlewire::{
     ikeya::{
@@ -21,13 +21,13 @@ const BOTH: &[Mode] = &[Mode::Velocity, Mode::Position];
 const POSITIONS: &[Mode] = &[Mode::Position, Mode::Position];
 
 impl<B: Kit> Bus<B> {
-    /// All nodes have been found.
+    /// All nodes have been discovered.
     fn known(modes: &[Mode], config: MasterConfig, menu: Menu) -> Self {
         let found = [Action::Exchange(Exchange::Right)].repeat(modes.len());
         Self::new(modes, config, menu).after(&[Action::Call(Call::Discover)]).after(&found)
     }
 
-    /// Node 1 has got a set-point.
+    /// Node 1 has a set-point.
     fn under_set_point(self) -> Self {
         let exchange = Action::Exchange(Exchange::Right);
         self.after(&[Action::Call(Call::Set(NodeId::N1)), exchange, exchange])
@@ -48,7 +48,7 @@ impl<B: Kit> Bus<B> {
         panic!("node 1 was not asked {times} times");
     }
 
-    /// The switch of node 1 was moved, and the master has heard it.
+    /// The switch of node 1 was moved, and the master has noticed.
     fn in_doubt(mut self) -> Self {
         self = self.after(&[Action::Switch(NodeId::N1)]);
         for _ in 0..4 {
@@ -69,7 +69,7 @@ fn direct() -> MasterConfig {
     MasterConfig::direct()
 }
 
-/// A master that knows nobody, in small steps.
+/// A master that knows no nodes, in small steps.
 pub(crate) fn fresh<B: Kit>(run: &mut Run) {
     let menu = Menu::FINE;
     run.world("fresh, velocity", Depth(3, 7), Bus::<B>::new(VELOCITY, direct(), menu));
@@ -85,7 +85,7 @@ pub(crate) fn small_steps<B: Kit>(run: &mut Run) {
         run.world(&format!("known, {name}"), Depth(2, 6), known.clone());
         let stop = [Action::Send(Fate::Arrives), Action::Call(Call::Stop(NodeId::N1))];
         let asked = known.clone().after(&stop);
-        run.world(&format!("stop while a READ is under way, {name}"), Depth(2, 6), asked);
+        run.world(&format!("stop during a READ, {name}"), Depth(2, 6), asked);
         let owed = known.under_set_point().after(&stop[1..]);
         run.world(&format!("stop owed, {name}"), Depth(2, 6), owed);
     }
@@ -142,7 +142,7 @@ pub(crate) fn settings<B: Kit>(run: &mut Run) {
         let mut manual = direct();
         manual.polling = Polling::Manual;
         let known = Bus::<B>::known(modes, manual, menu);
-        run.world(&format!("by hand, {name}"), Depth(2, 6), known);
+        run.world(&format!("manual, {name}"), Depth(2, 6), known);
         let mut slow = direct();
         slow.polling = Polling::Every(Duration::from_millis(10));
         run.world(&format!("every 10 ms, {name}"), Depth(2, 6), Bus::<B>::known(modes, slow, menu));
@@ -174,10 +174,10 @@ pub(crate) fn two_nodes<B: Kit>(run: &mut Run) {
     }
 }
 
-/// Two known nodes that are commanded and stopped all the time.
+/// Two known nodes that are commanded and stopped continuously.
 pub(crate) fn queues<B: Kit>(run: &mut Run) {
     for (name, modes) in [("both modes", BOTH), ("positions", POSITIONS)] {
-        // Long enough for the cycle to pass a node over.
+        // Long enough for the cycle to skip a node.
         let rounds = [Action::Exchange(Exchange::Right)].repeat(12);
         let known = Bus::<B>::known(modes, direct(), Menu::QUEUE).after(&rounds);
         run.world(&format!("busy queue, {name}"), Depth(3, 9), known);

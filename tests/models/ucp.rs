@@ -10,10 +10,10 @@ use axlewire::{
 
 use super::fingerprint::Merge;
 
-/// What a step has found: `Err` names the invariant.
+/// The result of a step: `Err` names the invariant.
 pub(crate) type Checked = Result<(), String>;
 
-/// What becomes of what a role wants to send now.
+/// The fate of the frames that a role sends now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Fate {
     /// All of it leaves and is flushed.
@@ -24,7 +24,7 @@ pub(crate) enum Fate {
     NotFlushed,
 }
 
-/// Counters, settings that never change, and what has been handed out.
+/// Counters, settings that never change, and data already handed out.
 const SKIPPED: [&str; 11] = [
     "config",
     "stats",
@@ -39,7 +39,7 @@ const SKIPPED: [&str; 11] = [
     "inbox",
 ];
 
-/// An empty inbox is left out: all that it knows then is when bytes came last.
+/// An empty inbox is left out: it then only knows when bytes last arrived.
 pub(crate) fn merge(now: Instant, counters: &Counters) -> Merge {
     let len = SKIPPED.len() - usize::from(pending(counters) > 0);
     Merge { now, skipped: &SKIPPED[..len] }
@@ -57,12 +57,12 @@ pub(crate) fn bytes<B: Body>(body: B) -> Vec<u8> {
     body.frame(0).as_bytes().to_vec()
 }
 
-/// Speed and turn 0, the lamp as it is.
+/// Speed and turn 0, the lamp unchanged.
 pub(crate) fn halted(command: MotorControl) -> MotorControl {
     MotorControl::STOP.with_front_led(command.front_led() == 100)
 }
 
-/// The same frame with a bit of its body turned over.
+/// The same frame with one bit of its body flipped.
 pub(crate) fn damaged(mut frame: Vec<u8>) -> Vec<u8> {
     frame[6] ^= 0x10;
     frame
@@ -75,23 +75,23 @@ pub(crate) fn unknown() -> Vec<u8> {
     frame
 }
 
-/// The events that wait in a role, in their order.
+/// The events that wait in a role, in order.
 pub(crate) fn queue<R: Endpoint + Clone>(role: &R) -> Vec<R::Event> {
     let mut copy = role.clone();
     std::iter::from_fn(|| copy.poll_event()).collect()
 }
 
-/// Frames on their way through a decoder, which holds them back behind half a frame.
+/// Frames on their way through a decoder, which holds them back after half a frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Feed<H> {
-    /// With their lengths; `true` for one that came in two halves and may be given up.
+    /// With their lengths; `true` for one that came in two halves and may be dropped.
     held: Vec<(H, u64, bool)>,
     framed: u64,
-    /// When the oldest of the bytes that are held back had arrived.
+    /// Arrival time of the oldest byte held back.
     since: Instant,
     /// The newest of them is arriving.
     has_new: bool,
-    /// The last thing received is the front of a frame.
+    /// The last thing received is the first part of a frame.
     pub(crate) is_half: bool,
 }
 
@@ -105,7 +105,7 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
         !self.held.is_empty()
     }
 
-    /// This many bytes have arrived, and have been looked at.
+    /// This many bytes have arrived and been searched.
     pub(crate) fn took(&mut self, len: usize, counters: &Counters, now: Instant) {
         if pending(counters) <= len as u64 {
             self.since = now;
@@ -117,8 +117,8 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
         self.has_new = true;
     }
 
-    /// What the role must have taken in by now (ruling B2), and how old it counts: one that was
-    /// held back whole is as old as the first byte that was.
+    /// What the role must have received by now (ruling B2), with its effective age: a whole frame
+    /// that was held back is as old as the first byte held back.
     pub(crate) fn arrived(
         &mut self,
         counters: &Counters,
@@ -127,9 +127,9 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
         let mut news = counters.framed - std::mem::replace(&mut self.framed, counters.framed);
         let mut arrived = Vec::new();
         while news > 0 {
-            // One that came in halves was given up if the next is already there.
+            // One that came in halves was dropped if the next one has arrived.
             let index = self.held.iter().position(|(_, len, _)| *len <= news);
-            let index = index.ok_or("a frame that nobody has sent")?;
+            let index = index.ok_or("a frame that was never sent")?;
             if self.held.drain(..index).any(|(_, _, is_in_halves)| !is_in_halves) {
                 return Err("a whole frame was lost".into());
             }
@@ -146,7 +146,7 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
     }
 }
 
-/// What has happened is never taken back: what waited is still there, or was handed out.
+/// Events are never taken back: a waiting one is still there, or was handed out.
 pub(crate) fn check_kept<E: PartialEq + std::fmt::Debug>(
     before: &[E],
     popped: &[E],

@@ -1,4 +1,4 @@
-//! A master, a slave and a host behind drivers whose ports fail: what stops all the same.
+//! A master, a slave and a host behind drivers whose ports fail: what still stops.
 
 use std::{
     cell::{Cell, RefCell},
@@ -28,7 +28,7 @@ use crate::{
     virtual_time::{End, VirtualClock, Wakes, World},
 };
 
-// What a user calls.
+// The calls under test.
 
 fn set_velocity(bus: &mut Bus, value: f32) -> Result<(), DriveError<Unplugged>> {
     bus.set_velocity(NodeId::N1, Rps::new(value).unwrap())
@@ -45,7 +45,7 @@ fn stop(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> 
 
 type Bus = Driver<Master, End, VirtualClock>;
 
-/// A master and node 1 with its motor, which runs whenever the world does.
+/// A master and node 1 with its motor, which runs whenever virtual time advances.
 struct Story {
     world: World,
     bus: Bus,
@@ -72,7 +72,7 @@ impl Story {
         Self { world, bus, node }
     }
 
-    /// One whose velocity node has been found and turns at 10 rps.
+    /// A story whose velocity node has been found and turns at 10 rps.
     fn at_10_rps(config: MasterConfig) -> Self {
         let mut story = Self::new(config, Mode::Velocity);
         story.bus.discover().unwrap();
@@ -82,12 +82,12 @@ impl Story {
         story
     }
 
-    /// Lets the motor run while nobody calls the driver.
+    /// Lets the motor run without calling the driver.
     fn pass(&self, millis: u32) {
         (0..10 * millis).for_each(|_| self.world.step(100));
     }
 
-    /// Goes on with the driver, whatever it says.
+    /// Runs the driver, ignoring its errors.
     fn run(&mut self, millis: u32) {
         let end = self.world.now() + Duration::from_millis(millis);
         while self.world.now() < end {
@@ -96,7 +96,7 @@ impl Story {
         }
     }
 
-    /// The node takes part in nothing any more; what it was told last it does on.
+    /// The node no longer takes part in anything; it continues its last command.
     fn unplug_node(&self) {
         self.node.borrow().port().unplugged.set(true);
     }
@@ -116,7 +116,7 @@ fn with_polling(polling: Polling) -> MasterConfig {
     config
 }
 
-// Stops that are told to have happened
+// Stops that are reported as done
 
 #[test]
 fn a_stop_after_a_pause_of_the_driver_leaves_a_position_node_where_it_is() {
@@ -125,11 +125,11 @@ fn a_stop_after_a_pause_of_the_driver_leaves_a_position_node_where_it_is() {
     story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
     story.pass(2000);
     let before = story.revolutions();
-    assert!(before > 9.0, "it is on its way");
+    assert!(before > 9.0, "it is not moving");
     stop(&mut story, false).unwrap();
     story.run(3000);
     let way = story.revolutions() - before;
-    assert!(way.abs() < 1.0, "the shaft runs back to where it was long ago: {way} turns");
+    assert!(way.abs() < 1.0, "the shaft returned to an old position: {way} turns");
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn a_stop_of_an_abnormal_node_is_no_success() {
         story.run(200);
         assert_eq!(story.bus.role().health(NodeId::N1), Some(Health::Abnormal));
         let stopped = stop(&mut story, is_async);
-        assert!(stopped.is_err(), "an abnormal node is said to have stopped");
+        assert!(stopped.is_err(), "an abnormal node is reported as stopped");
     }
 }
 
@@ -148,7 +148,7 @@ fn a_stop_of_an_abnormal_node_is_no_success() {
 fn a_stop_of_all_on_a_fresh_master_is_no_success() {
     let mut story = Story::new(MasterConfig::direct(), Mode::Velocity);
     let stopped = story.bus.stop_all();
-    assert!(stopped.is_err(), "nobody was asked and everything is said to have stopped");
+    assert!(stopped.is_err(), "no node was asked, but all are reported as stopped");
 }
 
 #[test]
@@ -158,10 +158,10 @@ fn a_stop_of_all_on_a_fresh_master_stops_whatever_answers() {
     let _ = story.bus.stop_all();
     story.run(1000);
     let is_still = story.rps().abs() < 0.05;
-    assert!(is_still, "a motor that the last master has left turning turns on");
+    assert!(is_still, "a motor left turning by the last master keeps turning");
 }
 
-// Receivers that fail
+// Failing receivers
 
 #[test]
 fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_motor() {
@@ -169,11 +169,11 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_motor() {
         let mut story = Story::at_10_rps(MasterConfig::direct());
         story.bus.port_mut().is_deaf = true;
         for _ in 0..20 {
-            assert!(stop(&mut story, is_async).is_err(), "nothing can be heard");
+            assert!(stop(&mut story, is_async).is_err(), "nothing can be received");
             story.world.step(500);
         }
         story.pass(1000);
-        assert!(story.rps().abs() < 0.05, "twenty stops and the motor runs on");
+        assert!(story.rps().abs() < 0.05, "twenty stops, but the motor keeps running");
     }
 }
 
@@ -191,12 +191,12 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
                 true => world.block_on(rover.stop_async()),
                 false => rover.stop(),
             };
-            assert_eq!(stopped, Ok(()), "nothing can be heard, but the stop has left");
+            assert_eq!(stopped, Ok(()), "nothing can be received, but the stop has left");
             world.step(100);
         }
         // The first frame is a motor command.
         let id = rover.port().written.get(4);
-        assert_eq!(id, Some(&2), "a thousand stops and not a byte");
+        assert_eq!(id, Some(&2), "a thousand stops, but not a byte");
     }
 }
 
@@ -241,7 +241,7 @@ fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
             world.step(10);
         }
         assert_eq!(node.role().statistics().replies, 1);
-        assert!(!pin.0.get(), "the pair is jammed for all");
+        assert!(!pin.0.get(), "the driver stays enabled and blocks the bus");
     }
 }
 
@@ -265,7 +265,7 @@ fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
     let (mut pauses, mut woken) = (0, 0);
     while careless.as_mut().poll(&mut Context::from_waker(&waker)).is_pending() {
         pauses += 1;
-        assert!(pauses < 1_000_000, "it does not wake up any more");
+        assert!(pauses < 1_000_000, "it never wakes up");
         if wakes.count() == woken {
             // It waits for time to pass.
             world.step(20);
@@ -275,7 +275,7 @@ fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
     assert!(pauses >= 100, "a loop that ignores errors lets no other task run");
 }
 
-// Senders that fail
+// Failing senders
 
 #[test]
 fn a_set_point_of_which_no_byte_has_left_is_not_sent_late() {
@@ -289,7 +289,7 @@ fn a_set_point_of_which_no_byte_has_left_is_not_sent_late() {
     let old = WriteRequest::velocity(NodeId::N1, Rps::new(10.0).unwrap());
     let mut written = story.bus.port().written.windows(WriteRequest::LEN);
     let is_sent = written.any(|packet| packet == old.as_bytes());
-    assert!(!is_sent, "a set-point of ten seconds ago goes out before the stop");
+    assert!(!is_sent, "a ten-second-old set-point is sent before the stop");
 }
 
 #[test]
@@ -301,5 +301,5 @@ fn a_stop_whose_packet_was_discarded_is_written_again() {
     story.bus.port_mut().is_mute = false;
     story.run(1000);
     let is_still = story.rps().abs() < 0.05;
-    assert!(is_still, "the stop is discarded for good and the motor runs on");
+    assert!(is_still, "the stop is discarded for good, and the motor keeps running");
 }

@@ -1,4 +1,4 @@
-//! The host of a rover, by itself and behind a driver: what is owed, what is kept, what is fresh.
+//! The host of a rover, alone and behind a driver: what is owed, what is kept, what is current.
 
 use std::{cell::RefCell, rc::Rc};
 
@@ -23,7 +23,7 @@ use crate::{
     virtual_time::{End, VirtualClock, World},
 };
 
-// What a user calls.
+// The calls under test.
 
 fn host<S: BiasStore>(store: S, now: Instant) -> Host<S> {
     let mut config = HostConfig::default();
@@ -31,14 +31,14 @@ fn host<S: BiasStore>(store: S, now: Instant) -> Host<S> {
     Host::with_store(config, store, now)
 }
 
-/// A host behind a driver whose port does what a test says.
+/// A host behind a driver whose port is controlled by the test.
 fn scripted() -> (World, Driver<Host, Script, VirtualClock>) {
     let world = World::default();
     let clock = VirtualClock(world.clone());
     (world.clone(), Driver::new(host(NoStore, world.now()), Script::default(), clock))
 }
 
-// What the far end says and hears.
+// What the far end sends and receives.
 
 fn ms(millis: u64) -> Instant {
     Instant::from_millis(millis)
@@ -64,7 +64,7 @@ fn events<R: Endpoint>(role: &mut R) -> Vec<R::Event> {
     core::iter::from_fn(|| role.poll_event()).collect()
 }
 
-/// The speeds of the motor commands among these bytes.
+/// The speeds of the motor commands in these bytes.
 fn speeds(written: &[u8]) -> Vec<i16> {
     let frames = Frames::<Ucp>::new(written);
     let speeds = frames.filter_map(|frame| match frame.message() {
@@ -84,7 +84,7 @@ fn a_command_of_which_no_byte_has_left_is_not_sent_late() {
     world.step(10_000_000);
     rover.stop().unwrap();
     let is_sent = speeds(&rover.port().written).contains(&100);
-    assert!(!is_sent, "a command of ten seconds ago goes out before the stop");
+    assert!(!is_sent, "a ten-second-old command is sent before the stop");
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn a_stop_whose_frame_was_discarded_goes_out_with_the_next_stop() {
     assert_eq!(last, Some(0), "stop is Ok with nothing on the line");
 }
 
-// What is discarded
+// Discarded frames
 
 #[test]
 fn a_network_state_whose_frame_was_discarded_is_sent_again() {
@@ -118,12 +118,12 @@ fn a_network_state_whose_frame_was_discarded_is_sent_again() {
     }
     let mut frames = Frames::<Ucp>::new(&rover.port().written);
     let is_sent = frames.any(|frame| matches!(frame.message(), Message::SetNetworkState(_)));
-    assert!(is_sent, "the lamp never shows the state that the host has on record");
+    assert!(is_sent, "the lamp never shows the recorded state");
 }
 
 // Results
 
-/// Hands in the result of a calibration; has it been acknowledged?
+/// Passes in the result of a calibration; returns whether it has been acknowledged.
 fn is_acknowledged<S: BiasStore>(host: &mut Host<S>, bias: ImuBias, now: Instant) -> bool {
     host.handle_input(&bytes(bias), now);
     let is_ack =
@@ -140,7 +140,7 @@ fn reports_that_nobody_takes_out_do_not_cost_a_result() {
     }
     is_acknowledged(&mut host, imu(1), ms(400));
     let is_told = events(&mut host).contains(&HostEvent::ImuBias(imu(1)));
-    assert!(is_told, "reports have taken the room of the result");
+    assert!(is_told, "reports took the room of the result");
 }
 
 #[test]
@@ -151,12 +151,12 @@ fn a_result_is_acknowledged_only_when_the_application_will_find_it() {
     }
     let mut was_acknowledged = is_acknowledged(&mut host, imu(1), ms(0));
     let mut told = events(&mut host);
-    // The robot sends it again, if it was not acknowledged.
+    // The robot sends it again if it was not acknowledged.
     was_acknowledged |= is_acknowledged(&mut host, imu(1), ms(1000));
     told.extend(events(&mut host));
     assert!(was_acknowledged);
     let is_told = told.contains(&HostEvent::ImuBias(imu(1)));
-    assert!(is_told, "the result is acknowledged and nobody will ever see it");
+    assert!(is_told, "the result is acknowledged, but never reaches the application");
 }
 
 #[test]
@@ -186,13 +186,13 @@ fn the_answer_to_a_start_is_not_taken_for_the_answer_to_an_end() {
         embedded_io::Write::write(&mut far, &answer).unwrap();
         world.step(2000);
         rover.service().unwrap();
-        // From here on nobody speaks.
+        // From here on the line is silent.
         let deadline = world.now() + Duration::from_millis(2000);
         let ended = match is_async {
             true => world.block_on(rover.end_calibration_async(kind, deadline)),
             false => rover.end_calibration(kind, deadline),
         };
-        assert!(ended.is_err(), "a silent robot is said to have ended its calibration");
+        assert!(ended.is_err(), "a silent robot is reported to have ended its calibration");
     }
 }
 
@@ -206,7 +206,7 @@ fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
     let robot = Rc::new(RefCell::new(Driver::new(robot, far, VirtualClock(world.clone()))));
     let time = world.clone();
     world.add(move || {
-        // The heading says when it was measured, in hundredths of a second.
+        // The heading encodes the measurement time, in hundredths of a second.
         let heading_deg = (time.now().as_micros() / 10_000) as i16;
         let telemetry = Telemetry { heading_deg, ..Telemetry::default() };
         let mut robot = robot.borrow_mut();
@@ -223,5 +223,5 @@ fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
         let measured_ms = 10 * u64::from(report.telemetry.heading_deg.unsigned_abs());
         age_ms = world.now().as_micros() / 1000 - measured_ms;
     }
-    assert!(age_ms <= 200, "reports are taken that are long out of date: {age_ms} ms");
+    assert!(age_ms <= 200, "outdated reports are returned: {age_ms} ms");
 }

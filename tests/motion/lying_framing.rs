@@ -1,4 +1,4 @@
-//! A framing that refuses more bytes than there are does not take a decoder beyond its input.
+//! A framing that rejects more bytes than are available does not make a decoder run past its input.
 
 use std::{cell::Cell, panic::catch_unwind};
 
@@ -8,7 +8,7 @@ thread_local! {
     static JUDGED: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Refuses everything behind two bytes, however much there will be.
+/// Rejects everything after two bytes, without limit.
 #[derive(Debug)]
 enum Boundless {}
 
@@ -20,7 +20,7 @@ impl Framing for Boundless {
 
     fn judge(bytes: &[u8]) -> Verdict {
         JUDGED.set(JUDGED.get() + 1);
-        assert!(JUDGED.get() < 1000, "the search does not get on");
+        assert!(JUDGED.get() < 1000, "the search makes no progress");
         match bytes.len() {
             len @ 0..2 => Verdict::Partial { need: len + 1 },
             _ => Verdict::Reject { reason: Reason::Crc, more: usize::MAX },
@@ -37,16 +37,16 @@ fn has_refused(counters: Counters, len: u64) -> bool {
 }
 
 #[test]
-fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_slice() {
+fn a_framing_that_rejects_without_bound_stops_at_the_end_of_the_slice() {
     let searched = catch_unwind(|| {
         let mut frames = Frames::<Boundless>::new(&[1, 2, 3]);
         frames.next().is_none() && has_refused(frames.counters(), 3)
     });
-    assert!(matches!(searched, Ok(true)), "the length of a refusal overflows in a slice");
+    assert!(matches!(searched, Ok(true)), "the length of a rejection overflows in a slice");
 }
 
 #[test]
-fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_chunk() {
+fn a_framing_that_rejects_without_bound_stops_at_the_end_of_the_chunk() {
     for chunk in 1..=6 {
         let searched = catch_unwind(|| {
             let mut decoder = Decoder::<Boundless, 8>::new();
@@ -60,6 +60,6 @@ fn a_framing_that_refuses_without_bound_ends_at_the_end_of_the_chunk() {
             let counters = decoder.counters();
             (counters.received, counters.skipped()) == (6, 6)
         });
-        assert!(matches!(searched, Ok(true)), "the length of a refusal overflows in a decoder");
+        assert!(matches!(searched, Ok(true)), "the length of a rejection overflows in a decoder");
     }
 }

@@ -1,4 +1,4 @@
-//! The master: what it writes to whom, and when it may not.
+//! The master: what it writes to which node, and when it must not.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -10,7 +10,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-// What a user calls.
+// The calls under test.
 
 fn discover(master: &mut Master, now: Instant) {
     master.discover(now);
@@ -77,7 +77,7 @@ impl Answer {
     }
 }
 
-/// A master, the time, and what the nodes answer.
+/// A master, the time, and the nodes' answers.
 struct Desk {
     master: Master,
     now: Instant,
@@ -86,7 +86,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// A master that has found these nodes.
+    /// A master that has discovered these nodes.
     fn new(config: MasterConfig, nodes: &[(NodeId, Answer)]) -> Self {
         let now = Instant::from_millis(1000);
         let master = Master::new(config, now);
@@ -104,7 +104,7 @@ impl Desk {
         self.answers[usize::from(node.get()) - 1] = answer;
     }
 
-    /// Goes on to the next packet, and past the answer or the end of the window if it is a READ;
+    /// Advances to the next packet, and, for a READ, past the answer or the end of the window;
     /// `None` if there is nothing to do.
     fn packet(&mut self) -> Option<Vec<u8>> {
         let sent = self.sent()?;
@@ -119,7 +119,7 @@ impl Desk {
         Some(sent)
     }
 
-    /// Goes on to the next packet, and no further.
+    /// Advances to the next packet, and no further.
     fn sent(&mut self) -> Option<Vec<u8>> {
         for _ in 0..100 {
             if let Some(bytes) = self.master.poll_transmit(self.now) {
@@ -131,7 +131,7 @@ impl Desk {
         panic!("nothing is ever sent");
     }
 
-    /// The next packets, no more than this.
+    /// The next packets, at most this many.
     fn packets(&mut self, most: usize) -> Vec<Vec<u8>> {
         core::iter::from_fn(|| self.packet()).take(most).collect()
     }
@@ -149,7 +149,7 @@ impl Desk {
 
 const TURNING: (NodeId, Answer) = (NodeId::N1, Answer::Velocity(0.0));
 
-/// A velocity node with a set-point, that has just answered as a position node at 7 turns.
+/// A velocity node with a set-point that has just answered as a position node at 7 turns.
 fn in_doubt() -> Desk {
     let mut desk = Desk::new(MasterConfig::direct(), &[TURNING]);
     set_velocity(&mut desk.master, NodeId::N1, 1.0, desk.now).unwrap();
@@ -185,7 +185,7 @@ fn a_stop_of_an_abnormal_position_node_waits_for_its_next_answer() {
     assert_eq!(writes(&desk.packets(4)), [[0; 0]; 0], "an hour-old position is written");
     desk.set(NodeId::N3, Answer::Position(turns(40)));
     let hold = WriteRequest::position(NodeId::N3, turns(40)).as_bytes().to_vec();
-    assert_eq!(writes(&desk.packets(6)).first(), Some(&hold), "it holds where it was heard to be");
+    assert_eq!(writes(&desk.packets(6)).first(), Some(&hold), "it holds its reported position");
 }
 
 // The mode
@@ -197,7 +197,7 @@ fn nothing_is_written_while_the_mode_of_a_node_is_in_doubt() {
     let hold = WriteRequest::position(NodeId::N1, turns(7)).as_bytes().to_vec();
     let written = writes(&desk.packets(6));
     let is_held = written.iter().all(|write| *write == hold);
-    assert!(is_held, "1.0 rps goes out to a node that reads it as 16256 turns: {written:02x?}");
+    assert!(is_held, "1.0 rps is sent to a node that reads it as 16256 turns: {written:02x?}");
 }
 
 #[test]
@@ -209,7 +209,7 @@ fn an_answer_in_another_mode_confirms_nothing() {
     desk.packets(10);
     let confirmed = MasterEvent::Confirmed { node: NodeId::N1 };
     let is_told = desk.events.contains(&confirmed);
-    assert!(!is_told, "the set-point of the old mode is said to be confirmed");
+    assert!(!is_told, "the set-point of the old mode is reported as confirmed");
 }
 
 #[test]
@@ -224,7 +224,7 @@ fn a_stop_while_the_mode_is_in_doubt_is_never_go_to_0() {
 fn a_set_point_is_refused_while_the_mode_is_in_doubt() {
     let mut desk = in_doubt();
     let taken = set_velocity(&mut desk.master, NodeId::N1, 2.0, desk.now);
-    assert!(taken.is_err(), "the set-point is kept for whatever mode it will be");
+    assert!(taken.is_err(), "the set-point is kept for an unknown mode");
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn a_late_answer_in_another_mode_puts_the_mode_in_doubt() {
     desk.set(NodeId::N1, late);
     desk.hear(10, &late.of(NodeId::N1).unwrap());
     let next = desk.packet().unwrap();
-    assert_eq!(next[0], READ, "the late answer in the other mode is not believed");
+    assert_eq!(next[0], READ, "the late answer in the other mode is ignored");
 }
 
 // A stop that is owed
@@ -276,7 +276,7 @@ fn a_stop_that_a_pulled_cable_has_swallowed_is_given_again_when_the_node_is_back
     let now = line.now();
     stop(line.head_mut(), NodeId::N1, now);
     let rps = rps_after_its_return(line);
-    assert!(rps.abs() < 0.05, "the stop is forgotten and the motor runs on");
+    assert!(rps.abs() < 0.05, "the stop is forgotten, and the motor keeps running");
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn a_node_that_became_abnormal_under_a_set_point_is_stopped_when_it_is_back() {
     let mut line = at_10_rps();
     pull_out(&mut line, true);
     let rps = rps_after_its_return(line);
-    assert!(rps.abs() < 0.05, "the motor runs on and nobody commands it");
+    assert!(rps.abs() < 0.05, "the motor keeps running without a command");
 }
 
 #[test]
@@ -292,7 +292,7 @@ fn a_stop_is_written_until_two_have_been_followed_by_an_answer_in_manual_polling
     let mut desk = Desk::new(with_polling(Polling::Manual), &[TURNING]);
     stop(&mut desk.master, NodeId::N1, desk.now);
     let order: Vec<_> = desk.packets(4).iter().map(|packet| packet[0]).collect();
-    assert_eq!(order, [WRITE, READ, WRITE, READ], "one lost packet and the motor runs on");
+    assert_eq!(order, [WRITE, READ, WRITE, READ], "after one lost packet the motor keeps running");
 }
 
 // Answers
@@ -329,7 +329,7 @@ fn an_answer_that_is_whole_before_its_request_has_left_is_no_answer() {
     assert_eq!(desk.sent().unwrap()[0], READ);
     desk.hear(1, &Answer::Velocity(9.0).of(NodeId::N1).unwrap());
     let told = desk.master.poll_event();
-    assert_eq!(told, None, "an answer from before its request counts as fresh");
+    assert_eq!(told, None, "an answer from before its request counts as current");
 }
 
 #[test]
@@ -342,5 +342,5 @@ fn a_confirmation_that_was_asked_for_comes_to_an_end_when_the_node_is_released()
     let is_end = |event: &MasterEvent| {
         matches!(event, MasterEvent::Confirmed { .. } | MasterEvent::NotConfirmed { .. })
     };
-    assert!(desk.events.iter().any(is_end), "nobody will ever hear of the confirmation");
+    assert!(desk.events.iter().any(is_end), "the confirmation is never reported");
 }

@@ -1,4 +1,4 @@
-//! Frames that must not be sent are refused, however their bytes came about.
+//! Frames that must not be sent are refused, however their bytes were created.
 
 use axlewire::{
     encode::Encode,
@@ -16,14 +16,14 @@ fn a_frame_cast_from_bytes_is_not_sent_under_an_id_that_is_not_its_bodys() {
     bytes[4] = 5;
     let crc = axlewire::crc16::compute(&bytes[..6]).to_le_bytes();
     bytes[6..].copy_from_slice(&crc);
-    // A cast that refuses the id is right as well.
+    // A cast that refuses the id is also correct.
     let cast = FrameOf::<Ping>::try_read_from_bytes(&bytes).ok();
     let mut buffer = [0; 64];
     let sent = cast.and_then(|frame| frame.encode(&mut buffer).ok());
-    assert_eq!(sent, None, "a ping that says it is a report is sent");
+    assert_eq!(sent, None, "a ping with the id of a report is sent");
 }
 
-/// A motor command as a careless sender makes it: 130 %, version 99.
+/// A motor command from a careless sender: 130 %, version 99.
 fn careless() -> [u8; 16] {
     let mut body = [0; 16];
     (body[0], body[8]) = (130, 99);
@@ -32,7 +32,7 @@ fn careless() -> [u8; 16] {
 
 #[test]
 fn a_motor_command_cast_from_bytes_neither_starts_an_update_nor_is_out_of_range() {
-    // No bytes can be cast to a command that can be framed, only to a received one.
+    // Bytes can only be cast to a received command, never to one that can be framed.
     let received: RawMotorControl = zerocopy::transmute!(careless());
     assert!(received.starts_update());
     let refused = EncodeError::StartsUpdate { version: 99 };
@@ -54,7 +54,7 @@ fn a_motor_command_copied_from_a_received_frame_is_not_sent_as_it_is() {
         panic!("it is a motor command");
     };
     assert!(MotorControl::try_from(*command).is_err());
-    // In range and without an update, only speed, turn and lamp are taken over.
+    // In range and without an update, only speed, turn and lamp are copied.
     let mut body = [0xFF_u8; 16];
     body[..6].copy_from_slice(&[50, 0, 0xF6, 0xFF, 1, 0]);
     let received: RawMotorControl = zerocopy::transmute!(body);

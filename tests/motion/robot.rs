@@ -1,4 +1,4 @@
-//! The robot, by itself and behind a driver: which command is in force, and what was told.
+//! The robot, alone and behind a driver: which command is in force, and what was reported.
 
 use axlewire::{
     drive::Driver,
@@ -17,7 +17,7 @@ use embedded_io::Write;
 
 use crate::virtual_time::{End, VirtualClock, World};
 
-// What a user calls.
+// The calls under test.
 
 fn robot(now: Instant) -> Robot {
     Robot::new(RobotConfig::default(), now)
@@ -49,8 +49,8 @@ fn events(robot: &mut Robot) -> Vec<RobotEvent> {
 
 // Commands
 
-/// A robot whose application drives at 50 and was then held up for 400 ms, in which twenty commands
-/// and behind them this one came.
+/// A robot whose application drives at 50 and was then held up for 400 ms, during which twenty
+/// commands arrived, then this one.
 fn held_up(last: i16) -> (World, Driver<Robot, End, VirtualClock>, End) {
     let world = World::default();
     let (near, mut far) = End::pair(&world, 87);
@@ -73,7 +73,7 @@ fn the_command_that_is_handed_out_after_a_pause_is_the_one_in_force() {
     let deadline = world.now() + Duration::from_millis(100);
     let command = robot.next_command(deadline).unwrap().map(|command| command.speed());
     assert_eq!(robot.role().command(world.now()).speed(), 33);
-    assert_eq!(command, Some(33), "a command that has been replaced is handed out");
+    assert_eq!(command, Some(33), "a replaced command is handed out");
 }
 
 #[test]
@@ -91,27 +91,27 @@ fn a_stop_is_handed_out_however_many_commands_came_before_it() {
             speed = command.unwrap().map_or(speed, |command| command.speed());
         }
         assert_eq!(robot.role().command(world.now()).speed(), 0);
-        assert_eq!(speed, 0, "the application drives on although it was told to stop");
+        assert_eq!(speed, 0, "the application keeps driving after a stop");
     }
 }
 
-// What was told
+// Reported events
 
-/// Fills the queue of events, of which nobody takes one out.
+/// Fills the event queue; no event is taken.
 fn flood(robot: &mut Robot, now: Instant) {
     let state = SetNetworkState::new(NetworkState::Connected).unwrap();
     (0..20).for_each(|_| robot.handle_input(&bytes(state), now));
 }
 
 #[test]
-fn biases_are_asked_for_until_the_application_will_find_them() {
+fn biases_are_requested_until_the_application_will_find_them() {
     let mut robot = robot(ms(0));
     let biases = Biases::new(ImuBias::new([1; 3], [2; 3]), MagBias::new([3; 3]));
-    assert!(!sent(&mut robot, ms(0)).is_empty(), "it asks");
+    assert!(!sent(&mut robot, ms(0)).is_empty(), "it sends a request");
     flood(&mut robot, ms(10));
     robot.handle_input(&bytes(biases), ms(20));
     let mut told = events(&mut robot);
-    // The host answers as often as it is asked.
+    // The host answers every request.
     for now in 1..=5 {
         let is_request = |frame: &Vec<u8>| {
             matches!(Frame::parse(frame).unwrap().message(), Message::BiasRequest(_))
@@ -122,7 +122,7 @@ fn biases_are_asked_for_until_the_application_will_find_them() {
         told.extend(events(&mut robot));
     }
     let is_told = told.contains(&RobotEvent::Biases(biases));
-    assert!(is_told, "the biases are lost and the robot asks no more");
+    assert!(is_told, "the biases are lost, and the robot stops requesting");
 }
 
 #[test]
@@ -134,12 +134,12 @@ fn a_calibration_start_is_acknowledged_only_when_the_application_will_find_it() 
         sent(&mut robot, ms(200 * now));
     }
     let mut told = events(&mut robot);
-    // Once more, for a host that has not had its acknowledgement.
+    // Again, for a host that has not received its acknowledgement.
     robot.handle_input(&bytes(start), ms(2200));
     told.extend(events(&mut robot));
     let is_told = told
         .contains(&RobotEvent::CalibrationStart { kind: CalibrationKind::Imu, repeated: false });
-    assert!(is_told, "the start is acknowledged ten times and never told");
+    assert!(is_told, "the start is acknowledged ten times, but never reported");
 }
 
 #[test]
@@ -154,5 +154,5 @@ fn a_calibration_whose_result_was_delivered_is_over() {
     assert!(events(&mut robot).contains(&RobotEvent::ImuBiasTaken));
     robot.handle_input(&bytes(start), ms(3_600_000));
     let is_told = events(&mut robot).contains(&begun);
-    assert!(is_told, "the new start is acknowledged and not told");
+    assert!(is_told, "the new start is acknowledged, but not reported");
 }

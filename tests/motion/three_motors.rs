@@ -1,4 +1,4 @@
-//! The master of three-motor boards: nobody waits for ever.
+//! The master of three-motor boards: no board waits forever.
 
 use axlewire::{
     endpoint::Endpoint,
@@ -6,7 +6,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-// What a user calls.
+// The calls under test.
 
 fn set_velocity(master: &mut Master<ThreeMotors>, node: NodeId, now: Instant) {
     master.set_velocity(node, [Rps::new(1.0).unwrap(); 3], now).unwrap();
@@ -15,7 +15,7 @@ fn set_velocity(master: &mut Master<ThreeMotors>, node: NodeId, now: Instant) {
 const WRITE: u8 = 0xBB;
 
 /// Three-motor boards 1 and 8, of which 1 gets a new set-point before each packet: the headers of
-/// what went to board 8 after `begin`.
+/// the packets to board 8 after `begin`.
 fn sent_beside_a_control_loop(begin: impl FnOnce(&mut Master<ThreeMotors>, Instant)) -> Vec<u8> {
     let mut now = Instant::from_millis(1000);
     let mut master: Master<ThreeMotors> = Master::new(MasterConfig::direct(), now);
@@ -48,11 +48,11 @@ fn sent_beside_a_control_loop(begin: impl FnOnce(&mut Master<ThreeMotors>, Insta
 #[test]
 fn a_control_loop_on_one_three_motor_board_does_not_hold_up_the_stop_of_another() {
     let sent = sent_beside_a_control_loop(|master, now| master.stop(NodeId::N8, now));
-    assert!(sent.contains(&WRITE), "the stop of node 8 waits for ever");
+    assert!(sent.contains(&WRITE), "the stop of node 8 waits forever");
 }
 
 #[test]
 fn a_control_loop_on_one_three_motor_board_does_not_keep_the_others_from_being_read() {
     let sent = sent_beside_a_control_loop(|_, _| ());
-    assert!(sent.len() >= 100, "node 8 is never asked");
+    assert!(sent.len() >= 100, "node 8 is hardly ever read");
 }

@@ -19,7 +19,7 @@ fn a_pause_or_a_full_buffer_ends_a_piece_of_dma() {
 }
 
 #[test]
-fn a_usb_adapter_hands_in_after_its_latency_timer_or_when_it_is_full() {
+fn a_usb_adapter_delivers_after_its_latency_timer_or_when_it_is_full() {
     let mut line = one_way(500_000, 0, &[0; 70]);
     line.timing_mut(Who::Tail(0)).input = Input::usb_adapter();
     line.run_for(Duration::from_millis(50)).unwrap();

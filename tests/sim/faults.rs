@@ -1,4 +1,4 @@
-//! Faults of a line and of its stubs: each is there as often as asked, and where it was asked for.
+//! Faults of a line and of its stubs: each occurs at the requested rate and place.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use axlewire::{
 use crate::talker::{Talker, at, one_way, random_bytes, us};
 
 #[test]
-fn bits_are_wrong_as_often_as_asked() {
+fn bits_are_flipped_at_the_requested_rate() {
     let sent = random_bytes(50_000);
     let mut line = one_way(500_000, 1, &sent);
     *line.pair_mut(Direction::ToTails) = Faults::noise(0.01);
@@ -30,7 +30,7 @@ fn after(faults: impl Fn(&mut Faults)) -> (usize, PairStatistics) {
 }
 
 #[test]
-fn bytes_are_lost_doubled_and_inserted_as_often_as_asked() {
+fn bytes_are_lost_doubled_and_inserted_at_the_requested_rate() {
     let expected = 9_700..10_300;
     let (len, statistics) = after(|faults| faults.lost = 0.1);
     assert!(expected.contains(&statistics.lost), "{statistics:?}");
@@ -92,7 +92,7 @@ fn delay_and_jitter_keep_the_order() {
 }
 
 #[test]
-fn the_answer_of_a_delayed_stub_comes_onto_the_pair_later() {
+fn the_answer_of_a_delayed_stub_arrives_later() {
     let mut line = one_way(500_000, 0, b"");
     line.add(Talker::saying(at(0), b"late"));
     line.tail_mut(0).say(at(0), b"soon");
@@ -115,12 +115,12 @@ fn an_echoing_adapter_hears_its_own_bytes() {
     line.stub_mut(Who::Head).echo = true;
     line.stub_mut(Who::Head).unplugged = true;
     line.run_for(us(1000)).unwrap();
-    assert_eq!(line.head().bytes(), b"own"); // the adapter is well, the cable is not
+    assert_eq!(line.head().bytes(), b"own"); // the adapter works, the cable does not
     assert_eq!(line.tail(0).bytes(), b"");
 }
 
 #[test]
-fn what_is_unplugged_hears_and_says_nothing_until_it_is_plugged_in_again() {
+fn an_unplugged_station_neither_receives_nor_sends_until_it_is_plugged_in_again() {
     let mut line = one_way(500_000, 0, &[1; 10]);
     line.add(Talker::saying(at(0), &[2; 10]));
     line.stub_mut(Who::Tail(1)).unplugged = true;

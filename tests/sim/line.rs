@@ -1,4 +1,4 @@
-//! A line without faults: how long bytes take, who hears whom, and what its trace and its seed say.
+//! A line without faults: how long bytes take, which stations receive them, its trace and its seed.
 
 use axlewire::{
     sim::{Direction, Faults, Line, Who},
@@ -71,7 +71,7 @@ fn an_unplugged_sender_collides_with_nobody() {
 }
 
 #[test]
-fn what_is_injected_stands_on_the_line_as_if_it_had_been_sent() {
+fn injected_bytes_are_on_the_line_as_if_they_had_been_sent() {
     let mut line = one_way(500_000, 0, b"head");
     line.inject(Who::Tail(0), b"ghost");
     line.run_for(us(1000)).unwrap();
@@ -80,9 +80,9 @@ fn what_is_injected_stands_on_the_line_as_if_it_had_been_sent() {
 }
 
 #[test]
-fn nothing_ever_happens_on_a_line_without_talk() {
+fn nothing_happens_on_a_silent_line() {
     let mut line: Line<Talker, Talker> = Line::new(500_000, 0, Talker::default());
-    assert_eq!(line.step(), Ok(Some(at(0)))); // everybody is asked once
+    assert_eq!(line.step(), Ok(Some(at(0)))); // every station is asked once
     assert_eq!(line.step(), Ok(None));
     line.run_for(Duration::from_millis(1_000_000)).unwrap();
     assert_eq!(line.polls(Who::Head), 1);
@@ -124,7 +124,7 @@ fn the_same_seed_gives_the_same_bytes_at_the_same_times() {
 }
 
 #[test]
-fn the_trace_says_who_sent_what_and_when() {
+fn the_trace_records_every_sender_byte_and_time() {
     let mut line = one_way(500_000, 0, &[7]);
     line.add(Talker::saying(at(5), &[8]));
     line.record();

@@ -74,8 +74,8 @@ fn commands_move_the_motors_and_the_master_reads_how_they_move() {
     assert_eq!(line.head().node_statistics(NodeId::N1).timeouts, 0);
 }
 
-/// Visits of each of eight nodes in `span`, with a WRITE and a READ each, and how much of it
-/// somebody was talking, percent.
+/// Visits of each of eight nodes in `span`, with a WRITE and a READ each, and the share of it in
+/// which the line was busy, percent.
 fn visits(config: MasterConfig, span: Duration) -> (u32, u64) {
     let mut line = bus(&NodeId::ALL, config);
     discovered(&mut line);
@@ -123,7 +123,7 @@ fn eight_nodes_are_written_and_read_at_ninety_percent_of_what_the_line_allows() 
             f64::from(visits) * 1e6 / f64::from(span.as_micros()),
         );
         assert!(visits * 100 >= CYCLES * 90, "{visits} of {CYCLES}");
-        assert!(visits <= CYCLES + 1, "{visits} are more than the line allows");
+        assert!(visits <= CYCLES + 1, "{visits} visits are more than the line allows");
         assert!(busy_pct * 100 >= u64::from(plan.busy_pct()) * 90);
     }
 }
@@ -142,7 +142,7 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 }
 
 #[test]
-fn a_node_without_commands_stands_still_after_its_watchdog() {
+fn a_node_without_commands_stops_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));

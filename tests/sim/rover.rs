@@ -1,4 +1,4 @@
-//! A simulated rover: how its wheels follow commands, and what its telemetry says.
+//! A simulated rover: how its wheels follow commands, and what its telemetry reports.
 
 use axlewire::{sim::Rover, time::Duration, ucp::MotorControl};
 
@@ -37,7 +37,7 @@ fn a_positive_turn_is_to_the_right() {
     assert!(back < turned || back > 180.0, "{back}");
 }
 
-/// What the wheels do once they have reached their speed, percent: left, right.
+/// Wheel speeds once they are steady, percent: left, right.
 fn wheels(commands: &[(i16, i16)]) -> (i16, i16) {
     let mut rover = Rover::new();
     for &(speed, angular) in commands {
@@ -50,7 +50,7 @@ fn wheels(commands: &[(i16, i16)]) -> (i16, i16) {
 }
 
 #[test]
-fn a_rover_mixes_as_the_vendors_motor_c_does() {
+fn a_rover_mixes_like_the_vendors_motor_c() {
     assert_eq!(wheels(&[(60, 50)]), (81, 39));
     assert_eq!(wheels(&[(60, -50)]), (39, 81));
     assert_eq!(wheels(&[(-60, 50)]), (-81, -39), "in reverse the nose swings left");
@@ -83,9 +83,9 @@ fn a_rover_has_the_dead_bands_of_the_vendors_motor_c() {
     assert_eq!(wheels(&[(5, 0)]), (0, 0), "a duty of 5 % moves nothing");
     assert_eq!(wheels(&[(6, 0)]), (6, 6));
     assert_eq!(wheels(&[(94, 0)]), (94, 94));
-    assert_eq!(wheels(&[(95, 0)]), (100, 100), "and from 95 % on it is full speed");
+    assert_eq!(wheels(&[(95, 0)]), (100, 100), "from 95 % on it is full speed");
     assert_eq!(wheels(&[(60, 5)]), (63, 63), "little steering does not steer");
-    // Below both thresholds the direction of the command before stays selected.
+    // Below both thresholds the direction of the previous command stays selected.
     assert_eq!(wheels(&[(-50, 0), (5, 5)]), (-8, -8));
     assert_eq!(wheels(&[(50, 0), (-5, 5)]), (8, 8));
     assert_eq!(wheels(&[(50, 0), (0, 0)]), (0, 0));

@@ -1,4 +1,4 @@
-//! A talker: an endpoint that says what a test tells it to, and remembers what it hears and when.
+//! A talker: an endpoint that sends what a test tells it to, and records what it receives and when.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ pub(crate) const fn at(micros: u64) -> Instant {
     Instant::from_micros(micros)
 }
 
-/// Says what it is told to say, and remembers what it hears and when.
+/// Sends what it is told to send, and records what it receives and when.
 #[derive(Debug, Default)]
 pub(crate) struct Talker {
     to_say: VecDeque<(Instant, Vec<u8>)>,
@@ -68,14 +68,14 @@ impl Endpoint for Talker {
     }
 }
 
-/// A head that says `bytes` at 0, and one silent tail.
+/// A head that sends `bytes` at 0, and one silent tail.
 pub(crate) fn one_way(baud: u32, seed: u64, bytes: &[u8]) -> Line<Talker, Talker> {
     let mut line = Line::new(baud, seed, Talker::saying(at(0), bytes));
     line.add(Talker::default());
     line
 }
 
-/// So many bytes of chance.
+/// This many random bytes.
 pub(crate) fn random_bytes(count: usize) -> Vec<u8> {
     let mut rng = Rng::new(99);
     (0..count).map(|_| rng.byte()).collect()

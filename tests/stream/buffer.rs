@@ -1,5 +1,4 @@
-//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and what does not
-//! fit.
+//! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and overflow.
 
 use axlewire::{
     ikeya,
@@ -37,7 +36,7 @@ fn frames_behind_a_false_header_of_an_earlier_chunk_are_not_copied() {
 }
 
 #[test]
-fn a_copy_of_a_decoder_goes_on_by_itself() {
+fn a_copy_of_a_decoder_is_independent() {
     let response = response();
     let (start, end) = response.split_at(5);
     let mut decoder = Decoder::<ikeya::ToMaster, 8>::new();
@@ -53,7 +52,7 @@ fn a_copy_of_a_decoder_goes_on_by_itself() {
 }
 
 #[test]
-fn a_byte_pushed_into_a_full_buffer_is_not_taken() {
+fn a_byte_pushed_into_a_full_buffer_is_refused() {
     let mut decoder = Decoder::<ikeya::ToMaster, 8>::new();
     let answers: Vec<_> = (0..10).map(|_| decoder.push(0)).collect();
     assert_eq!(answers, [[false; 7].as_slice(), &[true; 3]].concat());
@@ -69,7 +68,7 @@ fn a_byte_pushed_into_a_full_buffer_is_not_taken() {
 }
 
 #[test]
-fn no_more_is_committed_than_there_is_room_for() {
+fn a_commit_cannot_exceed_the_available_room() {
     let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
     decoder.commit(usize::MAX);
     assert_eq!((decoder.counters().received, decoder.pending()), (8, 8));

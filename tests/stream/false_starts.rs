@@ -1,4 +1,4 @@
-//! False headers, damage and frames inside of frames: no good frame is lost, none is invented.
+//! False headers, damage and nested frames: no good frame is lost, none is invented.
 
 use axlewire::{
     ikeya::{self, NodeId, Position, three},
@@ -56,7 +56,7 @@ fn a_bad_id_with_a_bad_crc_is_noise() {
 }
 
 #[test]
-fn a_packet_of_the_other_direction_is_no_header() {
+fn a_packet_of_the_other_direction_is_not_a_header() {
     let stream = [response(), write()].concat();
     let (at_slave, _) = seen::<ikeya::ToSlave, 8>(&[&stream], true);
     assert_eq!(at_slave, [Seen::Gap(8, Reason::Header), Seen::Frame(write())]);

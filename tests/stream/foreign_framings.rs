@@ -1,4 +1,4 @@
-//! Framings of others: one that breaks its contract hangs nothing, one that asks for more than it
+//! Foreign framings: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
 use axlewire::stream::{
@@ -50,7 +50,7 @@ struct Limit(u32);
 
 impl Limit {
     fn step(&mut self) {
-        self.0 = self.0.checked_sub(1).expect("the lie is told for ever");
+        self.0 = self.0.checked_sub(1).expect("the lie repeats forever");
     }
 }
 
@@ -134,7 +134,7 @@ fn a_framing_that_breaks_its_contract_neither_loops_nor_panics_and_the_account_h
     feed::<12>();
 }
 
-/// Frames of three bytes that begin with F, but judged only when eight bytes are there.
+/// Frames of three bytes that begin with F, but are judged only when eight bytes are available.
 struct Patient;
 
 impl Framing for Patient {

@@ -1,5 +1,5 @@
-//! Properties of every framing on hostile streams: whatever a user does, the decoder gives what the
-//! slow oracle says, and neither a delay nor the work grows without bound.
+//! Properties of every framing on hostile streams: whatever a user does, the decoder gives the same
+//! result as the slow oracle, and neither delay nor work grows without bound.
 
 use axlewire::{
     ikeya::{self, three},
@@ -143,7 +143,7 @@ properties! {
 }
 
 /// B3: whatever came before, less than a longest frame is held back, and a quiet line ends that;
-/// the first good frame then comes out with its last byte and as the first event.
+/// the first good frame is then delivered with its last byte and as the first event.
 fn check_stall<F: Known, const N: usize>(stream: &[u8], frame: &[u8]) {
     let mut line = Line::<F, N>::new();
     line.slice(stream);

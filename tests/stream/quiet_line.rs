@@ -14,7 +14,7 @@ use crate::{
 
 #[test]
 fn the_longest_false_header_delays_a_frame_by_at_most_a_longest_frame() {
-    // A frame of 64 bytes is promised; then motor commands of 24 come.
+    // The header announces a frame of 64 bytes; then motor commands of 24 bytes follow.
     let header = [0xFD, 0xFF, 60, 0];
     let mut line = Line::<Ucp, 64>::new();
     line.slice(&header);
@@ -41,7 +41,7 @@ fn a_new_candidate_at_the_very_end_outlives_one_quiet_line() {
     let start = &motor()[..10];
     let (first, pending) = seen::<Ucp, 64>(&[&[0xFD, 0xFF, 60, 0], start], true);
     assert_eq!((first, pending), (vec![Seen::Gap(4, Reason::Idle)], 10));
-    // Its rest comes after all.
+    // The rest still arrives.
     let mut line = Line::<Ucp, 64>::new();
     line.slice(&[&[0xFD, 0xFF, 60, 0], start].concat());
     line.idle();

@@ -1,4 +1,4 @@
-//! What the stories are told with: packets, and what a decoder makes of them.
+//! Helpers of the scenarios: packets, and a decoder's output for them.
 
 use axlewire::{
     ikeya::{self, NodeId, Rps},
@@ -15,7 +15,7 @@ pub(crate) enum Seen {
     Gap(u64, Reason),
 }
 
-/// What a decoder with the smallest buffer makes of `chunks`, then of a quiet line.
+/// The output of a decoder with the smallest buffer for `chunks`, then for a quiet line.
 pub(crate) fn seen<F: Known, const N: usize>(chunks: &[&[u8]], quiet: bool) -> (Vec<Seen>, usize) {
     let mut decoder = Decoder::<F, N>::new();
     let mut seen = Vec::new();

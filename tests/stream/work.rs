@@ -1,4 +1,4 @@
-//! Work: a candidate that arrives in pieces is judged no more often than it has to be.
+//! Work: a candidate that arrives in pieces is judged no more often than necessary.
 
 use std::cell::Cell;
 
@@ -19,7 +19,7 @@ thread_local! {
     static CHECKED: Cell<u64> = const { Cell::new(0) };
 }
 
-/// Another framing that counts how often it is asked, and how often about a whole candidate.
+/// Wraps a framing and counts how often it is asked, and how often about a whole candidate.
 struct Counted<F>(F);
 
 impl<F: Known> Framing for Counted<F> {
@@ -53,9 +53,9 @@ impl<F: Known> Known for Counted<F> {
     }
 }
 
-/// A checksum is computed once for every place where a candidate starts, and again at most twice
-/// for a frame: when a gap is reported in front of it, and when it is read where it lies. Short
-/// looks are a few for each byte and for each call.
+/// A checksum is computed once for every possible start of a candidate, and again at most twice for
+/// a frame: when a gap before it is reported, and when it is read in place. Short looks happen a
+/// few times for each byte and for each call.
 pub(crate) fn check_work<F: Known, const N: usize>(stream: &[u8], ops: &[Op]) {
     JUDGED.set(0);
     CHECKED.set(0);

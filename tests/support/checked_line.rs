@@ -1,6 +1,6 @@
-//! A decoder on a line that keeps the history of everything, so that the oracle can be asked.
+//! A decoder on a line that keeps the whole history, so that the oracle can be asked.
 //!
-//! Every call checks the account; [`Line::finish`] checks the rest.
+//! Every call checks the accounting; [`Line::finish`] checks the rest.
 
 use axlewire::stream::{self, Counters, Decoder, Frames, decode_capture};
 
@@ -9,20 +9,20 @@ use super::{
     oracle::{self, Event, Reason},
 };
 
-/// One thing that a user of a decoder may do.
+/// A single action of a decoder's user.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Op {
-    /// Gives so many bytes as a slice and takes all events.
+    /// Passes this many bytes as a slice and takes all events.
     Slice(usize),
-    /// Gives so many bytes as a slice, takes so many events and walks away.
+    /// Passes this many bytes as a slice, takes this many events and stops.
     Stop { len: usize, events: usize },
-    /// Writes up to so many bytes into the decoder's own buffer, and takes no event.
+    /// Writes up to this many bytes into the decoder's own buffer, and takes no event.
     Commit(usize),
-    /// Takes all events that are left, then pushes so many bytes and takes the events of each.
+    /// Takes all remaining events, then pushes this many bytes and takes the events of each.
     Push(usize),
-    /// Takes all events that are left.
+    /// Takes all remaining events.
     Drain,
-    /// Says that the line went quiet, drained or not.
+    /// Reports a quiet line, drained or not.
     Idle,
 }
 
@@ -32,11 +32,11 @@ pub(crate) struct Line<F, const N: usize> {
     history: Vec<u8>,
     idles: Vec<usize>,
     events: Vec<Event>,
-    /// `idle` has been called and its events have not all been taken.
+    /// `idle` has been called, and its events have not all been taken.
     quiet: bool,
     /// `push` has been called, which may leave noise unjudged until more follows.
     pushed: bool,
-    /// How much of the stream `decode` has been shown, taken or not.
+    /// How much of the stream `decode` has seen, consumed or not.
     shown: usize,
     /// Where the latest chunk of input began, and how many calls it has had.
     chunk: (usize, usize),
@@ -59,8 +59,8 @@ impl<F: Known, const N: usize> Line<F, N> {
         }
     }
 
-    /// Does `ops`, again and again until `stream` is used up or they have had a fair chance, gives
-    /// the rest, and asks the oracle about all of it. Says how often `decode` was called.
+    /// Runs `ops` repeatedly until `stream` is used up or they have had a fair chance, passes the
+    /// rest, and asks the oracle about all of it. Returns the number of calls of `decode`.
     pub(crate) fn play(mut self, stream: &[u8], ops: &[Op]) -> u64 {
         let mut rest = stream;
         for &op in ops.iter().cycle().take(ops.len().max(4 * stream.len())) {
@@ -74,7 +74,7 @@ impl<F: Known, const N: usize> Line<F, N> {
         self.calls
     }
 
-    /// Does `op` with bytes from the front of `stream`; says what it left.
+    /// Runs `op` with bytes from the front of `stream`; returns the remaining bytes.
     fn perform<'s>(&mut self, op: Op, stream: &'s [u8]) -> &'s [u8] {
         match op {
             Op::Slice(len) => {
@@ -86,7 +86,7 @@ impl<F: Known, const N: usize> Line<F, N> {
                 let mut piece = &stream[..len.min(stream.len())];
                 let given = piece.len();
                 self.chunk = (self.history.len(), 0);
-                // What is left comes again in another op, from another place in memory.
+                // The remaining bytes come again in another op, from another place in memory.
                 for _ in 0..events {
                     if !self.step(&mut piece) {
                         break;
@@ -115,7 +115,7 @@ impl<F: Known, const N: usize> Line<F, N> {
         }
     }
 
-    /// Gives `input` from a buffer of its own and takes all events.
+    /// Passes `input` from a buffer of its own and takes all events.
     pub(crate) fn slice(&mut self, input: &[u8]) {
         let copy = input.to_vec();
         let mut input = copy.as_slice();
@@ -123,13 +123,13 @@ impl<F: Known, const N: usize> Line<F, N> {
         while self.step(&mut input) {}
     }
 
-    /// Takes one event; `false` when there is none.
+    /// Takes one event; `false` if there is none.
     fn step(&mut self, input: &mut &[u8]) -> bool {
         let given = *input;
         self.calls += 1;
         self.chunk.1 += 1;
         let nothing_held = self.decoder.pending() == 0;
-        // With nothing new, `poll` is the same.
+        // With no new bytes, `poll` is the same.
         let polled = input.is_empty() && self.calls.is_multiple_of(2);
         let found = match if polled { self.decoder.poll() } else { self.decoder.decode(input) } {
             None => None,
@@ -152,25 +152,25 @@ impl<F: Known, const N: usize> Line<F, N> {
             self.quiet = false;
             return false;
         };
-        // A gap ends, and so does a frame, where the booked bytes end.
+        // A gap ends, and so does a frame, where the accounted bytes end.
         let counters = self.decoder.counters();
         let offset = (counters.framed + counters.skipped()) as usize - len;
         self.events.push(match what {
             Err(reason) => Event::Skipped { offset, len, reason: oracle_reason(reason) },
             Ok((bytes, borrowed)) => {
-                // Only the rest of a candidate that was cut off goes through the buffer, and a call
-                // completes at most one.
+                // Only the rest of a split candidate goes through the buffer, and a call completes
+                // at most one.
                 let (start, calls) = self.chunk;
                 let split = !nothing_held && offset < start + calls * F::MAX_LEN;
-                assert!(borrowed || split, "a frame that lies whole in the input was copied");
-                assert_eq!(bytes, self.history[offset..offset + len], "frame of other bytes");
+                assert!(borrowed || split, "a frame lying whole in the input was copied");
+                assert_eq!(bytes, self.history[offset..offset + len], "wrong bytes in the frame");
                 Event::Frame { offset, len }
             }
         });
         true
     }
 
-    /// Writes as much of `bytes` into the decoder as it has room for; says how much.
+    /// Writes as much of `bytes` into the decoder as it has room for; returns how much.
     pub(crate) fn commit(&mut self, bytes: &[u8]) -> usize {
         let room = N - self.decoder.pending();
         let spare = self.decoder.spare();
@@ -183,7 +183,7 @@ impl<F: Known, const N: usize> Line<F, N> {
         len
     }
 
-    /// Hands over one byte as an interrupt does, and takes events only when there may be some.
+    /// Passes in one byte as an interrupt does, and takes events only when there may be some.
     pub(crate) fn push(&mut self, byte: u8) {
         let worth_a_look = self.decoder.push(byte);
         self.history.push(byte);
@@ -196,8 +196,8 @@ impl<F: Known, const N: usize> Line<F, N> {
         }
     }
 
-    /// The line goes quiet, unless it already has and the decoder is about to say so, or bytes
-    /// that the decoder has been shown have not been given again.
+    /// The line goes quiet, unless it already has and the decoder is about to report it, or bytes
+    /// that the decoder has seen have not been passed again.
     pub(crate) fn idle(&mut self) {
         if !self.quiet && self.history.len() >= self.shown {
             self.decoder.idle();
@@ -207,7 +207,7 @@ impl<F: Known, const N: usize> Line<F, N> {
         }
     }
 
-    /// Everything so far is what the oracle says.
+    /// Everything so far matches the oracle.
     pub(crate) fn finish(&mut self) {
         self.slice(&[]);
         if self.pushed {
@@ -236,7 +236,7 @@ impl<F: Known, const N: usize> Line<F, N> {
     }
 }
 
-/// An event of a capture as the oracle writes it.
+/// An event of a capture in the oracle's format.
 pub(crate) fn located<F: Known>((offset, event): stream::Located<F::Frame<'_>>) -> Event {
     match event {
         stream::Event::Frame(frame) => Event::Frame { offset, len: F::bytes(&frame).len() },
@@ -247,7 +247,7 @@ pub(crate) fn located<F: Known>((offset, event): stream::Located<F::Frame<'_>>) 
     }
 }
 
-/// The slice iterator gives the oracle's frames, borrowed, and leaves its rest.
+/// The slice iterator gives the oracle's frames, borrowed, and leaves the same rest.
 pub(crate) fn check_slice<F: Known>(stream: &[u8]) {
     let told = oracle::answer(F::RULES, stream, &[]);
     let mut frames = Frames::<F>::new(stream);
@@ -264,7 +264,7 @@ pub(crate) fn check_slice<F: Known>(stream: &[u8]) {
     check_each::<F>(stream, &told);
 }
 
-/// Taken all together they are the same, whatever was taken one by one before.
+/// `each` gives the same frames, whatever was taken one by one before.
 fn check_each<F: Known>(stream: &[u8], told: &oracle::Answer) {
     let place = |frame| place_in(stream, F::bytes(&frame));
     for before in [0, 1, told.frames().len() / 3] {
@@ -282,8 +282,8 @@ fn check_each<F: Known>(stream: &[u8], told: &oracle::Answer) {
     assert_eq!(folded, told.frames());
 }
 
-/// With `idle` as often as there is a rest, the slice iterator gives all frames there are, and a
-/// capture all events: its end is one silence, so gaps do not end before the next frame.
+/// With `idle` called while there is a rest, the slice iterator gives all frames, and a capture all
+/// events: its end is one silence, so gaps do not end before the next frame.
 pub(crate) fn check_finished_slice<F: Known>(stream: &[u8]) {
     let mut frames = Frames::<F>::new(stream);
     let (mut found, mut idles) = (Vec::new(), Vec::new());
@@ -311,7 +311,7 @@ pub(crate) fn place_in(stream: &[u8], frame: &[u8]) -> (usize, usize) {
     (frame.as_ptr().addr() - stream.as_ptr().addr(), frame.len())
 }
 
-/// The counters are those of the oracle's answer, and the sums of its events.
+/// The counters match the oracle's answer and the sums of its events.
 pub(crate) fn check_counters(counters: &Counters, told: &oracle::Answer, received: usize) {
     let (mut frames, mut framed, mut skipped) = (0, 0, told.open);
     for event in &told.events {

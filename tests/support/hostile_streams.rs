@@ -1,4 +1,4 @@
-//! Hostile streams: everything that a line has been seen to do, in any mixture.
+//! Hostile streams: everything that lines have been seen to do, in any mixture.
 
 use axlewire::{
     encode::Encode,
@@ -19,7 +19,7 @@ pub(crate) fn stream(rules: Rules) -> impl Strategy<Value = Vec<u8>> {
     })
 }
 
-/// What a user does to a decoder, in any order.
+/// A user's actions on a decoder, in any order.
 pub(crate) fn ops() -> impl Strategy<Value = Vec<Op>> {
     let op = prop_oneof![
         4 => (0..80_usize).prop_map(Op::Slice),
@@ -48,7 +48,7 @@ fn piece(rules: Rules) -> BoxedStrategy<Vec<u8>> {
     .boxed()
 }
 
-/// Whole frames, most of them of a kind that `rules` let through.
+/// Whole frames, most of them of a kind that `rules` accept.
 pub(crate) fn frame(rules: Rules) -> BoxedStrategy<Vec<u8>> {
     match rules {
         Rules::Ikeya { long: 8, .. } => ikeya_frame().boxed(),
@@ -109,12 +109,12 @@ fn ucp_frame() -> impl Strategy<Value = Vec<u8>> {
     });
     let foreign = (0x0B..=255_u8, any::<u8>(), vec(any::<u8>(), 0..=56))
         .prop_map(|(id, index, body)| encoded(&ucp::RawFrame { id, index, body: &body }));
-    // Longer than anything that the library sends, but not than a chosen cap may let through.
+    // Longer than anything the library sends, but within what a chosen cap may accept.
     let long = vec(any::<u8>(), 57..=255).prop_map(|body| ucp_frame_around(0x20, &body));
     prop_oneof![6 => known, 3 => foreign, 1 => long]
 }
 
-/// A UCP frame that the library itself would perhaps refuse to make.
+/// A UCP frame that the library itself might refuse to create.
 pub(crate) fn ucp_frame_around(id: u8, body: &[u8]) -> Vec<u8> {
     let len = (body.len() as u16 + 4).to_le_bytes();
     let mut frame = [&[0xFD, 0xFF, len[0], len[1], id, 0], body, &[0, 0]].concat();
@@ -122,7 +122,7 @@ pub(crate) fn ucp_frame_around(id: u8, body: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// A packet with a good CRC and any id around `payload`, which decides how long it is.
+/// A packet with a good CRC and any id around `payload`, which determines its length.
 pub(crate) fn ikeya_packet_around(header: u8, id: u8, payload: &[u8]) -> Vec<u8> {
     let mut packet = [&[header, id], payload, &[0, 0]].concat();
     oracle::seal(&mut packet);
@@ -137,7 +137,7 @@ fn nest(rules: Rules) -> BoxedStrategy<Vec<u8>> {
             let id = prop_oneof![1..=8_u8, any::<u8>()];
             (header, id, vec(frame(rules), 1..4), any::<Index>())
                 .prop_map(move |(header, id, inner, at)| {
-                    // Any window of what lies inside: whole READs, and halves of longer packets.
+                    // Any window of the contents: whole READs, and halves of longer packets.
                     let mut inner = inner.concat();
                     inner.extend([0; 16]);
                     let at = at.index(inner.len() - (long - 4));
@@ -155,7 +155,7 @@ fn nest(rules: Rules) -> BoxedStrategy<Vec<u8>> {
     }
 }
 
-/// A header that promises a frame which does not come.
+/// A header that announces a frame which does not come.
 fn false_header(rules: Rules) -> BoxedStrategy<Vec<u8>> {
     match rules {
         Rules::Ikeya { .. } => {
@@ -177,7 +177,7 @@ fn false_header(rules: Rules) -> BoxedStrategy<Vec<u8>> {
     }
 }
 
-/// Noise that looks like a header more often than chance would have it.
+/// Noise that looks like a header more often than by chance.
 fn treacherous_byte(rules: Rules) -> Union<BoxedStrategy<u8>> {
     let headers = match rules {
         Rules::Ikeya { .. } => vec![0xAA, 0xBB, 0x55, 0x56, 0x01, 0x09],
@@ -186,7 +186,7 @@ fn treacherous_byte(rules: Rules) -> Union<BoxedStrategy<u8>> {
     Union::new([any::<u8>().boxed(), prop::sample::select(headers).boxed()])
 }
 
-/// What a line does to bytes.
+/// The faults of a line.
 #[derive(Clone, Debug)]
 enum Damage {
     Flip(Index, u8),

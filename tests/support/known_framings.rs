@@ -1,4 +1,4 @@
-//! The framings that the oracle knows: its rules for each, and the bytes behind a frame.
+//! The framings known to the oracle: its rules for each, and the bytes of a frame.
 
 use axlewire::{
     ikeya::{self, three},
@@ -8,12 +8,12 @@ use axlewire::{
 
 use super::oracle::Rules;
 
-/// A framing that the oracle knows too.
+/// A framing that the oracle also knows.
 pub(crate) trait Known: Framing {
     const RULES: Rules;
 
-    /// The bytes behind a frame, where they lie. (`'a: 'a` because a projection alone leaves it
-    /// open whether a caller may name the lifetime, and the impls have to agree.)
+    /// The bytes of a frame, in place. (`'a: 'a` because a projection alone leaves it open whether
+    /// a caller may name the lifetime, and the impls have to agree.)
     fn bytes<'a: 'a>(frame: &Self::Frame<'a>) -> &'a [u8];
 }
 

@@ -1,8 +1,8 @@
-//! The slow oracle: what a stream has to give, written from the rulings alone (B1 to B4, I1, I10,
-//! U1, U2).
+//! The slow oracle: the expected result for a stream, written from the rulings alone (B1 to B4, I1,
+//! I10, U1, U2).
 //!
-//! It has the whole history of a line before it, tries every start, and shares no code with the
-//! library: not the checksum, not the types.
+//! It sees the whole history of a line, tries every start, and shares no code with the library:
+//! neither the checksum nor the types.
 
 /// Why a byte belongs to no frame (ruling B4).
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -14,7 +14,7 @@ pub(crate) enum Reason {
     Idle,
 }
 
-/// What the stream gives, by its place in the history.
+/// The result for the stream, by position in the history.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Event {
     Frame { offset: usize, len: usize },
@@ -30,23 +30,23 @@ pub(crate) enum Rules {
     Ucp { cap: usize },
 }
 
-/// Everything a history gives.
+/// The result for a whole history.
 #[derive(Clone, Debug, Default, Eq, PartialEq)]
 pub(crate) struct Answer {
     /// Frames, and the gaps that have ended.
     pub(crate) events: Vec<Event>,
     /// Bytes of the gap that has not ended.
     pub(crate) open: usize,
-    /// Bytes of the candidate that the history cuts off.
+    /// Bytes of the candidate cut off at the end of the history.
     pub(crate) pending: usize,
     /// Bytes skipped, by [`Reason`] in its order.
     pub(crate) skipped: [usize; 5],
-    /// Gaps begun.
+    /// Number of gaps begun.
     pub(crate) gaps: usize,
 }
 
 impl Answer {
-    /// Place and length of every frame.
+    /// Position and length of every frame.
     pub(crate) fn frames(&self) -> Vec<(usize, usize)> {
         let frame = |event: &Event| match *event {
             Event::Frame { offset, len } => Some((offset, len)),
@@ -55,7 +55,7 @@ impl Answer {
         self.events.iter().filter_map(frame).collect()
     }
 
-    /// Makes one gap of gaps between which nothing but a silence lies.
+    /// Merges gaps separated only by a silence.
     pub(crate) fn join_gaps(&mut self) {
         let before = self.events.len();
         self.events.dedup_by(|next, gap| match (gap, next) {
@@ -69,9 +69,9 @@ impl Answer {
     }
 }
 
-/// What `bytes` give when the line goes quiet after each of `idles`, counts of bytes in order.
+/// The result for `bytes` when the line goes quiet after each of `idles`, byte counts in order.
 ///
-/// Two equal counts mean that the first silence has been read out before the second is noticed.
+/// Two equal counts mean that the first silence has been read before the second is noticed.
 pub(crate) fn answer(rules: Rules, bytes: &[u8], idles: &[usize]) -> Answer {
     let mut walk = Walk { rules, at: 0, gap: None, answer: Answer::default() };
     for &idle in idles {
@@ -127,7 +127,7 @@ impl Walk {
     }
 }
 
-/// What the bytes at one place are.
+/// The verdict on the bytes at one position.
 enum Claim {
     Frame { len: usize },
     Refuse { reason: Reason, len: usize },
@@ -151,7 +151,7 @@ fn claim(rules: Rules, bytes: &[u8]) -> Claim {
     Claim::Frame { len }
 }
 
-/// Length of the frame that the first bytes promise, `None` while they do not say yet.
+/// Length of the frame announced by the first bytes, `None` while it is not yet known.
 pub(crate) fn promised_len(rules: Rules, bytes: &[u8]) -> Result<Option<usize>, Reason> {
     match rules {
         Rules::Ikeya { to_slave, to_master, long } => match bytes[0] {
@@ -179,13 +179,13 @@ pub(crate) fn promised_len(rules: Rules, bytes: &[u8]) -> Result<Option<usize>, 
     }
 }
 
-/// Writes the right CRC into the last two bytes of `frame`.
+/// Writes the correct CRC into the last two bytes of `frame`.
 pub(crate) fn seal(frame: &mut [u8]) {
     let (body, field) = frame.split_at_mut(frame.len() - 2);
     field.copy_from_slice(&crc(body).to_le_bytes());
 }
 
-/// CRC-16/MODBUS, one bit after the other (B1).
+/// CRC-16/MODBUS, bit by bit (B1).
 pub(crate) fn crc(bytes: &[u8]) -> u16 {
     let mut crc = 0xFFFF;
     for &byte in bytes {

@@ -1,5 +1,5 @@
-//! The scripted port: it gives, takes, fails and stalls as a list of steps says, step by step. Time
-//! does not come in; for ports on a simulated line see `virtual_time.rs` and `adverse/wire.rs`.
+//! The scripted port: gives, takes, fails and stalls according to a list of steps. It has no notion
+//! of time; for ports on a simulated line see `virtual_time.rs` and `adverse/wire.rs`.
 
 use std::{
     cell::RefCell,
@@ -31,24 +31,24 @@ impl embedded_io::Error for Unplugged {
 /// A log that several parts write to.
 pub(crate) type Log = Rc<RefCell<Vec<String>>>;
 
-/// What the port does at one call.
+/// What the port does on one call.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// Gives these bytes, or takes as many as there are.
     Bytes(Vec<u8>),
     /// Fails.
     Error,
-    /// Says that the file has ended, or that it takes nothing.
+    /// Reports end of file, or that it takes nothing.
     Zero,
-    /// Async only: never answers this call; the next one goes on with the next step.
+    /// Async only: this call never completes; the next one continues with the next step.
     Stall,
 }
 
-/// Follows its scripts. Then it has nothing to give, and takes everything.
+/// Follows its scripts. After that it has nothing to give, and takes everything.
 #[derive(Debug, Default)]
 pub(crate) struct Script {
     pub(crate) reads: VecDeque<Step>,
-    /// Having nothing to give is the end of a file.
+    /// Having nothing to give means end of file.
     pub(crate) is_file: bool,
     pub(crate) writes: VecDeque<Step>,
     pub(crate) flushes: VecDeque<Step>,
@@ -79,7 +79,7 @@ impl Script {
         assert!(!buffer.is_empty(), "an empty buffer would look like an end of file");
         let end = self.is_file.then_some(Step::Zero);
         let step = self.reads.pop_front().or(end);
-        match step.expect("a read without a byte would block for ever") {
+        match step.expect("a read without a byte would block forever") {
             Step::Bytes(mut bytes) => {
                 let rest = bytes.split_off(bytes.len().min(buffer.len()));
                 if !rest.is_empty() {
@@ -118,7 +118,7 @@ impl Script {
     }
 }
 
-/// Stays in this call for ever if the script says so; its next call goes on.
+/// Never completes this call if the script says so; the next call continues.
 async fn stall(steps: &mut VecDeque<Step>) {
     if matches!(steps.front(), Some(Step::Stall)) {
         steps.pop_front();

@@ -1,4 +1,4 @@
-//! Tests of real time on a machine that has other things to do.
+//! Real-time tests on a machine that has other work to do.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
@@ -10,24 +10,23 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A line waits 20 ms for an answer. A machine that did not let a thread run for half of that may
-/// have lost one.
+/// A line waits 20 ms for an answer. A machine that keeps a thread from running for half of that
+/// may have lost one.
 const STALL: Duration = Duration::from_millis(10);
 
-/// Share of the time in which more is to run than there are processors, percent: what a test and
-/// its processes make of it themselves is less.
+/// Share of the time with more runnable threads than processors, percent: a test and its own
+/// processes cause less than this.
 const CROWD_PCT: u32 = 20;
 
-/// Share of the processors' time that other guests of the same computer took, percent. The machine
-/// is halted meanwhile, or a part of it: no thread of ours need notice.
+/// Share of processor time taken by other guests of the same host, percent. The machine, or part of
+/// it, is halted meanwhile; our threads may not notice.
 const STOLEN_PCT: u64 = 1;
 
-/// A test that fails on a busy machine is tried this many times.
+/// Number of attempts for a test that fails on a busy machine.
 const ATTEMPTS: u32 = 8;
 
 /// Runs one test at a time. A failure counts unless the machine was busy meanwhile; then the test
-/// is run again, because its failure may be that of the machine. The last attempt counts in any
-/// case.
+/// is run again, since the machine may have caused the failure. The last attempt always counts.
 pub(crate) fn undisturbed(test: impl Fn()) {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -38,13 +37,13 @@ pub(crate) fn undisturbed(test: impl Fn()) {
     });
 }
 
-/// The attempts: each gives its outcome, and how busy the machine was.
+/// Runs the attempts: each returns its outcome, and how busy the machine was.
 fn repeat(mut attempt: impl FnMut() -> (thread::Result<()>, Busy)) {
     for number in 1.. {
         match attempt() {
             (Ok(()), _) => return,
             (Err(_), busy) if busy.is_too_much() && number < ATTEMPTS => {
-                eprintln!("attempt {number} failed, and the machine was busy, {busy:?}: again");
+                eprintln!("attempt {number} failed on a busy machine, {busy:?}: retrying");
             }
             (Err(panic), _) => resume_unwind(panic),
         }
@@ -54,12 +53,12 @@ fn repeat(mut attempt: impl FnMut() -> (thread::Result<()>, Busy)) {
 /// How busy the machine was.
 #[derive(Clone, Copy, Debug, Default)]
 struct Busy {
-    /// The longest time for which a thread that wanted to run did not.
+    /// The longest time for which a runnable thread did not run.
     stall: Duration,
     samples: u32,
-    /// Samples in which more was to run than there are processors.
+    /// Samples with more runnable threads than processors.
     crowds: u32,
-    /// Processor time in all and what was stolen of it, in the system's ticks.
+    /// Total processor time and the stolen part of it, in system ticks.
     ticks: u64,
     stolen: u64,
 }
@@ -107,17 +106,18 @@ impl Watch {
     }
 }
 
-/// Threads of the whole system that run or want to; Linux alone tells.
+/// Runnable threads of the whole system; only available on Linux.
 fn running() -> Option<usize> {
     let load = std::fs::read_to_string("/proc/loadavg").ok()?;
     load.split(' ').nth(3)?.split('/').next()?.parse().ok()
 }
 
-/// Ticks of all processors since the start, and how many of them were stolen; Linux alone tells.
+/// Total and stolen processor ticks since boot; only available on Linux.
 fn processor_time() -> Option<(u64, u64)> {
     let all = std::fs::read_to_string("/proc/stat").ok()?;
     let ticks = all.lines().next()?.strip_prefix("cpu ")?.split_whitespace();
-    // User, nice, system, idle, waiting, two kinds of interrupts, stolen; the rest counts twice.
+    // User, nice, system, idle, iowait, two kinds of interrupts, steal; the rest is already
+    // included.
     let ticks: Vec<u64> = ticks.take(8).map_while(|ticks| ticks.parse().ok()).collect();
     Some((ticks.iter().sum(), *ticks.get(7)?))
 }

@@ -1,7 +1,7 @@
-//! Ports and clocks in virtual time, for the tests of the drivers.
+//! Ports and clocks in virtual time, for the driver tests.
 //!
-//! The port is an end of a simulated line: unlike the scripted one of `port.rs` it gives what
-//! others have sent, when it has arrived, and whoever waits for it is woken.
+//! The port is one end of a simulated line: unlike the scripted one of `port.rs` it gives bytes
+//! that others have sent, once they have arrived, and wakes a task waiting for them.
 
 use std::{
     cell::{Cell, RefCell},
@@ -22,7 +22,7 @@ use crate::port::Unplugged;
 
 type Actor = Box<dyn FnMut()>;
 
-/// Time, and who else lives in it.
+/// Time, and its other participants.
 #[derive(Clone, Default)]
 pub(crate) struct World {
     micros: Rc<Cell<u64>>,
@@ -30,7 +30,7 @@ pub(crate) struct World {
     sleepers: Rc<RefCell<Vec<Waker>>>,
 }
 
-/// Counts how often a task was woken.
+/// Counts wake-ups of a task.
 #[derive(Default)]
 pub(crate) struct Wakes(AtomicUsize);
 
@@ -55,7 +55,7 @@ impl World {
         self.actors.borrow_mut().push(Box::new(actor));
     }
 
-    /// Lets time pass and everybody act.
+    /// Lets time pass and everything run.
     pub(crate) fn step(&self, micros: u64) {
         self.micros.set(self.micros.get() + micros);
         for actor in &mut *self.actors.borrow_mut() {
@@ -70,13 +70,13 @@ impl World {
         Poll::Pending
     }
 
-    /// Runs a future to its end, which has to come within a minute of virtual time.
+    /// Runs a future to completion, which has to come within a minute of virtual time.
     pub(crate) fn block_on<T>(&self, future: impl Future<Output = T>) -> T {
         self.poll_times(usize::MAX, future).expect("hangs")
     }
 
-    /// Polls a future this many times, then drops it. As a real executor it polls only what was
-    /// woken; while nothing is, time passes.
+    /// Polls a future this many times, then drops it. Like a real executor it polls only a woken
+    /// task; otherwise time passes.
     pub(crate) fn poll_times<T>(&self, times: usize, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
         let wakes = Arc::new(Wakes::default());
@@ -100,7 +100,7 @@ impl World {
     }
 }
 
-/// Whoever idles by this clock lets the others act.
+/// Idling on this clock lets the others run.
 #[derive(Clone, Default)]
 pub(crate) struct VirtualClock(pub(crate) World);
 
@@ -110,7 +110,7 @@ impl Clock for VirtualClock {
     }
 
     fn idle_until(&mut self, until: Instant) {
-        // At least one, so that nobody idles for ever at one moment.
+        // At least one, so that idling always advances time.
         self.0.step(u64::from((until - self.0.now()).as_micros()).clamp(1, 20));
     }
 }
@@ -127,33 +127,33 @@ impl embedded_hal_async::delay::DelayNs for VirtualClock {
     }
 }
 
-/// Bytes on their way, each with the time at which it arrives.
+/// Bytes in flight, each with the time at which it arrives.
 pub(crate) type Wire = Rc<RefCell<VecDeque<(u64, u8)>>>;
 
-/// One end of a line: what it sends, all the others receive.
+/// One end of a line: all other ends receive what it sends.
 pub(crate) struct End {
     world: World,
     pub(crate) inbox: Wire,
     pub(crate) outboxes: Vec<Wire>,
-    /// Time of a byte on the line, microseconds.
+    /// Time of one byte on the line, microseconds.
     byte_us: u64,
-    /// Bytes taken per write at the most.
+    /// Most bytes taken per write.
     pub(crate) most: usize,
-    /// The port takes so many more bytes, and then fails once.
+    /// The port takes this many more bytes, and then fails once.
     pub(crate) fails_after: Option<usize>,
     /// The next flush fails, although the bytes leave.
     pub(crate) fails_flush: bool,
-    /// The receiver fails once, at the next look for bytes.
+    /// The receiver fails once, at the next check for bytes.
     pub(crate) fails_read: bool,
-    /// There always seems to be a byte, and every read fails.
+    /// A byte always seems available, and every read fails.
     pub(crate) is_deaf: bool,
-    /// It becomes deaf when something is written.
+    /// The receiver fails when something is written.
     pub(crate) is_deafened: bool,
     /// Every write fails.
     pub(crate) is_mute: bool,
-    /// Async writes and flushes are ready at the second poll only.
+    /// Async writes and flushes are ready only on the second poll.
     pub(crate) stutters: bool,
-    /// Every byte that it has taken.
+    /// All bytes taken.
     pub(crate) written: Vec<u8>,
     pub(crate) unplugged: Rc<Cell<bool>>,
 }
@@ -178,7 +178,7 @@ impl End {
         }
     }
 
-    /// Two ends, each the other's.
+    /// Two ends connected to each other.
     pub(crate) fn pair(world: &World, byte_us: u64) -> (Self, Self) {
         let (mut one, mut other) = (Self::new(world, byte_us), Self::new(world, byte_us));
         one.outboxes.push(other.inbox.clone());
@@ -199,7 +199,7 @@ impl End {
         if self.is_deaf {
             return Err(Unplugged);
         }
-        assert!(self.has_arrived(), "read without a byte would block for ever");
+        assert!(self.has_arrived(), "read without a byte would block forever");
         let mut count = 0;
         for slot in buffer {
             if !self.has_arrived() {

@@ -1,8 +1,8 @@
-//! Frames by hand.
+//! Hand-made frames.
 
 use axlewire::crc16;
 
-/// A frame by hand, with any id and any body.
+/// A hand-made frame, with any id and any body.
 pub(crate) fn frame(id: u8, body: &[u8]) -> Vec<u8> {
     let mut frame = vec![0xFD, 0xFF];
     frame.extend((body.len() as u16 + 4).to_le_bytes());

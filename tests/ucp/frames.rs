@@ -85,7 +85,7 @@ fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
             assert_eq!(buffer, [0xEE; 64]);
         }
     }
-    // Nor with a length field that makes shipped robots overflow.
+    // The same for a length field that makes shipped robots overflow.
     let mut long = frame(1, &[]);
     long[2] = 253;
     let ping = FrameOf::<Ping>::try_read_from_bytes(&long).unwrap();

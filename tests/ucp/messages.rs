@@ -1,4 +1,4 @@
-//! Messages: which ids and bodies are known, and what their values say.
+//! Messages: which ids and bodies are known, and the meaning of their values.
 
 use axlewire::{
     encode::Encode,
@@ -51,7 +51,7 @@ fn every_id_and_body_length_is_its_message_or_unknown_and_never_misread() {
     }
 }
 
-/// Ruling U4, written down a second time.
+/// Ruling U4, written again independently.
 const KNOWN: [(u8, usize); 19] = [
     (1, 0),
     (1, 1),
@@ -84,7 +84,7 @@ fn only_the_ids_of_ruling_u4_are_known() {
 }
 
 #[test]
-fn codes_keep_what_they_do_not_know() {
+fn codes_keep_unknown_values() {
     for raw in 0..=u8::MAX {
         assert_eq!(u8::from(ErrorCode::from(raw)), raw);
         assert_eq!(u8::from(CalibrationKind::from(raw)), raw);
@@ -131,14 +131,14 @@ fn telemetry_is_given_in_units_and_an_impossible_battery_is_flagged() {
 }
 
 #[test]
-fn an_update_is_requested_by_a_call_that_says_so() {
+fn an_update_is_requested_only_by_an_explicit_call() {
     let frame = OtaRequest::start_firmware_update(39).frame(0);
     assert_eq!(frame.as_bytes(), [0xFD, 0xFF, 6, 0, 9, 0, 39, 0, 0x99, 0xD3]);
     assert_eq!(frame.body().version(), 39);
 }
 
 #[test]
-fn a_received_request_to_update_is_passed_on_by_nothing_but_an_unchecked_relay() {
+fn only_an_unchecked_relay_passes_on_a_received_update_request() {
     let frame = OtaRequest::start_firmware_update(-2).frame(7);
     let frame = Frame::parse(frame.as_bytes()).unwrap();
     let Message::OtaRequest(received) = frame.message() else { panic!() };

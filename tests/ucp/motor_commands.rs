@@ -1,5 +1,5 @@
-//! Motor commands: their range, what the wheels make of them, and that none starts an update by
-//! mistake.
+//! Motor commands: their range, the resulting wheel speeds, and that none starts an update by
+//! accident.
 
 use axlewire::{
     encode::Encode,
@@ -84,13 +84,13 @@ fn received(speed: i16, angular: i16, front_led: i16, version: u16) -> RawMotorC
 }
 
 #[test]
-fn a_received_command_becomes_one_to_be_sent_only_if_it_is_in_range_and_starts_no_update() {
+fn a_received_command_can_be_sent_only_if_it_is_in_range_and_starts_no_update() {
     for version in 0..=u16::MAX {
         let command = MotorControl::try_from(received(10, 20, 100, version));
         if received(10, 20, 100, version).starts_update() {
             assert_eq!(command, Err(EncodeError::StartsUpdate { version }));
         } else {
-            // And nothing of its reserved fields is left.
+            // And nothing of its reserved fields remains.
             assert_eq!(command, MotorControl::new(10, 20).map(|it| it.with_front_led(true)));
         }
     }
@@ -108,7 +108,7 @@ fn a_received_command_becomes_one_to_be_sent_only_if_it_is_in_range_and_starts_n
 }
 
 #[test]
-fn foreign_bytes_are_relayed_only_by_the_call_that_says_so() {
+fn foreign_bytes_are_relayed_only_by_an_explicit_call() {
     let bytes = frame(2, zerocopy::IntoBytes::as_bytes(&received(130, -500, 7, 99)));
     let mut buffer = [0; 64];
     let view = Frame::parse(&bytes).unwrap();
@@ -141,10 +141,10 @@ fn a_yaw_swings_the_nose_to_its_side_whatever_the_direction_of_travel() {
 }
 
 #[test]
-fn the_wheels_turn_as_the_vendors_do_and_not_at_all_in_the_dead_bands() {
+fn the_wheels_turn_like_the_vendors_and_not_at_all_in_the_dead_bands() {
     let wheels = |speed, angular| MotorControl::new(speed, angular).unwrap().wheels_pct();
     for (speed, angular, expected) in [
-        // Run in the vendor's motor.c (ruling U6).
+        // From a run of the vendor's motor.c (ruling U6).
         (60, 50, (81, 39)),
         (-60, 50, (-81, -39)),
         (100, 100, (100, 30)),
@@ -161,7 +161,7 @@ fn the_wheels_turn_as_the_vendors_do_and_not_at_all_in_the_dead_bands() {
     for (speed, angular) in (-100..=100).flat_map(|s| (-100..=100).map(move |a| (s, a))) {
         let (left, right) = wheels(speed, angular);
         assert!(left.abs() <= 100 && right.abs() <= 100, "({speed}, {angular})");
-        assert_eq!(wheels(speed, -angular), (right, left), "the other way: the sides change");
+        assert_eq!(wheels(speed, -angular), (right, left), "the other way: the sides are swapped");
         if speed.abs() > 5 {
             assert_eq!(wheels(-speed, angular), (-left, -right), "in reverse: the same, backward");
             assert_eq!(left.signum() * right.signum(), 1, "no side stops or turns back");

@@ -1,13 +1,13 @@
 //! Nothing that was acknowledged is lost, whatever is in the queues (U15).
 //!
-//! The oracle looks at a copy of the role: what an application would find if it took everything out
-//! at this moment.
+//! The oracle looks at a copy of the role: what an application would find if it took all events
+//! now.
 
 use proptest::{collection::vec, prelude::*};
 
 use crate::rig::*;
 
-/// One thing that happens to a host.
+/// A single event for a host.
 #[derive(Clone, Copy, Debug)]
 enum ToHost {
     Imu(i16),
@@ -46,7 +46,7 @@ fn is_end(event: &HostEvent) -> bool {
     )
 }
 
-/// One thing that happens to a robot.
+/// A single event for a robot.
 #[derive(Clone, Copy, Debug)]
 enum ToRobot {
     Start(bool),
@@ -87,7 +87,7 @@ fn waiting<R: Endpoint + Clone>(role: &R) -> Vec<R::Event> {
     events(&mut role.clone())
 }
 
-/// Is the bias request still repeated?
+/// Whether the bias request is still repeated.
 fn asks(robot: &Robot) -> bool {
     let mut robot = robot.clone();
     let end = robot.poll_timeout().unwrap_or(ms(0)) + Duration::from_millis(2000);
@@ -158,14 +158,14 @@ proptest! {
             host.handle_timeout(now);
             sent(&mut host, now);
         }
-        // Every calibration request comes to its end, and that is told.
+        // Every calibration request ends, and its end is reported.
         wait(&mut host, now + HostConfig::default().calibration_bound());
         told.extend(events(&mut host));
         prop_assert_eq!(told.iter().filter(|event| is_end(event)).count(), asked);
     }
 
     #[test]
-    fn a_robot_loses_nothing_that_it_acknowledges_or_asks_for_no_more(
+    fn a_robot_loses_nothing_that_it_acknowledges_or_stops_requesting(
         calls in vec(to_robot(), 1..120),
     ) {
         let mut now = ms(0);
@@ -243,7 +243,7 @@ proptest! {
                     let request = OtaRequest::start_firmware_update(version);
                     let by = UpdateSource::Request;
                     let event = RobotEvent::UpdateRequested { version, by };
-                    // Answered before, so that only this request can be answered now.
+                    // Answered earlier, so that only this request can be answered now.
                     robot.answer_update(OtaStatus::Forbidden, now);
                     robot.handle_input(&bytes(request), now);
                     let told = waiting(&robot).contains(&event);

@@ -1,4 +1,5 @@
-//! What a role acknowledges, its application will find, however full the queues are (U15).
+//! Everything that a role acknowledges is available to its application, however full the queues are
+//! (U15).
 
 use crate::rig::*;
 
@@ -6,7 +7,7 @@ fn report(index: u8) -> Vec<u8> {
     FirmwareReport::new(&Telemetry::default(), 38).frame(index).as_bytes().to_vec()
 }
 
-/// Answers to a host's results among `frames`.
+/// The answers to a host's results in `frames`.
 fn acks(frames: &[Vec<u8>]) -> usize {
     frames.iter().filter(|frame| matches!(frame[4], 6 | 7)).count()
 }
@@ -15,7 +16,7 @@ fn acks(frames: &[Vec<u8>]) -> usize {
 fn a_result_without_a_store_is_acknowledged_only_when_its_event_has_room() {
     let mut host = quiet_host();
     sent(&mut host, ms(0));
-    // Results that nobody takes out, each another one, as long as there is room.
+    // Results that are never taken, each a different one, while there is room.
     let result = |value: i16| ImuBias::new([value; 3], [0; 3]);
     let mut acknowledged = Vec::new();
     for value in 0..40 {
@@ -28,7 +29,7 @@ fn a_result_without_a_store_is_acknowledged_only_when_its_event_has_room() {
     let told: Vec<_> =
         events(&mut host).into_iter().filter(|e| matches!(e, HostEvent::ImuBias(_))).collect();
     assert_eq!(told, acknowledged);
-    // The robot says the last one again, and now there is room.
+    // The robot sends the last one again, and now there is room.
     host.handle_input(&bytes(result(39)), ms(1000));
     assert_eq!(acks(&sent(&mut host, ms(1000))), 1);
     assert_eq!(events(&mut host), [HostEvent::ImuBias(result(39))]);
@@ -62,7 +63,7 @@ fn a_result_that_is_refused_withdraws_the_acknowledgement_of_the_one_before() {
         host.handle_input(&[&first[..], &second].concat(), ms(1));
         assert_eq!(sent(&mut host, ms(1)), [] as [Vec<u8>; 0]);
         assert_eq!(host.statistics().results_not_stored, 1);
-        // The robot says what was kept once more: that is acknowledged.
+        // The robot resends the stored result: that one is acknowledged.
         host.handle_input(&first, ms(2));
         assert_eq!(acks(&sent(&mut host, ms(2))), 1);
 
@@ -79,7 +80,7 @@ fn a_result_that_is_refused_withdraws_the_acknowledgement_of_the_one_before() {
                 host.handle_unsent(Unsent::Untouched, ms(4));
             }
             assert_eq!(sent(&mut host, ms(4)), [] as [Vec<u8>; 0], "{is_told_before}");
-            // Of those that do leave, none is missing in the count.
+            // The indices of those that do leave have no gap.
             host.handle_input(&first, ms(5));
             assert_eq!(sent(&mut host, ms(5))[0][5], 0);
         }
@@ -148,10 +149,10 @@ fn the_newest_motor_event_is_the_latest_command_however_full_the_queue_is() {
 }
 
 #[test]
-fn biases_end_the_asking_only_when_their_event_has_room() {
+fn biases_end_their_request_only_if_their_event_has_room() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     sent(&mut robot, ms(0));
-    // Other things that the host wants, until the queue is full.
+    // Other requests of the host, until the queue is full.
     for version in 40..60 {
         let request = OtaRequest::start_firmware_update(version);
         robot.handle_input(&bytes(request), ms(1));
@@ -159,11 +160,11 @@ fn biases_end_the_asking_only_when_their_event_has_room() {
     let biases = bytes(Biases::new(imu_bias(), mag_bias()));
     robot.handle_input(&biases, ms(2));
     let asked = wait(&mut robot, ms(1500));
-    assert_eq!(asked.iter().filter(|(_, frame)| frame[4] == 8).count(), 1, "it asks again");
+    assert_eq!(asked.iter().filter(|(_, frame)| frame[4] == 8).count(), 1, "it requests again");
     assert_eq!(events(&mut robot).len(), 16);
     robot.handle_input(&biases, ms(1600));
     assert_eq!(events(&mut robot), [RobotEvent::Biases(Biases::new(imu_bias(), mag_bias()))]);
-    assert_eq!(wait(&mut robot, ms(5000)), [], "and then no more");
+    assert_eq!(wait(&mut robot, ms(5000)), [], "and then no longer");
 }
 
 #[test]
@@ -193,7 +194,7 @@ fn a_calibration_request_is_acknowledged_only_when_its_event_has_room() {
 }
 
 #[test]
-fn biases_are_those_of_the_store_at_the_moment_they_are_sent() {
+fn biases_are_read_from_the_store_when_they_are_sent() {
     let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
     let mut host = Host::with_store(quiet_config(), store, ms(0));
     sent(&mut host, ms(0));
@@ -209,7 +210,7 @@ fn biases_are_those_of_the_store_at_the_moment_they_are_sent() {
 }
 
 #[test]
-fn a_calibration_ends_when_its_result_has_been_acknowledged_and_the_next_start_is_told() {
+fn a_calibration_ends_when_its_result_is_acknowledged_and_the_next_start_is_reported() {
     for kind in [IMU, MAG] {
         let mut robot = quiet_robot();
         robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
@@ -275,7 +276,7 @@ fn the_end_of_a_calibration_request_waits_for_room() {
 }
 
 #[test]
-fn a_start_that_comes_again_is_told_with_a_flag() {
+fn a_repeated_start_is_reported_with_a_flag() {
     let mut robot = quiet_robot();
     let start = bytes(CalibrationStart::new(IMU));
     robot.handle_input(&start, ms(1));
@@ -299,7 +300,7 @@ fn a_calibration_can_be_aborted_by_the_robot() {
     sent(&mut robot, ms(1));
     events(&mut robot);
     assert_eq!((robot.abort_calibration(), robot.calibrating()), (Some(IMU), None));
-    // The host's end is acknowledged and has no effect; its next start is told.
+    // The host's end is acknowledged without effect; its next start is reported.
     robot.handle_input(&bytes(CalibrationEnd::new(IMU)), ms(2));
     assert_eq!((sent(&mut robot, ms(2)).len(), events(&mut robot)), (1, vec![]));
     robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(3));
@@ -351,7 +352,7 @@ fn the_latest_command_and_network_state_have_getters_and_are_the_newest_of_their
 }
 
 #[test]
-fn roles_can_be_cloned_and_go_on_alike() {
+fn cloned_roles_behave_alike() {
     let mut rig = Rig::new(ms(0));
     rig.robot.set_telemetry(&Telemetry::default(), ms(0));
     rig.host.drive(go(10), ms(0)).unwrap();

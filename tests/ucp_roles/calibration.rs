@@ -39,7 +39,7 @@ fn calibration_requests_are_acknowledged_at_once() {
 }
 
 #[test]
-fn a_calibration_request_that_comes_again_is_acknowledged_and_no_event() {
+fn a_repeated_calibration_request_is_acknowledged_without_an_event() {
     let mut robot = quiet_robot();
     for (at, request) in [
         (1, bytes(CalibrationStart::new(MAG))),
@@ -60,7 +60,7 @@ fn a_calibration_request_that_comes_again_is_acknowledged_and_no_event() {
 }
 
 #[test]
-fn a_lost_acknowledgement_is_asked_for_again() {
+fn a_lost_acknowledgement_is_requested_again() {
     let mut rig = Rig::new(ms(0));
     let mut lost = 0;
     rig.fault = Box::new(move |_, frame| {
@@ -79,7 +79,7 @@ fn a_lost_acknowledgement_is_asked_for_again() {
 }
 
 #[test]
-fn a_calibration_request_that_nobody_answers_fails_within_its_bound() {
+fn an_unanswered_calibration_request_fails_within_its_bound() {
     let mut host = quiet_host();
     host.start_calibration(IMU, ms(0)).unwrap();
     sent(&mut host, ms(0));
@@ -96,12 +96,12 @@ fn a_calibration_request_that_nobody_answers_fails_within_its_bound() {
 }
 
 #[test]
-fn a_calibration_request_that_arrives_damaged_is_sent_again_at_once_and_fails_in_the_end() {
+fn a_calibration_request_that_arrives_damaged_is_resent_at_once_and_eventually_fails() {
     let mut host = quiet_host();
     host.end_calibration(IMU, ms(0)).unwrap();
     for at in [0, 1, 2] {
         assert_eq!(sent(&mut host, ms(at)).len(), 1);
-        // Shipped robots tell an old kind here.
+        // Shipped robots report an old kind here.
         let ack = CalibrationEndAck::new(MAG, ErrorCode::Damaged);
         host.handle_input(&bytes(ack), ms(at + 1));
     }
@@ -136,7 +136,7 @@ fn an_end_is_acknowledged_with_any_kind_as_long_as_the_robots_last_start_is_not_
     assert_eq!(events(&mut host).pop(), Some(HostEvent::CalibrationEnded(IMU)));
 }
 
-/// A host whose calibration of the IMU was begun, and whose next request nobody answered.
+/// A host whose calibration of the IMU was begun, and whose next request was not answered.
 fn host_after(failed: CalibrationStep) -> Host {
     let mut host = quiet_host();
     host.start_calibration(IMU, ms(0)).unwrap();
@@ -155,7 +155,7 @@ fn host_after(failed: CalibrationStep) -> Host {
 }
 
 #[test]
-fn a_start_that_nobody_answered_may_have_begun_its_kind_and_an_end_changes_nothing() {
+fn an_unanswered_start_may_have_begun_its_kind_and_an_unanswered_end_changes_nothing() {
     let ack = bytes(CalibrationEndAck::new(MAG, ErrorCode::Fine));
     let mut host = host_after(CalibrationStep::Start);
     host.handle_input(&ack, ms(2002));
@@ -164,11 +164,11 @@ fn a_start_that_nobody_answered_may_have_begun_its_kind_and_an_end_changes_nothi
     let mut host = host_after(CalibrationStep::End);
     let before = host.statistics().acks_unasked;
     host.handle_input(&ack, ms(2002));
-    assert_eq!(host.statistics().acks_unasked, before + 1, "it was the IMU's that was begun");
+    assert_eq!(host.statistics().acks_unasked, before + 1, "the IMU calibration was the one begun");
 }
 
 #[test]
-fn acknowledgements_that_nobody_waits_for_are_counted() {
+fn unexpected_acknowledgements_are_counted() {
     let mut host = quiet_host();
     let ack = bytes(CalibrationStartAck::new(IMU, ErrorCode::Fine));
     host.handle_input(&ack, ms(0)); // nothing was asked
@@ -185,7 +185,7 @@ fn acknowledgements_that_nobody_waits_for_are_counted() {
 }
 
 #[test]
-fn a_calibration_that_no_robot_knows_is_refused() {
+fn a_calibration_of_unknown_kind_is_refused() {
     let mut host = quiet_host();
     let refused = host.start_calibration(CalibrationKind::Other(7), ms(0));
     assert_eq!(refused, Err(CommandError::CalibrationKind { kind: 7 }));
@@ -200,7 +200,7 @@ fn results_are_repeated_every_1000_ms_until_acknowledged() {
     assert_eq!(sent(&mut robot, ms(300)), [bytes(imu_bias()), bytes(mag_bias())]);
     let times: Vec<_> = wait(&mut robot, ms(3400)).iter().map(|(at, _)| at.as_micros()).collect();
     assert_eq!(times, [1_300_000, 1_300_000, 2_300_000, 2_300_000, 3_300_000, 3_300_000]);
-    // One that says damaged does not end it.
+    // An acknowledgement with `Damaged` does not end it.
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Damaged)), ms(3500));
     robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Damaged)), ms(3500));
     assert_eq!(events(&mut robot), []);
@@ -209,7 +209,7 @@ fn results_are_repeated_every_1000_ms_until_acknowledged() {
     assert_eq!(wait(&mut robot, ms(5000)).len(), 1);
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(5000));
     assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken]);
-    assert_eq!(robot.poll_timeout(), None, "nothing is left to do");
+    assert_eq!(robot.poll_timeout(), None, "nothing more is due");
     assert_eq!(robot.statistics().acks_refused, 2);
 }
 
@@ -252,7 +252,7 @@ fn a_repeated_result_is_acknowledged_again_and_stored_once() {
 }
 
 #[test]
-fn a_result_is_told_once_though_the_end_is_asked_for_before_it_comes_again() {
+fn a_result_is_reported_once_even_if_the_end_is_requested_before_it_is_repeated() {
     for (kind, result) in [(IMU, bytes(imu_bias())), (MAG, bytes(mag_bias()))] {
         let mut host = quiet_host();
         host.start_calibration(kind, ms(0)).unwrap();
@@ -284,11 +284,11 @@ fn calibrating(kind: CalibrationKind) -> Host {
 }
 
 #[test]
-fn the_acknowledgement_of_an_end_tells_the_kind_asked_for_or_that_of_the_last_start() {
+fn the_acknowledgement_of_an_end_names_the_requested_kind_or_that_of_the_last_start() {
     for (asked, told, counts) in [
         (MAG, MAG, true),
         (IMU, IMU, true),
-        (IMU, MAG, true), // as shipped robots tell it
+        (IMU, MAG, true), // as shipped robots report it
         (MAG, IMU, false),
         (MAG, CalibrationKind::Other(0), false),
     ] {
@@ -344,7 +344,7 @@ fn a_result_that_is_not_stored_is_not_acknowledged() {
 }
 
 #[test]
-fn biases_are_asked_for_every_1000_ms_from_boot_until_answered() {
+fn biases_are_requested_every_1000_ms_from_boot_until_answered() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     assert_eq!(sent(&mut robot, ms(0)), [bytes(BiasRequest {})]);
     let times: Vec<_> = wait(&mut robot, ms(3500)).iter().map(|(at, _)| at.as_micros()).collect();

@@ -1,5 +1,4 @@
-//! Ids 5..=0x0A, on which some builds of the firmware hang, are not sent where the settings say so
-//! (U14).
+//! Ids 5..=0x0A, on which some firmware builds hang, are not sent if the settings forbid it (U14).
 
 use crate::rig::*;
 
@@ -10,7 +9,7 @@ fn low_ids_host<S: BiasStore>(store: S) -> Host<S> {
 }
 
 #[test]
-fn with_low_ids_only_no_id_from_5_to_10_is_sent_whatever_the_robot_and_the_application_ask_for() {
+fn with_low_ids_only_no_id_from_5_to_10_is_ever_sent() {
     let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
     let mut host = low_ids_host(store);
     let mut ids = Vec::new();
@@ -34,13 +33,13 @@ fn with_low_ids_only_no_id_from_5_to_10_is_sent_whatever_the_robot_and_the_appli
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids, [1, 2, 3]);
-    assert_eq!(host.store().imu, Some(ImuBias::new([199; 3], [0; 3])), "kept all the same");
+    assert_eq!(host.store().imu, Some(ImuBias::new([199; 3], [0; 3])), "still kept");
     let error = CommandError::LowIdsOnly { id: 9 };
     assert!(error.to_string().contains("0x09"));
 }
 
 #[test]
-fn with_low_ids_only_results_are_told_once_and_requests_for_biases_are_told_as_not_answered() {
+fn with_low_ids_only_results_are_reported_once_and_bias_requests_as_not_answered() {
     let mut host = low_ids_host(NoStore);
     let mut seen = Vec::new();
     for at in [0, 1000, 2000].map(ms) {
@@ -57,9 +56,9 @@ fn with_low_ids_only_results_are_told_once_and_requests_for_biases_are_told_as_n
     assert!(!seen.iter().any(missing));
 }
 
-/// How to recognise such a build: it answers pings, and after the biases no more.
+/// How to recognise such a build: it answers pings until it is sent the biases.
 #[test]
-fn the_first_ping_after_the_biases_is_never_answered_by_a_build_that_hangs() {
+fn a_build_that_hangs_never_answers_the_first_ping_after_the_biases() {
     for low_ids_only in [false, true] {
         let mut config = HostConfig::default();
         config.low_ids_only = low_ids_only;

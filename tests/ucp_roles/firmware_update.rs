@@ -1,10 +1,9 @@
-//! A firmware update starts only when it is asked for, behind a stop, and silence follows (U7,
-//! U13).
+//! A firmware update starts only on request, after a stop, and is followed by silence (U7, U13).
 
 use crate::rig::*;
 
 #[test]
-fn a_firmware_update_is_asked_for_once_and_followed_by_silence() {
+fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     host.start_calibration(IMU, ms(0)).unwrap();
     assert_eq!(host.start_firmware_update(40, ms(0)), Err(CommandError::Calibrating));
@@ -22,13 +21,13 @@ fn a_firmware_update_is_asked_for_once_and_followed_by_silence() {
     assert_eq!(speed(&frames[0]), Some(0));
     assert!(matches!(message(&frames[1]), Message::OtaRequest(request) if request.version() == 40));
     assert_eq!(frames.len(), 2);
-    // Whatever comes in meanwhile, nothing goes out.
+    // Whatever arrives meanwhile, nothing is sent.
     host.handle_input(&bytes(imu_bias()), ms(120));
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), ms(130));
     assert_eq!(wait(&mut host, ms(60_000)), []);
     assert!(events(&mut host).contains(&HostEvent::UpdateAnswered(OtaStatus::Accepted)));
     host.end_firmware_update(ms(60_000));
-    assert_eq!(host.poll_timeout(), Some(ms(60_000)), "no deadline lies in the past");
+    assert_eq!(host.poll_timeout(), Some(ms(60_000)), "the deadline is not in the past");
     host.handle_timeout(ms(60_000));
     assert!(sent(&mut host, ms(60_000)).iter().any(|frame| is_ping(frame)));
 }
@@ -71,7 +70,7 @@ fn an_update_is_refused_until_the_stop_has_been_sent() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
         let mut host = driving();
         host.stop(ms(40));
-        assert_eq!(host.start_firmware_update(40, ms(40)), refused, "asked for");
+        assert_eq!(host.start_firmware_update(40, ms(40)), refused, "requested");
         assert_eq!(host.poll_transmit(ms(40)).and_then(speed), Some(0));
         host.handle_unsent(unsent, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "{unsent:?}");
@@ -81,7 +80,7 @@ fn an_update_is_refused_until_the_stop_has_been_sent() {
 }
 
 #[test]
-fn one_more_stop_goes_in_front_of_an_update_request() {
+fn one_more_stop_precedes_an_update_request() {
     let mut host = driving();
     let mut robot = quiet_robot();
     robot.handle_input(&bytes(go(60)), ms(30));
@@ -102,7 +101,7 @@ fn one_more_stop_goes_in_front_of_an_update_request() {
 fn an_update_request_waits_for_a_stop_that_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
         let stops = if unsent == Unsent::CutOff { vec![2, 2] } else { vec![2] };
-        // The stop is lost in front of the request, or with it.
+        // The stop is lost before the request, or along with it.
         for frames in [1, 2] {
             let mut host = driving();
             host.stop(ms(40));
@@ -123,7 +122,7 @@ fn an_update_never_starts_by_itself() {
     let mut robot = quiet_robot();
     robot.handle_input(&bytes(go(10)), ms(0));
     robot.handle_input(&careless(90, 0, 0, 39), ms(10));
-    assert_eq!(robot.command(ms(10)).speed(), 10, "its speed is not taken");
+    assert_eq!(robot.command(ms(10)).speed(), 10, "its speed is ignored");
     assert_eq!(robot.command(ms(500)).speed(), 0, "and it does not feed the watchdog");
     assert!(!robot.answer_update(OtaStatus::Accepted, ms(10)), "nothing to answer");
     robot.handle_input(&bytes(OtaRequest::start_firmware_update(41)), ms(20));
@@ -139,10 +138,10 @@ fn an_update_never_starts_by_itself() {
 #[test]
 fn a_command_that_a_false_header_held_back_is_as_old_as_its_bytes() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
-    // A start of 64 bytes that never comes, a command behind it, and a driver that is late.
+    // The start of a 64-byte frame that never comes, a command after it, and a late driver.
     let held = [&[0xFD, 0xFF, 60, 0][..], go(60).frame(0).as_bytes()].concat();
     robot.handle_input(&held, ms(10));
-    assert_eq!(robot.command(ms(11)).speed(), 0, "not yet to be seen");
+    assert_eq!(robot.command(ms(11)).speed(), 0, "not visible yet");
     robot.handle_input(&[0; 36], ms(400));
     assert_eq!(robot.command(ms(400)).speed(), 60, "it holds for 500 ms ...");
     assert_eq!(robot.command(ms(510)).speed(), 0, "... from when it had arrived");
@@ -150,5 +149,5 @@ fn a_command_that_a_false_header_held_back_is_as_old_as_its_bytes() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     robot.handle_input(&held, ms(10));
     robot.handle_input(&[0; 36], ms(2000));
-    assert_eq!(robot.command(ms(2000)).speed(), 0, "nobody wants it any more");
+    assert_eq!(robot.command(ms(2000)).speed(), 0, "it is no longer wanted");
 }

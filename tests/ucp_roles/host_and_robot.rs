@@ -1,10 +1,10 @@
-//! What holds for host and robot alike: floods, full queues, unplugging, time that wraps, deadlines
+//! Properties common to host and robot: floods, full queues, unplugging, time that wraps, deadlines
 //! and memory.
 
 use crate::rig::*;
 
 #[test]
-fn a_host_that_floods_gets_one_answer_of_each_sort_at_a_time() {
+fn a_flooding_host_gets_one_answer_of_each_kind_at_a_time() {
     let mut robot = quiet_robot();
     let mut flood = Vec::new();
     for version in 0..1000 {
@@ -16,7 +16,7 @@ fn a_host_that_floods_gets_one_answer_of_each_sort_at_a_time() {
     assert_eq!(sent(&mut robot, ms(0)).len(), 2);
     assert_eq!((robot.statistics().pings, robot.statistics().pongs), (1000, 1));
     assert_eq!(events(&mut robot).len(), 16);
-    // A repeated start waits in the queue already; a request without room is not lost unseen.
+    // A repeated start is already queued; a request without room is not lost unnoticed.
     assert_eq!((robot.lost_events(), robot.statistics().without_room), (0, 1000 - 15));
 }
 
@@ -26,7 +26,7 @@ fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
     for at in 0..=50_u64 {
         robot.handle_input(&bytes(go(at as i16 + 1)), ms(at));
     }
-    assert_eq!(robot.command(ms(50)).speed(), 51, "the motors do not depend on it");
+    assert_eq!(robot.command(ms(50)).speed(), 51, "the motors do not depend on the queue");
     let seen = events(&mut robot);
     assert_eq!(seen[0], RobotEvent::Motor(go(1)));
     assert_eq!((seen.len() as u32) + robot.lost_events(), 51);
@@ -36,14 +36,14 @@ fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
         let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
         host.handle_input(report.as_bytes(), ms(index.into()));
     }
-    assert_eq!(host.last_report().unwrap().index, 49, "the latest is kept apart");
+    assert_eq!(host.last_report().unwrap().index, 49, "the latest is kept separately");
     let seen = events(&mut host);
     assert_eq!(seen[0], HostEvent::LinkUp);
     assert_eq!((seen.len() as u32) + host.lost_events(), 51);
 }
 
 #[test]
-fn garbage_for_ever_is_reported_as_a_lost_link() {
+fn endless_garbage_is_reported_as_a_lost_link() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     let mut seed = 1_u32;
     for at in 0..5000 {
@@ -60,7 +60,7 @@ fn garbage_for_ever_is_reported_as_a_lost_link() {
 }
 
 #[test]
-fn unplugging_stops_the_robot_and_is_reported_and_plugging_in_goes_on() {
+fn unplugging_stops_the_robot_and_is_reported_and_replugging_resumes() {
     let mut rig = Rig::new(ms(0));
     rig.robot.set_telemetry(&Telemetry::default(), rig.now);
     rig.host.set_network_state(NetworkState::Connected, rig.now).unwrap();
@@ -116,7 +116,7 @@ fn a_session_goes_the_same_way_over_the_wrap_of_time() {
 }
 
 #[test]
-fn a_call_too_many_does_nothing() {
+fn spurious_calls_do_nothing() {
     let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     host.drive(go(10), ms(0)).unwrap();
@@ -137,7 +137,7 @@ fn a_call_too_many_does_nothing() {
 }
 
 #[test]
-fn periods_of_nothing_do_not_make_a_driver_spin() {
+fn zero_periods_do_not_make_a_driver_spin() {
     let mut config = HostConfig::default();
     config.command_period = Duration::ZERO;
     config.command_gap = Duration::ZERO;
@@ -164,14 +164,14 @@ fn periods_of_nothing_do_not_make_a_driver_spin() {
         robot.calibration_result_imu(imu_bias(), ms(0));
         sent(&mut host, ms(0));
         sent(&mut robot, ms(0));
-        // Two sorts of frames, at most one of each in a millisecond.
+        // Two kinds of frames, at most one of each per millisecond.
         assert!(wait(&mut host, ms(100)).len() <= 250);
         assert!(wait(&mut robot, ms(100)).len() <= 310);
     }
 }
 
 #[test]
-fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_never() {
+fn zero_durations_in_the_settings_mean_a_millisecond() {
     let mut config = quiet_config();
     (config.command_gap, config.dead_man) = (Duration::ZERO, Duration::ZERO);
     let mut host = Host::new(config, ms(0));
@@ -179,14 +179,14 @@ fn a_command_counts_for_a_millisecond_and_waits_for_one_where_the_settings_say_n
     let at_once = sent(&mut host, ms(0));
     assert_eq!(at_once.iter().map(|it| speed(it)).collect::<Vec<_>>(), [Some(1)], "no stop yet");
     host.drive(go(2), ms(0)).unwrap();
-    assert_eq!(wait(&mut host, us(999)), [], "not two in one moment");
+    assert_eq!(wait(&mut host, us(999)), [], "not two at one time");
     host.drive(go(2), us(999)).unwrap();
     assert_eq!(speeds(&wait(&mut host, ms(1))), [(1000, 2)]);
     assert_eq!(speeds(&wait(&mut host, us(1999))), [(1999, 0)], "the dead-man");
 }
 
 #[test]
-fn a_host_whose_settings_say_nothing_pings_and_asks_once_a_millisecond() {
+fn a_host_with_zero_periods_pings_and_requests_once_a_millisecond() {
     let mut config = quiet_config();
     (config.ping_period, config.ack_timeout) = (Some(Duration::ZERO), Duration::ZERO);
     let mut host = Host::new(config, ms(0));
@@ -237,7 +237,7 @@ fn the_roles_fit_into_small_memories() {
     assert!(robot_event <= 24, "{robot_event}");
 }
 
-/// The frame of a start request, on which the computed bound rests.
+/// The frame of a start request, from which the bound is computed.
 #[test]
 fn the_calibration_bound_is_that_of_the_frames_that_are_sent() {
     assert_eq!(FrameOf::<CalibrationStart>::LEN, FrameOf::<CalibrationEnd>::LEN);

@@ -1,5 +1,5 @@
-//! The link: when it is up or lost, what pings and reports tell, and what passes through raw (U9,
-//! U10, U12).
+//! The link: when it is up or lost, what pings and reports show, and which frames pass through raw
+//! (U9, U10, U12).
 
 use axlewire::error::EncodeError;
 
@@ -19,7 +19,7 @@ fn the_link_is_lost_after_500_ms_without_a_valid_frame_and_not_earlier() {
     let mut host = quiet_host();
     host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(100));
     assert_eq!(events(&mut host), [HostEvent::LinkUp]);
-    // Noise is no frame.
+    // Noise is not a frame.
     host.handle_input(&[0x55; 40], ms(400));
     host.handle_timeout(us(599_999));
     assert_eq!((host.link(), events(&mut host)), (Link::Up, vec![]));
@@ -27,7 +27,7 @@ fn the_link_is_lost_after_500_ms_without_a_valid_frame_and_not_earlier() {
     host.handle_timeout(ms(600));
     assert_eq!((host.link(), events(&mut host)), (Link::Down, vec![HostEvent::LinkDown]));
     wait(&mut host, ms(5000));
-    assert_eq!(events(&mut host), [], "said once");
+    assert_eq!(events(&mut host), [], "reported once");
     host.handle_input(&bytes(BiasRequest {}), ms(6000));
     assert_eq!(events(&mut host)[0], HostEvent::LinkUp);
 }
@@ -46,7 +46,7 @@ fn a_robot_that_never_answers_is_reported_after_500_ms() {
 }
 
 #[test]
-fn an_echoing_line_is_no_robot() {
+fn an_echoing_line_is_not_a_robot() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     for now in (0..2000).step_by(10) {
         host.handle_timeout(ms(now));
@@ -61,7 +61,7 @@ fn an_echoing_line_is_no_robot() {
 }
 
 #[test]
-fn a_pong_tells_the_round_trip_time() {
+fn a_pong_gives_the_round_trip_time() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     for (turn, micros) in [(0, 3000), (1, 1000), (2, 2000)] {
         let at = ms(turn * 200);
@@ -119,7 +119,7 @@ fn missing_reports_are_counted_by_their_index() {
     assert_eq!(report(&mut host, 2, 180), 0, "repeated");
     assert_eq!((host.statistics().reports_lost, host.statistics().reports_repeated), (4, 1));
     assert_eq!(report(&mut host, 0, 200), 253, "a restart in disguise");
-    // A restart that the robot announces, or that takes the link down, costs nothing.
+    // A restart announced by the robot, or one that takes the link down, costs nothing.
     report(&mut host, 100, 220);
     host.handle_input(&bytes(BiasRequest {}), ms(230));
     events(&mut host);
@@ -133,7 +133,7 @@ fn missing_reports_are_counted_by_their_index() {
 #[test]
 fn a_false_header_holds_a_report_back_no_longer_than_the_quiet_margin() {
     let mut host = quiet_host();
-    // It promises 60 bytes, and the report has 44.
+    // It announces 60 bytes, and the report has 44.
     let mut line = vec![0xFD, 0xFF, 60, 0, 5];
     line.extend(bytes(FirmwareReport::new(&Telemetry::default(), 38)));
     host.handle_input(&line, ms(10));

@@ -1,4 +1,5 @@
-//! Motor commands are repeated, a stop goes first, and the dead-man ends what nobody renews (U10).
+//! Motor commands are repeated, a stop goes first, and the dead-man ends commands that are not
+//! renewed (U10).
 
 use crate::rig::*;
 
@@ -44,7 +45,7 @@ fn a_stop_goes_out_at_once_and_before_everything_else() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     host.drive(go(40).with_front_led(true), ms(0)).unwrap();
     sent(&mut host, ms(0));
-    // All that could be in its way: an acknowledgement, a calibration, the lamp, a ping.
+    // Everything that could delay it: an acknowledgement, a calibration, the lamp, a ping.
     let at = ms(250);
     host.handle_input(&bytes(imu_bias()), at);
     host.start_calibration(IMU, at).unwrap();
@@ -58,7 +59,7 @@ fn a_stop_goes_out_at_once_and_before_everything_else() {
 }
 
 #[test]
-fn a_stop_leaves_the_lamp_as_it_was() {
+fn a_stop_does_not_change_the_lamp() {
     let mut host = quiet_host();
     host.drive(go(40).with_front_led(true), ms(0)).unwrap();
     host.stop(ms(1));
@@ -68,7 +69,7 @@ fn a_stop_leaves_the_lamp_as_it_was() {
 }
 
 #[test]
-fn stop_called_without_end_does_not_flood_the_line() {
+fn stop_called_endlessly_does_not_flood_the_line() {
     let mut host = quiet_host();
     let mut count = 0;
     for now in 0..1000 {
@@ -91,7 +92,7 @@ fn the_host_sends_zero_when_the_application_has_been_silent_for_500_ms() {
     let after = wait(&mut host, ms(1000));
     assert_eq!(after[0].0, ms(500));
     assert!(speeds(&after).iter().all(|(_, speed)| *speed == 0));
-    assert_eq!(after.len(), 6, "it is sent on, every 100 ms");
+    assert_eq!(after.len(), 6, "it is still sent every 100 ms");
     let Message::MotorControl(command) = message(&after[5].1) else { panic!() };
     assert_eq!(command.front_led(), 100, "the lamp stays");
     let dead_men = events(&mut host).into_iter().filter(|event| *event == HostEvent::DeadMan);
@@ -127,7 +128,7 @@ fn an_application_that_has_stopped_may_be_silent() {
 fn a_late_driver_does_not_revive_a_command_that_is_too_old() {
     let mut host = quiet_host();
     host.drive(go(40), ms(0)).unwrap();
-    // Nobody called handle_timeout in between.
+    // handle_timeout was not called in between.
     assert_eq!(host.poll_transmit(ms(700)).and_then(speed), Some(0));
     assert_eq!(events(&mut host), [HostEvent::DeadMan]);
 }
@@ -159,7 +160,7 @@ fn the_index_counts_every_frame_of_the_host_and_wraps() {
 fn the_first_frame_of_a_host_is_a_zero_motor_command_before_any_ping_or_answer() {
     let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
     assert_eq!(host.poll_timeout(), Some(ms(0)), "due at once");
-    // All that could be in its way: an acknowledgement, biases, a calibration, the lamp, a ping.
+    // Everything that could delay it: an acknowledgement, biases, a calibration, the lamp, a ping.
     *host.store_mut() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
     host.handle_input(&bytes(imu_bias()), ms(1));
     host.handle_input(&bytes(BiasRequest {}), ms(1));
@@ -184,8 +185,8 @@ fn the_zero_command_is_repeated_every_100_ms_until_the_first_call() {
     assert_eq!(speeds(&wait(&mut host, ms(350))), [at(0), at(100), at(200), at(300)]);
 }
 
-/// The vendor's watchdog is fed by any byte: it drives on through the pings of a host that has been
-/// restarted. It is told to stand still, even if the first frame is damaged.
+/// Any byte feeds the vendor's watchdog: the robot keeps driving through the pings of a restarted
+/// host. It receives a stop, even if the first frame is damaged.
 #[test]
 fn a_robot_that_drives_on_while_any_byte_arrives_is_stopped_by_a_host_that_was_restarted() {
     let begin = ms(300);
@@ -235,7 +236,7 @@ fn turning_on_the_spot_is_moving() {
         sent(&mut host, ms(30));
         assert!(!host.is_stop_sent());
         assert_eq!(host.start_firmware_update(40, ms(30)), Err(CommandError::Moving));
-        // The dead-man ends it as well, and a stop does not wait for the pause between commands.
+        // The dead-man also ends it, and a stop does not wait for the pause between commands.
         let still = |frame: &[u8]| match message(frame) {
             Message::MotorControl(command) => (command.speed(), command.angular()) == (0, 0),
             _ => false,
@@ -246,7 +247,7 @@ fn turning_on_the_spot_is_moving() {
         assert_eq!(forgotten.statistics().dead_man, 1);
         host.stop(ms(31));
         assert!(still(host.poll_transmit(ms(31)).unwrap()));
-        // And so does a robot's watchdog.
+        // So does a robot's watchdog.
         let mut robot = quiet_robot();
         robot.handle_input(&bytes(spin), ms(0));
         assert_eq!(robot.command(us(499_999)).angular(), angular);
@@ -264,13 +265,13 @@ fn a_stop_is_sent_once_it_has_been_handed_out() {
     assert!(!host.is_stop_sent());
     sent(&mut host, ms(50));
     host.stop(ms(51));
-    assert!(!host.is_stop_sent(), "asked for");
+    assert!(!host.is_stop_sent(), "requested");
     sent(&mut host, ms(51));
     assert!(host.is_stop_sent());
     wait(&mut host, ms(5000));
     host.stop(ms(5000));
-    assert!(host.is_stop_sent(), "the robot has been told since");
-    // The dead-man's stop is one, too.
+    assert!(host.is_stop_sent(), "the robot has received another command since");
+    // The dead-man's stop also counts.
     host.drive(go(40), ms(6000)).unwrap();
     wait(&mut host, us(6_499_999));
     assert!(!host.is_stop_sent());

@@ -1,4 +1,4 @@
-//! What the stories are told with: frames by hand, roles alone, and two roles on one line.
+//! Helpers of the scenarios: hand-made frames, roles alone, and two roles on one line.
 
 use std::collections::VecDeque;
 
@@ -25,7 +25,7 @@ pub(crate) use axlewire::{
 pub(crate) const IMU: CalibrationKind = CalibrationKind::Imu;
 pub(crate) const MAG: CalibrationKind = CalibrationKind::Magnetometer;
 
-/// Everything that can have become of a frame that did not reach the line.
+/// Every possible fate of a frame that did not reach the line.
 pub(crate) const EVERY: [Unsent; 3] = [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed];
 
 pub(crate) fn ms(millis: u64) -> Instant {
@@ -52,7 +52,7 @@ pub(crate) fn bytes<B: Body>(body: B) -> Vec<u8> {
     body.frame(0).as_bytes().to_vec()
 }
 
-/// A motor command as a careless host sends it: speed, angular, front lamp, version.
+/// A motor command from a careless host: speed, angular, front lamp, version.
 pub(crate) fn careless(speed: i16, angular: i16, front_led: i16, version: u16) -> Vec<u8> {
     let mut frame = vec![0xFD, 0xFF, 20, 0, 2, 0];
     let mut body = [0; 16];
@@ -65,7 +65,7 @@ pub(crate) fn careless(speed: i16, angular: i16, front_led: i16, version: u16) -
     frame
 }
 
-/// Everything that a role wants to send now. A role that never ends would hang its driver.
+/// Everything that a role sends now. A role that never stops would hang its driver.
 pub(crate) fn sent<R: Endpoint>(role: &mut R, now: Instant) -> Vec<Vec<u8>> {
     let mut frames = Vec::new();
     while let Some(frame) = role.poll_transmit(now) {
@@ -80,7 +80,7 @@ pub(crate) fn events<R: Endpoint>(role: &mut R) -> Vec<R::Event> {
     std::iter::from_fn(|| role.poll_event()).collect()
 }
 
-/// Lets time pass up to `end`, deadline by deadline; what is sent meanwhile, and when.
+/// Lets time pass up to `end`, deadline by deadline; returns the frames sent meanwhile, with times.
 pub(crate) fn wait<R: Endpoint>(role: &mut R, end: Instant) -> Vec<(Instant, Vec<u8>)> {
     let mut frames = Vec::new();
     while let Some(at) = role.poll_timeout().filter(|&at| at <= end) {
@@ -106,7 +106,7 @@ pub(crate) fn speed(frame: &[u8]) -> Option<i16> {
     }
 }
 
-/// When motor commands went out, and with which speed.
+/// Times and speeds of the motor commands sent.
 pub(crate) fn speeds(frames: &[(Instant, Vec<u8>)]) -> Vec<(u64, i16)> {
     let speeds = frames.iter().filter_map(|(at, frame)| Some((at.as_micros(), speed(frame)?)));
     speeds.collect()
@@ -138,12 +138,12 @@ pub(crate) fn begins(kind: CalibrationKind) -> RobotEvent {
     RobotEvent::CalibrationStart { kind, repeated: false }
 }
 
-/// A host without pings and without the first stop, so that a test sees only what it asks for.
+/// A host without pings and without the first stop, so that a test sees only what it requests.
 pub(crate) fn quiet_host() -> Host {
     Host::new(quiet_config(), ms(0))
 }
 
-/// A robot that asks for nothing.
+/// A robot that requests nothing.
 pub(crate) fn quiet_robot() -> Robot {
     quiet_robot_at(ms(0))
 }
@@ -195,11 +195,11 @@ pub(crate) struct Rig<S: BiasStore = MemoryStore> {
     pub(crate) now: Instant,
     pub(crate) to_robot: Wire,
     pub(crate) to_host: Wire,
-    /// What becomes of a frame on the line.
+    /// The fate of a frame on the line.
     pub(crate) fault: Fault,
     pub(crate) host_events: Vec<(Instant, HostEvent)>,
     pub(crate) robot_events: Vec<(Instant, RobotEvent)>,
-    /// What the robot's motors did: every change of its command.
+    /// The motions of the robot: every change of its command.
     pub(crate) motion: Vec<(Instant, i16)>,
 }
 
@@ -225,7 +225,7 @@ impl<S: BiasStore> Rig<S> {
         }
     }
 
-    /// Unplugs the line for ever, or plugs it in again.
+    /// Unplugs the line permanently, or plugs it in again.
     pub(crate) fn unplug(&mut self, unplugged: bool) {
         self.fault = Box::new(move |_, frame| if unplugged { Vec::new() } else { frame.to_vec() });
     }
@@ -249,7 +249,7 @@ impl<S: BiasStore> Rig<S> {
         roles.into_iter().chain([self.to_robot.next(), self.to_host.next()]).flatten().min()
     }
 
-    /// One turn of both drivers' loops.
+    /// One iteration of both drivers' loops.
     pub(crate) fn step(&mut self) {
         let now = self.now;
         while let Some(bytes) = self.to_robot.arrived(now) {

@@ -1,5 +1,4 @@
-//! The robot answers at once, reports in step, and stands still without commands (U9, U10, U12,
-//! U13).
+//! The robot answers at once, reports on schedule, and stops without commands (U9, U10, U12, U13).
 
 use crate::rig::*;
 
@@ -44,7 +43,7 @@ fn no_valid_motor_frame_for_500_ms_means_standing_still() {
     assert_eq!(robot.command(ms(600)), still);
     assert_eq!(events(&mut robot), [RobotEvent::Watchdog]);
     wait(&mut robot, ms(5000));
-    assert_eq!(events(&mut robot), [], "said once");
+    assert_eq!(events(&mut robot), [], "reported once");
     robot.handle_input(&bytes(command), ms(6000));
     assert_eq!(events(&mut robot), [RobotEvent::Motor(command)], "the next one is obeyed");
 }
@@ -54,7 +53,7 @@ fn a_robot_whose_driver_is_late_still_stands_still() {
     let mut robot = quiet_robot();
     robot.handle_input(&bytes(go(60)), ms(0));
     assert_eq!(robot.command(ms(500)).speed(), 0, "without handle_timeout");
-    // The next command comes before anyone has handled the timeout.
+    // The next command arrives before the timeout has been handled.
     robot.handle_input(&bytes(go(60)), ms(700));
     let go = RobotEvent::Motor(go(60));
     assert_eq!(events(&mut robot), [go, RobotEvent::Watchdog, go]);
@@ -69,7 +68,7 @@ fn the_first_command_is_an_event_even_if_it_changes_nothing() {
 }
 
 #[test]
-fn a_repeated_command_is_no_event() {
+fn a_repeated_command_is_not_an_event() {
     let mut robot = quiet_robot();
     for at in (0..2000).step_by(100) {
         robot.handle_timeout(ms(at));
@@ -80,7 +79,7 @@ fn a_repeated_command_is_no_event() {
 }
 
 #[test]
-fn out_of_range_is_cut_as_the_vendor_firmware_does() {
+fn out_of_range_values_are_clamped_like_in_the_vendor_firmware() {
     let mut robot = quiet_robot();
     robot.handle_input(&careless(i16::MIN, 360, 0x0101, 0), ms(0));
     let command = robot.command(ms(0));
@@ -95,12 +94,12 @@ fn out_of_range_is_cut_as_the_vendor_firmware_does() {
 #[test]
 fn reports_come_every_20_ms_without_drift() {
     let mut robot = quiet_robot();
-    assert_eq!(robot.poll_timeout(), None, "nothing is reported unmeasured");
+    assert_eq!(robot.poll_timeout(), None, "nothing is reported before a measurement");
     robot.set_telemetry(&Telemetry::default(), ms(7));
     let mut count = 0;
     while let Some(at) = robot.poll_timeout().filter(|&at| at < ms(10_007)) {
         assert_eq!(at, ms(7 + 20 * count));
-        // A driver that is always a little late.
+        // A driver that is always slightly late.
         let now = at + Duration::from_micros(1 + (count * 977 % 19_000) as u32);
         robot.handle_timeout(now);
         let battery_pct = 80 + (count % 20) as u16;
@@ -122,9 +121,9 @@ fn a_robot_that_was_held_up_skips_the_reports_it_missed() {
     robot.set_telemetry(&Telemetry::default(), ms(0));
     assert_eq!(sent(&mut robot, ms(0)).len(), 1);
     assert_eq!(sent(&mut robot, ms(1005)).len(), 1, "no burst");
-    assert_eq!(robot.poll_timeout(), Some(ms(1020)), "in step");
+    assert_eq!(robot.poll_timeout(), Some(ms(1020)), "on schedule");
     assert_eq!((robot.statistics().reports, robot.statistics().reports_skipped), (2, 49));
-    // Longer than a Duration can tell.
+    // Longer than a Duration can represent.
     assert_eq!(sent(&mut robot, ms(20_000_000)).len(), 1);
     assert_eq!(robot.poll_timeout(), Some(ms(20_000_020)));
     assert!(robot.statistics().reports_skipped > 200_000);
@@ -169,8 +168,8 @@ fn frames_of_a_robot_do_not_disturb_a_robot() {
     assert_eq!((robot.statistics().misdirected, events(&mut robot)), (5, vec![]));
     assert_eq!(sent(&mut robot, ms(1)), [] as [Vec<u8>; 0]);
     robot.handle_input(&bytes(Ping {}), ms(2));
-    assert_eq!(sent(&mut robot, ms(2)).len(), 1, "and it is as lively as before");
-    // Unknown ids and bodies of no message: counted as well.
+    assert_eq!(sent(&mut robot, ms(2)).len(), 1, "and it still answers as before");
+    // Unknown ids and invalid bodies are counted as well.
     let mut buffer = [0; 64];
     let raw = RawFrame { id: 0x77, index: 0, body: &[1] };
     robot.handle_input(raw.encode(&mut buffer).unwrap(), ms(3));
@@ -182,7 +181,7 @@ fn an_update_by_a_motor_command_that_has_no_room_is_counted_and_one_that_has_is_
     let mut robot = quiet_robot();
     robot.handle_input(&careless(0, 0, 0, 39), ms(0));
     assert_eq!((robot.statistics().without_room, robot.statistics().commands_refused), (0, 1));
-    // Others, which nobody takes out, until there is no room.
+    // Other events that are never taken, until there is no room.
     for version in 0..40 {
         robot.handle_input(&bytes(OtaRequest::start_firmware_update(version)), ms(1));
     }

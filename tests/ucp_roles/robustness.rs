@@ -1,5 +1,5 @@
-//! Whatever calls, bytes and times a role gets, it keeps to its contract, and a bad line moves
-//! nothing that was not asked for.
+//! Under any calls, bytes and times a role keeps its contract, and a bad line causes no motion that
+//! was not requested.
 
 use std::collections::HashSet;
 
@@ -8,15 +8,15 @@ use proptest::{collection::vec, prelude::*, sample::Index};
 
 use crate::rig::*;
 
-/// One thing that may happen to a role.
+/// A single action on a role.
 #[derive(Clone, Debug)]
 enum Call {
-    /// Time passes, microseconds, without a look at the deadline.
+    /// Time passes, microseconds, without checking the deadline.
     Sleep(u32),
-    /// A driver does its work up to then, microseconds.
+    /// A driver runs up to this time, microseconds.
     Drive(u32),
     Noise(Vec<u8>),
-    /// A good frame: which, and with what in it.
+    /// A good frame: which one, and its content.
     Frame(Index, u8),
     /// The same, cut off.
     Cut(Index, usize),
@@ -71,7 +71,7 @@ fn any_frame(which: &Index, salt: u8) -> Vec<u8> {
     which.get(&frames).clone()
 }
 
-/// Does what a call says; `command` is what it means to this role.
+/// Runs a call; `command` is the role's own command.
 fn perform<R: Endpoint>(
     role: &mut R,
     call: &Call,
@@ -85,7 +85,7 @@ fn perform<R: Endpoint>(
             sent(role, *now);
             let end = *now + Duration::from_micros(*micros);
             let frames = wait(role, end);
-            // Motor commands, pings, reports, results, requests: nothing is sent for its own sake.
+            // Motor commands, pings, reports, results, requests: nothing is sent without a reason.
             let most = 30 + *micros / 5_000;
             assert!(frames.len() <= most as usize, "{} frames in {micros} us", frames.len());
             *now = end;
@@ -103,7 +103,7 @@ fn perform<R: Endpoint>(
         Call::Events => assert!(events(role).len() <= 16, "events are bounded"),
         Call::Command(which, value) => command(role, *which, *value, *now),
     }
-    // A deadline that has been handled lies behind no role.
+    // A handled deadline is no longer in the past.
     role.handle_timeout(*now);
     sent(role, *now);
 }
@@ -125,7 +125,7 @@ proptest! {
         for call in &calls {
             perform(&mut host, call, &mut now, |host, which, value, now| {
                 let kind = CalibrationKind::from((value & 3) as u8);
-                // Whether it is refused does not matter here.
+                // A refusal does not matter here.
                 let _ = match which % 8 {
                     0 => host.drive(go(value % 101), now),
                     1 => host.drive(MotorControl::new(0, value % 101).unwrap(), now),
@@ -166,11 +166,11 @@ proptest! {
     }
 }
 
-/// What a bad line does to a frame: each byte may be lost, damaged or doubled.
+/// A bad line's effect on a frame: each byte may be lost, damaged or doubled.
 #[derive(Clone, Copy, Debug)]
 struct BadLine {
     seed: u64,
-    /// Bytes out of 1000 that suffer.
+    /// Affected bytes per 1000.
     per_mille: u64,
 }
 
@@ -198,8 +198,8 @@ impl BadLine {
     }
 }
 
-/// Has a bad line made another good frame of it? The CRC lets one damaged frame in 65,536 through,
-/// which no role can see.
+/// Whether a bad line made another good frame of it. The CRC passes one damaged frame in 65,536,
+/// which no role can detect.
 fn holds_another(bytes: &[u8], frame: &[u8]) -> bool {
     let crc = Crc::<u16>::new(&CRC_16_MODBUS);
     (0..bytes.len()).any(|at| {
@@ -215,7 +215,7 @@ fn holds_another(bytes: &[u8], frame: &[u8]) -> bool {
 }
 
 #[test]
-fn a_line_whose_damage_the_crc_cannot_see_is_told_from_others() {
+fn damage_that_the_crc_cannot_detect_is_recognised() {
     let command = |crc: [u8; 2]| {
         let mut frame = [0_u8; 24];
         frame[..8].copy_from_slice(&[0xFD, 0xFF, 0x14, 0, 2, 0x18, 0xCE, 0xFF]);
@@ -225,7 +225,7 @@ fn a_line_whose_damage_the_crc_cannot_see_is_told_from_others() {
     let frame = command([0xD0, 0x05]);
     assert!(Frame::parse(&frame).is_ok());
     assert!(!holds_another(&frame, &frame));
-    // The index twice: what follows moves on by one place, and the CRC is right again.
+    // The index is doubled: the rest moves by one position, and the CRC is correct again.
     let mut doubled = frame.to_vec();
     doubled.insert(5, 0x18);
     assert!(Frame::parse(&doubled[..24]).is_ok());
@@ -233,7 +233,7 @@ fn a_line_whose_damage_the_crc_cannot_see_is_told_from_others() {
     assert!(!holds_another(&command([0xD0, 0x04]), &frame));
 }
 
-/// What the application does next, and for how long, milliseconds.
+/// The application's next action, and its duration, milliseconds.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Drive(i16, u32),
@@ -258,7 +258,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
 
     #[test]
-    fn over_a_bad_line_nothing_is_done_that_was_not_asked_for_and_nothing_hangs(
+    fn over_a_bad_line_nothing_unrequested_is_done_and_nothing_hangs(
         acts in vec(act(), 1..25),
         seed in any::<u64>(),
         per_mille in 0..200_u64,
@@ -301,18 +301,18 @@ proptest! {
                 }
             }
         }
-        // The application falls silent: dead-man, one frame on the line, and the robot stands.
+        // The application goes silent: dead-man, one frame on the line, and the robot stops.
         rig.run_for(500 + 3);
         if per_mille == 0 {
             prop_assert_eq!(rig.robot.command(rig.now).speed(), 0);
         }
         rig.run_for(500 + 3);
         prop_assert_eq!(rig.robot.command(rig.now).speed(), 0);
-        // No speed that nobody asked for.
+        // No speed that was not requested.
         for (at, speed) in &rig.motion {
             prop_assert!(asked.contains(speed), "{} at {:?}", speed, at);
         }
-        // Every calibration request has come to an end, in order, within its bound.
+        // Every calibration request has ended, in order, within its bound.
         let bound = HostConfig::default().calibration_bound();
         let ends: Vec<_> = rig.host_events.iter().filter(|(_, event)| matches!(
             event,
@@ -341,7 +341,7 @@ proptest! {
         for (turn, pause) in pauses.into_iter().enumerate() {
             if turn % 3 == 0 {
                 robot.handle_input(&noise, now);
-                // A pause ends whatever the noise has begun.
+                // A pause ends any frame that the noise has begun.
                 now += Duration::from_millis(20);
                 robot.handle_timeout(now);
                 events(&mut robot);

@@ -1,11 +1,10 @@
-//! Whatever happens, what should stand still does: the command is zero 500 ms after the last sign
-//! of life (U10, U16).
+//! Whatever happens, the command is zero 500 ms after the last sign of life (U10, U16).
 
 use proptest::{collection::vec, prelude::*};
 
 use crate::rig::*;
 
-/// What becomes of a frame that is handed out.
+/// The fate of a frame that is handed out.
 #[derive(Clone, Copy, Debug)]
 enum Fate {
     Sent,
@@ -28,11 +27,11 @@ enum Act {
     Drive(i16, i16),
     Stop,
     Sleep(u32),
-    /// One round of a driver, with what becomes of its frames.
+    /// One round of a driver, with the fates of its frames.
     Round(Vec<Fate>),
-    /// The robot says something.
+    /// The robot sends something.
     Hear(u8),
-    /// A motor command of somebody else, maybe a bad one.
+    /// A motor command from another host, possibly an invalid one.
     Foreign(i16, i16, u16),
 }
 
@@ -75,8 +74,8 @@ fn begin() -> impl Strategy<Value = u64> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
 
-    /// Every frame that is handed out is zero, or what the application has asked for last and less
-    /// than 500 ms ago; and after every round on a line that works, so is what the robot was told.
+    /// Every frame handed out is zero, or the application's last command if less than 500 ms old;
+    /// and after every round on a working line, so is the command that the robot has.
     #[test]
     fn a_hosts_command_is_zero_500_ms_after_the_applications_last_call(
         acts in vec(act(), 1..80),
@@ -124,7 +123,7 @@ proptest! {
                             }
                         }
                     }
-                    // Once everything is out, the robot knows the newest stop.
+                    // Once everything is out, the robot has the newest stop.
                     let is_old = now - wanted.1 >= TIMEOUT;
                     if wanted.0 == (0, 0) || is_old {
                         prop_assert!(host.is_stop_sent());
@@ -134,7 +133,7 @@ proptest! {
                     }
                 }
             }
-            // Never waits past what it owes.
+            // Never waits past an owed frame.
             if now - wanted.1 >= TIMEOUT && wanted.0 != (0, 0) {
                 prop_assert!(
                     host.is_stop_sent() || host.poll_timeout().is_some_and(|at| at <= now)
@@ -143,10 +142,10 @@ proptest! {
         }
     }
 
-    /// A robot hears what is left of the frames. Once the line works again and the application has
-    /// asked for a stop, one round and the time on the wire are enough.
+    /// A robot receives the rest of the frames. Once the line works again and the application has
+    /// requested a stop, one round and the time on the wire are enough.
     #[test]
-    fn after_any_failures_a_stop_is_at_the_robot_after_one_round(
+    fn after_any_failures_a_stop_reaches_the_robot_in_one_round(
         acts in vec(act(), 1..60),
         start in begin(),
         wait in 0..100_000_u32,
@@ -162,7 +161,7 @@ proptest! {
                 Act::Stop => host.stop(now),
                 Act::Sleep(micros) => now += Duration::from_micros(micros),
                 Act::Hear(which) => host.handle_input(&said(which), now),
-                // There is one host.
+                // There is only one host.
                 Act::Foreign(..) => {}
                 Act::Round(fates) => {
                     host.handle_timeout(now);
@@ -186,14 +185,14 @@ proptest! {
             robot.handle_input(&frame, now);
         }
         prop_assert!(host.is_stop_sent());
-        // A frame that was cut off keeps back what follows no longer than the quiet margin.
+        // A cut-off frame delays the following ones no longer than the quiet margin.
         now += Duration::from_millis(6);
         robot.handle_timeout(now);
         let command = robot.command(now);
         prop_assert_eq!((command.speed(), command.angular()), (0, 0));
     }
 
-    /// Out of range counts as a command, cut; one that would start an update does not.
+    /// An out-of-range command counts, clamped; one that would start an update does not.
     #[test]
     fn a_robots_command_is_zero_500_ms_after_the_last_valid_one(
         acts in vec(act(), 1..80),

@@ -32,7 +32,7 @@ fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
             ids
         };
         assert_eq!(ids(&lost), [1, 2, 3, 6, 7, 8, 10]);
-        assert_eq!(ids(&frames), ids(&lost), "all of it has been sent in the end");
+        assert_eq!(ids(&frames), ids(&lost), "everything has been sent eventually");
         let indices: Vec<_> = frames.iter().map(|frame| frame[5]).collect();
         assert_eq!(indices, (0..frames.len() as u8).collect::<Vec<_>>(), "without a gap");
         let seen = host.statistics();
@@ -40,12 +40,12 @@ fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
         assert_eq!((seen.commands as usize, seen.pings), (motor, 1));
         assert_eq!(seen.calibration_retries, 0);
         let told = events(&mut host).iter().filter(|e| **e == HostEvent::BiasesSent).count();
-        assert_eq!(told, 1, "and told once");
+        assert_eq!(told, 1, "and reported once");
     }
 }
 
 #[test]
-fn a_calibration_request_that_never_left_is_no_attempt() {
+fn a_calibration_request_that_never_left_does_not_count_as_an_attempt() {
     let mut host = begun();
     host.start_calibration(IMU, ms(10)).unwrap();
     for at in 10..30 {
@@ -83,7 +83,7 @@ fn an_answer_of_a_robot_that_never_left_is_due_again() {
         assert_eq!(ids, [3, 4, 9, 1, 6, 7, 8, 5]);
         let seen = robot.statistics();
         assert_eq!((seen.pongs, seen.results, seen.bias_requests, seen.reports), (1, 2, 1, 1));
-        // The next report: in step, and the next index.
+        // The next report: on schedule, with the next index.
         assert_eq!(wait(&mut robot, ms(20))[0].1[5], 1);
         assert_eq!(robot.statistics().reports_skipped, 0);
     }
@@ -112,7 +112,7 @@ fn a_result_that_never_left_is_not_ended_by_the_acknowledgement_of_the_one_befor
             begin(&mut robot, 2, ms(20));
             assert!(robot.poll_transmit(ms(20)).is_some());
             robot.handle_unsent(unsent, ms(20));
-            robot.handle_input(&ack, ms(21)); // for the first
+            robot.handle_input(&ack, ms(21)); // acknowledges the first
             assert_eq!(events(&mut robot), [], "{unsent:?}");
             assert_eq!(robot.statistics().acks_refused, 1);
             assert_eq!(sent(&mut robot, ms(22)).len(), 1);
@@ -136,7 +136,7 @@ fn a_repetition_that_did_not_leave_leaves_the_result_sent() {
 }
 
 #[test]
-fn reports_that_were_skipped_are_counted_once_though_the_next_did_not_leave() {
+fn skipped_reports_are_counted_once_even_if_the_next_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut robot = quiet_robot();
         robot.set_telemetry(&Telemetry::default(), ms(0));
@@ -146,7 +146,7 @@ fn reports_that_were_skipped_are_counted_once_though_the_next_did_not_leave() {
         assert_eq!(robot.poll_transmit(ms(86)).map(|frame| frame[5]), Some(1));
         let seen = robot.statistics();
         assert_eq!((seen.reports, seen.reports_skipped), (2, 3));
-        assert_eq!(robot.poll_timeout(), Some(ms(100)), "in step");
+        assert_eq!(robot.poll_timeout(), Some(ms(100)), "on schedule");
     }
 }
 
@@ -167,7 +167,7 @@ fn a_failed_flush_repeats_no_acknowledgement() {
 }
 
 #[test]
-fn a_failed_flush_repeats_no_update_request_where_no_stop_can_be_lost_with_it() {
+fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
     let mut host = quiet_host();
     host.start_firmware_update(50, ms(3)).unwrap();
     assert_eq!(sent(&mut host, ms(3)).len(), 1);
@@ -200,7 +200,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
 }
 
 #[test]
-fn a_robot_whose_flush_failed_says_results_and_requests_again_at_once() {
+fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     robot.calibration_result_imu(imu_bias(), ms(0));
     robot.calibration_result_mag(mag_bias(), ms(0));
@@ -208,5 +208,5 @@ fn a_robot_whose_flush_failed_says_results_and_requests_again_at_once() {
     assert_eq!(sent(&mut robot, ms(0)).len(), 4);
     robot.handle_unsent(Unsent::Unflushed, ms(5));
     let ids: Vec<_> = sent(&mut robot, ms(5)).iter().map(|frame| frame[4]).collect();
-    assert_eq!(ids, [6, 7, 8], "the host asks again for its pong");
+    assert_eq!(ids, [6, 7, 8], "the host pings again");
 }

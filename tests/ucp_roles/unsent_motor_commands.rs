@@ -1,5 +1,5 @@
-//! Motor commands and stops that did not reach the line: due again at once, twice behind a frame
-//! that was cut off, and never too late (U16).
+//! Motor commands and stops that did not reach the line: due again at once, twice after a cut-off
+//! frame, and never too late (U16).
 
 use crate::rig::*;
 
@@ -37,7 +37,7 @@ fn an_old_command_is_never_sent_late() {
         host.handle_timeout(ms(5000));
         let frames = sent(&mut host, ms(5000));
         assert!(!frames.is_empty());
-        assert!(frames.iter().all(|frame| speed(frame) == Some(0)), "the dead-man has spoken");
+        assert!(frames.iter().all(|frame| speed(frame) == Some(0)), "the dead-man has fired");
     }
 }
 
@@ -52,7 +52,7 @@ fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
 }
 
 #[test]
-fn both_frames_behind_one_that_was_cut_off_go_at_once_though_the_command_changes_in_between() {
+fn both_frames_after_a_cut_off_one_are_sent_at_once_even_if_the_command_changes_in_between() {
     let mut host = begun();
     host.drive(go(10), ms(20)).unwrap();
     sent(&mut host, ms(20));
@@ -81,7 +81,7 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
 }
 
 #[test]
-fn a_stop_asked_for_after_the_failure_is_sent_at_once_and_alone() {
+fn a_stop_requested_after_the_failure_is_sent_at_once_and_alone() {
     for unsent in EVERY {
         let mut host = begun();
         host.drive(go(40), ms(30)).unwrap();
@@ -121,26 +121,26 @@ fn a_first_frame_that_may_not_have_been_flushed_comes_first_again() {
         sent(host, now).iter().filter_map(|frame| speed(frame)).collect()
     };
     assert_eq!(speeds(&mut host, ms(2)), [0, 40]);
-    // As often as the flush of it fails.
+    // The flush may fail repeatedly.
     host.handle_unsent(Unsent::Unflushed, ms(3));
     assert_eq!(speeds(&mut host, ms(3)), [0, 40]);
-    // The next round says that it was flushed.
+    // The next round shows that it was flushed.
     assert_eq!(speeds(&mut host, ms(103)), [40]);
     host.handle_unsent(Unsent::Unflushed, ms(104));
     assert_eq!(speeds(&mut host, ms(104)), [40]);
 }
 
 #[test]
-fn the_first_frame_is_zero_also_when_the_flush_of_it_and_of_a_command_fails() {
+fn the_first_frame_is_zero_even_when_its_flush_and_that_of_a_command_fail() {
     let mut host = fresh_host();
     host.drive(go(60), ms(0)).unwrap();
     for at in 0..5 {
         assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(0));
         assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(60));
-        // Nothing of either has left, or the robot has heard both.
+        // Nothing of either has left, or the robot has received both.
         host.handle_unsent(Unsent::Unflushed, ms(at));
     }
-    // A command that the port did not take is not the first frame, which it did take.
+    // A command refused by the port is not the first frame, which the port did take.
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(0));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(60));
     host.handle_unsent(Unsent::Untouched, ms(5));
@@ -148,7 +148,7 @@ fn the_first_frame_is_zero_also_when_the_flush_of_it_and_of_a_command_fails() {
 }
 
 #[test]
-fn a_call_of_handle_unsent_too_many_only_repeats_the_motor_command() {
+fn a_spurious_handle_unsent_only_repeats_the_motor_command() {
     let mut host = begun();
     host.handle_unsent(Unsent::Untouched, ms(1));
     host.handle_unsent(Unsent::Untouched, ms(1));
@@ -159,8 +159,8 @@ fn a_call_of_handle_unsent_too_many_only_repeats_the_motor_command() {
     assert_eq!((sent(&mut robot, ms(1)), robot.poll_timeout()), (vec![], None));
 }
 
-/// A receiver that takes what follows for the rest of a frame that was cut off, as shipped robots
-/// do. It searches nothing that it has refused.
+/// A receiver that takes the following bytes for the rest of a cut-off frame, as shipped robots do.
+/// It does not search rejected bytes.
 fn heard_by_a_simple_receiver(line: &[u8]) -> Vec<Vec<u8>> {
     let (mut at, mut frames) = (0, Vec::new());
     while let Some(start) = line.get(at..).and_then(|rest| rest.first_chunk::<5>()) {
@@ -183,7 +183,7 @@ fn heard_by_a_simple_receiver(line: &[u8]) -> Vec<Vec<u8>> {
 
 #[test]
 fn behind_any_frame_that_was_cut_off_a_stop_reaches_a_simple_receiver() {
-    // The longest frame of a host, a motor command and the shortest, cut at every byte.
+    // The longest frame of a host, a motor command and the shortest frame, cut at every byte.
     for frame in [
         bytes(Biases::new(imu_bias(), mag_bias())),
         go(90).frame(0xFD).as_bytes().to_vec(),
@@ -222,14 +222,14 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     host.handle_unsent(Unsent::Untouched, ms(32));
     host.handle_unsent(Unsent::Unflushed, ms(32));
     assert_eq!(copies(&mut host, ms(33)), 2);
-    // It may have lost both, with what was sent behind them.
+    // It may have lost both, along with the frames after them.
     let mut host = cut();
     assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
     host.set_network_state(NetworkState::Connected, ms(32)).unwrap();
     sent(&mut host, ms(32));
     host.handle_unsent(Unsent::Unflushed, ms(33));
     assert_eq!(copies(&mut host, ms(33)), 2);
-    // Both are out, and it has only lost what came later.
+    // Both have left; the port has only lost later frames.
     let mut host = cut();
     sent(&mut host, ms(31));
     sent(&mut host, ms(40));

@@ -1,5 +1,5 @@
-//! A master under any calls, bytes and times: it writes nothing but the latest orders and the stops
-//! that it owes, and forgets no stop.
+//! A master under any calls, bytes and times: it writes only the latest orders and the stops that
+//! it owes, and forgets no stop.
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
@@ -74,7 +74,7 @@ impl<B: Board> Wishes<B> {
                 assert!(is_paid, "a forgotten stop: {progress:?}");
             }
             let is_online = matches!(master.health(id), Some(Health::Online | Health::Suspect(_)));
-            assert!(is_online || set_point.is_none(), "a set-point for a node that is not online");
+            assert!(is_online || set_point.is_none(), "a set-point for an offline node");
             if set_point.is_none() {
                 *self.order(id) = None;
             }
@@ -91,7 +91,7 @@ impl<B: Board> Wishes<B> {
         if is_stop {
             return;
         }
-        let order = self.order(id).expect("an order that was not given");
+        let order = self.order(id).expect("a WRITE without an order");
         let expected = match order {
             Target::Velocity(to) => packet(&B::write_velocity(id, to)),
             Target::Position(to) => packet(&B::write_position(id, to)),
@@ -191,7 +191,7 @@ fn master<B: Board>(
             told += u32::from(matches!(event, MasterEvent::Status { .. }));
         });
         wishes.follow(&mut master, turn, now);
-        // Raw input may also contain a good answer if it is long enough.
+        // Raw input can also contain a valid answer if it is long enough.
         assert!(told <= statuses.max(1), "{told} answers to one request");
         for sent in sent {
             let id = NodeId::new(sent[1]).expect("an id on the wire");

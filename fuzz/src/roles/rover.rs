@@ -1,5 +1,5 @@
-//! A host and a robot under any calls, bytes and times: neither sends a motion that was not asked
-//! for, and the robot stands still without a command.
+//! A host and a robot under any calls, bytes and times: neither sends a motion that was not
+//! requested, and the robot does not move without a command.
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
@@ -60,7 +60,7 @@ fn host(u: &mut Unstructured<'_>) -> Result<()> {
         }
         for packet in serve(&mut host, now, |_| {}) {
             let frame = Frame::parse(&packet).expect("a good frame");
-            assert!(!low_ids_only || frame.id() < 5, "an id that makes builds hang (U14)");
+            assert!(!low_ids_only || frame.id() < 5, "an id that hangs some builds (U14)");
             if core::mem::take(&mut is_first) {
                 assert_eq!(packet[4..10], [2, 0, 0, 0, 0, 0], "the first frame (U16)");
             }

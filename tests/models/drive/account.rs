@@ -1,4 +1,5 @@
-//! What a driver of a master owes its caller and its node after every call, by an own account.
+//! What a driver of a master owes its caller and its node after every call, by an independent
+//! account.
 
 use axlewire::{
     drive::Driver,
@@ -17,13 +18,13 @@ use super::{
 
 #[derive(Debug, Default)]
 pub(crate) struct Account {
-    /// A stop is owed, from this entry of the node's list on.
+    /// A stop is owed, starting at this entry of the node's log.
     owed_from: Option<usize>,
-    /// A stop has been offered to the port since.
+    /// A stop has since been offered to the port.
     pub(super) is_stop_offered: bool,
     /// The set-point that may be sent.
     pub(super) allowed: Option<u8>,
-    /// The last sign of life, in the time of the role.
+    /// The last sign of life, in role time.
     sign_us: u64,
 }
 
@@ -36,16 +37,16 @@ impl Account {
     }
 }
 
-/// What was the case when a call began.
+/// The state when a call began.
 pub(super) struct Before {
     pub(super) begun_us: u64,
     role_us: u64,
     log: usize,
-    /// The role refuses the set-point of this call.
+    /// The role refuses this call's set-point.
     pub(super) is_refused: bool,
-    /// Nothing is in the way of the call.
+    /// Nothing prevents the call from succeeding.
     pub(super) is_clear: bool,
-    /// The same but for errors that pass.
+    /// The same, except for transient errors.
     pub(super) is_passable: bool,
     /// The role has something to send.
     pub(super) is_due: bool,
@@ -121,7 +122,7 @@ impl<P: Wired> MasterLife<P> {
         Ok(())
     }
 
-    /// Only a set-point that counts is ever offered to the port.
+    /// Only a set-point in force is ever offered to the port.
     fn check_offers(&mut self, call: Call, before: &Before) -> Result<(), String> {
         let mode = self.setup.mode;
         if let (
@@ -155,19 +156,19 @@ impl<P: Wired> MasterLife<P> {
                 number.is_some_and(|number| target_payload(mode, number) == payload)
             };
             if !is_of(old) && !is_of(new.filter(|_| !before.is_refused)) {
-                return Err(format!("{payload:?} is sent, which counts no longer"));
+                return Err(format!("{payload:?} is sent, but no longer in force"));
             }
             if call == Call::DriveFor && is_stopping {
-                return Err("a set-point is sent behind the stop of its drive".into());
+                return Err("a set-point is sent after the stop of its drive".into());
             }
             if offer.role_us - self.account.sign_us > limit_us {
-                return Err("a set-point is sent that has expired".into());
+                return Err("an expired set-point is sent".into());
             }
         }
         Ok(())
     }
 
-    /// A stop is owed until it is paid, by the account of the node.
+    /// A stop is owed until it is paid, according to the node's log.
     fn check_debt(&mut self, before: &Before) -> Result<(), String> {
         let is_owed = self.driver.role().stops_owed().contains(N1);
         let (node, line) = (self.node.borrow(), self.line.line());
@@ -176,12 +177,12 @@ impl<P: Wired> MasterLife<P> {
             Some(from) if !is_owed => {
                 if !is_paid(&node.log[from..], stop, line.now_us) {
                     let log = &node.log[from..];
-                    return Err(format!("the stop is forgotten; the node's account: {log:?}"));
+                    return Err(format!("the stop is forgotten; the node's log: {log:?}"));
                 }
                 self.account.owed_from = None;
             }
             None if is_owed => {
-                // The master owes one of its own accord: a node that is abnormal, a dead-man.
+                // The master owes a stop on its own initiative: an abnormal node, a dead-man.
                 (self.account.owed_from, self.account.is_stop_offered) = (Some(before.log), false);
             }
             _ => {}
@@ -189,7 +190,7 @@ impl<P: Wired> MasterLife<P> {
         Ok(())
     }
 
-    /// What counts from now on.
+    /// Updates what is in force.
     fn settle(&mut self, call: Call, before: &Before, end: &End<Outcome>) {
         let (line, mode) = (self.line.line(), self.setup.mode);
         self.account.allowed = match (call, end) {

@@ -1,4 +1,4 @@
-//! What can happen to a driver.
+//! Actions on a driver.
 
 use axlewire::ikeya::Mode;
 
@@ -8,14 +8,14 @@ use super::{
     node::{Answer, Node},
 };
 
-/// One thing that can happen.
+/// A single action.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Action {
-    /// Arranges what goes wrong next.
+    /// Schedules the next fault.
     Fault(Fault),
     Pass(Pass),
     Call(Call),
-    /// An async call that is dropped after so many polls.
+    /// An async call that is dropped after this many polls.
     Drop(Call, usize),
 }
 
@@ -24,20 +24,20 @@ pub(crate) enum Fault {
     Write(Writing),
     /// A frame is cut off: one byte is taken, then the port fails.
     CutOff,
-    /// One byte is taken, and the next after too long a pause.
+    /// One byte is taken, and the next one after too long a pause.
     Late,
     Read(Reading),
     Flush(Flushing),
     Pin(Pinning),
     Answer(Answer),
-    /// The node loses its power, or has it again.
+    /// The node loses power, or gets it back.
     Power,
 }
 
 /// Time passes without a call.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Pass {
-    /// Shorter than a pause inside a frame may be.
+    /// Shorter than the longest pause inside a frame.
     Short,
     /// Longer than that.
     Pause,
@@ -54,19 +54,19 @@ pub(crate) enum Call {
     /// Waits for a while.
     Idle,
     Discover,
-    /// A set-point, 1 or 2.
+    /// Set-point 1 or 2.
     Set(u8),
     Stop,
     StopAll,
     Read,
     DriveFor,
-    /// Gives up what is unsent.
+    /// Discards what is unsent.
     Discard,
     KeepAlive,
 }
 
 impl Fault {
-    /// Arranges it.
+    /// Schedules it.
     pub(crate) fn arrange(self, line: &mut Line, node: Option<&mut Node>) {
         match (self, node) {
             (Self::Write(writing), _) => line.writes.push_back(writing),
@@ -81,7 +81,7 @@ impl Fault {
         }
     }
 
-    /// Faults of the port and, if it has one, of its pin.
+    /// Faults of the port and, if there is one, of its pin.
     pub(crate) fn of_port(has_pin: bool, is_async: bool) -> Vec<Self> {
         use {Flushing as F, Reading as R, Writing as W};
         let mut faults = vec![Self::CutOff, Self::Late];
@@ -97,7 +97,7 @@ impl Fault {
     }
 }
 
-/// What a world of a master offers.
+/// The actions of a world with a master.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setup {
     pub(crate) is_async: bool,
@@ -105,12 +105,12 @@ pub(crate) struct Setup {
     pub(crate) mode: Mode,
     /// The dead-man of the master, milliseconds.
     pub(crate) dead_man_ms: Option<u32>,
-    /// Two faults may wait to happen at a time, and async calls are dropped at every poll.
+    /// Up to two faults may be pending, and async calls are dropped at every poll.
     pub(crate) is_deep: bool,
 }
 
 impl Setup {
-    /// The actions that are possible after those of `past`.
+    /// The possible actions after those in `past`.
     pub(crate) fn actions(self, past: &[Action]) -> Vec<Action> {
         let is_fault = |action: &&Action| matches!(action, Action::Fault(_));
         let waiting = past.iter().rev().take_while(is_fault).count();

@@ -27,7 +27,7 @@ use crate::fingerprint::{COUNTERS, Merge};
 
 /// 115,200 bit/s.
 const BYTE_US: u64 = 87;
-/// A robot of this crate waits some 5 ms for the rest of a frame.
+/// A robot of this crate waits about 5 ms for the rest of a frame.
 const SPEECH: Speech =
     Speech { shape, moves, byte_us: BYTE_US, pause_us: 5_000, needs_silence: false };
 
@@ -56,7 +56,7 @@ pub(crate) enum Action {
 pub(crate) enum Call {
     Service,
     Idle,
-    /// At this speed.
+    /// Drives at this speed.
     Drive(i16),
     Stop,
     DriveFor,
@@ -64,7 +64,7 @@ pub(crate) enum Call {
     Discard,
 }
 
-/// What a call has told its caller.
+/// The result of a call.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Told {
     Failure(Failure),
@@ -86,7 +86,7 @@ impl Peer for Rover {
     }
 }
 
-/// A frame by the document: FD FF, the length, an id, an index, the body, the CRC.
+/// A frame as documented: FD FF, the length, an id, an index, the body, the CRC.
 fn shape(bytes: &[u8]) -> Shape {
     let begins = bytes.iter().zip([0xFD, 0xFF]).all(|(&byte, header)| byte == header);
     let &[_, _, low, high, ..] = bytes else {
@@ -101,7 +101,7 @@ fn shape(bytes: &[u8]) -> Shape {
     }
 }
 
-/// A motor command, and not a stop.
+/// A motor command that is not a stop.
 fn moves(frame: &[u8]) -> bool {
     frame[4] == 2 && frame[6..10] != [0; 4]
 }
@@ -130,7 +130,7 @@ impl<P: Wired> HostLife<P> {
 }
 
 impl<P: Wired> Life for HostLife<P> {
-    /// Faults that may wait to happen at a time.
+    /// Most faults pending at a time.
     type Setup = usize;
     type Action = Action;
 

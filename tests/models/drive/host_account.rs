@@ -1,4 +1,5 @@
-//! What a driver of a host owes its caller and its rover after every call, by an own account.
+//! What a driver of a host owes its caller and its rover after every call, by an independent
+//! account.
 
 use std::hash::Hash;
 
@@ -10,19 +11,19 @@ use super::{
     wire::Taken,
 };
 
-/// In which a stop has to be flushed (U16).
+/// Time within which a stop has to be flushed (U16).
 const STOP_US: u64 = 100_000;
 
 #[derive(Debug, Default)]
 pub(crate) struct Account {
-    /// The speed that the application wants, and when it has said so last, in the time of the role.
+    /// The speed wanted by the application, and the time of its last call, in role time.
     speed: i16,
     said_us: u64,
     /// A zero command has left, whole and flushed: others may follow (U16).
     is_begun: bool,
-    /// The last motor command was to stand still, and has left.
+    /// The last motor command was a stop, and has left.
     is_still: bool,
-    /// Zero commands that are still to go out behind a frame that was cut off.
+    /// Zero commands still to be sent after a cut-off frame.
     copies: u8,
 }
 
@@ -33,7 +34,7 @@ impl Account {
     }
 }
 
-/// What was the case when a call began.
+/// The state when a call began.
 pub(super) struct Before {
     begun_us: u64,
     role_us: u64,
@@ -42,7 +43,7 @@ pub(super) struct Before {
     is_whole: bool,
 }
 
-/// The speed that a frame commands.
+/// The speed commanded by a frame.
 fn speed(frame: &[u8]) -> Option<i16> {
     (frame[4] == 2).then(|| i16::from_le_bytes([frame[6], frame[7]]))
 }
@@ -82,7 +83,7 @@ impl<P: Wired> HostLife<P> {
             _ => 0,
         };
         let took_us = line.now_us - before.begun_us;
-        // A slow port stays for longer than a pause, and eight frames may go out at a time.
+        // A slow port blocks for longer than a pause, and up to eight frames may be sent at a time.
         let extra_us = 40_000 + 25_000 * before.faults as u64 + before.stalls * STALL_US;
         if took_us > bound_us + extra_us {
             return Err(format!("the call takes {took_us} us"));
@@ -91,17 +92,17 @@ impl<P: Wired> HostLife<P> {
         let is_stop = matches!(call, Call::Stop | Call::DriveFor);
         let is_late_pong = call == Call::Ping && outcome == Err(Told::Other) && first.is_none();
         if !is_stop && !is_late_pong && outcome.err() != first.map(Told::Failure) {
-            return Err(format!("{outcome:?}, and the port failed with {first:?}"));
+            return Err(format!("{outcome:?}, but the port failed with {first:?}"));
         }
         if is_stop && outcome.is_ok() && (!self.account.is_still || self.account.copies > 0) {
-            return Err("Ok, and the stop has not left".into());
+            return Err("Ok, but the stop has not left".into());
         }
         if call == Call::Stop && outcome.is_err() {
             if took_us < STOP_US {
-                return Err("a stop gives up too early".into());
+                return Err("a stop gave up too early".into());
             }
             if before.stalls == 0 && before.faults <= 4 {
-                return Err(format!("{outcome:?}, and errors that pass were in the way"));
+                return Err(format!("{outcome:?}, but only transient errors occurred"));
             }
         }
         let span_us = u64::from(SPAN.as_micros());
@@ -112,18 +113,18 @@ impl<P: Wired> HostLife<P> {
         }
         let is_clear = before.faults == 0 && before.is_whole;
         if is_clear && outcome.is_err() && call != Call::Ping {
-            return Err(format!("{outcome:?}, and nothing was in the way"));
+            return Err(format!("{outcome:?} without a cause"));
         }
         if call == Call::Idle && is_clear {
             let commands = line.wire.taken.iter().filter(|taken| speed(&taken.frame).is_some());
             if commands.count() == 0 {
-                return Err("the command is not repeated".into());
+                return Err("the command was not repeated".into());
             }
         }
         Ok(())
     }
 
-    /// Only a command that counts is ever offered to the port.
+    /// Only a command in force is ever offered to the port.
     fn check_offers(&mut self, call: Call, before: &Before) -> Result<(), String> {
         let (line, account) = (self.line.line(), &mut self.account);
         let mut limit_us = TIMEOUT_US;
@@ -134,7 +135,7 @@ impl<P: Wired> HostLife<P> {
             _ => {}
         }
         if call == Call::DriveFor {
-            // No longer than its span, and the writes in which the port stays.
+            // No longer than its span, plus the writes in which the port blocks.
             let stays_us = 25_000 * before.faults as u64 + before.stalls * STALL_US;
             limit_us = u64::from(SPAN.as_micros()) + 5_000 + stays_us;
         }
@@ -142,14 +143,14 @@ impl<P: Wired> HostLife<P> {
             let speed = speed(&offer.frame);
             // A port that has taken the first may fail to flush it: the next is a stop as well.
             if !account.is_begun && offer.taken == 0 && speed != Some(0) {
-                return Err("something goes out before the first stop".into());
+                return Err("something is sent before the first stop".into());
             }
             let Some(speed) = speed.filter(|&speed| speed != 0) else { continue };
             if speed != account.speed {
-                return Err(format!("{speed} is sent, which counts no longer"));
+                return Err(format!("{speed} is sent, but no longer in force"));
             }
             if offer.role_us - account.said_us > limit_us {
-                return Err("a command is sent that has expired".into());
+                return Err("an expired command is sent".into());
             }
         }
         if line.wire.cuts > 0 {

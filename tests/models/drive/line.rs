@@ -1,4 +1,4 @@
-//! What is on the other side of a driver: time, a line, and what goes wrong on it.
+//! The other side of a driver: time, a line, and its faults.
 
 use std::{
     cell::RefCell,
@@ -16,29 +16,29 @@ use super::{
     wire::Wire,
 };
 
-/// Operations of the port, the pin and the clock in one call at the most: far more than any call of
-/// these worlds needs.
+/// Most operations of the port, the pin and the clock in one call: far more than any call of these
+/// worlds needs.
 const OPERATIONS: u32 = 60_000;
 
-/// Whoever hears what is sent.
+/// The receiver of what is sent.
 pub(crate) trait Peer {
-    /// Hears a frame; says when it answers, microseconds after its end, and what.
+    /// Receives a frame; returns the delay of the answer after its end, microseconds, and the
+    /// answer.
     fn hear(&mut self, frame: &[u8], end_us: u64) -> Option<(u64, Vec<u8>)>;
 }
 
 pub(crate) struct Line {
     pub(crate) now_us: u64,
-    /// By how much the clock of the driver has gone back.
+    /// Amount by which the driver's clock has gone back.
     pub(crate) back_us: u64,
-    /// The time that a role is to be told: that of the clock, which stands still instead of going
-    /// back.
+    /// The time that a role has to be given: that of the clock, which stops instead of going back.
     ahead_us: u64,
     pub(crate) latest_us: u64,
     pub(crate) wire: Wire,
     pub(crate) peer: Box<dyn Peer>,
-    /// Bytes on their way to the driver, and when each is there.
+    /// Bytes on their way to the driver, with their arrival times.
     pub(crate) inbox: VecDeque<(u64, u8)>,
-    /// When the last byte that was written is out.
+    /// When the last byte written will have left.
     pub(crate) free_us: u64,
     pub(crate) reads: VecDeque<Reading>,
     pub(crate) writes: VecDeque<Writing>,
@@ -47,26 +47,26 @@ pub(crate) struct Line {
     /// When the current call began.
     pub(crate) begun_us: u64,
     pub(crate) writes_in_call: u32,
-    /// When the current call has first tried to write.
+    /// When the current call first tried to write.
     pub(crate) first_write_us: Option<u64>,
-    /// The current call has asked something of the port; one that is refused does not.
+    /// The current call has used the port; a refused call does not.
     pub(crate) is_touched: bool,
-    /// Writes that were tried since the last flush was.
+    /// A write was tried since the last flush attempt.
     pub(crate) is_flush_due: bool,
-    /// Whether the driver has a pin, when it went on, and whether it is.
+    /// Whether the driver has a pin; when it went on, if it is on.
     pub(crate) has_pin: bool,
     pub(crate) pin_on_us: Option<u64>,
-    /// An async write or flush, or a delay of the pin, is under way.
+    /// An async write or flush, or a delay of the pin, is in progress.
     pub(crate) is_sending: bool,
-    /// Since when an operation has been asked for that no call has waited for, microseconds.
+    /// Start of a requested operation that no call has waited for, microseconds.
     pub(crate) waits_since_us: Option<u64>,
-    /// In the current call such an operation may have stalled.
+    /// Such an operation may have stalled in the current call.
     pub(crate) may_have_stalled: bool,
     /// In the current call.
     pub(crate) failures: Vec<(u64, Failure)>,
-    /// The first of them was that of a write.
+    /// The first of them was a write failure.
     pub(crate) has_write_failed_first: bool,
-    /// A flush has failed, or the port has stalled: what it has taken may be lost.
+    /// A flush has failed, or the port has stalled: the bytes it has taken may be lost.
     pub(crate) is_given_up: bool,
     pub(crate) sleepers: Vec<(u64, u32, Waker)>,
     sleepers_so_far: u32,
@@ -75,11 +75,11 @@ pub(crate) struct Line {
     pub(crate) broken: Option<String>,
 }
 
-/// A handle of a line: its port, pin, clock and delay are such.
+/// A handle of a line: its port, pin, clock and delay are all handles.
 #[derive(Clone)]
 pub(crate) struct Shared(pub(crate) Rc<RefCell<Line>>);
 
-/// Not a part of what a driver is.
+/// Not part of a driver's state.
 impl Debug for Shared {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Shared")
@@ -134,12 +134,12 @@ impl Line {
         self.wire.begin();
     }
 
-    /// Takes note of a broken invariant.
+    /// Records a broken invariant.
     pub(crate) fn object(&mut self, invariant: &str) {
         self.broken.get_or_insert_with(|| invariant.into());
     }
 
-    /// One more operation. A call that does not end would try for ever, so it is ended by a panic.
+    /// One more operation. A call that does not end would continue forever, so a panic ends it.
     pub(crate) fn count(&mut self) {
         self.operations += 1;
         assert!(self.operations < OPERATIONS, "the call does not end");
@@ -155,7 +155,7 @@ impl Line {
         self.failures.push((self.now_us, failure));
     }
 
-    /// The clock of the driver, which may have gone back.
+    /// The driver's clock, which may have gone back.
     pub(crate) fn clock(&mut self) -> Instant {
         self.count();
         self.latest_us = self.role_us();
@@ -163,7 +163,7 @@ impl Line {
         Instant::from_micros(self.now_us - self.back_us)
     }
 
-    /// The time as the role should be told it, if it is asked for now.
+    /// The time that a role should be given if asked for now.
     fn role_us(&self) -> u64 {
         self.latest_us.max(self.now_us - self.back_us + self.ahead_us)
     }
@@ -172,7 +172,7 @@ impl Line {
         Instant::from_micros(self.role_us())
     }
 
-    /// Whoever idles or waits lets the others speak.
+    /// While the driver idles or waits, the others run.
     pub(crate) fn pass_until(&mut self, until_us: u64) {
         self.now_us = self.now_us.max(until_us);
         let now_us = self.now_us;
@@ -200,7 +200,7 @@ impl Line {
         self.failures.iter().any(|(_, failure)| matches!(failure, Failure::Pin(_)))
     }
 
-    /// Takes bytes onto the wire. The write began at `begun_us`.
+    /// Puts bytes on the wire. The write began at `begun_us`.
     pub(crate) fn carry(&mut self, bytes: &[u8], begun_us: u64) {
         let byte_us = self.wire.speech.byte_us;
         self.free_us = self.free_us.max(self.now_us) + byte_us * bytes.len() as u64;
@@ -223,7 +223,7 @@ impl Line {
         self.inbox.front().is_some_and(|&(at_us, _)| at_us <= self.now_us)
     }
 
-    /// What the next read does, if that is something else than giving what is there.
+    /// What the next read does, if not simply returning the available bytes.
     pub(crate) fn reading(&self) -> Option<Reading> {
         self.reads.front().copied().filter(|reading| match reading {
             Reading::One => self.has_arrived(),
@@ -246,13 +246,13 @@ impl Line {
     }
 }
 
-/// What matters for what comes next.
+/// The state that affects the future.
 impl Hash for Line {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.reads, &self.writes, &self.flushes, &self.pins).hash(hasher);
         self.wire.digest(self.now_us).hash(hasher);
         (self.pin_on_us.is_some(), self.free_us.saturating_sub(self.now_us)).hash(hasher);
-        // Time that will pass unseen, because the clock has gone back.
+        // Time that will pass unseen because the clock has gone back.
         let reading_us = self.now_us - self.back_us + self.ahead_us;
         self.latest_us.saturating_sub(reading_us).hash(hasher);
         let waits_us = self.waits_since_us.map(|at_us| (self.now_us - at_us).min(1_000_000));

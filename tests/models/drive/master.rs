@@ -28,7 +28,7 @@ use crate::fingerprint::{COUNTERS_AND_STATUS, Merge};
 
 pub(super) const N1: NodeId = NodeId::N1;
 
-/// How long an [`Call::Idle`] takes: longer than an exchange, its guard and one more.
+/// Duration of a [`Call::Idle`]: longer than an exchange, its guard and one more.
 pub(super) const IDLE: Duration = Duration::from_millis(5);
 pub(super) const SPAN: Duration = Duration::from_millis(4);
 
@@ -40,7 +40,7 @@ pub(crate) struct MasterLife<P> {
     pub(super) account: Account,
 }
 
-/// What a call has told its caller.
+/// The result of a call.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Told {
     Failure(Failure),

@@ -1,4 +1,4 @@
-//! The worlds of the drivers, and the states in which they start.
+//! The worlds of the drivers, and their initial states.
 
 mod account;
 mod action;
@@ -66,7 +66,7 @@ pub(crate) fn blocking(run: &mut Run) {
     master(run, false);
 }
 
-/// A master with async ones.
+/// A master with async calls.
 pub(crate) fn waiting(run: &mut Run) {
     master(run, true);
 }

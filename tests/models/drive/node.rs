@@ -1,4 +1,4 @@
-//! A node of a motor bus that does what it is told, and keeps a list of what it heard and said.
+//! A node of a motor bus that follows its commands, and logs what it received and sent.
 
 use std::{cell::RefCell, collections::VecDeque, rc::Rc};
 
@@ -20,7 +20,7 @@ fn moves(frame: &[u8]) -> bool {
     frame[0] == 0xBB && !stops.iter().any(|stop| frame[2..6] == *stop)
 }
 
-/// The payload of a stop: 0 rps, or the position at which the node is, count 7 and rotation 1.
+/// The payload of a stop: 0 rps, or the node's position, count 7 and rotation 1.
 pub(crate) const fn stop_payload(mode: Mode) -> [u8; 4] {
     match mode {
         Mode::Velocity => [0; 4],
@@ -28,7 +28,7 @@ pub(crate) const fn stop_payload(mode: Mode) -> [u8; 4] {
     }
 }
 
-/// Set-points of both kinds: 1 and 2 rps, or 1 and 2 rotations off.
+/// Set-points of both kinds: 1 and 2 rps, or 1 and 2 rotations away.
 pub(crate) fn target_payload(mode: Mode, number: u8) -> [u8; 4] {
     match mode {
         Mode::Velocity => f32::from(number).to_le_bytes(),
@@ -36,7 +36,7 @@ pub(crate) fn target_payload(mode: Mode, number: u8) -> [u8; 4] {
     }
 }
 
-/// What happens to the next answers.
+/// The fate of the next answers.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub(crate) enum Answer {
     Late,
@@ -45,13 +45,13 @@ pub(crate) enum Answer {
     CutOff,
 }
 
-/// What a node has heard and said, in its order.
+/// What a node has received and sent, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Entry {
     Wrote([u8; 4]),
-    /// A READ was answered well; the last byte of the answer arrived at this time.
+    /// A READ was answered correctly; the last byte of the answer arrived at this time.
     Answered(u64),
-    /// A READ was not answered, or not well.
+    /// A READ was not answered, or not correctly.
     Failed,
 }
 
@@ -104,7 +104,7 @@ impl Peer for Ear {
     }
 }
 
-/// Pairs of a stop WRITE and an answer behind it, and whether a WRITE waits for its answer.
+/// Number of stop WRITEs each followed by an answer, and whether a WRITE waits for its answer.
 pub(crate) fn progress(log: &[Entry], stop: [u8; 4], now_us: u64) -> (u8, bool) {
     let (mut pairs, mut is_written) = (0, false);
     for entry in log {
@@ -119,12 +119,12 @@ pub(crate) fn progress(log: &[Entry], stop: [u8; 4], now_us: u64) -> (u8, bool) 
     (pairs, is_written)
 }
 
-/// Two of them, by the node's own account.
+/// Two of them, according to the node's log.
 pub(crate) fn is_paid(log: &[Entry], stop: [u8; 4], now_us: u64) -> bool {
     progress(log, stop, now_us).0 >= 2
 }
 
-/// A packet of a master, by the document: a header, an id, the payload of a WRITE, the CRC.
+/// A packet of a master as documented: a header, an id, the payload of a WRITE, the CRC.
 fn shape(bytes: &[u8]) -> Shape {
     let len = match bytes.first() {
         None => return Shape::Part,

@@ -1,4 +1,4 @@
-//! What a call of a driver of a master has told its caller, and how it has left its port.
+//! The result of a call to a master's driver, and the state in which it left its port.
 
 use axlewire::time::Duration;
 
@@ -13,7 +13,7 @@ use super::{
 };
 
 impl<P: Wired> MasterLife<P> {
-    /// The port and the pin are left as they should be, and the time was kept.
+    /// The port and the pin are left in order, and the time limits were kept.
     pub(super) fn check_port(
         &self,
         call: Call,
@@ -24,12 +24,12 @@ impl<P: Wired> MasterLife<P> {
         let line = self.line.line();
         line.is_left_in_order(self.driver.unsent())?;
         if matches!(outcome, Err(Told::Failure(_))) && polls == 1 {
-            return Err("a call that fails at once has not let others run".into());
+            return Err("a call that failed at once did not let others run".into());
         }
         // The pin takes 30 us.
         let is_prompt = line.first_write_us.is_some_and(|at_us| at_us <= before.begun_us + 30);
         if before.is_due && line.is_touched && !is_prompt && !line.has_pin_failed() {
-            return Err("what is due is held up".into());
+            return Err("a due packet is delayed".into());
         }
         let role = self.driver.role();
         let bound = match call {
@@ -50,7 +50,7 @@ impl<P: Wired> MasterLife<P> {
         self.driver.role().read_bound().saturating_mul(4)
     }
 
-    /// The caller is told the truth.
+    /// The result is truthful.
     pub(super) fn check_outcome(
         &self,
         call: Call,
@@ -66,7 +66,7 @@ impl<P: Wired> MasterLife<P> {
             Call::Stop | Call::StopAll => {
                 let bound_us = u64::from(self.driver.role().stop_bound().as_micros());
                 match outcome {
-                    Ok(()) if is_owed => return Err("Ok, and the stop is owed".into()),
+                    Ok(()) if is_owed => return Err("Ok, but the stop is owed".into()),
                     Err(Told::Owed) if took_us < bound_us || !is_owed => {
                         return Err("StopsOwed too early".into());
                     }
@@ -74,7 +74,7 @@ impl<P: Wired> MasterLife<P> {
                         return Err(format!("a stop ends with {outcome:?}"));
                     }
                     Err(Told::Owed) if before.is_passable => {
-                        return Err("StopsOwed, and nothing was in the way".into());
+                        return Err("StopsOwed without a cause".into());
                     }
                     _ => {}
                 }
@@ -101,7 +101,7 @@ impl<P: Wired> MasterLife<P> {
                 };
                 let has_stalled = line.may_have_stalled && told == Some(Failure::Stalled);
                 if told != first && !has_stalled {
-                    return Err(format!("{outcome:?}, and the port failed with {first:?}"));
+                    return Err(format!("{outcome:?}, but the port failed with {first:?}"));
                 }
             }
         }
@@ -111,7 +111,7 @@ impl<P: Wired> MasterLife<P> {
                 taken.is_flushed && taken.frame[0] == 0xBB && taken.frame[2..6] == payload
             });
             if !is_sent && self.account.allowed != Some(number) {
-                return Err("Ok, and the set-point has not left".into());
+                return Err("Ok, but the set-point has not left".into());
             }
         }
         if let (Call::Read, Ok(())) = (call, outcome) {
@@ -123,17 +123,17 @@ impl<P: Wired> MasterLife<P> {
                 _ => false,
             });
             if !is_heard {
-                return Err("a reading that nobody gave".into());
+                return Err("a reading that no node gave".into());
             }
         }
-        // Under a dead-man that is over the set-point of a drive may be refused.
+        // After the dead-man has expired, a drive's set-point may be refused.
         let may_be_over = self.setup.dead_man_ms.is_some() && call == Call::DriveFor;
         let is_quiet = before.is_clear && outcome.is_err() && !may_be_over;
         if is_quiet && !is_owed && !before.is_refused {
-            return Err(format!("{outcome:?}, and nothing was in the way"));
+            return Err(format!("{outcome:?} without a cause"));
         }
         if call == Call::Idle && before.is_clear && was_owed && !self.account.is_stop_offered {
-            return Err("a stop that is owed is not sent".into());
+            return Err("an owed stop is not sent".into());
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! The port, the pin and the clock of a driver, all of them handles of a line.
 //!
-//! Unlike the scripted port of `support/port.rs` it has a line behind it: the search chooses what
-//! fails, calls take time, and a driver that breaks the contract is told so.
+//! Unlike the scripted port of `support/port.rs` it has a line behind it: the search chooses the
+//! faults, calls take time, and contract violations of the driver are detected.
 
 use std::cell::RefMut;
 
@@ -15,11 +15,11 @@ use super::{
     line::{Line, Shared},
 };
 
-/// Between the pin and the first byte, and the last byte and the pin, microseconds.
+/// Delays between the pin and the first byte, and the last byte and the pin, microseconds.
 const BEFORE_US: u64 = 30;
 const AFTER_US: u64 = 10;
 
-/// A part of the hardware has failed; which failure of this call it is.
+/// A hardware failure; its number within this call.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) struct Broken(u8);
 
@@ -70,7 +70,7 @@ impl Wired for Shared {
     }
 }
 
-/// The pin, and the delay around it.
+/// The pin, with its delays.
 #[derive(Clone, Debug)]
 pub(crate) struct Pin(pub(super) Shared);
 
@@ -92,7 +92,7 @@ impl Wired for Rs485<Shared, Pin, Pin> {
     }
 }
 
-/// What the port has to do with an error of a driver.
+/// A port's part in a driver's errors.
 pub(crate) fn failure<P: Wired>(error: DriveError<P::Error>) -> Option<Failure> {
     match error {
         DriveError::Port(error) => Some(P::failure(error)),
@@ -153,7 +153,7 @@ impl Shared {
             match line.pin_on_us {
                 None => line.object("written with the driver-enable pin off"),
                 Some(on_us) if line.now_us < on_us + BEFORE_US => {
-                    line.object("written before the driver has settled");
+                    line.object("written before the transceiver has settled");
                 }
                 Some(_) => {}
             }
@@ -240,7 +240,7 @@ impl Shared {
             buffer[count] = line.inbox.pop_front().map_or(0, |(_, byte)| byte);
             count += 1;
         }
-        assert!(count > 0, "a read without a byte would block for ever");
+        assert!(count > 0, "a read without a byte would block forever");
         Ok(count)
     }
 }

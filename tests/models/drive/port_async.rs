@@ -1,5 +1,5 @@
-//! The port, pin and clock of `port.rs` for async calls: as they are, whoever waits sleeps in
-//! virtual time, which the scripted port of `support/port.rs` does not have.
+//! The port, pin and clock of `port.rs` for async calls: the same behaviour, but a waiting task
+//! sleeps in virtual time, which the scripted port of `support/port.rs` lacks.
 
 use std::{
     future::poll_fn,
@@ -12,12 +12,12 @@ use super::{
     port::{Broken, Pin, SECOND_US},
 };
 
-/// The time that a port has in any case, however long it was asked before, microseconds: twice that
-/// of 64 bytes of a master, and a millisecond.
+/// The least time that a port gets, however long it has been waiting, microseconds: twice the time
+/// of 64 bytes of a master, plus a millisecond.
 const LEAST_US: u64 = 2 * 64 * 20 + 1000;
 
-/// An operation under way; notes a stall of a second that a driver has given up. The second may
-/// have begun in a call that was dropped.
+/// An operation in progress; notes a stall of a second when the driver gives up on it. The second
+/// may have begun in a call that was dropped.
 struct Sending<'a> {
     line: &'a Shared,
     begun_us: u64,
@@ -39,7 +39,7 @@ impl Drop for Sending<'_> {
     fn drop(&mut self) {
         let mut line = self.line.line();
         line.is_sending = false;
-        // The pin had its time before.
+        // The pin already had its time.
         if line.now_us + 100 >= self.begun_us + SECOND_US {
             line.is_given_up = true;
             line.failed(Failure::Stalled);
@@ -52,7 +52,7 @@ impl Drop for Sending<'_> {
     }
 }
 
-/// Takes a sleeper out when whoever waits is dropped.
+/// Removes a sleeper when the waiting task is dropped.
 struct Sleep<'a>(&'a Shared, Option<u32>);
 
 impl Drop for Sleep<'_> {
@@ -106,7 +106,7 @@ impl embedded_io_async::Read for Shared {
 
 impl embedded_io_async::Write for Shared {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
-        // A driver asks so when the port has stalled.
+        // A driver asks for this when the port has stalled.
         if bytes.is_empty() {
             return Ok(0);
         }

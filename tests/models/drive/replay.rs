@@ -1,17 +1,17 @@
-//! Worlds that cannot be cloned: a state is the list of actions that leads to it, done again on a
+//! Worlds that cannot be cloned: a state is the list of actions that leads to it, replayed on a
 //! fresh driver.
 
 use std::{cell::RefCell, fmt::Debug};
 
 use crate::search::World;
 
-/// A driver with its port, its clock and an account of its own.
+/// A driver with its port, its clock and an independent account.
 pub(crate) trait Life: Sized {
     type Setup: Copy;
     type Action: Copy + Debug;
 
     fn begin(setup: Self::Setup) -> Self;
-    /// What can happen to a life of this kind after these actions.
+    /// The possible actions of such a life after these.
     fn actions(setup: Self::Setup, past: &[Self::Action]) -> Vec<Self::Action>;
     fn step(&mut self, action: Self::Action) -> Result<(), String>;
     fn fingerprint(&self) -> u64;
@@ -20,7 +20,7 @@ pub(crate) trait Life: Sized {
 pub(crate) struct Replay<L: Life> {
     setup: L::Setup,
     past: Vec<L::Action>,
-    /// Those of them that have led to the start.
+    /// Those actions that led to the start.
     prepared: usize,
     life: RefCell<Option<L>>,
 }
@@ -64,7 +64,7 @@ impl<L: Life> World for Replay<L> {
         Ok(())
     }
 
-    /// Asked once for each state: the life is not kept.
+    /// Called once for each state: the life is not kept.
     fn fingerprint(&self) -> u64 {
         self.relive().fingerprint()
     }

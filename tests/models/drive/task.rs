@@ -1,5 +1,5 @@
-//! Runs the calls of a driver: blocking ones as they are, async ones with a waker that counts.
-//! A task is polled only when it was woken.
+//! Runs the calls of a driver: blocking ones directly, async ones with a waker that counts. A task
+//! is polled only after it was woken.
 
 use std::{
     future::Future,
@@ -14,7 +14,7 @@ use std::{
 
 use super::line::Shared;
 
-/// Polls of one call without any time in between.
+/// Most polls of one call without time passing in between.
 const POLLS: u32 = 40;
 
 #[derive(Default)]
@@ -28,13 +28,13 @@ impl Wake for Wakes {
 
 /// How an async call has ended.
 pub(crate) enum End<T> {
-    /// With this, after so many polls.
+    /// Completed with this result, after this many polls.
     Done(T, usize),
-    /// It was dropped while it waited.
+    /// Dropped while waiting.
     Dropped,
 }
 
-/// Runs a call to its end, or drops it after so many polls.
+/// Runs a call to completion, or drops it after this many polls.
 pub(crate) fn run<T>(
     line: &Shared,
     drop_after: Option<usize>,
@@ -66,7 +66,7 @@ pub(crate) fn run<T>(
             continue;
         }
         let next_us = line.sleepers.iter().map(|&(at_us, ..)| at_us).min();
-        let Some(next_us) = next_us else { return Err("nobody will wake the task".into()) };
+        let Some(next_us) = next_us else { return Err("nothing will wake the task".into()) };
         in_a_row = 0;
         line.pass_until(next_us);
     }

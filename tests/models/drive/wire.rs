@@ -1,8 +1,8 @@
-//! An account of the bytes that a port has taken: whole frames, or cut ones and a silence.
+//! An account of the bytes taken by a port: whole frames, or cut-off ones followed by silence.
 
 use std::{collections::VecDeque, hash::Hash};
 
-/// What the beginning of a byte stream is.
+/// What the bytes seen so far are.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum Shape {
     /// A part of a frame.
@@ -12,11 +12,11 @@ pub(crate) enum Shape {
     Bad,
 }
 
-/// Frames of a protocol, and how long one may pause.
+/// The frames of a protocol, and the longest pause inside one.
 #[derive(Clone, Copy)]
 pub(crate) struct Speech {
     pub(crate) shape: fn(&[u8]) -> Shape,
-    /// Is a whole frame a command that moves something?
+    /// Whether a whole frame is a command that moves something.
     pub(crate) moves: fn(&[u8]) -> bool,
     pub(crate) byte_us: u64,
     pub(crate) pause_us: u64,
@@ -29,7 +29,7 @@ pub(crate) struct Speech {
 pub(crate) struct Offer {
     /// The time of the role.
     pub(crate) role_us: u64,
-    /// Frames of this call that the port had taken whole before.
+    /// Frames of this call that the port had taken whole before this one.
     pub(crate) taken: usize,
     pub(crate) frame: Vec<u8>,
 }
@@ -38,7 +38,7 @@ pub(crate) struct Offer {
 pub(crate) struct Taken {
     pub(crate) frame: Vec<u8>,
     pub(crate) is_flushed: bool,
-    /// A flush has failed: it may be lost, whatever the next flush says.
+    /// A flush has failed: it may be lost, whatever the next flush returns.
     is_doubtful: bool,
 }
 
@@ -48,17 +48,18 @@ pub(crate) struct Wire {
     pub(crate) open: Vec<u8>,
     /// It is a command that moves something.
     is_moving: bool,
-    /// A stop was asked for behind it.
+    /// A stop was requested after it.
     is_outdated: bool,
-    /// When the last byte is out.
+    /// When the last byte has left.
     last_us: u64,
-    /// The same had each byte left when its write began. What a driver does not know lies between.
+    /// The same if each byte had left when its write began. The truth, unknown to a driver, lies
+    /// between.
     early_us: u64,
-    /// The frame may have paused for too long.
+    /// The frame may have paused too long.
     is_doubtful: bool,
-    /// The rest of a frame came late: a silence follows.
+    /// The rest of a frame came late: a silence must follow.
     is_noisy: bool,
-    /// The application has given up a frame: what comes next may be a new one.
+    /// The application has discarded a frame: a new one may follow.
     pub(crate) is_given_up: bool,
     unheard: VecDeque<Vec<u8>>,
     /// Of the current call.
@@ -93,12 +94,12 @@ impl Wire {
         self.cuts = 0;
     }
 
-    /// A stop is asked for.
+    /// A stop is requested.
     pub(crate) fn stop(&mut self) {
         self.is_outdated = self.is_moving && !self.open.is_empty();
     }
 
-    /// A driver offers bytes to its port: a whole frame, or the rest of the one that has begun.
+    /// A driver offers bytes to its port: a whole frame, or the rest of the current one.
     pub(crate) fn offer(&mut self, bytes: &[u8], at_us: u64, role_us: u64) -> Result<(), String> {
         if (self.speech.shape)(bytes) == Shape::Whole {
             if !self.open.is_empty() {
@@ -114,10 +115,10 @@ impl Wire {
         }
         let whole = [&self.open[..], bytes].concat();
         if self.open.is_empty() || (self.speech.shape)(&whole) != Shape::Whole {
-            return Err(format!("{bytes:02X?} is offered behind {:02X?}", self.open));
+            return Err(format!("{bytes:02X?} is offered after {:02X?}", self.open));
         }
         if self.is_outdated {
-            return Err("the rest of a command is offered behind a stop".into());
+            return Err("the rest of a command is offered after a stop".into());
         }
         if self.is_late(at_us) {
             return Err("the rest of a frame is offered after too long a pause".into());
@@ -125,8 +126,8 @@ impl Wire {
         Ok(())
     }
 
-    /// When a pause is certainly too long, the time of the byte that follows on the line included, for
-    /// a write that begins now.
+    /// When a pause is definitely too long, including the time of the next byte on the line, for a
+    /// write that begins now.
     pub(crate) fn too_late_us(&self, now_us: u64) -> u64 {
         self.last_us.max(now_us) + self.speech.pause_us + 200
     }
@@ -135,12 +136,13 @@ impl Wire {
         at_us.saturating_sub(self.last_us) > self.speech.pause_us
     }
 
-    /// For all that a driver knows, which is when its writes began and came back.
+    /// As far as a driver can tell, knowing when its writes began and returned.
     fn may_be_late(&self, at_us: u64) -> bool {
         at_us + self.speech.byte_us > self.early_us + self.speech.pause_us
     }
 
-    /// The port has taken bytes at `at_us`, in a write that began at `begun_us`. They are out at `end_us`.
+    /// The port has taken bytes at `at_us`, in a write that began at `begun_us`. They leave by
+    /// `end_us`.
     pub(crate) fn carry(
         &mut self,
         bytes: &[u8],
@@ -150,7 +152,7 @@ impl Wire {
     ) -> Result<(), String> {
         if self.is_noisy {
             if self.speech.needs_silence && !self.is_late(at_us) {
-                return Err("no silence behind a frame that was cut off".into());
+                return Err("no silence after a cut-off frame".into());
             }
             self.is_noisy = false;
         }
@@ -160,13 +162,13 @@ impl Wire {
         } else if !self.open.is_empty() && self.is_late(at_us) {
             self.open.clear();
             self.cuts += 1;
-            // The port came back late with a part of the rest, which nobody can know before.
+            // The port returned late with a part of the rest, which cannot be known in advance.
             if !self.is_late(begun_us) {
                 (self.is_noisy, self.last_us) = (true, end_us);
                 return Ok(());
             }
         } else if !self.open.is_empty() && self.is_given_up {
-            return Err("no silence behind a frame that was given up".into());
+            return Err("no silence after a discarded frame".into());
         }
         self.is_given_up = false;
         self.last_us = end_us;
@@ -202,13 +204,13 @@ impl Wire {
         self.unheard.pop_front()
     }
 
-    /// Of these bytes a part has left, and the rest may still go.
+    /// Some of these bytes have left, and the rest may still be sent.
     pub(crate) fn goes_on_with(&self, rest: &[u8]) -> bool {
         let whole = [&self.open[..], rest].concat();
         !self.open.is_empty() && (self.speech.shape)(&whole) == Shape::Whole
     }
 
-    /// What matters for what comes next.
+    /// The state that affects the future.
     pub(crate) fn digest(&self, now_us: u64) -> impl Hash {
         let since =
             |at_us: u64| (now_us as i64 - at_us as i64).min(self.speech.pause_us as i64 + 1);
