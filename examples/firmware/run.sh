@@ -7,7 +7,7 @@
 #
 # PROGRAM is ikeya_slave, ikeya_master or ucp_robot. To turn a motor in one command:
 #
-#   examples/firmware/run.sh ikeya_slave -- cargo run -q -p axle -- spin --port PORT --node 1 --rps 2
+#   examples/firmware/run.sh ikeya_slave -- cargo run -p axle -- spin --port PORT --node 1 --rps 2
 #
 # The port is a pseudo-terminal; its speed does not matter. Lines from the firmware begin with
 # "firmware: ". The compiler and QEMU come from Debian if they are missing.
