@@ -131,7 +131,7 @@ fn missing_reports_are_counted_by_their_index() {
 }
 
 #[test]
-fn a_false_header_holds_a_report_back_no_longer_than_the_quiet_margin() {
+fn a_false_header_holds_a_report_back_no_longer_than_the_idle_margin() {
     let mut host = quiet_host();
     // It announces 60 bytes, and the report has 44.
     let mut line = vec![0xFD, 0xFF, 60, 0, 5];
