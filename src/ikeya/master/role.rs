@@ -64,7 +64,7 @@ const EVENTS: usize = 16;
 ///
 /// An answer in a mode other than the one on record, even a late one, puts the mode in doubt (I11).
 /// The node is read again at once, and the next answer decides. A change of mode ends the
-/// set-point, and the node is owed a stop if it had any command, since a WRITE in flight has been
+/// set-point, and the node is owed a stop if it had any command, since a WRITE in flight is
 /// read in the new mode. While in doubt the node gets no WRITE, with one exception: a stop may
 /// write a position that a velocity node would read as standstill. A switch moved while a command
 /// is in flight cannot be detected: move it only while the machine is at rest.
