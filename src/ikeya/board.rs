@@ -1,4 +1,4 @@
-//! The two kinds of boards, with one motor and with three: one master and one slave serve both.
+//! The two kinds of boards, with one motor and with three; the same master and slave serve both.
 
 use super::{
     framing::{Packet, Request, Response},
@@ -17,7 +17,7 @@ use super::{
 /// | packets | [`ikeya`](crate::ikeya), 8 bytes | [`three`], 16 bytes |
 /// | a WRITE is answered | no | yes, with the status |
 ///
-/// Implemented by these two and by nothing else.
+/// Implemented by these two only.
 pub trait Board: Packets {}
 
 impl Board for OneMotor {}
@@ -25,7 +25,7 @@ impl Board for ThreeMotors {}
 
 pub(super) use packets::{Command, Heard, Packets};
 
-/// Private, so that only this crate can implement [`Board`] and call what it is made of.
+/// Private, so that only this crate can implement [`Board`] and call its parts.
 mod packets {
     use core::fmt;
 
@@ -36,7 +36,7 @@ mod packets {
     pub trait Packets: Copy + fmt::Debug + PartialEq + Sized + 'static {
         /// A target or current speed.
         type Velocity: Copy + fmt::Debug + PartialEq;
-        /// A speed as a packet carries it: any bits.
+        /// A speed as carried in a packet: any bits.
         type RawVelocity: Copy + fmt::Debug + PartialEq;
         /// A target or current position.
         type Position: Copy + fmt::Debug + PartialEq;
@@ -46,14 +46,14 @@ mod packets {
         type VelocityResponse: Encode;
         /// A position response.
         type PositionResponse: Encode;
-        /// What slaves hear.
+        /// Framing of the packets to slaves.
         type ToSlave: Framing + Clone + fmt::Debug;
-        /// What the master hears.
+        /// Framing of the packets to the master.
         type ToMaster: Framing + Clone + fmt::Debug;
-        /// What a slave on two wires hears.
+        /// Framing of the packets that a slave hears on two wires.
         type BothDirections: Framing + Clone + fmt::Debug;
 
-        /// Standing still.
+        /// Zero speed.
         const ZERO: Self::Velocity;
 
         /// Whether a WRITE is answered with the status.
@@ -71,34 +71,36 @@ mod packets {
         /// The answer of a position node.
         fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse;
 
-        /// The speed that was meant; `None` where it is no number.
+        /// The speed that was meant; `None` for NaN and infinities.
         fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
 
-        /// Below 0.05 rps: standing still (I12). What is no number is not.
+        /// Whether the speed is below 0.05 rps, which counts as standstill (I12). NaN is not.
         fn is_still(speed: Self::RawVelocity) -> bool;
 
-        /// Within 8 counts of each other (I12).
+        /// Whether the two positions are within 8 counts of each other (I12).
         fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
 
-        /// Would a velocity node read a WRITE of this position as standing still: as 0 to 5e-10 rps (I11)?
+        /// Whether a velocity node would read a WRITE of this position as standstill: 0 to
+        /// 5e-10 rps (I11).
         fn is_still_as_velocity(position: Self::Position) -> bool;
 
-        /// Who is asked, and what is commanded in either reading.
+        /// The addressed node, and the command in both readings.
         fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
 
-        /// The same on two wires; `None` for an answer of another node.
+        /// Same as [`request`](Self::request), on two wires; `None` for an answer of another node.
         fn packet(frame: <Self::BothDirections as Framing>::Frame<'_>) -> Option<Heard<Self>>;
 
-        /// Who answers, and what.
+        /// The responding node, and its status.
         fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>)
         where
             Self: Board;
     }
 
-    /// A request as a slave hears it: the node that is asked and, in a WRITE, what is commanded.
+    /// A request as a slave hears it: the addressed node and, for a WRITE, the command.
     pub(crate) type Heard<B> = (NodeId, Option<Command<B>>);
 
-    /// The payload of a WRITE in its two readings: its bytes do not say which was meant (ruling I3).
+    /// The payload of a WRITE in its two readings: its bytes do not say which one was meant (ruling
+    /// I3).
     #[derive(Clone, Copy, Debug)]
     pub struct Command<B: Packets> {
         /// Read as a speed.
@@ -111,32 +113,32 @@ mod packets {
 /// Longest packet of either kind of board, bytes.
 pub(super) const PACKET_LEN: usize = three::MAX_LEN;
 
-/// Speed below which a motor stands still, rps (I12).
+/// Speed below which a motor counts as standing still, rps (I12).
 const STILL_RPS: f32 = 0.05;
 
-/// Difference of two positions up to which a motor stands still, counts (I12).
+/// Largest difference of two positions at which a motor counts as standing still, counts (I12).
 const STILL_COUNTS: u32 = 8;
 
-/// Do these four bytes say 0 to 5e-10 rps? Bit patterns of positive numbers are in their order.
+/// Whether these four bytes encode 0 to 5e-10 rps. Bit patterns of positive floats sort by value.
 const fn is_still_on_wire(payload: [u8; 4]) -> bool {
     u32::from_le_bytes(payload) >> 16 <= 12_287
 }
 
-/// What a motor is to do.
+/// The target of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Target<B: Board = OneMotor> {
-    /// Turn, revolutions per second.
+    /// A speed, revolutions per second.
     Velocity(B::Velocity),
-    /// Go there.
+    /// A position to go to.
     Position(B::Position),
 }
 
 impl<B: Board> Target<B> {
-    /// The command by which a velocity node stops.
+    /// The command that stops a velocity node.
     pub(crate) const STANDSTILL: Self = Self::Velocity(B::ZERO);
 
-    /// The mode that such a command is for.
+    /// The mode that this target is for.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         match self {
@@ -145,7 +147,7 @@ impl<B: Board> Target<B> {
         }
     }
 
-    /// The position, if it is one.
+    /// The position; `None` for a speed.
     #[must_use]
     pub const fn position(&self) -> Option<B::Position> {
         match self {
@@ -155,18 +157,18 @@ impl<B: Board> Target<B> {
     }
 }
 
-/// What a node measures.
+/// A measurement of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status<B: Board = OneMotor> {
-    /// Of a velocity node, revolutions per second: any `f32`.
+    /// Speed of a velocity node, revolutions per second: any `f32`.
     Velocity(B::RawVelocity),
-    /// Of a position node.
+    /// Position of a position node.
     Position(B::Position),
 }
 
 impl<B: Board> Status<B> {
-    /// The mode that such a status tells.
+    /// The mode that this status shows.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         match self {
@@ -176,11 +178,11 @@ impl<B: Board> Status<B> {
     }
 }
 
-/// Boards as in the protocol document: one motor, 8-byte packets, a WRITE is not answered.
+/// Boards of the protocol document: one motor, 8-byte packets, a WRITE is not answered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OneMotor {}
 
-/// Boards of the field with three motors: 16-byte packets, a WRITE is answered (ruling I10).
+/// Boards found in the field with three motors: 16-byte packets, a WRITE is answered (ruling I10).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ThreeMotors {}
 
@@ -298,7 +300,7 @@ impl Packets for ThreeMotors {
     }
 
     fn is_still_as_velocity(positions: [Position; 3]) -> bool {
-        // The speed of a motor takes the bytes of several positions: the packet tells.
+        // The speed of one motor takes the bytes of several positions, so build the packet.
         let write = three::WriteRequest::position(NodeId::N1, positions);
         write.as_velocity().into_iter().all(|speed| is_still_on_wire(speed.to_le_bytes()))
     }

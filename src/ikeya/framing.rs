@@ -1,4 +1,4 @@
-//! Finds the packets of the bus in a byte stream, from either end or from the middle.
+//! Finds the packets of the bus in a byte stream, of one direction or of both.
 
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
@@ -19,15 +19,15 @@ pub const MAX_LEN: usize = WriteRequest::LEN;
 /// Decoder with the smallest buffer that a standard bus needs.
 pub type Decoder<F = ToMaster> = stream::Decoder<F, MAX_LEN>;
 
-/// What a master sends, as a slave sees it: READ (4 bytes) and WRITE (8).
+/// Packets from a master, as a slave sees them: READ (4 bytes) and WRITE (8).
 #[derive(Clone, Copy, Debug)]
 pub enum ToSlave {}
 
-/// What slaves send, as the master sees it: velocity and position responses (8 bytes).
+/// Packets from slaves, as the master sees them: velocity and position responses (8 bytes).
 #[derive(Clone, Copy, Debug)]
 pub enum ToMaster {}
 
-/// Everything on the bus, as a monitor or a capture of both pairs sees it.
+/// Everything on the bus, as seen by a monitor or in a capture of both pairs.
 #[derive(Clone, Copy, Debug)]
 pub enum BothDirections {}
 
@@ -35,9 +35,9 @@ pub enum BothDirections {}
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// Asks for the status.
+    /// Request for the status.
     Read(&'a ReadRequest),
-    /// Commands a motor.
+    /// Command to a motor.
     Write(&'a WriteRequest),
 }
 
@@ -61,8 +61,8 @@ pub enum Packet<'a> {
     Response(Response<'a>),
 }
 
-/// A framing of the bus: who sends what it finds, how long everything but a READ is, and the view of a
-/// packet for each header.
+/// A framing of the bus: the directions it finds, the length of everything but a READ, and the view
+/// of a packet for each header.
 macro_rules! framing {
     (
         $framing:ty: $($frame:ident)::+,
@@ -143,7 +143,7 @@ framing! {
     _ => |write| three::Packet::Request(three::Request::Write(write)),
 }
 
-/// One judged packet as its type.
+/// Views a judged packet as its type.
 #[inline(always)]
 fn view<P>(frame: &[u8]) -> Option<&P>
 where

@@ -1,4 +1,4 @@
-//! What the front of some bytes is on the bus: the rule of all its framings.
+//! Judges the front of some bytes: the rule of all framings of the bus.
 
 use super::wire::{
     ReadRequest,
@@ -9,10 +9,11 @@ use crate::{
     stream::{Reason, Verdict},
 };
 
-/// The rule of all six framings: the header gives the length, the CRC decides, then the id.
+/// The rule of all six framings: the header gives the length, then the CRC and the id are checked.
 ///
-/// `LONG` is the length of everything but a READ. An impossible id with a good CRC is somebody
-/// else's packet and skipped whole (ruling I1); with a bad one it is noise like any other.
+/// `LONG` is the length of everything but a READ. An impossible id with a good CRC belongs to a
+/// foreign packet, which is skipped as a whole (ruling I1); with a bad CRC it is noise like any
+/// other.
 #[inline(always)]
 pub(super) fn judge<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
@@ -28,7 +29,7 @@ pub(super) fn judge<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bo
     }
 }
 
-/// How many bytes behind the first are no headers.
+/// Number of bytes after the first that are not headers.
 fn noise<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> usize {
     let is_header = |byte: &u8| match *byte {
         READ | WRITE => TO_SLAVE,
@@ -38,7 +39,7 @@ fn noise<const TO_SLAVE: bool, const TO_MASTER: bool>(bytes: &[u8]) -> usize {
     bytes.iter().skip(1).take_while(|byte| !is_header(byte)).count()
 }
 
-/// Judges a packet of `LEN` bytes whose header is right.
+/// Judges a packet of `LEN` bytes with a valid header.
 #[inline(always)]
 fn judge_packet<const LEN: usize>(bytes: &[u8]) -> Verdict {
     let Some(packet) = bytes.first_chunk::<LEN>() else {

@@ -3,7 +3,7 @@
 //! # On the wire
 //!
 //! 500 kbit/s, 8 data bits, no parity, 1 stop bit, full duplex over four wires. All numbers are
-//! little-endian; the CRC covers every byte in front of it (ruling B1).
+//! little-endian; the CRC covers every byte before it (ruling B1).
 //!
 //! ```text
 //! byte        0     1     2     3     4     5     6     7
@@ -21,59 +21,61 @@
 //!
 //! * **B5, B6** Little-endian on every machine. A byte takes 10 bit times, not 8: the document's 64
 //!   and 128 µs are 80 and 160 µs.
-//! * **I1** Wire ids are 1..=8. Id 0 is the master's and never appears on the wire. A whole packet with a good
-//!   CRC and any other id is refused as [`Reason::Id`](crate::stream::Reason::Id) and skipped whole.
-//! * **I2** The document's two DIP switch examples contradict each other: [`DipSwitch`] takes the
-//!   reading from you. Scan ids 1..=8 with READ to find the truth.
-//! * **I3** One [`WriteRequest`], two constructors, two readings: its bytes do not tell a speed from
-//!   a position. A WRITE is not answered.
-//! * **I4** Any `f32` and any `i16` decodes. NaN and infinities are refused on encoding, by [`Rps`];
-//!   a slave refuses them on receipt as well. The document's ±32767 is a slip: -32768 is legal.
-//! * **I5** A [`Position`] is `rotation · 8192 + count` counts, an `i32`. From counts the split
-//!   truncates unless asked otherwise; out of range is an error, never a wrap or a clamp.
-//! * **I6** There is no stop in position mode: a stop reads the node and then writes the position of
-//!   that answer, never "go to 0". An older position is used only as far as
-//!   [`MasterConfig::hold_age`] allows. The position is then the set-point, and is measured anew only
-//!   after the node was abnormal or its mode in doubt.
-//! * **I7** The reply timeout, 500 µs unless set otherwise, runs from the end of the request on the
-//!   wire, and the answer's own wire time is added. Bytes left from before the request are dropped;
-//!   answers of another node or another kind, or after the deadline, are counted and never taken.
+//! * **I1** Wire ids are 1..=8. Id 0 is the master's and never appears on the wire. A complete
+//!   packet with a good CRC and any other id is refused as
+//!   [`Reason::Id`](crate::stream::Reason::Id) and skipped as a whole.
+//! * **I2** The document's two DIP switch examples contradict each other: you choose the reading
+//!   for [`DipSwitch`]. To find the truth, scan ids 1..=8 with READ.
+//! * **I3** One [`WriteRequest`], two constructors, two readings: its bytes do not tell a speed
+//!   from a position. A WRITE is not answered.
+//! * **I4** Any `f32` and any `i16` decodes. NaN and infinities are refused on encoding, by
+//!   [`Rps`]; a slave refuses them on receipt as well. The document's ±32767 is a slip: -32768 is
+//!   legal.
+//! * **I5** A [`Position`] is `rotation · 8192 + count` counts, an `i32`. Splitting counts
+//!   truncates unless you choose otherwise; out of range is an error, never a wrap or a clamp.
+//! * **I6** Position mode has no stop: a stop reads the node and then writes back the position of
+//!   that answer, never "go to 0". An older position is used only if [`MasterConfig::hold_age`]
+//!   allows it. The position then becomes the set-point, and is measured again only after the node
+//!   was abnormal or its mode in doubt.
+//! * **I7** The reply timeout, 500 µs by default, runs from the end of the request on the wire, and
+//!   the answer's own wire time is added. Bytes received before the request are dropped. Answers
+//!   from another node, of another kind or after the deadline are counted, and never accepted.
 //!   Three windows in a row without the answer make a node abnormal, one answer brings it back, and
-//!   a WRITE changes nothing. [`Master`] keeps to it.
-//! * **I8** A READ is repeated, three attempts unless set otherwise. A WRITE is silent, so the latest
-//!   set-point is repeated in every cycle and, where asked, confirmed by a READ.
-//! * **I9** A slave follows foreign traffic to stay in step, answers only a READ for its own id, and
-//!   keeps the last command on any error. [`Slave`] does; from the last byte of the request to the
-//!   first of the answer it should not take longer than 50 µs.
+//!   a WRITE changes nothing. [`Master`] follows this.
+//! * **I8** A READ is repeated, with three attempts by default. A WRITE is silent, so the latest
+//!   set-point is repeated in every cycle and, on request, confirmed by a READ.
+//! * **I9** A slave follows foreign traffic to stay in step, answers only a READ for its own id,
+//!   and keeps the last command on any error. [`Slave`] does; it should take no longer than 50 µs
+//!   from the last byte of the request to the first byte of the answer.
 //! * **I10** Boards with three motors use the 16-byte packets of [`three`], with the same headers.
-//!   They are another framing, chosen by you.
-//! * **I11** A good answer in another mode than the one on record, even a late one, puts the mode in
-//!   doubt. The node is read again at once, and the mode changes when the next answer says the same;
-//!   that ends the set-point. While in doubt there is no WRITE and no confirmation, set-points are
-//!   refused, and a stop waits, unless it holds a position, measured after the stop was asked for,
-//!   that a velocity node would read as standstill (rotation 0..=12287). After six exchanges without
-//!   a decision comes an event, and the node is read at the pace of the search.
-//! * **I12** A stop is owed from the call on until two stop WRITEs have each been followed by an
-//!   answer of the node in its mode. Until then it is repeated, whatever the polling; it survives
-//!   abnormal nodes, errors of the port and a full queue of events, and a release does not cancel
-//!   it; set-points are refused. Standing still (below 0.05 rps, or two positions within 8 counts) is
-//!   a second event. Ids that have never answered are read first. A node that becomes abnormal under
-//!   a set-point is owed a stop, because slaves keep their last command.
+//!   They are a separate framing that you choose.
+//! * **I11** A good answer in a mode other than the one on record, even a late one, puts the mode
+//!   in doubt. The node is read again at once; if the next answer agrees with the new mode, the
+//!   mode changes and the set-point ends. While in doubt, nothing is written or confirmed,
+//!   set-points are refused, and a stop waits, unless it holds a position, measured after the stop
+//!   was requested, that a velocity node would read as standstill (rotation 0..=12287). Six
+//!   exchanges without a decision produce an event, and the node is then read at the search rate.
+//! * **I12** A stop is owed from the call until two stop WRITEs have each been followed by an
+//!   answer from the node in its mode. Until then it is repeated, whatever the polling; it survives
+//!   abnormal nodes, port errors and a full event queue, a release does not cancel it, and
+//!   set-points are refused. Standstill (below 0.05 rps, or two positions within 8 counts) is a
+//!   second event. Ids that have never answered are read first. A node that becomes abnormal while
+//!   under a set-point is owed a stop, because slaves keep their last command.
 //! * **I13** Stops of nodes that answer go first: velocity WRITEs, then position nodes in turn. An
-//!   abnormal node gets one attempt at once and then one at the pace of the search. Then come new
+//!   abnormal node gets one attempt at once and further attempts at the search rate. Then come new
 //!   set-points, in turn, then a discovery, then the cycle. A master can have a dead-man.
 //! * **I14** A slave drops an answer when more bytes arrived before it was sent, or when it is too
-//!   late for it. On two wires it follows the answers of other nodes as well.
+//!   late. On two wires it also follows the answers of other nodes.
 //!
 //! # Roles
 //!
-//! [`Master`] and [`Slave`] speak the protocol without a clock and without a port, see
-//! [`endpoint`](crate::endpoint). [`Schedule`] tells how fast a bus can be before it is wired.
+//! [`Master`] and [`Slave`] speak the protocol without a clock or a port, see
+//! [`endpoint`](crate::endpoint). [`Schedule`] computes how fast a bus can be before it is wired.
 //!
 //! # Decoding
 //!
-//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`BothDirections`] both. None of them waits for more
-//! than the packet that a header promises, at most 8 bytes.
+//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`BothDirections`] both. None of them waits
+//! for more than the packet that a header announces, at most 8 bytes.
 //!
 //! ```
 //! use axlewire::{ikeya, stream::Event};
@@ -89,6 +91,10 @@
 //! }
 //! assert_eq!(decoder.counters().framed, 4);
 //! ```
+//!
+//! [`DipSwitch`]: slave::DipSwitch
+//! [`MasterConfig::hold_age`]: master::MasterConfig::hold_age
+//! [`Schedule`]: master::Schedule
 
 mod batch;
 pub mod board;

@@ -1,4 +1,4 @@
-//! The three-motor boards of the field (ruling I10): the same bus with 16-byte packets.
+//! Three-motor boards found in the field (ruling I10): the same bus with 16-byte packets.
 //!
 //! ```text
 //! READ      AA | id | crc                                                    4 bytes
@@ -7,9 +7,9 @@
 //! position  56 | id | 3 × count: i16, then 3 × rotation: i16 | crc          16 bytes
 //! ```
 //!
-//! They share their headers with the standard 8-byte packets and cannot be told apart by them: who
-//! sets up a decoder must know which boards hang on the line. On these a WRITE *is* answered, with
-//! the same status packet as a READ.
+//! Their packets have the same headers as the standard 8-byte packets, so the headers do not tell
+//! the two apart: to choose a decoder, you must know which boards are on the bus. Here a WRITE *is*
+//! answered, with the same status packet as a READ.
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
@@ -25,11 +25,11 @@ pub const MAX_LEN: usize = WriteRequest::LEN;
 /// Decoder with the smallest buffer that such a bus needs.
 pub type Decoder<F = ToMaster> = crate::stream::Decoder<F, MAX_LEN>;
 
-/// What a master sends to three-motor boards.
+/// Packets from a master to three-motor boards.
 #[derive(Clone, Copy, Debug)]
 pub enum ToSlave {}
 
-/// What three-motor boards send.
+/// Packets from three-motor boards.
 #[derive(Clone, Copy, Debug)]
 pub enum ToMaster {}
 
@@ -41,9 +41,9 @@ pub enum BothDirections {}
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// Asks for the status.
+    /// Request for the status.
     Read(&'a ReadRequest),
-    /// Commands the motors, and asks for the status.
+    /// Command to the motors; also requests the status.
     Write(&'a WriteRequest),
 }
 
@@ -69,8 +69,8 @@ pub enum Packet<'a> {
 
 /// Master to slave, commands three motors at once: 16 bytes, 320 µs at 500 kbit/s.
 ///
-/// As with the [standard packet](super::WriteRequest), only who knows the node's mode can choose
-/// between the two constructors and the two readings.
+/// As with the [standard packet](super::WriteRequest), you must know the node's mode to choose
+/// between the two constructors and between the two readings.
 ///
 /// ```
 /// use axlewire::ikeya::{NodeId, Rps, three::WriteRequest};
@@ -120,7 +120,7 @@ impl WriteRequest {
         Self { header: header::Write::Value, id, payload, crc: [0; 2] }.sealed()
     }
 
-    /// The node that is commanded.
+    /// The addressed node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
@@ -138,7 +138,7 @@ impl WriteRequest {
         positions_from_wire(self.payload)
     }
 
-    /// The payload as it stands on the wire, in groups of four bytes.
+    /// The payload as on the wire, in groups of four bytes.
     #[must_use]
     pub const fn payload(&self) -> [[u8; 4]; 3] {
         self.payload
@@ -173,14 +173,14 @@ impl VelocityResponse {
     /// Size on the wire, bytes.
     pub const LEN: usize = size_of::<Self>();
 
-    /// The motors of node `id` turn at `current`.
+    /// Reports that the motors of node `id` turn at `current`.
     #[must_use]
     pub fn new(id: NodeId, current: [Rps; 3]) -> Self {
         let rps = current.map(|rps| rps.get().to_le_bytes());
         Self { header: header::Velocity::Value, id, rps, crc: [0; 2] }.sealed()
     }
 
-    /// The node that answers.
+    /// The responding node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
@@ -221,20 +221,20 @@ impl PositionResponse {
     /// Size on the wire, bytes.
     pub const LEN: usize = size_of::<Self>();
 
-    /// The motors of node `id` are at `current`.
+    /// Reports that the motors of node `id` are at `current`.
     #[must_use]
     pub fn new(id: NodeId, current: [Position; 3]) -> Self {
         let positions = positions_to_wire(current);
         Self { header: header::Position::Value, id, positions, crc: [0; 2] }.sealed()
     }
 
-    /// The node that answers.
+    /// The responding node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
     }
 
-    /// Where the shafts are.
+    /// Shaft positions.
     #[must_use]
     pub fn positions(&self) -> [Position; 3] {
         positions_from_wire(self.positions)

@@ -1,4 +1,4 @@
-//! Node ids, speeds and positions: values that cannot be wrong once they exist.
+//! Node ids, speeds and positions: invalid values are unrepresentable.
 
 use core::{f64::consts::TAU, fmt};
 
@@ -11,7 +11,7 @@ pub const BAUD: u32 = 500_000;
 
 /// Address of a motor driver on the bus, 1 to 8 (ruling I1).
 ///
-/// The master has no id on the wire; 0 and 9 upwards are not values of this type.
+/// The master has no id on the wire; 0 and anything above 8 are not values of this type.
 ///
 /// ```
 /// use axlewire::ikeya::NodeId;
@@ -27,12 +27,12 @@ pub const BAUD: u32 = 500_000;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
 #[repr(u8)]
-#[expect(missing_docs, reason = "the type says it")]
+#[expect(missing_docs, reason = "the names say it")]
 #[rustfmt::skip]
 pub enum NodeId { N1 = 1, N2, N3, N4, N5, N6, N7, N8 }
 
 impl NodeId {
-    /// All nodes a bus can have, in order.
+    /// All nodes that a bus can have, in order.
     pub const ALL: [Self; 8] =
         [Self::N1, Self::N2, Self::N3, Self::N4, Self::N5, Self::N6, Self::N7, Self::N8];
 
@@ -82,7 +82,7 @@ impl fmt::Display for NodeId {
     }
 }
 
-/// What a motor driver controls: set by its DIP switch, told by the header of its answers.
+/// What a motor driver controls: set by its DIP switch, reported in the header of its responses.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -106,8 +106,8 @@ impl fmt::Display for Mode {
 
 /// A speed in revolutions per second, always finite (ruling I4).
 ///
-/// The sign is the direction, and -0.0 is kept. What a packet *carries* may be NaN or infinite, so
-/// packets are read as plain `f32` and written from this type.
+/// The sign is the direction, and -0.0 is kept. A packet may *carry* NaN or infinity, so packets
+/// are read as plain `f32` and written from this type.
 ///
 /// ```
 /// use axlewire::ikeya::Rps;
@@ -123,7 +123,7 @@ impl fmt::Display for Mode {
 pub struct Rps(f32);
 
 impl Rps {
-    /// Standing still.
+    /// Zero speed.
     pub const ZERO: Self = Self(0.0);
 
     /// A speed in revolutions per second.
@@ -139,7 +139,7 @@ impl Rps {
         }
     }
 
-    /// A speed in revolutions per minute: 60 rpm are 1 rps.
+    /// Converts from revolutions per minute: 60 rpm is 1 rps.
     ///
     /// # Errors
     ///
@@ -148,7 +148,7 @@ impl Rps {
         Self::new(rpm / 60.0)
     }
 
-    /// A speed in radians per second: 2π rad/s are 1 rps.
+    /// Converts from radians per second: 2π rad/s is 1 rps.
     ///
     /// # Errors
     ///
@@ -163,13 +163,13 @@ impl Rps {
         self.0
     }
 
-    /// Revolutions per minute; infinite above 5.7e36 rps, where `f32` ends.
+    /// Revolutions per minute; infinite above 5.7e36 rps, where `f32` overflows.
     #[must_use]
     pub const fn rpm(self) -> f32 {
         self.0 * 60.0
     }
 
-    /// Radians per second; infinite above 5.4e37 rps, where `f32` ends.
+    /// Radians per second; infinite above 5.4e37 rps, where `f32` overflows.
     #[must_use]
     pub const fn rad_per_s(self) -> f32 {
         self.0 * core::f32::consts::TAU
@@ -197,12 +197,12 @@ impl<'a> arbitrary::Arbitrary<'a> for Rps {
     }
 }
 
-/// A shaft position as the wire carries it: `rotation` turns and `count` encoder counts.
+/// A shaft position as carried on the wire: `rotation` turns and `count` encoder counts.
 ///
-/// Any two `i16` are a position (ruling I4), and several pairs may name the same one: it is
-/// [`counts`](Self::counts) that says where the shaft is. From a total there are two ways to split
-/// (ruling I5): truncating, the default, gives both parts the sign of the total;
-/// Euclidean gives a count of 0..=8191.
+/// Any two `i16` are a position (ruling I4), and several pairs may mean the same one:
+/// [`counts`](Self::counts) says where the shaft is. A total can be split in two ways (ruling I5):
+/// truncating, the default, gives both parts the sign of the total; Euclidean gives a count of
+/// 0..=8191.
 ///
 /// ```
 /// use axlewire::ikeya::Position;
@@ -237,7 +237,7 @@ impl Position {
     ///
     /// # Errors
     ///
-    /// [`EncodeError::Position`] where the rotation does not fit: outside -268,443,647..=268,435,455.
+    /// [`EncodeError::Position`] if the rotation does not fit: outside -268,443,647..=268,435,455.
     pub const fn from_counts(counts: i32) -> Result<Self, EncodeError> {
         const LIMIT: i32 = Position::COUNTS_PER_REVOLUTION;
         const MIN: i32 = i16::MIN as i32 * LIMIT - (LIMIT - 1);
@@ -252,7 +252,7 @@ impl Position {
     ///
     /// # Errors
     ///
-    /// [`EncodeError::Position`] where the rotation does not fit: outside -268,435,456..=268,435,455.
+    /// [`EncodeError::Position`] if the rotation does not fit: outside -268,435,456..=268,435,455.
     pub const fn from_counts_euclidean(counts: i32) -> Result<Self, EncodeError> {
         const LIMIT: i32 = Position::COUNTS_PER_REVOLUTION;
         const MIN: i32 = i16::MIN as i32 * LIMIT;
@@ -263,7 +263,7 @@ impl Position {
         Ok(Self::new(counts.rem_euclid(LIMIT) as i16, counts.div_euclid(LIMIT) as i16))
     }
 
-    /// A position from revolutions, to the nearest count, split as by
+    /// Converts from revolutions, rounded to the nearest count, split as in
     /// [`from_counts`](Self::from_counts).
     ///
     /// # Errors
@@ -274,7 +274,7 @@ impl Position {
             return Err(EncodeError::NotFinite { value: revolutions });
         }
         let counts = revolutions * f64::from(Self::COUNTS_PER_REVOLUTION);
-        // `as` truncates and saturates, so half a count away from zero makes it round.
+        // `as` truncates and saturates, so adding half a count away from zero makes it round.
         let counts = (counts + if counts < 0.0 { -0.5 } else { 0.5 }) as i64;
         match i32::try_from(counts) {
             Ok(counts) => Self::from_counts(counts),
@@ -291,16 +291,16 @@ impl Position {
         }
     }
 
-    /// A position from radians, to the nearest count.
+    /// Converts from radians, rounded to the nearest count.
     ///
     /// # Errors
     ///
-    /// As [`from_revolutions`](Self::from_revolutions).
+    /// Same as [`from_revolutions`](Self::from_revolutions).
     pub fn from_radians(radians: f64) -> Result<Self, EncodeError> {
         Self::from_revolutions(radians / TAU)
     }
 
-    /// The count field: -32768..=32767, though one revolution is 8192.
+    /// The count field: -32768..=32767, although one revolution is 8192.
     #[must_use]
     pub const fn count(self) -> i16 {
         self.count
@@ -312,19 +312,19 @@ impl Position {
         self.rotation
     }
 
-    /// The whole position in encoder counts; always fits.
+    /// The total position in encoder counts; always fits.
     #[must_use]
     pub const fn counts(self) -> i32 {
         self.rotation as i32 * Self::COUNTS_PER_REVOLUTION + self.count as i32
     }
 
-    /// The whole position in revolutions, exact.
+    /// The total position in revolutions, exact.
     #[must_use]
     pub const fn revolutions(self) -> f64 {
         self.counts() as f64 / Self::COUNTS_PER_REVOLUTION as f64
     }
 
-    /// The whole position in radians.
+    /// The total position in radians.
     #[must_use]
     pub const fn radians(self) -> f64 {
         self.revolutions() * TAU

@@ -5,7 +5,7 @@ use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 use super::units::{NodeId, Position, Rps};
 use crate::{crc16, error::ParseError};
 
-/// Headers, each an enum of one variant: any other byte is not a value of the packet.
+/// Headers, each an enum of one variant: any other byte makes an invalid packet.
 pub(super) mod header {
     use super::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
@@ -49,8 +49,8 @@ pub(super) mod header {
 
 /// Master to slave, asks for the status: `AA | id | crc: u16`, 4 bytes, 80 µs at 500 kbit/s.
 ///
-/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
-/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+/// Every value has a valid header and id. A value from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has a valid CRC; a raw zerocopy or bytemuck cast does not check it.
 ///
 /// ```
 /// use axlewire::ikeya::{NodeId, ReadRequest};
@@ -88,7 +88,7 @@ impl ReadRequest {
         Self { header: header::Read::Value, id, crc: [0; 2] }.sealed()
     }
 
-    /// The node that is asked.
+    /// The addressed node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
@@ -99,11 +99,11 @@ impl ReadRequest {
 /// 500 kbit/s. It is not answered (ruling I3).
 ///
 /// The bytes do not say whether the payload is a speed or a position: the slave reads it according
-/// to its DIP switch, so only who knows the node's [`Mode`](super::Mode) can choose. 1.0 rps taken
-/// for a position is 16,256 turns. Hence two constructors and two readings.
+/// to its DIP switch, so you must know the node's [`Mode`](super::Mode) to choose between the two
+/// constructors and between the two readings. Read as a position, 1.0 rps is 16,256 turns.
 ///
-/// Every value has a legal header and id. One got from a constructor, [`parse`](Self::parse) or a
-/// decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+/// Every value has a valid header and id. A value from a constructor, [`parse`](Self::parse) or a
+/// decoder also has a valid CRC; a raw zerocopy or bytemuck cast does not check it.
 ///
 /// ```
 /// use axlewire::ikeya::{NodeId, Position, Rps, WriteRequest};
@@ -159,7 +159,7 @@ impl WriteRequest {
         Self { header: header::Write::Value, id, payload, crc: [0; 2] }.sealed()
     }
 
-    /// The node that is commanded.
+    /// The addressed node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
@@ -177,7 +177,7 @@ impl WriteRequest {
         Position::from_le_bytes(self.payload)
     }
 
-    /// The payload as it stands on the wire.
+    /// The payload as on the wire.
     #[must_use]
     pub const fn payload(&self) -> [u8; 4] {
         self.payload
@@ -187,8 +187,8 @@ impl WriteRequest {
 /// Slave to master, status of a velocity node: `55 | id | rps: f32 | crc: u16`, 8 bytes, 160 µs at
 /// 500 kbit/s.
 ///
-/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
-/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+/// Every value has a valid header and id. A value from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has a valid CRC; a raw zerocopy or bytemuck cast does not check it.
 ///
 /// ```
 /// use axlewire::ikeya::{NodeId, VelocityResponse};
@@ -224,14 +224,14 @@ impl VelocityResponse {
     /// Size on the wire, bytes.
     pub const LEN: usize = size_of::<Self>();
 
-    /// Node `id` turns at `current`.
+    /// Reports that node `id` turns at `current`.
     #[must_use]
     pub fn new(id: NodeId, current: Rps) -> Self {
         let rps = current.get().to_le_bytes();
         Self { header: header::Velocity::Value, id, rps, crc: [0; 2] }.sealed()
     }
 
-    /// The node that answers.
+    /// The responding node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
@@ -247,8 +247,8 @@ impl VelocityResponse {
 /// Slave to master, status of a position node: `56 | id | count: i16 | rotation: i16 | crc: u16`,
 /// 8 bytes, 160 µs at 500 kbit/s.
 ///
-/// Every value has a legal header and id. One got from [`new`](Self::new), [`parse`](Self::parse)
-/// or a decoder also has the right CRC; a raw zerocopy or bytemuck cast does not check it.
+/// Every value has a valid header and id. A value from [`new`](Self::new), [`parse`](Self::parse)
+/// or a decoder also has a valid CRC; a raw zerocopy or bytemuck cast does not check it.
 ///
 /// ```
 /// use axlewire::ikeya::{NodeId, Position, PositionResponse};
@@ -283,27 +283,27 @@ impl PositionResponse {
     /// Size on the wire, bytes.
     pub const LEN: usize = size_of::<Self>();
 
-    /// Node `id` is at `current`.
+    /// Reports that node `id` is at `current`.
     #[must_use]
     pub fn new(id: NodeId, current: Position) -> Self {
         let position = current.to_le_bytes();
         Self { header: header::Position::Value, id, position, crc: [0; 2] }.sealed()
     }
 
-    /// The node that answers.
+    /// The responding node.
     #[must_use]
     pub const fn id(&self) -> NodeId {
         self.id
     }
 
-    /// Where the shaft is.
+    /// Shaft position.
     #[must_use]
     pub const fn position(&self) -> Position {
         Position::from_le_bytes(self.position)
     }
 }
 
-/// What all packets of both variants have: bytes in, bytes out.
+/// Common to all packets of both variants: parsing and encoding.
 macro_rules! packet {
     ($($packet:ident),+) => {$(
         impl $packet {
@@ -317,13 +317,13 @@ macro_rules! packet {
                 super::wire::parsed(bytes)
             }
 
-            /// The packet as it goes over the wire.
+            /// The packet as bytes on the wire.
             #[must_use]
             pub fn as_bytes(&self) -> &[u8; Self::LEN] {
                 zerocopy::transmute_ref!(self)
             }
 
-            /// The same packet with the CRC that belongs to it.
+            /// The same packet with its CRC filled in.
             fn sealed(self) -> Self {
                 Self { crc: $crate::crc16::seal(self.as_bytes()), ..self }
             }
@@ -347,7 +347,7 @@ pub(super) use packet;
 
 packet!(ReadRequest, WriteRequest, VelocityResponse, PositionResponse);
 
-/// Borrows `bytes` as a packet if header, id and CRC are right.
+/// Borrows `bytes` as a packet if header, id and CRC are valid.
 pub(super) fn parsed<P>(bytes: &[u8]) -> Result<&P, ParseError>
 where
     P: TryFromBytes + Immutable + KnownLayout + Unaligned,

@@ -1,7 +1,7 @@
-//! Refuses many bytes at once: all places of a block are judged together, by sync and length alone.
+//! Rejects many bytes at once: all places of a block are judged together, by sync and length only.
 //!
-//! A plain loop over arrays, which a compiler for a host turns into vector instructions; on other
-//! machines nobody calls it.
+//! The loop is a plain loop over arrays, which a compiler for a host vectorizes; other machines do
+//! not call it.
 
 use zerocopy::transmute;
 
@@ -21,14 +21,14 @@ impl<const CAP: usize> Kernel for SyncBatch<CAP> {
     }
 }
 
-/// Places that are judged together.
+/// Number of places judged together.
 const PLACES: usize = 32;
 
-/// What a block can see, bytes: the last place may begin a sync and a length field.
+/// Bytes that a block covers: the last place may begin a sync and a length field.
 const BLOCK: usize = PLACES + 3;
 
-/// How many bytes at the front start no frame. Ends in front of a length that a frame may have, or
-/// where less than a block is left.
+/// Counts the bytes at the front that start no frame. Ends before a length that a frame may have,
+/// or where less than a block is left.
 #[inline(always)]
 fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
     let mut rejected = Rejected::default();
@@ -52,7 +52,7 @@ fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
         }
         let first = first(starts);
         rejected.len += first;
-        // One of the syncs is that of the place it ends at.
+        // The place at which the run ends has one of the syncs.
         if count > 1 {
             let in_front = syncs.into_iter().take(first);
             rejected.length += in_front.map(usize::from).sum::<usize>();
@@ -62,7 +62,7 @@ fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
     rejected
 }
 
-/// Where the first flag is set; at the end if none is.
+/// Index of the first flag that is set; at the end if none is.
 #[inline(always)]
 fn first(flags: [u8; PLACES]) -> usize {
     let [low, high]: [u128; 2] = transmute!(flags);
@@ -85,7 +85,7 @@ mod tests {
         ucp::Ucp,
     };
 
-    /// Dense syncs with lengths of all sorts, whole frames, and thinner places.
+    /// Dense syncs with all sorts of lengths, complete frames, and sparser stretches.
     fn stream() -> impl Strategy<Value = Vec<u8>> {
         let half = select([0xFD, 0xFF].as_slice());
         let byte = select([0xFD, 0xFF, 0xFD, 0xFF, 0, 1, 3, 4, 40, 60, 61, 252].as_slice());

@@ -3,7 +3,7 @@
 use super::codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
 use crate::error::EncodeError;
 
-/// Declares bodies: a struct of private byte fields, alignment 1, and the id it travels under.
+/// Declares bodies: a struct of private byte fields, alignment 1, and the id of its message.
 macro_rules! body {
     ($(
         $(#[$meta:meta])*
@@ -30,7 +30,7 @@ macro_rules! body {
 pub(super) use body;
 
 body! {
-    /// Host to robot: are you there? No body.
+    /// Host to robot: checks that the robot is there. No body.
     pub struct Ping(Ping) {}
 
     /// Robot to host, answers a ping: `err`, 1 byte.
@@ -39,15 +39,15 @@ body! {
     /// Host to robot, begins a calibration: `type`, 1 byte (ruling U11).
     pub struct CalibrationStart(CalibrationStart) { kind: u8 }
 
-    /// Robot to host, answers at once: `type | err`, 2 bytes.
+    /// Robot to host, answers the start at once: `type | err`, 2 bytes.
     pub struct CalibrationStartAck(CalibrationStart) { kind: u8, err: u8 }
 
     /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11).
     pub struct CalibrationEnd(CalibrationEnd) { kind: u8 }
 
-    /// Robot to host, answers at once: `type | err`, 2 bytes.
+    /// Robot to host, answers the end at once: `type | err`, 2 bytes.
     ///
-    /// The vendor firmware tells the type of the last *start* here.
+    /// The vendor firmware returns the type of the last *start* here.
     pub struct CalibrationEndAck(CalibrationEnd) { kind: u8, err: u8 }
 
     /// Robot to host, the result of an IMU calibration: `acc: 3 × i16 | gyro: 3 × i16`, 12 bytes.
@@ -70,7 +70,7 @@ body! {
     pub struct BiasRequest(Biases) {}
 
     /// Host to robot, the stored biases: `err | acc: 3 × i16 | gyro: 3 × i16 | mag: 3 × i16`, 19
-    /// bytes. The vendor firmware takes them whatever `err` says.
+    /// bytes. The vendor firmware accepts them whatever `err` says.
     pub struct Biases(Biases) {
         err: u8,
         acc: [[u8; 2]; 3],
@@ -78,15 +78,16 @@ body! {
         mag: [[u8; 2]; 3]
     }
 
-    /// Robot to host, answers an [`OtaRequest`](super::OtaRequest): `err`, 1 byte. Shipped robots
-    /// never send it.
+    /// Robot to host, answers an [`OtaRequest`](super::message::OtaRequest): `err`, 1 byte.
+    /// Shipped robots never send it.
     pub struct OtaAck(Ota) { status: u8 }
 
-    /// Host to robot, state of the host's network: 1 byte, what a host should send (ruling U8).
+    /// Host to robot, state of the host's network: 1 byte; the form that a host should send (ruling
+    /// U8).
     pub struct SetNetworkState(NetworkState) { state: u8 }
 
-    /// Host to robot, state of the host's network in the 4 bytes that a Linux `enum` takes.
-    /// Read, never built.
+    /// Host to robot, state of the host's network in 4 bytes, the size of a Linux `enum`. Only
+    /// received, never built.
     pub struct SetNetworkStateWide(NetworkState) { state: [u8; 4] }
 }
 
@@ -105,13 +106,13 @@ impl Pong {
 }
 
 impl CalibrationStart {
-    /// Begins a calibration.
+    /// Starts a calibration.
     #[must_use]
     pub fn new(kind: CalibrationKind) -> Self {
         Self { kind: kind.into() }
     }
 
-    /// What is to be calibrated.
+    /// Sensors to be calibrated.
     #[must_use]
     pub fn kind(&self) -> CalibrationKind {
         self.kind.into()
@@ -125,7 +126,7 @@ impl CalibrationStartAck {
         Self { kind: kind.into(), err: err.into() }
     }
 
-    /// What is being calibrated.
+    /// Sensors being calibrated.
     #[must_use]
     pub fn kind(&self) -> CalibrationKind {
         self.kind.into()
@@ -145,7 +146,7 @@ impl CalibrationEnd {
         Self { kind: kind.into() }
     }
 
-    /// What was calibrated.
+    /// Sensors that were calibrated.
     #[must_use]
     pub fn kind(&self) -> CalibrationKind {
         self.kind.into()
@@ -159,7 +160,7 @@ impl CalibrationEndAck {
         Self { kind: kind.into(), err: err.into() }
     }
 
-    /// What was calibrated.
+    /// Sensors that were calibrated.
     #[must_use]
     pub fn kind(&self) -> CalibrationKind {
         self.kind.into()
@@ -173,7 +174,7 @@ impl CalibrationEndAck {
 }
 
 impl ImuBias {
-    /// Biases in the raw units of the [report](Report): x, y, z.
+    /// Biases in the raw units of the [report](super::message::Report): x, y, z.
     #[must_use]
     pub fn new(acc: [i16; 3], gyro: [i16; 3]) -> Self {
         Self { acc: acc.map(i16::to_le_bytes), gyro: gyro.map(i16::to_le_bytes) }
@@ -207,7 +208,7 @@ impl ImuBiasAck {
 }
 
 impl MagBias {
-    /// Biases in the raw units of the [report](Report): x, y, z.
+    /// Biases in the raw units of the [report](super::message::Report): x, y, z.
     #[must_use]
     pub fn new(mag: [i16; 3]) -> Self {
         Self { mag: mag.map(i16::to_le_bytes) }
@@ -235,13 +236,13 @@ impl MagBiasAck {
 }
 
 impl Biases {
-    /// What the host has kept from the last calibrations.
+    /// Biases that the host has kept from the last calibrations.
     #[must_use]
     pub fn new(imu: ImuBias, mag: MagBias) -> Self {
         Self { err: ErrorCode::Fine.into(), acc: imu.acc, gyro: imu.gyro, mag: mag.mag }
     }
 
-    /// 0 unless the host has reason to say otherwise; the vendor firmware ignores it.
+    /// Normally 0; the vendor firmware ignores it.
     #[must_use]
     pub fn err(&self) -> ErrorCode {
         self.err.into()
@@ -267,13 +268,13 @@ impl Biases {
 }
 
 impl OtaAck {
-    /// Answers an [`OtaRequest`](super::OtaRequest).
+    /// Answers an [`OtaRequest`](super::message::OtaRequest).
     #[must_use]
     pub fn new(status: OtaStatus) -> Self {
         Self { status: status.into() }
     }
 
-    /// What the robot makes of the request.
+    /// The robot's decision on the request.
     #[must_use]
     pub fn status(&self) -> OtaStatus {
         self.status.into()
@@ -281,11 +282,11 @@ impl OtaAck {
 }
 
 impl SetNetworkState {
-    /// Tells the robot which state its lamp is to show.
+    /// Sets the state that the robot's lamp shows.
     ///
     /// # Errors
     ///
-    /// [`EncodeError::NetworkState`] for a state above 255, which one byte cannot carry.
+    /// [`EncodeError::NetworkState`] for a state above 255, which does not fit into one byte.
     pub fn new(state: NetworkState) -> Result<Self, EncodeError> {
         let value = u32::from(state);
         let state = u8::try_from(value).map_err(|_| EncodeError::NetworkState { value })?;

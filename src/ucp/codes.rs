@@ -1,6 +1,6 @@
-//! Small codes that keep what they do not know.
+//! Small codes that keep unknown values.
 
-/// A `u8` code with names for some values; `Other` keeps the rest as received.
+/// A code with names for some values; `Other` keeps the rest as received.
 macro_rules! code {
     (
         $(#[$meta:meta])*
@@ -13,7 +13,7 @@ macro_rules! code {
         #[cfg_attr(feature = "serde", serde(from = $serde, into = $serde))]
         pub enum $name {
             $($(#[$variant_meta])* $variant,)+
-            /// Any other value, as it stood on the wire.
+            /// Any other value, as received.
             Other($raw),
         }
 
@@ -26,7 +26,7 @@ macro_rules! code {
             }
         }
 
-        /// By the value on the wire, so that `Other` never stands for a value with a name.
+        /// By the value on the wire, so that `Other` never holds a value that has a name.
         #[cfg(feature = "arbitrary")]
         impl<'a> arbitrary::Arbitrary<'a> for $name {
             fn arbitrary(u: &mut arbitrary::Unstructured<'a>) -> arbitrary::Result<Self> {
@@ -46,7 +46,7 @@ macro_rules! code {
 }
 
 code! {
-    /// What a pong or an acknowledgement says of the frame that it answers (ruling U12).
+    /// Verdict of a pong or an acknowledgement on the frame that it answers (ruling U12).
     ErrorCode: u8 = "u8" {
         /// It arrived undamaged.
         Fine = 0,
@@ -56,11 +56,11 @@ code! {
 }
 
 code! {
-    /// What is calibrated.
+    /// Sensors to calibrate.
     CalibrationKind: u8 = "u8" {
-        /// The magnetometer; the host has to turn the robot meanwhile.
+        /// The magnetometer; the host must turn the robot meanwhile.
         Magnetometer = 1,
-        /// Accelerometer and gyroscope; the robot has to stand still meanwhile.
+        /// Accelerometer and gyroscope; the robot must stand still meanwhile.
         Imu = 2,
     }
 }
@@ -90,7 +90,7 @@ code! {
         Disconnected = 2,
         /// Connected.
         Connected = 3,
-        /// Firmware update under way; not in the protocol document.
+        /// Firmware update in progress; not in the protocol document.
         Ota = 4,
     }
 }

@@ -1,4 +1,4 @@
-//! Frames: as they were received, and as they are sent.
+//! Frames as received and as sent.
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
@@ -11,8 +11,9 @@ use crate::{
 
 /// A frame on the wire: `FD | FF | len: u16 | id | index | body | crc: u16` (ruling U1).
 ///
-/// A reference to one is a view of the bytes it arrived in. The decoder and [`parse`](Self::parse)
-/// hand out only frames whose length and CRC are right; a raw zerocopy cast checks neither.
+/// A reference to a frame is a view of the bytes in which it arrived. The decoder and
+/// [`parse`](Self::parse) return only frames with a valid length and CRC; a raw zerocopy cast
+/// checks neither.
 ///
 /// ```
 /// use axlewire::ucp::{Frame, Message};
@@ -33,12 +34,12 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Borrows `bytes`, exactly one frame of any length up to 256, as a frame.
+    /// Borrows `bytes`, exactly one frame of up to 256 bytes, as a frame.
     ///
     /// # Errors
     ///
-    /// [`ParseError::Length`] when there are fewer than 8 bytes or another number than the length
-    /// field says, [`ParseError::Field`] without FD FF in front, otherwise [`ParseError::Crc`].
+    /// [`ParseError::Length`] for fewer than 8 bytes or a number other than the length field says,
+    /// [`ParseError::Field`] if it does not begin with FD FF, otherwise [`ParseError::Crc`].
     pub fn parse(bytes: &[u8]) -> Result<&Self, ParseError> {
         let found = bytes.len();
         let smallest = LEN_WITHOUT_BODY + OUTSIDE_LEN;
@@ -46,7 +47,7 @@ impl Frame {
             return Err(ParseError::Length { expected: smallest, found });
         }
         let frame = Self::try_ref_from_bytes(bytes).map_err(|_| ParseError::Field)?;
-        // Where usize has 16 bits, a length field may leave no room for the rest.
+        // With a 16-bit usize, adding to a length field may overflow.
         let expected = usize::from(frame.header.len()).saturating_add(OUTSIDE_LEN);
         if found != expected {
             return Err(ParseError::Length { expected, found });
@@ -61,7 +62,7 @@ impl Frame {
         Self::try_ref_from_bytes(frame).ok()
     }
 
-    /// The six bytes in front of the body.
+    /// The six bytes before the body.
     #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
@@ -88,7 +89,7 @@ impl Frame {
         }
     }
 
-    /// The frame as it went over the wire.
+    /// The frame as bytes on the wire.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         IntoBytes::as_bytes(self)
@@ -98,15 +99,15 @@ impl Frame {
     /// crate is applied (rulings U2, U7, U13).
     ///
     /// The frame may start a firmware update, be out of range, or hang or corrupt a shipped robot:
-    /// a relay is as dangerous as its source. To pass on only harmless motor commands, make a
-    /// [`MotorControl`](super::MotorControl) of a received one by `try_from`.
+    /// a relay is as dangerous as its source. To pass on only harmless motor commands, convert a
+    /// received one to [`MotorControl`](super::MotorControl) with `try_from`.
     #[must_use]
     pub const fn relay_unchecked(&self) -> RelayedFrame<'_> {
         RelayedFrame(self)
     }
 }
 
-/// A received frame to be sent on byte for byte; see [`Frame::relay_unchecked`].
+/// A received frame to be passed on byte for byte; see [`Frame::relay_unchecked`].
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayedFrame<'a>(&'a Frame);
@@ -121,33 +122,33 @@ impl Encode for RelayedFrame<'_> {
     }
 }
 
-/// The body of a known message that may be sent: a struct of bytes that knows its id.
+/// The body of a known message that may be sent: a struct of bytes with an id.
 ///
-/// Which message a frame holds follows from its id and the length of its body, so no two bodies
-/// share both. Implemented by this crate's bodies and by nothing else. [`RawMotorControl`] and
-/// [`RawOtaRequest`] are none (ruling U7): a motor command is sent as a
-/// [`MotorControl`](super::MotorControl), which is always harmless, and a request to update as an
-/// [`OtaRequest`](super::OtaRequest), which has one constructor.
+/// The id of a frame and the length of its body determine its message, so no two bodies share both.
+/// Implemented only by this crate's bodies. [`RawMotorControl`](super::message::RawMotorControl)
+/// and [`RawOtaRequest`](super::message::RawOtaRequest) are not bodies (ruling U7): a motor command
+/// is sent as a [`MotorControl`](super::MotorControl), which is always harmless, and an update
+/// request as an [`OtaRequest`](super::message::OtaRequest), which has one constructor.
 pub trait Body: IntoBytes + Immutable + KnownLayout + Unaligned + Copy + sealed::Sealed {
-    /// The id under which it travels.
+    /// The message id of its frames.
     const ID: MessageId;
 
-    /// The whole frame, as a value with the right CRC. `index` is the sender's counter (U9).
+    /// The complete frame, as a value with a valid CRC. `index` is the sender's counter (U9).
     fn frame(self, index: u8) -> FrameOf<Self> {
         FrameOf::new(index, self)
     }
 }
 
 pub(super) mod sealed {
-    /// Keeps `Body` to this crate.
+    /// Limits `Body` to this crate.
     pub trait Sealed {}
 }
 
-/// A whole frame with a body of known type, as a value.
+/// A complete frame with a body of known type, as a value.
 ///
-/// [`Body::frame`] builds one. A value that was cast from bytes may say anything in its header and
-/// its CRC: [`encode`](Encode::encode) refuses an id or length that is not the body's, and a
-/// damaged CRC is refused by every receiver.
+/// [`Body::frame`] builds one. A value cast from bytes may have any header and CRC:
+/// [`encode`](Encode::encode) refuses an id or length that is not the body's, and every receiver
+/// refuses a damaged CRC.
 ///
 /// ```
 /// use axlewire::ucp::{message::Ping, Body};
@@ -181,14 +182,14 @@ impl<B: Body> FrameOf<B> {
         size_of::<Self>()
     };
 
-    /// The frame with the sender's counter `index` and its right CRC.
+    /// Builds the frame with the sender's counter `index` and a valid CRC.
     #[must_use]
     pub fn new(index: u8, body: B) -> Self {
         let frame = Self { header: Self::header(index), body, crc: [0; 2] };
         Self { crc: crc16::seal(IntoBytes::as_bytes(&frame)), ..frame }
     }
 
-    /// The frame as it goes over the wire.
+    /// The frame as bytes on the wire.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         IntoBytes::as_bytes(self)
@@ -214,8 +215,8 @@ impl<B> FrameOf<B> {
     }
 }
 
-/// Refuses with [`EncodeError::Header`] a frame that was cast from bytes and has another id or
-/// length than its body: a report's id, for one, hangs shipped robots (ruling U13).
+/// Refuses with [`EncodeError::Header`] a frame that was cast from bytes and has an id or length
+/// other than its body's: a report's id, for example, hangs shipped robots (ruling U13).
 impl<B: Body> Encode for FrameOf<B> {
     fn encoded_len(&self) -> usize {
         Self::LEN
@@ -230,7 +231,7 @@ impl<B: Body> Encode for FrameOf<B> {
     }
 }
 
-/// A frame by its parts, for ids that this crate has no message for (ruling U3).
+/// A frame given by its parts, for ids for which this crate has no message (ruling U3).
 ///
 /// ```
 /// use axlewire::{encode::Encode, ucp::RawFrame};
@@ -244,15 +245,15 @@ impl<B: Body> Encode for FrameOf<B> {
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RawFrame<'a> {
-    /// The message id; to be sent, none of [`MessageId`].
+    /// The message id; to be sent, it must not be one of [`MessageId`].
     pub id: u8,
     /// The sender's counter.
     pub index: u8,
-    /// The body; to be sent, at most 56 bytes.
+    /// The body; to be sent, it must be at most 56 bytes.
     pub body: &'a [u8],
 }
 
-/// Built in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what
+/// Encodes in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what
 /// hangs or corrupts shipped robots (ruling U13).
 impl Encode for RawFrame<'_> {
     fn encoded_len(&self) -> usize {

@@ -17,8 +17,8 @@ pub type Decoder = stream::Decoder<Ucp, MAX_LEN>;
 /// Finds UCP frames whose length field is 4..=`CAP` (ruling U2).
 ///
 /// The default of 60, frames of at most 64 bytes, is the most that a shipped robot survives, and
-/// far above the largest known message. A larger cap, at most 252, lets foreign frames through and
-/// holds good ones back longer behind a false header.
+/// far above the largest known message. A larger cap, at most 252, lets foreign frames through, but
+/// false headers then hold good frames back for longer.
 #[derive(Clone, Copy, Debug)]
 pub enum Ucp<const CAP: usize = 60> {}
 
@@ -55,7 +55,7 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
     }
 }
 
-/// Judges less than a sync and a length field.
+/// Judges fewer bytes than a sync and a length field.
 #[inline(always)]
 fn judge_start<const CAP: usize>(bytes: &[u8]) -> Verdict {
     match len_of::<CAP>(fill_up(bytes)) {
@@ -64,7 +64,7 @@ fn judge_start<const CAP: usize>(bytes: &[u8]) -> Verdict {
     }
 }
 
-/// The length of the whole frame, or what is wrong.
+/// The length of the complete frame, or what is wrong.
 #[inline(always)]
 fn len_of<const CAP: usize>([first, second, low, high]: [u8; 4]) -> Result<usize, Reason> {
     if [first, second] != SYNC {
@@ -78,8 +78,8 @@ fn len_of<const CAP: usize>([first, second, low, high]: [u8; 4]) -> Result<usize
     }
 }
 
-/// With a sync and the length of the shortest frame where bytes are missing: what is there is wrong
-/// exactly when the whole is.
+/// Fills missing bytes with a sync and the length of the shortest frame: the result is wrong
+/// exactly if the bytes present are wrong.
 #[cold]
 fn fill_up(bytes: &[u8]) -> [u8; 4] {
     let mut start = [SYNC[0], SYNC[1], LEN_WITHOUT_BODY as u8, 0];
@@ -87,15 +87,15 @@ fn fill_up(bytes: &[u8]) -> [u8; 4] {
     start
 }
 
-/// How many bytes behind the first start no sync.
+/// Number of bytes after the first that start no sync.
 #[inline(always)]
 fn noise(bytes: &[u8]) -> usize {
     let behind = bytes.get(1..).unwrap_or_default();
     if !IS_HOST {
         return noise_by_bytes(behind);
     }
-    // Where false headers are dense, the next FD is a few bytes away: a branch that is predicted is
-    // then faster than arithmetic.
+    // Where false headers are dense, the next FD is a few bytes away: a predicted branch is then
+    // faster than arithmetic.
     let few = noise_by_bytes(behind.first_chunk::<3>().map_or(behind, |near| near));
     match behind.get(3..) {
         Some(far) if few == 3 => few + noise_by_words(far),
@@ -103,20 +103,19 @@ fn noise(bytes: &[u8]) -> usize {
     }
 }
 
-/// How many bytes in front of the first FD.
+/// Number of bytes before the first FD.
 #[inline(always)]
 fn noise_by_bytes(bytes: &[u8]) -> usize {
     bytes.iter().take_while(|&&byte| byte != SYNC[0]).count()
 }
 
-/// The same, eight at a time.
+/// Same as [`noise_by_bytes`], eight bytes at a time.
 #[inline(never)]
 fn noise_by_words(bytes: &[u8]) -> usize {
     let every = |byte| u64::from_ne_bytes([byte; 8]);
     let mut rest = bytes;
     while let Some((word, behind)) = rest.split_first_chunk() {
-        // FD becomes zero, and the first zero has the first borrow: in front of it no high bit is
-        // set.
+        // FD becomes zero, and the first zero has the first borrow: before it no high bit is set.
         let word = u64::from_le_bytes(*word) ^ every(SYNC[0]);
         let zeros = word.wrapping_sub(every(1)) & !word & every(0x80);
         if zeros != 0 {

@@ -1,11 +1,11 @@
-//! The six bytes in front of every body, the names of the ids, and the sizes of a frame.
+//! The six bytes before every body, the names of the ids, and the sizes of a frame.
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;
 
-/// Longest frame that is sent, and that is accepted by default, bytes (ruling U2).
+/// Longest frame that is sent and, by default, accepted, bytes (ruling U2).
 pub const MAX_LEN: usize = 64;
 
 /// Longest body that is sent, bytes.
@@ -17,7 +17,7 @@ pub(super) const LEN_WITHOUT_BODY: usize = 4;
 /// Bytes of a frame that `len` does not count: the sync and the CRC.
 pub(super) const OUTSIDE_LEN: usize = 4;
 
-/// First byte of a frame: no other value is a header.
+/// First byte of a frame; any other value makes an invalid header.
 #[derive(
     Clone,
     Copy,
@@ -62,7 +62,7 @@ enum SecondSync {
 /// The first two bytes of every frame.
 pub const SYNC: [u8; 2] = [FirstSync::Value as u8, SecondSync::Value as u8];
 
-/// What stands in front of every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
+/// The fields before every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
 #[derive(
     Clone,
     Copy,
@@ -103,7 +103,7 @@ impl Header {
         u16::from_le_bytes(self.len)
     }
 
-    /// Says no more than that the length field is 0, which no frame has.
+    /// Whether the length field is 0, which no frame has; it says nothing about the body.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.len() == 0
@@ -115,7 +115,7 @@ impl Header {
         self.id
     }
 
-    /// The sender's counter, wrapping; many senders leave it 0 (ruling U9).
+    /// The sender's wrapping counter; many senders leave it at 0 (ruling U9).
     #[must_use]
     pub const fn index(&self) -> u8 {
         self.index

@@ -1,4 +1,4 @@
-//! Received bytes, made frames of, and how old each frame is.
+//! Turns received bytes into frames, and tracks how old each frame is.
 
 use super::{frame::Frame, framing::Decoder, role::SHORTEST};
 use crate::{
@@ -12,31 +12,32 @@ use crate::{
 pub(super) struct Inbox {
     decoder: Decoder,
     times: inbox::Inbox,
-    /// When the oldest byte that the decoder holds had arrived.
+    /// Arrival time of the oldest byte that the decoder holds.
     since: Instant,
     /// Length of the newest chunk, bytes.
     chunk_len: usize,
 }
 
 impl Inbox {
-    /// An inbox in which a pause of two byte times and `margin` cuts a frame off.
+    /// Creates an inbox in which a pause of two byte times plus `margin` cuts off a frame.
     pub(super) fn new(baud: u32, margin: Duration, now: Instant) -> Self {
         let idle = (wire_time(2, baud) + margin).max(SHORTEST);
         let times = inbox::Inbox::new(idle, AfterIdle::GiveUpAll, now);
         Self { decoder: Decoder::new(), times, since: now, chunk_len: 0 }
     }
 
-    /// A chunk of bytes is handed in at `now`, and may have arrived at any time from `at` on. Call
-    /// [`next`](Self::next) with it until that is `None`.
+    /// Announces a chunk of bytes handed in at `now`, which may have arrived at any time since
+    /// `at`. Then call [`next`](Self::next) with it until that returns `None`.
     pub(super) const fn receive(&mut self, chunk: &[u8], at: Instant, now: Instant) {
         self.times.receive(at, now);
         self.chunk_len = chunk.len();
     }
 
-    /// Gives up the pending candidate if the line has been idle for so long that nothing will
-    /// complete it, and says whether that is so.
+    /// Gives up the pending candidate once the line has been idle long enough; returns whether it
+    /// did.
     ///
-    /// If it is, call [`next`](Self::next) without bytes until that is `None`, and then ask again.
+    /// If so, call [`next`](Self::next) without bytes until it returns `None`, and then call this
+    /// again.
     pub(super) fn settle(&mut self, now: Instant) -> bool {
         let is_idle = self.times.settle(self.decoder.pending(), now);
         if is_idle {
@@ -46,15 +47,14 @@ impl Inbox {
         is_idle
     }
 
-    /// The next frame, and when it had arrived.
+    /// The next frame, and its arrival time.
     ///
-    /// A frame that had arrived whole before the newest chunk was held back by a false header. It is
-    /// as old as the first byte that was held, because a command that comes to light late is an old
-    /// one.
+    /// A frame that had arrived completely before the newest chunk was held back by a false header.
+    /// It is dated to the oldest byte held, because a command found late is an old command.
     pub(super) fn next(&mut self, bytes: &mut &[u8]) -> Option<(&Frame, Instant)> {
         loop {
             match self.decoder.advance_buffered(bytes) {
-                // A gap is in the counters already.
+                // The counters already include the gap.
                 Some(Held::Gap(_)) => {}
                 Some(held) => {
                     let behind = self.decoder.pending() + bytes.len();
@@ -75,7 +75,7 @@ impl Inbox {
         }
     }
 
-    /// When the line counts as idle, if any byte is pending.
+    /// Time at which the line counts as idle, if any byte is pending.
     pub(super) fn deadline(&self) -> Option<Instant> {
         self.times.deadline(self.decoder.pending())
     }

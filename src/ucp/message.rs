@@ -1,4 +1,4 @@
-//! What frames say: the messages, their bodies and their values (ruling U4).
+//! The content of frames: the messages, their bodies and their values (ruling U4).
 //!
 //! [`Frame::message`] reads one, [`Body::frame`](super::Body::frame) builds one.
 
@@ -20,10 +20,10 @@ use super::{
     header::MessageId,
 };
 
-/// What a frame says, borrowed from its body.
+/// The message in a frame, borrowed from its body.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[expect(missing_docs, reason = "each variant is the body it holds, as it was received")]
+#[expect(missing_docs, reason = "each variant is named after the body it holds")]
 #[non_exhaustive]
 pub enum Message<'a> {
     Ping(&'a Ping),
@@ -44,12 +44,12 @@ pub enum Message<'a> {
     OtaAck(&'a OtaAck),
     SetNetworkState(&'a SetNetworkState),
     SetNetworkStateWide(&'a SetNetworkStateWide),
-    /// An unknown id, or a known one with a body that no message has (ruling U3).
+    /// An unknown id, or a known one with a body length that no message has (ruling U3).
     Unknown(RawFrame<'a>),
 }
 
 impl Frame {
-    /// What the frame says.
+    /// The message in this frame.
     #[must_use]
     pub fn message(&self) -> Message<'_> {
         Message::of(self)
@@ -64,8 +64,8 @@ impl defmt::Format for Frame {
 }
 
 impl<'a> Message<'a> {
-    /// Tells the message from the id and the length of the body; the first that fits is the only
-    /// one that does.
+    /// Determines the message from the id and the length of the body; the first match is the only
+    /// one.
     fn of(frame: &'a Frame) -> Self {
         let body = frame.body();
         let unknown = Self::Unknown(RawFrame { id: frame.id(), index: frame.index(), body });
@@ -98,7 +98,7 @@ impl<'a> Message<'a> {
     }
 }
 
-/// The body as a `B` if it has the length of one.
+/// The body as a `B`, if it has the right length.
 fn cast<'a, B, T>(body: &'a [u8], variant: impl FnOnce(&'a B) -> T) -> Option<T>
 where
     B: FromBytes + Immutable + KnownLayout + 'a,

@@ -10,77 +10,78 @@
 //! ```
 //!
 //! ```text
-//! id          to the robot                          to the host
-//! 1           Ping 0                                Pong 1
+//! id          to the robot                    to the host
+//! 1           Ping 0                          Pong 1
 //! 2           MotorControl 16, every 100 ms
-//! 3           CalibrationStart 1                    CalibrationStartAck 2
-//! 4           CalibrationEnd 1                      CalibrationEndAck 2
-//! 5                                                 FirmwareReport 36 or DocumentReport 34, every 20 ms
-//! 6           ImuBiasAck 1                          ImuBias 12
-//! 7           MagBiasAck 1                          MagBias 6
-//! 8           Biases 19                             BiasRequest 0
-//! 9           OtaRequest 2                          OtaAck 1
+//! 3           CalibrationStart 1              CalibrationStartAck 2
+//! 4           CalibrationEnd 1                CalibrationEndAck 2
+//! 5                                           FirmwareReport 36 or DocumentReport 34, every 20 ms
+//! 6           ImuBiasAck 1                    ImuBias 12
+//! 7           MagBiasAck 1                    MagBias 6
+//! 8           Biases 19                       BiasRequest 0
+//! 9           OtaRequest 2                    OtaAck 1
 //! 0A          SetNetworkState 1, or 4
 //! ```
 //!
-//! The numbers are body lengths in bytes. Id and body length together name the message, so no
-//! direction has to be known.
+//! The numbers are body lengths in bytes. Id and body length together identify the message, so the
+//! direction need not be known.
 //!
 //! # Rulings
 //!
 //! Where the protocol document is silent, unclear or wrong, this crate decides:
 //!
-//! * **B1, U1** The CRC covers every byte in front of it, FD FF included, and is sent low byte
-//!   first. `len` is 4 + body length, which is the frame length minus 4.
-//! * **U2** `len` 4..=60 is accepted unless a larger cap is chosen, at most 252; never sent above
-//!   60.
+//! * **B1, U1** The CRC covers every byte before it, FD FF included, and is sent low byte first.
+//!   `len` is 4 + body length, which is the frame length minus 4.
+//! * **U2** `len` 4..=60 is accepted by default; a larger cap, at most 252, can be chosen. `len`
+//!   above 60 is never sent.
 //! * **U3** A good frame with an unknown id, or with a body length that no message has, is
 //!   delivered as [`Message::Unknown`]: never dropped, never misread.
 //! * **U4** The table above.
-//! * **U5** Two report layouts, told apart by their length; [`Telemetry`] is what both have, raw
-//!   and in SI units. A battery above 100 % is kept raw and flagged.
-//! * **U6** The document says that a positive `angular` turns left, the vendor firmware and three
+//! * **U5** Two report layouts, distinguished by their length; [`Telemetry`] holds their common
+//!   fields, raw and in SI units. A battery above 100 % is kept raw and flagged.
+//! * **U6** The document says that a positive `angular` turns left; the vendor firmware and three
 //!   host programs turn right. The wire value passes through; [`MotorControl::turn_right`] and
-//!   [`MotorControl::turn_left`] follow the firmware. It is a steering wheel and not a yaw rate: in
-//!   reverse the nose swings the other way. [`MotorControl::yaw_right`] and
+//!   [`MotorControl::turn_left`] follow the firmware. `angular` is a steering wheel, not a yaw
+//!   rate: in reverse the nose swings the other way. [`MotorControl::yaw_right`] and
 //!   [`MotorControl::yaw_left`] name the side to which the nose swings.
-//! * **U7** `speed` and `angular` are -100..=100, out of range is an error. `front_led` is 100 or
+//! * **U7** `speed` and `angular` are -100..=100; out of range is an error. `front_led` is 100 or
 //!   0. `version` and the reserved fields are 0, because a `version` above 38 starts a firmware
-//!   update. So a command to be sent is a [`MotorControl`], which can be nothing else, and one that
-//!   was received is a [`RawMotorControl`], which cannot be framed. Likewise an [`OtaRequest`]
-//!   comes from [`OtaRequest::start_firmware_update`] alone, and one that was received is a
+//!   update. A command to be sent is therefore a [`MotorControl`], which cannot hold other values;
+//!   a received one is a [`RawMotorControl`], which cannot be framed. Likewise only
+//!   [`OtaRequest::start_firmware_update`] makes an [`OtaRequest`], and a received one is a
 //!   [`RawOtaRequest`].
-//! * **U8** Network states 0 to 4, one byte sent, one or four read, unknown values kept.
+//! * **U8** Network states are 0 to 4. One byte is sent, one or four are read, and unknown values
+//!   are kept.
 //! * **U9** `index` is a wrapping counter per sender; a gap in it is never an error.
 //! * **U10** [`Host`] repeats the latest motor command every 100 ms, and sends zero when its
 //!   application has been silent for 500 ms. [`Robot`] stands still 500 ms after the last *valid*
-//!   motor command; the vendor firmware is content with any byte. Reports come every 20 ms, and the
+//!   motor command; the vendor firmware accepts any byte instead. Reports come every 20 ms, and the
 //!   link is lost after 500 ms without a valid frame.
 //! * **U11** A calibration's start and end are acknowledged at once. Its result and the robot's
-//!   request for biases at boot are repeated every 1000 ms until answered; the host keeps the
-//!   results in a [`BiasStore`] and sends those that are stored at the moment of sending.
-//! * **U12** Pong 0 means fine, 1 that the ping arrived damaged.
+//!   request for biases at boot are repeated every 1000 ms until answered. The host keeps the
+//!   results in a [`BiasStore`], and sends those stored at the moment of sending.
+//! * **U12** Pong 0 means fine; 1 means that the ping arrived damaged.
 //! * **U13** Never sent: a report by a host, a body shorter than its message, `len` above 60. Each
-//!   hangs or corrupts shipped robots, so no constructor makes one, and a frame cast from bytes
-//!   with the id or length of another is not encoded. [`Frame::relay_unchecked`] alone passes on
-//!   whatever was received.
-//! * **U14** Firmware built from the vendor's main branch hangs for ever on any frame with an id in
+//!   of these hangs or corrupts shipped robots, so no constructor makes one, and a frame cast from
+//!   bytes with the id or length of another is not encoded. Only [`Frame::relay_unchecked`] passes
+//!   on whatever was received.
+//! * **U14** Firmware built from the vendor's main branch hangs forever on any frame with an id in
 //!   5..=0x0A, the answer to its own boot request included. v6.38, which ships, does not.
 //!   [`HostConfig::low_ids_only`] is the switch for such builds. To recognise one: the first ping
 //!   after the biases is never answered.
-//! * **U15** A result, a start or end of a calibration, or a set of biases is acknowledged, and a
-//!   request repeated no more, only after it is where the application will find it: in the store,
-//!   or in an event queue that had room. Half of each queue is reserved for what happens once.
+//! * **U15** A result, a calibration's start or end, or a set of biases is acknowledged, and a
+//!   request no longer repeated, only after it is where the application will find it: in the store,
+//!   or in an event queue that had room. Half of each queue is reserved for rare events.
 //! * **U16** Motor frames are never answered, so a stop is done when it has been flushed:
 //!   [`Host::is_stop_sent`]. A frame that did not reach the line makes the motor command due again,
-//!   twice if it was cut off. The first frame of a host is a zero motor command, because a vendor
-//!   robot keeps driving while any byte arrives: a host that was restarted and only pings would
-//!   keep it moving. Hosts that only listen switch it off by [`HostConfig::sends_first_stop`].
+//!   twice if the frame was cut off. The first frame of a host is a zero motor command, because a
+//!   vendor robot keeps driving while any byte arrives: a restarted host that only pings would keep
+//!   it moving. To disable this for hosts that only listen, clear [`HostConfig::sends_first_stop`].
 //!
 //! # Layers
 //!
 //! [`Decoder`] finds frames, [`Frame::message`] reads one, [`Body::frame`] builds one. [`Host`] and
-//! [`Robot`] do the talking: who repeats what, who waits how long, what is safe.
+//! [`Robot`] do the talking: repetition, timeouts and safety.
 //!
 //! # Decoding and encoding
 //!
@@ -96,6 +97,14 @@
 //! assert_eq!((frame.index(), command.speed(), command.angular()), (7, 60, 20));
 //! # Ok::<(), axlewire::error::EncodeError>(())
 //! ```
+//!
+//! [`BiasStore`]: host::BiasStore
+//! [`HostConfig::low_ids_only`]: host::HostConfig::low_ids_only
+//! [`HostConfig::sends_first_stop`]: host::HostConfig::sends_first_stop
+//! [`OtaRequest`]: message::OtaRequest
+//! [`OtaRequest::start_firmware_update`]: message::OtaRequest::start_firmware_update
+//! [`RawMotorControl`]: message::RawMotorControl
+//! [`RawOtaRequest`]: message::RawOtaRequest
 
 mod batch;
 mod body;

@@ -13,17 +13,16 @@ use crate::error::EncodeError;
 /// `speed: i16 | angular: i16 | front_led: i16 | 10 bytes of 0`
 ///
 /// Speed and turn are -100..=100, the lamp is 100 or 0. The last ten bytes are `back_led`,
-/// `version` and the reserved fields: a `version` above 38 starts a firmware update in a shipped
-/// robot, so they are 0. No bytes can be cast to this type; a received command is a
-/// [`RawMotorControl`], and becomes one of these by `try_from`, if it is in range and starts no
-/// update.
+/// `version` and the reserved fields, all 0: a `version` above 38 starts a firmware update in a
+/// shipped robot. No bytes can be cast to this type. A received command is a [`RawMotorControl`];
+/// `try_from` converts it to this type if it is in range and starts no update.
 ///
-/// The robot stops after 500 ms without a valid command, so repeat it every 100 ms (U10).
+/// The robot stops after 500 ms without a valid command, so repeat the command every 100 ms (U10).
 ///
 /// # Steering
 ///
 /// `angular` is a steering wheel, not a yaw rate (ruling U6). The vendor's firmware drives the left
-/// wheels with `speed * (100 + 0.7 * angular) / 100` and the right ones with
+/// wheels at `speed * (100 + 0.7 * angular) / 100` and the right ones at
 /// `speed * (100 - 0.7 * angular) / 100`, both limited to 100 %:
 ///
 /// | speed, angular | left, right | the nose swings |
@@ -32,12 +31,12 @@ use crate::error::EncodeError;
 /// | -60, 50 | -81, -39 | **left** |
 /// | 0, 50 | 35, -35 | right, on the spot |
 ///
-/// So a positive `angular` is right forward and on the spot, and in reverse it is the *other* way,
-/// as with a car whose wheel is turned to the right. [`turn_right`](Self::turn_right) and
-/// [`turn_left`](Self::turn_left) turn the wheel; [`yaw_right`](Self::yaw_right) and
+/// So a positive `angular` turns the nose right when driving forward or on the spot, and the
+/// *other* way in reverse, like a car with its wheel turned right. [`turn_right`](Self::turn_right)
+/// and [`turn_left`](Self::turn_left) turn the wheel; [`yaw_right`](Self::yaw_right) and
 /// [`yaw_left`](Self::yaw_left) turn the nose, in reverse too.
 ///
-/// A speed of -5..=5 counts as none: the robot then turns on the spot if `angular` is beyond ±10.
+/// A speed of -5..=5 counts as 0: the robot then turns on the spot if `angular` is beyond ±10.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -49,7 +48,7 @@ pub struct MotorControl {
     zero: [u8; 10],
 }
 
-/// A percentage that may be beyond 100.
+/// Limits a percentage to -100..=100.
 const fn limited(percent: i32) -> i16 {
     if percent > 100 {
         100
@@ -67,24 +66,24 @@ impl Body for MotorControl {
 }
 
 impl MotorControl {
-    /// Stand still, lamp off.
+    /// Standstill, lamp off.
     pub const STOP: Self =
         Self { speed: [0; 2], angular: [0; 2], front_led: [0; 2], zero: [0; 10] };
 
     /// Largest magnitude of `speed` and `angular`.
     pub const LIMIT: i16 = 100;
 
-    /// Up to this magnitude the vendor's firmware takes a speed for none (ruling U6).
+    /// Largest magnitude of a speed that the vendor's firmware treats as 0 (ruling U6).
     pub(crate) const SPEED_DEAD_BAND: i16 = 5;
 
-    /// Value of `front_led` that means on.
+    /// Value of `front_led` for on.
     const LAMP_ON: i16 = 100;
 
-    /// Drives at `speed`, positive forward, with the wire's own `angular`; both -100..=100.
+    /// Drives at `speed`, positive forward, with the raw wire value `angular`; both -100..=100.
     ///
     /// The document says that a positive `angular` turns left; the vendor firmware and three host
     /// programs turn right (ruling U6). [`turn_right`](Self::turn_right) and
-    /// [`turn_left`](Self::turn_left) do as the firmware does.
+    /// [`turn_left`](Self::turn_left) follow the firmware.
     ///
     /// # Errors
     ///
@@ -144,8 +143,8 @@ impl MotorControl {
     /// Drives at `speed` and swings the nose right by `turn`, 0..=100, whatever the direction of
     /// travel: in reverse the steering wheel is turned left (ruling U6).
     ///
-    /// A speed of 0 turns on the spot if `turn` is above 10. Still no yaw rate: how fast the nose
-    /// swings depends on speed as well.
+    /// A speed of 0 turns on the spot if `turn` is above 10. This is still no yaw rate: how fast
+    /// the nose swings also depends on the speed.
     ///
     /// # Errors
     ///
@@ -171,7 +170,7 @@ impl MotorControl {
     ///
     /// # Errors
     ///
-    /// As [`yaw_right`](Self::yaw_right).
+    /// Same as [`yaw_right`](Self::yaw_right).
     pub const fn yaw_left(speed: i16, turn: i16) -> Result<Self, EncodeError> {
         if speed < -Self::SPEED_DEAD_BAND {
             Self::turn_right(speed, turn)
@@ -205,12 +204,12 @@ impl MotorControl {
         i16::from_le_bytes(self.front_led)
     }
 
-    /// Speeds of the left and the right wheels, -100..=100 percent, positive forward: for a robot
-    /// that is to steer as the vendor's firmware does, see [Steering](Self#steering).
+    /// Speeds of the left and right wheels, -100..=100 percent, positive forward: for a robot that
+    /// should steer like the vendor's firmware, see [Steering](Self#steering).
     ///
-    /// Both are 0 where neither speed nor `angular` is beyond its dead band; the vendor's wheels then
-    /// creep on in the direction of the command before, at up to 8 %. Between -5 and 5 `angular`
-    /// does not steer.
+    /// Both are 0 if neither speed nor `angular` is beyond its dead band; the vendor's wheels then
+    /// creep on in the direction of the previous command, at up to 8 %. From -5 to 5 `angular` does
+    /// not steer.
     ///
     /// ```
     /// use axlewire::ucp::MotorControl;
@@ -232,20 +231,20 @@ impl MotorControl {
         (limited(left), limited(right))
     }
 
-    /// Neither driving nor turning.
+    /// Whether the command is neither to drive nor to turn.
     #[must_use]
     pub const fn stands_still(&self) -> bool {
         self.speed() == 0 && self.angular() == 0
     }
 
-    /// Speed and turn 0, the lamp as it is: a stop does not make a robot harder to see.
+    /// Speed and turn 0, the lamp unchanged: a stop does not make a robot harder to see.
     pub(super) const fn halted(&self) -> Self {
         Self { front_led: self.front_led, ..Self::STOP }
     }
 }
 
-/// What a received command asks for, if it may be sent: speed, turn, and the lamp on or off as the
-/// vendor firmware reads it. All other fields become 0.
+/// Converts a received command that may be sent: speed, turn, and the lamp on or off as the vendor
+/// firmware reads it. All other fields become 0.
 ///
 /// Fails with [`EncodeError::StartsUpdate`] or [`EncodeError::Percent`] (ruling U7).
 impl TryFrom<RawMotorControl> for MotorControl {
@@ -260,15 +259,15 @@ impl TryFrom<RawMotorControl> for MotorControl {
     }
 }
 
-/// A motor command as it was received: eight fields, 16 bytes, any values.
+/// A motor command as received: eight fields, 16 bytes, any values.
 ///
 /// `speed: i16 | angular: i16 | front_led: i16 | back_led: i16 | version: u16 | reserve1: u16 |
 /// reserve2: u32`
 ///
-/// It may be out of range, and it may start a firmware update (ruling U7): ask
-/// [`starts_update`](Self::starts_update). So it cannot be framed. `MotorControl::try_from` makes a
-/// harmless command of it; [`Frame::relay_unchecked`](super::Frame::relay_unchecked) passes on the
-/// frame that it came in, byte for byte.
+/// It may be out of range, and it may start a firmware update (ruling U7): see
+/// [`starts_update`](Self::starts_update). Therefore it cannot be framed. `MotorControl::try_from`
+/// turns it into a harmless command; [`Frame::relay_unchecked`](super::Frame::relay_unchecked)
+/// passes on its frame, byte for byte.
 ///
 /// ```compile_fail
 /// use axlewire::ucp::{message::RawMotorControl, Body};
@@ -296,7 +295,7 @@ impl RawMotorControl {
     /// Newest firmware version that a command can carry without starting an update.
     const LAST_HARMLESS_VERSION: i16 = 38;
 
-    /// Speed, positive forward; -100..=100 unless the sender was careless.
+    /// Speed, positive forward; -100..=100 from a correct sender.
     #[must_use]
     pub const fn speed(&self) -> i16 {
         i16::from_le_bytes(self.speed)
@@ -314,7 +313,7 @@ impl RawMotorControl {
         i16::from_le_bytes(self.front_led)
     }
 
-    /// Does the vendor firmware light the lamp? It looks at the low byte only.
+    /// Whether the vendor firmware lights the lamp. It checks only the low byte.
     #[must_use]
     pub const fn lamp_is_on(&self) -> bool {
         !matches!(self.front_led[0], 0x00 | 0xFF)
@@ -344,7 +343,7 @@ impl RawMotorControl {
         u32::from_le_bytes(self.reserve2)
     }
 
-    /// Would this command start a firmware update in a shipped robot (ruling U7)?
+    /// Whether this command would start a firmware update in a shipped robot (ruling U7).
     #[must_use]
     pub const fn starts_update(&self) -> bool {
         i16::from_le_bytes(self.version) > Self::LAST_HARMLESS_VERSION

@@ -20,7 +20,7 @@ body! {
         version: [u8; 2]
     }
 
-    /// The report as the protocol document prints it: 34 bytes, `len` 38. No known robot sends it.
+    /// The report as printed in the protocol document: 34 bytes, `len` 38. No known robot sends it.
     ///
     /// `battery: u16 | rpm: 4 × i16 | power: u8 | voltage: u8 | current: u16 | acc: 3 × i16 |
     /// gyro: 3 × i16 | mag: 3 × i16 | heading: i16`
@@ -55,7 +55,7 @@ macro_rules! telemetry_of {
 }
 
 impl FirmwareReport {
-    /// A report of these values from a robot with firmware `version`.
+    /// Creates a report of these values from a robot with firmware `version`.
     #[must_use]
     pub fn new(telemetry: &Telemetry, version: u16) -> Self {
         Self {
@@ -72,7 +72,7 @@ impl FirmwareReport {
         }
     }
 
-    /// The values that both layouts have.
+    /// The values common to both layouts.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         telemetry_of!(self)
@@ -86,7 +86,7 @@ impl FirmwareReport {
 }
 
 impl DocumentReport {
-    /// A report of these values.
+    /// Creates a report of these values.
     #[must_use]
     pub fn new(telemetry: &Telemetry) -> Self {
         Self {
@@ -102,14 +102,14 @@ impl DocumentReport {
         }
     }
 
-    /// The values that both layouts have.
+    /// The values common to both layouts.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         telemetry_of!(self)
     }
 }
 
-/// A report of either layout, told apart by its length.
+/// A report of either layout, distinguished by its length.
 ///
 /// ```
 /// use axlewire::ucp::{message::{FirmwareReport, Report}, Telemetry};
@@ -122,14 +122,14 @@ impl DocumentReport {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Report<'a> {
-    /// What robots send.
+    /// The layout that robots send.
     Firmware(&'a FirmwareReport),
-    /// What the document says they send.
+    /// The layout in the document.
     Document(&'a DocumentReport),
 }
 
 impl Report<'_> {
-    /// The values that both layouts have.
+    /// The values common to both layouts.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         match self {
@@ -138,7 +138,7 @@ impl Report<'_> {
         }
     }
 
-    /// Version of the robot's firmware, where the layout has it.
+    /// Version of the robot's firmware, if the layout has it.
     #[must_use]
     pub const fn version(&self) -> Option<u16> {
         match self {
@@ -148,16 +148,16 @@ impl Report<'_> {
     }
 }
 
-/// The values of a report: raw integers as fields, SI units by method.
+/// The values of a report: raw integers as fields, SI units from methods.
 #[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "arbitrary", derive(arbitrary::Arbitrary))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Telemetry {
-    /// Battery, percent; more than 100 means nothing, see [`battery`](Self::battery).
+    /// Battery, percent; invalid above 100, see [`battery`](Self::battery).
     pub battery_pct: u16,
     /// Wheel speeds, rpm: front left, front right, back left, back right. The vendor firmware
-    /// measures one wheel a side, and its sign is that of the command.
+    /// measures one wheel per side, and takes its sign from the command.
     pub rpm: [i16; 4],
     /// Acceleration x, y, z; 16384 is 1 g.
     pub acc: [i16; 3],
@@ -183,7 +183,7 @@ impl Telemetry {
     /// Raw angular velocity of 1 degree per second.
     pub const GYRO_PER_DEG_PER_S: f32 = 16.4;
 
-    /// Battery, percent, or `None` where the raw value is above 100 and means nothing.
+    /// Battery, percent; `None` if the raw value is above 100, which is invalid.
     #[must_use]
     pub const fn battery(&self) -> Option<u8> {
         if self.battery_pct <= 100 { Some(self.battery_pct as u8) } else { None }

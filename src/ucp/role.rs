@@ -1,21 +1,21 @@
-//! What both roles are made of: received bytes and the frame going out.
+//! Common to both roles: frames to be sent, and the direction of a message.
 
 use super::{frame::Body, header::MAX_LEN, message::Message};
 use crate::{encode::Encode, time::Duration};
 
-/// Shortest period or timeout that a role keeps: a shorter one would make its driver spin.
+/// Shortest period or timeout of a role: a shorter one would make its driver spin.
 pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 
-/// Longest pause inside a frame that is sent: a robot of this crate gives one up soon after. Ruling U16
-/// has 20 ms.
+/// Longest pause inside a frame that is sent: a robot of this crate gives the frame up soon after.
+/// Ruling U16 allows 20 ms.
 pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(5);
 
-/// Writes a frame to the front of `buffer` and says how long it is.
+/// Encodes a frame to the front of `buffer`; returns its length.
 pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {
     body.frame(index).encode(buffer).map_or(0, <[u8]>::len)
 }
 
-/// Is this message one that only a host sends? `None` for a message of neither side (ruling U4).
+/// Whether only a host sends this message. `None` for a message of neither side (ruling U4).
 pub(super) const fn is_from_host(message: &Message<'_>) -> Option<bool> {
     Some(match message {
         Message::Ping(_)

@@ -1,4 +1,4 @@
-//! Requests to update the firmware: those that may be sent, and those that were received.
+//! Firmware update requests: those that may be sent, and those that were received.
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned, transmute};
 
@@ -7,11 +7,11 @@ use super::{
     header::MessageId,
 };
 
-/// Host to robot, **starts a firmware update** where `version: i16` is above the robot's own, 2
-/// bytes. The robot then leaves this protocol and waits for YMODEM on the same line.
+/// Host to robot, **starts a firmware update** if `version: i16` is above the robot's own, 2 bytes.
+/// The robot then leaves this protocol and waits for YMODEM on the same line.
 ///
-/// Made by [`start_firmware_update`](Self::start_firmware_update) and by nothing else (ruling U7):
-/// no bytes can be cast to this type, and a received request is a [`RawOtaRequest`].
+/// Made only by [`start_firmware_update`](Self::start_firmware_update) (ruling U7): no bytes can be
+/// cast to this type, and a received request is a [`RawOtaRequest`].
 ///
 /// ```compile_fail
 /// use axlewire::ucp::message::OtaRequest;
@@ -39,18 +39,17 @@ impl OtaRequest {
         Self { version: version.to_le_bytes() }
     }
 
-    /// The version on offer.
+    /// The version offered.
     #[must_use]
     pub const fn version(&self) -> i16 {
         i16::from_le_bytes(self.version)
     }
 }
 
-/// A request to update the firmware as it was received: `version: i16`, 2 bytes.
+/// A firmware update request as received: `version: i16`, 2 bytes.
 ///
-/// It cannot be framed, so that nothing that was received starts an update (ruling U7).
-/// [`Frame::relay_unchecked`](super::Frame::relay_unchecked) passes on the frame that it came in,
-/// byte for byte.
+/// It cannot be framed, so that nothing received starts an update (ruling U7).
+/// [`Frame::relay_unchecked`](super::Frame::relay_unchecked) passes on its frame, byte for byte.
 ///
 /// ```compile_fail
 /// use axlewire::ucp::{message::RawOtaRequest, Body};
@@ -69,7 +68,7 @@ pub struct RawOtaRequest {
 }
 
 impl RawOtaRequest {
-    /// The version on offer.
+    /// The version offered.
     #[must_use]
     pub const fn version(&self) -> i16 {
         i16::from_le_bytes(self.version)

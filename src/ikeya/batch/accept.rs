@@ -1,7 +1,7 @@
 //! Finds packets that follow each other closely, many at once.
 //!
-//! In lanes of 32 bits, as `crc16` does it on a microcontroller, since each of its steps is one for as
-//! many lanes as a register has. Plain loops over arrays: the compiler makes vector instructions of them.
+//! Works in lanes of 32 bits, like `crc16` on a microcontroller: one step handles as many lanes as
+//! a register holds. The loops are plain loops over arrays, which the compiler vectorizes.
 
 use zerocopy::{little_endian::U32, transmute_ref};
 
@@ -14,26 +14,27 @@ use crate::{
     stream::Accepted,
 };
 
-/// Words in which packets begin that are judged together; a bit in a mask for each.
+/// Number of words judged together as starts of packets; one bit in a mask for each.
 const PLACES: usize = 32;
 
 /// All even places.
 const EVEN: u32 = 0x5555_5555;
 
-/// A word more than in a block: what the last place can see.
+/// One word more than a block: the last place needs it.
 type Block = [U32; PLACES + 1];
 
-/// How long a block is, bytes.
+/// Length of a block, bytes.
 const BLOCK: usize = 4 * PLACES;
 
-/// So many packets of 8 bytes at the front are a run of their own, whatever follows.
+/// This many packets of 8 bytes at the front are a run of their own, whatever follows.
 const WORTH: usize = 3;
 
-/// The packets at the front, one behind the other.
+/// The packets at the front that directly follow each other.
 ///
-/// Packets of 8 bytes whose CRC is right: header and id are looked at when they are handed out. If there
-/// are hardly any, and registers are wide, whole and right packets of both lengths. In narrower ones those
-/// cost more than they bring, since every place may begin one.
+/// Finds packets of 8 bytes with a valid CRC; their header and id are checked when they are handed
+/// out. If there are hardly any and registers are wide, it finds complete and correct packets of
+/// both lengths. In narrower registers those cost more than they gain, since a packet may begin at
+/// every place.
 #[inline(always)]
 pub(super) fn accept_batch<const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
@@ -49,13 +50,13 @@ pub(super) fn accept_batch<const TO_SLAVE: bool, const TO_MASTER: bool>(
     Accepted { frames, len: frames * VelocityResponse::LEN }
 }
 
-/// The packets of both lengths at the front; of the even places it is known where a CRC is right.
+/// The packets of both lengths at the front; `evens` are the even places with a valid CRC.
 #[inline(always)]
 fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> Accepted {
     let right = evens | right_longs(block, 1);
     let longs = right & mask(block, starts_long::<TO_MASTER>);
     let shorts = mask(block, |word| read_mismatch(word) == 0);
-    // Whatever no packet in front of it leads to is behind damage, or inside a packet.
+    // A place that no earlier packet leads to is behind damage or inside a packet.
     let led_to = 1 | longs << 2 | shorts << 1;
     let loose = (longs | shorts) & !led_to;
     let in_front = (loose & loose.wrapping_neg()).wrapping_sub(1);
@@ -67,7 +68,7 @@ fn both_lengths<const TO_MASTER: bool>(block: &Block, evens: u32) -> Accepted {
     }
 }
 
-/// The even places, or, from 1 on, the odd ones, where 8 bytes end in their CRC.
+/// The even places (or, with `from` 1, the odd ones) whose 8 bytes end in their CRC.
 #[inline(always)]
 fn right_longs(block: &Block, from: usize) -> u32 {
     let mut found = 0;
@@ -79,7 +80,7 @@ fn right_longs(block: &Block, from: usize) -> u32 {
     found
 }
 
-/// The places whose word is one of these.
+/// The places whose word satisfies `is_one`.
 #[inline(always)]
 fn mask(block: &Block, is_one: impl Fn(u32) -> bool) -> u32 {
     let mut found = 0;
@@ -89,7 +90,7 @@ fn mask(block: &Block, is_one: impl Fn(u32) -> bool) -> u32 {
     found
 }
 
-/// Does a packet of 8 bytes start like this?
+/// Whether a packet of 8 bytes can start with this word.
 #[inline(always)]
 fn starts_long<const TO_MASTER: bool>(word: u32) -> bool {
     let is = |header| start_mismatch(word, header) == 0;
@@ -102,7 +103,7 @@ fn read_mismatch(word: u32) -> u32 {
     crc16::syndrome_4(word) | start_mismatch(word, READ)
 }
 
-/// Zero for this header and an id of 1 to 8. Not in bytes: lanes would have to be taken apart.
+/// Zero for this header with an id of 1 to 8. Not bytewise, which would take the lanes apart.
 #[inline(always)]
 fn start_mismatch(word: u32, header: u8) -> u32 {
     ((word << 16).wrapping_sub(0x0100_0000) & 0xF8FF_0000) ^ u32::from(header) << 16

@@ -1,4 +1,4 @@
-//! Packets and noise of the bus, judged many bytes at once on a host.
+//! Packets and noise of the bus, judged many bytes at a time on a host.
 
 mod accept;
 mod reject;
@@ -6,8 +6,8 @@ mod reject;
 use super::wire::{VelocityResponse, header::READ};
 use crate::stream::{Accepted, Batch, Kernel, Rejected};
 
-/// The batches of one framing: `LONG` is the length of everything but a READ, the others say which
-/// direction it finds.
+/// The batches of one framing: `LONG` is the length of everything but a READ, the others are the
+/// directions that it finds.
 #[derive(Clone, Copy, Debug)]
 pub enum PacketBatch<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool> {}
 
@@ -24,7 +24,7 @@ impl<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool> Kernel
         reject::reject_batch::<LONG, TO_SLAVE, TO_MASTER>(bytes)
     }
 
-    /// None of a three-motor bus: its captures are small.
+    /// Nothing for a three-motor bus: its captures are small.
     #[inline(always)]
     fn accept_batch(bytes: &[u8], is_wide: bool) -> Accepted {
         if LONG == VelocityResponse::LEN {
@@ -63,7 +63,7 @@ mod tests {
         check_batches::<three::BothDirections>(bytes);
     }
 
-    /// Whole packets, and what is nearly one: of a node that cannot exist, of odd parity, plainly
+    /// Valid packets, and near misses: from an impossible node, with odd parity, or plainly
     /// damaged.
     fn packet() -> impl Strategy<Value = Vec<u8>> {
         let change = select([0, 0, 0, TRINOMIAL, 0x0100].as_slice());
@@ -78,7 +78,7 @@ mod tests {
         )
     }
 
-    /// Dense headers with packets in them, thinner places, and runs of packets.
+    /// Dense headers with packets in them, sparser stretches, and runs of packets.
     fn stream() -> impl Strategy<Value = Vec<u8>> {
         let header = select(HEADERS.as_slice());
         let byte = prop_oneof![3 => header.clone(), 1 => select([0, 1, 2, 9, 0xFC].as_slice())];

@@ -1,25 +1,25 @@
-//! Refuses many bytes at once where headers stand thick.
+//! Rejects many bytes at once where header bytes are dense.
 //!
-//! One look after the other costs two or three mispredicted branches a byte there. Here all places of
-//! a block are judged together, header or not, and the processor has to foresee one thing of a block:
-//! that nothing is in it. The loops are plain ones over arrays, which a compiler for a host turns
-//! into vector instructions; on other machines nobody calls them.
+//! Judging one place after another costs two or three mispredicted branches per byte there. Here
+//! all places of a block are judged together, header or not, so there is one branch to predict per
+//! block: whether it contains a frame. The loops are plain loops over arrays, which a compiler for
+//! a host vectorizes; other machines do not call them.
 //!
 //! # What is computed
 //!
-//! As in [`crc16`](crate::crc16), a frame is a multiple of `T = x^15 + x + 1` with an even number of
-//! ones, bit 0 of a word belongs to its highest power, and multiplying by `x` is a shift to the right.
-//! The remainder modulo `T` of the bytes behind a place grows by a word at a time: times `x^16`, plus
-//! the word.
+//! As in [`crc16`](crate::crc16), a frame is a multiple of `T = x^15 + x + 1` with an even number
+//! of ones, bit 0 of a word belongs to its highest power, and multiplying by `x` is a shift to the
+//! right. The remainder modulo `T` of the bytes after a place grows by one word at a time: times
+//! `x^16`, plus the word.
 //!
-//! `x^16 = x^2 + x`: two shifts. They lose bit 0, which ought to become `x^16` and `x^17`, and bit 1,
-//! which ought to become `x^16`: together `(x^2 + x)(b0 x + b0 + b1)`. So adding `b0 x + b0 + b1` to
-//! the word beforehand makes up for it, and that is `(w << 14) + (w << 15)`.
+//! `x^16 = x^2 + x`: two shifts. They lose bit 0, which should become `x^16` and `x^17`, and bit 1,
+//! which should become `x^16`: together `(x^2 + x)(b0 x + b0 + b1)`. Adding `b0 x + b0 + b1`, that
+//! is `(w << 14) + (w << 15)`, to the word beforehand compensates for that.
 //!
 //! The initial value 0xFFFF, added to the first word, adds the same remainder to all windows of a
-//! length; each is compared with that instead of with zero. Two values of 16 bits share a remainder of
-//! 15, and they differ by `T`, which has three ones: those bits are left out of the comparison, and so is
-//! parity. What passes without being right, 1 of 8192 windows by chance, is refused by a single look.
+//! length; each is compared with that instead of with zero. Each 15-bit remainder is shared by two
+//! 16-bit values, which differ by `T`. `T` has three ones: the comparison ignores those bits, and
+//! parity. A single check rejects the false positives, by chance 1 in 8192 windows.
 
 use zerocopy::{little_endian::U16, transmute_ref};
 
@@ -36,17 +36,17 @@ use crate::{
     stream::{Reason, Rejected, Verdict},
 };
 
-/// Places that are judged together: one half of them even, one odd.
+/// Number of places judged together: half of them even, half odd.
 const PLACES: usize = 32;
 
-/// Words that begin at the places of a half, or behind the last of them in the longest packet.
+/// Words that begin at the places of a half, or after the last of them in the longest packet.
 const WORDS: usize = PLACES / 2 + three::WriteRequest::LEN / 2 - 1;
 
-/// What a block can see, bytes.
+/// Bytes that a block covers.
 const BLOCK: usize = 2 * WORDS + 1;
 
-/// How many bytes at the front start no frame. Ends in front of the first that does, or where less
-/// than a block is left.
+/// Counts the bytes at the front that start no frame. Ends before the first that does, or where
+/// less than a block is left.
 #[inline(always)]
 pub(super) fn reject_batch<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
@@ -78,7 +78,7 @@ pub(super) fn reject_batch<const LONG: usize, const TO_SLAVE: bool, const TO_MAS
     rejected
 }
 
-/// What a single look says.
+/// The verdict of a single check.
 #[inline(always)]
 fn is_rejected<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
@@ -88,7 +88,7 @@ fn is_rejected<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     matches!(verdict, Verdict::Reject { reason: Reason::Crc | Reason::Header, .. })
 }
 
-/// Finds the places where a header stands, 1 for yes; how many there are.
+/// Marks the places of headers with 1; returns their number.
 #[inline(always)]
 fn find_headers<const TO_SLAVE: bool, const TO_MASTER: bool>(
     block: &[u8; BLOCK],
@@ -109,14 +109,14 @@ fn find_headers<const TO_SLAVE: bool, const TO_MASTER: bool>(
     count
 }
 
-/// Finds the places of a half where a window as long as a packet may be a multiple of `T`, 0xFFFF
-/// for yes; all of them ORed.
+/// Marks with 0xFFFF the places of a half at which a window as long as a packet may be a multiple
+/// of `T`; returns the marks ORed together.
 #[inline(always)]
 fn find_multiples<const LONG: usize, const TO_SLAVE: bool>(
     bytes: &[u8; 2 * WORDS],
     found: &mut [u16; PLACES / 2],
 ) -> u16 {
-    const { assert!(LONG <= three::WriteRequest::LEN, "a block sees too little") }
+    const { assert!(LONG <= three::WriteRequest::LEN, "the block is too short") }
     let words: &[U16; WORDS] = transmute_ref!(bytes);
     let mut any = 0;
     for lane in 0..PLACES / 2 {
@@ -141,7 +141,7 @@ const fn flag(is_set: bool) -> u16 {
     if is_set { 0xFFFF } else { 0 }
 }
 
-/// `x^16 = x^2 + x`, for any word.
+/// Multiplies a word by `x^16 = x^2 + x`.
 #[inline(always)]
 const fn times_x16(word: u16) -> u16 {
     let word = word ^ (word << 14) ^ (word << 15);

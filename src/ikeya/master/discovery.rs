@@ -1,10 +1,10 @@
-//! Discovery: every id that is not online is asked, silent ones again.
+//! Discovery: polls every id that is not online, and silent ones again.
 
 use super::{event::MasterEvent, role::Master, turns::Discovery};
 use crate::ikeya::{board::Board, units::NodeId};
 
 impl<B: Board> Master<B> {
-    /// Begins a discovery, or joins the one that is under way.
+    /// Begins a discovery, or joins the one in progress.
     pub(super) fn begin_discovery(&mut self) {
         if self.discovery.is_some() {
             return;
@@ -16,7 +16,7 @@ impl<B: Board> Master<B> {
         self.settle_discovery();
     }
 
-    /// Moves a discovery past the ids that need not be asked, and ends it after the last.
+    /// Advances the discovery past ids that need no request, and ends it after the last.
     pub(super) fn settle_discovery(&mut self) {
         let Some(mut discovery) = self.discovery else { return };
         while discovery.pass() < self.config.attempts.max(1).into() {

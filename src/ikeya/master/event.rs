@@ -1,4 +1,4 @@
-//! Events of a master, and its refusals.
+//! Events and command errors of a master.
 
 use core::fmt;
 
@@ -8,100 +8,102 @@ use crate::ikeya::{
     units::{Mode, NodeId},
 };
 
-/// What the master tells its application.
+/// An event of a master.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MasterEvent<B: Board = OneMotor> {
     /// A node has answered for the first time.
     Discovered {
-        /// Which.
+        /// The node.
         node: NodeId,
         /// Its mode.
         mode: Mode,
     },
-    /// Every id has been asked.
+    /// Every id has been polled: the discovery is over.
     DiscoveryDone {
-        /// How many nodes are online now.
+        /// Number of online nodes.
         online: u8,
     },
     /// A node has answered.
     Status {
-        /// Which.
+        /// The node.
         node: NodeId,
-        /// What it measures.
+        /// Its status.
         status: Status<B>,
     },
-    /// A READ was given up.
+    /// A READ was given up after its last attempt.
     ReadFailed {
-        /// Which node did not answer.
+        /// The node that did not answer.
         node: NodeId,
-        /// What was heard instead, the last time.
+        /// What was heard instead on the last attempt.
         cause: Cause,
     },
     /// A node's health has changed.
     Health {
-        /// Which.
+        /// The node.
         node: NodeId,
-        /// To what.
+        /// Its new health.
         health: Health,
     },
-    /// A node has answered twice in another mode than before; its set-point is dropped (I11).
+    /// A node has answered twice in a mode other than the one on record; its set-point is dropped
+    /// (I11).
     ModeChanged {
-        /// Which.
+        /// The node.
         node: NodeId,
         /// The new mode.
         mode: Mode,
     },
-    /// The mode of a node is in doubt, and six exchanges have not decided it (I11). It is read at the
-    /// pace of the search from now on.
+    /// The mode of a node is still in doubt after six exchanges (I11). It is read at the search
+    /// rate from now on.
     ModeInDoubt {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// The same of a node that is owed a stop: it cannot be written before the mode is known. **The
-    /// motor may be running.**
+    /// Like [`ModeInDoubt`](Self::ModeInDoubt), but for a node that is owed a stop: nothing is
+    /// written before the mode is known. **The motor may be running.**
     StopBlocked {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// A stop is paid: two stop WRITEs have each been followed by an answer of the node (I12). The
-    /// motor may still be running out.
+    /// A stop is paid, that is, confirmed twice: two stop WRITEs have each been followed by an
+    /// answer from the node (I12). The motor may still be slowing down.
     Stopped {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// A node whose stop is paid was measured standing still: below 0.05 rps, or within 8 counts in
-    /// 20 ms or more (I12).
+    /// A node was found standing still after its stop was paid: below 0.05 rps, or within 8 counts
+    /// over at least 20 ms (I12).
     StandingStill {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// The application has given no sign of life for [`MasterConfig::dead_man`](super::MasterConfig::dead_man):
-    /// every node under a set-point is owed a stop (I13).
+    /// The application has shown no sign of life for
+    /// [`MasterConfig::dead_man`](super::MasterConfig::dead_man): every node under a set-point is
+    /// owed a stop (I13).
     DeadMan,
     /// A node has answered a READ that followed the WRITE to be confirmed.
     Confirmed {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// The READ that was to confirm a WRITE failed, or the set-point was dropped before.
+    /// The READ that should confirm a WRITE failed, or the set-point was dropped first.
     NotConfirmed {
-        /// Which node.
+        /// The node.
         node: NodeId,
         /// What was heard instead.
         cause: Cause,
     },
 }
 
-/// Why there is no answer, or no confirmation.
+/// Reason for a missing answer or confirmation.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Cause {
     /// Nothing was heard.
     Silent,
-    /// Bytes were heard, but no packet: damaged, or noise.
+    /// Bytes were heard, but no valid packet: damage or noise.
     Damaged,
     /// Only other nodes were heard, or the node in another mode.
     Unexpected,
@@ -109,36 +111,36 @@ pub enum Cause {
     Dropped,
 }
 
-/// Why a command is refused.
+/// Reason for refusing a command.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CommandError {
     /// The node has not been discovered, or is abnormal.
     NotOnline {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
     /// The node is in the other mode (ruling I3).
     WrongMode {
-        /// Which.
+        /// The node.
         node: NodeId,
-        /// The mode it is in.
+        /// The mode that it is in.
         mode: Mode,
     },
-    /// An answer has put the node's mode in doubt (ruling I11). Try again after the next one.
+    /// An answer has put the node's mode in doubt (ruling I11). Try again after the next answer.
     ModeInDoubt {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
     /// The node is owed a stop (ruling I12). Wait for [`MasterEvent::Stopped`].
     StopOwed {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
-    /// The node has no set-point that could be confirmed.
+    /// The node has no set-point to confirm.
     NoSetPoint {
-        /// Which.
+        /// The node.
         node: NodeId,
     },
 }

@@ -1,6 +1,6 @@
 //! The master's side of the bus: settings, events, node health and statistics.
 //!
-//! [`Master`](super::Master) is the role. It is in the files of this module, one concept each:
+//! [`Master`] is the role. Its code is in the files of this module, one concept each:
 //!
 //! | file | what it decides |
 //! |---|---|
@@ -9,10 +9,10 @@
 //! | `window`, `replies` | which replies are accepted, and what they do (I7) |
 //! | `echo` | which received bytes are the master's own |
 //! | `strikes`, `health` | when a node is abnormal, and how it is searched for (I7) |
-//! | `discovery` | which ids are asked for the first time |
+//! | `discovery` | which ids are polled for the first time |
 //! | `mode` | whether a node has changed its mode (I11) |
-//! | `stop`, `set_point` | what a node is owed and told (I12) |
-//! | `view` | what an application can ask |
+//! | `stop`, `set_point` | what a node is owed, and what it has been told (I12) |
+//! | `view` | what an application can query |
 
 mod config;
 mod discovery;

@@ -1,4 +1,4 @@
-//! Modes: what an answer in another mode does, and who decides (I11).
+//! Modes: the effect of an answer in another mode (I11).
 
 use super::{
     event::{Cause, MasterEvent},
@@ -18,18 +18,18 @@ use crate::{
 /// What an answer says about the mode.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Decision {
-    /// It is the mode on record, or the first one heard.
+    /// The mode on record, or the first one heard.
     Agreed,
-    /// It is the mode on record, which was in doubt until now.
+    /// The mode on record, which was in doubt until now.
     Settled,
-    /// It is the other one for the first time: nothing is decided.
+    /// The other mode for the first time: nothing is decided.
     Doubtful,
-    /// It is the other one again.
+    /// The other mode again.
     Changed,
 }
 
 impl<B: Board> Node<B> {
-    /// Takes in the mode of an answer in its window.
+    /// Records the mode of an answer in its window.
     pub(super) fn decide(&mut self, mode: Mode) -> Decision {
         let decision = match (self.mode, self.doubt) {
             (Some(known), None) if known != mode => Decision::Doubtful,
@@ -43,8 +43,8 @@ impl<B: Board> Node<B> {
         decision
     }
 
-    /// Puts the mode in doubt. A position that was held is to be measured anew. Says whether that
-    /// ends a confirmation.
+    /// Puts the mode in doubt; a held position must be measured again. Returns whether that ends a
+    /// confirmation.
     fn doubt_mode(&mut self) -> bool {
         count_apart(&mut self.statistics.other_mode);
         if self.doubt.is_some() {
@@ -78,14 +78,14 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// An answer outside its window can put the mode in doubt, and decides nothing.
+    /// Handles an answer outside its window: it can put the mode in doubt, but decides nothing.
     pub(super) fn hear_mode_outside_window(&mut self, id: NodeId, mode: Mode) {
         if self.node(id).mode.is_some_and(|known| known != mode) {
             self.doubt_mode(id);
         }
     }
 
-    /// An answer in its window has put the mode in doubt.
+    /// Handles an answer in its window that has put the mode in doubt.
     pub(super) fn hear_doubtful(&mut self, id: NodeId, status: &Status<B>) {
         self.doubt_mode(id);
         let now = self.now;
@@ -94,7 +94,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// An exchange with a node in doubt has decided nothing.
+    /// Counts an exchange with a node in doubt that has decided nothing.
     pub(super) fn count_doubtful_exchange(&mut self, id: NodeId) {
         let node = self.node_mut(id);
         let Some(exchanges) = &mut node.doubt else { return };
@@ -105,7 +105,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// Says that the mode stays in doubt.
+    /// Reports that the mode stays in doubt.
     pub(super) fn tell_undecided(&mut self, node: NodeId) {
         let event = match self.node(node).stop {
             Some(_) => MasterEvent::StopBlocked { node },
@@ -114,15 +114,15 @@ impl<B: Board> Master<B> {
         self.tell(event);
     }
 
-    /// The doubt is over. What was measured in it no longer counts, and if the mode has changed,
-    /// what the node was told was meant for the old one.
+    /// Ends the doubt. Anything measured during it no longer counts, and if the mode has changed,
+    /// the node's command was meant for the old one.
     pub(super) fn end_doubt(&mut self, id: NodeId, mode: Mode, decision: Decision) {
         let node = self.node_mut(id);
         if let Some(stop) = &mut node.stop {
             stop.restart();
         }
         if decision == Decision::Changed {
-            // The last WRITE may have been read in the new mode: 0 rps are "go to 0" there.
+            // The last WRITE may have been read in the new mode, where 0 rps means "go to 0".
             let was_commanded = node.is_commanded();
             node.standstill = Standstill::Unwatched;
             self.drop_set_point(id);

@@ -1,4 +1,4 @@
-//! Everything that a master keeps of one node.
+//! Everything a master keeps about one node.
 
 use super::{
     config::{MasterConfig, Polling},
@@ -18,11 +18,11 @@ use crate::{
     time::Instant,
 };
 
-/// Exchanges without a decision after which the application is told that a mode stays in doubt
-/// (I11). The node has been abnormal since the third, and is read at the pace of the search.
+/// Number of exchanges without a decision after which the application is told that a mode stays in
+/// doubt (I11). The node has been abnormal since the third, and is read at the search rate.
 pub(super) const DOUBT_EXCHANGES: u8 = 6;
 
-// Flags in front: there they take short instructions.
+// Flags first: short instructions can reach them there.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(super) struct Node<B: Board> {
@@ -30,28 +30,29 @@ pub(super) struct Node<B: Board> {
     pub(super) health: Option<Health>,
     /// The mode on record.
     pub(super) mode: Option<Mode>,
-    /// The mode is in doubt: exchanges since then that decided nothing.
+    /// While the mode is in doubt: number of exchanges since then that decided nothing.
     pub(super) doubt: Option<u8>,
-    /// The latest order, sent or not, is a set-point: not a stop, and not none at all.
+    /// Whether the latest command, sent or not, is a set-point: neither a stop nor none at all.
     pub(super) is_under_order: bool,
-    /// It has had a WRITE since it was asked last: it is read before its set-point is repeated.
+    /// Whether it has had a WRITE since it was last asked: it is read before its set-point is
+    /// repeated.
     pub(super) is_written: bool,
     pub(super) confirm: Confirm,
-    /// Windows in a row that closed without its answer.
+    /// Number of consecutive windows that closed without its answer.
     pub(super) strikes: u8,
-    /// Failed attempts of the READ under way.
+    /// Failed attempts of the READ in progress.
     pub(super) attempt: u8,
-    /// The application, or a doubt, asks for a READ.
+    /// Whether the application, or a mode in doubt, asks for a READ.
     pub(super) is_asked: bool,
-    /// Requests in the discovery under way.
+    /// Number of requests in the discovery in progress.
     pub(super) scans: u8,
-    /// What the latest READ has come to.
+    /// Outcome of the latest READ.
     pub(super) read_outcome: Option<Result<(), Cause>>,
     pub(super) stop: Option<Stop<B>>,
     pub(super) set_point: Option<SetPoint<B>>,
-    /// Not to be asked before then: a late answer may be on its way.
+    /// Time before which it is not polled: a late answer may be on its way.
     pub(super) guarded_until: Option<Instant>,
-    /// When the next READ is due; only set with [`Polling::Every`].
+    /// Time of the next READ; only set with [`Polling::Every`].
     pub(super) read_due: Option<Instant>,
     pub(super) standstill: Standstill<B>,
     pub(super) status: Option<(Status<B>, Instant)>,
@@ -90,7 +91,7 @@ impl<B: Board> Node<B> {
         self.health == Some(Health::Abnormal)
     }
 
-    /// It has been told something, a stop that is paid included, or is to be.
+    /// Whether it has been given a command, a paid stop included, or will be.
     pub(super) fn is_commanded(&self) -> bool {
         self.set_point.is_some() || self.is_under_order
     }
@@ -106,8 +107,8 @@ impl<B: Board> Node<B> {
 
     /// Takes a new set-point; the latest wins.
     ///
-    /// Refused, and not kept, unless the node is online, is owed no stop, and is in that mode
-    /// without a doubt.
+    /// Refused, and not kept, unless the node is online, is owed no stop, and is certain to be in
+    /// that mode.
     pub(super) fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
         self.check(node, &target)?;
         self.set_point = Some(SetPoint::new(target));
@@ -130,15 +131,15 @@ impl<B: Board> Node<B> {
         Ok(())
     }
 
-    /// Drops the set-point; says whether the application waits for its confirmation.
+    /// Drops the set-point; returns whether the application is waiting for its confirmation.
     pub(super) fn drop_set_point(&mut self) -> bool {
         self.set_point = None;
         core::mem::replace(&mut self.confirm, Confirm::Unasked) != Confirm::Unasked
     }
 
-    /// The stop WRITE to be sent next, if it may be.
+    /// The stop WRITE to be sent next, if one may be sent.
     ///
-    /// In doubt about the mode, only a position that means standstill to a velocity node (I11).
+    /// While the mode is in doubt: only a position that means standstill to a velocity node (I11).
     pub(super) fn stop_write(&self) -> Option<Target<B>> {
         let stop = self.stop.as_ref().filter(|stop| !stop.is_written)?;
         let hold = stop.hold.map(Target::Position);
@@ -149,12 +150,12 @@ impl<B: Board> Node<B> {
         }
     }
 
-    /// Whether it is due a request for this reason now.
+    /// Whether a request for this reason is due now.
     pub(super) fn is_due(&self, reason: Reason, config: &MasterConfig, now: Instant) -> bool {
         self.wants(reason, config) && self.earliest(reason).is_none_or(|at| now >= at)
     }
 
-    /// Whether it is to be sent a request for this reason, at once or later.
+    /// Whether a request for this reason is to be sent, now or later.
     #[inline(never)]
     pub(super) fn wants(&self, reason: Reason, config: &MasterConfig) -> bool {
         let is_online = self.is_online();
@@ -183,11 +184,11 @@ impl<B: Board> Node<B> {
         }
     }
 
-    /// No request for this reason before then.
+    /// Earliest time of a request for this reason.
     #[inline(never)]
     pub(super) fn earliest(&self, reason: Reason) -> Option<Instant> {
         match reason {
-            // A WRITE that is answered waits, like a READ, for a late answer to be over.
+            // An answered WRITE waits, like a READ, until no late answer can arrive.
             Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::SetPoint
                 if !B::ANSWERS_WRITE =>
             {
@@ -198,25 +199,25 @@ impl<B: Board> Node<B> {
         }
     }
 
-    /// Whether it is owed a stop, and has not had the attempts that are made at once while it is not
-    /// online: one, or those of a READ where nothing has ever been heard of it.
+    /// Whether it is owed a stop and has attempts left of those made at once while it is not
+    /// online: one, or those of a READ if the node has never been heard.
     fn awaits_lost_stop(&self, config: &MasterConfig) -> bool {
         let limit = if self.health.is_none() { config.attempts.max(1) } else { 1 };
         self.stop.as_ref().is_some_and(|stop| stop.lost_attempts < limit)
     }
 
-    /// Whether it has turns in the cycle: to be read, or its set-point repeated.
+    /// Whether it takes part in the cycle: to be read, or to have its set-point repeated.
     fn is_in_cycle(&self, config: &MasterConfig) -> bool {
         let is_polled = self.is_wanted() || config.polling != Polling::Manual;
         is_polled && self.stop.is_none() && self.doubt.is_none()
     }
 
-    /// Whether it is to be read whatever the polling is.
+    /// Whether it is to be read regardless of the polling.
     fn is_wanted(&self) -> bool {
         self.attempt > 0 || self.is_asked || self.confirm != Confirm::Unasked
     }
 
-    /// A request that it is to answer has been sent.
+    /// Records that a request that expects an answer has been sent.
     #[inline(never)]
     pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
         count_apart(&mut self.statistics.requests);

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::ikeya::units::NodeId;
 
-/// A set of node ids, one bit each.
+/// A set of node ids, as one bit each.
 ///
 /// ```
 /// use axlewire::ikeya::{master::NodeSet, NodeId};
@@ -25,7 +25,7 @@ impl NodeSet {
     /// No node.
     pub const NONE: Self = Self { bits: 0 };
 
-    /// All eight.
+    /// All eight nodes.
     pub const ALL: Self = Self { bits: 0xFF };
 
     /// Adds a node.
@@ -33,12 +33,12 @@ impl NodeSet {
         self.bits |= bit(node);
     }
 
-    /// Takes a node out.
+    /// Removes a node.
     pub const fn remove(&mut self, node: NodeId) {
         self.bits &= !bit(node);
     }
 
-    /// Is the node in it?
+    /// Whether the set contains the node.
     #[must_use]
     pub const fn contains(self, node: NodeId) -> bool {
         self.bits & bit(node) != 0
@@ -50,13 +50,13 @@ impl NodeSet {
         self.bits.count_ones() as usize
     }
 
-    /// Is no node in it?
+    /// Whether the set is empty.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.bits == 0
     }
 
-    /// The nodes of this set that are in the other one as well.
+    /// The nodes that are in both sets.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self { bits: self.bits & other.bits }

@@ -1,21 +1,20 @@
-//! The queue: who is next (I13).
+//! The queue: which request goes next (I13).
 //!
-//! A request is silent, or it is an *exchange*: one that is answered. Stops, reads about a mode in
-//! doubt and new set-points are urgent. Each node has one urgent exchange for a stop and one new
-//! set-point in a round; a round ends with one regular exchange, if one is due: of the search for
-//! abnormal nodes, of a discovery, or of the cycle. The search is not due twice in a row, unless
-//! nothing else is. Reading a position and holding it is one turn: the WRITE goes right behind the
-//! answer, also where it is an exchange of its own (three motors). So no node can keep the others
-//! waiting:
+//! A request is either silent or an *exchange*, which is answered. Stops, reads about a mode in
+//! doubt and new set-points are urgent. In each round a node has one urgent exchange for a stop and
+//! one new set-point. A round ends with one regular exchange, if one is due: for the search for
+//! abnormal nodes, a discovery, or the cycle. The search is not due twice in a row unless nothing
+//! else is. Reading a position and holding it is one turn: the WRITE directly follows the answer,
+//! even where it is an exchange of its own (three motors). So no node can starve the others:
 //!
-//! * a stop of an online velocity node is sent right after the exchange under way and at most seven
-//!   other stop WRITEs; one of a position node is read after at most 16 exchanges more, with three
-//!   motors 24, and written next;
+//! * a stop of an online velocity node is sent right after the exchange in progress and at most
+//!   seven other stop WRITEs; a stop of a position node is read after at most 16 more exchanges,
+//!   with three motors 24, and written next;
 //! * a new set-point waits for at most 16 exchanges and 14 other WRITEs, with three motors for 24
-//!   exchanges, a stop not counted;
-//! * a node in the cycle waits for at most 8 rounds of 17 exchanges, with three motors 25, for as many
-//!   rounds of the search, and for two discoveries;
-//! * the search waits for one round, also while a discovery goes on.
+//!   exchanges, not counting a stop;
+//! * a node in the cycle waits for at most 8 rounds of 17 exchanges, with three motors 25, for as
+//!   many rounds of the search, and for two discoveries;
+//! * the search waits for one round, even during a discovery.
 
 use super::{
     node::Node,
@@ -36,7 +35,7 @@ use crate::{
 };
 
 impl<B: Board> Master<B> {
-    /// When the next request is due, wherever the line may be.
+    /// Time at which the next request is due, regardless of the line.
     pub(super) fn due(&self) -> Option<Instant> {
         let mut earliest: Option<Instant> = None;
         for (index, node) in self.nodes.iter().enumerate() {
@@ -60,15 +59,15 @@ impl<B: Board> Master<B> {
         earliest
     }
 
-    /// What to send now, if anything, the line aside.
+    /// Chooses the request to send now, if any, regardless of the line.
     fn choose(&self, now: Instant) -> Option<Choice<B>> {
         self.urgent(now, Round::Same)
             .or_else(|| self.regular(now))
-            // With nothing regular to do, the next round begins at once.
+            // With no regular request due, the next round begins at once.
             .or_else(|| self.urgent(now, Round::Next))
     }
 
-    /// Stops, reads about a mode in doubt, new set-points.
+    /// The next urgent request: for a stop, a mode in doubt or a new set-point.
     fn urgent(&self, now: Instant, round: Round) -> Option<Choice<B>> {
         Reason::ALL[..6].iter().find_map(|&reason| {
             let last = if reason.is_stop() { self.turns.stop } else { self.turns.set_point };
@@ -76,7 +75,7 @@ impl<B: Board> Master<B> {
         })
     }
 
-    /// The next request that is not urgent; it ends the round.
+    /// The next regular request; it ends the round.
     fn regular(&self, now: Instant) -> Option<Choice<B>> {
         let sought = self.sought(now);
         if sought.is_some() && !self.turns.was_search {
@@ -85,7 +84,7 @@ impl<B: Board> Master<B> {
         self.discovery_or_cycle(now).or(sought)
     }
 
-    /// The next request of the search, at its pace.
+    /// The next request of the search, at the search rate.
     fn sought(&self, now: Instant) -> Option<Choice<B>> {
         let is_time = self.search.next_at.is_none_or(|at| now >= at);
         let first = self.search.last + 1;
@@ -106,7 +105,7 @@ impl<B: Board> Master<B> {
         is_due.then(|| Choice { index, request: node.request(reason), reason, round })
     }
 
-    /// The request for the first node, from this index on, that is due one for this reason.
+    /// The request for the first node, starting at index `first`, for which this reason is due.
     fn next_for(
         &self,
         reason: Reason,
@@ -137,7 +136,7 @@ impl<B: Board> Master<B> {
             }
         }
         let choice = self.choose(now)?;
-        // On the heels of a WRITE only what does not add up: a READ, or one stop for each node.
+        // Right behind a WRITE, send only what cannot pile up: a READ, or one stop per node.
         let is_set_point = !matches!(choice.request, Request::Read) && !choice.reason.is_stop();
         if !is_free && is_set_point {
             return None;
@@ -160,7 +159,7 @@ impl<B: Board> Master<B> {
         Some(packet)
     }
 
-    /// Puts the request into the buffer that is handed out, and says how long it is.
+    /// Encodes the request into the buffer that is handed out; returns its length.
     fn encode(&mut self, choice: &Choice<B>) -> Option<usize> {
         let id = NodeId::ALL[choice.index & 7];
         let buffer = &mut self.packet;
@@ -172,10 +171,10 @@ impl<B: Board> Master<B> {
         bytes.ok().map(|bytes| bytes.len().min(PACKET_LEN))
     }
 
-    /// Notes what has been handed out, and whose turn is next.
+    /// Records what has been handed out, and advances the turns.
     fn book(&mut self, choice: &Choice<B>, now: Instant) {
         let Choice { index, request, reason, round } = *choice;
-        // A silent WRITE of the cycle is followed by its READ, and only that ends the round.
+        // A silent WRITE of the cycle is followed by its READ; only the READ ends the round.
         if round == Round::Next && request.is_exchange() {
             (self.turns.had_stop, self.turns.had_set_point) = (0, 0);
             self.turns.was_search = reason == Reason::Search;
@@ -195,7 +194,7 @@ impl<B: Board> Master<B> {
                 self.turns.set_point = index;
                 self.turns.had_set_point |= 1 << index;
             }
-            // The node is still to be read.
+            // The node has yet to be read.
             _ if !is_exchange => {}
             Reason::Discovery => {}
             Reason::Search => self.searched(index, now),
@@ -210,7 +209,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// Is the packet that was handed out last a WRITE of a set-point that the node no longer has?
+    /// Whether the packet handed out last is a WRITE of a set-point that the node no longer has.
     pub(super) fn has_sent_old_set_point(&self) -> bool {
         let Some(Sent { choice, .. }) = &self.sent else { return false };
         match (choice.reason, choice.request) {
@@ -222,12 +221,12 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// The packet that was handed out last has not left: what it was for is to be sent again, or
-    /// what has come in its place.
+    /// The packet handed out last has not left: its request, or the one that has replaced it, is to
+    /// be sent again.
     pub(super) fn take_back(&mut self, unsent: Unsent, now: Instant) {
         if unsent == Unsent::Unflushed {
-            // Which of the latest WRITEs have left is not known: once more for all, and an answer
-            // that comes now pays for none of them.
+            // It is unknown which of the latest WRITEs have left: send all of them again, and do
+            // not count an answer that comes now for any of them.
             self.nodes.iter_mut().for_each(Node::take_back_write);
             return;
         }
@@ -238,8 +237,9 @@ impl<B: Board> Master<B> {
             self.line_free = Some(start);
             self.echo.forget_last();
         } else {
-            // What the port has taken may still be on its way. Behind it twice the pause that ends a
-            // packet: a slave must not take the next one for the rest.
+            // Bytes that the port has taken may still be on their way. Leave twice the pause that
+            // ends a packet after them: a slave must not take the next packet for the rest of this
+            // one.
             let end = start.max(now) + self.wire_time(len);
             let silence = self.frame_pause().saturating_mul(2);
             self.line_free = Some(end + self.config.turnaround_gap + silence);
@@ -266,8 +266,8 @@ impl<B: Board> Master<B> {
 }
 
 impl<B: Board> Node<B> {
-    /// What it is sent. A node that is not online gets its stop blind, then a READ; in the cycle its
-    /// set-point, then a READ.
+    /// The node's request for this reason. A node that is not online gets its stop blind, then a
+    /// READ; in the cycle a node gets its set-point, then a READ.
     fn request(&self, reason: Reason) -> Request<B> {
         let target = match reason {
             Reason::StopRead | Reason::Discovery => None,
@@ -278,7 +278,7 @@ impl<B: Board> Node<B> {
         target.map_or(Request::Read, Request::Write)
     }
 
-    /// Its stop or its set-point has been handed out.
+    /// Records that its stop or its set-point has been handed out.
     fn wrote(&mut self) {
         self.is_written = true;
         if let Some(stop) = &mut self.stop {

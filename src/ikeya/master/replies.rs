@@ -1,4 +1,4 @@
-//! Replies: which of them are accepted, and what an accepted one does (I7).
+//! Replies: which ones are accepted, and their effects (I7).
 
 use super::{
     event::MasterEvent,
@@ -21,17 +21,17 @@ use crate::{
 };
 
 impl<B: Board> Master<B> {
-    /// From handing out a READ to the end of its window.
+    /// Time from handing out a READ to the end of its window.
     pub(super) fn window_time(&self) -> Duration {
         wire_time(ReadRequest::LEN, self.config.baud) + self.answer_time()
     }
 
-    /// From the end of a request to the end of its window.
+    /// Time from the end of a request to the end of its window.
     fn answer_time(&self) -> Duration {
         self.config.reply_timeout + self.answer_wire_time
     }
 
-    /// Opens the window of a request, and drops the bytes that were received before it.
+    /// Opens the window of a request, and drops the bytes received before it.
     pub(super) fn open_window(&mut self, node: NodeId, request_end: Instant) {
         let stale = self.decoder.pending();
         add(&mut self.statistics.stale_bytes, stale as u32);
@@ -47,7 +47,7 @@ impl<B: Board> Master<B> {
         self.window = Some(Window { node, request_end, deadline, heard: Heard::Nothing });
     }
 
-    /// The next whole response in the input.
+    /// The next complete response in the input.
     pub(super) fn next_response(&mut self, bytes: &mut &[u8]) -> Option<(NodeId, Status<B>)> {
         loop {
             match self.decoder.decode_buffered(bytes)? {
@@ -57,14 +57,14 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// A node has spoken. Whether that is an answer is decided here and nowhere else.
+    /// Handles a response. Only here is it decided whether it is an answer.
     pub(super) fn hear(&mut self, id: NodeId, status: Status<B>, now: Instant) {
         let half_answer = Duration::from_micros(self.answer_wire_time.as_micros() / 2);
         let accepts_early = self.config.accepts_early;
         let statistics = &mut self.nodes[index_of(id)].statistics;
         match &mut self.window {
             Some(window) if window.node == id && now <= window.deadline => {
-                // No line is that fast, even if the clock is a little coarse.
+                // No line is that fast, even allowing for a slightly coarse clock.
                 if now < window.request_end + half_answer && !accepts_early {
                     window.heard = Heard::Others;
                     count_apart(&mut statistics.early);
@@ -86,7 +86,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// An answer in its window.
+    /// Handles an answer in its window.
     fn hear_answer(&mut self, id: NodeId, status: Status<B>, request_end: Instant, now: Instant) {
         let latency = now - (request_end + self.answer_wire_time);
         let mode = status.mode();
@@ -117,7 +117,8 @@ impl<B: Board> Master<B> {
         self.pay_stop(id, status, now);
     }
 
-    /// A good answer in the node's mode measures and pays a stop, and shows a standstill.
+    /// Handles a good answer in the node's mode: it may measure or pay a stop, or show a
+    /// standstill.
     fn pay_stop(&mut self, id: NodeId, status: Status<B>, now: Instant) {
         let node = self.node_mut(id);
         if let Some(stop) = &mut node.stop {
@@ -125,7 +126,7 @@ impl<B: Board> Master<B> {
             if !stop.pay() {
                 return;
             }
-            // A position stop is not written before there is a position to hold.
+            // A position stop is not written until there is a position to hold.
             let target = match (status, stop.hold) {
                 (Status::Position(_), Some(hold)) => Target::Position(hold),
                 _ => Target::STANDSTILL,
@@ -140,7 +141,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// Closes the window that has passed without its answer.
+    /// Closes a window that has passed without its answer.
     pub(super) fn expire_window(&mut self, now: Instant) {
         if let Some(window) = self.window.filter(|window| now >= window.deadline) {
             self.window = None;

@@ -23,55 +23,56 @@ use crate::{
     time::{Duration, Instant, reached, wire_time},
 };
 
-/// Events that wait for the application at the most.
+/// Capacity of the event queue.
 const EVENTS: usize = 16;
 
-/// The master: discovers nodes, repeats the latest set-points, reads every node in turn, pays the
-/// stops that it owes, and accepts only genuine replies.
+/// The master: discovers nodes, repeats the latest set-points, reads every node in turn, sends
+/// stops until they are confirmed, and accepts only genuine replies.
 ///
-/// It has no clock and no port; see [`Endpoint`] for what to call when. A cycle visits every node
-/// that is online: a WRITE if it has a set-point, then a READ (I8). With
-/// [`ThreeMotors`](super::ThreeMotors) the WRITE is answered and is the READ as well (I10).
+/// It has no clock and no port; see [`Endpoint`] for what to call when. A cycle visits every online
+/// node: a WRITE if it has a set-point, then a READ (I8). With
+/// [`ThreeMotors`](crate::ikeya::board::ThreeMotors) the WRITE is answered, so it also serves as
+/// the READ (I10).
 ///
 /// # Stops
 ///
-/// A stop is a debt (I12). From the call of [`stop`](Self::stop) on the set-point is gone, new ones
-/// are refused, and the stop is written and repeated until two of its WRITEs have each been
-/// followed by an answer of the node, whatever happens on the line, in the port or in the event
-/// queue. Then comes [`MasterEvent::Stopped`], and [`MasterEvent::StandingStill`] once the node was
-/// measured to be so.
+/// A stop is a debt (I12). As soon as [`stop`](Self::stop) is called, the set-point is gone and new
+/// ones are refused. The stop is repeated until it is paid: two of its WRITEs have each been
+/// followed by an answer from the node, whatever happens on the line, in the port or in the event
+/// queue. [`MasterEvent::Stopped`] reports that, and [`MasterEvent::StandingStill`] follows once a
+/// measurement shows a standstill.
 ///
 /// * A velocity node is told 0 rps.
-/// * A position node is read, and told to hold the position of that answer (I6). It may return by as
-///   much as it ran on since the measurement: the speed times the time from the answer to the
-///   WRITE, which is sent next, so some 0.2 ms on a line of its own. Behind a USB adapter that holds
-///   answers back, that time is added.
-/// * An abnormal node gets an attempt at once and then one at the pace of the search, a velocity node
-///   blindly.
-/// * A node that becomes abnormal under a set-point is owed a stop, and so is every node under one
-///   after [`MasterConfig::dead_man`].
+/// * A position node is read, and told to hold the position of that answer (I6). It may move back
+///   by the distance it has run since the measurement: the speed times the time from the answer to
+///   the WRITE. The WRITE is sent next, so that time is about 0.2 ms on a dedicated line. A USB
+///   adapter that delays answers adds its delay.
+/// * An abnormal node gets one attempt at once and further attempts at the search rate, blind for a
+///   velocity node.
+/// * A node that becomes abnormal while under a set-point is owed a stop; so is every node under a
+///   set-point after [`MasterConfig::dead_man`].
 ///
 /// # Answers
 ///
-/// A READ opens a window that ends [`MasterConfig::reply_timeout`] plus the answer's wire time after
-/// the request has left the line (I7). What is heard outside, or from another node, is counted and
-/// dropped. A node that did not answer is not asked again for [`MasterConfig::late_guard`], so that a
-/// late answer meets a closed window. An answer later than that cannot be told from the next one:
-/// the protocol has no numbers.
+/// A READ opens a window that ends [`MasterConfig::reply_timeout`] plus the answer's wire time
+/// after the request has left the line (I7). Packets outside the window or from another node are
+/// counted and dropped. A node that did not answer is not polled again for
+/// [`MasterConfig::late_guard`], so that a late answer meets a closed window. An answer later than
+/// that cannot be told from the next one: the protocol has no sequence numbers.
 ///
 /// # Modes
 ///
-/// An answer in another mode than the one on record, even a late one, puts the mode in doubt (I11).
-/// The node is read again at once, and the next answer decides; if the mode has changed, that ends
-/// the set-point, and the node is owed a stop if it had any order: a WRITE that was on its way has
-/// been read in the new mode. While in doubt the node gets no WRITE, with one exception: a stop may write a
-/// position that a velocity node would read as standstill. A switch moved while a command is on
-/// its way cannot be detected: move it on a machine that is not moving.
+/// An answer in a mode other than the one on record, even a late one, puts the mode in doubt (I11).
+/// The node is read again at once, and the next answer decides. A change of mode ends the
+/// set-point, and the node is owed a stop if it had any command, since a WRITE in flight is
+/// read in the new mode. While in doubt the node gets no WRITE, with one exception: a stop may
+/// write a position that a velocity node would read as standstill. A switch moved while a command
+/// is in flight cannot be detected: move it only while the machine is at rest.
 ///
 /// # Health
 ///
-/// A window without the answer is a strike, whatever else was heard in it. Three in a row and the
-/// node is abnormal, one answer and it is online again; a WRITE changes nothing (I7). The set-point
+/// A window without the answer is a strike, whatever else was heard in it. Three in a row make the
+/// node abnormal, one answer brings it back online, and a WRITE changes nothing (I7). The set-point
 /// of a node that becomes abnormal is dropped.
 ///
 /// ```
@@ -84,28 +85,28 @@ const EVENTS: usize = 16;
 /// assert_eq!(master.poll_transmit(now), None); // until the window closes
 /// assert_eq!(master.poll_timeout(), Some(Instant::from_micros(80 + 500 + 160)));
 /// ```
-// What is used most in front: there it takes short instructions.
+// Most used fields first: short instructions can reach them there.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Master<B: Board = OneMotor> {
     pub(super) config: MasterConfig,
     pub(super) answer_wire_time: Duration,
-    /// The last packet was a WRITE that is not answered: a READ may follow without a pause.
+    /// Whether the last packet was an unanswered WRITE: a READ may follow without a pause.
     pub(super) is_behind_write: bool,
     pub(super) discovery: Option<Discovery>,
     pub(super) turns: Turns,
     /// Time of the last call.
     pub(super) now: Instant,
-    /// When the bytes handed out for sending have left, and the gap behind them is over.
+    /// Time at which the bytes handed out have left and the gap after them is over.
     pub(super) line_free: Option<Instant>,
-    /// The node that may answer now.
+    /// The open reply window.
     pub(super) window: Option<Window>,
     pub(super) search: Search,
-    /// The last sign of life of the application.
+    /// Time of the application's last sign of life.
     pub(super) alive_at: Instant,
     pub(super) statistics: MasterStatistics,
     pub(super) packet: [u8; PACKET_LEN],
-    /// What `packet` is.
+    /// The request in `packet`.
     pub(super) sent: Option<Sent<B>>,
     pub(super) decoder: Decoder<B::ToMaster, PACKET_LEN>,
     pub(super) echo: Echo,
@@ -115,7 +116,7 @@ pub struct Master<B: Board = OneMotor> {
 
 /// Commands.
 impl<B: Board> Master<B> {
-    /// A master that knows no nodes yet: [`discover`](Self::discover) them.
+    /// Creates a master that knows no nodes yet; call [`discover`](Self::discover) to find them.
     #[must_use]
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
@@ -139,11 +140,11 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// Asks every id of [`MasterConfig::nodes`] that is not online: one READ each, silent ids again
-    /// until [`MasterConfig::attempts`]. Ends with [`MasterEvent::DiscoveryDone`].
+    /// Polls every id of [`MasterConfig::nodes`] that is not online: one READ each, repeated for
+    /// silent ids up to [`MasterConfig::attempts`]. Ends with [`MasterEvent::DiscoveryDone`].
     ///
-    /// A call during a discovery joins it. After every second one each node that is online has its turn
-    /// in the cycle before the next begins, so an application may call this as often as it likes.
+    /// A call during a discovery joins it. After every second discovery each online node has a turn
+    /// in the cycle before the next one begins, so call this as often as you like.
     pub fn discover(&mut self, now: Instant) {
         self.now = now;
         self.begin_discovery();
@@ -153,8 +154,8 @@ impl<B: Board> Master<B> {
     ///
     /// # Errors
     ///
-    /// [`CommandError`]: the node is not online, is not in velocity mode, has its mode in doubt, or
-    /// is owed a stop. The command is then not kept.
+    /// [`CommandError`] if the node is not online, is not in velocity mode, has its mode in doubt,
+    /// or is owed a stop. The command is then not kept.
     pub fn set_velocity(
         &mut self,
         node: NodeId,
@@ -168,8 +169,8 @@ impl<B: Board> Master<B> {
     ///
     /// # Errors
     ///
-    /// [`CommandError`]: the node is not online, is not in position mode, has its mode in doubt, or
-    /// is owed a stop. The command is then not kept.
+    /// [`CommandError`] if the node is not online, is not in position mode, has its mode in doubt,
+    /// or is owed a stop. The command is then not kept.
     pub fn set_position(
         &mut self,
         node: NodeId,
@@ -182,15 +183,15 @@ impl<B: Board> Master<B> {
     /// Stops a node: 0 rps, or *hold where you are*, never "go to 0" (I6). The stop is owed until
     /// [`MasterEvent::Stopped`] (I12).
     ///
-    /// A node that has never answered is read first. A repeated call joins the stop that is owed;
-    /// one after the stop is paid has it confirmed again, with the same position to hold.
+    /// A node that has never answered is read first. A repeated call joins the stop that is owed. A
+    /// call after the stop is paid has it confirmed again, holding the same position.
     pub fn stop(&mut self, node: NodeId, now: Instant) {
         self.sign_of_life(now);
         self.owe_stop(node);
     }
 
     /// Stops every node of [`MasterConfig::nodes`] and every node that has ever answered. Ids that
-    /// have never answered are read first; they stay owed a stop, which goes to whatever answers.
+    /// have never answered are read first; they remain owed a stop, which goes to whatever answers.
     pub fn stop_all(&mut self, now: Instant) {
         self.sign_of_life(now);
         for id in NodeId::ALL {
@@ -200,24 +201,24 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// Says that the application is alive, for [`MasterConfig::dead_man`].
+    /// Shows that the application is alive, for [`MasterConfig::dead_man`].
     pub fn keep_alive(&mut self, now: Instant) {
         self.sign_of_life(now);
     }
 
-    /// Sends no more set-points to a node. It keeps the last one that it has received. A stop that is
-    /// owed stays owed.
+    /// Stops sending set-points to a node. The node keeps the last one it received. A stop that is
+    /// owed remains owed.
     pub fn release(&mut self, node: NodeId) {
         self.drop_set_point(node);
     }
 
-    /// Asks for [`MasterEvent::Confirmed`] once the node has answered a READ that followed the next
-    /// WRITE of its set-point (I8). It ends with [`MasterEvent::NotConfirmed`] if that READ fails or
-    /// the set-point is dropped first.
+    /// Requests a confirmation: [`MasterEvent::Confirmed`] comes once the node has answered a READ
+    /// that followed the next WRITE of its set-point (I8), or [`MasterEvent::NotConfirmed`] if that
+    /// READ fails or the set-point is dropped first.
     ///
     /// # Errors
     ///
-    /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] where there is none to confirm.
+    /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] if there is none to confirm.
     pub fn confirm(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
         self.now = now;
         let it = self.node_mut(node);
@@ -231,7 +232,8 @@ impl<B: Board> Master<B> {
         Ok(())
     }
 
-    /// Reads a node once more than the polling does: the way to read with [`Polling::Manual`].
+    /// Reads a node once, in addition to polling. Use it with
+    /// [`Polling::Manual`](super::Polling::Manual).
     ///
     /// Ends with [`MasterEvent::Status`] or [`MasterEvent::ReadFailed`].
     ///
@@ -256,21 +258,21 @@ impl<B: Board> Master<B> {
         Ok(())
     }
 
-    /// The application is alive, which does not revive a command that is too old already.
+    /// Records a sign of life, which does not revive an expired command.
     fn sign_of_life(&mut self, now: Instant) {
         self.now = now;
         self.expire_commands(now);
         self.alive_at = now;
     }
 
-    /// Drops the set-point, and says so to whoever waits for its confirmation.
+    /// Drops the set-point, and reports that to an application waiting for its confirmation.
     pub(super) fn drop_set_point(&mut self, node: NodeId) {
         if self.node_mut(node).drop_set_point() {
             self.tell(MasterEvent::NotConfirmed { node, cause: Cause::Dropped });
         }
     }
 
-    /// The node is owed a stop from now on, if it is not already.
+    /// Makes the node owed a stop, unless it already is.
     pub(super) fn owe_stop(&mut self, id: NodeId) {
         let (now, hold_age) = (self.now, self.config.hold_age);
         let node = self.node_mut(id);
@@ -293,7 +295,7 @@ impl<B: Board> Master<B> {
         self.drop_set_point(id);
     }
 
-    /// When the dead-man stops the nodes.
+    /// Time at which the dead-man stops the nodes.
     fn dead_man_at(&self) -> Option<Instant> {
         let is_armed = self.nodes.iter().any(|node| node.is_under_order);
         self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
@@ -321,7 +323,7 @@ impl<B: Board> Master<B> {
         &mut self.nodes[index_of(node)]
     }
 
-    /// Takes out the events that are not to stay.
+    /// Removes the events that `stays` rejects.
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&MasterEvent<B>) -> bool) {
         self.events.retain(stays);
@@ -333,7 +335,7 @@ impl<B: Board> Master<B> {
     }
 }
 
-/// Eight ids, eight nodes; the mask lets the compiler see it.
+/// Eight ids, eight nodes; the mask proves it to the compiler.
 pub(super) const fn index_of(node: NodeId) -> usize {
     (node.get() as usize - 1) & 7
 }
@@ -364,7 +366,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
         self.now = now;
-        // A set-point must not outlive its application because a driver is late.
+        // A set-point must not outlive its application because the driver is late.
         self.expire_commands(now);
         if self.window.is_some() {
             return None;
@@ -372,7 +374,7 @@ impl<B: Board> Endpoint for Master<B> {
         self.send_next(now)
     }
 
-    /// As long as a slave on a UART waits for the rest of a packet: five byte times.
+    /// Five byte times: as long as a slave on a UART waits for the rest of a packet.
     fn frame_pause(&self) -> Duration {
         wire_time(5, self.config.baud)
     }
@@ -381,7 +383,7 @@ impl<B: Board> Endpoint for Master<B> {
         wire_time(bytes, self.config.baud)
     }
 
-    /// A WRITE of a set-point that has been dropped or replaced.
+    /// Whether it is a WRITE of a set-point that has been dropped or replaced.
     fn is_outdated(&self) -> bool {
         self.has_sent_old_set_point()
     }

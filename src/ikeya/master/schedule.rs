@@ -1,4 +1,4 @@
-//! How fast a bus can be, before it is wired.
+//! Maximum speed of a bus, computed before it is wired.
 
 use crate::ikeya::{
     board::{Board, OneMotor},
@@ -10,7 +10,7 @@ use crate::{
     time::{Duration, wire_time},
 };
 
-/// The plan of a cycle: each node gets a WRITE, if it is commanded, and a READ that it answers.
+/// The plan of a cycle: each node gets a WRITE, if it is commanded, and a READ, which it answers.
 ///
 /// ```
 /// use axlewire::ikeya::master::Schedule;
@@ -24,20 +24,21 @@ use crate::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Schedule {
-    /// Nodes on the bus.
+    /// Number of nodes on the bus.
     pub nodes: u8,
-    /// Whether they get a WRITE in each cycle, or are only read.
+    /// Whether the nodes get a WRITE in each cycle, or are only read.
     pub writes: bool,
     /// Speed of the line, bit/s.
     pub baud: u32,
-    /// Time from the end of a request to the beginning of its answer.
+    /// Time from the end of a request to the start of its answer.
     pub response_time: Duration,
-    /// Silence behind each packet of the master and each answer.
+    /// Silence after each packet of the master and after each answer.
     pub turnaround_gap: Duration,
 }
 
 impl Schedule {
-    /// Nodes that are commanded and read at 500 kbit/s and answer after 50 µs (ruling I9).
+    /// A plan for nodes that are commanded and read at 500 kbit/s and answer after 50 µs (ruling
+    /// I9).
     #[must_use]
     pub const fn new(nodes: u8) -> Self {
         Self {
@@ -68,19 +69,19 @@ impl Schedule {
         asked + self.response_time + packet + self.turnaround_gap
     }
 
-    /// Time until the first node's turn comes again.
+    /// Time of a whole cycle: from one turn of a node to its next.
     #[must_use]
     pub fn cycle_time(&self) -> Duration {
         self.exchange_time().saturating_mul(self.nodes.into())
     }
 
-    /// How often each node is visited in a second, rounded down; 0 without nodes.
+    /// Number of visits to each node per second, rounded down; 0 without nodes.
     #[must_use]
     pub fn cycles_per_second(&self) -> u32 {
         1_000_000_u32.checked_div(self.cycle_time().as_micros()).unwrap_or(0)
     }
 
-    /// How much of the time somebody is talking, percent, rounded down.
+    /// Share of the time in which the line is in use, percent, rounded down.
     #[must_use]
     pub fn busy_pct(&self) -> u32 {
         let silent = self.response_time

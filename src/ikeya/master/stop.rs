@@ -5,40 +5,40 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Stop WRITEs that have to be followed by a good answer before a stop is paid.
+/// Stop WRITEs that must be followed by a good answer before a stop is paid.
 const PAYMENTS: u8 = 2;
 
-/// Time in which a measured position has to be written, or it is measured anew. It doubles with each
-/// position that is given up, so that a loop that comes late finds one to write all the same.
+/// Time within which a measured position must be written, or it is measured again. It doubles with
+/// each position that is given up, so that even a slow loop eventually writes one.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
-/// Time between two positions that are compared: 8 counts in this time are 0.05 rps.
+/// Minimum time between two positions that are compared: 8 counts in this time are 0.05 rps.
 const STANDSTILL_TIME: Duration = Duration::from_millis(20);
 
-/// A stop that a node is owed.
+/// A stop that is owed to a node.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop<B: Board> {
-    /// Where a position node is to hold; `None` until it has been measured.
+    /// The position to hold for a position node; `None` until it has been measured.
     pub(super) hold: Option<B::Position>,
-    /// When that was measured.
+    /// Time of that measurement.
     measured_at: Option<Instant>,
-    /// Time in which it has to be written.
+    /// Time within which it must be written.
     patience: Duration,
-    /// A stop WRITE has been sent and waits for an answer.
+    /// Whether a stop WRITE has been sent and waits for an answer.
     pub(super) is_written: bool,
     /// Stop WRITEs sent.
     pub(super) writes: u8,
-    /// The window that is open, if any, was opened after the stop was asked for.
+    /// Whether the open window, if any, was opened after the stop was requested.
     pub(super) is_asked: bool,
     /// Stop WRITEs that were followed by a good answer.
     paid: u8,
-    /// Attempts that the node has had while it was not online.
+    /// Attempts made while the node was not online.
     pub(super) lost_attempts: u8,
 }
 
 impl<B: Board> Stop<B> {
-    /// A new debt; `hold` is a position that may be held without measuring it again, for as long as
-    /// if it had been measured at `measured_at`.
+    /// A new debt. `hold` is a position that may be held without measuring again, treated as
+    /// measured at `measured_at`.
     pub(super) const fn new(hold: Option<B::Position>, measured_at: Option<Instant>) -> Self {
         Self {
             hold,
@@ -52,27 +52,27 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// What was measured or paid before no longer counts: the node was abnormal, or its mode in
-    /// doubt.
+    /// Discards everything measured or paid so far: the node was abnormal, or its mode in doubt.
     #[inline(never)]
     pub(super) fn restart(&mut self) {
         (self.hold, self.measured_at) = (None, None);
         (self.is_written, self.writes, self.paid) = (false, 0, 0);
     }
 
-    /// Keeps the position of an answer to hold, if it was asked for after the stop was.
+    /// Keeps the position of an answer to hold, if it was requested after the stop.
     pub(super) fn measure(&mut self, status: &Status<B>, now: Instant) {
         if let (Status::Position(position), None, true) = (status, self.hold, self.is_asked) {
             (self.hold, self.measured_at, self.writes) = (Some(*position), Some(now), 0);
         }
     }
 
-    /// Has a position been measured for this stop that has not been written yet?
+    /// Whether a position has been measured for this stop but not written yet.
     pub(super) const fn is_measured(&self) -> bool {
         self.is_asked && self.measured_at.is_some() && self.writes == 0
     }
 
-    /// Gives up a position that could not be written at once, but for the `gap` behind each packet.
+    /// Gives up a position that could not be written at once, allowing for the `gap` after each
+    /// packet.
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
         if self.writes > 0 {
             return;
@@ -83,7 +83,7 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// The node has given a good answer in its mode; says whether the stop is paid now.
+    /// Counts a good answer in the node's mode; returns whether the stop is now paid.
     pub(super) fn pay(&mut self) -> bool {
         if core::mem::take(&mut self.is_written) {
             self.paid += 1;
@@ -96,13 +96,13 @@ impl<B: Board> Stop<B> {
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StopProgress {
-    /// The latest order of the node, if it has had any, is not a stop.
+    /// The node's latest command, if any, is not a stop.
     NotAsked,
     /// The stop is owed: it has not been confirmed twice yet.
     Owed,
-    /// The node has confirmed the stop, and may still be running out.
+    /// The node has confirmed the stop twice, and may still be slowing down.
     Paid,
-    /// The node has confirmed the stop and was measured standing still.
+    /// The node has confirmed the stop twice, and was found standing still.
     StandingStill,
 }
 
@@ -113,12 +113,12 @@ pub(super) enum Standstill<B: Board> {
     Unwatched,
     /// Watched, with a status to compare the next ones with.
     Watched(Option<(Status<B>, Instant)>),
-    /// Reached.
+    /// Standstill was measured.
     Reached,
 }
 
 impl<B: Board> Standstill<B> {
-    /// Takes in a status; says whether the node has just been found standing still.
+    /// Processes a status; returns whether it is the first to show a standstill.
     pub(super) fn watch(&mut self, status: Status<B>, now: Instant) -> bool {
         let Self::Watched(before) = *self else { return false };
         let is_still = match (status, before) {

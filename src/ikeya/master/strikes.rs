@@ -14,14 +14,14 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Strikes after which a node is abnormal.
+/// Number of strikes after which a node is abnormal.
 const STRIKES: u8 = 3;
 
-/// Share of the line's time for nodes that are owed a stop where none are searched for, percent.
+/// Share of line time for nodes that are owed a stop when no others are searched for, percent.
 const LEAST_SHARE_PCT: u8 = 1;
 
 impl<B: Board> Master<B> {
-    /// A window has closed without its answer.
+    /// Records a window that closed without its answer.
     pub(super) fn strike(&mut self, id: NodeId, cause: Cause, deadline: Instant) {
         let (attempts, guard) = (self.config.attempts.max(1), self.config.late_guard);
         let node = self.node_mut(id);
@@ -31,7 +31,7 @@ impl<B: Board> Master<B> {
             count_apart(&mut node.statistics.crc_errors);
         }
         if let Some(stop) = &mut node.stop {
-            // The WRITE may be what was lost: it is repeated.
+            // The WRITE may have been lost: repeat it.
             stop.is_written = false;
         }
         self.count_doubtful_exchange(id);
@@ -64,7 +64,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// A node has become abnormal: it keeps what it was told last, so it is owed a stop.
+    /// Handles a node that has become abnormal: it keeps its last command, so it is owed a stop.
     fn lose(&mut self, id: NodeId) {
         let stops = self.config.stops_abnormal;
         let node = self.node_mut(id);
@@ -78,7 +78,7 @@ impl<B: Board> Master<B> {
         }
     }
 
-    /// The search has asked a node.
+    /// Records a request of the search, and computes when the next is due.
     pub(super) fn searched(&mut self, index: usize, now: Instant) {
         let share = self.config.recovery_share_pct.clamp(LEAST_SHARE_PCT, 50);
         let exchange = self.window_time() + self.config.turnaround_gap;

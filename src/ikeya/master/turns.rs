@@ -1,11 +1,11 @@
-//! Turns: what may be sent next, why, and whose turn it is.
+//! Turns: which requests may be sent next, why, and whose turn it is.
 
 use crate::{
     ikeya::board::{Board, Target},
     time::Instant,
 };
 
-/// What is sent.
+/// Kind of request.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Request<B: Board> {
     Read,
@@ -13,22 +13,22 @@ pub(super) enum Request<B: Board> {
 }
 
 impl<B: Board> Request<B> {
-    /// A silent request is not answered.
+    /// Whether it is answered; a silent request is not.
     pub(super) const fn is_exchange(&self) -> bool {
         B::ANSWERS_WRITE || matches!(self, Self::Read)
     }
 }
 
-/// Why it is sent.
+/// Reason for a request.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Reason {
-    /// The WRITE of a position that has just been measured: the second half of an attempt.
+    /// The WRITE of a freshly measured position: the second half of an attempt.
     Hold,
     /// A stop WRITE for a velocity node that is online.
     SpeedStop,
     /// A stop WRITE for any node that is online.
     Stop,
-    /// A READ that a stop or a mode in doubt waits for.
+    /// A READ that a stop or a mode in doubt is waiting for.
     StopRead,
     /// The first attempt for a node that is owed a stop and is not online.
     LostStop,
@@ -39,7 +39,7 @@ pub(super) enum Reason {
 }
 
 impl Reason {
-    /// What is urgent, in its order, and then the rest.
+    /// The urgent reasons by priority, then the rest.
     pub(super) const ALL: [Self; 9] = [
         Self::Hold,
         Self::SpeedStop,
@@ -52,7 +52,7 @@ impl Reason {
         Self::Cycle,
     ];
 
-    /// For a stop, or about a mode in doubt.
+    /// Whether it is for a stop or a mode in doubt.
     pub(super) const fn is_stop(self) -> bool {
         matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
     }
@@ -67,19 +67,18 @@ pub(super) struct Choice<B: Board> {
     pub(super) round: Round,
 }
 
-/// The round that a request belongs to: the one under way, or the next, in which each node has its
-/// turns again.
+/// Round of a request: the one in progress, or the next, in which each node has its turns again.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Round {
     Same,
     Next,
 }
 
-/// The request that was handed out last.
+/// The request handed out last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sent<B: Board> {
     pub(super) choice: Choice<B>,
-    /// When its first byte could leave.
+    /// Earliest time at which its first byte could leave.
     pub(super) start: Instant,
     pub(super) len: usize,
 }
@@ -87,25 +86,25 @@ pub(super) struct Sent<B: Board> {
 /// Whose turn it is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Turns {
-    /// The node that was served last with a stop, as an index.
+    /// Index of the last node served with a stop.
     pub(super) stop: usize,
-    /// The same with a new set-point.
+    /// Index of the last node served with a new set-point.
     pub(super) set_point: usize,
-    /// The node whose turn in the cycle it is.
+    /// Index of the node whose turn in the cycle it is.
     pub(super) cycle: usize,
-    /// Turns of the cycle that go in front of a discovery.
+    /// Turns of the cycle that go before a discovery.
     pub(super) cycle_first: u8,
     is_second_discovery: bool,
-    /// The last round ended with an exchange of the search.
+    /// Whether the last round ended with an exchange of the search.
     pub(super) was_search: bool,
-    /// The nodes that have had their exchange for a stop in this round, a bit for each.
+    /// Nodes that have had their exchange for a stop in this round, one bit each.
     pub(super) had_stop: u8,
-    /// The same with their new set-point.
+    /// Nodes that have had their new set-point in this round, one bit each.
     pub(super) had_set_point: u8,
 }
 
 impl Turns {
-    /// A discovery has ended: after every second one each node has its turn in the cycle first.
+    /// Ends a discovery: after every second one each node first has its turn in the cycle.
     pub(super) const fn end_discovery(&mut self) {
         self.is_second_discovery = !self.is_second_discovery;
         if !self.is_second_discovery {
@@ -113,8 +112,8 @@ impl Turns {
         }
     }
 
-    /// Has this node its turn? A stop WRITE is followed by a READ before it is repeated, so it needs
-    /// no turn of its own unless it is answered.
+    /// Whether it is this node's turn. A stop WRITE is followed by a READ before it is repeated, so
+    /// it needs no turn of its own unless it is answered.
     pub(super) fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
         let had = match reason {
             _ if round == Round::Next => 0,
@@ -127,19 +126,19 @@ impl Turns {
     }
 }
 
-/// How far a discovery is: all ids once, then all again.
+/// Progress of a discovery: each id once, then all again.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) struct Discovery {
     pub(super) step: u16,
 }
 
 impl Discovery {
-    /// The node to be asked next, as an index.
+    /// Index of the node to be polled next.
     pub(super) const fn index(self) -> usize {
         (self.step & 7) as usize
     }
 
-    /// How often each id was asked before.
+    /// Number of times each id has been polled before.
     pub(super) const fn pass(self) -> u16 {
         self.step >> 3
     }
@@ -148,8 +147,8 @@ impl Discovery {
 /// The search for nodes that do not answer, one at a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Search {
-    /// Nobody is asked before then.
+    /// Time before which no node is polled.
     pub(super) next_at: Option<Instant>,
-    /// The node that was asked last, as an index.
+    /// Index of the node polled last.
     pub(super) last: usize,
 }

@@ -1,4 +1,4 @@
-//! What a master knows of its bus.
+//! The getters of a master.
 
 use super::nodes::NodeSet;
 use super::{
@@ -26,88 +26,87 @@ impl<B: Board> Master<B> {
         &self.config
     }
 
-    /// How a node is; `None` if it has never answered.
+    /// Health of a node; `None` if it has never answered.
     #[must_use]
     pub fn health(&self, node: NodeId) -> Option<Health> {
         self.node(node).health
     }
 
-    /// The mode of a node on record; `None` if it has never answered.
+    /// Mode of a node on record; `None` if it has never answered.
     #[must_use]
     pub fn mode(&self, node: NodeId) -> Option<Mode> {
         self.node(node).mode
     }
 
-    /// Is the mode of a node in doubt (I11)?
+    /// Whether the mode of a node is in doubt (I11).
     #[must_use]
     pub fn is_mode_in_doubt(&self, node: NodeId) -> bool {
         self.node(node).doubt.is_some()
     }
 
-    /// What a node measured last, and when that was heard.
+    /// Last measurement of a node, and when it arrived.
     #[must_use]
     pub fn status(&self, node: NodeId) -> Option<(Status<B>, Instant)> {
         self.node(node).status
     }
 
-    /// Progress of the latest stop of a node.
+    /// Progress of a node's latest stop.
     #[must_use]
     pub fn stop_progress(&self, node: NodeId) -> StopProgress {
         self.node(node).stop_progress()
     }
 
-    /// Nodes whose stop is owed, those among them that have never answered.
+    /// Nodes that are owed a stop, including those that have never answered.
     #[must_use]
     pub fn stops_owed(&self) -> NodeSet {
         NodeId::ALL.into_iter().filter(|&id| self.node(id).stop.is_some()).collect()
     }
 
-    /// The counts of a node.
+    /// Counts of a node.
     #[must_use]
     pub fn node_statistics(&self, node: NodeId) -> &NodeStatistics {
         &self.node(node).statistics
     }
 
-    /// The counts of the line.
+    /// Counts of the line.
     #[must_use]
     pub const fn statistics(&self) -> &MasterStatistics {
         &self.statistics
     }
 
-    /// Number of events refused because the application had not taken the older ones; stops at
-    /// 2^32 - 1.
+    /// Number of events lost because the application did not poll in time; saturates at 2^32 - 1.
     #[must_use]
     pub const fn lost_events(&self) -> u32 {
         self.events.lost()
     }
 
-    /// Where every byte went.
+    /// Accounts for every received byte.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.decoder.counters()
     }
 
-    /// The set-point of a node that is repeated, or that of its paid stop; `None` where there is none
-    /// and while a stop is owed.
+    /// The set-point that is repeated for a node, or that of its paid stop; `None` without one and
+    /// while a stop is owed.
     #[must_use]
     pub fn set_point(&self, node: NodeId) -> Option<Target<B>> {
         self.node(node).set_point.map(|set_point| set_point.target)
     }
 
-    /// Has the set-point of a node been handed out for sending, and not been taken back?
+    /// Whether the set-point of a node has been handed out for sending, and not been taken back.
     #[must_use]
     pub fn is_set_point_sent(&self, node: NodeId) -> bool {
         self.node(node).set_point.is_some_and(|set_point| !set_point.is_new)
     }
 
-    /// What the latest READ of a node has come to: an answer, or why it was given up. `None` before
-    /// the first, and from a call of [`read`](Self::read) until that has come to something.
+    /// Outcome of a node's latest READ: an answer, or why it was given up. `None` before the first,
+    /// and after a call of [`read`](Self::read) until that read is decided.
     #[must_use]
     pub fn read_outcome(&self, node: NodeId) -> Option<Result<(), Cause>> {
         self.node(node).read_outcome
     }
 
-    /// Whether a command would be taken now.
+    /// Checks whether a command would be accepted now.
     ///
     /// # Errors
     ///
@@ -116,18 +115,18 @@ impl<B: Board> Master<B> {
         self.node(node).check(node, target)
     }
 
-    /// Is a discovery under way?
+    /// Whether a discovery is in progress.
     #[must_use]
     pub const fn is_discovering(&self) -> bool {
         self.discovery.is_some()
     }
 
     /// Longest time from the first request of a READ to its answer or its
-    /// [failure](crate::ikeya::master::MasterEvent::ReadFailed), on any line, where the driver is called in time and
-    /// neither a discovery nor stops are under way, which go first.
+    /// [failure](crate::ikeya::master::MasterEvent::ReadFailed), on any line. It assumes that the
+    /// driver is called in time, and that no discovery or stop, which go first, is in progress.
     ///
-    /// Between two attempts lie the guard, one exchange with each other node and as many of the search
-    /// for abnormal ones, and before each of these a new set-point for every node.
+    /// Between two attempts come the guard, one exchange with each other node and as many of the
+    /// search for abnormal ones, and before each of these a new set-point for every node.
     #[must_use]
     pub fn read_bound(&self) -> Duration {
         let (write, exchange) = self.request_times();
@@ -136,12 +135,12 @@ impl<B: Board> Master<B> {
         self.attempts_bound(round.saturating_mul(16))
     }
 
-    /// Time after which a stop of nodes that answer is paid, with room for lost packets. A call that
-    /// waits for stops gives up after it.
+    /// Time within which a stop of nodes that answer is paid, with room for lost packets. A call
+    /// that waits for stops gives up after it.
     ///
-    /// It is four times [`MasterConfig::attempts`] of what goes between two reads of a node while
-    /// stops are owed: the guard, an exchange with every other node and with one that is searched
-    /// for, and a WRITE to each.
+    /// It is four times [`MasterConfig::attempts`] times the longest time between two reads of a
+    /// node while stops are owed: the guard, an exchange with every other node and with one that is
+    /// searched for, and a WRITE to each.
     #[must_use]
     pub fn stop_bound(&self) -> Duration {
         let (write, exchange) = self.request_times();

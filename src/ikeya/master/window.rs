@@ -1,4 +1,4 @@
-//! The reply window: the node that was asked, and until when its answer counts (I7).
+//! The reply window: the node that was asked, and its deadline (I7).
 
 use super::event::Cause;
 use crate::{ikeya::units::NodeId, time::Instant};

@@ -13,35 +13,36 @@ use crate::{
 pub struct SlaveConfig {
     /// Speed of the line, bit/s.
     pub baud: u32,
-    /// Time without a valid command before [`SlaveEvent::Watchdog`](super::SlaveEvent::Watchdog). The protocol document has no such
-    /// time, hence `None`: **a motor then keeps its last command for ever.**
+    /// Time without a valid command before [`SlaveEvent::Watchdog`](super::SlaveEvent::Watchdog).
+    /// The protocol document defines none, so the default is `None`: **a motor then keeps its last
+    /// command forever.**
     pub watchdog: Option<Duration>,
     /// Silence kept between a request and its answer, for transceivers that need it. Together with
-    /// the processor's own time it should stay below 50 µs (ruling I9).
+    /// the processing time it should stay below 50 µs (ruling I9).
     pub turnaround_gap: Duration,
-    /// Silence after which the start of a packet is given up (ruling B3). Longer than the longest
+    /// Silence after which an incomplete packet is given up (ruling B3). Must exceed the longest
     /// pause that the port makes inside a packet.
     pub idle: Duration,
-    /// Time after which an answer is no longer sent, from the end of the request and
-    /// [`turnaround_gap`](Self::turnaround_gap) on (ruling I14): its master has given up, and may be
-    /// asking another node.
+    /// Time during which an answer may still be sent, from the end of the request plus
+    /// [`turnaround_gap`](Self::turnaround_gap) (ruling I14): after it the master has given up, and
+    /// may be asking another node.
     ///
-    /// A driver that has not seen its port empty for this long, but at least 4 ms and at most
-    /// 20 ms, dates what it finds back to then.
+    /// A driver that has not seen its port empty for this long (at least 4 ms, at most 20 ms)
+    /// treats the bytes it finds as received when it last did.
     pub answer_within: Duration,
-    /// Whether the slaves of this line hear each other, as on two wires (ruling I14): the slave then
-    /// follows answers as well, and finds no request inside one.
+    /// Whether the slaves on this line hear each other, as on two wires (ruling I14): the slave
+    /// then follows answers as well, and finds no request inside one.
     pub two_wire: bool,
 }
 
 impl SlaveConfig {
-    /// For a UART of the processor itself at 500 kbit/s: a pause of five bytes ends a packet.
+    /// For one of the processor's own UARTs at 500 kbit/s: a pause of five bytes ends a packet.
     #[must_use]
     pub const fn direct() -> Self {
         Self::at(BAUD)
     }
 
-    /// For a UART of the processor itself at another speed, bit/s.
+    /// For one of the processor's own UARTs at another speed, bit/s.
     #[must_use]
     pub const fn at(baud: u32) -> Self {
         Self {
@@ -62,7 +63,7 @@ impl SlaveConfig {
     }
 }
 
-/// [`direct`](SlaveConfig::direct).
+/// Same as [`direct`](SlaveConfig::direct).
 impl Default for SlaveConfig {
     fn default() -> Self {
         Self::direct()

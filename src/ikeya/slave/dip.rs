@@ -11,7 +11,7 @@ use crate::{
 ///
 /// The protocol document contradicts itself: its range 1..8 and its example `0101` = id 3 need
 /// [`ValuePlusOne`](Self::ValuePlusOne), its example `0010` = id 1 needs [`Value`](Self::Value).
-/// So nothing is guessed here. To find the truth, scan ids 1..=8 with READ.
+/// The crate does not guess. To find the truth, scan ids 1..=8 with READ.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum IdReading {
@@ -37,7 +37,7 @@ pub enum IdReading {
 pub struct DipSwitch(u8);
 
 impl DipSwitch {
-    /// Switches from a number: bit 0 is the lowest digit, the mode; bits 1 to 3 are the id.
+    /// Converts from a number: bit 0 is the lowest digit, the mode; bits 1 to 3 are the id.
     ///
     /// # Errors
     ///
@@ -55,13 +55,13 @@ impl DipSwitch {
         self.0
     }
 
-    /// The lowest digit: 0 is velocity, 1 is position.
+    /// The mode, from the lowest digit: 0 is velocity, 1 is position.
     #[must_use]
     pub const fn mode(self) -> Mode {
         if self.0 & 1 == 0 { Mode::Velocity } else { Mode::Position }
     }
 
-    /// The upper three digits, under the reading that the board's maker meant.
+    /// The id in the upper three digits, in the reading that the board's maker meant.
     ///
     /// # Errors
     ///
@@ -78,7 +78,7 @@ impl DipSwitch {
     }
 }
 
-/// Four digits as printed on a board, `"0101"`.
+/// Parses four digits as printed on a board, `"0101"`.
 impl FromStr for DipSwitch {
     type Err = EncodeError;
 

@@ -1,6 +1,6 @@
-//! A slave's side of the bus: settings, events, statistics and DIP switches.
+//! The slave's side of the bus: settings, events, statistics and DIP switches.
 //!
-//! [`Slave`](super::Slave) is the role.
+//! [`Slave`] is the role.
 
 mod config;
 mod dip;

@@ -1,4 +1,4 @@
-//! Requests in the received bytes, on four wires or on two (I14).
+//! Finds requests in the received bytes, on four wires or on two (I14).
 
 use crate::{
     ikeya::board::{Board, Heard, PACKET_LEN},
@@ -7,7 +7,7 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Finds requests, and where they end.
+/// Finds requests and their ends.
 #[derive(Clone, Debug)]
 pub(super) struct Requests<B: Board> {
     inbox: Inbox,
@@ -16,9 +16,9 @@ pub(super) struct Requests<B: Board> {
 
 #[derive(Clone, Debug)]
 enum AnyDecoder<B: Board> {
-    /// Only the master is heard.
+    /// Hears only the master.
     FourWire(Decoder<B::ToSlave, PACKET_LEN>),
-    /// The other slaves are heard as well.
+    /// Hears the other slaves as well.
     TwoWire(Decoder<B::BothDirections, PACKET_LEN>),
 }
 
@@ -55,7 +55,7 @@ impl<B: Board> Requests<B> {
         is_idle
     }
 
-    /// The next whole packet in the input.
+    /// The next complete packet in the input.
     pub(super) fn next(&mut self, bytes: &mut &[u8]) -> Option<Found<B>> {
         loop {
             let found = match &mut self.decoder {
@@ -69,8 +69,8 @@ impl<B: Board> Requests<B> {
                 },
             };
             match found {
-                // Only what has been received in front of a packet is reported before it, so what is
-                // pending came behind it.
+                // Only bytes received before a packet are reported before it, so any pending bytes
+                // came after it.
                 Ok(Some(request)) => {
                     let is_last = bytes.is_empty() && self.pending() == 0;
                     return Some(Found::Request { request, is_last });
@@ -81,12 +81,12 @@ impl<B: Board> Requests<B> {
         }
     }
 
-    /// When the newest byte may have arrived first.
+    /// Earliest time at which the newest byte may have arrived.
     pub(super) const fn last(&self) -> Instant {
         self.inbox.last()
     }
 
-    /// When the start of a packet that is pending is given up.
+    /// Time at which a pending incomplete packet is given up.
     pub(super) fn deadline(&self) -> Option<Instant> {
         self.inbox.deadline(self.pending())
     }

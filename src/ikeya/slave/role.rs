@@ -23,18 +23,21 @@ use crate::{
     time::{Duration, Instant, earliest, reached, wire_time},
 };
 
-/// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that the
-/// application has set, and hands on the commands for it (ruling I9).
+/// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that
+/// the application has set, and passes on the commands for it (ruling I9).
 ///
-/// * A WRITE is answered only by [`ThreeMotors`](super::ThreeMotors) boards (I3, I10).
-/// * On any error the previous command stays: a damaged packet is no packet, and a speed that is no
-///   number is counted and refused (I4).
-/// * A request that is followed by another byte is not answered any more, nor one that was not
-///   answered in time (I14): its master has moved on, and an answer would meet the next node's.
-/// * On two wires it follows the answers of other nodes, so that it finds no request in them (I14).
+/// * Only [`ThreeMotors`](crate::ikeya::board::ThreeMotors) boards answer a WRITE (I3, I10).
+/// * On any error the previous command stays: a damaged packet is ignored, and a NaN or infinite
+///   speed is counted and refused (I4).
+/// * A request is not answered if another byte follows it or the answer is too late (I14): the
+///   master has moved on, and the answer would collide with the next node's.
+/// * On two wires it follows the answers of other nodes, so that it finds no request inside them
+///   (I14).
 ///
 /// ```
-/// use axlewire::{endpoint::Endpoint, ikeya::{slave::SlaveConfig, Mode, NodeId, ReadRequest, Rps, Slave, VelocityResponse}, time::Instant};
+/// use axlewire::ikeya::{slave::SlaveConfig, Mode, NodeId, Rps, Slave};
+/// use axlewire::ikeya::{ReadRequest, VelocityResponse};
+/// use axlewire::{endpoint::Endpoint, time::Instant};
 ///
 /// let now = Instant::from_micros(0);
 /// let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
@@ -54,9 +57,9 @@ pub struct Slave<B: Board = OneMotor> {
     position: Option<B::Position>,
     command: Option<Target<B>>,
     commanded_at: Option<Instant>,
-    /// The answer to the request that was heard last.
+    /// The answer to the latest request.
     answer: Option<Answer>,
-    /// The same, handed out, until more bytes are received.
+    /// The answer handed out, until more bytes are received.
     sent: Option<Answer>,
     requests: Requests<B>,
     packet: Vec<u8, PACKET_LEN>,
@@ -64,7 +67,7 @@ pub struct Slave<B: Board = OneMotor> {
     statistics: SlaveStatistics,
 }
 
-/// When an answer may be sent.
+/// Time span in which an answer may be sent.
 #[derive(Clone, Copy, Debug)]
 struct Answer {
     from: Instant,
@@ -72,7 +75,7 @@ struct Answer {
 }
 
 impl Answer {
-    /// To a request that ended then.
+    /// The answer to a request that ended at `request_end`.
     fn new(request_end: Instant, config: &SlaveConfig) -> Self {
         let from = request_end + config.turnaround_gap;
         Self { from, until: from + config.answer_within }
@@ -80,7 +83,7 @@ impl Answer {
 }
 
 impl<B: Board> Slave<B> {
-    /// A slave that is not moving and has heard nothing yet.
+    /// Creates a slave that is not moving and has heard nothing yet.
     #[must_use]
     pub fn new(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
         Self {
@@ -100,12 +103,12 @@ impl<B: Board> Slave<B> {
         }
     }
 
-    /// A slave with the id and mode of a DIP switch, in the reading that the board's maker meant
-    /// (ruling I2).
+    /// Creates a slave with the id and mode of a DIP switch, in the reading that the board's maker
+    /// meant (ruling I2).
     ///
     /// # Errors
     ///
-    /// [`EncodeError::DipSwitch`] where that reading gives no id.
+    /// [`EncodeError::DipSwitch`] if that reading gives no id.
     pub fn from_dip(
         dip: DipSwitch,
         reading: IdReading,
@@ -115,19 +118,19 @@ impl<B: Board> Slave<B> {
         Ok(Self::new(dip.node_id(reading)?, dip.mode(), config, now))
     }
 
-    /// The speed that a velocity node answers with from now on.
+    /// Sets the speed that a velocity node reports from now on.
     pub fn set_velocity(&mut self, current: B::Velocity) {
         self.velocity = current;
     }
 
-    /// The position that a position node answers with from now on. Before the first one it does not
-    /// answer at all: a master would take a made-up position for one to hold.
+    /// Sets the position that a position node reports from now on. Before the first call the node
+    /// does not answer at all: a master would hold a made-up position.
     pub fn set_position(&mut self, current: B::Position) {
         self.position = Some(current);
     }
 
-    /// Changes the mode, as when somebody moves the switch. The command is forgotten: it was meant
-    /// for the other mode.
+    /// Changes the mode, as when the switch is moved. The command is dropped: it was meant for the
+    /// other mode.
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
@@ -149,10 +152,10 @@ impl<B: Board> Slave<B> {
         self.mode
     }
 
-    /// What to do at this moment: the last good command; `None` before the first, and once the
-    /// watchdog has fired.
+    /// The command in force: the last good one; `None` before the first, and once the watchdog has
+    /// fired.
     ///
-    /// Right at any time, whether or not events have been taken out and timeouts handled.
+    /// Correct at any time, whether or not events have been taken out and timeouts handled.
     #[must_use]
     pub fn command(&self, now: Instant) -> Option<Target<B>> {
         if reached(self.watchdog_at(), now) { None } else { self.command }
@@ -164,26 +167,25 @@ impl<B: Board> Slave<B> {
         &self.config
     }
 
-    /// The counts.
+    /// Counts of the slave.
     #[must_use]
     pub const fn statistics(&self) -> &SlaveStatistics {
         &self.statistics
     }
 
-    /// Where every byte went.
+    /// Accounts for every received byte.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.requests.counters()
     }
 
-    /// Number of events that the next one replaced because the application had not taken them; stops
-    /// at 2^32 - 1.
+    /// Number of events lost because the application did not poll in time; saturates at 2^32 - 1.
     #[must_use]
     pub const fn lost_events(&self) -> u32 {
         self.event.lost()
     }
 
-    /// Takes in bytes and what they complete, which had arrived at `at`.
+    /// Processes bytes that arrived at `at`, and the packets that they complete.
     fn receive(&mut self, mut bytes: &[u8], at: Instant) {
         while let Some(found) = self.requests.next(&mut bytes) {
             match found {
@@ -195,7 +197,7 @@ impl<B: Board> Slave<B> {
         }
     }
 
-    /// Takes one whole request, whichever node it is for.
+    /// Handles one complete request, for any node.
     fn hear(&mut self, node: NodeId, command: Option<Command<B>>, is_last: bool, at: Instant) {
         self.overtake();
         if node != self.node {
@@ -216,14 +218,14 @@ impl<B: Board> Slave<B> {
         }
     }
 
-    /// More bytes have been received: an answer would meet them.
+    /// Drops the answer: more bytes have been received, and it would collide with them.
     fn overtake(&mut self) {
         if self.answer.take().is_some() {
             count(&mut self.statistics.overtaken);
         }
     }
 
-    /// Reads a WRITE in the node's own mode.
+    /// Obeys a WRITE, read in the node's own mode.
     fn obey(&mut self, command: Command<B>, at: Instant) {
         let target = match self.mode {
             Mode::Velocity => B::finite(command.velocity).map(Target::Velocity),
@@ -234,7 +236,7 @@ impl<B: Board> Slave<B> {
         self.tell(SlaveEvent::Command(target));
     }
 
-    /// The latest event counts: it replaces one that nobody has taken.
+    /// Puts an event; it replaces one that has not been taken.
     fn tell(&mut self, event: SlaveEvent<B>) {
         self.event.put(event);
     }
@@ -304,7 +306,7 @@ impl<B: Board> Endpoint for Slave<B> {
         Some(self.config.answer_within.clamp(SHORTEST, Duration::from_millis(20)))
     }
 
-    /// A command, and the request for an answer, is as old as it can be.
+    /// Treats commands and requests as old as they can be.
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
         if !bytes.is_empty() {
             self.sent = None;
@@ -314,12 +316,12 @@ impl<B: Board> Endpoint for Slave<B> {
         }
     }
 
-    /// An answer behind which more has been heard (I14).
+    /// Whether more has been heard since the answer was handed out (I14).
     fn is_outdated(&self) -> bool {
         self.sent.is_none()
     }
 
-    /// An answer of which no byte has left is still due, within its time. One that was cut off is
+    /// An answer of which no byte has left remains due, within its time. One that was cut off is
     /// not repeated: the master asks again.
     fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
         if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {

@@ -1,6 +1,6 @@
-//! Statistics of a slave.
+//! Counts of a slave.
 
-/// What a slave has heard. Counts stop at 2^32 - 1.
+/// Packets heard and answers sent by a slave. Counts saturate at 2^32 - 1.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -16,12 +16,12 @@ pub struct SlaveStatistics {
     pub foreign: u32,
     /// Answers sent.
     pub replies: u32,
-    /// Requests not answered, because more bytes were received before the answer was sent.
+    /// Requests not answered because more bytes arrived before the answer was sent.
     pub overtaken: u32,
-    /// Requests not answered, because the answer was not sent in time.
+    /// Requests not answered because the answer was not sent in time.
     pub expired: u32,
-    /// Answers of other nodes, on two wires; one's own as well where it is heard.
+    /// Answers of other nodes, on two wires; and its own if it hears them.
     pub answers: u32,
-    /// Times that the watchdog has fired.
+    /// Number of times the watchdog has fired.
     pub watchdog: u32,
 }

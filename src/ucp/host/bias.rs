@@ -1,46 +1,46 @@
-//! Where a host keeps what calibrations have found (ruling U11).
+//! Where a host keeps the results of calibrations (ruling U11).
 
 use core::{error::Error, fmt};
 
 use crate::ucp::body::{ImuBias, MagBias};
 
-/// What the host keeps for the robot, which has no memory of its own.
+/// Storage that the host provides for the robot, which has none of its own.
 ///
 /// The robot asks at every boot (id 8) and sends new values after a calibration (ids 6 and 7). The
-/// calls are made from [`handle_input`](crate::endpoint::Endpoint::handle_input), at most one per
-/// received frame, and [`load`](Self::load) from
-/// [`poll_transmit`](crate::endpoint::Endpoint::poll_transmit): a store that takes its time is
-/// better filled from a copy in memory.
+/// methods are called from [`handle_input`](crate::endpoint::Endpoint::handle_input), at most one
+/// per received frame, and [`load`](Self::load) from
+/// [`poll_transmit`](crate::endpoint::Endpoint::poll_transmit): a slow store should work on a copy
+/// in memory.
 pub trait BiasStore {
-    /// Does a result that was taken without an error stay here? `false` if it is only passed on:
-    /// then it is acknowledged only when its event has found room, because the application will
-    /// find it nowhere else (ruling U15). As provided, `true`.
+    /// Whether results that were stored without an error stay in the store; the default is `true`.
+    /// `false` means that they are only passed on. A result is then acknowledged only when its
+    /// event has found room, because the application will find it nowhere else (ruling U15).
     fn keeps(&self) -> bool {
         true
     }
 
-    /// What is kept of each kind; `None` if there is nothing, or it cannot be read. Read at the
-    /// moment at which biases are sent, so that they are never superseded ones.
+    /// Stored result of each kind; `None` if there is none or it cannot be read. Called at the
+    /// moment at which biases are sent, so that they are never outdated.
     fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>);
 
-    /// Keeps the result of an IMU calibration in place of the one before.
+    /// Stores the result of an IMU calibration, replacing the previous one.
     ///
     /// # Errors
     ///
-    /// [`NotStored`]: the result is then not acknowledged, so that the robot sends it again in a
+    /// [`NotStored`]: the result is then not acknowledged, so the robot sends it again after a
     /// second.
     fn store_imu(&mut self, bias: ImuBias) -> Result<(), NotStored>;
 
-    /// Keeps the result of a magnetometer calibration in place of the one before.
+    /// Stores the result of a magnetometer calibration, replacing the previous one.
     ///
     /// # Errors
     ///
-    /// [`NotStored`]: the result is then not acknowledged, so that the robot sends it again in a
+    /// [`NotStored`]: the result is then not acknowledged, so the robot sends it again after a
     /// second.
     fn store_mag(&mut self, bias: MagBias) -> Result<(), NotStored>;
 }
 
-/// A store could not keep a value.
+/// Error of a store that could not keep a value.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NotStored;
@@ -53,10 +53,10 @@ impl fmt::Display for NotStored {
 
 impl Error for NotStored {}
 
-/// Keeps biases as long as the program runs.
+/// Keeps biases while the program runs.
 ///
-/// What an application keeps in a file or in flash it puts into the fields at start and takes out
-/// of them, or of the events, after a calibration.
+/// To keep them in a file or in flash, set the fields at start, and save them, or the values of the
+/// events, after a calibration.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MemoryStore {
@@ -82,8 +82,8 @@ impl BiasStore for MemoryStore {
     }
 }
 
-/// Keeps nothing: results reach the application as events alone, are acknowledged when these have
-/// found room, and the robot's request at boot stays unanswered.
+/// Keeps nothing: results reach the application only as events and are acknowledged when these have
+/// found room, and the robot's request at boot is not answered.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoStore;

@@ -1,4 +1,4 @@
-//! Calibration requests: acknowledged, repeated, given up.
+//! Calibration requests: sent, repeated, acknowledged or given up.
 
 use super::{
     config::HostConfig,
@@ -14,26 +14,26 @@ use crate::{
 pub(super) struct Request {
     step: CalibrationStep,
     kind: CalibrationKind,
-    /// What the robot has been told to begin last, if that is known.
+    /// The calibration that the robot was last told to start, if known.
     last_start: Option<CalibrationKind>,
     attempts: u8,
-    /// What the latest attempt has come to so far.
+    /// Outcome of the latest attempt so far.
     cause: FailureCause,
     wait: Wait,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Wait {
-    /// To be sent then.
+    /// To be sent at this time.
     Send(Instant),
-    /// To be acknowledged by then.
+    /// To be acknowledged by this time.
     Ack(Instant),
 }
 
-/// What an acknowledgement has done.
+/// Effect of an acknowledgement.
 #[derive(Debug)]
 pub(super) enum Answer {
-    /// Nobody was waiting for it.
+    /// It was not expected.
     Unasked,
     /// The request will be sent again.
     Again,
@@ -52,7 +52,7 @@ impl Request {
         Self { step, kind, last_start, attempts: 0, cause, wait }
     }
 
-    /// What to send now, if anything, and whether it was sent before.
+    /// The request to send now, if any, and whether it is a repetition.
     pub(super) fn take_due(
         &mut self,
         now: Instant,
@@ -69,18 +69,19 @@ impl Request {
         Some((self.step, self.kind, again))
     }
 
-    /// The latest attempt did not reach the line: it does not count, and is due again.
+    /// Takes back the latest attempt, which did not reach the line: it does not count, and is due
+    /// again.
     pub(super) const fn unsent(&mut self, now: Instant) {
         self.attempts = self.attempts.saturating_sub(1);
         self.wait = Wait::Send(now);
     }
 
-    /// Takes in an acknowledgement.
+    /// Processes an acknowledgement.
     ///
-    /// After a good start its kind is the kind asked for. In a bad one the vendor firmware tells
-    /// the kind of the start before, so that is not looked at. After an end it tells the kind of
-    /// the last start, so that counts as well as the kind asked for, and any kind where the last
-    /// start is not known.
+    /// A good acknowledgement of a start must have the kind asked for. In a bad one the kind is
+    /// ignored, because the vendor firmware returns that of the previous start. When it
+    /// acknowledges an end, it returns the kind of the last start, so that kind is accepted too,
+    /// and any kind if the last start is unknown.
     pub(super) fn acknowledge(
         &mut self,
         step: CalibrationStep,

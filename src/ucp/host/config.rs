@@ -1,4 +1,4 @@
-//! Host settings.
+//! Settings of a host.
 
 use crate::{
     time::{Duration, wire_time},
@@ -8,7 +8,7 @@ use crate::{
 /// Settings of a [`Host`](super::Host): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
-/// A period or timeout under 1 ms counts as 1 ms, because a driver would spin otherwise.
+/// A period or timeout below 1 ms counts as 1 ms, because a driver would spin otherwise.
 ///
 /// ```
 /// use axlewire::ucp::host::HostConfig;
@@ -21,65 +21,67 @@ use crate::{
 pub struct HostConfig {
     /// Speed of the line, bit/s; 115,200.
     pub baud: u32,
-    /// How often the latest motor command is sent (ruling U10); 100 ms.
+    /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
     pub command_period: Duration,
-    /// Shortest pause between two motor commands that differ; 20 ms, a tenth of the line. In
-    /// between the latest wins. A command to stand still does not wait for it.
+    /// Shortest pause between two different motor commands; 20 ms, a tenth of the line. Within it
+    /// the latest wins. A command to stand still does not wait for it.
     pub command_gap: Duration,
-    /// Begins with a zero motor command, before any ping or answer (ruling U16); `true`.
+    /// Whether the first frame is a zero motor command, before any ping or answer (ruling U16);
+    /// `true`.
     ///
-    /// A vendor robot keeps driving while *any* byte arrives. A host that is restarted within 500
-    /// ms and only pings would keep it moving, so it is told to stand still at once, and again
-    /// every 100 ms until the application drives. `false` is for hosts that only listen: no motor
-    /// command goes out before the first call, and what another program has told the robot goes on.
+    /// A vendor robot keeps driving while *any* byte arrives. A host that is restarted within
+    /// 500 ms and only pings would keep it moving, so the host tells it to stand still at once, and
+    /// again every 100 ms until the application drives. Set `false` for hosts that only listen: no
+    /// motor command is sent before the first call, and the robot keeps following any other
+    /// program.
     pub sends_first_stop: bool,
-    /// Dead-man: after this much silence of the application the robot is told to stand still
+    /// Dead-man: after this much silence from the application the robot is told to stand still
     /// (ruling U10); 500 ms.
     pub dead_man: Duration,
-    /// How often a ping is sent; 200 ms, `None` for never.
+    /// Period of pings; 200 ms, `None` for no pings.
     pub ping_period: Option<Duration>,
-    /// How long a pong may take before the ping counts as lost; 500 ms. The next ping waits for it:
-    /// pongs do not say which ping they answer.
+    /// Time after which a ping without a pong counts as lost; 500 ms. The next ping waits until
+    /// then: a pong does not say which ping it answers.
     pub ping_timeout: Duration,
-    /// The link is down after this long without a valid frame (ruling U10); 500 ms.
+    /// Time without a valid frame after which the link is down (ruling U10); 500 ms.
     pub link_timeout: Duration,
-    /// How long the acknowledgement of a calibration request may take, from the end of the request
+    /// Longest time for the acknowledgement of a calibration request, from the end of the request
     /// on the wire; 200 ms.
     pub ack_timeout: Duration,
-    /// How often a calibration request is sent before it has failed; 3, at least 1.
+    /// Number of times a calibration request is sent before it fails; 3, at least 1.
     pub attempts: u8,
-    /// A frame is cut off by a pause of two byte times and this; 20 ms, because USB adapters and
-    /// operating systems hand in bytes up to 16 ms late. On a bare UART 1 ms will do.
+    /// Pause that cuts off a frame, in addition to two byte times; 20 ms, because USB adapters and
+    /// operating systems deliver bytes up to 16 ms late. On a bare UART 1 ms is enough.
     pub idle_margin: Duration,
-    /// Never sends an id in 5..=0x0A, for robots that hang on them (ruling U14); `false`.
+    /// Whether to send no id in 5..=0x0A, for robots that hang on them (ruling U14); `false`.
     ///
-    /// Firmware built from the vendor's main branch hangs for ever on any such frame, the answer to
+    /// Firmware built from the vendor's main branch hangs forever on any such frame, the answer to
     /// its own boot request included. v6.38, which ships, does not. To recognise such a build: the
-    /// first ping after the biases is never answered, and no report comes any more.
+    /// first ping after the biases is never answered, and no more reports arrive.
     ///
-    /// With it set, calibration results are kept but not acknowledged, so the robot repeats them
-    /// every 1000 ms. Its request for biases is not answered, and each is a
-    /// [`HostEvent::BiasesNotAnswered`](super::HostEvent::BiasesNotAnswered): its measurements are
-    /// off. [`Host::set_network_state`](super::Host::set_network_state) and
+    /// If set, calibration results are kept but not acknowledged, so the robot repeats them every
+    /// 1000 ms. Its requests for biases are not answered, so its measurements are off; each is a
+    /// [`HostEvent::BiasesNotAnswered`](super::HostEvent::BiasesNotAnswered).
+    /// [`Host::set_network_state`](super::Host::set_network_state) and
     /// [`Host::start_firmware_update`](super::Host::start_firmware_update) are refused with
     /// [`CommandError::LowIdsOnly`](super::CommandError::LowIdsOnly).
     pub low_ids_only: bool,
 }
 
 impl HostConfig {
-    /// A calibration request has been acknowledged or has failed this long after it was sent, if
-    /// the driver is in time.
+    /// Time within which a calibration request has been acknowledged or has failed, if the driver
+    /// is called in time.
     #[must_use]
     pub fn calibration_bound(&self) -> Duration {
         self.sane().ack_wait().saturating_mul(self.attempts.max(1).into())
     }
 
-    /// From the start of a calibration request to the end of the wait for its acknowledgement.
+    /// Time from the start of a calibration request to the end of the wait for its acknowledgement.
     pub(super) fn ack_wait(&self) -> Duration {
         wire_time(FrameOf::<CalibrationStart>::LEN, self.baud) + self.ack_timeout
     }
 
-    /// The same with nothing shorter than a driver can keep.
+    /// The same settings, with periods and timeouts raised to what a driver can keep.
     pub(super) fn sane(self) -> Self {
         Self {
             command_period: self.command_period.max(SHORTEST),
@@ -94,7 +96,8 @@ impl HostConfig {
     }
 }
 
-/// [`usb_adapter`](HostConfig::usb_adapter), which suits every host with an operating system.
+/// Same as [`usb_adapter`](HostConfig::usb_adapter), which suits every host with an operating
+/// system.
 impl Default for HostConfig {
     fn default() -> Self {
         Self::usb_adapter()
@@ -102,13 +105,13 @@ impl Default for HostConfig {
 }
 
 impl HostConfig {
-    /// For a UART of the processor itself: a frame is cut off by a pause of little more than 1 ms.
+    /// For one of the processor's own UARTs: a pause of little more than 1 ms cuts off a frame.
     #[must_use]
     pub const fn direct() -> Self {
         Self { idle_margin: Duration::from_millis(1), ..Self::usb_adapter() }
     }
 
-    /// For a USB adapter or an operating system, which may hold back bytes for 16 ms.
+    /// For a USB adapter or an operating system, which may delay bytes by 16 ms.
     #[must_use]
     pub const fn usb_adapter() -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Events of a host, and its refusals.
+//! Events and command errors of a host.
 
 use core::{error::Error, fmt};
 
@@ -16,77 +16,79 @@ use crate::{
     },
 };
 
-/// What has happened on the link.
+/// An event of a host.
 ///
-/// As large as a raw frame, 60 bytes: reports need two thirds of that, and everything else is rare.
+/// As large as a raw frame, 60 bytes: reports need two thirds of that, and all other events are
+/// rare.
 #[derive(Clone, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum HostEvent {
-    /// A valid frame of a robot has arrived, the first or the first after
+    /// A valid frame of a robot has arrived, either the first or the first after
     /// [`LinkDown`](Self::LinkDown).
     LinkUp,
-    /// No valid frame of a robot has arrived for the link timeout: since the last one, or at all.
+    /// No valid frame of a robot has arrived within the link timeout, since the last one or at all.
     LinkDown,
     /// The robot has answered a ping.
     Pong {
-        /// From the start of the ping to the end of the pong, their wire times included.
+        /// Time from the start of the ping to the end of the pong, their wire times included.
         round_trip: Duration,
-        /// Whether the ping had arrived undamaged (ruling U12).
+        /// Whether the ping arrived undamaged (ruling U12).
         err: ErrorCode,
     },
-    /// The robot has reported.
+    /// The robot has sent a report.
     Report(ReceivedReport),
-    /// The application has been silent for too long with the robot on the move: it is being told
-    /// to stand still, until the next command (ruling U10).
+    /// The application has been silent for too long while the robot was moving: the host tells the
+    /// robot to stand still until the next command (ruling U10).
     DeadMan,
     /// The robot has acknowledged the start of a calibration.
     CalibrationStarted(CalibrationKind),
     /// The robot has acknowledged the end of a calibration; its result follows.
     CalibrationEnded(CalibrationKind),
-    /// A calibration request has come to nothing.
+    /// A calibration request has failed.
     CalibrationFailed(CalibrationFailure),
-    /// The result of an IMU calibration, which has been stored. A repetition is no event.
+    /// The result of an IMU calibration has been stored. A repetition causes no event.
     ///
-    /// Without a store that keeps it, this event is the only copy: it is acknowledged because it is
-    /// here, and the robot says it again if there was no room (ruling U15).
+    /// If the store does not keep it, this event is the only copy. The result is acknowledged
+    /// because the event was queued; without room, the robot repeats it (ruling U15).
     ImuBias(ImuBias),
-    /// The result of a magnetometer calibration, likewise.
+    /// The same for a magnetometer calibration.
     MagBias(MagBias),
     /// The store has refused the result of this calibration; the robot will send it again.
     BiasNotStored(CalibrationKind),
-    /// The robot has booted and gets the stored biases.
+    /// The robot has booted, and the host answers with the stored biases.
     BiasesSent,
-    /// The robot has booted and asks for biases, but not all are stored: it is not answered, asks
-    /// again in a second, and its measurements are off until it has been calibrated.
+    /// The robot has booted and asks for biases, but not all are stored: the host does not answer.
+    /// The robot asks again after a second, and its measurements are off until it has been
+    /// calibrated.
     BiasesMissing {
-        /// Accelerometer and gyroscope biases are missing.
+        /// Whether accelerometer and gyroscope biases are missing.
         imu: bool,
-        /// Magnetometer biases are missing.
+        /// Whether magnetometer biases are missing.
         mag: bool,
     },
     /// The robot has booted and asks for biases, but
     /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids the answer (ruling
-    /// U14). It asks again in a second.
+    /// U14). The robot asks again after a second.
     BiasesNotAnswered,
-    /// The robot has answered the request to update its firmware.
+    /// The robot has answered the firmware update request.
     UpdateAnswered(OtaStatus),
-    /// A good frame that this crate has no message for (ruling U3).
+    /// A good frame for which this crate has no message (ruling U3).
     Unknown(UnknownFrame),
 }
 
-/// A report as it came.
+/// A report as received.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct ReceivedReport {
-    /// What the robot has measured.
+    /// The robot's measurements.
     pub telemetry: Telemetry,
-    /// Version of its firmware, where the layout has it.
+    /// Version of the robot's firmware, if the layout has it.
     pub version: Option<u16>,
-    /// The robot's counter of reports, wrapping.
+    /// The robot's wrapping report counter.
     pub index: u8,
-    /// How many reports are missing between the one before and this one.
+    /// Number of reports missing between the previous one and this one.
     pub lost: u8,
 }
 
@@ -96,7 +98,7 @@ impl ReceivedReport {
     }
 }
 
-/// A frame without a message, as a copy.
+/// A copy of a frame for which this crate has no message.
 #[derive(Clone, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnknownFrame {
@@ -106,13 +108,13 @@ pub struct UnknownFrame {
 }
 
 impl UnknownFrame {
-    /// `None` for a body longer than any that the role's decoder lets through.
+    /// Copies a frame; `None` if its body is longer than the role's decoder lets through.
     pub(super) fn copy(frame: &RawFrame<'_>) -> Option<Self> {
         let body = Vec::from_slice(frame.body).ok()?;
         Some(Self { id: frame.id, index: frame.index, body })
     }
 
-    /// The frame by its parts.
+    /// The frame given by its parts.
     #[must_use]
     pub fn as_raw(&self) -> RawFrame<'_> {
         RawFrame { id: self.id, index: self.index, body: &self.body }
@@ -123,24 +125,24 @@ impl UnknownFrame {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationStep {
-    /// To begin.
+    /// To start the calibration.
     Start,
-    /// To end, and to send the result.
+    /// To end the calibration and send the result.
     End,
 }
 
-/// A calibration request that came to nothing.
+/// A calibration request that has failed.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct CalibrationFailure {
-    /// Which of the two requests.
+    /// The request that failed.
     pub step: CalibrationStep,
-    /// What was to be calibrated.
+    /// The sensors to be calibrated.
     pub kind: CalibrationKind,
-    /// Why.
+    /// The cause.
     pub cause: FailureCause,
-    /// How often the request was sent.
+    /// Number of times the request was sent.
     pub attempts: u8,
 }
 
@@ -155,27 +157,27 @@ impl CalibrationFailure {
     }
 }
 
-/// Why a request came to nothing: what the last attempt ended in.
+/// Cause of a failed request: the outcome of its last attempt.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FailureCause {
-    /// The robot said nothing.
+    /// The robot did not answer.
     NoAnswer,
-    /// The robot said this instead of [`ErrorCode::Fine`].
+    /// The robot answered with a code other than [`ErrorCode::Fine`].
     Refused(ErrorCode),
 }
 
-/// Why a command was not taken. Whatever was going on goes on.
+/// Reason for refusing a command. The command has no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum CommandError {
     /// A speed, a turn or a network state out of range (rulings U7, U8).
     Value(EncodeError),
-    /// A calibration that no robot knows: it would be acknowledged and do nothing.
+    /// A kind of calibration that no robot knows: it would be acknowledged without effect.
     CalibrationKind {
-        /// What was asked for.
+        /// The kind asked for.
         kind: u8,
     },
     /// A calibration request is still waiting for its acknowledgement, or its event for room in the
@@ -187,10 +189,10 @@ pub enum CommandError {
         /// The id.
         id: u8,
     },
-    /// The robot has to be told to stand still before its firmware is updated, and the stop has to
-    /// have been [sent](super::Host::is_stop_sent).
+    /// A firmware update requires that the robot has been told to stand still, and that the stop
+    /// has been [sent](super::Host::is_stop_sent).
     Moving,
-    /// The firmware is being updated: this frame would end up in it.
+    /// A firmware update is in progress: the frame would end up in it.
     Updating,
 }
 
@@ -201,10 +203,10 @@ impl fmt::Display for CommandError {
             Self::CalibrationKind { kind } => write!(f, "no robot can calibrate {kind}"),
             Self::Calibrating => f.write_str("a calibration request is still unanswered"),
             Self::LowIdsOnly { id } => {
-                write!(f, "frames with id {id:#04x} are switched off: this robot may hang on them")
+                write!(f, "frames with id {id:#04x} are disabled: this robot may hang on them")
             }
-            Self::Moving => f.write_str("the robot has to stand still for a firmware update"),
-            Self::Updating => f.write_str("a firmware update is under way"),
+            Self::Moving => f.write_str("stop the robot before a firmware update"),
+            Self::Updating => f.write_str("a firmware update is in progress"),
         }
     }
 }

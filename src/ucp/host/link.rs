@@ -1,13 +1,13 @@
 //! The link to the robot.
 
-/// What is known about the robot.
+/// State of the link to the robot.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Link {
-    /// Nothing has been heard yet, and the link timeout is not over.
+    /// No valid frame has arrived yet, and the link timeout has not passed.
     Waiting,
     /// Valid frames arrive.
     Up,
-    /// None has for the link timeout.
+    /// No valid frame has arrived within the link timeout.
     Down,
 }

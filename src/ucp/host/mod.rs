@@ -1,6 +1,6 @@
 //! The host's side of the link: settings, events, statistics and the store of biases.
 //!
-//! [`Host`](super::Host) is the role. It is in the files of this module, one concept each:
+//! [`Host`] is the role. Its code is in the files of this module, one concept each:
 //!
 //! | file | what it decides |
 //! |---|---|

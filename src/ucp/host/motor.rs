@@ -7,31 +7,31 @@ use crate::{
     ucp::motor::MotorControl,
 };
 
-/// Which motor command is sent when.
+/// Decides which motor command is sent, and when.
 #[derive(Clone, Debug)]
 pub(super) struct Motor {
     latest: Option<MotorControl>,
-    /// What was handed out last, and when; `None` once it is in doubt whether it has left.
+    /// The command handed out last, and when; `None` if it may not have left.
     sent: Option<(MotorControl, Instant)>,
-    /// When the latest is to be sent.
+    /// Time at which the latest command is to be sent.
     due: Option<Instant>,
-    /// When the application has been silent for too long; set while the robot moves.
+    /// Time at which the application has been silent for too long; set while the robot moves.
     dead_man: Option<Instant>,
     first: First,
     copies: Copies,
 }
 
-/// Motor commands behind a frame that was cut off: two, one right behind the other, because the robot
-/// may take the first for the rest of that frame (ruling U16).
+/// Motor commands after a frame that was cut off: two, the second right behind the first, because
+/// the robot may take the first for the rest of that frame (ruling U16).
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Copies {
     /// One frame is enough.
     None,
-    /// So many are to be handed out.
+    /// This many are still to be handed out.
     Due(u8),
-    /// Both are handed out.
+    /// Both have been handed out.
     Out,
-    /// Both are handed out, and so was all the rest: the port is flushed now.
+    /// Both have been handed out, and so have all other frames: the port is being flushed.
     Flushing,
 }
 
@@ -42,7 +42,7 @@ impl Copies {
         matches!(self, Self::Due(_))
     }
 
-    /// A motor command is handed out.
+    /// Counts a motor command that is handed out.
     const fn take(self) -> Self {
         match self {
             Self::None => Self::None,
@@ -51,8 +51,8 @@ impl Copies {
         }
     }
 
-    /// A frame did not reach the line. With a flush that failed, all that were handed out since the last
-    /// one may be lost; a copy that the port has not touched is due again with the command.
+    /// Handles a frame that did not reach the line. A failed flush may have lost everything handed
+    /// out since the last one; a copy that the port has not touched is due again with the command.
     const fn unsent(self, unsent: Unsent) -> Self {
         match (unsent, self) {
             (Unsent::CutOff, _) => Self::BOTH,
@@ -68,11 +68,11 @@ impl Copies {
 enum First {
     /// To be sent before anything else.
     Due,
-    /// Handed out, and no motor command since.
+    /// Handed out, with no motor command since.
     Out,
-    /// Handed out, and other motor commands behind it before the port could be flushed.
+    /// Handed out, and followed by other motor commands before the port could be flushed.
     Followed,
-    /// Handed out, and so was all the rest: the port is flushed now.
+    /// Handed out, and so have all other frames: the port is being flushed.
     Flushing,
     /// Done, or not wanted.
     Done,
@@ -88,12 +88,12 @@ impl Motor {
         Self { latest, sent: None, due, dead_man: None, first, copies: Copies::None }
     }
 
-    /// The latest command, halted by now if the application has gone silent.
+    /// The latest command, already halted if the application has gone silent.
     pub(super) const fn latest(&self) -> Option<MotorControl> {
         self.latest
     }
 
-    /// Has the robot been told to stand still, as the latest command says?
+    /// Whether the latest command is to stand still, and the robot has been told so.
     pub(super) fn is_stop_sent(&self) -> bool {
         let stands_still = |command: &MotorControl| command.stands_still();
         self.latest.as_ref().is_some_and(stands_still)
@@ -101,13 +101,13 @@ impl Motor {
             && !self.copies.are_due()
     }
 
-    /// May an update begin? The robot has been told to stand still, or this host has told it
-    /// nothing at all.
+    /// Whether an update may begin: the robot has been told to stand still, or this host has sent
+    /// it no command at all.
     pub(super) fn allows_update(&self) -> bool {
         self.latest.is_none() || self.is_stop_sent()
     }
 
-    /// Says the latest command once more, at once.
+    /// Repeats the latest command at once.
     pub(super) fn repeat(&mut self, now: Instant) {
         self.due = self.latest.map(|_| now);
     }
@@ -117,9 +117,9 @@ impl Motor {
         self.latest = Some(command);
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
-            // The first frame comes first, and more copies of it if need be.
+            // The first frame takes precedence, and so do its copies.
             _ if self.first == First::Due || self.copies.are_due() => now,
-            // What the robot has been told already can wait for its turn.
+            // A command that the robot already has can wait for its turn.
             Some((sent, _)) if sent == command && self.due.is_some() => return,
             Some((sent, at)) if !still || sent.stands_still() => now.max(at + config.command_gap),
             _ => now,
@@ -127,7 +127,7 @@ impl Motor {
         self.due = Some(earliest);
     }
 
-    /// Halts when the application has been silent for too long; says whether that is now.
+    /// Halts when the application has been silent for too long; returns whether that happened now.
     pub(super) fn expire(&mut self, now: Instant) -> bool {
         let silent = reached(self.dead_man, now);
         if silent {
@@ -144,28 +144,28 @@ impl Motor {
         let command = if self.first == First::Due { latest.halted() } else { latest };
         self.copies = self.copies.take();
         self.sent = Some((command, now));
-        // What has been waiting behind the first frame goes out right behind it.
+        // A command that waits behind the first frame is sent right after it.
         let goes_on = self.copies.are_due() || command != latest;
         self.due = Some(if goes_on { now } else { now + config.command_period });
         if !self.copies.are_due() {
             self.first = match self.first {
                 First::Due => First::Out,
                 First::Out | First::Followed => First::Followed,
-                // Whoever asks for the next round has flushed this one.
+                // A request for the next round shows that this one has been flushed.
                 First::Flushing | First::Done => First::Done,
             };
         }
         Some(command)
     }
 
-    /// Somebody asks for a frame: whoever had everything before has flushed it.
+    /// Begins a round: a request for a frame shows that the previous round has been flushed.
     pub(super) fn begin_round(&mut self) {
         if self.copies == Copies::Flushing {
             self.copies = Copies::None;
         }
     }
 
-    /// Everything that was due has been handed out.
+    /// Ends a round: everything that was due has been handed out.
     pub(super) fn end_round(&mut self) {
         if matches!(self.first, First::Out | First::Followed) {
             self.first = First::Flushing;
@@ -175,8 +175,8 @@ impl Motor {
         }
     }
 
-    /// A frame did not reach the line: whatever the robot was told before, it is told the latest
-    /// command at once. `was_last` says that the frame was a motor command.
+    /// Handles a frame that did not reach the line: whatever the robot was told before, the latest
+    /// command is due at once. `was_last` means that the frame was a motor command.
     pub(super) fn unsent(&mut self, unsent: Unsent, was_last: bool, now: Instant) {
         self.sent = None;
         let is_lost = match self.first {
@@ -188,13 +188,13 @@ impl Motor {
             self.first = First::Due;
         }
         self.copies = self.copies.unsent(unsent);
-        // Paused, it stays silent.
+        // A paused motor stays silent.
         if self.due.is_some() {
             self.due = Some(now);
         }
     }
 
-    /// Sends no more until the next command.
+    /// Sends no more commands until the next call.
     pub(super) const fn pause(&mut self) {
         self.due = None;
     }

@@ -7,14 +7,14 @@ use crate::ucp::{
     motor::MotorControl,
 };
 
-/// What a frame carries.
+/// Content of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Outgoing {
     Motor(MotorControl),
     ImuAck,
     MagAck,
     Biases(Biases),
-    /// The last says that it is a repetition.
+    /// The flag marks a repetition.
     Calibration(CalibrationStep, CalibrationKind, bool),
     Network(SetNetworkState),
     Update(i16),

@@ -3,14 +3,14 @@
 use super::config::HostConfig;
 use crate::time::{Duration, Instant};
 
-/// Where the ping is.
+/// State of the current ping.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum PingState {
-    /// Not wanted.
+    /// Pings are disabled.
     Off,
-    /// To be sent then.
+    /// To be sent at this time.
     Due(Instant),
-    /// Sent, and lost if no pong comes.
+    /// Sent at `at`, and lost if no pong arrives before `until`.
     Sent { at: Instant, until: Instant },
 }
 
@@ -19,7 +19,7 @@ impl PingState {
         if config.ping_period.is_some() { Self::Due(now) } else { Self::Off }
     }
 
-    /// Is a ping to be sent now? It counts as sent.
+    /// Whether a ping is to be sent now; if so, it counts as sent.
     pub(super) fn take_due(&mut self, now: Instant, config: &HostConfig) -> bool {
         let due = matches!(*self, Self::Due(at) if at <= now);
         if due {
@@ -28,14 +28,14 @@ impl PingState {
         due
     }
 
-    /// A pong has arrived: how long it took, if it was waited for.
+    /// Handles a pong; returns its round trip, if one was expected.
     pub(super) fn pong(&mut self, now: Instant, config: &HostConfig) -> Option<Duration> {
         let Self::Sent { at, .. } = *self else { return None };
         self.next(at, now, config);
         Some(now - at)
     }
 
-    /// Gives up the ping whose pong is late; says whether that is now.
+    /// Gives up a ping whose pong is late; returns whether it did.
     pub(super) fn expire(&mut self, now: Instant, config: &HostConfig) -> bool {
         let Self::Sent { at, until } = *self else { return false };
         let late = until <= now;
@@ -45,7 +45,8 @@ impl PingState {
         late
     }
 
-    /// The ping did not reach the line and is due again; `false` if it has been given up by now.
+    /// Takes back a ping that did not reach the line: it is due again. `false` if it has already
+    /// been given up.
     pub(super) fn unsent(&mut self, now: Instant) -> bool {
         let sent = matches!(self, Self::Sent { .. });
         if sent {
@@ -54,7 +55,7 @@ impl PingState {
         sent
     }
 
-    /// Ends a silence: what was due during it is due now.
+    /// Ends a silence: a ping that was due during it is due now.
     pub(super) fn resume(&mut self, now: Instant) {
         if let Self::Due(at) = self {
             *at = now.max(*at);
@@ -68,7 +69,7 @@ impl PingState {
         }
     }
 
-    /// The ping sent at `sent` is done with.
+    /// Finishes the ping sent at `sent`, and schedules the next.
     fn next(&mut self, sent: Instant, now: Instant, config: &HostConfig) {
         *self = match config.ping_period {
             Some(period) => Self::Due(now.max(sent + period)),

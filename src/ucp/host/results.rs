@@ -1,16 +1,16 @@
-//! The results of one kind of calibration: which was taken, and whether it is to be acknowledged.
+//! The results of one kind of calibration: the one accepted, and whether to acknowledge it.
 
 use crate::time::Instant;
 
-/// An acknowledgement does not say of which result: what it says has to be true of the latest
-/// (ruling U15).
+/// An acknowledgement does not identify its result, so it must be true of the latest one (ruling
+/// U15).
 #[derive(Clone, Debug)]
 pub(super) struct Results<B> {
-    /// The latest one taken since the calibration began, to know a repetition.
+    /// The latest one accepted since the calibration began, to recognise a repetition.
     taken: Option<B>,
-    /// The latest one received is not kept anywhere.
+    /// Whether the latest one received is not kept anywhere.
     is_refused: bool,
-    /// Since when the acknowledgement is due.
+    /// Time since which the acknowledgement is due.
     pub(super) ack_due: Option<Instant>,
 }
 
@@ -19,7 +19,7 @@ impl<B: PartialEq> Results<B> {
         Self { taken: None, is_refused: false, ack_due: None }
     }
 
-    /// A calibration begins: the same result once more is a new one.
+    /// Begins a calibration: the same result again is then a new one.
     pub(super) fn begin(&mut self) {
         self.taken = None;
     }
@@ -28,17 +28,18 @@ impl<B: PartialEq> Results<B> {
         self.taken.as_ref() == Some(result)
     }
 
-    /// The result is where the application will find it.
+    /// Records a result that is where the application will find it.
     pub(super) fn accept(&mut self, result: B, ack_due: Option<Instant>) {
         (self.taken, self.is_refused, self.ack_due) = (Some(result), false, ack_due);
     }
 
-    /// The result is not kept: the robot would take an acknowledgement of the one before for its.
+    /// Records a result that is not kept: the robot would take an acknowledgement of the previous
+    /// one for this one.
     pub(super) fn refuse(&mut self) {
         (self.is_refused, self.ack_due) = (true, None);
     }
 
-    /// The acknowledgement did not leave.
+    /// Takes back an acknowledgement that did not leave.
     pub(super) fn ack_unsent(&mut self, now: Instant) {
         if !self.is_refused {
             self.ack_due = Some(now);

@@ -22,47 +22,46 @@ use crate::{
     },
 };
 
-/// The host of a rover: a pure state machine, driven as [`Endpoint`] says.
+/// The host of a rover: a pure state machine, driven as described in [`Endpoint`].
 ///
-/// * **First frame (U16).** A zero motor command, before any ping or answer, and again first if it
-///   did not leave or its flush failed. If the application drives at once, its command follows
-///   right behind. The zero command is repeated every 100 ms until the first call, in case it was
-///   damaged: a vendor robot keeps driving while any byte arrives, and a host that was restarted
-///   has to tell it to stand still.
-///   [`HostConfig::sends_first_stop`] switches this off for hosts that only listen.
+/// * **First frame (U16).** A zero motor command, before any ping or answer; it is sent first again
+///   if it did not leave or its flush failed. If the application drives at once, its command
+///   follows directly. The zero command is repeated every 100 ms until the first call, in case it
+///   was damaged: a vendor robot keeps driving while any byte arrives, so a restarted host must
+///   tell it to stand still. To disable this for hosts that only listen, clear
+///   [`HostConfig::sends_first_stop`].
 /// * **Motor commands (U10).** The latest of [`drive`](Self::drive) and [`stop`](Self::stop) wins
-///   and is repeated every 100 ms. When the application has called neither for 500 ms with the
-///   robot on the move, speed and turn 0 are sent, and sent on, until the next call; the lamp
-///   stays.
-/// * **Stops (U16).** Motor frames are never answered. So a stop counts as done when
-///   [`is_stop_sent`](Self::is_stop_sent) says so and the port has been flushed since.
-///   [`handle_unsent`](Endpoint::handle_unsent) makes every motor command due again, twice behind a
+///   and is repeated every 100 ms. If the application calls neither for 500 ms while the robot is
+///   moving, speed and turn 0 are sent and repeated until the next call; the lamp stays as it is.
+/// * **Stops (U16).** Motor frames are never answered, so a stop is done when
+///   [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since.
+///   [`handle_unsent`](Endpoint::handle_unsent) makes every motor command due again, twice after a
 ///   frame that was cut off, because the robot may take the first for the rest of that frame.
-/// * **Link (U10).** Pings go out every 200 ms. The link goes up with the first valid frame that
-///   comes from a robot, and down after 500 ms without one.
-/// * **Reports (U9).** Every one is an event and the [latest](Self::last_report) is kept. Missing
-///   ones are counted by their index. Counting starts anew after a lost link and when the robot
-///   asks for its biases, as it does at boot and then once a second until it has them: reports lost
-///   around such a request are not counted. A robot that restarts without either counts as up to
-///   255.
-/// * **Calibration (U11, U15).** Requests are acknowledged, repeated or given up, within
+/// * **Link (U10).** Pings are sent every 200 ms. The link goes up with the first valid frame from
+///   a robot, and down after 500 ms without one.
+/// * **Reports (U9).** Each report is an event, and the [latest](Self::last_report) is kept.
+///   Missing reports are counted by their index. Counting restarts after a lost link and when the
+///   robot asks for its biases, which it does at boot and then once a second until it has them:
+///   reports lost around such a request are not counted. A robot that restarts without either adds
+///   up to 255 to the count.
+/// * **Calibration (U11, U15).** Requests are acknowledged, repeated or given up within
 ///   [`HostConfig::calibration_bound`]. Results go to the [`BiasStore`] and are acknowledged once
-///   it has them; a store that does not [keep](BiasStore::keeps) them passes them on as events, and
-///   they are acknowledged once the event has found room. One that is refused withdraws an
-///   acknowledgement that has not left: the robot would take it for its latest.
+///   it has them. If the store does not [keep](BiasStore::keeps) them, they are only events, and
+///   are acknowledged once the event has found room. Refusing a result withdraws an acknowledgement
+///   that has not left: the robot would take it as acknowledging the refused one.
 /// * **Biases (U11).** The robot's request at boot is answered only if *both* results are stored,
-///   with those that are stored at the moment of sending: a made-up zero is a wrong bias, would
-///   overwrite what the robot has found since, and would end its asking. To send zeros, store
+///   with those stored at the moment of sending: a made-up zero is a wrong bias, would overwrite
+///   any result that the robot has found since, and would end its requests. To send zeros, store
 ///   zeros.
-/// * **Firmware update (U7, U13).** Starts by
-///   [`start_firmware_update`](Self::start_firmware_update) and by nothing else, behind a stop that
-///   has been sent.
-/// * **Builds that hang (U14)** on ids 5..=0x0A are spared them by [`HostConfig::low_ids_only`].
-/// * **Events (U15).** There is room for 16. Reports, pongs and what comes again by itself take at
-///   most half of it, so that they never refuse what happens once.
+/// * **Firmware update (U7, U13).** Only [`start_firmware_update`](Self::start_firmware_update)
+///   starts one, and only after a stop has been sent.
+/// * **Builds that hang (U14)** on ids 5..=0x0A: set [`HostConfig::low_ids_only`] to send none of
+///   these.
+/// * **Events (U15).** The queue holds 16 events. Reports, pongs and other recurring events take at
+///   most half of it, so that they never displace rare ones.
 ///
-/// What goes out first: motor commands, then answers, requests, the lamp's network state, pings.
-/// Every frame takes the next `index`.
+/// Frames are sent in this order: motor commands, answers, requests, the network state for the
+/// lamp, pings. Every frame takes the next `index`.
 ///
 /// ```
 /// use axlewire::{endpoint::Endpoint, time::Instant, ucp::{host::HostConfig, Host, MotorControl}};
@@ -87,7 +86,7 @@ pub struct Host<S = NoStore> {
 }
 
 impl Host {
-    /// A host that keeps no biases. The link timeout starts now.
+    /// Creates a host that keeps no biases. The link timeout starts now.
     #[must_use]
     pub fn new(config: HostConfig, now: Instant) -> Self {
         Self::with_store(config, NoStore, now)
@@ -95,7 +94,7 @@ impl Host {
 }
 
 impl<S: BiasStore> Host<S> {
-    /// A host that keeps biases in `store`. The link timeout starts now.
+    /// Creates a host that keeps biases in `store`. The link timeout starts now.
     #[must_use]
     pub fn with_store(config: HostConfig, store: S, now: Instant) -> Self {
         let config = config.sane();
@@ -106,11 +105,11 @@ impl<S: BiasStore> Host<S> {
         }
     }
 
-    /// Drives: sent at once, at the latest 20 ms after a command that differs, and repeated every
-    /// 100 ms. To be called at least every 500 ms, be it with the same command: see
-    /// [`HostEvent::DeadMan`].
+    /// Drives the robot. The command is sent at once, but no sooner than 20 ms after a different
+    /// one, and is repeated every 100 ms. Call this at least every 500 ms, even with the same
+    /// command: see [`HostEvent::DeadMan`].
     ///
-    /// A received command becomes one of these by [`MotorControl::try_from`] (U7).
+    /// To pass on a received command, convert it with [`MotorControl::try_from`] (U7).
     ///
     /// # Errors
     ///
@@ -123,20 +122,21 @@ impl<S: BiasStore> Host<S> {
         Ok(())
     }
 
-    /// Stands still: speed and turn 0 go out at once, the lamp stays.
+    /// Stops the robot: speed and turn 0 are sent at once, and the lamp stays as it is.
     ///
-    /// Always possible; it ends the silence of a firmware update. Done when
-    /// [`is_stop_sent`](Self::is_stop_sent) and the port has been flushed since (U16).
+    /// Always accepted; it ends the silence of a firmware update. The stop is done when
+    /// [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since
+    /// (U16).
     pub fn stop(&mut self, now: Instant) {
         self.state.end_update(now);
         let command = self.state.motor.latest().map_or(MotorControl::STOP, |it| it.halted());
         self.state.motor.command(command, now, &self.state.config);
     }
 
-    /// Has the robot been told to stand still, and nothing else since (ruling U16)?
+    /// Whether the robot has been told to stand still, and nothing else since (ruling U16).
     ///
     /// `true` if the latest command is to stand still and has been handed out, twice where that is
-    /// needed, and [`handle_unsent`](Endpoint::handle_unsent) has not taken it back. When the port
+    /// needed, and [`handle_unsent`](Endpoint::handle_unsent) has not taken it back. Once the port
     /// has then been flushed, the stop is done; motor frames are never answered.
     #[must_use]
     pub fn is_stop_sent(&self) -> bool {
@@ -149,15 +149,15 @@ impl<S: BiasStore> Host<S> {
         &self.state.config
     }
 
-    /// The motor command that is being repeated: the latest, or the stop once the dead-man has
-    /// fired.
+    /// The command in force: the latest, or the stop once the dead-man has fired; `None` before the
+    /// first.
     #[must_use]
     pub const fn command(&self) -> Option<MotorControl> {
         self.state.motor.latest()
     }
 
-    /// Shows the state of the network on the robot's lamp: sent when it changes, when the link
-    /// comes up and when the robot has booted (U8).
+    /// Shows the state of the network on the robot's lamp. It is sent when it changes, when the
+    /// link comes up, and when the robot has booted (U8).
     ///
     /// # Errors
     ///
@@ -171,11 +171,11 @@ impl<S: BiasStore> Host<S> {
         self.state.show(network, now)
     }
 
-    /// Asks the robot to begin a calibration.
+    /// Asks the robot to start a calibration.
     ///
-    /// Comes to [`HostEvent::CalibrationStarted`] or [`HostEvent::CalibrationFailed`]. The robot
-    /// does not move by itself: for the magnetometer the application turns it, for the IMU it keeps
-    /// it still.
+    /// Ends with [`HostEvent::CalibrationStarted`] or [`HostEvent::CalibrationFailed`]. The robot
+    /// does not move by itself: the application turns it for the magnetometer, and keeps it still
+    /// for the IMU.
     ///
     /// # Errors
     ///
@@ -192,12 +192,12 @@ impl<S: BiasStore> Host<S> {
 
     /// Asks the robot to end a calibration.
     ///
-    /// Comes to [`HostEvent::CalibrationEnded`] or [`HostEvent::CalibrationFailed`], and later to
-    /// [`HostEvent::ImuBias`] or [`HostEvent::MagBias`].
+    /// Ends with [`HostEvent::CalibrationEnded`] or [`HostEvent::CalibrationFailed`];
+    /// [`HostEvent::ImuBias`] or [`HostEvent::MagBias`] follows later.
     ///
     /// # Errors
     ///
-    /// As [`start_calibration`](Self::start_calibration).
+    /// Same as [`start_calibration`](Self::start_calibration).
     pub fn end_calibration(
         &mut self,
         kind: CalibrationKind,
@@ -209,18 +209,18 @@ impl<S: BiasStore> Host<S> {
     /// **Starts a firmware update** in a robot whose firmware is older than `version`.
     ///
     /// The robot then leaves this protocol and waits for YMODEM on the same line. So the request is
-    /// sent once, and behind it nothing: no command, no ping, until the robot refuses, or
+    /// sent once, and nothing after it, not even a ping, until the robot refuses, or
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
-    /// During an update it hears no stop either. So one more stop goes in front of the request, and
-    /// the request waits for a stop that did not leave. When the two may have been lost together
+    /// During an update the robot hears no stop either. So one more stop precedes the request, and
+    /// the request waits for a stop that did not leave. If both may have been lost
     /// ([`handle_unsent`](Endpoint::handle_unsent)), both are sent again.
     ///
     /// # Errors
     ///
     /// [`CommandError::Moving`] unless [`is_stop_sent`](Self::is_stop_sent); without
-    /// [`HostConfig::sends_first_stop`] it is taken before the first motor command, too.
+    /// [`HostConfig::sends_first_stop`] the call is also accepted before the first motor command.
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].
@@ -232,66 +232,66 @@ impl<S: BiasStore> Host<S> {
         self.state.start_update(version, now)
     }
 
-    /// The firmware update is over: pings and the zero motor command go out again.
+    /// Ends a firmware update: pings and the zero motor command are sent again.
     pub fn end_firmware_update(&mut self, now: Instant) {
         self.state.end_update(now);
     }
 
-    /// What is known about the robot.
+    /// State of the link to the robot.
     #[must_use]
     pub const fn link(&self) -> Link {
         self.state.link
     }
 
-    /// The latest report, however old; also when its event was refused.
+    /// The latest report, however old, even if its event was lost.
     #[must_use]
     pub const fn last_report(&self) -> Option<&ReceivedReport> {
         self.state.last_report.as_ref()
     }
 
-    /// The latest report, if no call of this has returned it yet.
+    /// The latest report, unless this method has already returned it.
     pub fn take_report(&mut self) -> Option<ReceivedReport> {
         let is_new = core::mem::take(&mut self.state.is_report_new);
         self.state.last_report.filter(|_| is_new)
     }
 
-    /// The round trip of the latest pong, if no call of this has returned it yet.
+    /// The round trip of the latest pong, unless this method has already returned it.
     pub const fn take_round_trip(&mut self) -> Option<Duration> {
         self.state.new_round_trip.take()
     }
 
-    /// What the latest calibration request has come to; `None` while it is unanswered, and before
-    /// the first.
+    /// Outcome of the latest calibration request; `None` before the first and while one is
+    /// unanswered.
     #[must_use]
     pub const fn calibration_outcome(&self) -> Option<Result<(), CalibrationFailure>> {
         self.state.settled
     }
 
-    /// What the host has seen.
+    /// Counts of the host.
     #[must_use]
     pub const fn statistics(&self) -> &HostStatistics {
         &self.state.stats
     }
 
-    /// Where every received byte went.
+    /// Accounts for every received byte.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.inbox.counters()
     }
 
-    /// Events refused because nobody took the older ones out.
+    /// Number of events lost because the application did not poll in time; saturates at 2^32 - 1.
     #[must_use]
     pub const fn lost_events(&self) -> u32 {
         self.state.events.lost()
     }
 
-    /// Takes out the events that are not to stay, a calibration's that waits for room included.
+    /// Removes the events that `stays` rejects, including a calibration's that waits for room.
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&HostEvent) -> bool) {
         self.state.retain_events(stays);
     }
 
-    /// Takes in the frames that `bytes` complete.
+    /// Processes the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8]) {
         while let Some((frame, at)) = self.inbox.next(&mut bytes) {
             self.state.receive(frame, at);
@@ -304,7 +304,7 @@ impl<S: BiasStore> Host<S> {
         &self.state.store
     }
 
-    /// The store of biases, to change what it keeps.
+    /// The store of biases, for changing its contents.
     pub const fn store_mut(&mut self) -> &mut S {
         &mut self.state.store
     }
@@ -329,7 +329,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        // A command must not outlive its application because a driver is late.
+        // A command must not outlive its application because the driver is late.
         self.state.expire_command(now);
         let len = self.state.fill(&mut self.outgoing, now)?;
         self.outgoing.get(..len)
@@ -343,7 +343,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
         wire_time(bytes, self.state.config.baud)
     }
 
-    /// A motor command that moves the robot, and is no longer the latest.
+    /// Whether it is a motor command that moves the robot and is no longer the latest.
     fn is_outdated(&self) -> bool {
         self.state.has_sent_old_command()
     }
@@ -384,7 +384,7 @@ mod tests {
             host.handle_input(ack.as_bytes(), now);
             assert_eq!(host.calibration_outcome(), Some(Ok(())));
             assert_eq!(host.start_calibration(kind, now), Err(CommandError::Calibrating));
-            // What stays is told as before.
+            // An event that stays is reported as before.
             host.retain_events(|_| true);
             assert_eq!(host.start_calibration(kind, now), Err(CommandError::Calibrating));
             host.retain_events(|event| !matches!(event, HostEvent::CalibrationStarted(_)));

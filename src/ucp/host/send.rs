@@ -1,4 +1,4 @@
-//! What a host sends next, and what comes back unsent.
+//! The next frame of a host, and frames that come back unsent.
 
 use super::{
     bias::BiasStore,
@@ -21,7 +21,7 @@ use crate::{
 };
 
 impl<S: BiasStore> State<S> {
-    /// Writes the most urgent frame that is due and says how long it is.
+    /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         self.motor.begin_round();
         let Some(outgoing) = self.next(now) else {
@@ -50,7 +50,7 @@ impl<S: BiasStore> State<S> {
         })
     }
 
-    /// The most urgent thing to send; it counts as sent.
+    /// The most urgent frame to send; it counts as sent.
     fn next(&mut self, now: Instant) -> Option<Outgoing> {
         if self.update == Update::Silent {
             return None;
@@ -95,7 +95,7 @@ impl<S: BiasStore> State<S> {
         None
     }
 
-    /// The biases that are stored at this moment, if they were asked for.
+    /// The biases stored at this moment, if they were requested.
     fn next_biases(&mut self) -> Option<Biases> {
         self.biases_due.take()?;
         let stored = self.store.load();
@@ -111,8 +111,8 @@ impl<S: BiasStore> State<S> {
         Some(Biases::new(imu, mag))
     }
 
-    /// Was the frame that was handed out last a motor command that moves the robot, and has another
-    /// come since?
+    /// Whether the frame handed out last is a motor command that moves the robot, and is no longer
+    /// the latest.
     pub(super) fn has_sent_old_command(&self) -> bool {
         match self.last {
             Some(Outgoing::Motor(command)) => {
@@ -122,10 +122,10 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Takes back the frame that was handed out last: what it carried is decided anew.
+    /// Takes back the frame handed out last: its content is decided again.
     ///
-    /// What the robot asks for again by itself is not repeated after a failed flush, behind which
-    /// it may have arrived: an acknowledgement that comes twice would count for the next result. An
+    /// After a failed flush the frame may have arrived, so anything that the robot requests again
+    /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
         let last = self.last.take();
@@ -142,7 +142,7 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// The update request is due again, unless the application has ended the update.
+    /// Makes the update request due again, unless the application has ended the update.
     fn ask_update_again(&mut self, version: i16, now: Instant) {
         if self.update == Update::Silent {
             self.end_update(now);
@@ -150,7 +150,7 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Nothing that the robot could act on has left.
+    /// Takes back a frame of which nothing that the robot could act on has left.
     fn take_back(&mut self, outgoing: Outgoing, now: Instant) {
         match outgoing {
             Outgoing::Motor(_) => uncount(&mut self.stats.commands),

@@ -1,4 +1,4 @@
-//! What a host knows and is waiting for.
+//! State of a host.
 
 use super::{
     bias::BiasStore,
@@ -28,7 +28,7 @@ use crate::{
     },
 };
 
-/// Everything but the bytes.
+/// Everything except the bytes.
 #[derive(Clone, Debug)]
 pub(super) struct State<S> {
     pub(super) config: HostConfig,
@@ -38,47 +38,47 @@ pub(super) struct State<S> {
     /// Counter of the next frame.
     pub(super) index: u8,
     pub(super) link: Link,
-    /// When the link goes down.
+    /// Time at which the link goes down.
     pub(super) link_until: Option<Instant>,
     pub(super) motor: Motor,
     pub(super) ping: PingState,
     pub(super) calibration: Option<Request>,
-    /// What the robot has been told to begin last; `None` if this host does not know.
+    /// The calibration that the robot was last told to start; `None` if unknown.
     last_start: Option<CalibrationKind>,
-    /// What a calibration request has come to, while there is no room for the event.
+    /// Outcome of a calibration request, while there is no room for its event.
     outcome: Option<HostEvent>,
-    /// What the latest calibration request has come to.
+    /// Outcome of the latest calibration request.
     pub(super) settled: Option<Result<(), CalibrationFailure>>,
     pub(super) update: Update,
     pub(super) network: Option<SetNetworkState>,
     pub(super) last_report: Option<ReceivedReport>,
-    /// The latest report has not been taken.
+    /// Whether the latest report has not been taken.
     pub(super) is_report_new: bool,
     /// Round trip of the latest pong, until it is taken.
     pub(super) new_round_trip: Option<Duration>,
-    /// Index of the report before, where there is one to count from.
+    /// Index of the previous report, if there is one to count from.
     last_index: Option<u8>,
     pub(super) imu: Results<ImuBias>,
     pub(super) mag: Results<MagBias>,
-    /// What is to be sent, and since when.
+    /// Time since which biases are due.
     pub(super) biases_due: Option<Instant>,
-    /// The application knows that the biases go out.
+    /// Whether the application has been told that the biases are sent.
     pub(super) biases_told: bool,
     pub(super) network_due: Option<Instant>,
-    /// The frame that was handed out last, as long as it may come back.
+    /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
 }
 
-/// Where a firmware update is.
+/// Progress of a firmware update.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Update {
     None,
-    /// The request is to be sent, once the robot has been told to stand still.
+    /// The request is to be sent once the robot has been told to stand still.
     Asked {
         version: i16,
         at: Instant,
     },
-    /// The request was sent, the line belongs to the update.
+    /// The request has been sent; the line belongs to the update.
     Silent,
 }
 
@@ -131,7 +131,7 @@ impl<S: BiasStore> State<S> {
             }
             (CalibrationKind::Imu, CalibrationStep::Start) => self.imu.begin(),
             (CalibrationKind::Magnetometer, CalibrationStep::Start) => self.mag.begin(),
-            // A result that has come by now is the one that is told.
+            // A result that has already arrived is the one reported.
             (_, CalibrationStep::End) => {}
         }
         let request = Request::new(step, kind, self.last_start, now);
@@ -139,7 +139,7 @@ impl<S: BiasStore> State<S> {
         Ok(())
     }
 
-    /// Is a request unanswered, or its end untold?
+    /// Whether a request is unanswered, or its outcome not yet reported.
     pub(super) const fn is_calibrating(&self) -> bool {
         self.calibration.is_some() || self.outcome.is_some()
     }
@@ -164,19 +164,19 @@ impl<S: BiasStore> State<S> {
         if !self.motor.allows_update() {
             return Err(CommandError::Moving);
         }
-        // A robot whose firmware is being updated hears no stop any more, so one damaged stop must
-        // not be enough to update it while it drives.
+        // A robot that is being updated hears no stop, so a single damaged stop must not be enough
+        // to update it while it drives.
         self.motor.repeat(at);
         self.update = Update::Asked { version, at };
         Ok(())
     }
 
-    /// The line is the host's again.
+    /// Ends an update: the line is the host's again.
     pub(super) fn end_update(&mut self, now: Instant) {
         self.update = Update::None;
         self.motor.resume(now);
         self.ping.resume(now);
-        // What the robot has asked for during the silence is due now.
+        // Anything that the robot requested during the silence is due now.
         let dues = [
             &mut self.imu.ack_due,
             &mut self.mag.ack_due,
@@ -186,7 +186,7 @@ impl<S: BiasStore> State<S> {
         dues.into_iter().flatten().for_each(|at| *at = now.max(*at));
     }
 
-    /// May a frame with this id, one of 5..=0x0A, be sent (ruling U14)?
+    /// Checks whether a frame with this id, one of 5..=0x0A, may be sent (ruling U14).
     const fn allow(&self, id: u8) -> Result<(), CommandError> {
         if self.config.low_ids_only { Err(CommandError::LowIdsOnly { id }) } else { Ok(()) }
     }
@@ -204,7 +204,7 @@ impl<S: BiasStore> State<S> {
         self.use_room();
     }
 
-    /// Tells what has been waiting for room.
+    /// Reports an outcome that has been waiting for room.
     fn use_room(&mut self) {
         if let Some(outcome) = self.outcome.take() {
             self.outcome = self.events.keep(outcome).err();
@@ -237,7 +237,7 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// A valid frame of a robot has arrived.
+    /// Records that a valid frame of a robot has arrived.
     fn heard(&mut self, at: Instant) {
         self.link_until = Some(at + self.config.link_timeout);
         if self.link != Link::Up {
@@ -301,7 +301,7 @@ impl<S: BiasStore> State<S> {
             HostEvent::CalibrationFailed(failure) => {
                 count(&mut self.stats.calibration_failures);
                 if failure.step == CalibrationStep::Start {
-                    // It may have arrived all the same.
+                    // The start may have arrived anyway.
                     self.last_start = None;
                 }
                 Err(failure)
@@ -312,7 +312,7 @@ impl<S: BiasStore> State<S> {
             }
             _ => Ok(()),
         });
-        // Without room it waits, and until then there is no other request.
+        // Without room it waits, and until then no other request is accepted.
         self.outcome = self.events.keep(event).err();
     }
 
@@ -342,7 +342,8 @@ impl<S: BiasStore> State<S> {
         self.mag.accept(bias, ack_due);
     }
 
-    /// Tells of a result that the store has taken; will the application find it (ruling U15)?
+    /// Reports a result that the store has accepted; returns whether the application will find it
+    /// (ruling U15).
     fn is_kept(&mut self, event: HostEvent) -> bool {
         if self.store.keeps() {
             self.events.push(event);
@@ -360,13 +361,14 @@ impl<S: BiasStore> State<S> {
         self.events.push_frequent(HostEvent::BiasNotStored(kind));
     }
 
-    /// The robot has booted, not more than a second ago or unanswered since.
+    /// Handles a request for biases: the robot has booted within the last second, or has not been
+    /// answered since.
     fn bias_request(&mut self, at: Instant) {
         count(&mut self.stats.bias_requests);
         self.last_index = None;
         self.network_due = self.network.map(|_| at);
         if self.allow(8).is_ok() {
-            // Which biases is decided when they are sent: better ones may be on their way.
+            // The biases are chosen when they are sent: better ones may be on their way.
             self.biases_due = Some(at);
             self.biases_told = false;
         } else {

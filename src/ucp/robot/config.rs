@@ -1,4 +1,4 @@
-//! Robot settings.
+//! Settings of a robot.
 
 use crate::{
     time::Duration,
@@ -8,7 +8,7 @@ use crate::{
 /// Settings of a [`Robot`](super::Robot): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
-/// A period or timeout under 1 ms counts as 1 ms, because a driver would spin otherwise.
+/// A period or timeout below 1 ms counts as 1 ms, because a driver would spin otherwise.
 ///
 /// ```
 /// use axlewire::ucp::robot::{ReportLayout, RobotConfig};
@@ -22,24 +22,25 @@ use crate::{
 pub struct RobotConfig {
     /// Speed of the line, bit/s; 115,200.
     pub baud: u32,
-    /// Speed and turn become 0 after this long without a valid command (ruling U10); 500 ms.
+    /// Time without a valid command after which speed and turn become 0 (ruling U10); 500 ms.
     pub watchdog: Duration,
-    /// How often a report is sent (ruling U10); 20 ms.
+    /// Period of reports (ruling U10); 20 ms.
     pub report_period: Duration,
-    /// How a report is laid out (ruling U5); as firmware 38 does it.
+    /// Layout of a report (ruling U5); that of firmware 38.
     pub layout: ReportLayout,
-    /// How often a calibration result is sent until it is acknowledged (ruling U11); 1000 ms.
+    /// Period at which a calibration result is repeated until it is acknowledged (ruling U11);
+    /// 1000 ms.
     pub result_period: Duration,
-    /// How often biases are asked for, from the first moment until they come (ruling U11); 1000 ms,
-    /// `None` for never.
+    /// Period of requests for biases, from the start until the biases arrive (ruling U11); 1000 ms,
+    /// `None` for no requests.
     pub bias_request_period: Option<Duration>,
-    /// A frame is cut off by a pause of two byte times and this; 5 ms, which a host with a USB
-    /// adapter does not make within a frame.
+    /// Pause that cuts off a frame, in addition to two byte times; 5 ms, longer than the pauses of
+    /// a host with a USB adapter within a frame.
     pub idle_margin: Duration,
 }
 
 impl RobotConfig {
-    /// The same with nothing shorter than a driver can keep.
+    /// The same settings, with periods and timeouts raised to what a driver can keep.
     pub(super) fn sane(self) -> Self {
         Self {
             baud: self.baud,
@@ -53,7 +54,7 @@ impl RobotConfig {
     }
 }
 
-/// [`direct`](RobotConfig::direct).
+/// Same as [`direct`](RobotConfig::direct).
 impl Default for RobotConfig {
     fn default() -> Self {
         Self::direct()
@@ -61,14 +62,14 @@ impl Default for RobotConfig {
 }
 
 impl RobotConfig {
-    /// For a robot on a host, behind a USB adapter or an operating system, which may hold back bytes
-    /// for 16 ms.
+    /// For a robot on a host, behind a USB adapter or an operating system, which may delay bytes by
+    /// 16 ms.
     #[must_use]
     pub const fn usb_adapter() -> Self {
         Self { idle_margin: Duration::from_millis(20), ..Self::direct() }
     }
 
-    /// For a UART of the processor itself. The host may have a USB adapter.
+    /// For one of the processor's own UARTs. The host may have a USB adapter.
     #[must_use]
     pub const fn direct() -> Self {
         Self {
@@ -87,11 +88,11 @@ impl RobotConfig {
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ReportLayout {
-    /// What shipped robots send.
+    /// The layout that shipped robots send.
     Firmware {
         /// Version of the robot's firmware.
         version: u16,
     },
-    /// What the protocol document prints.
+    /// The layout in the protocol document.
     Document,
 }

@@ -6,44 +6,45 @@ use crate::ucp::{
     motor::MotorControl,
 };
 
-/// Events of a robot: what the host asks for, and that it has fallen silent.
+/// An event of a robot.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum RobotEvent {
-    /// The command has changed, or is back after a [`Watchdog`](Self::Watchdog). In range,
-    /// the lamp field 100 or 0, all other fields 0.
+    /// The command has changed, or is back after a [`Watchdog`](Self::Watchdog). It is in range,
+    /// the lamp field is 100 or 0, and all other fields are 0.
     ///
-    /// To move the robot, ask [`Robot::command`](super::Robot::command) instead: it is right at any
-    /// time. In a queue that fills, only the latest command is sure to be told.
+    /// To move the robot, use [`Robot::command`](super::Robot::command) instead: it is correct at
+    /// any time. In a queue that fills up, only the latest command is sure to be reported.
     Motor(MotorControl),
-    /// No valid command for 500 ms: speed and turn are 0, the lamp is as it was (ruling U10).
+    /// No valid command for 500 ms: speed and turn are 0, the lamp is unchanged (ruling U10).
     Watchdog,
-    /// A calibration is to begin; it is acknowledged because it is told here (ruling U15).
+    /// A calibration is to start. The start is acknowledged because this event was queued (ruling
+    /// U15).
     CalibrationStart {
-        /// What is to be calibrated.
+        /// The sensors to calibrate.
         kind: CalibrationKind,
-        /// This calibration is running already: the acknowledgement was lost, or the host has begun
-        /// again. A repetition is not told twice while the first event still waits.
+        /// Whether this calibration is already running: the acknowledgement was lost, or the host
+        /// has started again. A repetition is not reported while the first event is still waiting.
         repeated: bool,
     },
-    /// The calibration is to end, and its result to be handed in; it is acknowledged because it is
-    /// told here. A repetition is no event.
+    /// The calibration is to end, and its result to be handed in. The end is acknowledged because
+    /// this event was queued. A repetition causes no event.
     CalibrationEnd(CalibrationKind),
     /// The host has the IMU biases. If their calibration was still running, it has ended.
     ImuBiasTaken,
-    /// The host has the magnetometer biases, likewise.
+    /// The same for the magnetometer biases.
     MagBiasTaken,
-    /// The host has sent the biases that it keeps. The vendor firmware takes them whatever their
-    /// `err` says.
+    /// The host has sent its stored biases. The vendor firmware accepts them whatever their `err`
+    /// says.
     Biases(Biases),
-    /// State of the host's network, for the lamp. Also when it has not changed.
+    /// State of the host's network, for the lamp; reported even if it has not changed.
     NetworkState(NetworkState),
-    /// The host asks for a firmware update. Nothing has been done about it: the application
-    /// decides, and says so by [`Robot::answer_update`](super::Robot::answer_update) if it was a
-    /// request.
+    /// The host asks for a firmware update. The role does nothing about it: the application
+    /// decides, and answers a [`Request`](UpdateSource::Request) with
+    /// [`Robot::answer_update`](super::Robot::answer_update).
     UpdateRequested {
-        /// The version on offer.
+        /// The version offered.
         version: i16,
         /// How the host asked.
         by: UpdateSource,
@@ -54,10 +55,10 @@ pub enum RobotEvent {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum UpdateSource {
-    /// By the request that is meant for it (id 9).
+    /// By the dedicated request (id 9).
     Request,
-    /// By a motor command whose version is above 38 (ruling U7): on purpose, or because it did not
-    /// clear its memory. Speed and turn of such a command are not taken, and it does not feed the
+    /// By a motor command with a version above 38 (ruling U7): on purpose, or because the host did
+    /// not clear its memory. Speed and turn of such a command are ignored, and it does not feed the
     /// watchdog.
     MotorCommand,
 }

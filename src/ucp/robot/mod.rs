@@ -1,13 +1,13 @@
 //! The robot's side of the link: settings, events and statistics.
 //!
-//! [`Robot`](super::Robot) is the role. It is in the files of this module, one concept each:
+//! [`Robot`] is the role. Its code is in the files of this module, one concept each:
 //!
 //! | file | what it decides |
 //! |---|---|
 //! | `role` | commands, and the calls of [`Endpoint`](crate::endpoint::Endpoint) |
 //! | `state` | what a received frame means, and when the watchdog fires (U10) |
 //! | `send` | which frame goes next, and what a frame that did not leave means |
-//! | `repeat` | what is sent again and again: reports, results, requests for biases |
+//! | `repeat` | periodic frames: reports, results, requests for biases |
 
 mod config;
 mod event;

@@ -1,4 +1,4 @@
-//! The frames that a robot sends, and the answers that it owes.
+//! The frames that a robot sends, and the answers that are due.
 
 use super::repeat::Beat;
 use crate::{
@@ -9,14 +9,14 @@ use crate::{
     },
 };
 
-/// Answers to be sent: the latest of each sort, however often the host asks.
+/// Answers to be sent: the latest of each kind, however often the host asks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Answers {
     pub(super) pong: bool,
     pub(super) calibration_start: Option<CalibrationKind>,
     pub(super) calibration_end: Option<CalibrationKind>,
     pub(super) update: Option<OtaStatus>,
-    /// When the oldest was asked for.
+    /// Time of the oldest request.
     pub(super) since: Option<Instant>,
 }
 
@@ -44,7 +44,7 @@ impl Answers {
     }
 }
 
-/// What a frame carries.
+/// Content of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Outgoing {
     StartAck(CalibrationKind),

@@ -1,11 +1,11 @@
-//! What is sent again and again until the other side has it, and what is sent for ever.
+//! Frames repeated until the other side has them, and frames repeated forever.
 
 use crate::{
     stats::{count, uncount},
     time::{Duration, Instant},
 };
 
-/// Something to be sent at once, and every period until it is dropped.
+/// Something to be sent at once, and then every period until it is dropped.
 #[derive(Clone, Debug)]
 pub(super) struct Repeat<T> {
     what: Option<Due<T>>,
@@ -15,7 +15,7 @@ pub(super) struct Repeat<T> {
 struct Due<T> {
     what: T,
     at: Instant,
-    /// How often it has been sent; stops at 2^32 - 1.
+    /// Number of times it has been sent; saturates at 2^32 - 1.
     sendings: u32,
 }
 
@@ -33,12 +33,12 @@ impl<T: Copy> Repeat<T> {
         self.what = None;
     }
 
-    /// Is there something that the other side can have received?
+    /// Whether it has been sent, so that the other side may have received it.
     pub(super) fn was_sent(&self) -> bool {
         self.what.as_ref().is_some_and(|due| due.sendings > 0)
     }
 
-    /// What to send now, if anything.
+    /// The item to send now, if any.
     pub(super) fn take_due(&mut self, now: Instant, period: Duration) -> Option<T> {
         let due = self.what.as_mut().filter(|due| due.at <= now)?;
         due.at = now + period;
@@ -53,7 +53,7 @@ impl<T: Copy> Repeat<T> {
         }
     }
 
-    /// The latest sending did not leave: it does not count, and is due again.
+    /// Takes back the latest sending, which did not leave: it does not count, and is due again.
     pub(super) fn take_back(&mut self, now: Instant) {
         if let Some(due) = &mut self.what {
             uncount(&mut due.sendings);
@@ -66,7 +66,7 @@ impl<T: Copy> Repeat<T> {
     }
 }
 
-/// A steady beat: each at one period after the one before, however late that was noticed.
+/// A steady beat: each is due one period after the previous one, however late that was noticed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cadence {
     next: Option<Instant>,
@@ -75,24 +75,24 @@ pub(super) struct Cadence {
 /// One beat.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beat {
-    /// When the first beat was due that had not been taken.
+    /// Time at which the first beat not taken was due.
     due: Instant,
-    /// Beats that were missed before this one. They are not made up for.
+    /// Number of beats missed before this one. They are not made up for.
     pub(super) missed: u32,
 }
 
 impl Cadence {
-    /// Begins now, unless it has begun.
+    /// Begins now, unless it has already begun.
     pub(super) fn begin(&mut self, now: Instant) {
         self.next.get_or_insert(now);
     }
 
-    /// A beat, if it is time.
+    /// A beat, if one is due.
     pub(super) fn take_due(&mut self, now: Instant, period: Duration) -> Option<Beat> {
         let due = self.next.filter(|&next| next <= now)?;
         let late = now - due;
         if late == Duration::from_micros(u32::MAX) {
-            // More than a Duration can tell: the beat starts anew.
+            // More than a Duration can hold: restart the beat.
             self.next = Some(now + period);
             let missed = u32::MAX / period.as_micros().max(1);
             return Some(Beat { due, missed });

@@ -16,28 +16,29 @@ use crate::{
     },
 };
 
-/// A rover, as its host sees it: a pure state machine, driven as [`Endpoint`] says.
+/// A rover as seen by its host: a pure state machine, driven as described in [`Endpoint`].
 ///
-/// * **Commands (U10).** A valid command holds for 500 ms, then speed and turn are 0 until the
-///   next. Only a valid command counts: the vendor firmware is content with any byte, and drives on
-///   through noise. Out of range is cut to -100..=100, as the vendor firmware does: a sender of 360
-///   means full speed, and to refuse would leave the command before in force, which nobody wants
-///   any more. A command that would start a firmware update (U7) is not taken and does not count.
-/// * **Pings (U12).** Answered at once, and always with 0. The robot never says 1: a damaged frame
-///   is refused before anyone knows that it was a ping. The host sees a lost ping.
-/// * **Reports (U9, U10).** Every 20 ms from the first [`set_telemetry`](Self::set_telemetry) on,
-///   one period after the one before; a robot that was held up skips what it missed. `index` counts
-///   the reports that were sent. All other frames have index 0, as shipped robots send them.
-/// * **Calibration (U11, U15).** A start or end is acknowledged at once, as soon as its event has
-///   found room. A calibration lasts until the host ends it, its result has been acknowledged, or
-///   [`abort_calibration`](Self::abort_calibration); a start that comes again meanwhile is told
-///   with a flag. Results are sent every 1000 ms until acknowledged, and so is the request for
-///   biases, from the first moment until it is answered.
-/// * **Events (U15).** There is room for 16, and only what has found room ends an asking of either
-///   side: without room a request is not acknowledged, and biases and acknowledgements are not
-///   taken, so that the other side says them again. Changes of the command and of the network state
-///   take at most half of the room; when that is short, the newest of them is replaced by the
-///   latest, and both have getters.
+/// * **Commands (U10).** A valid command holds for 500 ms; then speed and turn are 0 until the
+///   next. Only valid commands count: the vendor firmware accepts any byte, and drives on through
+///   noise. Values out of range are clamped to -100..=100, as in the vendor firmware: a sender of
+///   360 means full speed, and refusing it would leave an outdated command in force. A command that
+///   would start a firmware update (U7) is refused and does not count.
+/// * **Pings (U12).** Answered at once, and always with 0. The robot never sends 1: a damaged frame
+///   is rejected before it is known to be a ping. The host notices a lost ping.
+/// * **Reports (U9, U10).** Sent every 20 ms from the first [`set_telemetry`](Self::set_telemetry)
+///   on, each one period after the previous one; a robot that was held up skips the reports it
+///   missed. `index` counts the reports sent. All other frames have index 0, as from shipped
+///   robots.
+/// * **Calibration (U11, U15).** A start or end is acknowledged as soon as its event has found
+///   room. A calibration lasts until the host ends it, its result has been acknowledged, or
+///   [`abort_calibration`](Self::abort_calibration) is called; a start repeated meanwhile is
+///   reported with a flag. Results are sent every 1000 ms until acknowledged, and so is the request
+///   for biases, from the start until it is answered.
+/// * **Events (U15).** The queue holds 16 events, and only an event that has found room settles a
+///   request from either side: without room a request is not acknowledged, and biases and
+///   acknowledgements are not accepted, so that the other side repeats them. Changes of the command
+///   and of the network state take at most half of the queue; if that is full, the latest replaces
+///   the newest of its kind, and both have getters.
 /// * **Firmware update (U7).** Never starts by itself: it is an event, and the application decides.
 /// * **Frames that only a robot sends (U13)** are counted and ignored. Shipped robots hang on id 5.
 ///
@@ -60,7 +61,7 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// A robot that has just booted: it stands still and asks for its biases.
+    /// Creates a robot that has just booted: it stands still and asks for its biases.
     #[must_use]
     pub fn new(config: RobotConfig, now: Instant) -> Self {
         let config = config.sane();
@@ -71,65 +72,68 @@ impl Robot {
         }
     }
 
-    /// What to do at this moment: the latest command, or standing still if it is too old.
+    /// The command in force: the latest, or a stop if it is too old.
     ///
-    /// Right at any time, whether or not events have been taken out and timeouts handled.
+    /// Correct at any time, whether or not events have been taken out and timeouts handled.
     #[must_use]
     pub fn command(&self, now: Instant) -> MotorControl {
         let State { command, command_until, .. } = &self.state;
         if reached(*command_until, now) { command.halted() } else { *command }
     }
 
-    /// What to do from this moment on, if that has changed since the last call of this: standing still
-    /// by the watchdog included. It cannot be lost in a full queue of events.
+    /// The command in force, if it has changed since the last call of this method; a stop by the
+    /// watchdog is a change. It cannot be lost in a full event queue.
     pub fn take_command(&mut self, now: Instant) -> Option<MotorControl> {
         self.state.watch(now);
         let is_new = core::mem::take(&mut self.state.is_command_new);
         is_new.then_some(self.state.command)
     }
 
-    /// What the next reports say. The first call starts them: nothing is reported unmeasured.
+    /// Sets the content of the next reports. The first call starts them: nothing unmeasured is
+    /// reported.
     pub fn set_telemetry(&mut self, telemetry: &Telemetry, now: Instant) {
         self.state.telemetry = *telemetry;
         self.state.reports.begin(now);
     }
 
-    /// Sends the result of an IMU calibration until the host has it, in place of one still unsent.
+    /// Sends the result of an IMU calibration until the host has it, replacing one not yet
+    /// acknowledged.
     ///
-    /// An acknowledgement does not say of which result: once this one has been sent, one still on
-    /// its way for the result before counts for this one.
+    /// An acknowledgement does not identify its result: once this result has been sent, a late
+    /// acknowledgement of the previous one counts for this one.
     pub fn calibration_result_imu(&mut self, bias: ImuBias, now: Instant) {
         self.state.begin_imu_result(bias, now);
     }
 
-    /// Sends the result of a magnetometer calibration until the host has it, likewise.
+    /// Same as [`calibration_result_imu`](Self::calibration_result_imu), for a magnetometer
+    /// calibration.
     pub fn calibration_result_mag(&mut self, bias: MagBias, now: Instant) {
         self.state.begin_mag_result(bias, now);
     }
 
-    /// Answers the host's request to update the firmware; `false` if none is unanswered.
+    /// Answers the host's firmware update request; returns `false` if there is no unanswered one.
     ///
-    /// To update is up to the application: behind [`OtaStatus::Accepted`] it takes the port away
+    /// The application performs the update: after [`OtaStatus::Accepted`] it takes the port away
     /// from this role.
     pub fn answer_update(&mut self, status: OtaStatus, now: Instant) -> bool {
         self.state.answer_update(status, now)
     }
 
-    /// What is being calibrated.
+    /// The calibration that is running, if any.
     #[must_use]
     pub fn calibrating(&self) -> Option<CalibrationKind> {
         self.state.calibrating()
     }
 
-    /// Ends the calibration that is running, if any, without a result; says which it was.
+    /// Ends the running calibration, if any, without a result; returns which one it was.
     ///
-    /// The host is not told: the protocol has no message for it. When it asks for the end, that is
-    /// acknowledged and without effect, and no result follows.
+    /// The host is not told: the protocol has no message for it. If the host asks for the end, the
+    /// request is acknowledged without effect, and no result follows.
     pub fn abort_calibration(&mut self) -> Option<CalibrationKind> {
         self.state.abort_calibration()
     }
 
-    /// State of the host's network, as it was sent last; `None` before the first.
+    /// The state of the host's network as last received; `None` before the first.
     #[must_use]
     pub const fn network_state(&self) -> Option<NetworkState> {
         self.state.network
@@ -141,32 +145,32 @@ impl Robot {
         &self.state.config
     }
 
-    /// What the robot has seen.
+    /// Counts of the robot.
     #[must_use]
     pub const fn statistics(&self) -> &RobotStatistics {
         &self.state.stats
     }
 
-    /// Where every received byte went.
+    /// Accounts for every received byte.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.inbox.counters()
     }
 
-    /// Takes in the frames that `bytes` complete.
+    /// Processes the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8], now: Instant) {
         while let Some((frame, at)) = self.inbox.next(&mut bytes) {
             self.state.receive(frame, at, now);
         }
     }
 
-    /// Takes out the events that are not to stay.
+    /// Removes the events that `stays` rejects.
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&RobotEvent) -> bool) {
         self.state.events.retain(stays);
     }
 
-    /// Events refused because nobody took the older ones out.
+    /// Number of events lost because the application did not poll in time; saturates at 2^32 - 1.
     #[must_use]
     pub const fn lost_events(&self) -> u32 {
         self.state.events.lost()
@@ -200,12 +204,12 @@ impl Endpoint for Robot {
         wire_time(bytes, self.state.config.baud)
     }
 
-    /// 20 ms, of the 500 ms for which a command counts (U10).
+    /// 20 ms of the 500 ms for which a command is valid (U10).
     fn held_up_after(&self) -> Option<Duration> {
         Some(Duration::from_millis(20))
     }
 
-    /// A command is as old as it can be (U10).
+    /// Treats commands as old as they can be (U10).
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
         if bytes.is_empty() {
             return;

@@ -1,4 +1,4 @@
-//! What a robot sends next, and what comes back unsent.
+//! The next frame of a robot, and frames that come back unsent.
 
 use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
 };
 
 impl State {
-    /// Writes the most urgent frame that is due and says how long it is.
+    /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         let outgoing = self.next(now)?;
         self.last = Some(outgoing);
@@ -35,7 +35,7 @@ impl State {
         })
     }
 
-    /// The most urgent thing to send; it counts as sent.
+    /// The most urgent frame to send; it counts as sent.
     fn next(&mut self, now: Instant) -> Option<Outgoing> {
         if let Some(answer) = self.answers.next() {
             if matches!(answer, Outgoing::Pong) {
@@ -73,10 +73,11 @@ impl State {
         }
     }
 
-    /// Takes back the frame that was handed out last: what it carried is decided anew.
+    /// Takes back the frame handed out last: its content is decided again.
     ///
-    /// What the host asks for again by itself is not repeated after a failed flush, behind which it
-    /// may have arrived. Results and requests are due at once: a host knows a repetition.
+    /// After a failed flush the frame may have arrived, so anything that the host requests again
+    /// anyway is not repeated. Results and requests are due at once: a host recognises a
+    /// repetition.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
         let last = self.last.take();
         if unsent == Unsent::Unflushed {
@@ -92,7 +93,7 @@ impl State {
         }
     }
 
-    /// Nothing that the host could act on has left.
+    /// Takes back a frame of which nothing that the host could act on has left.
     fn take_back(&mut self, outgoing: Outgoing, now: Instant) {
         match outgoing {
             Outgoing::StartAck(kind) => {

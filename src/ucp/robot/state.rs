@@ -1,4 +1,4 @@
-//! What a robot knows and is waiting for.
+//! State of a robot.
 
 use super::{
     config::RobotConfig,
@@ -23,16 +23,16 @@ use crate::{
     },
 };
 
-/// Everything but the bytes.
+/// Everything except the bytes.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) config: RobotConfig,
     pub(super) events: Events<RobotEvent, 16>,
     pub(super) stats: RobotStatistics,
     pub(super) command: MotorControl,
-    /// The command has changed since it was taken.
+    /// Whether the command has changed since it was taken.
     pub(super) is_command_new: bool,
-    /// When the command is too old; `None` while the robot stands still for want of one.
+    /// Time at which the command is too old; `None` while the robot stands still for lack of one.
     pub(super) command_until: Option<Instant>,
     pub(super) answers: Answers,
     /// Counter of the next report.
@@ -45,15 +45,15 @@ pub(super) struct State {
     pub(super) bias_request: Repeat<BiasRequest>,
     pub(super) network: Option<NetworkState>,
     pub(super) update_asked: bool,
-    /// The frame that was handed out last, as long as it may come back.
+    /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
 }
 
-/// A calibration that is running.
+/// A running calibration.
 #[derive(Clone, Copy, Debug)]
 struct Calibration {
     kind: CalibrationKind,
-    /// Its result has been handed in: the acknowledgement of that ends it.
+    /// Whether its result has been handed in: the acknowledgement of the result ends it.
     has_result: bool,
 }
 
@@ -113,7 +113,7 @@ impl State {
         asked
     }
 
-    /// Takes in a frame that had arrived at `at`.
+    /// Processes a frame that arrived at `at`.
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant, now: Instant) {
         let message = frame.message();
         if is_from_host(&message) == Some(false) {
@@ -160,7 +160,7 @@ impl State {
         let resumed = self.command_until.is_none();
         self.command_until = Some(at + self.config.watchdog);
         if reached(self.command_until, now) {
-            // Too old already: it moves nothing, and is not told as one that does.
+            // Already too old: it moves nothing, and is not reported as a moving command.
             command = command.halted();
         }
         if resumed || command != self.command {
@@ -169,7 +169,7 @@ impl State {
         }
     }
 
-    /// Stops when the command has become too old.
+    /// Stops the robot when the command is too old.
     pub(super) fn watch(&mut self, now: Instant) {
         if reached(self.command_until, now) {
             self.command_until = None;
@@ -197,7 +197,8 @@ impl State {
         self.answers.ask(at);
     }
 
-    /// Tells of a start. A repetition of one that still waits in the queue is told by that one.
+    /// Reports a start. If the previous start still waits in the queue, a repetition needs no
+    /// event.
     fn tell_start(&mut self, kind: CalibrationKind, repeated: bool) -> bool {
         let waits = match self.events.newest(is_calibration) {
             Some(RobotEvent::CalibrationStart { kind: waiting, .. }) => *waiting == kind,
@@ -234,7 +235,8 @@ impl State {
         }
     }
 
-    /// The host says that it has a result: tells so, and ends the calibration that it came from.
+    /// Handles the host's acknowledgement of a result: reports it, and ends the result's
+    /// calibration.
     fn is_taken(
         &mut self,
         asked: bool,
@@ -273,8 +275,7 @@ impl State {
         }
     }
 
-    /// Tells of a request to update. A repetition of one that still waits in the queue is told by
-    /// it.
+    /// Reports an update request. If the same request still waits in the queue, it needs no event.
     fn tell_update(&mut self, event: RobotEvent) -> bool {
         let waits = |event: &RobotEvent| matches!(event, RobotEvent::UpdateRequested { .. });
         self.events.newest(waits) == Some(&event) || self.events.keep(event).is_ok()
@@ -295,7 +296,7 @@ const fn is_calibration(event: &RobotEvent) -> bool {
     matches!(event, RobotEvent::CalibrationStart { .. } | RobotEvent::CalibrationEnd(_))
 }
 
-/// The command within -100..=100, its lamp on or off as the vendor firmware reads it.
+/// The command clamped to -100..=100, its lamp on or off as the vendor firmware reads it.
 fn clamped(command: &RawMotorControl) -> MotorControl {
     let limit = MotorControl::LIMIT;
     MotorControl::new(command.speed().clamp(-limit, limit), command.angular().clamp(-limit, limit))
