@@ -79,19 +79,8 @@ pub enum Packet<'a> {
 /// assert_eq!(packet.as_bytes()[..6], [0xBB, 0x01, 0x00, 0x00, 0xC0, 0x3F]);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -146,19 +135,8 @@ impl WriteRequest {
 }
 
 /// Slave to master, status of a velocity node with three motors: 16 bytes.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -194,19 +172,8 @@ impl VelocityResponse {
 }
 
 /// Slave to master, status of a position node with three motors: 16 bytes.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]

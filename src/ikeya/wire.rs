@@ -16,19 +16,8 @@ pub(super) mod header {
 
     macro_rules! header {
         ($name:ident = $value:tt) => {
-            #[derive(
-                Clone,
-                Copy,
-                Debug,
-                Eq,
-                Hash,
-                PartialEq,
-                TryFromBytes,
-                IntoBytes,
-                Immutable,
-                KnownLayout,
-                Unaligned,
-            )]
+            #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+            #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
             #[cfg_attr(
                 feature = "bytemuck",
                 derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit)
@@ -56,19 +45,8 @@ pub(super) mod header {
 /// use axlewire::ikeya::{NodeId, ReadRequest};
 /// assert_eq!(ReadRequest::new(NodeId::N1).as_bytes(), &[0xAA, 0x01, 0xBE, 0xD0]);
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -116,19 +94,8 @@ impl ReadRequest {
 /// assert_eq!(go.as_bytes(), &[0xBB, 0x06, 0x00, 0x10, 0x01, 0x00, 0x93, 0x05]);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -197,19 +164,8 @@ impl WriteRequest {
 /// assert_eq!((response.id(), response.rps()), (NodeId::N2, 1.0));
 /// # Ok::<(), axlewire::error::ParseError>(())
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -256,19 +212,8 @@ impl VelocityResponse {
 /// let response = PositionResponse::new(NodeId::N3, Position::new(4096, 1));
 /// assert_eq!(response.as_bytes(), &[0x56, 0x03, 0x00, 0x10, 0x01, 0x00, 0x48, 0x78]);
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]

@@ -23,9 +23,8 @@ use crate::{
 /// assert!(matches!(frame.message(), Message::Pong(_)));
 /// # Ok::<(), axlewire::error::ParseError>(())
 /// ```
-#[derive(
-    Debug, Eq, Hash, PartialEq, TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned,
-)]
+#[derive(Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct Frame {
     header: Header,
@@ -154,19 +153,8 @@ pub(super) mod sealed {
 /// use axlewire::ucp::{message::Ping, Body};
 /// assert_eq!(Ping {}.frame(0).as_bytes(), [0xFD, 0xFF, 0x04, 0, 0x01, 0, 0x01, 0x42]);
 /// ```
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct FrameOf<B> {

@@ -18,19 +18,8 @@ pub(super) const LEN_WITHOUT_BODY: usize = 4;
 pub(super) const OUTSIDE_LEN: usize = 4;
 
 /// First byte of a frame; any other value makes an invalid header.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -39,19 +28,8 @@ enum FirstSync {
 }
 
 /// Second byte of a frame.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -63,19 +41,8 @@ enum SecondSync {
 pub const SYNC: [u8; 2] = [FirstSync::Value as u8, SecondSync::Value as u8];
 
 /// The fields before every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Eq,
-    Hash,
-    PartialEq,
-    TryFromBytes,
-    IntoBytes,
-    Immutable,
-    KnownLayout,
-    Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]

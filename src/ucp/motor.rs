@@ -37,7 +37,8 @@ use crate::error::EncodeError;
 /// [`yaw_left`](Self::yaw_left) turn the nose, in reverse too.
 ///
 /// A speed of -5..=5 counts as 0: the robot then turns on the spot if `angular` is beyond ±10.
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq, IntoBytes, Immutable, KnownLayout, Unaligned)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -275,9 +276,8 @@ impl TryFrom<RawMotorControl> for MotorControl {
 ///     let _ = received.frame(0); // no such method
 /// }
 /// ```
-#[derive(
-    Clone, Copy, Debug, Eq, Hash, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]

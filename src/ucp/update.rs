@@ -18,7 +18,8 @@ use super::{
 /// use zerocopy::FromBytes;
 /// let request = OtaRequest::read_from_bytes(&[40, 0]); // no such method
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq, IntoBytes, Immutable, KnownLayout, Unaligned)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -57,9 +58,8 @@ impl OtaRequest {
 ///     let _ = received.frame(0); // no such method
 /// }
 /// ```
-#[derive(
-    Clone, Copy, Debug, Eq, Hash, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned,
-)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
