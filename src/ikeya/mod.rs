@@ -15,6 +15,46 @@
 //!
 //! A slave answers a READ for its own id within about 50 µs, and never answers a WRITE.
 //!
+//! # Decoding
+//!
+//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`BothDirections`] both. None of them waits
+//! for more than the packet that a header announces, at most 8 bytes.
+//!
+//! ```
+//! use axlewire::{ikeya, stream::Event};
+//!
+//! let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
+//! let mut line: &[u8] = &[0x00, 0xAA, 0x01, 0xBE, 0xD0]; // a stray byte, READ for node 1
+//! while let Some(event) = decoder.decode(&mut line) {
+//!     match event {
+//!         Event::Frame(ikeya::Request::Read(read)) => assert_eq!(read.id().get(), 1),
+//!         Event::Frame(ikeya::Request::Write(_)) => unreachable!(),
+//!         Event::Skipped(gap) => assert_eq!(gap.len, 1),
+//!     }
+//! }
+//! assert_eq!(decoder.counters().framed, 4);
+//! ```
+//!
+//! # Encoding
+//!
+//! A packet is built by a constructor, which takes only values that exist, and knows its bytes.
+//!
+//! ```
+//! use axlewire::ikeya::{NodeId, Rps, WriteRequest};
+//!
+//! let turn = WriteRequest::velocity(NodeId::N2, Rps::from_rpm(60.0)?); // 1 revolution per second
+//! assert_eq!(turn.as_bytes(), &[0xBB, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x43, 0x40]);
+//! assert!(Rps::new(f32::NAN).is_err());
+//! # Ok::<(), axlewire::error::EncodeError>(())
+//! ```
+//!
+//! # Roles
+//!
+//! [`Master`] and [`Slave`] speak the protocol without a clock or a port, see
+//! [`endpoint`](crate::endpoint); `drive::Driver` gives them both. Their settings, events and
+//! statistics are in [`master`] and [`slave`]. [`Schedule`] computes how fast a bus can be before it
+//! is wired. Boards with three motors: [`board`] and [`three`].
+//!
 //! # Rulings
 //!
 //! Where the protocol document is silent, unclear or wrong, this crate decides:
@@ -66,31 +106,6 @@
 //!   set-points, in turn, then a discovery, then the cycle. A master can have a dead-man.
 //! * **I14** A slave drops an answer when more bytes arrived before it was sent, or when it is too
 //!   late. On two wires it also follows the answers of other nodes.
-//!
-//! # Roles
-//!
-//! [`Master`] and [`Slave`] speak the protocol without a clock or a port, see
-//! [`endpoint`](crate::endpoint). [`Schedule`] computes how fast a bus can be before it is wired.
-//!
-//! # Decoding
-//!
-//! [`ToMaster`] finds responses, [`ToSlave`] requests, [`BothDirections`] both. None of them waits
-//! for more than the packet that a header announces, at most 8 bytes.
-//!
-//! ```
-//! use axlewire::{ikeya, stream::Event};
-//!
-//! let mut decoder = ikeya::Decoder::<ikeya::ToSlave>::new();
-//! let mut line: &[u8] = &[0x00, 0xAA, 0x01, 0xBE, 0xD0]; // a stray byte, READ for node 1
-//! while let Some(event) = decoder.decode(&mut line) {
-//!     match event {
-//!         Event::Frame(ikeya::Request::Read(read)) => assert_eq!(read.id().get(), 1),
-//!         Event::Frame(ikeya::Request::Write(_)) => unreachable!(),
-//!         Event::Skipped(gap) => assert_eq!(gap.len, 1),
-//!     }
-//! }
-//! assert_eq!(decoder.counters().framed, 4);
-//! ```
 //!
 //! [`DipSwitch`]: slave::DipSwitch
 //! [`MasterConfig::hold_age`]: master::MasterConfig::hold_age

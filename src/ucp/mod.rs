@@ -26,6 +26,44 @@
 //! The numbers are body lengths in bytes. Id and body length together identify the message, so the
 //! direction need not be known.
 //!
+//! # Decoding
+//!
+//! [`Decoder`] finds frames, [`Frame::message`] reads one. [`message`] has all messages.
+//!
+//! ```
+//! use axlewire::{stream::Event, ucp::{self, Message}};
+//!
+//! let mut decoder = ucp::Decoder::new();
+//! let mut line: &[u8] = &[0x00, 0xFD, 0xFF, 4, 0, 1, 0, 0x01, 0x42]; // a stray byte, a ping
+//! while let Some(event) = decoder.decode(&mut line) {
+//!     match event {
+//!         Event::Frame(frame) => assert!(matches!(frame.message(), Message::Ping(_))),
+//!         Event::Skipped(gap) => assert_eq!(gap.len, 1),
+//!     }
+//! }
+//! assert_eq!(decoder.counters().framed, 8);
+//! ```
+//!
+//! # Encoding
+//!
+//! [`Body::frame`] makes a whole frame of a message that may be sent.
+//!
+//! ```
+//! use axlewire::ucp::{Body, Frame, Message, MotorControl};
+//!
+//! let sent = MotorControl::turn_right(60, 20)?.frame(7);
+//! let Message::MotorControl(command) = Frame::parse(sent.as_bytes())?.message() else { panic!() };
+//! assert_eq!((sent.index(), command.speed(), command.angular()), (7, 60, 20));
+//! assert!(MotorControl::new(101, 0).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Roles
+//!
+//! [`Host`] and [`Robot`] do the talking, without a clock or a port, see
+//! [`endpoint`](crate::endpoint): repetition, timeouts and safety; `drive::Driver` gives them clock
+//! and port. Their settings, events and statistics are in [`host`] and [`robot`].
+//!
 //! # Rulings
 //!
 //! Where the protocol document is silent, unclear or wrong, this crate decides:
@@ -77,26 +115,6 @@
 //!   twice if the frame was cut off. The first frame of a host is a zero motor command, because a
 //!   vendor robot keeps driving while any byte arrives: a restarted host that only pings would keep
 //!   it moving. To disable this for hosts that only listen, clear [`HostConfig::sends_first_stop`].
-//!
-//! # Layers
-//!
-//! [`Decoder`] finds frames, [`Frame::message`] reads one, [`Body::frame`] builds one. [`Host`] and
-//! [`Robot`] do the talking: repetition, timeouts and safety.
-//!
-//! # Decoding and encoding
-//!
-//! ```
-//! use axlewire::{stream::Event, ucp::{self, Body, Message, MotorControl}};
-//!
-//! let sent = MotorControl::turn_right(60, 20)?.frame(7);
-//!
-//! let mut decoder = ucp::Decoder::new();
-//! let mut line: &[u8] = sent.as_bytes();
-//! let Some(Event::Frame(frame)) = decoder.decode(&mut line) else { panic!() };
-//! let Message::MotorControl(command) = frame.message() else { panic!() };
-//! assert_eq!((frame.index(), command.speed(), command.angular()), (7, 60, 20));
-//! # Ok::<(), axlewire::error::EncodeError>(())
-//! ```
 //!
 //! [`BiasStore`]: host::BiasStore
 //! [`HostConfig::low_ids_only`]: host::HostConfig::low_ids_only
