@@ -1,8 +1,8 @@
-//! Frames that can be sent.
+//! Encoding of frames.
 
 use crate::error::EncodeError;
 
-/// A whole frame that can be sent: it knows its bytes, CRC included.
+/// A whole frame that can be sent, CRC included.
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
@@ -22,8 +22,8 @@ pub trait Encode {
     ///
     /// # Errors
     ///
-    /// [`EncodeError::BufferTooSmall`] when it does not fit, and what the type itself refuses;
-    /// `buffer` is then unchanged.
+    /// [`EncodeError::BufferTooSmall`] if the frame does not fit, or the type's own error. `buffer`
+    /// is then unchanged.
     fn encode<'b>(&self, buffer: &'b mut [u8]) -> Result<&'b [u8], EncodeError>;
 }
 

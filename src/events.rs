@@ -1,4 +1,4 @@
-//! Where a role keeps its events for the application: a queue, or a place for the latest.
+//! Events of a role that the application has not taken yet: a queue, or a slot for the latest.
 
 use heapless::Deque;
 
@@ -6,10 +6,11 @@ use heapless::Deque;
 use crate::stats::count;
 use crate::stats::count_apart;
 
-/// A queue of at most `N` events, in their order.
+/// A queue of at most `N` events, in order.
 ///
-/// Half of it is reserved (ruling U15): what comes all the time, and what comes again by itself, never takes the
-/// room of events that happen once. What finds no room is counted, unless the caller keeps it.
+/// Half of it is reserved for events that happen once (ruling U15): frequent events, and those that
+/// repeat by themselves, never take that room. Events that find no room are counted as lost, unless
+/// the caller keeps them.
 #[derive(Clone, Debug)]
 pub(crate) struct Events<E, const N: usize> {
     queue: Deque<E, N>,
@@ -21,19 +22,19 @@ impl<E, const N: usize> Events<E, N> {
         Self { queue: Deque::new(), lost: 0 }
     }
 
-    /// Queues a rare event, or gives it back when there is no room.
+    /// Queues a rare event, or returns it if there is no room.
     pub(crate) fn keep(&mut self, event: E) -> Result<(), E> {
         self.queue.push_back(event)
     }
 
-    /// Queues a rare event that nobody can keep or repeat.
+    /// Queues a rare event that cannot be kept elsewhere or repeated.
     pub(crate) fn push(&mut self, event: E) {
         if self.keep(event).is_err() {
             count_apart(&mut self.lost);
         }
     }
 
-    /// Queues an event that comes all the time, or again by itself.
+    /// Queues a frequent event, or one that repeats by itself.
     pub(crate) fn push_frequent(&mut self, event: E) {
         if self.is_reserved() {
             count_apart(&mut self.lost);
@@ -42,9 +43,8 @@ impl<E, const N: usize> Events<E, N> {
         }
     }
 
-    /// Queues an event of which only the latest of its sort matters: when room is short it takes
-    /// the place of the newest one of that sort, so that the last one in the queue is always the
-    /// latest.
+    /// Queues an event of which only the latest of its kind matters. When room is short it replaces
+    /// the newest event of that kind, so that the last one in the queue is always the latest.
     #[cfg(feature = "ucp")]
     pub(crate) fn push_latest(&mut self, event: E, is_of_its_sort: impl Fn(&E) -> bool) {
         let is_reserved = self.is_reserved();
@@ -58,7 +58,7 @@ impl<E, const N: usize> Events<E, N> {
         }
     }
 
-    /// The newest event of a sort that still waits.
+    /// The newest queued event of a kind.
     #[cfg(feature = "ucp")]
     pub(crate) fn newest(&self, is_of_its_sort: impl Fn(&E) -> bool) -> Option<&E> {
         self.queue.iter().rev().find(|queued| is_of_its_sort(queued))
@@ -68,13 +68,13 @@ impl<E, const N: usize> Events<E, N> {
         self.queue.pop_front()
     }
 
-    /// Takes out every event that is not to stay; the others keep their order.
+    /// Removes every event that does not stay; the others keep their order.
     #[cfg(any(test, feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain(&mut self, mut stays: impl FnMut(&E) -> bool) {
         for _ in 0..self.queue.len() {
             match self.queue.pop_front() {
                 Some(event) if stays(&event) => {
-                    // It has just made the room that it takes.
+                    // There is room: it was just taken out.
                     let _ = self.queue.push_back(event);
                 }
                 _ => {}
@@ -87,16 +87,16 @@ impl<E, const N: usize> Events<E, N> {
         self.lost
     }
 
-    /// Is the rest of the room for rare events only?
+    /// Whether the remaining room is for rare events only.
     fn is_reserved(&self) -> bool {
         self.queue.len() >= N / 2
     }
 }
 
-/// A place for one event, of which only the latest matters. It takes the place of one that nobody
-/// has taken out, which is counted as lost.
+/// A slot for one event, of which only the latest matters. A new event replaces one that was not
+/// taken, which is counted as lost.
 ///
-/// A queue of one would do the same in 150 more bytes of flash.
+/// A queue of one would do the same, but needs 150 more bytes of flash.
 #[cfg(feature = "ikeya")]
 #[derive(Clone, Debug)]
 pub(crate) struct Latest<E> {
@@ -116,7 +116,7 @@ impl<E> Latest<E> {
         }
     }
 
-    /// The event, left in its place.
+    /// The event, without taking it.
     pub(crate) const fn peek(&self) -> Option<&E> {
         self.event.as_ref()
     }
@@ -140,7 +140,7 @@ mod tests {
         let mut events: Events<u8, 4> = Events::new();
         (0..4).for_each(|event| events.push_frequent(event));
         assert_eq!((events.keep(10), events.keep(11), events.keep(12)), (Ok(()), Ok(()), Err(12)));
-        assert_eq!(events.lost(), 2, "the caller has the last");
+        assert_eq!(events.lost(), 2, "the caller got the last one back");
         let all: heapless::Vec<u8, 8> = core::iter::from_fn(|| events.pop()).collect();
         assert_eq!(all, [0, 1, 10, 11]);
     }

@@ -1,27 +1,27 @@
-//! When received bytes arrived, and when the line is idle: the inbox of every role that waits for
-//! the other end to speak first.
+//! When received bytes arrived, and when the line is idle. For every role that waits for the other
+//! end to speak first.
 
 use crate::time::{Duration, Instant, reached};
 
-/// The times of the newest bytes that a role has received.
+/// Times of the newest received bytes.
 #[derive(Clone, Debug)]
 pub(crate) struct Inbox {
-    /// Earliest time at which the newest byte can have arrived.
+    /// Earliest time at which the newest byte may have arrived.
     last: Instant,
-    /// When that byte was handed in: the rest of its frame may come from then on.
+    /// When that byte was handed in: the rest of its frame may arrive from then on.
     read_at: Instant,
-    /// A pause this long cuts a frame off.
+    /// Length of a pause that cuts a frame off.
     idle: Duration,
     after_idle: AfterIdle,
 }
 
-/// What an idle line means for the candidates behind the one that it has ended.
+/// What an idle line means for the candidates behind the one it ends.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) enum AfterIdle {
-    /// They end with it.
+    /// They end as well.
     #[cfg(feature = "ucp")]
     GiveUpAll,
-    /// Each may go on for as long again.
+    /// Each waits for as long again.
     #[cfg(feature = "ikeya")]
     WaitAgain,
 }
@@ -31,15 +31,16 @@ impl Inbox {
         Self { last: now, read_at: now, idle, after_idle }
     }
 
-    /// Bytes are handed in at `now`, and may have arrived at any time from `at` on.
+    /// Notes bytes handed in at `now` that may have arrived at any time from `at` on.
     pub(crate) const fn receive(&mut self, at: Instant, now: Instant) {
         (self.last, self.read_at) = (at, now);
     }
 
-    /// Has the line been idle for so long that nothing will complete the `pending` bytes (ruling B3)?
+    /// Whether the line has been idle for long enough that nothing will complete the `pending`
+    /// bytes (ruling B3).
     ///
-    /// If it has, call `idle` of the decoder and take the frames that the candidate has held back,
-    /// and then ask again.
+    /// If it has, call the decoder's `idle`, take the frames that the candidate held back, and call
+    /// this again.
     pub(crate) fn settle(&mut self, pending: usize, now: Instant) -> bool {
         let is_idle = reached(self.deadline(pending), now);
         if is_idle {
@@ -53,12 +54,12 @@ impl Inbox {
         is_idle
     }
 
-    /// When the newest byte had arrived, at the earliest.
+    /// Earliest time at which the newest byte may have arrived.
     pub(crate) const fn last(&self) -> Instant {
         self.last
     }
 
-    /// When the line counts as idle, if any byte is pending.
+    /// When the line counts as idle, if any bytes are pending.
     pub(crate) fn deadline(&self, pending: usize) -> Option<Instant> {
         (pending > 0).then(|| self.read_at + self.idle)
     }

@@ -1,4 +1,4 @@
-//! Two serial protocols for motors and rovers, the same code in firmware and on a host.
+//! Two serial protocols for motors and rovers: the same code in firmware and on a host.
 //!
 //! * `ikeya`: **Ikeya MD**, an RS485 bus of up to eight motor drivers, 500 kbit/s.
 //! * `ucp`: **UCP**, the UART between a rover's Linux board and its STM32, 115,200 bit/s.
@@ -7,8 +7,8 @@
 //!
 #![doc = include_str!("guarantees.md")]
 //!
-//! **Before you connect a motor, read the page `safety`**: what can move or fail to stop, what this crate
-//! does about it, and what is left to you.
+//! **Before you connect a motor, read the page `safety`**: what can move or fail to stop, what this
+//! crate does about it, and what is left to you.
 //!
 //! # Where to start
 //!
@@ -48,8 +48,8 @@
 //! # Rulings
 //!
 //! Where a protocol document is silent, unclear or wrong, a numbered ruling decides. B1 to B6 hold
-//! for both protocols, I1 to I14 for `ikeya`, U1 to U16 for `ucp`; they are on those pages and, for
-//! B2 to B4, in [`stream`]. B1: the CRC is CRC-16/MODBUS over every byte in front of it, low byte
+//! for both protocols, I1 to I14 for `ikeya`, U1 to U16 for `ucp`. Those pages list them;
+//! [`stream`] lists B2 to B4. B1: the CRC is CRC-16/MODBUS over every byte in front of it, low byte
 //! first. B5: the wire is little-endian on every machine. B6: a byte takes 10 bit times.
 
 #![no_std]
@@ -94,7 +94,7 @@ pub mod time;
 #[cfg(feature = "ucp")]
 pub mod ucp;
 
-/// The examples of the README are tests, too.
+/// Runs the examples of the README as tests.
 #[cfg(all(doctest, feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,10 +1,10 @@
-//! Bytes on their way to a port that takes them in parts: the outbox of a writer and of a driver.
+//! Bytes for a port that takes them in parts: the outbox of a writer and of a driver.
 
 use heapless::Vec;
 
 use crate::{encode::Encode, error::EncodeError};
 
-/// Bytes that a port has not taken yet, at most `N`.
+/// At most `N` bytes that a port has not taken yet.
 #[derive(Clone, Debug)]
 pub(crate) struct Outbox<const N: usize> {
     unsent: Vec<u8, N>,
@@ -24,7 +24,7 @@ impl<const N: usize> Outbox<N> {
         self.unsent.is_empty()
     }
 
-    /// Puts a frame behind what is still to be sent, or changes nothing.
+    /// Appends a frame, or changes nothing.
     pub(crate) fn queue(&mut self, frame: &impl Encode) -> Result<(), EncodeError> {
         let (start, needed) = (self.unsent.len(), frame.encoded_len());
         let too_small = EncodeError::BufferTooSmall { needed, available: N - start };
@@ -37,17 +37,17 @@ impl<const N: usize> Outbox<N> {
         encoded
     }
 
-    /// Puts the bytes of a frame behind what is still to be sent; `None` if they do not fit.
+    /// Appends the bytes of a frame; `None` if they do not fit.
     pub(crate) fn extend(&mut self, frame: &[u8]) -> Option<()> {
         self.unsent.extend_from_slice(frame).ok()
     }
 
-    /// The port has taken `count` bytes.
+    /// Removes `count` bytes, which the port has taken.
     pub(crate) fn taken(&mut self, count: usize) {
         self.unsent.drain(..count.min(self.unsent.len()));
     }
 
-    /// Gives up what is still to be sent; returns the number of bytes given up.
+    /// Discards the unsent bytes; returns their number.
     pub(crate) fn discard(&mut self) -> usize {
         let discarded = self.unsent.len();
         self.unsent.clear();

@@ -1,33 +1,33 @@
-//! What the statistics of all roles are made of: counts that stop at 2^32 - 1, and times.
+//! Building blocks of all roles' statistics: counts that stop at 2^32 - 1, and latencies.
 
 use crate::time::Duration;
 
-/// Counts one more.
+/// Adds one.
 #[inline]
 pub(crate) const fn count(counter: &mut u32) {
     *counter = counter.saturating_add(1);
 }
 
-/// Counts one more, out of line: for a role that counts in many places, to save code size.
+/// Adds one, out of line: saves code size in a role that counts in many places.
 #[inline(never)]
 pub(crate) const fn count_apart(counter: &mut u32) {
     count(counter);
 }
 
-/// Counts this many more.
+/// Adds `number`.
 #[cfg(feature = "ikeya")]
 #[inline]
 pub(crate) const fn add(counter: &mut u32, number: u32) {
     *counter = counter.saturating_add(number);
 }
 
-/// Takes back one that was counted and did not happen.
+/// Takes back one that was counted but did not happen.
 #[inline]
 pub(crate) const fn uncount(counter: &mut u32) {
     *counter = counter.saturating_sub(1);
 }
 
-/// Times from a request to its answer: number, latest, fastest, slowest and mean.
+/// Times from a request to its answer: count, latest, fastest, slowest and mean.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -40,7 +40,7 @@ pub struct Latency {
 }
 
 impl Latency {
-    /// As [`default`](Self::default), for constants.
+    /// [`default`](Self::default), for constants.
     #[cfg(feature = "ikeya")]
     pub(crate) const NEW: Self = Self { count: 0, last_us: 0, min_us: 0, max_us: 0, sum_us: 0 };
 
@@ -49,7 +49,8 @@ impl Latency {
         self.min_us = if self.count == 0 { micros } else { self.min_us.min(micros) };
         self.max_us = self.max_us.max(micros);
         self.last_us = micros;
-        // 2^32 spans of 32 bits fit into 64; one more would let the mean drift.
+        // The sum of 2^32 values of 32 bits fits into 64 bits. Counting beyond that would skew the
+        // mean.
         if let Some(count) = self.count.checked_add(1) {
             self.count = count;
             self.sum_us += u64::from(micros);
@@ -62,25 +63,26 @@ impl Latency {
         self.count
     }
 
-    /// The latest; `None` before the first.
+    /// The latest time; `None` before the first answer.
     #[must_use]
     pub const fn last(&self) -> Option<Duration> {
         if self.count == 0 { None } else { Some(Duration::from_micros(self.last_us)) }
     }
 
-    /// The fastest; `None` before the first.
+    /// The shortest time; `None` before the first answer.
     #[must_use]
     pub const fn min(&self) -> Option<Duration> {
         if self.count == 0 { None } else { Some(Duration::from_micros(self.min_us)) }
     }
 
-    /// The slowest; `None` before the first.
+    /// The longest time; `None` before the first answer.
     #[must_use]
     pub const fn max(&self) -> Option<Duration> {
         if self.count == 0 { None } else { Some(Duration::from_micros(self.max_us)) }
     }
 
-    /// The mean of the first 2^32 - 1, truncated; `None` before the first.
+    /// Mean of the first 2^32 - 1 times, rounded down to a microsecond; `None` before the first
+    /// answer.
     #[must_use]
     pub const fn mean(&self) -> Option<Duration> {
         match self.sum_us.checked_div(self.count as u64) {

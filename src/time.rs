@@ -1,16 +1,16 @@
-//! Time as the roles see it: microseconds, handed in by the caller.
+//! Time as the roles see it: microseconds, supplied by the caller.
 //!
-//! No role reads a clock. Whoever drives one passes the time of each call as an [`Instant`], from
-//! any free-running source: only differences count. An `Instant` has 64 bits, which wrap after
-//! 584,000 years; a hardware timer of 32 bits wraps after 71 minutes, and [`Wrapping32`] makes one
-//! of the other. Comparisons look at differences, so even the wrap of the 64 bits is harmless.
+//! No role reads a clock. Pass the time of each call as an [`Instant`], from any free-running
+//! source: only differences count. An `Instant` has 64 bits and wraps after 584,000 years. A 32-bit
+//! hardware timer wraps after 71 minutes; [`Wrapping32`] extends it to 64 bits. Comparisons use
+//! differences, so even the 64-bit wrap is harmless.
 
 use core::{
     cmp::Ordering,
     ops::{Add, AddAssign, Sub},
 };
 
-/// A span of time, microseconds, up to 71 minutes.
+/// A span of time in microseconds, up to 71 minutes.
 #[derive(Clone, Copy, Debug, Default, Eq, Hash, Ord, PartialEq, PartialOrd)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,7 +19,7 @@ pub struct Duration {
 }
 
 impl Duration {
-    /// No time at all.
+    /// Zero.
     pub const ZERO: Self = Self::from_micros(0);
 
     /// A span in microseconds.
@@ -28,7 +28,7 @@ impl Duration {
         Self { micros }
     }
 
-    /// A span in milliseconds, at most 4,294,967 of them: a longer one is cut to 71 minutes.
+    /// A span in milliseconds. More than 4,294,967 ms saturate to 71 minutes.
     #[must_use]
     pub const fn from_millis(millis: u32) -> Self {
         Self { micros: millis.saturating_mul(1000) }
@@ -40,13 +40,13 @@ impl Duration {
         self.micros
     }
 
-    /// Both spans together, at most 71 minutes.
+    /// The sum of both spans, at most 71 minutes.
     #[must_use]
     pub const fn saturating_add(self, other: Self) -> Self {
         Self { micros: self.micros.saturating_add(other.micros) }
     }
 
-    /// The span `times` over, at most 71 minutes.
+    /// The span multiplied by `times`, at most 71 minutes.
     #[must_use]
     pub const fn saturating_mul(self, times: u32) -> Self {
         Self { micros: self.micros.saturating_mul(times) }
@@ -61,9 +61,9 @@ impl Add for Duration {
     }
 }
 
-/// A point in time, microseconds since any moment that the caller likes.
+/// A point in time, in microseconds since a zero that the caller chooses.
 ///
-/// Of two instants less than 292,000 years apart the later one is the greater.
+/// Of two instants less than 292,000 years apart, the later one is the greater.
 ///
 /// ```
 /// use axlewire::time::{Duration, Instant};
@@ -81,13 +81,13 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// The time in microseconds.
+    /// An instant at this number of microseconds.
     #[must_use]
     pub const fn from_micros(micros: u64) -> Self {
         Self { micros }
     }
 
-    /// The time in milliseconds.
+    /// An instant at this number of milliseconds.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
         Self { micros: millis.wrapping_mul(1000) }
@@ -131,7 +131,7 @@ impl AddAssign<Duration> for Instant {
     }
 }
 
-/// The time from `other` to `self`: zero if that is backwards, at most 71 minutes.
+/// The time from `other` to `self`: zero if `other` is later, at most 71 minutes.
 impl Sub for Instant {
     type Output = Duration;
 
@@ -141,7 +141,7 @@ impl Sub for Instant {
     }
 }
 
-/// Makes instants of a 32-bit microsecond counter that wraps every 71 minutes.
+/// Extends a 32-bit microsecond counter, which wraps every 71 minutes, to [`Instant`]s.
 ///
 /// ```
 /// use axlewire::time::Wrapping32;
@@ -158,13 +158,14 @@ pub struct Wrapping32 {
 }
 
 impl Wrapping32 {
-    /// Starts with the counter's first turn.
+    /// Starts in the first cycle of the counter.
     #[must_use]
     pub const fn new() -> Self {
         Self { last: 0 }
     }
 
-    /// The time at a reading of the counter. To be asked at least once in 71 minutes, in order.
+    /// The time at this reading of the counter. Pass readings in order, at least one every 71
+    /// minutes.
     pub fn at(&mut self, counter: u32) -> Instant {
         let elapsed = counter.wrapping_sub(self.last as u32);
         self.last = self.last.wrapping_add(elapsed.into());
@@ -173,7 +174,7 @@ impl Wrapping32 {
 }
 
 /// The earliest of these deadlines, if there is one.
-// One copy for all roles and their drivers: flash counts more than the call.
+// One copy for all roles and their drivers: flash matters more than the cost of the call.
 #[cfg(any(
     feature = "ikeya",
     feature = "ucp",
@@ -185,7 +186,7 @@ pub(crate) fn earliest(deadlines: &[Option<Instant>]) -> Option<Instant> {
     deadlines.iter().flatten().copied().reduce(Instant::min)
 }
 
-/// Has this deadline been reached?
+/// Whether this deadline has been reached.
 #[cfg(any(
     feature = "ikeya",
     feature = "ucp",
@@ -196,9 +197,9 @@ pub(crate) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
     deadline.is_some_and(|at| at <= now)
 }
 
-/// How long `bytes` bytes take on a line: 10 bit times each, rounded up (ruling B6).
+/// Time that `bytes` bytes take on a line: 10 bit times each, rounded up (ruling B6).
 ///
-/// A `baud` of 0 is a line that never gets done: the longest span there is.
+/// For a `baud` of 0, the longest span: such a line never finishes.
 ///
 /// ```
 /// use axlewire::time::wire_time;
@@ -213,7 +214,7 @@ pub const fn wire_time(bytes: usize, baud: u32) -> Duration {
     if baud == 0 {
         return Duration::from_micros(u32::MAX);
     }
-    // A division of 64 bits is half a kilobyte of flash, and a frame needs none.
+    // A 64-bit division takes half a kilobyte of flash, and no frame needs one.
     if bytes <= (u32::MAX / BYTE_BIT_MICROS) as usize {
         let bit_micros = bytes as u32 * BYTE_BIT_MICROS;
         return Duration::from_micros(bit_micros.div_ceil(baud));

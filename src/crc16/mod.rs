@@ -1,44 +1,48 @@
 //! CRC-16/MODBUS without a table (ruling B1).
 //!
-//! Both protocols end every frame with this checksum, low byte first: polynomial 0x8005 sent
-//! least significant bit first (0xA001 reflected), initial value 0xFFFF, no final XOR. The
-//! catalogue's check value, the CRC of `123456789`, is 0x4B37.
+//! Both protocols end every frame with this checksum, low byte first. Polynomial 0x8005, least
+//! significant bit first (0xA001 reflected); initial value 0xFFFF; no final XOR. The check value of
+//! the CRC catalogue, the CRC of `123456789`, is 0x4B37.
 //!
 //! # How it works
 //!
-//! A message is a polynomial over the field of two elements: the first bit sent is the coefficient of
-//! the highest power, and a frame is good when `P = x^16 + x^15 + x^2 + 1` divides it. Words are read
-//! little-endian, so bit 0 of a word was sent first. Multiplying by `x` is a shift to the *right*, and
-//! what a shift pushes out has to come back at the *left*. Whole words are done at a time, by shifts
-//! and XORs alone: no table, no multiplication, no step per bit or byte.
+//! A message is a polynomial over the field of two elements. The first bit sent is the coefficient
+//! of the highest power, and a frame is good when `P = x^16 + x^15 + x^2 + 1` divides it. Words are
+//! read little-endian, so bit 0 of a word was sent first: multiplying by `x` is a shift to the
+//! *right*, and the bits shifted out re-enter at the *left*. The code works on whole words, with
+//! shifts and XORs alone: no table, no multiplication, no step per bit or byte.
 //!
-//! **A word further.** Modulo `P`, `x^32 = x^16 + x^4 + x`, so a state of 32 bits is multiplied by `x^32`,
-//! to make room for the next word, by three shifts to the right. What they push out are powers from
-//! `x^32` on: the same equation applies to them. They are put in again at the left *before* the shifts,
-//! which then carry them along, and since no shift is longer than half a word, nothing is pushed out
-//! twice: `y = s ^ s<<16 ^ s<<28 ^ s<<31`, and `y>>16 ^ y>>4 ^ y>>1` is `s` times `x^32`.
+//! **Appending a word.** The 32-bit state `s` is multiplied by `x^32` to make room for the next
+//! word, which is then XORed in. Modulo `P`, `x^32 = x^16 + x^4 + x`, so three shifts to the right
+//! do it. The bits they shift out are powers from `x^32` on, so the same equation applies to them.
+//! They are put back in at the left *before* the shifts, which then carry them along: with
+//! `y = s ^ s<<16 ^ s<<28 ^ s<<31`, `y>>16 ^ y>>4 ^ y>>1` is `s` times `x^32`. No shift is longer
+//! than half a word, so no bit is shifted out twice.
 //!
-//! **Good or not.** Is a word a multiple of `P`? Dividing from the low powers up never ends, as with
-//! `1 / (1 + u)` of numbers, except for multiples. With `P = 1 + u` and `(1 + u)(1 + u) = 1 + u^2`, the
-//! quotient is the word times `(1 + u)(1 + u^2)(1 + u^4)`... until a power of `u` is beyond the word. Squaring
-//! doubles exponents and adds nothing between, so each factor has at most three shifts. For a multiple
-//! the quotient stops 16 places before the end: its last coefficients, 16 bits, are zero. The other way
-//! round, a quotient that stops there times `P` has no room for anything beyond the word: it is the word.
+//! **Checking a frame.** The whole frame is now one word. Is it a multiple of `P`? Divide it from
+//! the low powers up. Like `1 / (1 + u)` for numbers, this gives an infinite series, except for
+//! multiples. Write `P = 1 + u`. As `(1 + u)(1 + u) = 1 + u^2`, the quotient is the word times
+//! `(1 + u)(1 + u^2)(1 + u^4)`... until a power of `u` is beyond the word. Squaring doubles the
+//! exponents and adds no cross terms, so each factor takes at most three shifts. For a multiple,
+//! the quotient ends 16 places before the word does: its last 16 coefficients are zero. Conversely,
+//! a quotient that ends there, times `P`, fits into the word, and so it is the word.
 //!
-//! **Making a CRC** is the division from the high powers down, which does end: the quotient comes of the
-//! same product in `1/x`, with `P = x^16 (1 + 1/x + x^-14 + x^-16)`, and the remainder is what is left.
+//! **Computing a CRC.** The CRC is the remainder of the message times `x^16`. Division from the
+//! high powers down does end. The quotient is the same product in `1/x`, with
+//! `P = x^16 (1 + 1/x + x^-14 + x^-16)`, and the remainder is what is left.
 //!
-//! **Words of 64 bits.** The equation for `x^64` is dear, but `P = (x + 1)(x^15 + x + 1)`, and modulo
-//! the second factor `x^64 = x^8 + x^4`. The first factor divides what has an even number of ones: XOR
-//! all words, count once. A frame is good when both hold, because the factors have no common divisor. A
-//! remainder modulo `x^15 + x + 1` comes by `x^15 = x + 1`, and squared `x^30 = x^2 + 1`, which lowers
-//! all high powers at once; the parity then says which of the two 16-bit values that share it is the CRC.
+//! **64-bit words.** Reducing by `x^64` directly is expensive, but `P = (x + 1)(x^15 + x + 1)`, and
+//! modulo the second factor `x^64 = x^8 + x^4`. The first factor divides exactly the polynomials
+//! with an even number of ones: XOR all words, and count the ones once. The factors have no common
+//! divisor, so a frame is good when both divide it. To reduce modulo `x^15 + x + 1`, use
+//! `x^15 = x + 1` and its square, `x^30 = x^2 + 1`, which lowers all high powers at once. Two
+//! 16-bit values share that remainder, and the parity tells which of them is the CRC.
 //!
-//! **Any length.** A message that does not fill its words gets zeros in front, which change nothing. The
-//! initial value is added to its first two bytes, wherever these then are.
+//! **Any length.** A message that does not fill its words is padded with zeros in front, which
+//! change nothing. The initial value is XORed into its first two bytes, wherever they end up.
 //!
-//! The words are the machine's own: 64 bits on a host, 32 on a microcontroller, where a shift of 64
-//! bits takes four instructions. Both forms are below, each complete.
+//! The word is the machine's own: 64 bits (`wide`) on a host, 32 (`narrow`) on a microcontroller,
+//! where a 64-bit shift takes four instructions.
 
 mod narrow;
 #[cfg(any(test, target_pointer_width = "64"))]
@@ -55,9 +59,9 @@ pub(crate) use narrow::{TRINOMIAL, syndrome_4, syndrome_8};
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 use crate::error::ParseError;
 
-/// Is `frame`, a whole frame with its CRC in the last two bytes, undamaged?
+/// Whether `frame`, a whole frame with its CRC in the last two bytes, is undamaged.
 ///
-/// Anything shorter than its own CRC is not: fewer than two bytes are `false`.
+/// `false` for fewer than two bytes, which cannot hold a CRC.
 ///
 /// ```
 /// use axlewire::crc16;
@@ -70,14 +74,14 @@ pub const fn check(frame: &[u8]) -> bool {
     words::check(frame)
 }
 
-/// [`check`] of a packet whose length is known when it is compiled.
+/// [`check`] for a packet whose length is known at compile time.
 #[cfg(feature = "ikeya")]
 #[inline(always)]
 pub(crate) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
     words::check_packet(packet)
 }
 
-/// The CRC of `bytes`, to be sent low byte first behind them.
+/// The CRC of `bytes`. Send it after them, low byte first.
 ///
 /// ```
 /// use axlewire::crc16;
@@ -90,7 +94,7 @@ pub const fn compute(bytes: &[u8]) -> u16 {
     words::compute(bytes)
 }
 
-/// [`check`] with an answer that says what was wrong.
+/// [`check`] that returns the reason for a failure.
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) fn verify(frame: &[u8]) -> Result<(), ParseError> {
     if check(frame) {
@@ -102,14 +106,14 @@ pub(crate) fn verify(frame: &[u8]) -> Result<(), ParseError> {
     Err(ParseError::Crc { expected: compute(body), found: u16::from_le_bytes(*found) })
 }
 
-/// The CRC that belongs into the last two bytes of `frame`, whatever stands there now.
+/// The CRC for the last two bytes of `frame`, whatever they contain now.
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub(crate) fn seal(frame: &[u8]) -> [u8; 2] {
     let body = frame.split_last_chunk::<2>().map_or(&[][..], |(body, _)| body);
     compute(body).to_le_bytes()
 }
 
-/// The form that this machine does not use is tested on it, too: the tests in `tests` see only one.
+/// Both forms are tested here, on every machine; the tests in `tests` see only one of them.
 #[cfg(test)]
 mod tests {
     extern crate alloc;
@@ -128,7 +132,7 @@ mod tests {
         let crc = ORACLE.checksum(message);
         assert_eq!(wide::compute(message), crc, "{message:02x?}");
         assert_eq!(narrow::compute(message), crc, "{message:02x?}");
-        // The good frame, the one that differs by `x^15 + x + 1`, and a damaged one.
+        // The good frame, one that differs by `x^15 + x + 1`, and a damaged one.
         for (end, is_good) in [(crc, true), (crc ^ TRINOMIAL, false), (crc ^ 0x0100, false)] {
             let mut frame = message.to_vec();
             frame.extend(end.to_le_bytes());

@@ -1,10 +1,10 @@
-//! In words of 64 bits: for a host.
+//! 64-bit words: for a host.
 
 use super::narrow::TRINOMIAL;
 
 #[inline(always)]
 pub(super) const fn check(frame: &[u8]) -> bool {
-    // The packets of the bus are one word, or half of one with zeros behind it, which change nothing.
+    // A bus packet is one word, or half a word followed by zeros, which change nothing.
     if let Some((word, [])) = frame.split_first_chunk::<8>() {
         return divides(u64::from_le_bytes(*word) ^ 0xFFFF);
     }
@@ -23,7 +23,7 @@ pub(super) const fn check_packet<const LEN: usize>(packet: &[u8; LEN]) -> bool {
 
 #[inline(always)]
 pub(super) const fn compute(bytes: &[u8]) -> u16 {
-    // What most packets of the bus have in front of their CRC.
+    // The length of most bus packets, without their CRC.
     if let (6, Some(low), Some(high)) = (bytes.len(), bytes.first_chunk(), bytes.last_chunk()) {
         return compute_6(u32::from_le_bytes(*low), u32::from_le_bytes(*high));
     }
@@ -33,23 +33,23 @@ pub(super) const fn compute(bytes: &[u8]) -> u16 {
 #[inline(never)]
 const fn compute_any(bytes: &[u8]) -> u16 {
     let Some(last) = bytes.last_chunk::<8>() else { return compute_short(bytes) };
-    // The last word has two zero bytes at its end, which multiply by x^16.
+    // The last word ends in two zero bytes, which multiply by x^16.
     let word = u64::from_le_bytes(*last) >> 16;
     let (state, parity) = residue(bytes, 2);
     crc_of(word ^ times_x64(state), word ^ parity)
 }
 
-/// The message with `zeros` zero bytes behind it, without those words that have some: modulo the
-/// trinomial, not reduced, and the XOR of its words.
+/// The message followed by `zeros` zero bytes, without the words that contain any of these: its
+/// residue modulo the trinomial, not fully reduced, and the XOR of its words.
 #[inline(always)]
 const fn residue(bytes: &[u8], zeros: usize) -> (u64, u64) {
     let Some(first) = bytes.first_chunk::<8>() else { return residue_short(bytes) };
-    // Zeros in front change nothing: as many as leave whole words behind.
+    // Zeros in front change nothing: pad so that only whole words follow.
     let head = (bytes.len() + zeros - 1) % 8 + 1;
     let mut state = (u64::from_le_bytes(*first) ^ 0xFFFF) << (64 - 8 * head);
     let mut parity = state;
     if head == 1 {
-        // Half of the initial value belongs to the second byte, which is in the next word.
+        // The second half of the initial value belongs to the second byte, in the next word.
         state ^= LATE;
     }
     let Some((_, mut words)) = bytes.split_at_checked(head) else { return (state, parity) };
@@ -71,7 +71,7 @@ const fn residue(bytes: &[u8], zeros: usize) -> (u64, u64) {
     (state, parity)
 }
 
-/// The same of less than a word.
+/// [`residue`] of less than a word.
 #[inline(never)]
 const fn residue_short(mut bytes: &[u8]) -> (u64, u64) {
     let (mut state, mut parity) = (INITIAL, 0);
@@ -90,7 +90,7 @@ const fn compute_short(bytes: &[u8]) -> u16 {
     crc_of(state >> 2 ^ state >> 1, parity)
 }
 
-/// Six bytes, in words of 32 bits. The product of this and x^16 needs no room at the left.
+/// Six bytes, in 32-bit words. The product with x^16 does not overflow.
 #[inline(always)]
 const fn compute_6(first: u32, last: u32) -> u16 {
     let (low, high) = (first ^ 0xFFFF, last & 0xFFFF_0000);
@@ -101,27 +101,27 @@ const fn compute_6(first: u32, last: u32) -> u16 {
     (remainder >> 16) as u16 ^ if odd { TRINOMIAL } else { 0 }
 }
 
-/// The CRC is the remainder of the message times x^16.
+/// The CRC: the remainder of `product`, the message times x^16.
 #[inline(always)]
 const fn crc_of(product: u64, parity: u64) -> u16 {
     let remainder = reduce(fold(product));
     with_parity((remainder >> 48) as u16, parity ^ remainder)
 }
 
-/// Modulo the trinomial `remainder` stands for itself and for its sum with the trinomial.
+/// Adds the trinomial to `remainder` if `parity` is odd: modulo the trinomial both are the same.
 #[inline(always)]
 const fn with_parity(remainder: u16, parity: u64) -> u16 {
     remainder ^ if is_odd(parity) { TRINOMIAL } else { 0 }
 }
 
-/// The state before the first byte: `0xFFFF · x^-16` modulo the trinomial. Multiplied up to the
-/// first two bytes of a message of any length it is the initial value 0xFFFF.
+/// The state before the first byte: `0xFFFF · x^-16` modulo the trinomial. After the first two
+/// bytes of a message of any length it has become the initial value 0xFFFF.
 const INITIAL: u64 = 0xD556_0000_0000_0000;
 
-/// What the initial value adds behind one byte, of which its first half has been added.
+/// What the initial value still adds after one byte: its first half is in already.
 const LATE: u64 = INITIAL >> 8 ^ 0xFF << 56;
 
-/// Is the word a multiple of the whole polynomial?
+/// Whether the whole polynomial divides the word.
 #[inline(always)]
 const fn divides(word: u64) -> bool {
     let mut quotient = word;
@@ -133,7 +133,7 @@ const fn divides(word: u64) -> bool {
     quotient as u16 == 0
 }
 
-/// `x^64 = x^8 + x^4`, of any state.
+/// Times `x^64 = x^8 + x^4`.
 #[inline(always)]
 const fn times_x64(state: u64) -> u64 {
     let state = state ^ state << 56 ^ state << 60;
@@ -147,7 +147,7 @@ const fn fold(word: u64) -> u64 {
     (word & !((1 << 34) - 1)) ^ moved ^ moved >> 2
 }
 
-/// The full reduction of a folded word, by `x^15 = x + 1` twice: 15 bits at the end remain.
+/// Reduces a folded word fully, by `x^15 = x + 1` twice: only the last 15 bits remain.
 #[inline(always)]
 const fn reduce(mut state: u64) -> u64 {
     let mut step = 0;
@@ -166,7 +166,7 @@ const fn fold_32(word: u32) -> u32 {
     (word & !0x1_FFFF) ^ moved ^ moved >> 1
 }
 
-/// Is the number of ones odd?
+/// Whether the number of ones is odd.
 #[inline(always)]
 const fn is_odd(word: u64) -> bool {
     word.count_ones() & 1 == 1

@@ -1,4 +1,4 @@
-//! The same calls for `embedded-io-async`.
+//! The async calls, over `embedded-io-async`.
 
 use core::{
     future::{Future, poll_fn, ready},
@@ -20,25 +20,25 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Longest time in which a port may take no byte, or not be flushed.
+/// Longest time for which a port may take no byte, or stay unflushed.
 const STALL: Duration = Duration::from_millis(1000);
 
-/// Longest delay asked for at once, microseconds: what a delay is off by does not add up.
+/// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
 
 impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
-    /// One round that waits for nothing but the port's own `write` and `flush`: takes in what has
-    /// been received, lets time pass, sends what is due.
+    /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
+    /// nothing but the port's own `write` and `flush`.
     ///
-    /// Its work is bounded, by 8 frames sent and 4096 bytes taken in at a time.
+    /// Its work is bounded: 8 frames sent, and 4096 bytes taken in at a time.
     ///
     /// # Errors
     ///
-    /// [`DriveError::Port`], [`Closed`](DriveError::Closed), [`WriteZero`](DriveError::WriteZero) or
-    /// [`Stalled`](DriveError::Stalled), the first of several; but a [`Rs485`](super::Rs485)
-    /// port that cannot be flushed behind a `write` that failed is `Stalled`. What is due has been
-    /// sent and flushed all the same, as far as the port could. A call that fails has yielded once,
-    /// so that a loop that ignores errors does not starve the other tasks.
+    /// The first of any [`DriveError::Port`], [`Closed`](DriveError::Closed),
+    /// [`WriteZero`](DriveError::WriteZero) or [`Stalled`](DriveError::Stalled); but if an
+    /// [`Rs485`](super::Rs485) port cannot be flushed after a failed `write`, the error is
+    /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
+    /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round_async().await;
         if result.is_err() {
@@ -75,12 +75,12 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         result
     }
 
-    /// The next event; waits for it until `deadline`, and is then `None`. At least one round is
-    /// made, whatever the time.
+    /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least
+    /// one round, even after `deadline`.
     ///
     /// # Errors
     ///
-    /// As [`service_async`](Self::service_async). Events from before the failure are not lost.
+    /// Same as [`service_async`](Self::service_async). Events from before the failure are not lost.
     pub async fn next_event_async(
         &mut self,
         deadline: Instant,
@@ -88,12 +88,12 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         self.until_async(deadline, Self::poll_event).await
     }
 
-    /// Goes on until `deadline`. Every event is handed to `on_event`, with the role, to be commanded, and
-    /// the time.
+    /// Runs until `deadline`, and passes every event to `on_event`, with the role, to give it
+    /// commands, and the time.
     ///
     /// # Errors
     ///
-    /// As [`service_async`](Self::service_async).
+    /// Same as [`service_async`](Self::service_async).
     pub async fn run_until_async(
         &mut self,
         deadline: Instant,
@@ -109,7 +109,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         Ok(())
     }
 
-    /// Goes on until `done` says so; `None` at `deadline`. A port that fails ends it.
+    /// Runs until `done` returns a value; `None` at `deadline`. A failing port ends it.
     pub(super) async fn until_async<T>(
         &mut self,
         deadline: Instant,
@@ -118,7 +118,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         self.until_with_async(deadline, Needs::WholePort, done).await
     }
 
-    /// The same; says whether `done` is asked after a failure as well.
+    /// The same; `needs` tells whether to call `done` after a failure as well.
     pub(super) async fn until_with_async<T>(
         &mut self,
         deadline: Instant,
@@ -140,7 +140,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    /// Takes in what is there: each read is asked once, and not waited for.
+    /// Takes in received bytes: polls each read once, without waiting.
     async fn receive_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
         self.look();
@@ -191,23 +191,23 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    /// For how long to wait for the port, microseconds: what is left of a second since it was asked
-    /// first, perhaps in a call that was dropped. A port that is well, and was not asked for a while,
-    /// has the time that a frame takes in any case.
+    /// Time to wait for the port, microseconds: what is left of a second since it was first asked,
+    /// perhaps in a call that was dropped. At least the time that a frame takes, for a healthy port
+    /// that was not asked for a while.
     fn patience_us(&self, waited: Duration) -> u32 {
         let frame_us = 2 * self.role.wire_time(FRAME_LEN).as_micros() + 1000;
         STALL.as_micros().saturating_sub(waited.as_micros()).max(frame_us)
     }
 
-    /// The port has stalled. A write of no bytes, which takes no time, lets a
-    /// [`Rs485`](super::Rs485) port put its pin off, with bytes still in it, perhaps.
+    /// Handles a stalled port. A write of no bytes, which takes no time, lets an
+    /// [`Rs485`](super::Rs485) port switch its pin off, perhaps with bytes still in it.
     async fn stalled_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.unflushed();
         let _ = first(self.port.write(&[]), ready(())).await;
         Err(DriveError::Stalled)
     }
 
-    /// Waits for bytes, for the role's next deadline or for `deadline`, whichever is first.
+    /// Waits for bytes, for the role's next deadline or for `deadline`, whichever comes first.
     async fn wait_async(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
         let wake_at = self.wake_at(deadline);
         let nap = (wake_at - self.now()).as_micros().min(NAP_US);
@@ -226,7 +226,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     }
 }
 
-/// What `read` gives; `None` when `wait` is over first. If both are ready, the bytes count.
+/// The result of `read`; `None` if `wait` is over first. If both are ready, `read` wins.
 async fn first<T>(read: impl Future<Output = T>, wait: impl Future<Output = ()>) -> Option<T> {
     let (mut read, mut wait) = (pin!(read), pin!(wait));
     poll_fn(|context| match read.as_mut().poll(context) {

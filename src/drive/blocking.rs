@@ -1,4 +1,4 @@
-//! The blocking calls.
+//! The blocking calls, over `embedded-io`.
 
 use embedded_io::{Read, ReadReady, Write};
 
@@ -10,17 +10,17 @@ use super::{
 use crate::{endpoint::Endpoint, time::Instant};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
-    /// One round without waiting for anything but the port's own `write` and `flush`: takes in what
-    /// has been received, lets time pass, sends what is due.
+    /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
+    /// nothing but the port's own `write` and `flush`.
     ///
-    /// Its work is bounded, by 8 frames sent and 4096 bytes taken in at a time. Call it again and
-    /// again from a main loop, at the latest at [`poll_timeout`](Self::poll_timeout).
+    /// Its work is bounded: 8 frames sent, and 4096 bytes taken in at a time. Call it repeatedly
+    /// from a main loop, no later than [`poll_timeout`](Self::poll_timeout).
     ///
     /// # Errors
     ///
-    /// [`DriveError::Port`], [`Closed`](DriveError::Closed) or [`WriteZero`](DriveError::WriteZero),
-    /// the first of several. What is due has been sent and flushed all the same, as far as the port
-    /// could.
+    /// The first of any [`DriveError::Port`], [`Closed`](DriveError::Closed) or
+    /// [`WriteZero`](DriveError::WriteZero). What is due has still been sent and flushed, as far as
+    /// the port could.
     pub fn service(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let mut result = self.receive();
@@ -48,12 +48,12 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         result
     }
 
-    /// The next event; waits for it until `deadline`, and is then `None`. At least one round is
-    /// made, whatever the time.
+    /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least
+    /// one round, even after `deadline`.
     ///
     /// # Errors
     ///
-    /// As [`service`](Self::service). Events from before the failure are not lost.
+    /// Same as [`service`](Self::service). Events from before the failure are not lost.
     pub fn next_event(
         &mut self,
         deadline: Instant,
@@ -61,12 +61,12 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         self.until(deadline, Self::poll_event)
     }
 
-    /// Goes on until `deadline`. Every event is handed to `on_event`, with the role, to be commanded, and
-    /// the time.
+    /// Runs until `deadline`, and passes every event to `on_event`, with the role, to give it
+    /// commands, and the time.
     ///
     /// # Errors
     ///
-    /// As [`service`](Self::service).
+    /// Same as [`service`](Self::service).
     pub fn run_until(
         &mut self,
         deadline: Instant,
@@ -82,7 +82,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// Goes on until `done` says so; `None` at `deadline`. A port that fails ends it.
+    /// Runs until `done` returns a value; `None` at `deadline`. A failing port ends it.
     pub(super) fn until<T>(
         &mut self,
         deadline: Instant,
@@ -91,7 +91,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         self.until_with(deadline, Needs::WholePort, done)
     }
 
-    /// The same; says whether `done` is asked after a failure as well.
+    /// The same; `needs` tells whether to call `done` after a failure as well.
     pub(super) fn until_with<T>(
         &mut self,
         deadline: Instant,
@@ -114,7 +114,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// Takes in what is there.
+    /// Takes in received bytes.
     fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
         self.look();
@@ -129,8 +129,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// Sends what is unsent, and takes in what has come meanwhile: it belongs in front of the next
-    /// frame, and a receiver without a buffer would lose it. A receiver that fails does not end the
+    /// Sends the unsent bytes, and takes in bytes received meanwhile: they belong before the next
+    /// frame, and a receiver without a buffer would lose them. A failing receiver does not stop the
     /// sending.
     fn send(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());

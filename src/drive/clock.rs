@@ -1,21 +1,21 @@
-//! Where a driver gets its time from.
+//! The time source of a driver.
 
 use crate::time::Instant;
 
-/// A clock of microseconds that does not go backwards.
+/// A microsecond clock that does not go backwards.
 ///
-/// A closure is a clock: `|| Instant::from_micros(counter())`. A counter of 32 bits becomes one with
+/// A closure is a clock: `|| Instant::from_micros(counter())`. For a 32-bit counter, use
 /// [`Wrapping32`](crate::time::Wrapping32).
 pub trait Clock {
-    /// The time.
+    /// The current time.
     fn now(&mut self) -> Instant;
 
-    /// Passes the time until `until`, or a part of it: bytes may come in meanwhile, and whoever
-    /// calls this looks for them when it returns. Return in time: a slave or a robot whose driver
-    /// comes late takes what it finds for old ([module](super#when-a-driver-is-held-up)).
+    /// Idles until `until`, or for a part of that time: the caller checks for received bytes when
+    /// this returns. Return in time: if the driver of a slave or a robot is late, the bytes that it
+    /// finds count as old ([module](super#when-a-driver-is-held-up)).
     ///
-    /// Only the blocking calls use it. As provided it returns at once, so that they spin, which is
-    /// right for a processor with nothing else to do.
+    /// Only the blocking calls use it. By default it returns at once, so that they spin: right for
+    /// a processor with nothing else to do.
     fn idle_until(&mut self, until: Instant) {
         let _ = until;
         core::hint::spin_loop();
@@ -28,10 +28,10 @@ impl<F: FnMut() -> Instant> Clock for F {
     }
 }
 
-/// The monotonic clock of `std`, from its creation on.
+/// The monotonic clock of `std`, starting at 0.
 ///
-/// Idles in naps of 200 µs: short for an answer on the line, long for a processor, which is then
-/// free for others most of the time.
+/// Idles in naps of 200 µs: short compared with an answer on the line, but long for a processor,
+/// which is free for other work most of the time.
 #[cfg(feature = "std")]
 #[derive(Clone, Copy, Debug)]
 pub struct StdClock {
@@ -72,16 +72,16 @@ impl Clock for StdClock {
     }
 }
 
-/// A clock and a delay in one, which the async calls need: `WithDelay { clock, delay }`.
+/// A clock and a delay in one, for the async calls: `WithDelay { clock, delay }`.
 ///
-/// Both have to tell the same time: a delay that runs fast makes a driver look at its clock more
-/// often, one that runs slow makes it late.
+/// Both must run at the same rate: a fast delay makes the driver check its clock more often, a slow
+/// one makes it late.
 #[cfg(feature = "embedded-io-async")]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithDelay<C, D> {
-    /// Tells the time.
+    /// The clock.
     pub clock: C,
-    /// Waits.
+    /// The delay.
     pub delay: D,
 }
 

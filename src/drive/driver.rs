@@ -1,4 +1,4 @@
-//! The driver itself: a role, a port and a clock, and what one round does.
+//! The driver itself: a role, a port and a clock, and the steps of one round.
 
 use super::{clock::Clock, error::DriveError, sending::Sending};
 use crate::{
@@ -6,49 +6,50 @@ use crate::{
     time::{Duration, Instant, earliest, reached},
 };
 
-/// Bytes read at once at the most.
+/// Bytes read at once, at most.
 pub(super) const CHUNK_LEN: usize = 64;
 
-/// Reads in one go at the most: 4096 bytes. A line is slower than that, a runaway port is not.
+/// Reads in a row, at most: 4096 bytes. A line is slower than that; a runaway port is not.
 pub(super) const READS: usize = 64;
 
-/// Frames sent in one round at the most: a role that is flooded with requests could go on for ever.
+/// Frames sent in one round, at most: a role flooded with requests could go on forever.
 pub(super) const FRAMES: usize = 8;
 
-/// What a call needs of its port before it looks at the role.
+/// What a call needs from its port before it looks at the role.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Needs {
     /// A round without a failure.
     WholePort,
-    /// The half that works may be enough: a command was received, a stop has left.
+    /// The half that works may be enough: a command was received, or a stop has left.
     #[cfg(any(feature = "ikeya", feature = "ucp"))]
     HalfPort,
 }
 
-/// A role with its port and its clock; see the [module](super) for what it does.
+/// A role with its port and its clock; see the [module](super).
 #[derive(Clone, Debug)]
 pub struct Driver<R, P, C> {
     pub(super) role: R,
     pub(super) port: P,
     pub(super) clock: C,
-    /// The latest time that the role has been told.
+    /// The latest time given to the role.
     pub(super) latest: Instant,
-    /// What the role's time is ahead of the clock, microseconds: by as much as that ever went back.
+    /// Lead of the role's time over the clock, microseconds: the sum of all backward steps of the
+    /// clock.
     pub(super) ahead_us: u64,
-    /// When the port was last looked at for received bytes.
+    /// When the port was last checked for received bytes.
     pub(super) looked_at: Instant,
-    /// When it was last seen empty: all that is received has arrived since.
+    /// When it was last seen empty: all received bytes have arrived since.
     pub(super) empty_at: Instant,
     pub(super) sending: Sending,
 }
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
-    /// Pause after an error of the port in a call that goes on all the same.
+    /// Pause after an error of the port, in a call that continues.
     #[cfg(any(feature = "ikeya", feature = "ucp"))]
     pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
 
-    /// Puts a role, a port and a clock together. The role must have been made with a time of the
-    /// same clock; [`with`](Self::with) sees to that.
+    /// Combines a role, a port and a clock. The role must have been made with a time of the same
+    /// clock; [`with`](Self::with) ensures that.
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
         Self {
@@ -63,13 +64,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// The same with a role that is made here, at the time of this clock.
+    /// The same, with a role made here, at the time of this clock.
     pub fn with(role: impl FnOnce(Instant) -> R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
         Self::new(role(latest), port, clock)
     }
 
-    /// The time, as the role is told it. When the clock goes backwards, the role's time goes on from
+    /// The time given to the role. If the clock goes backwards, the role's time continues from
     /// where it was: one wrong reading must not stop it.
     pub fn now(&mut self) -> Instant {
         let reading = self.clock.now().as_micros();
@@ -88,7 +89,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         &self.role
     }
 
-    /// The role, to command it.
+    /// The role, to give it commands.
     pub const fn role_mut(&mut self) -> &mut R {
         &mut self.role
     }
@@ -99,28 +100,27 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         &self.port
     }
 
-    /// The port, to change its settings. Bytes read from it here are lost to the role, bytes written
-    /// may land inside a frame.
+    /// The port, to change its settings. The role misses bytes that you read from it, and bytes
+    /// that you write may land inside a frame.
     pub const fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
 
-    /// Role, port and clock; what is unsent is given up.
+    /// Role, port and clock. Unsent bytes are discarded.
     #[must_use]
     pub fn into_parts(self) -> (R, P, C) {
         (self.role, self.port, self.clock)
     }
 
-    /// The next event that is there already, without touching the port.
+    /// The next event in the queue, without using the port.
     pub fn poll_event(&mut self) -> Option<R::Event> {
         self.role.poll_event()
     }
 
-    /// When the next round has to be made at the latest, if no bytes come in.
+    /// When the next round must run at the latest, if no bytes arrive.
     ///
-    /// Never `None` for a slave or a robot, even while it has nothing to do: bytes that are found
-    /// after a longer time may be old, and are not obeyed or answered like new ones
-    /// ([`Endpoint::held_up_after`]).
+    /// Never `None` for a slave or a robot, even an idle one: bytes found after a longer time may
+    /// be old, and do not count as new ([`Endpoint::held_up_after`]).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let look_at = self
@@ -130,15 +130,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         earliest(&[self.role.poll_timeout(), look_at])
     }
 
-    /// Bytes of a frame that the port has not taken yet.
+    /// The bytes of a frame that the port has not taken yet.
     #[must_use]
     pub fn unsent(&self) -> &[u8] {
         self.sending.rest()
     }
 
-    /// Gives up what is unsent or not flushed, when a port has come back after a while; returns the
-    /// number of bytes given up. The role counts it as not sent. The other end may have heard the
-    /// beginning of the frame.
+    /// Discards unsent or unflushed bytes, for a port that comes back after a while; returns the
+    /// number of unsent bytes. The role counts them as not sent. The other end may have received
+    /// the beginning of the frame.
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
         let given_up = self.sending.give_up();
@@ -147,15 +147,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         discarded
     }
 
-    /// Lets the role decide anew about a frame that did not leave.
+    /// Lets the role decide again about a frame that did not leave.
     pub(super) fn reclaim(&mut self) {
         let now = self.now();
         let unsent = self.sending.reclaim(now, self.silence());
         self.tell_unsent(unsent);
     }
 
-    /// Longest silence inside a frame. The other end measures from byte to byte, and the first one
-    /// behind the silence takes its time.
+    /// Longest silence inside a frame. The other end measures from byte to byte, which includes the
+    /// time of the byte after the silence.
     pub(super) fn silence(&self) -> Duration {
         let (pause, byte) = (self.role.frame_pause(), self.role.wire_time(1));
         Duration::from_micros(pause.as_micros().saturating_sub(byte.as_micros()))
@@ -168,9 +168,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// Hands in what a read has given. Unless the port was seen empty a short while ago, the driver
-    /// was held up, in a call of the port, by its caller or by another task, and the bytes may have
-    /// arrived at any time since then.
+    /// Hands in the bytes of a read. If the port was not seen empty recently, the driver was held
+    /// up, in a call of the port, by its caller or by another task, and the bytes may have arrived
+    /// at any time since it was.
     pub(super) fn receive_chunk<E>(
         &mut self,
         chunk: &[u8],
@@ -190,13 +190,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// The port is looked at for received bytes now, or a little later.
+    /// Notes that the port is checked for received bytes now, or a little later.
     pub(super) fn look(&mut self) {
         self.looked_at = self.latest;
     }
 
-    /// The port was empty at `latest` or a little later. A short read does not show that: a
-    /// ring buffer gives only what lies in front of its end.
+    /// Notes that the port was empty at `latest` or a little later. A short read does not show
+    /// that: a ring buffer returns only the bytes up to its end.
     pub(super) fn saw_empty(&mut self) {
         self.empty_at = self.latest;
     }
@@ -209,8 +209,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
     }
 
-    /// Is there something to send? The rest of a frame goes before the next one, unless it is
-    /// outdated.
+    /// Whether there is something to send. The rest of a frame goes before the next one, unless it
+    /// is outdated.
     pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
         let now = self.now();
         if !self.sending.rest().is_empty() && self.role.is_outdated() {
@@ -224,13 +224,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Ok(true)
     }
 
-    /// The port is about to be asked to take what is unsent.
+    /// Notes that the port is about to be asked to take the unsent bytes.
     pub(super) fn before_write(&mut self) {
         let now = self.now();
         self.sending.begin_write(now);
     }
 
-    /// What a write has done: the port has taken bytes, or it has failed.
+    /// Handles the result of a write: the port took bytes, or failed.
     pub(super) fn after_write<E>(
         &mut self,
         written: Result<usize, E>,
@@ -261,7 +261,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// What was sent since the last flush may not have left.
+    /// Notes that bytes sent since the last flush may not have left.
     pub(super) fn unflushed(&mut self) {
         if self.sending.is_in_doubt() {
             let given_up = self.sending.give_up();
@@ -271,19 +271,19 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.tell_unsent(unsent);
     }
 
-    /// Has the port let go of everything that the role has handed out?
+    /// Whether everything that the role handed out has left the port.
     #[cfg(any(feature = "ikeya", feature = "ucp"))]
     pub(super) fn is_sent(&self) -> bool {
         self.sending.rest().is_empty() && !self.sending.needs_flush()
     }
 
-    /// The same moment on the clock of the user.
+    /// The same moment on the user's clock.
     #[cfg(feature = "embedded-io")]
     pub(super) fn on_clock(&self, at: Instant) -> Instant {
         Instant::from_micros(at.as_micros().wrapping_sub(self.ahead_us))
     }
 
-    /// When to look at the role again, until `deadline`.
+    /// When to look at the role again, `deadline` at the latest.
     pub(super) fn wake_at(&self, deadline: Instant) -> Instant {
         self.poll_timeout().map_or(deadline, |at| at.min(deadline))
     }

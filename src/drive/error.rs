@@ -1,4 +1,4 @@
-//! Why a call of a driver has failed.
+//! Errors of a driver's calls.
 
 use core::{error::Error, fmt};
 
@@ -7,51 +7,52 @@ use crate::ikeya;
 #[cfg(feature = "ucp")]
 use crate::ucp;
 
-/// Why a call of a driver has failed.
+/// Why a call of a driver failed.
 ///
-/// None of these breaks the driver: what was received and what is unsent are kept, and the next
-/// call goes on.
+/// None of these breaks the driver: received and unsent bytes are kept, and the next call
+/// continues.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum DriveError<E> {
     /// The port failed.
     Port(E),
-    /// The port says that nothing will be received any more: an adapter was unplugged, the other
-    /// end of a pipe has gone.
+    /// The port will receive nothing more: an adapter was unplugged, or the other end of a pipe has
+    /// gone.
     Closed,
     /// The port took no bytes, which the traits forbid.
     WriteZero,
-    /// The port took no byte, or was not flushed, for a second. Only the async calls can tell.
+    /// The port took no byte, or was not flushed, for a second. Async calls only.
     Stalled,
-    /// A role has handed out a frame that the driver has no room for. No role of this crate does.
+    /// The role handed out a frame longer than the driver's buffer. No role of this crate does.
     FrameTooLong {
         /// Length of the frame, bytes.
         length: usize,
         /// Longest frame that can be sent, bytes.
         limit: usize,
     },
-    /// The operation was not done in its time.
+    /// The operation timed out.
     Timeout(Operation),
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
     Bus(ikeya::master::CommandError),
-    /// The stops of these nodes are not paid (ruling I12): they have not answered twice after a stop
-    /// WRITE, or have never answered at all. **Their motors may be running.** The stops stay owed.
+    /// The stops of these nodes are not paid (ruling I12): they have not answered twice after a
+    /// stop WRITE, or have never answered at all. **Their motors may be running.** The stops stay
+    /// owed.
     #[cfg(feature = "ikeya")]
     StopsOwed(ikeya::master::NodeSet),
-    /// A node could not be read, all attempts included.
+    /// A node could not be read in any of the attempts.
     #[cfg(feature = "ikeya")]
     ReadFailed {
-        /// Which node.
+        /// The node.
         node: ikeya::NodeId,
-        /// What was heard instead of its answer.
+        /// What was received instead of its answer.
         cause: ikeya::master::Cause,
     },
     /// The host refuses the command.
     #[cfg(feature = "ucp")]
     Rover(ucp::host::CommandError),
-    /// The robot did not agree to a calibration, or did not answer, all attempts included.
+    /// The robot refused a calibration, or answered none of the attempts.
     #[cfg(feature = "ucp")]
     Calibration(ucp::host::CalibrationFailure),
 }
@@ -61,7 +62,7 @@ pub enum DriveError<E> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Operation {
-    /// Asking every id.
+    /// Discovery of the nodes.
     #[cfg(feature = "ikeya")]
     Discovery,
     /// Sending a set-point.
@@ -70,16 +71,16 @@ pub enum Operation {
     /// Reading a node.
     #[cfg(feature = "ikeya")]
     Read {
-        /// Which.
+        /// The node.
         node: ikeya::NodeId,
     },
-    /// Having a stop written and flushed.
+    /// Writing and flushing a stop.
     #[cfg(feature = "ucp")]
     Stop,
-    /// Having a ping answered.
+    /// Waiting for the answer to a ping.
     #[cfg(feature = "ucp")]
     Ping,
-    /// Having a calibration request answered.
+    /// Waiting for the answer to a calibration request.
     #[cfg(feature = "ucp")]
     Calibration,
 }
@@ -90,7 +91,7 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::Port(error) => write!(f, "port failed: {error}"),
             Self::Closed => f.write_str("port is closed: its other end has gone"),
             Self::WriteZero => f.write_str("port took no bytes"),
-            Self::Stalled => f.write_str("port has taken nothing for a second"),
+            Self::Stalled => f.write_str("port has stalled for a second"),
             Self::FrameTooLong { length, limit } => {
                 write!(f, "frame of {length} bytes is longer than {limit}")
             }
@@ -125,7 +126,9 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
                     ucp::host::FailureCause::NoAnswer => {
                         write!(f, "no answer to {attempts} requests")
                     }
-                    ucp::host::FailureCause::Refused(err) => write!(f, "the robot says {err:?}"),
+                    ucp::host::FailureCause::Refused(err) => {
+                        write!(f, "the robot answered {err:?}")
+                    }
                 }
             }
         }
@@ -139,7 +142,7 @@ impl fmt::Display for Operation {
         let _ = f;
         match *self {
             #[cfg(feature = "ikeya")]
-            Self::Discovery => f.write_str("the discovery was not done in time"),
+            Self::Discovery => f.write_str("the discovery did not finish in time"),
             #[cfg(feature = "ikeya")]
             Self::SetPoint => f.write_str("the set-point was not sent in time"),
             #[cfg(feature = "ikeya")]

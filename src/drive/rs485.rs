@@ -12,22 +12,22 @@ use crate::time::Duration;
 
 /// A port whose transceiver has a driver-enable pin (DE, often joined with /RE).
 ///
-/// The pin goes on before the first byte that is written and off once the port's `flush` says that
-/// the last is out, or when writing or flushing fails. So *flush after each packet*, as a
-/// [`Driver`](super::Driver) does: until then nobody else can speak. The port's `flush` has to wait
-/// for the last stop bit, and not only for a buffer to be empty; where it does not, the delay behind
-/// makes up for it.
+/// The pin is switched on before the first byte is written, and off when the port's `flush` reports
+/// that the last byte is out, or when writing or flushing fails. So *flush after each packet*, as a
+/// [`Driver`](super::Driver) does: until then no other station can speak. The port's `flush` must
+/// wait for the last stop bit, not just for an empty buffer; if it does not, use the delay `after`
+/// to make up for it.
 ///
-/// A `write` that fails flushes what the port has taken before, so that it reaches the line, and only
-/// then puts the pin off. Where that flush fails as well, the next `flush` is
+/// If a `write` fails, it first flushes the bytes that the port took before, so that they reach the
+/// line, and then switches the pin off. If that flush fails as well, the next `flush` returns
 /// [`Rs485Error::Lost`].
 ///
-/// A cancelled async `write` or `flush` leaves the pin as it is, because a part of the packet may be
-/// on the line: go on with the packet, or give it up with [`release`](Self::release) or with a `write`
-/// of no bytes, which puts the pin off at once. A [`Driver`](super::Driver) does the latter when an
-/// async `write` or `flush` has stalled for a second.
+/// A cancelled async `write` or `flush` leaves the pin as it is, because part of the packet may be
+/// on the line. Continue with the packet, or give it up with [`release`](Self::release) or with a
+/// `write` of no bytes, which switches the pin off at once. A [`Driver`](super::Driver) does the
+/// latter when an async `write` or `flush` has stalled for a second.
 ///
-/// High is on. For a transceiver that is enabled by low, hand in an inverted pin.
+/// High is on. For an active-low transceiver, pass an inverted pin.
 #[derive(Debug)]
 pub struct Rs485<P, O, D = NoDelay> {
     port: P,
@@ -36,36 +36,36 @@ pub struct Rs485<P, O, D = NoDelay> {
     before: Duration,
     after: Duration,
     state: State,
-    /// The pin went off, and bytes may have been in the transmitter.
+    /// The pin went off while bytes may have been in the transmitter.
     is_lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum State {
     Off,
-    /// The pin is on, or may be, and the time before the first byte is not over.
+    /// The pin is on, or may be, and the delay before the first byte is not over.
     Settling,
     On,
 }
 
 impl<P, O: OutputPin> Rs485<P, O> {
-    /// Sends through `port` with `pin` on. It is put off first.
+    /// Sends through `port` while `pin` is on. The pin is switched off first.
     ///
     /// # Errors
     ///
-    /// The pin's own.
+    /// Pin errors.
     pub fn new(port: P, pin: O) -> Result<Self, O::Error> {
         Self::with_delays(port, pin, NoDelay, Duration::ZERO, Duration::ZERO)
     }
 }
 
 impl<P, O: OutputPin, D> Rs485<P, O, D> {
-    /// The same for a transceiver that needs the time `before` between the pin and the first byte, or
-    /// `after` between the last byte and the pin.
+    /// The same for a transceiver that needs a delay `before`, between the pin and the first byte,
+    /// or `after`, between the last byte and the pin.
     ///
     /// # Errors
     ///
-    /// The pin's own.
+    /// Pin errors.
     pub fn with_delays(
         port: P,
         mut pin: O,
@@ -77,18 +77,18 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
         Ok(Self { port, pin, delay, before, after, state: State::Off, is_lost: false })
     }
 
-    /// Puts the pin off, whatever is still being sent.
+    /// Switches the pin off, even if bytes are still being sent.
     ///
     /// # Errors
     ///
-    /// The pin's own: it may still be on.
+    /// Pin errors: it may still be on.
     pub fn release(&mut self) -> Result<(), O::Error> {
         self.pin.set_low()?;
         self.state = State::Off;
         Ok(())
     }
 
-    /// Is the pin on? After an error of the pin it may be.
+    /// Whether the pin is on, or may be after an error of the pin.
     #[must_use]
     pub const fn is_on(&self) -> bool {
         !matches!(self.state, State::Off)
@@ -99,31 +99,31 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
         &mut self.port
     }
 
-    /// The port and the pin, which stays as it is.
+    /// The port, the pin and the delay. The pin stays as it is.
     #[must_use]
     pub fn into_parts(self) -> (P, O, D) {
         (self.port, self.pin, self.delay)
     }
 
-    /// Puts the pin on; says how long to wait before the first byte.
+    /// Switches the pin on; returns the time to wait before the first byte.
     fn engage(&mut self) -> Result<Duration, O::Error> {
         match self.state {
             State::On => return Ok(Duration::ZERO),
-            // A cancelled write has not waited to the end.
+            // A cancelled write has not waited until the end.
             State::Settling => return Ok(self.before),
             State::Off => {}
         }
-        // A pin that fails may have switched all the same.
+        // A pin that fails may have switched anyway.
         self.state = State::Settling;
         if let Err(error) = self.pin.set_high() {
-            // The first error is the one to tell.
+            // Report the first error.
             let _ = self.release();
             return Err(error);
         }
         Ok(self.before)
     }
 
-    /// Puts the pin off for a write of no bytes.
+    /// Switches the pin off for a write of no bytes.
     fn give_up<E>(&mut self) -> Result<usize, Rs485Error<E, O::Error>> {
         if self.is_on() {
             self.release().map_err(Rs485Error::Pin)?;
@@ -131,18 +131,19 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
         Ok(0)
     }
 
-    /// The end of a flush: says once whether bytes were lost before.
+    /// Ends a flush: reports once if bytes were lost before.
     fn all_out<E>(&mut self) -> Result<(), Rs485Error<E, O::Error>> {
         if core::mem::take(&mut self.is_lost) { Err(Rs485Error::Lost) } else { Ok(()) }
     }
 
-    /// Puts the pin off because of `error`, which is the one to tell.
+    /// Switches the pin off because of `error`, and reports that error.
     fn fail<T, E>(&mut self, error: E) -> Result<T, Rs485Error<E, O::Error>> {
         let _ = self.release();
         Err(Rs485Error::Port(error))
     }
 
-    /// Puts the pin off after a write that took nothing. What was taken before is out, or may be lost.
+    /// Switches the pin off after a write that took nothing. Bytes taken before are out, or may be
+    /// lost.
     fn end<E>(
         &mut self,
         written: Result<usize, E>,
@@ -156,7 +157,7 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
     }
 }
 
-/// No delay: the pin and the bytes follow each other at once.
+/// No delay between the pin and the bytes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoDelay;
 
@@ -169,7 +170,7 @@ impl embedded_hal_async::delay::DelayNs for NoDelay {
     async fn delay_ns(&mut self, _: u32) {}
 }
 
-/// The port's error, or the pin's.
+/// An error of the port or of the pin.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Rs485Error<E, F> {
@@ -177,8 +178,8 @@ pub enum Rs485Error<E, F> {
     Port(E),
     /// The driver-enable pin failed.
     Pin(F),
-    /// Bytes may not have reached the line: the port failed while it sent them, and could not be
-    /// flushed before the pin went off. Told once, by the `flush` behind.
+    /// Bytes may not have reached the line: the port failed while sending them, and could not be
+    /// flushed before the pin went off. Reported once, by the next `flush`.
     Lost,
 }
 
@@ -188,7 +189,7 @@ impl<E: fmt::Display, F: fmt::Debug> fmt::Display for Rs485Error<E, F> {
             Self::Port(error) => error.fmt(f),
             Self::Pin(error) => write!(f, "driver-enable pin failed: {error:?}"),
             Self::Lost => {
-                f.write_str("bytes may have been lost: the port failed while it sent them")
+                f.write_str("bytes may have been lost: the port failed while sending them")
             }
         }
     }
@@ -207,7 +208,7 @@ impl<E: io::Error + 'static, F: fmt::Debug> io::Error for Rs485Error<E, F> {
     fn kind(&self) -> io::ErrorKind {
         match self {
             Self::Port(error) => error.kind(),
-            // Pins know no other kind.
+            // Pin errors have no other kind.
             Self::Pin(_) | Self::Lost => io::ErrorKind::Other,
         }
     }

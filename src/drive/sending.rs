@@ -1,4 +1,4 @@
-//! The frame that is being sent, and whether it is still worth sending.
+//! The frame being sent, and whether it is still worth sending.
 
 use super::error::DriveError;
 use crate::{
@@ -7,54 +7,54 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Longest frame of any role, bytes.
+/// Length of the longest frame of any role, bytes.
 pub(super) const FRAME_LEN: usize = 64;
 
-/// What is left of a frame.
+/// The unsent rest of a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Sending {
     outbox: Outbox<FRAME_LEN>,
-    /// When the latest write began.
+    /// Start of the latest write.
     asked_at: Instant,
-    /// The frame, if a byte of it has left.
+    /// The frame, if any byte of it has left.
     begun: Option<Begun>,
     flush: Flush,
-    /// Since when the port has been asked without success to take bytes, and to flush them.
+    /// Since when the port has been asked, without success, to take bytes, and to flush them.
     #[cfg(feature = "embedded-io-async")]
     pub(super) write_wait: Wait,
     #[cfg(feature = "embedded-io-async")]
     pub(super) flush_wait: Wait,
 }
 
-/// How a frame leaves that a port takes in parts.
+/// Timing of a frame that a port takes in parts.
 ///
-/// When its bytes are on the line is not known: a write may come back before they are out, or long
-/// after. But no byte leaves before its write has begun, and the bytes of a write that has come back
-/// are on their way, so the longest possible pause in front of them is known. And no pause is longer
-/// than what a frame has taken, from its first write to its flush, beyond its time on the line.
+/// When its bytes are on the line is not known: a write may return before they are out, or long
+/// after. But no byte leaves before its write begins, and when the write returns, its bytes are on
+/// their way. So the longest possible pause in front of them is known. And no pause is longer than
+/// the time from the first write of the frame to its flush, less its time on the line.
 #[derive(Clone, Copy, Debug)]
 struct Begun {
-    /// The bytes that the port has taken have not all left before.
+    /// Earliest time at which all bytes taken by the port can have left.
     left_at: Instant,
-    /// The same had there been no pause and no wait at all.
+    /// The same time, without any pause or wait.
     unbroken_at: Instant,
-    /// A pause may have been too long.
+    /// Whether a pause may have been too long.
     is_doubtful: bool,
 }
 
-/// Since when a port has been asked for something, in calls that were dropped as well.
+/// Since when a port has been asked for something, including calls that were dropped.
 #[cfg(feature = "embedded-io-async")]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wait(Option<Instant>);
 
 #[cfg(feature = "embedded-io-async")]
 impl Wait {
-    /// The port is asked, for the first time or again: says how long ago the first time was.
+    /// Notes a request to the port, the first or a repeated one; returns the time since the first.
     pub(super) fn begin(&mut self, now: Instant) -> Duration {
         now - *self.0.get_or_insert(now)
     }
 
-    /// The port has done it, or has failed.
+    /// Notes that the port has done it, or has failed.
     pub(super) fn end(&mut self) {
         self.0 = None;
     }
@@ -67,7 +67,7 @@ enum Flush {
     Done,
     /// Bytes written since the last flush.
     Due,
-    /// As before, and the role knows that they may be lost.
+    /// The same, and the role knows that they may be lost.
     Failed,
 }
 
@@ -91,7 +91,7 @@ impl Sending {
         self.outbox.unsent()
     }
 
-    /// Takes in the next frame.
+    /// Loads the next frame.
     pub(super) fn load<E>(&mut self, frame: &[u8]) -> Result<(), DriveError<E>> {
         let (length, limit) = (frame.len(), FRAME_LEN);
         self.outbox.extend(frame).ok_or(DriveError::FrameTooLong { length, limit })?;
@@ -99,13 +99,15 @@ impl Sending {
         Ok(())
     }
 
-    /// The port is to take the rest. Even if it takes nothing, it may have switched its driver on.
+    /// Notes that the port is asked to take the rest. Even if it takes nothing, it may have
+    /// switched its driver on.
     pub(super) fn begin_write(&mut self, now: Instant) {
         (self.asked_at, self.flush) = (now, Flush::Due);
     }
 
-    /// The port has taken `count` bytes, which take `wire_time` on the line. Gives up the frame if
-    /// they came after too long a silence: the other end no longer takes them for its rest.
+    /// Notes that the port has taken `count` bytes, which take `wire_time` on the line. Gives up
+    /// the frame if they came after too long a silence: the other end no longer takes them as its
+    /// rest.
     pub(super) fn sent(
         &mut self,
         count: usize,
@@ -128,18 +130,18 @@ impl Sending {
             is_doubtful: before.is_doubtful || !is_first && now > before.left_at + silence,
         };
         self.begun = Some(frame);
-        // Its flush cannot be in time any more.
+        // Its flush can no longer be in time.
         let is_cut_off = frame.is_doubtful && now > frame.unbroken_at + silence;
         if is_cut_off { self.give_up() } else { None }
     }
 
-    /// Has all of a frame been taken, and only a flush in time shows that it had no pause?
+    /// Whether all of a frame was taken, but only a flush in time can show that it did not pause.
     pub(super) fn is_in_doubt(&self) -> bool {
         self.outbox.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
     }
 
-    /// Gives up what is no longer worth sending, for the role to decide anew: a frame of which
-    /// nothing has left, and one that was cut off too long ago.
+    /// Gives up a frame that is no longer worth sending: one of which nothing has left, or that was
+    /// cut off too long ago. The role then decides again.
     pub(super) fn reclaim(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         match self.begun {
             Some(frame) if !self.outbox.is_empty() && now <= frame.left_at + silence => None,
@@ -156,12 +158,13 @@ impl Sending {
         Some(self.begun.take().map_or(Unsent::Untouched, |_| Unsent::CutOff))
     }
 
-    /// Is a flush due? Again and again after one that failed.
+    /// Whether a flush is due; after a failed one, it is due again.
     pub(super) fn needs_flush(&self) -> bool {
         self.flush != Flush::Done
     }
 
-    /// Everything has left. Gives up a frame in doubt, unless it cannot have paused for too long.
+    /// Notes that everything has left. Gives up a frame in doubt, unless it cannot have paused for
+    /// too long.
     pub(super) fn flushed(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         self.flush = Flush::Done;
         let frame = self.begun.filter(|_| self.is_in_doubt())?;
@@ -172,7 +175,8 @@ impl Sending {
         None
     }
 
-    /// A flush has failed, or will not be made; says whether the role does not know that yet.
+    /// Notes that a flush failed, or will not be made; returns whether the role does not know that
+    /// yet.
     pub(super) fn flush_failed(&mut self) -> Option<Unsent> {
         let is_news = self.flush == Flush::Due;
         if is_news {

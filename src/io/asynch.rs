@@ -9,13 +9,13 @@ use crate::{
 };
 
 impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
-    /// The next event; waits for the port where there is none yet. `None` at an end of file.
+    /// Returns the next event; waits for the port if there is none yet. `None` at end of file.
     ///
-    /// Cancel safe where the port's `read` is.
+    /// Cancel safe if the port's `read` is.
     ///
     /// # Errors
     ///
-    /// The port's own. Nothing that was received is lost: the next call goes on where this one
+    /// Port errors. No received bytes are lost: the next call continues where this one
     /// stopped.
     pub async fn read_event_async(&mut self) -> Result<Option<Event<F::Frame<'_>>>, R::Error> {
         loop {
@@ -32,27 +32,27 @@ impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
 }
 
 impl<W: Write, const N: usize> FrameWriter<W, N> {
-    /// Sends what waits, then `frame`, and returns when the port has taken it all; the line may
-    /// still be busy, see [`flush_async`](Self::flush_async).
+    /// Sends the unsent bytes, then `frame`, and returns when the port has taken them all. The line
+    /// may still be busy; see [`flush_async`](Self::flush_async).
     ///
-    /// Cancel safe where the port's `write` is: a frame that was begun is finished by the next
-    /// call. Cancelled before that, the frame is not queued.
+    /// Cancel safe if the port's `write` is: the next call finishes a frame that was begun. If
+    /// cancelled before that, the frame is not queued.
     ///
     /// # Errors
     ///
-    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during the
-    /// frame itself its rest waits, and [`flush_async`](Self::flush_async) goes on with it.
+    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during
+    /// `frame`, its rest stays unsent, and [`flush_async`](Self::flush_async) continues with it.
     pub async fn write_async(&mut self, frame: &impl Encode) -> Result<(), WriteError<W::Error>> {
         self.send_async().await?;
         self.queue(frame)?;
         self.send_async().await
     }
 
-    /// Sends what waits, and returns when the port says that its last byte is out.
+    /// Sends the unsent bytes, and returns when the port reports that the last of them is out.
     ///
     /// # Errors
     ///
-    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest waits on.
+    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest stays unsent.
     pub async fn flush_async(&mut self) -> Result<(), WriteError<W::Error>> {
         self.send_async().await?;
         self.port.flush().await.map_err(WriteError::Port)

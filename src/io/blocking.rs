@@ -9,11 +9,11 @@ use crate::{
 };
 
 impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
-    /// The next event; waits for the port where there is none yet. `None` at an end of file.
+    /// Returns the next event; waits for the port if there is none yet. `None` at end of file.
     ///
     /// # Errors
     ///
-    /// The port's own. Nothing that was received is lost: the next call goes on where this one
+    /// Port errors. No received bytes are lost: the next call continues where this one
     /// stopped.
     pub fn read_event(&mut self) -> Result<Option<Event<F::Frame<'_>>>, R::Error> {
         loop {
@@ -30,24 +30,24 @@ impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
 }
 
 impl<W: Write, const N: usize> FrameWriter<W, N> {
-    /// Sends what waits, then `frame`, and returns when the port has taken it all; the line may
-    /// still be busy, see [`flush`](Self::flush).
+    /// Sends the unsent bytes, then `frame`, and returns when the port has taken them all. The line
+    /// may still be busy; see [`flush`](Self::flush).
     ///
     /// # Errors
     ///
-    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during the
-    /// frame itself its rest waits, and [`flush`](Self::flush) goes on with it.
+    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during
+    /// `frame`, its rest stays unsent, and [`flush`](Self::flush) continues with it.
     pub fn write(&mut self, frame: &impl Encode) -> Result<(), WriteError<W::Error>> {
         self.send()?;
         self.queue(frame)?;
         self.send()
     }
 
-    /// Sends what waits, and returns when the port says that its last byte is out.
+    /// Sends the unsent bytes, and returns when the port reports that the last of them is out.
     ///
     /// # Errors
     ///
-    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest waits on.
+    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest stays unsent.
     pub fn flush(&mut self) -> Result<(), WriteError<W::Error>> {
         self.send()?;
         self.port.flush().map_err(WriteError::Port)

@@ -4,23 +4,23 @@ use core::{error::Error, fmt};
 
 use crate::error::EncodeError;
 
-/// Why a frame has not been sent.
+/// Why a frame was not sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WriteError<E> {
-    /// The frame cannot be encoded; nothing of it was sent.
+    /// The frame cannot be encoded; none of it was sent.
     Encode(EncodeError),
-    /// The port failed; the rest of the frame waits.
+    /// The port failed; the rest of the frame stays unsent.
     Port(E),
-    /// The port took no bytes, which the traits forbid; the rest of the frame waits.
+    /// The port took no bytes, which the traits forbid; the rest of the frame stays unsent.
     Zero,
 }
 
 impl<E: fmt::Display> fmt::Display for WriteError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Encode(error) => write!(f, "frame not encoded: {error}"),
+            Self::Encode(error) => write!(f, "frame cannot be encoded: {error}"),
             Self::Port(error) => write!(f, "port failed while sending: {error}"),
             Self::Zero => f.write_str("port took no bytes"),
         }

@@ -1,11 +1,11 @@
 //! Frames in and out of a port, over the traits of `embedded-io` and `embedded-io-async`.
 //!
-//! [`FrameReader`] and [`FrameWriter`] are thin: they move bytes between a port and the decoder or a
-//! small buffer, and add no rule of their own. What has been received stays in the reader through
-//! read errors, ends of file and cancelled futures; what could not be sent stays in the writer.
+//! [`FrameReader`] and [`FrameWriter`] are thin: they move bytes between a port and the decoder or
+//! a small buffer, and add no rules. Received bytes stay in the reader through read errors, end of
+//! file and cancelled futures; unsent bytes stay in the writer.
 //!
-//! Both have their blocking calls with feature `embedded-io`, and the same calls with `_async`
-//! behind the name with feature `embedded-io-async`.
+//! Both have blocking calls with feature `embedded-io`, and the same calls with the suffix `_async`
+//! with feature `embedded-io-async`.
 //!
 //! ```
 //! # #[cfg(all(feature = "embedded-io", feature = "ucp"))] {

@@ -1,11 +1,11 @@
-//! Frames out.
+//! Sending frames.
 
 use crate::{encode::Encode, error::EncodeError, outbox::Outbox};
 
 /// Sends frames through a port.
 ///
 /// A frame is first put whole into a buffer of `N` bytes, then sent from it. After an error or a
-/// cancelled future the rest waits there, and the next call goes on with it: no frame is cut and
+/// cancelled future the rest stays there, and the next call continues with it: no frame is cut and
 /// none is sent twice, as long as the port's own `write` does neither.
 #[derive(Clone, Debug)]
 pub struct FrameWriter<W, const N: usize> {
@@ -20,33 +20,33 @@ impl<W, const N: usize> FrameWriter<W, N> {
         Self { port, outbox: Outbox::new() }
     }
 
-    /// Puts a frame behind what is still to be sent, without touching the port.
+    /// Appends a frame to the unsent bytes, without using the port.
     ///
     /// # Errors
     ///
-    /// [`EncodeError::BufferTooSmall`] when there is no room for it now, and what the frame itself
-    /// refuses. What waits stays as it was.
+    /// [`EncodeError::BufferTooSmall`] if there is no room for it now, or an error of the frame
+    /// itself. The unsent bytes are unchanged.
     pub fn queue(&mut self, frame: &impl Encode) -> Result<(), EncodeError> {
         self.outbox.queue(frame)
     }
 
-    /// Bytes that wait to be sent.
+    /// The unsent bytes.
     #[must_use]
     pub fn unsent(&self) -> &[u8] {
         self.outbox.unsent()
     }
 
-    /// Gives up on what waits; says how many bytes that were.
+    /// Discards the unsent bytes; returns their number.
     pub fn discard(&mut self) -> usize {
         self.outbox.discard()
     }
 
-    /// The port, to change its settings. Bytes sent through it here may land inside a frame.
+    /// The port, to change its settings. Bytes that you send through it may land inside a frame.
     pub fn port_mut(&mut self) -> &mut W {
         &mut self.port
     }
 
-    /// The port; what still waits is given up.
+    /// The port. Unsent bytes are discarded.
     #[must_use]
     pub fn into_port(self) -> W {
         self.port

@@ -1,19 +1,19 @@
-//! What can be wrong with a wire.
+//! Faults of a wire.
 
 use alloc::vec::Vec;
 
 use super::rng::Rng;
 use crate::time::Duration;
 
-/// What a piece of wire does to what passes it. The default does nothing.
+/// Faults of a piece of wire. The default has none.
 ///
-/// Rates are probabilities from 0 to 1. Each byte is first lost or not; one that is left may be
-/// damaged, then doubled, and may get a made-up one in front.
+/// Rates are probabilities from 0 to 1. Each byte is first lost or not. A byte that is not lost may
+/// be damaged, then doubled, and may get a random one in front.
 ///
 /// ```
 /// use axlewire::{sim::Faults, time::Duration};
 ///
-/// let mut faults = Faults::noise(1e-4); // every 10,000th bit
+/// let mut faults = Faults::noise(1e-4); // one bit in 10,000
 /// faults.jitter = Duration::from_micros(30);
 /// assert_eq!(faults.lost, 0.0);
 /// assert_eq!(Faults::CLEAN, Faults::default());
@@ -27,25 +27,24 @@ pub struct Faults {
     pub lost: f64,
     /// Bytes that arrive twice, per byte. The second one takes no time on the wire.
     pub duplicated: f64,
-    /// Random bytes that come in front of another, per byte. They take no time on the wire.
+    /// Random bytes inserted in front of another, per byte. They take no time on the wire.
     pub inserted: f64,
-    /// A byte in front of the first of every transmission, as from a transceiver that is switched
-    /// on. It takes no time on the wire.
+    /// A byte in front of every transmission, as from a transceiver that is switched on. It takes
+    /// no time on the wire.
     pub stray: Option<u8>,
-    /// Time that everything takes longer.
+    /// Constant delay.
     pub delay: Duration,
-    /// Time that things take longer by chance, evenly spread from nothing to this. Nothing
-    /// overtakes.
+    /// Random extra delay, evenly distributed from zero to this. The order of bytes is kept.
     pub jitter: Duration,
-    /// The sender hears its own bytes, as the adapters of 2-wire lines do, even where the wire
-    /// behind them is unplugged.
+    /// Whether the sender hears its own bytes, as with 2-wire adapters, even if the wire behind
+    /// them is unplugged.
     pub echo: bool,
-    /// Nothing gets through.
+    /// Whether the wire is open: nothing gets through.
     pub unplugged: bool,
 }
 
 impl Faults {
-    /// A good wire.
+    /// A wire without faults.
     pub const CLEAN: Self = Self {
         bit_errors: 0.0,
         lost: 0.0,
@@ -58,13 +57,13 @@ impl Faults {
         unplugged: false,
     };
 
-    /// A wire with nothing but wrong bits, of this rate per bit.
+    /// A wire with bit errors only, at this rate per bit.
     #[must_use]
     pub const fn noise(bit_errors: f64) -> Self {
         Self { bit_errors, ..Self::CLEAN }
     }
 
-    /// How long something is held up this time.
+    /// The delay of one byte or transmission.
     pub(super) fn hold_up(&self, rng: &mut Rng) -> Duration {
         if self.jitter == Duration::ZERO {
             return self.delay;
@@ -73,7 +72,8 @@ impl Faults {
         self.delay + Duration::from_micros(jitter as u32)
     }
 
-    /// What becomes of a byte; `is_first` of its transmission.
+    /// Passes a byte, and appends the result to `through`. `is_first` marks the first byte of a
+    /// transmission.
     pub(super) fn pass(
         &self,
         byte: u8,
@@ -109,7 +109,7 @@ impl Faults {
     }
 }
 
-/// What has happened on one pair, the stubs of those who send and hear on it included.
+/// Statistics of one pair, including the stubs of its senders and receivers.
 ///
 /// ```
 /// # use axlewire::sim::PairStatistics;
@@ -118,18 +118,18 @@ impl Faults {
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[non_exhaustive]
 pub struct PairStatistics {
-    /// Bytes that were sent onto the pair.
+    /// Bytes sent onto the pair.
     pub bytes: u64,
-    /// Time that somebody was talking, µs; talking at the same time counts once.
+    /// Time with at least one sender talking, µs.
     pub busy_us: u64,
-    /// Bytes that met another sender's and were garbled.
+    /// Bytes garbled because they overlapped another sender's.
     pub collided: u64,
-    /// Data bits turned over.
+    /// Data bits inverted.
     pub bit_errors: u64,
     /// Bytes lost.
     pub lost: u64,
     /// Bytes that arrived twice.
     pub duplicated: u64,
-    /// Bytes that nobody had sent.
+    /// Bytes inserted.
     pub inserted: u64,
 }

@@ -1,4 +1,4 @@
-//! What a motor does with a new target: it follows, ever more slowly.
+//! A first-order lag: how a motor approaches a new target.
 
 use crate::time::Duration;
 
@@ -16,7 +16,8 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    /// Lets `dt` pass; returns the integral of the value over it, in the value's unit times seconds.
+    /// Advances by `dt`; returns the integral of the value over it, in the value's unit times
+    /// seconds.
     pub(super) fn step(&mut self, dt: Duration) -> f64 {
         let (dt, constant) = (seconds(dt), seconds(self.time_constant));
         let off = self.value - self.target;

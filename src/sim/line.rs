@@ -1,4 +1,4 @@
-//! Two pairs of wire, one head, any number of tails, and virtual time.
+//! Two wire pairs, one head, any number of tails, and virtual time.
 
 use alloc::vec::Vec;
 use core::{error::Error, fmt, mem};
@@ -13,32 +13,32 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// Somebody on the line.
+/// A station on the line.
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
 pub enum Who {
-    /// The one at the head: a master, a host.
+    /// The station at the head: a master, a host.
     Head,
-    /// One at the tail, in the order in which they were added: a slave, a robot.
+    /// A station at the tail, numbered in the order in which they were added: a slave, a robot.
     Tail(usize),
 }
 
-/// One of the two pairs.
+/// One of the two wire pairs.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 pub enum Direction {
-    /// What the head sends and every tail hears.
+    /// From the head to every tail.
     ToTails,
-    /// What the tails send and the head hears.
+    /// From the tails to the head.
     ToHead,
 }
 
-/// A byte that stood on the line.
+/// A byte on the line.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct Traced {
-    /// When it was whole.
+    /// When it was complete.
     pub at: Instant,
-    /// Who sent it.
+    /// Its sender.
     pub who: Who,
-    /// The byte, with what the sender's stub and the pair have done to it.
+    /// The byte, after the faults of the sender's stub and the pair.
     pub byte: u8,
 }
 
@@ -46,18 +46,18 @@ pub struct Traced {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub enum Stuck {
-    /// It wants to be called again at once, for ever, and does nothing when it is.
+    /// It asks to be called again at once, forever, but then does nothing.
     BusyLoop {
-        /// Which endpoint.
+        /// The endpoint.
         who: Who,
-        /// When.
+        /// The time.
         at: Instant,
     },
-    /// It sends, or tells events, without end at one instant.
+    /// It sends, or reports events, without end at one instant.
     Endless {
-        /// Which endpoint.
+        /// The endpoint.
         who: Who,
-        /// When.
+        /// The time.
         at: Instant,
     },
 }
@@ -78,23 +78,25 @@ impl fmt::Display for Stuck {
 
 impl Error for Stuck {}
 
-/// A full-duplex line in virtual time: what the head sends is heard by every tail, what a tail sends
-/// by the head. A motor bus is a master with its slaves, a link is one with a single tail.
+/// A full-duplex line in virtual time: every tail hears the head, and the head hears the tails. A
+/// motor bus is a master with its slaves; a link has a single tail.
 ///
-/// Every endpoint is driven exactly as [`Endpoint`] says, in an order that depends on nothing but the
+/// Every endpoint is driven exactly as [`Endpoint`] describes, in an order that depends only on the
 /// seed: bytes first, then the head, then the tails in their order.
 ///
-/// * A byte takes 10 bit times (ruling B6). A sender's bytes follow one another, however much it
-///   sends at once; one to another sender's on the same pair garbles both.
-/// * Faults come where they are set: on a pair, for all who share it, with [`pair_mut`](Self::pair_mut),
-///   or on the stub of one station, for what it sends and for what it hears, with
-///   [`stub_mut`](Self::stub_mut). What a delayed stub sends comes onto the pair later, so that an
-///   answer can be late; all other delays are on the way from the pair to whom it concerns.
-/// * How late and in which pieces an endpoint's loop sees things is its [`Timing`].
+/// * A byte takes 10 bit times (ruling B6). A sender's bytes follow one another, however many it
+///   sends at once. Bytes of two senders that overlap on one pair are both garbled.
+/// * Set faults on a pair, for all its stations, with [`pair_mut`](Self::pair_mut), or on the stub
+///   of one station, for the bytes that it sends and hears, with [`stub_mut`](Self::stub_mut).
+///   Bytes from a delayed stub reach the pair later, so that an answer can be late; all other
+///   delays are on the way from the pair to the receiver.
+/// * [`Timing`] sets how late, and in which pieces, an endpoint's loop sees its input.
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
-/// use axlewire::{ikeya::{master::{MasterConfig, MasterEvent}, Master, Mode, NodeId, Rps}, sim::{Line, MotorNode, Who}, time::{Duration, Instant}};
+/// use axlewire::ikeya::{master::{MasterConfig, MasterEvent}, Master, Mode, NodeId, Rps};
+/// use axlewire::sim::{Line, MotorNode, Who};
+/// use axlewire::time::{Duration, Instant};
 ///
 /// let start = Instant::from_micros(0);
 /// let mut master: Master = Master::new(MasterConfig::direct(), start);
@@ -122,7 +124,7 @@ impl Error for Stuck {}
 pub struct Line<H: Endpoint, T: Endpoint> {
     head: H,
     tails: Vec<T>,
-    /// The head's, then the tails'.
+    /// Port of the head, then those of the tails.
     ports: Vec<Port>,
     to_tails: Pair,
     to_head: Pair,
@@ -138,7 +140,7 @@ pub struct Line<H: Endpoint, T: Endpoint> {
 struct Pair {
     faults: Faults,
     statistics: PairStatistics,
-    /// The end of the last byte.
+    /// End of the last byte.
     busy_until: Option<Instant>,
 }
 
@@ -156,10 +158,10 @@ const fn who_at(port: usize) -> Who {
     }
 }
 
-/// Who hangs on the line, and how.
+/// Stations and their settings.
 impl<H: Endpoint, T: Endpoint> Line<H, T> {
-    /// A clean line of this speed, bit/s, with nobody at the tail yet. All chance comes from `seed`.
-    /// A `baud` of 0 counts as 1.
+    /// A clean line of this speed, bit/s, without tails yet. All randomness comes from `seed`. A
+    /// `baud` of 0 counts as 1.
     #[must_use]
     pub fn new(baud: u32, seed: u64, head: H) -> Self {
         let now = Instant::from_micros(0);
@@ -178,8 +180,8 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         }
     }
 
-    /// The same line with its time starting at `now` instead of 0. To be called before anything
-    /// else, as with a clock that is about to wrap.
+    /// The same line, with its time starting at `now` instead of 0, for example just before the
+    /// clock wraps. Call it before anything else.
     #[must_use]
     pub fn starting_at(mut self, now: Instant) -> Self {
         self.now = now;
@@ -188,7 +190,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         self
     }
 
-    /// Hangs another endpoint onto the tail; says which it is.
+    /// Adds another endpoint at the tail; returns its number.
     pub fn add(&mut self, tail: T) -> usize {
         self.tails.push(tail);
         self.ports.push(Port::new(self.now));
@@ -201,7 +203,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         &self.head
     }
 
-    /// The endpoint at the head, to be commanded. Its loop then runs once more.
+    /// The endpoint at the head, to give it commands. Its loop then runs once more.
     pub fn head_mut(&mut self) -> &mut H {
         self.ports[0].touch(self.now);
         &mut self.head
@@ -217,23 +219,23 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
     ///
     /// # Panics
     ///
-    /// Where there is none of this number.
+    /// If there is no tail of this number.
     #[must_use]
     pub fn tail(&self, index: usize) -> &T {
         &self.tails[index]
     }
 
-    /// An endpoint at the tail, to be commanded. Its loop then runs once more.
+    /// An endpoint at the tail, to give it commands. Its loop then runs once more.
     ///
     /// # Panics
     ///
-    /// Where there is none of this number.
+    /// If there is no tail of this number.
     pub fn tail_mut(&mut self, index: usize) -> &mut T {
         self.ports[index + 1].touch(self.now);
         &mut self.tails[index]
     }
 
-    /// What is wrong with a pair, to be changed at any time.
+    /// Faults of a pair. Change them at any time.
     pub const fn pair_mut(&mut self, direction: Direction) -> &mut Faults {
         match direction {
             Direction::ToTails => &mut self.to_tails.faults,
@@ -241,20 +243,20 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         }
     }
 
-    /// What is wrong with the wires between one station and the pairs, to be changed at any time.
+    /// Faults of the wires between one station and the pairs. Change them at any time.
     ///
     /// # Panics
     ///
-    /// Where there is no such tail.
+    /// If there is no such tail.
     pub fn stub_mut(&mut self, who: Who) -> &mut Faults {
         &mut self.ports[port_of(who)].stub
     }
 
-    /// How a station's loop runs, to be changed at any time.
+    /// Timing of a station's loop. Change it at any time.
     ///
     /// # Panics
     ///
-    /// Where there is no such tail.
+    /// If there is no such tail.
     pub fn timing_mut(&mut self, who: Who) -> &mut Timing {
         &mut self.ports[port_of(who)].timing
     }
@@ -268,7 +270,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         self.now
     }
 
-    /// When something happens next; `None` if nothing ever does.
+    /// When the next event is due; `None` if there never is one.
     #[must_use]
     pub fn next(&self) -> Option<Instant> {
         let mut next = None;
@@ -278,8 +280,8 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         next.map(|at| at.max(self.now))
     }
 
-    /// Goes on to the next instant at which something happens, and lets it happen. `None` if nothing
-    /// ever does.
+    /// Advances to the next instant at which something is due, and runs it; returns that instant.
+    /// `None` if nothing is ever due.
     ///
     /// # Errors
     ///
@@ -292,7 +294,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         Ok(next)
     }
 
-    /// Lets all that is due at `now` happen.
+    /// Runs everything that is due at `now`.
     fn happen(&mut self, now: Instant) -> Result<(), Stuck> {
         self.now = now;
         for port in 0..self.ports.len() {
@@ -310,7 +312,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         Ok(())
     }
 
-    /// Lets everything up to and at `end` happen; it is `end` then.
+    /// Runs everything due up to and including `end`. The time is then `end`.
     ///
     /// # Errors
     ///
@@ -323,7 +325,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         Ok(())
     }
 
-    /// Lets `span` pass.
+    /// Advances by `span`.
     ///
     /// # Errors
     ///
@@ -355,13 +357,14 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
     }
 }
 
-/// What is on the wires.
+/// Bytes on the wires.
 impl<H: Endpoint, T: Endpoint> Line<H, T> {
-    /// Sends `bytes` from a station without asking its endpoint, behind what that is sending.
+    /// Sends `bytes` from a station without involving its endpoint, after the bytes that it is
+    /// sending.
     ///
     /// # Panics
     ///
-    /// Where there is no such tail.
+    /// If there is no such tail.
     pub fn inject(&mut self, who: Who, bytes: &[u8]) {
         self.send(port_of(who), bytes);
     }
@@ -374,7 +377,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         }
     }
 
-    /// Marks the bytes from `older` on that meet another tail's, and those that they meet.
+    /// Marks collisions: the bytes from `older` on that overlap another tail's, and those others.
     fn collide(&mut self, port: usize, older: usize) {
         let (before, rest) = self.ports.split_at_mut(port);
         let Some((own, behind)) = rest.split_first_mut() else { return };
@@ -388,7 +391,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         }
     }
 
-    /// A byte has come off a station's transmitter: hands it to all who hear it.
+    /// Carries a byte from a station's transmitter to all stations that hear it.
     fn carry(&mut self, port: usize, sent: WireByte) {
         let (pair, receivers) = match port {
             0 => (&mut self.to_tails, 1..self.ports.len()),
@@ -407,7 +410,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
             statistics.busy_us += u64::from((sent.end - since).as_micros());
             pair.busy_until = Some(sent.end);
             for (index, byte) in on_stub.iter().copied().enumerate() {
-                // Never the same byte again, or it would be no collision.
+                // Never 0, which would leave the byte undamaged.
                 let garble = if sent.is_collided { 1 + rng.below(255) as u8 } else { 0 };
                 let is_first = sent.is_first && index == 0;
                 faults.pass(byte ^ garble, is_first, rng, statistics, &mut on_pair);
@@ -446,19 +449,19 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
     }
 }
 
-/// What has happened.
+/// Events and statistics.
 impl<H: Endpoint, T: Endpoint> Line<H, T> {
-    /// The head's events so far, with the time at which each was told. Only once each.
+    /// Takes out the head's events so far, each with the time of its report.
     pub fn take_head_events(&mut self) -> Vec<(Instant, H::Event)> {
         mem::take(&mut self.head_events)
     }
 
-    /// The tails' events so far: when, which tail, and what. Only once each.
+    /// Takes out the tails' events so far: time, number of the tail, and event.
     pub fn take_tail_events(&mut self) -> Vec<(Instant, usize, T::Event)> {
         mem::take(&mut self.tail_events)
     }
 
-    /// What has happened on a pair since the beginning.
+    /// Statistics of a pair since the beginning.
     #[must_use]
     pub const fn statistics(&self, direction: Direction) -> &PairStatistics {
         match direction {
@@ -467,24 +470,23 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         }
     }
 
-    /// How often a station's loop has run since the beginning: many times without a byte and without
-    /// a deadline are a busy loop, too.
+    /// Number of rounds of a station's loop since the beginning. Many rounds without a byte or a
+    /// deadline are a busy loop, too.
     ///
     /// # Panics
     ///
-    /// Where there is no such tail.
+    /// If there is no such tail.
     #[must_use]
     pub fn polls(&self, who: Who) -> u64 {
         self.ports[port_of(who)].polls
     }
 
-    /// Keeps every byte that stands on the line from now on.
+    /// Records every byte on the line from now on.
     pub fn record(&mut self) {
         self.trace.get_or_insert_default();
     }
 
-    /// The bytes so far, by the time at which they were whole; nothing without
-    /// [`record`](Self::record).
+    /// The recorded bytes, in order of completion; empty without [`record`](Self::record).
     #[must_use]
     pub fn trace(&self) -> &[Traced] {
         self.trace.as_deref().unwrap_or_default()

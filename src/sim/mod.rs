@@ -1,17 +1,19 @@
-//! A line with faults, in virtual time, and models of what hangs on it: for tests of applications,
+//! A line with faults, in virtual time, and models of the devices on it: for tests of applications
 //! and of this crate.
 //!
-//! [`Line`] drives roles exactly as [`Endpoint`](crate::endpoint::Endpoint) says, byte by byte, with
-//! the [`Faults`] and the slow or chunky [`Timing`]s that you set. A second on it takes milliseconds,
-//! and the same seed gives the same second. An endpoint that would make a real driver spin is an
-//! error, [`Stuck`].
+//! [`Line`] drives roles exactly as [`Endpoint`](crate::endpoint::Endpoint) describes, byte by
+//! byte, with the [`Faults`] and the slow or chunky [`Timing`]s that you set. One simulated second
+//! takes milliseconds, and the same seed gives the same second. An endpoint that would make a real
+//! driver spin is an error, [`Stuck`].
 //!
-//! `Motor` and `Rover` are models without a line, for tests that have another one; `MotorNode` and
-//! `RoverNode` are these with the slave or the robot that drives them.
+//! `Motor` and `Rover` are models without a line, for tests that have their own. `MotorNode` and
+//! `RoverNode` combine them with the slave or the robot that drives them.
 //!
 //! ```
 //! # #[cfg(feature = "ikeya")] {
-//! use axlewire::{ikeya::{master::{Health, MasterConfig}, Master, Mode, NodeId}, sim::{Direction, Faults, Line, MotorNode}, time::{Duration, Instant}};
+//! use axlewire::ikeya::{master::{Health, MasterConfig}, Master, Mode, NodeId};
+//! use axlewire::sim::{Direction, Faults, Line, MotorNode};
+//! use axlewire::time::{Duration, Instant};
 //!
 //! let start = Instant::from_micros(0); // a line begins at 0
 //! let mut master: Master = Master::new(MasterConfig::direct(), start);
@@ -20,7 +22,7 @@
 //! for node in [NodeId::N1, NodeId::N2] {
 //!     line.add(MotorNode::new(node, Mode::Position));
 //! }
-//! *line.pair_mut(Direction::ToHead) = Faults::noise(1e-3); // every 1000th bit is wrong
+//! *line.pair_mut(Direction::ToHead) = Faults::noise(1e-3); // one bit in 1000 is wrong
 //! line.run_for(Duration::from_millis(1000))?;
 //! assert_ne!(line.head().health(NodeId::N2), None);
 //! assert!(line.statistics(Direction::ToHead).bit_errors > 0);

@@ -1,4 +1,4 @@
-//! A motor, and a node of the bus that drives it.
+//! A motor, and a bus node that drives it.
 
 use super::lag::{Lag, seconds};
 use crate::{
@@ -11,8 +11,8 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// A motor that turns at a speed, which it reaches with a time constant, or goes to a position at a
-/// limited speed. Steps of any length give the same motion.
+/// A motor that approaches a speed with a time constant, or moves to a position at a limited speed.
+/// Steps of any length give the same motion.
 ///
 /// ```
 /// use axlewire::{ikeya::{Position, Rps}, sim::Motor, time::Duration};
@@ -35,12 +35,12 @@ pub struct Motor {
     speed: Lag,
     speed_limit: f64,
     revolutions: f64,
-    /// Where to go, revolutions; `None` when turning.
+    /// Target position, revolutions; `None` in velocity mode.
     goal: Option<f64>,
 }
 
 impl Motor {
-    /// A motor that stands still at position 0: 50 ms to 63 % of a speed, 5 rps to a position.
+    /// A motor at standstill at position 0: 50 ms to 63 % of a new speed, 5 rps to a position.
     #[must_use]
     pub const fn new() -> Self {
         let time_constant = Duration::from_millis(50);
@@ -48,43 +48,43 @@ impl Motor {
         Self { speed, speed_limit: 5.0, revolutions: 0.0, goal: None }
     }
 
-    /// The same motor with another time to 63 % of a new speed; zero is there at once.
+    /// The same motor with this time to 63 % of a new speed; zero reaches the speed at once.
     #[must_use]
     pub const fn with_time_constant(mut self, time_constant: Duration) -> Self {
         self.speed.time_constant = time_constant;
         self
     }
 
-    /// The same motor with another speed, its sign ignored, on its way to a position.
+    /// The same motor with this speed on its way to a position; the sign is ignored.
     #[must_use]
     pub const fn with_speed_limit(mut self, limit: Rps) -> Self {
         self.speed_limit = limit.get().abs() as f64;
         self
     }
 
-    /// The same motor, its shaft at `position`.
+    /// The same motor, with its shaft at `position`.
     #[must_use]
     pub const fn at(mut self, position: Position) -> Self {
         self.revolutions = position.revolutions();
         self
     }
 
-    /// Turn at this speed from now on.
+    /// Turns at this speed from now on.
     pub fn turn(&mut self, target: Rps) {
         (self.goal, self.speed.target) = (None, target.get().into());
     }
 
-    /// Go to this position, and hold it.
+    /// Moves to this position, and holds it.
     pub fn go_to(&mut self, target: Position) {
         self.goal = Some(target.revolutions());
     }
 
-    /// Hold the position where the shaft is now.
+    /// Holds the present position of the shaft.
     pub fn hold(&mut self) {
         self.goal = Some(self.revolutions);
     }
 
-    /// Lets `dt` pass.
+    /// Advances by `dt`.
     pub fn step(&mut self, dt: Duration) {
         let Some(goal) = self.goal else {
             self.revolutions += self.speed.step(dt);
@@ -102,19 +102,19 @@ impl Motor {
     /// The speed of the shaft.
     #[must_use]
     pub fn velocity(&self) -> Rps {
-        // Between two speeds that are numbers lies a number.
+        // Finite: it lies between two finite speeds.
         Rps::new(self.speed.value as f32).unwrap_or(Rps::ZERO)
     }
 
-    /// The position of the shaft to the nearest count. Beyond what the wire can carry it stays at
-    /// the last position that it can.
+    /// The position of the shaft, to the nearest count. Beyond the range of the wire it stays at
+    /// the last position in range.
     #[must_use]
     pub fn position(&self) -> Position {
         Position::from_revolutions(self.revolutions)
             .unwrap_or(Self::END[usize::from(self.revolutions > 0.0)])
     }
 
-    /// The first and the last position on the wire.
+    /// The first and the last position in the range of the wire.
     const END: [Position; 2] = [Position::new(-8191, i16::MIN), Position::new(8191, i16::MAX)];
 }
 
@@ -124,11 +124,11 @@ impl Default for Motor {
     }
 }
 
-/// A node of a motor bus: a [`Slave`] whose commands move a [`Motor`], and whose answers are what the
-/// motor does at that moment.
+/// A node of a motor bus: a [`Slave`] whose commands move a [`Motor`], and whose answers are the
+/// motor's state at that moment.
 ///
-/// Without a command, and after the slave's watchdog, a velocity node stands still and a position
-/// node holds.
+/// Without a command, and after the slave's watchdog has fired, a velocity node stands still and a
+/// position node holds.
 ///
 /// ```
 /// use axlewire::{
@@ -161,7 +161,7 @@ impl MotorNode {
         Self::from_parts(slave, Motor::new())
     }
 
-    /// A node of this slave and this motor.
+    /// Combines this slave and this motor.
     #[must_use]
     pub fn from_parts(slave: Slave, motor: Motor) -> Self {
         let mut node = Self { slave, motor, now: None };
@@ -186,13 +186,13 @@ impl MotorNode {
         &mut self.motor
     }
 
-    /// Moves the mode switch: the command is forgotten.
+    /// Moves the mode switch. The command is forgotten.
     pub fn set_mode(&mut self, mode: Mode) {
         self.slave.set_mode(mode);
         self.obey(self.now.unwrap_or_default());
     }
 
-    /// Lets the motor run up to `now`.
+    /// Runs the motor up to `now`.
     fn run(&mut self, now: Instant) {
         let dt = self.now.replace(now).map_or(Duration::ZERO, |last| now - last);
         if dt != Duration::ZERO {
@@ -201,13 +201,13 @@ impl MotorNode {
         self.show();
     }
 
-    /// Lets the slave answer with what the motor does.
+    /// Gives the state of the motor to the slave.
     fn show(&mut self) {
         self.slave.set_velocity(self.motor.velocity());
         self.slave.set_position(self.motor.position());
     }
 
-    /// Lets the motor do what the slave was told.
+    /// Lets the motor carry out the slave's command.
     fn obey(&mut self, now: Instant) {
         match (self.slave.command(now), self.slave.mode()) {
             (Some(Target::Velocity(target)), _) => self.motor.turn(target),

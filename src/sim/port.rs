@@ -1,4 +1,4 @@
-//! One end of the line: the loop around an endpoint, and what waits on either side of it.
+//! One end of the line: the loop around an endpoint, with its queues.
 
 use alloc::{collections::VecDeque, vec::Vec};
 
@@ -8,36 +8,37 @@ use crate::{
     time::{Duration, Instant, wire_time},
 };
 
-/// Rounds in a row in which an endpoint wants to be called again at once, and nothing comes of it,
-/// before that is a busy loop.
+/// Consecutive rounds in which an endpoint asks to be called again at once and does nothing, before
+/// this counts as a busy loop.
 const PATIENCE: u32 = 3;
 
-/// Most that an endpoint may say in one round.
+/// Most frames, and most events, of an endpoint in one round.
 const ROUND_LIMIT: usize = 10_000;
 
-/// Most rounds that an endpoint may want at one instant.
+/// Most rounds of an endpoint at one instant.
 const ROUNDS_AT_ONCE: u32 = 10_000;
 
-/// How the loop around an endpoint runs: at once and byte by byte, unless set otherwise.
+/// How the loop around an endpoint runs. By default without delay and byte by byte.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub struct Timing {
-    /// How far the loop is behind: whatever arrives, and every deadline, is seen so much later.
+    /// Delay of the loop: it sees received bytes and deadlines this much later.
     pub latency: Duration,
-    /// In which pieces received bytes come.
+    /// How received bytes are grouped.
     pub input: Input,
-    /// Whether the loop takes the events out. An application that does not lets them pile up.
+    /// Whether the loop takes events out. Without it they pile up, as with an application that
+    /// ignores them.
     pub takes_events: bool,
 }
 
-/// One that is never late.
+/// A loop that is never late.
 impl Default for Timing {
     fn default() -> Self {
         Self { latency: Duration::ZERO, input: Input::Bytes, takes_events: true }
     }
 }
 
-/// In which pieces received bytes reach an endpoint.
+/// How received bytes are grouped into pieces of input.
 ///
 /// ```
 /// use axlewire::{sim::Input, time::Duration};
@@ -46,17 +47,17 @@ impl Default for Timing {
 /// ```
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Input {
-    /// Each by itself, as an interrupt per byte does it.
+    /// Each byte by itself, as with an interrupt per byte.
     Bytes,
-    /// Together, once nothing has come for `pause` or `at_most` bytes are there: DMA with the idle
-    /// interrupt of a UART.
+    /// A piece ends when nothing has arrived for `pause` or `at_most` bytes are there: DMA with the
+    /// idle interrupt of a UART.
     AfterPause {
         /// Silence that ends a piece.
         pause: Duration,
         /// Bytes that end a piece.
         at_most: usize,
     },
-    /// Together, `wait` after the first of them or once `at_most` bytes are there: a USB adapter
+    /// A piece ends `wait` after its first byte or when `at_most` bytes are there: a USB adapter
     /// with its latency timer.
     AfterFirst {
         /// Time from the first byte of a piece to its end.
@@ -67,14 +68,14 @@ pub enum Input {
 }
 
 impl Input {
-    /// A USB adapter with its latency timer as delivered: 16 ms, or 62 bytes.
+    /// A USB adapter with the default latency timer: 16 ms, or 62 bytes.
     #[must_use]
     pub const fn usb_adapter() -> Self {
         Self::AfterFirst { wait: Duration::from_millis(16), at_most: 62 }
     }
 }
 
-/// What is wrong with an endpoint.
+/// How an endpoint breaks the contract.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Trouble {
     BusyLoop,
@@ -87,14 +88,14 @@ pub(super) struct WireByte {
     pub(super) start: Instant,
     pub(super) end: Instant,
     pub(super) byte: u8,
-    /// The first of its transmission.
+    /// Whether this is the first byte of its transmission.
     pub(super) is_first: bool,
-    /// Another sender talks meanwhile.
+    /// Whether another sender was talking at the same time.
     pub(super) is_collided: bool,
 }
 
-/// Bytes without a gap between them: their ends are counted from the first start, so that no
-/// rounding adds up.
+/// Bytes without a gap between them. Their ends are counted from the first start, so that rounding
+/// errors do not add up.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     start: Instant,
@@ -115,18 +116,18 @@ pub(super) struct Port {
     pub(super) timing: Timing,
     pub(super) stub: Faults,
     pub(super) polls: u64,
-    /// Sent, and not yet at the end of the wire.
+    /// Bytes sent, but not yet at the end of the wire.
     pub(super) sending: VecDeque<WireByte>,
     run: Option<Run>,
-    /// Received, in order, with the times of arrival, some of them yet to come.
+    /// Received bytes in order, with their times of arrival, some in the future.
     arrivals: VecDeque<(Instant, u8)>,
     last_arrival: Option<Instant>,
-    /// What the endpoint last answered to `poll_timeout`.
+    /// The endpoint's last `poll_timeout`.
     deadline: Option<Instant>,
-    /// The application may have commanded something.
+    /// When the application may have given a command.
     touched: Option<Instant>,
     fruitless: u32,
-    /// The time of the last round, and how many there were.
+    /// Time of the last round, and number of rounds at that time.
     rounds: (Option<Instant>, u32),
 }
 
@@ -147,13 +148,13 @@ impl Port {
         }
     }
 
-    /// The application has had its hands on the endpoint.
+    /// Notes that the application had access to the endpoint.
     pub(super) fn touch(&mut self, now: Instant) {
         self.touched.get_or_insert(now);
     }
 
-    /// Puts bytes onto the wire behind those that are on it, not before `from`; returns how many
-    /// of `sending` are older.
+    /// Puts bytes onto the wire after those already on it, not before `from`; returns the number of
+    /// older bytes in `sending`.
     pub(super) fn send(&mut self, bytes: &[u8], from: Instant, baud: u32) -> usize {
         let older = self.sending.len();
         for (index, &byte) in bytes.iter().enumerate() {
@@ -165,7 +166,8 @@ impl Port {
             let start = end_of(&run);
             run.bytes += 1;
             let end = end_of(&run);
-            // So many bytes take 10 s to the bit: no rounding is lost, and no run gets too long.
+            // This many bytes take exactly 10 s, so there is no rounding error, and no run gets too
+            // long.
             if run.bytes == baud as usize {
                 run = Run { start: end, bytes: 0 };
             }
@@ -176,14 +178,14 @@ impl Port {
         older
     }
 
-    /// A byte will be there at `at`, but not before the one in front of it.
+    /// Notes a byte that arrives at `at`, but not before the previous one.
     pub(super) fn receive(&mut self, byte: u8, at: Instant) {
         let at = self.last_arrival.map_or(at, |last| last.max(at));
         self.last_arrival = Some(at);
         self.arrivals.push_back((at, byte));
     }
 
-    /// The next byte to come off the wire is whole then.
+    /// When the next byte on the wire is complete.
     pub(super) fn sent_at(&self) -> Option<Instant> {
         self.sending.front().map(|byte| byte.end)
     }
@@ -195,7 +197,7 @@ impl Port {
         trigger.map(|at| at + self.timing.latency)
     }
 
-    /// The next piece of input: when it is complete, and how many bytes it has.
+    /// The next piece of input: when it is complete, and its number of bytes.
     fn next_piece(&self) -> Option<(Instant, usize)> {
         let first = self.arrivals.front()?.0;
         let arrived_by = |limit: Instant| self.arrivals.partition_point(|(at, _)| *at <= limit);
@@ -219,7 +221,8 @@ impl Port {
         }
     }
 
-    /// One round of the loop that [`Endpoint`] describes. Appends what is to be sent to `sent`.
+    /// Runs one round of the loop that [`Endpoint`] describes. Appends the frames to send to
+    /// `sent`.
     pub(super) fn run<E: Endpoint>(
         &mut self,
         endpoint: &mut E,
@@ -261,7 +264,7 @@ impl Port {
         self.judge(is_fruitful, now)
     }
 
-    /// Whether the endpoint lets time go on.
+    /// Checks that the endpoint lets time pass.
     fn judge(&mut self, is_fruitful: bool, now: Instant) -> Result<(), Trouble> {
         let wants_more = self.deadline.is_some_and(|at| at <= now);
         self.fruitless = if wants_more && !is_fruitful { self.fruitless + 1 } else { 0 };

@@ -1,8 +1,8 @@
-//! Chance that can be repeated.
+//! Reproducible randomness.
 
-/// A generator of pseudo-random numbers (splitmix64): the same seed, the same numbers, everywhere.
+/// A pseudo-random number generator (splitmix64): the same seed gives the same numbers everywhere.
 ///
-/// Good for tests, useless for secrets.
+/// Good for tests, unfit for secrets.
 ///
 /// ```
 /// use axlewire::sim::Rng;
@@ -36,14 +36,14 @@ impl Rng {
         (self.next_u64() >> 56) as u8
     }
 
-    /// A number from 0 to `limit - 1`; 0 where `limit` is 0.
+    /// A number from 0 to `limit - 1`; 0 if `limit` is 0.
     pub const fn below(&mut self, limit: u64) -> u64 {
         ((self.next_u64() as u128 * limit as u128) >> 64) as u64
     }
 
-    /// Whether something of this probability happens: never at 0, always at 1.
+    /// Whether an event of this probability happens: never at 0, always at 1.
     pub fn chance(&mut self, probability: f64) -> bool {
-        // 53 bits are what an f64 holds exactly.
+        // An f64 holds 53 bits exactly.
         let roll = (self.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
         roll < probability
     }

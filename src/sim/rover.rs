@@ -1,4 +1,4 @@
-//! A rover with four wheels, two a side.
+//! A rover with four wheels, two on each side.
 
 use super::lag::{Lag, seconds};
 use crate::{
@@ -8,19 +8,19 @@ use crate::{
 
 /// A rover on flat ground: motor commands and time go in, telemetry comes out.
 ///
-/// It steers as the vendor's `motor.c` does (ruling U6), by a steering wheel and in whole percent.
-/// The left wheels get `speed * (100 + 0.7 * angular) / 100`, the right ones the same with minus: a
-/// positive `angular` turns right forward, and in reverse the nose swings *left*. A speed of ±5 or
-/// less counts as none: beyond ±10 `angular` then turns it on the spot, at 0.7 of its value. An
-/// `angular` of ±5 or less does not steer, and adds 0.7 of its value to both sides. Where neither
-/// selects a direction, that of the command before stays selected. Of the result, 5 % or less is no
-/// motion, and 95 % or more is full speed.
+/// It steers as the vendor's `motor.c` does (ruling U6), like a steering wheel and in whole
+/// percent. The left wheels get `speed * (100 + 0.7 * angular) / 100`, the right ones the same with
+/// a minus sign: a positive `angular` turns right when moving forward; in reverse the nose swings
+/// *left*. A speed of ±5 or less counts as zero: with an `angular` beyond ±10 the rover then turns
+/// on the spot, at 0.7 of that value. An `angular` of ±5 or less does not steer, and adds 0.7 of
+/// its value to both sides. If neither selects a direction, the direction of the previous command
+/// stays selected. A result of 5 % or less is no motion, and 95 % or more is full speed.
 ///
-/// At full speed a wheel makes 120 rpm, and 63 % of a new speed is reached in 150 ms.
-/// The heading is a compass's, growing to the right. The battery gives 40 Wh, at 12.6 V full and
-/// 9.6 V empty; an empty one turns no wheel.
+/// At full speed a wheel turns at 120 rpm, and 63 % of a new speed is reached in 150 ms. The
+/// heading is that of a compass, growing to the right. The battery holds 40 Wh and gives 12.6 V
+/// when full and 9.6 V when empty; an empty battery turns no wheel.
 ///
-/// It has no watchdog: that is the [`Robot`](crate::ucp::Robot)'s.
+/// It has no watchdog: the [`Robot`](crate::ucp::Robot) has one.
 ///
 /// ```
 /// use axlewire::{sim::Rover, time::Duration, ucp::MotorControl};
@@ -35,10 +35,10 @@ use crate::{
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rover {
-    /// Speeds of the wheels as parts of the full one.
+    /// Wheel speeds as fractions of full speed.
     left: Lag,
     right: Lag,
-    /// What the latest command that selects a direction has selected.
+    /// The direction selected by the latest command that selects one.
     direction: Direction,
     heading_deg: f64,
     turn_deg_per_s: f64,
@@ -63,7 +63,7 @@ impl Rover {
     /// The earth's field along the ground and into it, sensor counts.
     const FIELD: (f64, f64) = (300.0, -400.0);
 
-    /// A rover that stands still, heads north and is fully charged.
+    /// A rover at standstill, heading north, fully charged.
     #[must_use]
     pub const fn new() -> Self {
         let time_constant = Duration::from_millis(150);
@@ -81,14 +81,14 @@ impl Rover {
         }
     }
 
-    /// The same rover with another charge, percent, 0 to 100.
+    /// The same rover with this charge, percent, 0 to 100.
     #[must_use]
     pub const fn with_battery(mut self, percent: f64) -> Self {
         self.battery_wh = Self::BATTERY_WH * percent.clamp(0.0, 100.0) / 100.0;
         self
     }
 
-    /// Drives as commanded from now on.
+    /// Carries out a command from now on.
     pub fn command(&mut self, command: &MotorControl) {
         let (speed, angular) = (i32::from(command.speed()), i32::from(command.angular()));
         if let Some(selected) = Direction::selected(speed, angular) {
@@ -100,7 +100,7 @@ impl Rover {
         self.right.target = f64::from(right_sign * limited(right)) / 100.0;
     }
 
-    /// Lets `dt` pass.
+    /// Advances by `dt`.
     pub fn step(&mut self, dt: Duration) {
         let span = seconds(dt);
         if span <= 0.0 {
@@ -125,26 +125,26 @@ impl Rover {
         self.battery_wh = (self.battery_wh - self.power_w * span / 3600.0).max(0.0);
     }
 
-    /// Where it heads, degrees from north to the right, 0 up to 360.
+    /// Heading, degrees clockwise from north, 0 up to 360.
     #[must_use]
     pub const fn heading_deg(&self) -> f64 {
         self.heading_deg
     }
 
-    /// The way it has made, metres, backwards counted off.
+    /// Distance travelled, metres; reversing counts negative.
     #[must_use]
     pub const fn distance_m(&self) -> f64 {
         self.distance_m
     }
 
-    /// What is left in the battery, percent.
+    /// Battery charge, percent.
     #[must_use]
     pub const fn battery(&self) -> f64 {
         self.battery_wh / Self::BATTERY_WH * 100.0
     }
 
-    /// What its sensors say: x is ahead, y is to the left, z is up. Accelerations and turns are
-    /// means over the last step.
+    /// Readings of its sensors: x is ahead, y is to the left, z is up. Accelerations and turn rates
+    /// are means over the last step.
     #[must_use]
     pub fn telemetry(&self) -> Telemetry {
         let volts = Self::EMPTY_V + (Self::FULL_V - Self::EMPTY_V) * self.battery() / 100.0;
@@ -153,7 +153,7 @@ impl Rover {
         let one_g = f64::from(Telemetry::ACC_PER_G);
         let (sin, cos) = self.heading_deg.to_radians().sin_cos();
         let (along, into) = Self::FIELD;
-        // To the right is negative around an axis that points up.
+        // A right turn is negative around an axis that points up.
         let turn = -self.turn_deg_per_s * f64::from(Telemetry::GYRO_PER_DEG_PER_S);
         Telemetry {
             battery_pct: self.battery() as u16,
@@ -169,7 +169,7 @@ impl Rover {
     }
 }
 
-/// Which way the wheels turn; how fast is another matter.
+/// Direction of the wheels, whatever their speed.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Direction {
     None,
@@ -180,7 +180,7 @@ enum Direction {
 }
 
 impl Direction {
-    /// What a command selects; `None` where that of the command before stays selected.
+    /// The direction that a command selects; `None` if the previous one stays selected.
     const fn selected(speed: i32, angular: i32) -> Option<Self> {
         Some(match (speed, angular) {
             (6.., _) => Self::Forward,
@@ -203,7 +203,7 @@ impl Direction {
     }
 }
 
-/// Magnitudes for the left and the right wheels, percent, truncated as the vendor's are.
+/// Magnitudes for the left and the right wheels, percent, truncated as by the vendor.
 const fn duties(speed: i32, angular: i32) -> (i32, i32) {
     let magnitude = speed.abs();
     match (speed, angular) {
@@ -216,7 +216,7 @@ const fn duties(speed: i32, angular: i32) -> (i32, i32) {
     }
 }
 
-/// Too little moves no wheel, and nearly all is all.
+/// Turns a small duty into 0 and a large one into 100.
 const fn limited(duty: i32) -> i32 {
     match duty {
         ..=5 => 0,

@@ -1,4 +1,4 @@
-//! A rover with the robot that drives it.
+//! A rover with its robot.
 
 use super::rover::Rover;
 use crate::{
@@ -8,10 +8,11 @@ use crate::{
 };
 
 /// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports
-/// are what the rover does at that moment.
+/// are the rover's telemetry of that moment.
 ///
 /// ```
-/// use axlewire::{endpoint::Endpoint, sim::RoverNode, time::Instant, ucp::{robot::RobotConfig, Body, MotorControl}};
+/// use axlewire::ucp::{robot::RobotConfig, Body, MotorControl};
+/// use axlewire::{endpoint::Endpoint, sim::RoverNode, time::Instant};
 ///
 /// let mut node = RoverNode::new(RobotConfig::default(), Instant::from_millis(0));
 /// let drive = MotorControl::new(50, 0)?.frame(0);
@@ -35,7 +36,7 @@ impl RoverNode {
         Self::from_parts(Robot::new(config, now), Rover::new(), now)
     }
 
-    /// A node of this robot and this rover.
+    /// Combines this robot and this rover.
     #[must_use]
     pub fn from_parts(robot: Robot, rover: Rover, now: Instant) -> Self {
         let mut node = Self { robot, rover, now };
@@ -49,7 +50,7 @@ impl RoverNode {
         &self.robot
     }
 
-    /// The robot, to answer its events.
+    /// The robot, to respond to its events.
     pub const fn robot_mut(&mut self) -> &mut Robot {
         &mut self.robot
     }
@@ -60,7 +61,7 @@ impl RoverNode {
         &self.rover
     }
 
-    /// Lets the rover run up to `now`, and the robot report what it does.
+    /// Runs the rover up to `now`, and lets the robot report its telemetry.
     fn run(&mut self, now: Instant) {
         self.rover.command(&self.robot.command(now));
         let dt = now - self.now;

@@ -1,4 +1,4 @@
-//! The decoder of the roles: less code, by way of the buffer alone.
+//! The decoder of the roles: less code, because every byte goes through the buffer.
 
 #[cfg(any(test, feature = "ikeya"))]
 use super::event::Event;
@@ -8,10 +8,10 @@ use super::{
 };
 
 impl<F: Framing, const N: usize> Decoder<F, N> {
-    /// The same events as [`decode`](Self::decode), one for one, without reading frames where they lie
-    /// in the input.
+    /// Returns exactly the events of [`decode`](Self::decode), but does not read frames in place in
+    /// the input.
     ///
-    /// Slower for long inputs, and some 700 bytes of flash less: for the roles, which get a few
+    /// Slower for long inputs, but saves some 700 bytes of flash. For the roles, which get a few
     /// bytes at a time.
     #[cfg(any(test, feature = "ikeya"))]
     pub(crate) fn decode_buffered(&mut self, input: &mut &[u8]) -> Option<Event<F::Frame<'_>>> {
@@ -19,10 +19,10 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.held_event(held)
     }
 
-    /// Finds and books the next event, like [`decode_buffered`](Self::decode_buffered). The answer
-    /// borrows nothing from `self`.
+    /// Finds and books the next event, like [`decode_buffered`](Self::decode_buffered). The result
+    /// does not borrow from `self`.
     pub(crate) fn advance_buffered(&mut self, input: &mut &[u8]) -> Option<Held> {
-        // Each turn takes in bytes, or is the last.
+        // Each iteration takes in bytes, or is the last.
         loop {
             if self.fill.is_early() {
                 if input.is_empty() {
@@ -31,7 +31,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 let is_first = self.fill == Self::EMPTY;
                 self.hold(input, self.fill.missing());
                 if is_first {
-                    // Bytes that start no frame are refused at once.
+                    // Refuse bytes that start no frame right away.
                     self.wake_now();
                 }
                 if self.fill.is_early() {
@@ -54,7 +54,7 @@ mod tests {
 
     use super::*;
 
-    /// Everything that can be seen of both ways after each piece.
+    /// Compares everything observable of both ways, after each piece.
     fn same_events<F: Framing, const N: usize>(
         pieces: &[(Vec<u8>, bool)],
     ) -> Result<(), TestCaseError>
@@ -83,7 +83,7 @@ mod tests {
         Ok(())
     }
 
-    /// Whole frames, headers, anything, in pieces of which some are followed by silence.
+    /// Whole frames, headers and random bytes, in pieces, some of them followed by silence.
     fn pieces() -> impl Strategy<Value = Vec<(Vec<u8>, bool)>> {
         let sealed = |frame: &[u8]| [frame, &crate::crc16::compute(frame).to_le_bytes()].concat();
         let frames = vec![

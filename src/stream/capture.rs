@@ -1,4 +1,4 @@
-//! A whole capture at once, for hosts.
+//! Decoding of a whole capture, for hosts.
 
 use alloc::vec::Vec;
 
@@ -9,14 +9,15 @@ use super::{
     search::{Front, search},
 };
 
-/// An event, and the offset of its first byte in the capture.
+/// An event, with the offset of its first byte in the capture.
 pub type Located<T> = (usize, Event<T>);
 
-/// Everything in a capture that is already in memory: each event with the offset of its first
-/// byte, and the account.
+/// Decodes a capture that is already in memory: each event with the offset of its first byte, and
+/// the account.
 ///
-/// Nothing follows a capture, so a candidate that its end cuts off is refused as
-/// [`Reason::Idle`](super::Reason::Idle), and whole frames inside it are found. Needs feature `alloc`.
+/// Nothing follows a capture, so a candidate cut off by its end is refused as
+/// [`Reason::Idle`](super::Reason::Idle), and whole frames inside it are found. Needs feature
+/// `alloc`.
 ///
 /// ```
 /// # #[cfg(feature = "ucp")] {

@@ -1,4 +1,4 @@
-//! Frames of a stream.
+//! The decoder of a stream.
 
 use core::{cell::Cell, fmt, marker::PhantomData};
 
@@ -11,18 +11,18 @@ use super::{
 };
 use crate::machine::IS_HOST;
 
-/// Frames of a stream that arrives in pieces of any size.
+/// Finds the frames of a stream that arrives in pieces of any size.
 ///
-/// `N` is the size of its buffer, bytes: at least [`Framing::MAX_LEN`] and, except on 64-bit machines, at
-/// most 32,766. That is checked when it is compiled. A frame lying whole in the input is borrowed from the
-/// input; only one that is split over two inputs goes through the buffer.
+/// `N` is the size of the buffer, bytes: at least [`Framing::MAX_LEN`] and, except on 64-bit
+/// machines, at most 32,766, checked at compile time. A frame that is whole in the input is
+/// borrowed from the input; only a frame split over two inputs goes through the buffer.
 ///
-/// Feed it in one of three ways, or all in turn:
+/// There are three ways to feed it, which you can mix:
 ///
 /// * [`decode`](Self::decode) takes a slice and advances it;
-/// * a port or a DMA channel writes into [`spare`](Self::spare), [`commit`](Self::commit) says how
-///   much, and [`poll`](Self::poll) reads it out;
-/// * a receive interrupt [`push`](Self::push)es single bytes, and `poll` reads them out.
+/// * a port or a DMA channel writes into [`spare`](Self::spare), [`commit`](Self::commit) tells how
+///   many bytes it wrote, and [`poll`](Self::poll) returns the events;
+/// * a receive interrupt [`push`](Self::push)es single bytes, and `poll` returns the events.
 ///
 /// ```
 /// # #[cfg(feature = "ucp")] {
@@ -44,46 +44,46 @@ use crate::machine::IS_HOST;
 /// # }
 /// ```
 ///
-/// A buffer too short for the longest packet does not compile:
+/// A buffer too short for the longest frame does not compile:
 ///
 /// ```compile_fail,E0080
 /// let decoder = axlewire::stream::Decoder::<axlewire::ikeya::ToSlave, 7>::new();
 /// ```
-// The buffer in front: a pushed byte is stored without an addition.
+// The buffer comes first: storing a pushed byte then needs no addition.
 #[repr(C)]
 pub struct Decoder<F, const N: usize> {
-    /// `buffer[at..end]` is held: received, and neither framed nor skipped yet.
+    /// `buffer[at..end]` is held: received, but neither framed nor skipped yet.
     buffer: [u8; N],
-    /// Where `end` is, and when to look. As long as it is too early, nothing can be said about the held bytes,
-    /// and there is room for more. More are waited for only where the line is busy and the held ones begin at
-    /// the front.
+    /// `end`, and when to look at the held bytes. While it is too early, they decide nothing, and
+    /// there is room for more. The decoder waits for more only while the line is busy and the held
+    /// bytes begin at the front.
     pub(super) fill: Fill,
     at: usize,
     line: Line,
-    /// Where the held bytes ended when the line went quiet: what lies behind came later.
+    /// End of the held bytes when the line went quiet: bytes beyond it came later.
     quiet_end: usize,
     ledger: Ledger,
     framing: PhantomData<fn() -> F>,
 }
 
-/// What `idle` has asked for.
+/// What a call of `idle` has left to do.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Line {
     /// Nothing.
     Busy,
-    /// To refuse the candidate that is pending, if the held bytes end in one.
+    /// Refuse the pending candidate, if the held bytes end in one.
     Quiet,
-    /// To report the gap as soon as the search comes to an end.
+    /// Report the gap when the search ends.
     Settling,
 }
 
-/// An event that has been booked but borrows nothing from the decoder yet: where its bytes are.
+/// An event that has been booked: where its bytes are. Borrows nothing from the decoder.
 pub(crate) enum Found<'i> {
     Held(Held),
     Input(&'i [u8]),
 }
 
-/// One in what is held.
+/// An event in the held bytes.
 pub(crate) enum Held {
     Gap(Gap),
     Frame { at: usize, len: usize },
@@ -97,7 +97,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(N >= F::MAX_LEN, "the buffer is shorter than the longest frame") }
-        const { assert!(N <= Fill::MAX, "the buffer is longer than a decoder counts") }
+        const { assert!(N <= Fill::MAX, "the buffer is longer than a decoder supports") }
         Self {
             buffer: [0; N],
             fill: Self::EMPTY,
@@ -109,20 +109,21 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// The next event in what is held and then in `input`, which is advanced by what was used.
+    /// Returns the next event in the held bytes and then in `input`, and advances `input` past the
+    /// bytes used.
     ///
-    /// `None` means that `input` is used up and all that can be said has been said; stopping
-    /// before that loses nothing, as long as the next call gets what is left of `input`.
+    /// `None` means that `input` is used up and there is no further event. You may stop earlier
+    /// without loss, as long as the next call gets the rest of `input`.
     #[inline]
     pub fn decode<'a, 'i: 'a>(&'a mut self, input: &mut &'i [u8]) -> Option<Event<F::Frame<'a>>> {
         let found = self.advance(input)?;
         self.event(found)
     }
 
-    /// The next event in what is held: [`decode`](Self::decode) with nothing new.
+    /// Returns the next event in the held bytes: [`decode`](Self::decode) without new input.
     #[inline]
     pub fn poll(&mut self) -> Option<Event<F::Frame<'_>>> {
-        // What has been waited for is mostly one frame and nothing else: no need to go through `Held`.
+        // Usually the held bytes are exactly one frame: no need to go through `Held`.
         if self.fill.is_just(F::MIN_LEN..=N) {
             let end = self.fill.end();
             match judge::<F>(self.buffer.get(..end)?) {
@@ -146,19 +147,19 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.held_event(held)
     }
 
-    /// Room behind the held bytes for a port to write into.
+    /// Free space after the held bytes, for a port to write into.
     ///
-    /// At least one byte long once [`decode`](Self::decode) has answered `None`; before that it
-    /// may be empty.
+    /// At least one byte once [`decode`](Self::decode) or [`poll`](Self::poll) has returned `None`;
+    /// may be empty before.
     #[must_use]
     pub fn spare(&mut self) -> &mut [u8] {
         self.compact();
         self.buffer.get_mut(self.fill.end()..).unwrap_or_default()
     }
 
-    /// The first `len` bytes of [`spare`](Self::spare) have been written.
+    /// Takes in the first `len` bytes of [`spare`](Self::spare), which have been written.
     ///
-    /// No more than `spare` has are taken.
+    /// A larger `len` is cut to the length of `spare`.
     pub fn commit(&mut self, len: usize) {
         if self.pending() == 0 {
             self.wake_now();
@@ -166,15 +167,15 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.fill = self.fill.plus(len.min(N - self.fill.end()));
     }
 
-    /// Takes in one byte, as a receive interrupt brings it; says whether [`poll`](Self::poll) may
-    /// have an event now, to be called until it has none.
+    /// Takes in one byte, as from a receive interrupt. Returns whether [`poll`](Self::poll) may
+    /// have an event now; if so, call it until it returns `None`.
     ///
     /// The cheapest way to feed single bytes: until a frame can be complete, they are only stored.
-    /// No frame is found later than by [`decode`](Self::decode), but bytes that start none may stay
-    /// [`pending`](Self::pending) until [`Framing::MIN_LEN`] of them are there.
+    /// Frames are found as early as with [`decode`](Self::decode), but bytes that start no frame
+    /// may stay [`pending`](Self::pending) until there are [`Framing::MIN_LEN`] of them.
     ///
-    /// There is always room once `poll` has answered `None`. Who goes on pushing after a `true`
-    /// without it fills the buffer in the end; then the byte is not taken, and the answer is `true`.
+    /// There is always room after `poll` has returned `None`. If you keep pushing without polling
+    /// after a `true`, the buffer fills; bytes are then refused, and `push` keeps returning `true`.
     ///
     /// ```
     /// # #[cfg(feature = "ikeya")] {
@@ -196,7 +197,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     pub fn push(&mut self, byte: u8) -> bool {
         let (at, fill) = (self.fill.end(), self.fill.plus(1));
         if fill.is_early() {
-            // There is room. Where a mask can tell the compiler so, it is cheaper than a comparison.
+            // There is room. Where a mask shows that to the compiler, it is cheaper than a
+            // comparison.
             let at = if N.is_power_of_two() { at % N } else { at };
             if let Some(room) = self.buffer.get_mut(at) {
                 *room = byte;
@@ -211,39 +213,40 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         true
     }
 
-    /// The line went quiet: what is pending will not be completed (ruling B3).
+    /// Tells the decoder that the line went quiet: the pending bytes will not be completed (ruling
+    /// B3).
     ///
-    /// Concerns the bytes that the decoder has taken in; hand in what came before the silence first.
-    /// Takes effect in the calls of [`decode`](Self::decode) or [`poll`](Self::poll) that follow, which deliver whole
-    /// frames still held, refuse the pending candidate, search on inside it and report the gap.
-    /// What can still be the start of a frame at the very end remains pending: when nothing at all
-    /// will follow, call it until [`pending`](Self::pending) is 0. Each call ends a gap, so a second
-    /// one may then follow right behind the first.
+    /// Applies to the bytes taken in so far; hand in everything from before the silence first.
+    /// Takes effect in the following calls of [`decode`](Self::decode) or [`poll`](Self::poll).
+    /// They deliver whole frames still held, refuse the pending candidate, search on inside it and
+    /// report the gap. A possible start of a frame at the very end remains pending: if nothing will
+    /// follow at all, call `idle` until [`pending`](Self::pending) is 0. Each call ends a gap, so
+    /// two gaps may be adjacent.
     pub fn idle(&mut self) {
         (self.line, self.quiet_end) = (Line::Quiet, self.fill.end());
         self.wake_now();
     }
 
-    /// Bytes received and neither framed nor skipped yet.
+    /// Number of bytes received but neither framed nor skipped yet.
     #[must_use]
     pub const fn pending(&self) -> usize {
         self.fill.end() - self.at
     }
 
-    /// Where every byte went so far.
+    /// The account of every byte so far.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.ledger.counters(self.pending())
     }
 
-    /// Bytes taken in: [`Counters::received`] alone.
+    /// Number of bytes taken in: [`Counters::received`] alone.
     #[must_use]
     pub const fn received(&self) -> u64 {
         self.ledger.received(self.pending())
     }
 
-    /// Finds and books the next event. The answer borrows nothing from `self`, so that a caller
-    /// can go on reading from its port where there is none.
+    /// Finds and books the next event. The result does not borrow from `self`, so without an event
+    /// the caller can go on reading from its port.
     #[inline]
     pub(crate) fn advance<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         if self.fill != Self::EMPTY {
@@ -261,14 +264,14 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.advance_input(input)
     }
 
-    /// Finds and books the next event in what is held.
+    /// Finds and books the next event in the held bytes.
     #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     #[inline]
     pub(crate) fn advance_held(&mut self) -> Option<Held> {
         if self.fill.is_early() { None } else { self.judge_held(0) }
     }
 
-    /// Makes an event of what `advance` has found.
+    /// Makes an event from a result of `advance`.
     #[inline]
     pub(crate) fn event<'a, 'i: 'a>(&'a self, found: Found<'i>) -> Option<Event<F::Frame<'a>>> {
         match found {
@@ -277,7 +280,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Makes an event of what `advance_held` has found.
+    /// Makes an event from a result of `advance_held`.
     #[inline]
     pub(crate) fn held_event(&self, held: Held) -> Option<Event<F::Frame<'_>>> {
         match held {
@@ -288,9 +291,10 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Nothing is held: reads `input` where it lies, and holds the candidate that it cuts off.
+    /// Reads `input` in place, while nothing is held, and holds the candidate that its end cuts
+    /// off.
     ///
-    /// Part of its caller on a host, and one copy on a microcontroller.
+    /// Inlined on a host; a single copy on a microcontroller.
     #[inline(always)]
     fn advance_input<'i>(&mut self, input: &mut &'i [u8]) -> Option<Found<'i>> {
         if IS_HOST { self.read_input(input) } else { self.read_input_apart(input) }
@@ -313,7 +317,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     *input = found;
                     return Some(Found::Held(Held::Gap(gap)));
                 }
-                // Fails only if the framing breaks its contract; the input is then left as it is.
+                // Fails only if the framing breaks its contract; `input` then stays as it is.
                 let (frame, rest) = found.split_at_checked(len)?;
                 *input = rest;
                 self.ledger.frame(len);
@@ -330,8 +334,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Something is held, or the line went quiet: completes the candidate from `input`. Either an
-    /// event comes of that, or more input is needed, or nothing is held any more.
+    /// Completes the held candidate from `input`, or handles a quiet line. Afterwards there is an
+    /// event, or more input is needed, or nothing is held any more.
     #[inline(never)]
     fn complete(&mut self, input: &mut &[u8]) -> Option<Held> {
         let start = *input;
@@ -347,7 +351,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                 return Some(held);
             }
             if self.pending() <= taken {
-                // All that is still held came from this input: it is read there.
+                // All bytes still held came from this input: read them there.
                 *input = start.get(taken - self.pending()..)?;
                 self.clear();
                 return None;
@@ -355,12 +359,12 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Finds and books the next event in what is held, of which something can be said; but none in
-    /// the last `taken` bytes, if nothing in front of them is left.
+    /// Finds and books the next event in the held bytes, once there are enough of them. If only the
+    /// last `taken` bytes are left, finds none in them.
     #[inline(never)]
     pub(super) fn judge_held(&mut self, taken: usize) -> Option<Held> {
         loop {
-            // What came behind a silence does not complete what was pending before it.
+            // Bytes from after a silence do not complete a candidate from before it.
             let end = if self.line == Line::Busy { self.fill.end() } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
             match (judge::<F>(held), self.line) {
@@ -408,7 +412,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Nothing can be said before the held bytes are `need`; sees to it that there is room for them.
+    /// Waits until `need` bytes are held, and makes room for them.
     #[inline]
     fn wait_for(&mut self, need: usize) {
         if self.at == self.fill.end() {
@@ -418,19 +422,19 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         self.wake_at(need);
     }
 
-    /// What is held begins at the front, and nothing can be said before there are `need` bytes of it.
+    /// Waits until `need` bytes are held; they begin at the front.
     #[inline]
     fn wake_at(&mut self, need: usize) {
         self.fill = Fill::until(need.min(N), self.fill.end());
     }
 
-    /// Whatever is held is to be looked at.
+    /// Looks at the held bytes at the next opportunity, however few they are.
     #[inline]
     pub(super) fn wake_now(&mut self) {
         self.fill = Fill::now(self.fill.end());
     }
 
-    /// Moves up to `most` bytes from the input behind the held ones.
+    /// Moves up to `most` bytes from the input to the end of the held ones.
     #[inline]
     pub(super) fn hold(&mut self, input: &mut &[u8], most: usize) {
         let count = most.min(input.len());
@@ -439,7 +443,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             (input.split_at_checked(count), self.buffer.get_mut(end..end + count))
         {
             match (room, taken) {
-                // A single byte is not worth a call to copy it.
+                // For a single byte, a copy call is not worth it.
                 ([room], [byte]) => *room = *byte,
                 (room, taken) => room.copy_from_slice(taken),
             }
@@ -448,7 +452,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
         }
     }
 
-    /// Nothing is held.
+    /// Empties the buffer.
     fn clear(&mut self) {
         (self.at, self.fill) = (0, Self::EMPTY);
     }
@@ -457,7 +461,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     fn compact(&mut self) {
         let (at, end) = (self.at, self.fill.end());
         if at > 0 {
-            // Not by `copy_within`: the compiler does not see that it cannot panic here.
+            // Not `copy_within`: the compiler does not see that it cannot panic here.
             let cells = Cell::from_mut(self.buffer.as_mut_slice()).as_slice_of_cells();
             for (to, from) in cells.iter().zip(cells.get(at..end).unwrap_or_default()) {
                 to.set(from.get());
@@ -468,7 +472,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     }
 }
 
-/// Whatever `F` is: there is none of it in here.
+// By hand: a derive would require `F: Clone`.
 impl<F, const N: usize> Clone for Decoder<F, N> {
     fn clone(&self) -> Self {
         Self { ledger: self.ledger.clone(), ..*self }

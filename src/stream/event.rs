@@ -2,12 +2,12 @@
 
 use super::ledger::Gap;
 
-/// What a stream brings: frames, and the gaps between them.
+/// An event of a stream: a frame, or a gap between frames.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event<T> {
-    /// A whole frame with the right CRC.
+    /// A whole frame with a correct CRC.
     Frame(T),
-    /// A gap, reported when a frame or a quiet line has ended it.
+    /// A gap, reported when a frame or a quiet line ends it.
     Skipped(Gap),
 }

@@ -1,34 +1,35 @@
-//! How full a buffer is, and when to look into it.
+//! Fill level of a buffer, and when to look at its bytes.
 
 use core::ops::RangeInclusive;
 
 use crate::machine::Word;
 
-/// Bits of half a word.
+/// Half the bits of a word.
 const HALF: u32 = Word::BITS / 2;
 const LOWER: Word = (1 << HALF) - 1;
 const SIGN: Word = 1 << (Word::BITS - 1);
 const BOTH: Word = 1 | 1 << HALF;
 
-/// How many bytes a buffer holds, `end`, and how many of them to wait for before looking at them, `wake`.
+/// Number of bytes in a buffer, `end`, and the number to wait for before looking at them, `wake`.
 ///
-/// Both in one word: a byte more is one addition, and its sign says whether more are missing. The lower half
-/// is `end`, the upper half `end - wake`, or anything above 0 where nothing is waited for.
+/// Both are in one word: counting another byte is one addition, and the sign tells whether bytes
+/// are missing. The lower half is `end`. The upper half is `end - wake`, or anything above 0 if
+/// there is nothing to wait for.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) struct Fill(Word);
 
 impl Fill {
-    /// The longest buffer, bytes: with one more in the upper half there is still no sign.
+    /// Longest buffer, bytes: with one more in the upper half, the sign is still clear.
     pub(super) const MAX: usize = (1 << (HALF - 1)) - 2;
 
-    /// `end` bytes, to be looked at when there are `wake`. Neither may be above [`MAX`](Self::MAX).
+    /// `end` bytes; look at them when there are `wake`. Neither may exceed [`MAX`](Self::MAX).
     #[inline(always)]
     pub(super) const fn until(wake: usize, end: usize) -> Self {
         let (wake, end) = (wake as Word, end as Word);
         Self(end | end.wrapping_sub(wake) << HALF)
     }
 
-    /// `end` bytes, to be looked at.
+    /// `end` bytes; look at them now.
     #[inline(always)]
     pub(super) const fn now(end: usize) -> Self {
         Self(end as Word | 1 << HALF)
@@ -39,25 +40,25 @@ impl Fill {
         (self.0 & LOWER) as usize
     }
 
-    /// Is it too early to look?
+    /// Whether it is too early to look.
     #[inline(always)]
     pub(super) const fn is_early(self) -> bool {
         self.0 & SIGN != 0
     }
 
-    /// How many bytes are missing before a look.
+    /// Number of bytes missing before the next look.
     #[inline(always)]
     pub(super) const fn missing(self) -> usize {
         if self.is_early() { (LOWER + 1 - (self.0 >> HALF)) as usize } else { 0 }
     }
 
-    /// Is there what was waited for and nothing else, and are these so many bytes?
+    /// Whether exactly the awaited bytes are there, and their number is in `lens`.
     #[inline(always)]
     pub(super) fn is_just(self, lens: RangeInclusive<usize>) -> bool {
         (*lens.start() as Word..=*lens.end() as Word).contains(&self.0)
     }
 
-    /// With so many bytes more, together at most [`MAX`](Self::MAX).
+    /// With `len` bytes more; at most [`MAX`](Self::MAX) together.
     #[inline(always)]
     pub(super) const fn plus(self, len: usize) -> Self {
         Self(self.0.wrapping_add(len as Word * BOTH))
@@ -74,7 +75,7 @@ mod tests {
         fn one_addition_counts_what_is_held_and_what_is_missing(
             lens in prop::collection::vec(0..4_000_usize, 0..8), nth in 0..8_usize, beside in 0..3_usize,
         ) {
-            // Mostly what is waited for comes to be there exactly.
+            // In most cases the awaited number is reached exactly.
             let wake = lens.iter().take(nth).sum::<usize>() + beside / 2;
             let (mut fill, mut now, mut end) = (Fill::until(wake, 0), Fill::now(0), 0);
             for len in lens {

@@ -1,4 +1,4 @@
-//! Frames of a slice.
+//! Iteration over the frames of a slice.
 
 use core::marker::PhantomData;
 
@@ -9,11 +9,11 @@ use super::{
     search::{Front, Looks, judge, search},
 };
 
-/// Frames of a slice that is already in memory, borrowed from it.
+/// The frames of a slice that is already in memory, borrowed from it.
 ///
-/// The iterator stops where the slice ends, or where a candidate begins that the slice cuts off:
-/// [`rest`](Self::rest) is then that tail, to be kept until more has arrived. When nothing more
-/// will come, [`idle`](Self::idle) lets the search go on inside it.
+/// The iterator stops at the end of the slice, or at a candidate that this end cuts off:
+/// [`rest`](Self::rest) is then that tail; keep it until more bytes arrive. If nothing will follow,
+/// call [`idle`](Self::idle) to search on inside it.
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
@@ -37,24 +37,24 @@ pub struct Frames<'a, F> {
 }
 
 impl<'a, F: Framing> Frames<'a, F> {
-    /// Frames of `bytes`, from the first byte on.
+    /// The frames of `bytes`.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { rest: bytes, ledger: Ledger::new(), framing: PhantomData }
     }
 
-    /// What has not been judged yet; once the iterator has ended, the candidate that the slice
-    /// cuts off, shorter than [`Framing::MAX_LEN`].
+    /// The bytes not judged yet. Once the iterator has ended, the candidate that the end of the
+    /// slice cuts off, shorter than [`Framing::MAX_LEN`].
     #[must_use]
     pub fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
-    /// Nothing follows the slice: refuses the candidate that it cuts off, if there is one, so that
-    /// the search can go on inside it (ruling B3).
+    /// Refuses the candidate that the end of the slice cuts off, if there is one, so that the
+    /// search can go on inside it: nothing follows (ruling B3).
     ///
-    /// Call it once the iterator has ended, as often as [`rest`](Self::rest) is not empty.
-    // Rare: not to be compiled into the loop that takes the frames.
+    /// Call it when the iterator has ended, and iterate again, until [`rest`](Self::rest) is empty.
+    // Rare: keep it out of the loop that takes the frames.
     #[inline(never)]
     pub fn idle(&mut self) {
         let [_, rest @ ..] = self.rest else { return };
@@ -70,13 +70,14 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
-    /// Hands every frame that is left to `take`: the ones that [`next`](Self::next) would give, in the same
-    /// order, and the iterator has then ended.
+    /// Passes every remaining frame to `take`: the frames of [`next`](Self::next), in the same
+    /// order. The iterator has then ended.
     ///
-    /// Faster than a `for` loop where frames of one length follow each other, as on a motor bus: many of
-    /// them are judged together, and with feature `simd` more, and quicker. What the iterator's own methods
-    /// do with all frames, such as [`fold`](Iterator::fold), [`for_each`](Iterator::for_each) and
-    /// [`count`](Iterator::count), is as fast, but leaves nothing to ask for [`counters`](Self::counters).
+    /// Faster than a `for` loop where frames of one length follow each other, as on a motor bus:
+    /// many of them are judged together, and feature `simd` makes the batches larger and faster.
+    /// The iterator's own methods for all frames, such as [`fold`](Iterator::fold),
+    /// [`for_each`](Iterator::for_each) and [`count`](Iterator::count), are as fast, but consume
+    /// the iterator and so its [`counters`](Self::counters).
     ///
     /// ```
     /// # #[cfg(feature = "ikeya")] {
@@ -113,7 +114,7 @@ impl<'a, F: Framing> Frames<'a, F> {
         }
     }
 
-    /// Hands out the frames of a batch, and books them.
+    /// Passes the frames of a batch to `fold`, and books them.
     #[inline(always)]
     fn fold_batch<B>(
         &mut self,
@@ -132,7 +133,8 @@ impl<'a, F: Framing> Frames<'a, F> {
             taken.len = taken.frames * F::MAX_LEN;
         } else {
             loop {
-                // A branch: a length that is looked up would have to be waited for.
+                // A branch is faster: the next frame would have to wait for a length that is looked
+                // up.
                 let (frame, behind) = if F::Batch::is_short(bytes) {
                     let Some(cut) = bytes.split_at_checked(F::MIN_LEN) else { break };
                     cut
@@ -154,14 +156,14 @@ impl<'a, F: Framing> Frames<'a, F> {
         folded
     }
 
-    /// Where every byte went so far.
+    /// The account of every byte so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
         self.ledger.counters(self.rest.len())
     }
 }
 
-/// Whatever `F` is: there is none of it in here.
+// By hand: a derive would require `F: Clone`.
 impl<F> Clone for Frames<'_, F> {
     fn clone(&self) -> Self {
         Self { ledger: self.ledger.clone(), ..*self }

@@ -1,25 +1,25 @@
-//! What a protocol has to say so that its frames can be found.
+//! What a protocol defines so that its frames can be found.
 
 use super::{kernel::Kernel, ledger::Reason};
 
-/// What the front of a slice is.
+/// Verdict on the front of a slice.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
-    /// A whole frame with the right CRC.
+    /// A whole frame with a correct CRC.
     Frame {
         /// Length of the frame, bytes.
         len: usize,
     },
-    /// The start of what may become a frame.
+    /// The start of a possible frame.
     Partial {
-        /// Bytes needed, counted from the front, before calling `judge` again can say more. Greater
-        /// than the length of the slice.
+        /// Length, bytes, that the slice must have for `judge` to say more. Greater than its length
+        /// now.
         need: usize,
     },
     /// No frame starts at the first byte.
     Reject {
-        /// Why not.
+        /// The reason.
         reason: Reason,
         /// Number of following bytes rejected for the same reason, as far as the slice has them.
         more: usize,
@@ -28,10 +28,10 @@ pub enum Verdict {
 
 /// One protocol's rule for finding frames.
 ///
-/// Implement it to have [`Frames`](super::Frames), [`Decoder`](super::Decoder) and
-/// [`decode_capture`](super) find the frames of another protocol, with the same resync, the same
-/// account and the same bounds. Here is one with a sync byte, a length, a payload of 1 to 16 bytes
-/// and a sum over everything in front of it:
+/// Implement it to find the frames of another protocol with [`Frames`](super::Frames),
+/// [`Decoder`](super::Decoder) and [`decode_capture`](super), with the same resync, account and
+/// bounds. This example has a sync byte, a length, a payload of 1 to 16 bytes and the sum of all
+/// bytes before it:
 ///
 /// ```
 /// use axlewire::stream::{Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict};
@@ -81,41 +81,44 @@ pub enum Verdict {
 /// assert_eq!(decoder.pending(), 2);
 /// ```
 ///
-/// A `judge` that breaks its contract can neither make these loop nor panic, and the account holds. A
-/// frame shorter than `MIN_LEN`, and a `Partial` about `MAX_LEN` bytes or more, count as one byte
-/// rejected for [`Reason::Header`]; at a frame longer than the slice, a `Decoder` stops taking input.
+/// A `judge` that breaks its contract causes neither an endless loop nor a panic, and the account
+/// still holds. A frame shorter than `MIN_LEN`, and a `Partial` for `MAX_LEN` bytes or more, count
+/// as one byte rejected for [`Reason::Header`]. At a frame longer than the slice, a `Decoder` stops
+/// taking input.
 pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
     type Frame<'a>;
 
-    /// How many bytes are judged at once on a host: [`OneByOne`] for every framing of another crate.
+    /// How batches are judged on a host: [`OneByOne`] for every framing outside this crate.
     type Batch: Batch;
 
-    /// Shortest frame, bytes; at least 1. A decoder that holds nothing waits for this many.
+    /// Length of the shortest frame, bytes; at least 1. A decoder that holds nothing waits for this
+    /// many.
     const MIN_LEN: usize;
 
-    /// Longest frame, bytes. Given this many, `judge` never answers [`Verdict::Partial`].
+    /// Length of the longest frame, bytes. Given this many, `judge` never returns
+    /// [`Verdict::Partial`].
     const MAX_LEN: usize;
 
-    /// Judges the front of `bytes` and nothing else. An empty slice is `Partial`.
+    /// Judges the front of `bytes` only. An empty slice is `Partial`.
     ///
-    /// More bytes behind the same ones may turn `Partial` into anything, but change neither
-    /// `Frame` nor `Reject`, except that a `Reject` may cover more bytes.
+    /// Appending bytes may turn `Partial` into anything. It changes neither `Frame` nor `Reject`,
+    /// except that a `Reject` may cover more bytes.
     fn judge(bytes: &[u8]) -> Verdict;
 
-    /// The view of one whole frame, exactly the bytes that `judge` called a frame.
+    /// The view of one whole frame, exactly the bytes that `judge` found to be one.
     ///
-    /// `None` for any other bytes, never after a [`Verdict::Frame`].
+    /// `None` for any other bytes, but never after a [`Verdict::Frame`].
     fn view(frame: &[u8]) -> Option<Self::Frame<'_>>;
 }
 
-/// How a [`Framing`] judges many bytes at once, where a host gains by it.
+/// How a [`Framing`] judges many bytes at once, where that is faster on a host.
 ///
-/// It has no methods to implement: the framings of this crate have batches of their own, and every
-/// other framing names [`OneByOne`].
+/// It has no methods to implement: the framings of this crate have their own batches, and all
+/// others use [`OneByOne`].
 pub trait Batch: Kernel {}
 
-/// No batches: one byte after the other, one frame after the other. The same frames and gaps.
+/// No batches: byte after byte and frame after frame. The frames and gaps are the same.
 #[derive(Clone, Copy, Debug)]
 pub enum OneByOne {}
 

@@ -1,37 +1,38 @@
 //! Batches: many bytes judged together, for speed on a host.
 //!
-//! A kernel may only say what [`Framing::judge`](super::Framing::judge) would say of the same
-//! bytes. One that judges nothing is right, too: only speed is lost.
+//! A kernel must agree with [`Framing::judge`](super::Framing::judge) on the same bytes. A kernel
+//! that judges nothing is correct, too, only slower.
 
-/// How a framing judges many bytes at once. Asked on a host only.
+/// How a framing judges many bytes at once. Used on a host only.
 ///
-/// Private: a framing of another crate names [`OneByOne`](super::OneByOne).
+/// Private: framings of other crates use [`OneByOne`](super::OneByOne).
 pub trait Kernel {
-    /// Whether the batches may be compiled for AVX2, where feature `simd` is on.
+    /// Whether the batches may be compiled for AVX2 if feature `simd` is on.
     const USES_AVX2: bool = true;
 
-    /// Rejects bytes at the front that are cheaper to reject together than one by one: `judge`
+    /// Rejects bytes at the front that are cheaper to reject together than one by one. `judge`
     /// would reject each of them, for the same reasons.
     ///
-    /// Called behind a rejected byte, where rejected bytes are dense. What follows the batch may be
-    /// anything, more bytes to reject included.
+    /// Called after a rejected byte, where rejected bytes are dense. Anything may follow the batch,
+    /// including more bytes to reject.
     #[inline(always)]
     fn reject_batch(_bytes: &[u8]) -> Rejected {
         Rejected::default()
     }
 
-    /// Accepts frames at the front, one behind the other, that are cheaper to judge together than
-    /// one by one. More may follow.
+    /// Accepts adjacent frames at the front that are cheaper to judge together than one by one.
+    /// More may follow.
     ///
-    /// Each has the shortest or the longest length of its framing, and is a frame by `judge` or
-    /// refused by `view`: [`Frames::each`](super::Frames::each) hands them out without judging them
-    /// again, up to the first without a view. `is_wide` says that the registers have 256 bits.
+    /// Each has the shortest or the longest length of its framing, and is either a frame according
+    /// to `judge` or refused by `view`: [`Frames::each`](super::Frames::each) passes them on
+    /// without judging them again, up to the first without a view. `is_wide` is true if registers
+    /// have 256 bits.
     #[inline(always)]
     fn accept_batch(_bytes: &[u8], _is_wide: bool) -> Accepted {
         Accepted::default()
     }
 
-    /// Whether the frame at the front, one of a batch, has the shortest length and not the longest.
+    /// Whether the frame at the front of a batch has the shortest length, not the longest.
     #[inline(always)]
     fn is_short(_bytes: &[u8]) -> bool {
         false
@@ -41,21 +42,21 @@ pub trait Kernel {
 /// Bytes at the front that start no frame.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct Rejected {
-    /// All of them, bytes.
+    /// Number of bytes.
     pub(crate) len: usize,
-    /// Of these, rejected for [`Reason::Length`](super::Reason::Length).
+    /// Number of those rejected for [`Reason::Length`](super::Reason::Length).
     pub(crate) length: usize,
-    /// Of these, rejected for [`Reason::Crc`](super::Reason::Crc). The rest is for
+    /// Number of those rejected for [`Reason::Crc`](super::Reason::Crc). The rest are for
     /// [`Reason::Header`](super::Reason::Header).
     pub(crate) crc: usize,
 }
 
-/// Frames at the front, one behind the other.
+/// Adjacent frames at the front.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct Accepted {
     /// Number of frames.
     pub(crate) frames: usize,
-    /// All of them together, bytes.
+    /// Total length, bytes.
     pub(crate) len: usize,
 }
 
@@ -66,14 +67,14 @@ pub(crate) mod tests {
     use super::*;
     use crate::stream::{Batch, Decoder, Frames, Framing, Reason, Verdict};
 
-    /// A batch says what `judge` says one by one, with wide registers and with others.
+    /// Checks that batches agree with `judge`, with 256-bit registers and without.
     pub(crate) fn check_batches<F: Framing>(bytes: &[u8]) {
         check_rejected::<F>(bytes);
         check_accepted::<F>(bytes, false);
         check_accepted::<F>(bytes, true);
     }
 
-    /// What a batch rejects is what `judge` rejects at each place, and for the same reasons.
+    /// Checks that `judge` rejects each byte of a rejected batch, for the same reason.
     fn check_rejected<F: Framing>(bytes: &[u8]) {
         let rejected = F::Batch::reject_batch(bytes);
         let mut told = Rejected { len: rejected.len, ..Rejected::default() };
@@ -88,7 +89,7 @@ pub(crate) mod tests {
         assert_eq!(rejected, told);
     }
 
-    /// What a batch accepts is what `judge` finds one by one, up to the first frame without a view.
+    /// Checks that `judge` finds the frames of an accepted batch, up to the first without a view.
     fn check_accepted<F: Framing>(bytes: &[u8], is_wide: bool) {
         let batch = F::Batch::accept_batch(bytes, is_wide);
         let (mut frames, mut at) = (0, 0);
@@ -105,7 +106,7 @@ pub(crate) mod tests {
         assert_eq!((frames, at), (batch.frames, batch.len));
     }
 
-    /// A framing whose batches are made up.
+    /// A framing whose batches are wrong.
     struct Liar<const LIE: u8>;
 
     impl<const LIE: u8> Framing for Liar<LIE> {
@@ -164,13 +165,13 @@ pub(crate) mod tests {
                 let mut found = 0;
                 frames.each(|_| {
                     found += 1;
-                    assert!(found <= len / 2, "lie {LIE} is told for ever");
+                    assert!(found <= len / 2, "lie {LIE} never ends");
                 });
                 assert!(frames.next().is_none());
                 let mut decoder = Decoder::<Liar<LIE>, 4>::new();
                 let mut input = &bytes[..];
                 let events = core::iter::from_fn(|| decoder.decode(&mut input).map(drop));
-                assert!(events.take(2 * len + 1).count() <= 2 * len, "lie {LIE} is told for ever");
+                assert!(events.take(2 * len + 1).count() <= 2 * len, "lie {LIE} never ends");
             }
         }
         feed::<0>();

@@ -1,4 +1,4 @@
-//! Where every byte went: counters, reasons, gaps.
+//! The account of every byte: counters, reasons, gaps.
 
 use core::fmt;
 
@@ -11,18 +11,18 @@ use core::fmt;
 pub enum Reason {
     /// No frame starts with this byte.
     Header,
-    /// The length field has a value that no frame has.
+    /// The length field has a value that occurs in no frame.
     Length,
-    /// A whole packet with a good CRC for a node that cannot exist (ruling I1).
+    /// A whole packet with a correct CRC for a node that cannot exist (ruling I1).
     Id,
-    /// The CRC does not belong to the bytes in front of it.
+    /// The CRC does not match the bytes in front of it.
     Crc,
     /// The line went quiet in the middle of the candidate (ruling B3).
     Idle,
 }
 
 impl Reason {
-    /// The reason in one lower-case word: `header`, `length`, `id`, `crc` or `idle`.
+    /// The reason as one lower-case word: `header`, `length`, `id`, `crc` or `idle`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -52,20 +52,20 @@ pub struct Gap {
     pub reason: Reason,
 }
 
-/// Where every byte went, `received == framed + skipped() + pending`. All counts wrap at 2^64,
+/// The account of every byte: `received == framed + skipped() + pending`. All counts wrap at 2^64,
 /// which no line reaches.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Counters {
-    /// Bytes taken in.
+    /// Bytes received.
     pub received: u64,
     /// Bytes that belong to delivered frames.
     pub framed: u64,
     /// Frames delivered.
     pub frames: u64,
-    /// Gaps begun.
+    /// Gaps, including one that has not ended yet.
     pub gaps: u64,
     /// Bytes that start no frame.
     pub header: u64,
@@ -103,26 +103,26 @@ impl Counters {
     }
 }
 
-/// The one place where bytes are booked.
+/// The only place where bytes are booked.
 ///
-/// Only what cannot be told from the rest is counted: a frame costs two additions, a byte that
-/// starts no frame none of its own.
+/// Counts only what cannot be derived: a frame costs two additions, and a byte that starts no frame
+/// has no count of its own.
 #[derive(Clone, Debug)]
 pub(super) struct Ledger {
     framed: u64,
-    /// Bytes in all gaps; those that no other count claims are [`Reason::Header`].
+    /// Bytes in all gaps. Those in no other count are [`Reason::Header`].
     skipped: u64,
     length: u64,
     id: u64,
     crc: u64,
     idle: u64,
-    /// Not beside `framed`: on a host the compiler would count both in one register of 128 bits, and
-    /// each frame would wait for the store of the one before.
+    /// Not next to `framed`: on a host the compiler would count both in one 128-bit register, and
+    /// each frame would wait for the store of the frame before.
     frames: u64,
     gaps: u64,
-    /// Why the gap that is open began.
+    /// Why the open gap began.
     gap: Option<Reason>,
-    /// `skipped` as it was then.
+    /// Value of `skipped` at that time.
     gap_start: u64,
 }
 
@@ -142,23 +142,23 @@ impl Ledger {
         }
     }
 
-    /// A frame of `len` bytes, where no gap is open: it has been taken, or ended without a report.
+    /// Books a frame of `len` bytes. If a gap is open, take it or end it first.
     #[inline(always)]
     pub(super) fn frame(&mut self, len: usize) {
         self.frames(1, len);
     }
 
-    /// The same for so many frames of so many bytes together.
+    /// Books this number of frames, of `len` bytes in total.
     #[inline(always)]
     pub(super) fn frames(&mut self, frames: usize, len: usize) {
         self.framed = self.framed.wrapping_add(len as u64);
         self.frames = self.frames.wrapping_add(frames as u64);
     }
 
-    /// So many bytes are refused for this reason; `skip` counts them.
+    /// Books `len` bytes as refused for this reason; `skip` counts them.
     ///
-    /// Every count gets a number, most of them zero: on a microcontroller the compiler then leaves
-    /// out those that nobody reads.
+    /// Adds to every count, mostly zero: on a microcontroller the compiler can then drop the counts
+    /// that are never read.
     #[inline(always)]
     pub(super) fn refuse(&mut self, reason: Reason, len: usize) {
         if self.gap.is_none() {
@@ -172,37 +172,37 @@ impl Ledger {
         self.idle = self.idle.wrapping_add(if_for(Reason::Idle));
     }
 
-    /// `refuse` for callers whose counts are read by somebody: out of their way, and there once.
+    /// Out-of-line `refuse`, to save code size where the counts are read.
     #[inline(never)]
     pub(super) fn refuse_apart(&mut self, reason: Reason, len: usize) {
         self.refuse(reason, len);
     }
 
-    /// The first byte of a candidate that a quiet line cuts off.
+    /// Books the first byte of a candidate that a quiet line cuts off.
     pub(super) fn refuse_idle(&mut self) {
         self.refuse(Reason::Idle, 1);
         self.skip(1);
     }
 
-    /// So many bytes have been refused.
+    /// Counts `len` refused bytes.
     #[inline(always)]
     pub(super) fn skip(&mut self, len: usize) {
         self.skipped = self.skipped.wrapping_add(len as u64);
     }
 
-    /// Is there a gap that is to be reported before the next frame?
+    /// Whether there is a gap to report before the next frame.
     #[inline(always)]
     pub(super) const fn has_gap(&self) -> bool {
         self.gap.is_some()
     }
 
-    /// A frame ends the gap, and nobody wants a report.
+    /// Ends the gap, if one is open, without a report.
     #[inline(always)]
     pub(super) fn end_gap(&mut self) {
         self.gap = None;
     }
 
-    /// The gap that has ended, if there is one.
+    /// Ends the gap, if one is open, and returns it.
     #[inline(always)]
     pub(super) fn take_gap(&mut self) -> Option<Gap> {
         let reason = self.gap?;
@@ -210,13 +210,13 @@ impl Ledger {
         Some(Gap { len: self.skipped.wrapping_sub(self.gap_start), reason })
     }
 
-    /// Bytes taken in, `pending` of them not booked yet.
+    /// Bytes received, `pending` of them not booked yet.
     #[inline]
     pub(super) const fn received(&self, pending: usize) -> u64 {
         self.framed.wrapping_add(self.skipped).wrapping_add(pending as u64)
     }
 
-    /// The account, with so many bytes not booked yet.
+    /// The account, with `pending` bytes not booked yet.
     pub(super) const fn counters(&self, pending: usize) -> Counters {
         let Self { framed, frames, skipped, length, id, crc, idle, gaps, .. } = *self;
         let claimed = length.wrapping_add(id).wrapping_add(crc).wrapping_add(idle);

@@ -1,25 +1,24 @@
 //! Finds frames in a byte stream and accounts for every byte.
 //!
-//! A [`Framing`] says what one protocol's frames look like. [`Frames`] walks a slice that is already
-//! in memory, as an iterator, or faster with [`each`](Frames::each). [`Decoder`] walks a stream that
-//! arrives in pieces. Both ask the same function what the front of the bytes is, so they cannot
-//! disagree.
+//! A [`Framing`] defines what the frames of a protocol look like. [`Frames`] walks a slice that is
+//! already in memory, as an iterator, or faster with [`each`](Frames::each). [`Decoder`] walks a
+//! stream that arrives in pieces. Both use the same function to judge the front of the bytes, so
+//! they cannot disagree.
 //!
-//! # What holds
+//! # Guarantees
 //!
-//! * **Resync (B2).** A candidate that fails costs exactly one byte and the search goes on inside
-//!   it, so a lying length or a false header swallows nothing. Every frame that arrives whole is
-//!   delivered unless it overlaps one accepted before it. The price: a whole frame inside the
-//!   payload of a *damaged* one is delivered too.
+//! * **Resync (B2).** A candidate that fails costs exactly one byte, and the search goes on inside
+//!   it, so a wrong length or a false header byte swallows nothing. Every frame that arrives whole
+//!   is delivered, unless it overlaps one accepted before it. The price: a whole frame inside the
+//!   payload of a *damaged* one is delivered, too.
 //! * **Account (B2).** `received == framed + skipped + pending`, at any time.
-//! * **Bounded stall (B3).** A false header holds good frames back by at most
-//!   [`Framing::MAX_LEN`] bytes, and [`Decoder::idle`] ends it when the line goes quiet.
+//! * **Bounded stall (B3).** A false header byte delays good frames by at most [`Framing::MAX_LEN`]
+//!   bytes, and [`Decoder::idle`] ends the delay when the line goes quiet.
 //! * **Reasons (B4).** A gap is one [`Event::Skipped`] with the [`Reason`] of its first byte, and
 //!   every skipped byte is counted under its own reason in [`Counters`].
-//! * **Chunks do not matter.** Any cutting of the same bytes gives the same events.
-//! * **Bounded work.** A byte is looked at once for each candidate it may belong to, at most
-//!   `MAX_LEN` times; on a host that judges batches, a bounded number of times more often. Nothing
-//!   allocates, nothing panics.
+//! * **Chunks do not matter.** The same bytes give the same events, however they are cut.
+//! * **Bounded work.** A byte is examined once for each candidate that it may belong to, at most
+//!   `MAX_LEN` times; batches on a host add a bounded factor. Nothing allocates, nothing panics.
 
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod buffered;

@@ -7,8 +7,7 @@ use super::{
     kernel::{Accepted, Kernel, Rejected},
 };
 
-/// A framing without its SIMD: compiled as it would be without feature `simd`. To measure and to
-/// test with.
+/// A framing without SIMD, compiled as without feature `simd`. For measurements and tests.
 ///
 /// ```
 /// # #[cfg(feature = "ikeya")] {
@@ -39,7 +38,7 @@ impl<F: Framing> Framing for Portable<F> {
     }
 }
 
-/// The batches of another, never compiled for AVX2.
+/// The batches of another framing, never compiled for AVX2.
 #[derive(Debug)]
 pub struct WithoutAvx2<K>(PhantomData<fn() -> K>);
 

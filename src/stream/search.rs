@@ -7,21 +7,21 @@ use super::{
 };
 use crate::machine::{self, IS_HOST};
 
-/// What the search stops at: a verdict that is no rejection.
+/// What stops the search: a verdict other than a rejection.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Front {
     Frame { len: usize },
     Partial { need: usize },
 }
 
-/// Judges the front of `bytes`. A verdict that would make a search go on for ever becomes the
-/// rejection of one byte: a frame shorter than any, or a candidate that asks for more than the
-/// longest frame has. For the framings of this crate the compiler sees that neither happens.
+/// Judges the front of `bytes`. A verdict that would make the search endless becomes the rejection
+/// of one byte: a frame shorter than the shortest, or a candidate that asks for more than the
+/// longest frame. The compiler sees that neither happens with the framings of this crate.
 ///
-/// A frame longer than `bytes` stays one: whoever splits it off finds out.
+/// A frame longer than `bytes` passes: the caller notices when it splits the frame off.
 #[inline(always)]
 pub(super) fn judge<F: Framing>(bytes: &[u8]) -> Verdict {
-    const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "no such lengths") }
+    const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "1 <= MIN_LEN <= MAX_LEN") }
     match F::judge(bytes) {
         Verdict::Frame { len } if len >= F::MIN_LEN => Verdict::Frame { len },
         Verdict::Partial { need } if bytes.len() < F::MAX_LEN => {
@@ -33,11 +33,12 @@ pub(super) fn judge<F: Framing>(bytes: &[u8]) -> Verdict {
     }
 }
 
-/// Books rejected bytes from the front of `bytes` until something else is there; returns the bytes
-/// from there on and what it is.
+/// Books rejected bytes at the front of `bytes` up to the first that is not rejected. Returns the
+/// bytes from there on, and what they start with.
 ///
-/// On a host, good frames do not wait for the registers that rejections need: those have a function
-/// of their own. A microcontroller has no flash for it, and its caller says how to book them.
+/// On a host, rejections have a function of their own, so that their registers do not slow down
+/// good frames. A microcontroller lacks the flash for that, and the caller chooses how to book
+/// rejections.
 #[inline(always)]
 pub(super) fn search<'b, F: Framing>(
     bytes: &'b [u8],
@@ -78,7 +79,7 @@ fn search_through<'b, F: Framing>(
             Verdict::Reject { reason, more } => {
                 let (len, behind) = match rest.get(more..) {
                     Some([_, behind @ ..]) => (1 + more, Some(behind)),
-                    // The slice ends before.
+                    // The slice ends within the rejected bytes.
                     _ => (rest.len(), None),
                 };
                 refuse(ledger, reason, len);
@@ -99,15 +100,15 @@ fn search_through<'b, F: Framing>(
     (rest, front)
 }
 
-/// How many rejections to wait for before bytes are rejected in batches.
+/// Number of rejections to wait for before bytes are rejected in batches.
 ///
 /// Batches pay where rejected bytes are dense. A damaged frame brings two or three rejections, and
-/// the good one behind it is found faster one byte at a time. Batches do not pay, either, where
+/// the good frame after it is found faster one byte at a time. Batches do not pay either where
 /// candidates that have to be judged are close together: there the attempts back off.
 struct BackOff {
     /// Rejections still to wait for.
     left: u32,
-    /// Rejections waited for this time.
+    /// Rejections to wait for in this round.
     begun: u32,
 }
 
@@ -119,7 +120,7 @@ impl BackOff {
         Self { left: Self::LEAST, begun: Self::LEAST }
     }
 
-    /// Counts one rejection, of what was in front of `bytes`; returns what is left of them.
+    /// Counts one rejection, of bytes in front of `bytes`; returns the bytes still to be judged.
     #[inline(always)]
     fn reject_batch<'b, F: Framing>(&mut self, bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
         self.left -= 1;
@@ -137,7 +138,7 @@ impl BackOff {
     }
 }
 
-/// Books what a batch rejects; returns the bytes behind it.
+/// Books the bytes that a batch rejects; returns the bytes after it.
 #[cold]
 #[inline(never)]
 fn reject_batch<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
@@ -151,24 +152,23 @@ fn reject_batch<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8
 
 /// When to look for a batch of frames.
 ///
-/// The end of a batch is a branch that the processor did not foresee, and a failed look is wasted
-/// work: where damage is dense, or frames are not of the lengths that batches have, the looks back
-/// off.
+/// The end of a batch is a mispredicted branch, and a failed look is wasted work. So the looks back
+/// off where damage is dense, or where frames do not have the lengths of a batch.
 #[derive(Debug)]
 pub(super) struct Looks {
-    /// The next look is due when no more than this is left, bytes.
+    /// Number of remaining bytes at which the next look is due.
     due: usize,
-    /// From a look that did not pay to the next one, bytes.
+    /// Distance from a look that did not pay to the next one, bytes.
     wait: usize,
 }
 
-/// Frames that make a look pay: all that Ikeya's batches can have, or nearly.
+/// Number of frames that makes a look pay: nearly the most that Ikeya's batches can have.
 const MANY: usize = 14;
 
 /// Two packets.
 const FIRST_WAIT: usize = 16;
 
-/// What is lost when good frames come at last, bytes.
+/// Longest wait, bytes: what good frames lose at most when they return.
 const LONGEST_WAIT: usize = 1 << 14;
 
 impl Looks {
@@ -195,8 +195,8 @@ impl Looks {
     }
 }
 
-/// Runs a batch, with feature `simd` compiled for AVX2 where the processor has it; tells it whether
-/// that is so.
+/// Runs a batch, compiled for AVX2 if feature `simd` is on and the processor has it. Tells the
+/// batch whether that is so.
 #[inline(always)]
 fn in_best_form<K: Kernel, R>(batch: impl Fn(bool) -> R) -> R {
     if K::USES_AVX2 {

@@ -13,22 +13,22 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// The async calls of a master: the same as the blocking ones, and as cancel safe as the
-/// [module](crate::drive) says.
+/// The async calls of a master: the same as the blocking ones, and cancel safe as the
+/// [module](crate::drive) describes.
 ///
-/// A cancelled set-point has been taken and will be sent; a cancelled stop is owed; a cancelled
-/// discovery or read is asked for anew.
+/// A set-point is sent even if its call is cancelled, and a cancelled stop is still owed. After a
+/// cancelled discovery or read, call it again.
 impl<B: Board, P, C> Driver<Master<B>, P, C>
 where
     P: embedded_io_async::Read + embedded_io_async::Write,
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
-    /// Asks every id of the bus and returns the nodes that are online. The events of the discovery
-    /// itself are taken out.
+    /// Asks every id on the bus and returns the nodes that are online. Removes the events of the
+    /// discovery itself.
     ///
     /// # Errors
     ///
-    /// Those of the port. That no node answers is no error.
+    /// Port errors. It is not an error if no node answers.
     pub async fn discover_async(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
         self.begin_discovery();
         let bound = self.bound();
@@ -36,18 +36,18 @@ where
         found.ok_or(DriveError::Timeout(Operation::Discovery))
     }
 
-    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
+    /// Turns a velocity node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called.
     ///
     /// # Errors
     ///
-    /// [`DriveError::Bus`] where the master refuses the command, or drops it before it was sent;
-    /// [`DriveError::Timeout`] where it could not be sent within four times
-    /// [`Master::read_bound`]; and those of the port, also where only its receiver has failed. After
-    /// any of them but a refusal the command is withdrawn: neither it nor its rest is sent later, and
-    /// **the node is owed a stop** (ruling I12), because it may have heard the command. Keep calling
-    /// the driver, or call [`stop_async`](Self::stop_async), until the stop is paid: set-points are refused with
-    /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed) meanwhile.
+    /// [`DriveError::Bus`] if the master refuses the command, or drops it before it was sent;
+    /// [`DriveError::Timeout`] if it could not be sent within four times [`Master::read_bound`];
+    /// and port errors, even if only its receiver failed. After any of them but a refusal the
+    /// command is withdrawn: neither it nor its rest is sent later, and **the node is owed a stop**
+    /// (ruling I12), because it may have heard the command. Keep calling the driver, or call
+    /// [`stop_async`](Self::stop_async), until the stop is paid: until then, set-points are refused
+    /// with [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
     pub async fn set_velocity_async(
         &mut self,
         node: NodeId,
@@ -56,12 +56,12 @@ where
         self.send_target_async(node, Target::Velocity(target)).await
     }
 
-    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
+    /// Moves a position node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called.
     ///
     /// # Errors
     ///
-    /// As [`set_velocity_async`](Self::set_velocity_async).
+    /// Same as [`set_velocity_async`](Self::set_velocity_async).
     pub async fn set_position_async(
         &mut self,
         node: NodeId,
@@ -70,16 +70,17 @@ where
         self.send_target_async(node, Target::Position(target)).await
     }
 
-    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. The set-point
-    /// is repeated, and counts as a sign of life, all the while.
+    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. Meanwhile
+    /// the set-point is repeated, and counts as a sign of life.
     ///
-    /// A future that is dropped leaves the stop owed: the next call sends it. **If there is no next
-    /// call, the motor runs on.**
+    /// If the future is dropped, the stop is owed, and the next call sends it. **If there is no
+    /// next call, the motor runs on.**
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] where the stop is not paid, whatever came before. Otherwise as
-    /// [`set_velocity_async`](Self::set_velocity_async), at once where the node loses its set-point on the way.
+    /// [`DriveError::StopsOwed`] if the stop is not paid, whatever else failed before. Otherwise
+    /// the errors of [`set_velocity_async`](Self::set_velocity_async), returned at once if the node
+    /// loses its set-point on the way.
     pub async fn drive_for_async(
         &mut self,
         node: NodeId,
@@ -98,37 +99,37 @@ where
         moved
     }
 
-    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs have
-    /// each been followed by an answer (ruling I12). It goes on through errors of the port.
+    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs
+    /// have each been followed by an answer (ruling I12). Continues through errors of the port.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running**; the stop
-    /// is still owed, and pursued as long as the driver is called.
+    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running.** The
+    /// stop is still owed, and pursued as long as the driver is called.
     pub async fn stop_async(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
         self.pay_stops_async(node.into()).await
     }
 
-    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and every
-    /// other one that has ever answered, as [`stop_async`](Self::stop_async) does.
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and
+    /// every other node that has ever answered, as [`stop_async`](Self::stop_async) does.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after [`Master::stop_bound`],
-    /// and with the ids that have never answered: only you know whether there is a motor behind
-    /// them. On a bus of fewer than eight nodes say so in the settings.
+    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after
+    /// [`Master::stop_bound`], and the ids that have never answered: only you know whether they
+    /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
     pub async fn stop_all_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
         self.pay_stops_async(NodeSet::ALL).await
     }
 
-    /// Waits until the stopped nodes among these were measured standing still, or until `deadline`;
-    /// returns the nodes that were not, those that are owed no stop among them.
+    /// Waits until the stopped nodes among `nodes` have been measured at standstill, or until
+    /// `deadline`; returns those that have not, including those that are owed no stop.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub async fn await_standstill_async(
         &mut self,
         nodes: NodeSet,
@@ -139,12 +140,12 @@ where
         Ok(self.moving(nodes))
     }
 
-    /// What a node measures, heard after this call was made.
+    /// Reads a node; returns a measurement received after this call was made.
     ///
     /// # Errors
     ///
     /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
-    /// online, and those of the port.
+    /// online, and port errors.
     pub async fn read_async(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
         self.begin_read(node)?;
         let bound = self.bound();
@@ -187,7 +188,7 @@ where
         Ok(())
     }
 
-    /// Goes on until the stops of these nodes are paid, through errors of the port.
+    /// Runs until the stops of these nodes are paid, through errors of the port.
     async fn pay_stops_async(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
         loop {
@@ -201,14 +202,14 @@ where
                 return Err(DriveError::StopsOwed(owed));
             }
             if result.is_err() {
-                // A port that fails at once is not asked again at once.
+                // If the port fails at once, pause before the next attempt.
                 self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
             }
         }
     }
 }
 
-/// Owes a node its stop when a call ends, however it ends.
+/// Makes a stop of the node due when a call ends, however it ends.
 struct StopOnDrop<'a, B: Board, P, C: Clock> {
     driver: &'a mut Driver<Master<B>, P, C>,
     node: NodeId,
@@ -226,12 +227,12 @@ where
     P: embedded_io_async::Read + embedded_io_async::Write,
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
-    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
-    /// fired: its event is then the next of [`poll_event`](Self::poll_event).
+    /// Returns the next command, and answers requests meanwhile. `None` at `deadline`, and at once
+    /// when the watchdog has fired: its event is then the next of [`poll_event`](Self::poll_event).
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub async fn next_command_async(
         &mut self,
         deadline: Instant,

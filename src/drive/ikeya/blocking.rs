@@ -15,19 +15,19 @@ use crate::{
 
 /// The blocking calls of a master.
 ///
-/// Each ends within four times [`Master::read_bound`], or at the deadline that it is given. Readings
-/// that come in meanwhile are not kept as events, because [`Master::status`] has the latest; all
-/// other events are.
+/// Each ends within four times [`Master::read_bound`], or at its deadline argument. Readings
+/// received meanwhile are not kept as events, because [`Master::status`] has the latest; all other
+/// events are kept.
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
-    /// Asks every id of the bus and returns the nodes that are online. The events of the discovery
-    /// itself are taken out.
+    /// Asks every id on the bus and returns the nodes that are online. Removes the events of the
+    /// discovery itself.
     ///
     /// # Errors
     ///
-    /// Those of the port. That no node answers is no error.
+    /// Port errors. It is not an error if no node answers.
     pub fn discover(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
         self.begin_discovery();
         let bound = self.bound();
@@ -35,18 +35,18 @@ where
         found.ok_or(DriveError::Timeout(Operation::Discovery))
     }
 
-    /// Turns a velocity node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
+    /// Turns a velocity node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called.
     ///
     /// # Errors
     ///
-    /// [`DriveError::Bus`] where the master refuses the command, or drops it before it was sent;
-    /// [`DriveError::Timeout`] where it could not be sent within four times
-    /// [`Master::read_bound`]; and those of the port, also where only its receiver has failed. After
-    /// any of them but a refusal the command is withdrawn: neither it nor its rest is sent later, and
-    /// **the node is owed a stop** (ruling I12), because it may have heard the command. Keep calling
-    /// the driver, or call [`stop`](Self::stop), until the stop is paid: set-points are refused with
-    /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed) meanwhile.
+    /// [`DriveError::Bus`] if the master refuses the command, or drops it before it was sent;
+    /// [`DriveError::Timeout`] if it could not be sent within four times [`Master::read_bound`];
+    /// and port errors, even if only its receiver failed. After any of them but a refusal the
+    /// command is withdrawn: neither it nor its rest is sent later, and **the node is owed a stop**
+    /// (ruling I12), because it may have heard the command. Keep calling the driver, or call
+    /// [`stop`](Self::stop), until the stop is paid: until then, set-points are refused with
+    /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
     pub fn set_velocity(
         &mut self,
         node: NodeId,
@@ -55,12 +55,12 @@ where
         self.send_target(node, Target::Velocity(target))
     }
 
-    /// Moves a position node, and returns when the command is on the line. It is repeated as long as
-    /// the driver is called.
+    /// Moves a position node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called.
     ///
     /// # Errors
     ///
-    /// As [`set_velocity`](Self::set_velocity).
+    /// Same as [`set_velocity`](Self::set_velocity).
     pub fn set_position(
         &mut self,
         node: NodeId,
@@ -69,13 +69,14 @@ where
         self.send_target(node, Target::Position(target))
     }
 
-    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. The set-point
-    /// is repeated, and counts as a sign of life, all the while.
+    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. Meanwhile
+    /// the set-point is repeated, and counts as a sign of life.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] where the stop is not paid, whatever came before. Otherwise as
-    /// [`set_velocity`](Self::set_velocity), at once where the node loses its set-point on the way.
+    /// [`DriveError::StopsOwed`] if the stop is not paid, whatever else failed before. Otherwise
+    /// the errors of [`set_velocity`](Self::set_velocity), returned at once if the node loses its
+    /// set-point on the way.
     pub fn drive_for(
         &mut self,
         node: NodeId,
@@ -92,37 +93,37 @@ where
         moved
     }
 
-    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs have
-    /// each been followed by an answer (ruling I12). It goes on through errors of the port.
+    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs
+    /// have each been followed by an answer (ruling I12). Continues through errors of the port.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running**; the stop
-    /// is still owed, and pursued as long as the driver is called.
+    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running.** The
+    /// stop is still owed, and pursued as long as the driver is called.
     pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
         self.pay_stops(node.into())
     }
 
-    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and every
-    /// other one that has ever answered, as [`stop`](Self::stop) does.
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and
+    /// every other node that has ever answered, as [`stop`](Self::stop) does.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after [`Master::stop_bound`],
-    /// and with the ids that have never answered: only you know whether there is a motor behind
-    /// them. On a bus of fewer than eight nodes say so in the settings.
+    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after
+    /// [`Master::stop_bound`], and the ids that have never answered: only you know whether they
+    /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
     pub fn stop_all(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
         self.pay_stops(NodeSet::ALL)
     }
 
-    /// Waits until the stopped nodes among these were measured standing still, or until `deadline`;
-    /// returns the nodes that were not, those that are owed no stop among them.
+    /// Waits until the stopped nodes among `nodes` have been measured at standstill, or until
+    /// `deadline`; returns those that have not, including those that are owed no stop.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub fn await_standstill(
         &mut self,
         nodes: NodeSet,
@@ -133,12 +134,12 @@ where
         Ok(self.moving(nodes))
     }
 
-    /// What a node measures, heard after this call was made.
+    /// Reads a node; returns a measurement received after this call was made.
     ///
     /// # Errors
     ///
     /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
-    /// online, and those of the port.
+    /// online, and port errors.
     pub fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
         self.begin_read(node)?;
         let bound = self.bound();
@@ -177,7 +178,7 @@ where
         Ok(())
     }
 
-    /// Goes on until the stops of these nodes are paid, through errors of the port.
+    /// Runs until the stops of these nodes are paid, through errors of the port.
     fn pay_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
         loop {
@@ -191,7 +192,7 @@ where
                 return Err(DriveError::StopsOwed(owed));
             }
             if result.is_err() {
-                // A port that fails at once is not asked again at once.
+                // If the port fails at once, pause before the next attempt.
                 let until = (self.now() + Self::ERROR_NAP).min(deadline);
                 let until = self.on_clock(until);
                 self.clock.idle_until(until);
@@ -205,12 +206,12 @@ impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
-    /// The next command; answers meanwhile. `None` at `deadline`, and at once when the watchdog has
-    /// fired: its event is then the next of [`poll_event`](Self::poll_event).
+    /// Returns the next command, and answers requests meanwhile. `None` at `deadline`, and at once
+    /// when the watchdog has fired: its event is then the next of [`poll_event`](Self::poll_event).
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub fn next_command(
         &mut self,
         deadline: Instant,

@@ -1,4 +1,4 @@
-//! High-level motor-bus calls: what the blocking and the async ones have in common.
+//! High-level motor-bus calls: the common part of the blocking and the async ones.
 
 use heapless::Vec;
 
@@ -14,12 +14,12 @@ use crate::{
     time::{Duration, Instant},
 };
 
-/// The nodes that are online, in the order of their ids, and their modes.
+/// The online nodes, in order of their ids, with their modes.
 pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
 
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
-    /// When a call has taken too long: a discovery may be under way in front of it, each takes no
-    /// longer than a read may, and a driver on a host comes late now and then.
+    /// Deadline of a call: a discovery may run before it, each takes no longer than a read may, and
+    /// a driver on a host is late now and then.
     pub(super) fn bound(&mut self) -> Instant {
         self.now() + self.role.read_bound().saturating_mul(4)
     }
@@ -37,7 +37,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.role.discover(now);
     }
 
-    /// The nodes that are online, once the discovery is over; takes out what it has told.
+    /// The online nodes, once the discovery is over; removes its events.
     pub(super) fn discovered(&mut self) -> Option<OnlineNodes> {
         self.role.retain_events(|event| {
             !matches!(
@@ -50,7 +50,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         if self.role.is_discovering() {
             return None;
         }
-        // Not by `collect`: the compiler does not see that it cannot panic here.
+        // Not `collect`: the compiler does not see that it cannot panic here.
         let mut found = Vec::new();
         for node in NodeId::ALL.into_iter().filter(|&node| self.is_online(node)) {
             if let Some(mode) = self.role.mode(node) {
@@ -60,7 +60,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         Some(found)
     }
 
-    /// The role has the latest reading of each node.
+    /// Removes readings from the events: the role has the latest of each node.
     pub(super) fn drop_readings(&mut self) {
         self.role.retain_events(|event| !matches!(event, MasterEvent::Status { .. }));
     }
@@ -73,7 +73,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         }
     }
 
-    /// Whether the set-point has left, once that is settled: it may be dropped while it waits.
+    /// Whether the set-point has left, once that is known: it may be dropped while it waits.
     pub(super) fn aimed(
         &mut self,
         node: NodeId,
@@ -86,8 +86,8 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         (self.role.is_set_point_sent(node) && self.is_sent()).then_some(Ok(()))
     }
 
-    /// A call that fails leaves no set-point behind, nor the rest of a packet, which would make a cut
-    /// set-point whole. The node may have heard it all the same, and its order before is gone: it is
+    /// Withdraws the set-point of a failed call, and the rest of a packet, which would complete a
+    /// cut-off set-point. The node may have heard it anyway, and its previous order is gone: it is
     /// owed a stop.
     pub(super) fn withdraw(&mut self, node: NodeId) {
         let cut_off = self.sending.give_up();
@@ -97,7 +97,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         }
     }
 
-    /// Whether a node still has this set-point, and why not.
+    /// Whether a node still has this set-point, and if not, why.
     pub(super) fn still_aimed(&self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
         if self.role.set_point(node) == Some(target) {
             return Ok(());
@@ -106,7 +106,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         Err(CommandError::NoSetPoint { node })
     }
 
-    /// Asks for a READ; what was heard before is not its answer.
+    /// Requests a READ; readings from before do not count as its answer.
     pub(super) fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
         let now = self.now();
         self.drop_readings();
@@ -136,13 +136,13 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.role.stop_all(now);
     }
 
-    /// Of these nodes, those whose stop is still owed.
+    /// The nodes among these whose stop is still owed.
     pub(super) fn owed(&mut self, nodes: NodeSet) -> NodeSet {
         self.drop_readings();
         self.role.stops_owed().and(nodes)
     }
 
-    /// Of these nodes, those that have not been measured standing still.
+    /// The nodes among these that have not been measured at standstill.
     pub(super) fn moving(&mut self, nodes: NodeSet) -> NodeSet {
         self.drop_readings();
         let mut moving = nodes;
@@ -151,14 +151,14 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
                 moving.remove(node);
             } else if self.role.config().polling == Polling::Manual {
                 let now = self.now();
-                // One that is not online is looked for all the same.
+                // A node that is not online is looked for anyway.
                 let _ = self.role.read(node, now);
             }
         }
         moving
     }
 
-    /// A sign of life; says when to give the next one, well before the dead-man.
+    /// Gives a sign of life; returns when to give the next, well before the dead-man fires.
     pub(super) fn keep_alive(&mut self) -> Instant {
         let now = self.now();
         self.role.keep_alive(now);
@@ -168,7 +168,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
 }
 
 impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
-    /// A command; or its absence, whose event stays to be taken out.
+    /// A command; `Some(None)` for the watchdog, whose event stays in the queue.
     pub(super) fn command(&mut self) -> Option<Option<Target<B>>> {
         match *self.role.peek_event()? {
             SlaveEvent::Command(target) => {

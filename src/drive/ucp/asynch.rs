@@ -12,22 +12,22 @@ use crate::{
     },
 };
 
-/// The async calls of a host: the same as the blocking ones, and as cancel safe as the
-/// [module](crate::drive) says.
+/// The async calls of a host: the same as the blocking ones, and cancel safe as the
+/// [module](crate::drive) describes.
 ///
-/// A cancelled command has been taken and will be sent; a cancelled stop is due; a calibration goes on
-/// and tells its end as an event.
+/// A command is sent even if its call is cancelled, and a cancelled stop is still due. A
+/// calibration continues, and reports its end as an event.
 impl<S: BiasStore, P, C> Driver<Host<S>, P, C>
 where
     P: embedded_io_async::Read + embedded_io_async::Write,
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
-    /// Waits for the robot to answer a ping, of which one is sent every
-    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period); returns its round trip.
+    /// Waits for the robot to answer a ping, and returns the round trip. A ping is sent every
+    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period).
     ///
     /// # Errors
     ///
-    /// [`DriveError::Timeout`] at `deadline`, and those of the port.
+    /// [`DriveError::Timeout`] at `deadline`, and port errors.
     pub async fn ping_async(
         &mut self,
         deadline: Instant,
@@ -37,14 +37,14 @@ where
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
-    /// Drives with speed and turn in percent (ruling U6), the lamp as it is. Sent now or, right after
-    /// another command, within the next 20 ms, and repeated as long as the driver is called. Call it
-    /// again within 500 ms: see [`Host::drive`], and
+    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. The command is
+    /// sent now or, right after another command, within the next 20 ms, and repeated as long as the
+    /// driver is called. Call it again within 500 ms (see [`Host::drive`]), or use
     /// [`drive_for_async`](Self::drive_for_async), which does.
     ///
     /// # Errors
     ///
-    /// [`DriveError::Rover`], and those of the port.
+    /// [`DriveError::Rover`], and port errors.
     pub async fn drive_async(
         &mut self,
         speed: i16,
@@ -56,13 +56,14 @@ where
 
     /// Drives for `span`, then stops, and returns when the stop is on the line.
     ///
-    /// A future that is dropped leaves the stop due: the next call sends it. **If there is no next
-    /// call, it is the robot's watchdog that stops it**, and that of a vendor robot waits for silence
-    /// on the line.
+    /// If the future is dropped, the stop is due, and the next call sends it. **If there is no next
+    /// call, only the robot's watchdog stops it**, and that of a vendor robot waits for silence on
+    /// the line.
     ///
     /// # Errors
     ///
-    /// Those of [`stop_async`](Self::stop_async), otherwise [`DriveError::Rover`] and those of the port.
+    /// The errors of [`stop_async`](Self::stop_async); otherwise [`DriveError::Rover`] and port
+    /// errors.
     pub async fn drive_for_async(
         &mut self,
         speed: i16,
@@ -77,25 +78,25 @@ where
         driven
     }
 
-    /// Stops, and returns when the command has left the port: written and flushed (ruling U16). It
-    /// goes on through errors of the port for 100 ms. The stop is repeated as long as the driver is
-    /// called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
+    /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
+    /// is called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
     ///
     /// # Errors
     ///
-    /// Those of the port, or [`DriveError::Timeout`]. **The robot may be driving**; the stop stays
+    /// Port errors, or [`DriveError::Timeout`]. **The robot may be driving.** The stop stays
     /// due, and the next call sends it.
     pub async fn stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop();
         self.send_stop_async().await
     }
 
-    /// The latest report that no call of this has returned yet; waits for one until `deadline`, and
-    /// is then `None`. Reports in between are skipped: take events to see every one.
+    /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
+    /// `None`. Reports in between are skipped: to see every report, take events.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub async fn next_report_async(
         &mut self,
         deadline: Instant,
@@ -103,14 +104,14 @@ where
         self.until_async(deadline, Self::report).await
     }
 
-    /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
-    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound)
-    /// leaves room for all attempts.
+    /// Begins a calibration, and returns when the robot has agreed; see
+    /// [`Host::start_calibration`]. For all attempts to fit, set `deadline` at least
+    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound) from now.
     ///
     /// # Errors
     ///
     /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
-    /// and those of the port.
+    /// and port errors.
     pub async fn start_calibration_async(
         &mut self,
         kind: CalibrationKind,
@@ -121,12 +122,12 @@ where
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
     }
 
-    /// Ends a calibration, and returns when the robot has agreed. Its result comes later, as an
+    /// Ends a calibration, and returns when the robot has agreed. The result comes later, as an
     /// event.
     ///
     /// # Errors
     ///
-    /// As [`start_calibration_async`](Self::start_calibration_async).
+    /// Same as [`start_calibration_async`](Self::start_calibration_async).
     pub async fn end_calibration_async(
         &mut self,
         kind: CalibrationKind,
@@ -158,7 +159,7 @@ where
         Ok(())
     }
 
-    /// Goes on until the stop has left, through errors of the port.
+    /// Runs until the stop has left, through errors of the port.
     async fn send_stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
         loop {
@@ -166,7 +167,7 @@ where
                 Ok(Some(())) => return Ok(()),
                 Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
                 Err(error) if self.now() >= deadline => return Err(error),
-                // A port that fails at once is not asked again at once.
+                // If the port fails at once, pause before the next attempt.
                 Err(_) => {
                     self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
                 }
@@ -190,12 +191,13 @@ where
     P: embedded_io_async::Read + embedded_io_async::Write,
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
-    /// The command of this moment, once it has changed since the last call of this: standing still by
-    /// the watchdog included. Answers and reports meanwhile. `None` at `deadline`.
+    /// Returns the current command, once it has changed since the last call, including a standstill
+    /// by the watchdog. Answers and reports meanwhile. `None` at `deadline`.
     ///
     /// # Errors
     ///
-    /// Those of the port. The command holds until its watchdog ends it: ask [`Robot::command`].
+    /// Port errors. The command stays in force until its watchdog ends it: see
+    /// [`Robot::command`].
     pub async fn next_command_async(
         &mut self,
         deadline: Instant,

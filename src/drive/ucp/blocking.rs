@@ -14,32 +14,32 @@ use crate::{
 
 /// The blocking calls of a host.
 ///
-/// Reports and pongs that come in meanwhile are not kept as events, because [`Host::last_report`] and
-/// [`Host::statistics`] have what counts; all other events are.
+/// Reports and pongs received meanwhile are not kept as events, because [`Host::last_report`] and
+/// [`Host::statistics`] have their contents; all other events are kept.
 impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
-    /// Waits for the robot to answer a ping, of which one is sent every
-    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period); returns its round trip.
+    /// Waits for the robot to answer a ping, and returns the round trip. A ping is sent every
+    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period).
     ///
     /// # Errors
     ///
-    /// [`DriveError::Timeout`] at `deadline`, and those of the port.
+    /// [`DriveError::Timeout`] at `deadline`, and port errors.
     pub fn ping(&mut self, deadline: Instant) -> Result<Duration, DriveError<P::Error>> {
         let _old = self.pong();
         let pong = self.until(deadline, |driver| driver.pong())?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
-    /// Drives with speed and turn in percent (ruling U6), the lamp as it is. Sent now or, right after
-    /// another command, within the next 20 ms, and repeated as long as the driver is called. Call it
-    /// again within 500 ms: see [`Host::drive`], and
+    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. The command is
+    /// sent now or, right after another command, within the next 20 ms, and repeated as long as the
+    /// driver is called. Call it again within 500 ms (see [`Host::drive`]), or use
     /// [`drive_for`](Self::drive_for), which does.
     ///
     /// # Errors
     ///
-    /// [`DriveError::Rover`], and those of the port.
+    /// [`DriveError::Rover`], and port errors.
     pub fn drive(&mut self, speed: i16, angular: i16) -> Result<(), DriveError<P::Error>> {
         self.command(speed, angular)?;
         self.service()
@@ -49,7 +49,7 @@ where
     ///
     /// # Errors
     ///
-    /// Those of [`stop`](Self::stop), otherwise [`DriveError::Rover`] and those of the port.
+    /// The errors of [`stop`](Self::stop); otherwise [`DriveError::Rover`] and port errors.
     pub fn drive_for(
         &mut self,
         speed: i16,
@@ -62,25 +62,25 @@ where
         driven
     }
 
-    /// Stops, and returns when the command has left the port: written and flushed (ruling U16). It
-    /// goes on through errors of the port for 100 ms. The stop is repeated as long as the driver is
-    /// called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
+    /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
+    /// is called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
     ///
     /// # Errors
     ///
-    /// Those of the port, or [`DriveError::Timeout`]. **The robot may be driving**; the stop stays
+    /// Port errors, or [`DriveError::Timeout`]. **The robot may be driving.** The stop stays
     /// due, and the next call sends it.
     pub fn stop(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop();
         self.send_stop()
     }
 
-    /// The latest report that no call of this has returned yet; waits for one until `deadline`, and
-    /// is then `None`. Reports in between are skipped: take events to see every one.
+    /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
+    /// `None`. Reports in between are skipped: to see every report, take events.
     ///
     /// # Errors
     ///
-    /// Those of the port.
+    /// Port errors.
     pub fn next_report(
         &mut self,
         deadline: Instant,
@@ -88,14 +88,14 @@ where
         self.until(deadline, Self::report)
     }
 
-    /// Begins a calibration, and returns when the robot has agreed; see [`Host::start_calibration`].
-    /// A deadline after [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound)
-    /// leaves room for all attempts.
+    /// Begins a calibration, and returns when the robot has agreed; see
+    /// [`Host::start_calibration`]. For all attempts to fit, set `deadline` at least
+    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound) from now.
     ///
     /// # Errors
     ///
     /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
-    /// and those of the port.
+    /// and port errors.
     pub fn start_calibration(
         &mut self,
         kind: CalibrationKind,
@@ -106,12 +106,12 @@ where
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
     }
 
-    /// Ends a calibration, and returns when the robot has agreed. Its result comes later, as an
+    /// Ends a calibration, and returns when the robot has agreed. The result comes later, as an
     /// event.
     ///
     /// # Errors
     ///
-    /// As [`start_calibration`](Self::start_calibration).
+    /// Same as [`start_calibration`](Self::start_calibration).
     pub fn end_calibration(
         &mut self,
         kind: CalibrationKind,
@@ -143,7 +143,7 @@ where
         Ok(())
     }
 
-    /// Goes on until the stop has left, through errors of the port.
+    /// Runs until the stop has left, through errors of the port.
     fn send_stop(&mut self) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
         loop {
@@ -151,7 +151,7 @@ where
                 Ok(Some(())) => return Ok(()),
                 Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
                 Err(error) if self.now() >= deadline => return Err(error),
-                // A port that fails at once is not asked again at once.
+                // If the port fails at once, pause before the next attempt.
                 Err(_) => {
                     let until = (self.now() + Self::ERROR_NAP).min(deadline);
                     let until = self.on_clock(until);
@@ -167,12 +167,13 @@ impl<P, C: Clock> Driver<Robot, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
-    /// The command of this moment, once it has changed since the last call of this: standing still by
-    /// the watchdog included. Answers and reports meanwhile. `None` at `deadline`.
+    /// Returns the current command, once it has changed since the last call, including a standstill
+    /// by the watchdog. Answers and reports meanwhile. `None` at `deadline`.
     ///
     /// # Errors
     ///
-    /// Those of the port. The command holds until its watchdog ends it: ask [`Robot::command`].
+    /// Port errors. The command stays in force until its watchdog ends it: see
+    /// [`Robot::command`].
     pub fn next_command(
         &mut self,
         deadline: Instant,

@@ -1,4 +1,4 @@
-//! High-level rover-link calls: what the blocking and the async ones have in common.
+//! High-level rover-link calls: the common part of the blocking and the async ones.
 
 use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// Time in which a stop has to be flushed: the period of motor commands (ruling U16).
+/// Time within which a stop must be flushed: the period of motor commands (ruling U16).
 const STOP_BOUND: Duration = Duration::from_millis(100);
 
 impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
@@ -22,8 +22,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         self.role.drive(command.with_front_led(is_lit), now)
     }
 
-    /// When to say a command again that is to go on: long before the host takes its application for
-    /// dead.
+    /// When to renew a command that is to continue: long before the host's dead-man fires.
     pub(super) fn renew_at(&mut self) -> Instant {
         let half_us = self.role.config().dead_man.as_micros() / 2;
         self.now() + Duration::from_micros(half_us.max(1))
@@ -38,19 +37,19 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         self.now() + STOP_BOUND
     }
 
-    /// Has the stop left the port?
+    /// Whether the stop has left the port.
     pub(super) fn stopped(&mut self) -> Option<()> {
         self.drop_routine();
         (self.role.is_stop_sent() && self.is_sent()).then_some(())
     }
 
-    /// The host has the latest report, and counts both.
+    /// Removes reports and pongs from the events: the host has the latest report and counts both.
     pub(super) fn drop_routine(&mut self) {
         self.role
             .retain_events(|event| !matches!(event, HostEvent::Report(_) | HostEvent::Pong { .. }));
     }
 
-    /// The round trip of the next pong; call it once before, to forget the one that is there.
+    /// The round trip of the next pong. Call it once before, to discard the current one.
     pub(super) fn pong(&mut self) -> Option<Duration> {
         self.drop_routine();
         self.role.take_round_trip()
@@ -68,7 +67,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     ) -> Result<(), CommandError> {
         let now = self.now();
         if self.role.calibration_outcome().is_some() {
-            // One that was settled after its call had given up takes no room from the next.
+            // An outcome that came after its call had given up takes no room from the next.
             self.drop_calibration_events();
         }
         match step {
@@ -88,11 +87,11 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         });
     }
 
-    /// What the request has come to. There is one at a time, so it is that of this call.
+    /// The outcome of the request. There is one request at a time, so it is that of this call.
     pub(super) fn calibration<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
         self.drop_routine();
         let outcome = self.role.calibration_outcome()?;
-        // It is returned instead of told.
+        // The call returns the outcome, so it is not an event.
         self.drop_calibration_events();
         Some(outcome.map_err(DriveError::Calibration))
     }
