@@ -36,7 +36,7 @@ impl fmt::Display for ParseError {
             }
             Self::Field => f.write_str("header or node id does not belong to this packet"),
             Self::Crc { expected, found } => {
-                write!(f, "CRC is {expected:#06x}, packet says {found:#06x}")
+                write!(f, "CRC is {expected:#06x}, but packet has {found:#06x}")
             }
         }
     }
@@ -149,7 +149,7 @@ impl fmt::Display for EncodeError {
                 write!(f, "motor command with version {version} would start a firmware update")
             }
             Self::Header { id, len } => {
-                write!(f, "header with id {id:#04x} and length {len} is not that of its body")
+                write!(f, "header (id {id:#04x}, length {len}) does not match its body")
             }
         }
     }

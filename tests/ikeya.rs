@@ -70,7 +70,7 @@ fn every_single_bit_error_in_a_packet_is_refused() {
     bad[6] ^= 1;
     let error = VelocityResponse::parse(&bad).unwrap_err();
     assert_eq!(error, ParseError::Crc { expected: 0x0E54, found: 0x0E55 });
-    assert_eq!(error.to_string(), "CRC is 0x0e54, packet says 0x0e55");
+    assert_eq!(error.to_string(), "CRC is 0x0e54, but packet has 0x0e55");
 }
 
 #[test]

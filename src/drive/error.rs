@@ -89,7 +89,7 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Port(error) => write!(f, "port failed: {error}"),
-            Self::Closed => f.write_str("port is closed: its other end has gone"),
+            Self::Closed => f.write_str("port is closed: the other end has gone"),
             Self::WriteZero => f.write_str("port took no bytes"),
             Self::Stalled => f.write_str("port has stalled for a second"),
             Self::FrameTooLong { length, limit } => {
@@ -100,7 +100,7 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::Bus(error) => error.fmt(f),
             #[cfg(feature = "ikeya")]
             Self::StopsOwed(nodes) => {
-                write!(f, "no confirmed stop of node {nodes}: a motor may be running")
+                write!(f, "stop of node {nodes} not confirmed: a motor may be running")
             }
             #[cfg(feature = "ikeya")]
             Self::ReadFailed { node, cause } => {
@@ -118,10 +118,10 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::Calibration(failure) => {
                 let ucp::host::CalibrationFailure { step, kind, cause, attempts, .. } = failure;
                 let step = match step {
-                    ucp::host::CalibrationStep::Start => "begun",
-                    ucp::host::CalibrationStep::End => "ended",
+                    ucp::host::CalibrationStep::Start => "start",
+                    ucp::host::CalibrationStep::End => "end",
                 };
-                write!(f, "calibration of {kind:?} was not {step}: ")?;
+                write!(f, "calibration of {kind:?} did not {step}: ")?;
                 match cause {
                     ucp::host::FailureCause::NoAnswer => {
                         write!(f, "no answer to {attempts} requests")

@@ -8,7 +8,7 @@
 //!   implement `ReadReady`, and the calls idle with [`Clock::idle_until`];
 //! * the same calls with the suffix `_async`, over the traits of `embedded-io-async` (feature
 //!   `embedded-io-async`). They wait with `DelayNs` of `embedded-hal-async`, which the clock must
-//!   implement as well: [`WithDelay`] combines a clock and a delay.
+//!   implement as well: `WithDelay` combines a clock and a delay.
 //!
 //! Each role has high-level calls, such as [`discover`](Driver::discover) and
 //! [`read`](Driver::read) of a master, [`drive`](Driver::drive) and
@@ -141,7 +141,7 @@
 //!
 //! # Half duplex
 //!
-//! [`Rs485`] (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On a
+//! `Rs485` (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On a
 //! two-wire line whose receiver stays on while sending, also set
 //! [`removes_echo`](crate::ikeya::master::MasterConfig::removes_echo) of the master.
 //!

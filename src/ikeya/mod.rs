@@ -52,8 +52,8 @@
 //!
 //! [`Master`] and [`Slave`] speak the protocol without a clock or a port, see
 //! [`endpoint`](crate::endpoint); `drive::Driver` gives them both. Their settings, events and
-//! statistics are in [`master`] and [`slave`]. [`Schedule`] computes how fast a bus can be before it
-//! is wired. Boards with three motors: [`board`] and [`three`].
+//! statistics are in [`master`] and [`slave`]. [`Schedule`] computes how fast a bus can be, before
+//! it is wired. Boards with three motors: [`board`] and [`three`].
 //!
 //! # Rulings
 //!

@@ -65,7 +65,7 @@ pub enum Stuck {
 impl fmt::Display for Stuck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (who, at, what) = match self {
-            Self::BusyLoop { who, at } => (who, at, "its poll_timeout has passed and stays so"),
+            Self::BusyLoop { who, at } => (who, at, "its poll_timeout stays in the past"),
             Self::Endless { who, at } => (who, at, "it sends or tells events without end"),
         };
         match who {

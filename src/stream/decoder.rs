@@ -59,7 +59,7 @@ pub struct Decoder<F, const N: usize> {
     /// bytes begin at the front.
     pub(super) fill: Fill,
     at: usize,
-    line: Line,
+    line: LineState,
     /// End of the held bytes when the line went quiet: bytes beyond it came later.
     quiet_end: usize,
     ledger: Ledger,
@@ -68,7 +68,7 @@ pub struct Decoder<F, const N: usize> {
 
 /// What a call of `idle` has left to do.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-enum Line {
+enum LineState {
     /// Nothing.
     Busy,
     /// Refuse the pending candidate, if the held bytes end in one.
@@ -102,7 +102,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
             buffer: [0; N],
             fill: Self::EMPTY,
             at: 0,
-            line: Line::Busy,
+            line: LineState::Busy,
             quiet_end: 0,
             ledger: Ledger::new(),
             framing: PhantomData,
@@ -223,7 +223,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     /// follow at all, call `idle` until [`pending`](Self::pending) is 0. Each call ends a gap, so
     /// two gaps may be adjacent.
     pub fn idle(&mut self) {
-        (self.line, self.quiet_end) = (Line::Quiet, self.fill.end());
+        (self.line, self.quiet_end) = (LineState::Quiet, self.fill.end());
         self.wake_now();
     }
 
@@ -365,7 +365,7 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     pub(super) fn judge_held(&mut self, taken: usize) -> Option<Held> {
         loop {
             // Bytes from after a silence do not complete a candidate from before it.
-            let end = if self.line == Line::Busy { self.fill.end() } else { self.quiet_end };
+            let end = if self.line == LineState::Busy { self.fill.end() } else { self.quiet_end };
             let held = self.buffer.get(self.at..end)?;
             match (judge::<F>(held), self.line) {
                 (Verdict::Reject { reason, more }, _) => {
@@ -385,22 +385,22 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     }
                     self.ledger.frame(len);
                     self.at = at + len;
-                    if self.at == self.fill.end() && line == Line::Busy {
+                    if self.at == self.fill.end() && line == LineState::Busy {
                         self.clear();
                     }
                     return Some(Held::Frame { at, len });
                 }
-                (Verdict::Partial { need }, Line::Busy) => {
+                (Verdict::Partial { need }, LineState::Busy) => {
                     self.wait_for(need);
                     return None;
                 }
-                (Verdict::Partial { .. }, Line::Quiet) if self.at < end => {
-                    self.line = Line::Settling;
+                (Verdict::Partial { .. }, LineState::Quiet) if self.at < end => {
+                    self.line = LineState::Settling;
                     self.ledger.refuse_idle();
                     self.at += 1;
                 }
-                (Verdict::Partial { .. }, Line::Quiet | Line::Settling) => {
-                    self.line = Line::Busy;
+                (Verdict::Partial { .. }, LineState::Quiet | LineState::Settling) => {
+                    self.line = LineState::Busy;
                     if self.at == self.fill.end() {
                         self.clear();
                     }

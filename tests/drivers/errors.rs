@@ -19,7 +19,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
     assert!(DriveError::<Unplugged>::Closed.source().is_none());
     assert_eq!(
         DriveError::<Unplugged>::Closed.to_string(),
-        "port is closed: its other end has gone"
+        "port is closed: the other end has gone"
     );
     assert_eq!(DriveError::<Unplugged>::WriteZero.to_string(), "port took no bytes");
     let bus = ikeya::master::CommandError::NotOnline { node: NodeId::N2 };

@@ -222,7 +222,7 @@ fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
         };
         let DriveError::Calibration(failure) = error else { panic!("{error:?}") };
         assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
-        assert_eq!(error.to_string(), "calibration of Imu was not begun: no answer to 3 requests");
+        assert_eq!(error.to_string(), "calibration of Imu did not start: no answer to 3 requests");
         assert!(world.now() < deadline);
         // An earlier deadline takes precedence.
         let deadline = after(&world, 50);

@@ -79,7 +79,7 @@ fn a_stop_that_is_not_paid_is_an_error_at_its_stated_deadline_and_stays_owed() {
         assert_eq!(command(&story), STOPPED);
     }
     let told = OWED_2.to_string();
-    assert_eq!(told, "no confirmed stop of node 2: a motor may be running");
+    assert_eq!(told, "stop of node 2 not confirmed: a motor may be running");
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
     let ping = FrameOf::<Ping>::try_read_from_bytes(&long).unwrap();
     let error = EncodeError::Header { id: 1, len: 253 };
     assert_eq!(ping.encode(&mut buffer), Err(error));
-    assert_eq!(error.to_string(), "header with id 0x01 and length 253 is not that of its body");
+    assert_eq!(error.to_string(), "header (id 0x01, length 253) does not match its body");
 }
 
 #[test]
