@@ -14,7 +14,7 @@ use axlewire::{
     ikeya::{BothDirections, ToMaster, ToSlave, three},
     ucp::Ucp,
 };
-use checked_line::{Line, Op};
+use checked_line::{CheckedLine, Op};
 use known_framings::Known;
 use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
@@ -51,10 +51,10 @@ macro_rules! properties {
                     chunks in vec(0..150_usize, 1..6),
                 ) {
                     let ops = |op: fn(usize) -> Op| chunks.iter().copied().map(op).collect::<Vec<_>>();
-                    Line::<F, $max_len>::new().play(&stream, &ops(Op::Slice));
-                    Line::<F, 300>::new().play(&stream, &ops(Op::Slice));
+                    CheckedLine::<F, $max_len>::new().play(&stream, &ops(Op::Slice));
+                    CheckedLine::<F, 300>::new().play(&stream, &ops(Op::Slice));
                     let filled: Vec<_> = ops(Op::Commit).into_iter().chain([Op::Idle]).collect();
-                    Line::<F, 300>::new().play(&stream, &filled);
+                    CheckedLine::<F, 300>::new().play(&stream, &filled);
                 }
             }
         }
@@ -159,6 +159,6 @@ fn check_every_cut<F: Known, const N: usize>() {
         for len in 40..stream.len() {
             check_slice::<F>(&stream[..len]);
         }
-        Line::<F, N>::new().play(&stream, &[Op::Slice(70), Op::Slice(stream.len())]);
+        CheckedLine::<F, N>::new().play(&stream, &[Op::Slice(70), Op::Slice(stream.len())]);
     }
 }

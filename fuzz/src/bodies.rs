@@ -28,7 +28,7 @@ mod known_framings;
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
 
-use checked_line::{Line, Op};
+use checked_line::{CheckedLine, Op};
 use known_framings::Known;
 
 /// Checks any stream, with any chunks and interruptions, against the oracle: the six Ikeya
@@ -100,7 +100,7 @@ impl<'a> Script<'a> {
     fn play<F: Known, const N: usize>(&self) {
         let mut stream = self.stream.to_vec();
         self.repair.repair::<F>(&mut stream);
-        Line::<F, N>::new().play(&stream, &self.ops);
+        CheckedLine::<F, N>::new().play(&stream, &self.ops);
         checked_line::check_slice::<F>(&stream);
         checked_line::check_slice::<Portable<F>>(&stream);
         // Feature `simd` works on blocks of 128 bytes: more than most inputs have.

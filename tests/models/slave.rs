@@ -59,7 +59,7 @@ const WAITS: [u32; 5] = [40, 110, 500, 501, 30_000];
 const WATCHDOG: Duration = Duration::from_millis(20);
 
 #[derive(Clone)]
-struct Line<B: Kit> {
+struct SlaveLine<B: Kit> {
     slave: Slave<B>,
     now: Instant,
     config: SlaveConfig,
@@ -81,7 +81,7 @@ struct Line<B: Kit> {
     is_open: bool,
 }
 
-impl<B: Kit> Line<B> {
+impl<B: Kit> SlaveLine<B> {
     fn new(mode: Mode, two_wire: bool) -> Self {
         let mut config = SlaveConfig::direct();
         (config.two_wire, config.watchdog) = (two_wire, Some(WATCHDOG));
@@ -238,7 +238,7 @@ impl<B: Kit> Line<B> {
     }
 }
 
-impl<B: Kit> World for Line<B> {
+impl<B: Kit> World for SlaveLine<B> {
     type Action = Act;
 
     fn actions(&self) -> Vec<Act> {
@@ -290,7 +290,7 @@ impl<B: Kit> World for Line<B> {
 
 /// On four wires and on two, in both modes.
 pub(crate) fn lines<B: Kit>(run: &mut Run) {
-    run.world("four wires, velocity", Depth(3, 4), Line::<B>::new(Mode::Velocity, false));
-    run.world("two wires, velocity", Depth(3, 4), Line::<B>::new(Mode::Velocity, true));
-    run.world("two wires, position", Depth(3, 4), Line::<B>::new(Mode::Position, true));
+    run.world("four wires, velocity", Depth(3, 4), SlaveLine::<B>::new(Mode::Velocity, false));
+    run.world("two wires, velocity", Depth(3, 4), SlaveLine::<B>::new(Mode::Velocity, true));
+    run.world("two wires, position", Depth(3, 4), SlaveLine::<B>::new(Mode::Position, true));
 }

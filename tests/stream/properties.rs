@@ -9,7 +9,7 @@ use axlewire::{
 use proptest::{collection::vec, prelude::*};
 
 use crate::{
-    checked_line::{self, Line, Op},
+    checked_line::{self, CheckedLine, Op},
     hostile_streams,
     known_framings::Known,
     oracle,
@@ -46,20 +46,20 @@ macro_rules! properties {
 
                 #[test]
                 fn single_bytes_give_what_the_oracle_says(stream in stream()) {
-                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Slice(1)]);
-                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Commit(1), Op::Drain]);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &[Op::Slice(1)]);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &[Op::Commit(1), Op::Drain]);
                 }
 
                 #[test]
                 fn pushed_bytes_give_what_the_oracle_says(stream in stream()) {
-                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Push(1)]);
-                    Line::<F, MAX_LEN>::new().play(&stream, &[Op::Push(5), Op::Slice(3), Op::Idle]);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &[Op::Push(1)]);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &[Op::Push(5), Op::Slice(3), Op::Idle]);
                 }
 
                 #[test]
                 fn chunks_do_not_matter(stream in stream(), chunks in vec(0..80_usize, 1..8)) {
                     let ops: Vec<_> = chunks.into_iter().map(Op::Slice).collect();
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
                 }
 
                 #[test]
@@ -70,9 +70,9 @@ macro_rules! properties {
                     let drained = |(len, drain)| [Op::Commit(len), if drain { Op::Drain } else { Op::Commit(1) }];
                     let mut ops: Vec<_> = chunks.into_iter().flat_map(drained).collect();
                     ops.push(Op::Drain);
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
-                    Line::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
-                    Line::<F, 512>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
+                    CheckedLine::<F, 512>::new().play(&stream, &ops);
                 }
 
                 #[test]
@@ -82,7 +82,7 @@ macro_rules! properties {
                 ) {
                     let quiet = |len| [Op::Slice(len), Op::Idle];
                     let ops: Vec<_> = chunks.into_iter().flat_map(quiet).collect();
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
                 }
 
                 #[test]
@@ -92,8 +92,8 @@ macro_rules! properties {
                 ) {
                     let quiet = |len| [Op::Commit(len), Op::Idle, Op::Drain];
                     let ops: Vec<_> = chunks.into_iter().flat_map(quiet).collect();
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
-                    Line::<F, 512>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, 512>::new().play(&stream, &ops);
                 }
 
                 #[test]
@@ -103,14 +103,14 @@ macro_rules! properties {
                 ) {
                     let stop = |(len, events)| Op::Stop { len, events };
                     let ops: Vec<_> = stops.into_iter().map(stop).collect();
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
                 }
 
                 #[test]
                 fn nothing_that_a_user_does_matters(stream in stream(), ops in hostile_streams::ops()) {
-                    Line::<F, MAX_LEN>::new().play(&stream, &ops);
-                    Line::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
-                    Line::<F, 512>::new().play(&stream, &ops);
+                    CheckedLine::<F, MAX_LEN>::new().play(&stream, &ops);
+                    CheckedLine::<F, { MAX_LEN + 1 }>::new().play(&stream, &ops);
+                    CheckedLine::<F, 512>::new().play(&stream, &ops);
                 }
 
                 #[test]
@@ -145,7 +145,7 @@ properties! {
 /// B3: whatever came before, less than a longest frame is held back, and a quiet line ends that;
 /// the first good frame is then delivered with its last byte and as the first event.
 fn check_stall<F: Known, const N: usize>(stream: &[u8], frame: &[u8]) {
-    let mut line = Line::<F, N>::new();
+    let mut line = CheckedLine::<F, N>::new();
     line.slice(stream);
     loop {
         let before = line.decoder().pending();

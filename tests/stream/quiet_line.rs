@@ -7,7 +7,7 @@ use axlewire::{
 };
 
 use crate::{
-    checked_line::Line,
+    checked_line::CheckedLine,
     oracle,
     rig::{Seen, motor, read, response, seen, write},
 };
@@ -16,7 +16,7 @@ use crate::{
 fn the_longest_false_header_delays_a_frame_by_at_most_a_longest_frame() {
     // The header announces a frame of 64 bytes; then motor commands of 24 bytes follow.
     let header = [0xFD, 0xFF, 60, 0];
-    let mut line = Line::<Ucp, 64>::new();
+    let mut line = CheckedLine::<Ucp, 64>::new();
     line.slice(&header);
     for (sent, byte) in motor().into_iter().cycle().take(59).enumerate() {
         line.slice(&[byte]);
@@ -42,7 +42,7 @@ fn a_new_candidate_at_the_very_end_outlives_one_quiet_line() {
     let (first, pending) = seen::<Ucp, 64>(&[&[0xFD, 0xFF, 60, 0], start], true);
     assert_eq!((first, pending), (vec![Seen::Gap(4, Reason::Idle)], 10));
     // The rest still arrives.
-    let mut line = Line::<Ucp, 64>::new();
+    let mut line = CheckedLine::<Ucp, 64>::new();
     line.slice(&[&[0xFD, 0xFF, 60, 0], start].concat());
     line.idle();
     line.slice(&motor()[10..]);
@@ -60,7 +60,7 @@ fn a_quiet_line_without_a_candidate_reports_the_gap_and_nothing_else() {
 
 #[test]
 fn a_quiet_line_does_not_touch_whole_frames_that_wait_in_the_buffer() {
-    let mut line = Line::<ikeya::ToSlave, 64>::new();
+    let mut line = CheckedLine::<ikeya::ToSlave, 64>::new();
     line.commit(&[&read()[..], &write(), &read()[..2]].concat());
     line.idle();
     line.slice(&[]);

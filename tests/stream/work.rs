@@ -8,7 +8,7 @@ use axlewire::{
 };
 
 use crate::{
-    checked_line::{Line, Op},
+    checked_line::{CheckedLine, Op},
     hostile_streams,
     known_framings::Known,
     oracle::Rules,
@@ -59,7 +59,7 @@ impl<F: Known> Known for Counted<F> {
 pub(crate) fn check_work<F: Known, const N: usize>(stream: &[u8], ops: &[Op]) {
     JUDGED.set(0);
     CHECKED.set(0);
-    let calls = Line::<Counted<F>, N>::new().play(stream, ops);
+    let calls = CheckedLine::<Counted<F>, N>::new().play(stream, ops);
     let bytes = stream.len() as u64;
     let frames = bytes / 4;
     assert!(CHECKED.get() <= bytes + 2 * frames, "{} of {bytes} bytes", CHECKED.get());
@@ -71,7 +71,7 @@ fn a_split_candidate_is_judged_no_more_often_than_its_bytes_can_change_the_verdi
     let frame = hostile_streams::ucp_frame_around(0x20, &[0; 56]);
     JUDGED.set(0);
     CHECKED.set(0);
-    let mut line = Line::<Counted<Ucp>, 64>::new();
+    let mut line = CheckedLine::<Counted<Ucp>, 64>::new();
     for byte in &frame[..63] {
         line.slice(&[*byte]);
     }

@@ -1,6 +1,6 @@
 //! A decoder on a line that keeps the whole history, so that the oracle can be asked.
 //!
-//! Every call checks the accounting; [`Line::finish`] checks the rest.
+//! Every call checks the accounting; [`CheckedLine::finish`] checks the rest.
 
 use axlewire::stream::{self, Counters, Decoder, Frames, decode_capture};
 
@@ -27,7 +27,7 @@ pub(crate) enum Op {
 }
 
 /// A decoder and the history of its line.
-pub(crate) struct Line<F, const N: usize> {
+pub(crate) struct CheckedLine<F, const N: usize> {
     decoder: Decoder<F, N>,
     history: Vec<u8>,
     idles: Vec<usize>,
@@ -43,7 +43,7 @@ pub(crate) struct Line<F, const N: usize> {
     calls: u64,
 }
 
-impl<F: Known, const N: usize> Line<F, N> {
+impl<F: Known, const N: usize> CheckedLine<F, N> {
     pub(crate) fn new() -> Self {
         let (history, idles, events) = (Vec::new(), Vec::new(), Vec::new());
         Self {

@@ -9,7 +9,7 @@ use axlewire::{
 
 use super::{
     action::Call,
-    line::{Line, Shared},
+    line::{DrivenLine, Shared},
     master::{MasterLife, N1, Outcome, SPAN, target},
     node::{Node, is_paid, progress, stop_payload, target_payload},
     port::Wired,
@@ -29,7 +29,7 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    pub(super) fn digest(&self, node: &Node, line: &Line) -> impl std::hash::Hash + use<> {
+    pub(super) fn digest(&self, node: &Node, line: &DrivenLine) -> impl std::hash::Hash + use<> {
         let stop = stop_payload(node.mode);
         let paid = self.owed_from.map(|from| progress(&node.log[from..], stop, line.now_us));
         let sign_us = (line.role_now().as_micros() - self.sign_us).min(100_000);

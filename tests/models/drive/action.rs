@@ -4,7 +4,7 @@ use axlewire::ikeya::Mode;
 
 use super::{
     fault::{Flushing, Pinning, Reading, Writing},
-    line::Line,
+    line::DrivenLine,
     node::{Answer, Node},
 };
 
@@ -67,7 +67,7 @@ pub(crate) enum Call {
 
 impl Fault {
     /// Schedules it.
-    pub(crate) fn arrange(self, line: &mut Line, node: Option<&mut Node>) {
+    pub(crate) fn arrange(self, line: &mut DrivenLine, node: Option<&mut Node>) {
         match (self, node) {
             (Self::Write(writing), _) => line.writes.push_back(writing),
             (Self::CutOff, _) => line.writes.extend([Writing::One, Writing::Error]),

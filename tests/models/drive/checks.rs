@@ -2,13 +2,13 @@
 
 use super::{
     fault::{Failure, Flushing, Writing},
-    line::Line,
+    line::DrivenLine,
 };
 
 /// Longest time in which a port takes nothing, microseconds, plus a margin.
 pub(super) const STALL_US: u64 = 1_010_000;
 
-impl Line {
+impl DrivenLine {
     /// Checks that everything is flushed, the pin is off, and no frame is kept of which no byte has
     /// left. A refused call has not used the port.
     pub(super) fn is_left_in_order(&self, unsent: &[u8]) -> Result<(), String> {

@@ -16,7 +16,7 @@ use super::{
     action::Fault,
     fault::Failure,
     host_account::Account,
-    line::{Line, Peer, Shared},
+    line::{DrivenLine, Peer, Shared},
     node::crc,
     port::{Wired, failure},
     replay::Life,
@@ -135,7 +135,7 @@ impl<P: Wired> Life for HostLife<P> {
     type Action = Action;
 
     fn begin(_: usize) -> Self {
-        let line = Line::new(Wire::new(SPEECH), Box::new(Rover), P::HAS_PIN);
+        let line = DrivenLine::new(Wire::new(SPEECH), Box::new(Rover), P::HAS_PIN);
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = HostConfig::default();
         config.command_period = Duration::from_millis(10);

@@ -6,7 +6,7 @@ use std::hash::Hash;
 use super::{
     checks::STALL_US,
     host::{Call, HostLife, IDLE, Outcome, SPAN, TIMEOUT_US, Told},
-    line::Line,
+    line::DrivenLine,
     port::Wired,
     wire::Taken,
 };
@@ -28,7 +28,7 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    pub(super) fn digest(&self, line: &Line) -> impl Hash + use<> {
+    pub(super) fn digest(&self, line: &DrivenLine) -> impl Hash + use<> {
         let said_us = line.role_now().as_micros().saturating_sub(self.said_us).min(TIMEOUT_US + 1);
         (self.speed, said_us, self.is_begun, self.is_still, self.copies)
     }

@@ -27,7 +27,7 @@ pub(crate) trait Peer {
     fn hear(&mut self, frame: &[u8], end_us: u64) -> Option<(u64, Vec<u8>)>;
 }
 
-pub(crate) struct Line {
+pub(crate) struct DrivenLine {
     pub(crate) now_us: u64,
     /// Amount by which the driver's clock has gone back.
     pub(crate) back_us: u64,
@@ -77,7 +77,7 @@ pub(crate) struct Line {
 
 /// A handle of a line: its port, pin, clock and delay are all handles.
 #[derive(Clone)]
-pub(crate) struct Shared(pub(crate) Rc<RefCell<Line>>);
+pub(crate) struct Shared(pub(crate) Rc<RefCell<DrivenLine>>);
 
 /// Not part of a driver's state.
 impl Debug for Shared {
@@ -86,7 +86,7 @@ impl Debug for Shared {
     }
 }
 
-impl Line {
+impl DrivenLine {
     pub(crate) fn new(wire: Wire, peer: Box<dyn Peer>, has_pin: bool) -> Self {
         // Not 0, so that a clock can go back.
         let start_us = 100_000_000_000;
@@ -247,7 +247,7 @@ impl Line {
 }
 
 /// The state that affects the future.
-impl Hash for Line {
+impl Hash for DrivenLine {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
         (&self.reads, &self.writes, &self.flushes, &self.pins).hash(hasher);
         self.wire.digest(self.now_us).hash(hasher);

@@ -17,7 +17,7 @@ use super::{
     account::Account,
     action::{Action, Call, Pass, Setup},
     fault::Failure,
-    line::{Line, Shared},
+    line::{DrivenLine, Shared},
     node::{Ear, Node, SPEECH, SharedNode},
     port::{Wired, failure},
     replay::Life,
@@ -164,7 +164,7 @@ impl<P: Wired> Life for MasterLife<P> {
         let node = Node { mode: setup.mode, answers: VecDeque::new(), is_gone: false, log: vec![] };
         let node = Rc::new(RefCell::new(node));
         let ear = Box::new(Ear(node.clone()));
-        let line = Line::new(Wire::new(SPEECH), ear, P::HAS_PIN);
+        let line = DrivenLine::new(Wire::new(SPEECH), ear, P::HAS_PIN);
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = MasterConfig::direct();
         config.nodes = [N1].into_iter().collect();

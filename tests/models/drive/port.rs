@@ -12,7 +12,7 @@ use axlewire::{
 
 use super::{
     fault::{Failure, Flushing, Pinning, Reading, Writing},
-    line::{Line, Shared},
+    line::{DrivenLine, Shared},
 };
 
 /// Delays between the pin and the first byte, and the last byte and the pin, microseconds.
@@ -136,7 +136,7 @@ impl embedded_hal::digital::OutputPin for Pin {
 }
 
 impl Shared {
-    pub(crate) fn line(&self) -> RefMut<'_, Line> {
+    pub(crate) fn line(&self) -> RefMut<'_, DrivenLine> {
         self.0.borrow_mut()
     }
 
