@@ -11,7 +11,7 @@
 //! * Calls: set-point, stop, stop of all, release, confirm, read, discovery, sign of life.
 //! * Packets: arrive, are lost, are refused by the port, cut off, or not flushed.
 //! * Answers: correct, missing, late, damaged, from another node, left over from an older request,
-//! in another mode because the switch was moved.
+//!   in another mode because the switch was moved.
 //! * Nodes restart; time passes: briefly, up to a deadline, 1 us past it, 10 s.
 //!
 //! On UCP:
@@ -20,7 +20,7 @@
 //!   calibration, lamp, firmware update and its end; of a robot: its command, reports, results, the
 //!   end of a calibration, the answer to an update.
 //! * Frames: every message of the other side, correct, unsolicited, repeated, damaged, in halves,
-//! held back by a false header, old, our own echo, of no known message.
+//!   held back by a false header, old, our own echo, of no known message.
 //! * Frames handed back unsent or cut off, and failing flushes, immediately or after other calls.
 //! * A store that fails, or keeps nothing; events that are never taken, up to a full queue.
 //!
