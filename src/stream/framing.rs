@@ -83,8 +83,9 @@ pub enum Verdict {
 ///
 /// A `judge` that breaks its contract causes neither an endless loop nor a panic, and the account
 /// still holds. A frame shorter than `MIN_LEN`, and a `Partial` for `MAX_LEN` bytes or more, count
-/// as one byte rejected for [`Reason::Header`]. At a frame longer than the slice, a `Decoder` stops
-/// taking input.
+/// as one byte rejected for [`Reason::Header`]. A frame longer than the slice counts as a candidate
+/// that the slice cuts off, except in a [`Decoder`](super::Decoder): `decode` may leave it in its
+/// input, and `poll` may cut it to the bytes that are held.
 pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
     type Frame<'a>;

@@ -16,14 +16,14 @@ pub(super) enum Front {
 
 /// Judges the front of `bytes`. A verdict that would make the search endless becomes the rejection
 /// of one byte: a frame shorter than the shortest, or a candidate that asks for more than the
-/// longest frame. The compiler sees that neither happens with the framings of this crate.
+/// longest frame. An empty slice is always `Partial`. The compiler sees that neither happens with the framings of this crate.
 ///
 /// A frame longer than `bytes` passes: the caller notices when it splits the frame off.
 #[inline(always)]
 pub(super) fn judge<F: Framing>(bytes: &[u8]) -> Verdict {
     const { assert!(1 <= F::MIN_LEN && F::MIN_LEN <= F::MAX_LEN, "1 <= MIN_LEN <= MAX_LEN") }
     match F::judge(bytes) {
-        Verdict::Frame { len } if len >= F::MIN_LEN => Verdict::Frame { len },
+        Verdict::Frame { len } if len >= F::MIN_LEN && !bytes.is_empty() => Verdict::Frame { len },
         Verdict::Partial { need } if bytes.len() < F::MAX_LEN => {
             Verdict::Partial { need: need.max(bytes.len() + 1).min(F::MAX_LEN) }
         }

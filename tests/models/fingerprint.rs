@@ -25,13 +25,32 @@ pub(crate) struct Merge {
 
 /// Counters, settings that never change, and data already handed out.
 #[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS: &[&str] =
-    &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics"];
+pub(crate) const COUNTERS: &[&str] = &[
+    "config",
+    "last_failure",
+    "ledger",
+    "lost",
+    "packet",
+    "has_answered",
+    "has_failed",
+    "sent",
+    "statistics",
+];
 
 /// The same, and the last answer if no stop may hold its position.
 #[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS_AND_STATUS: &[&str] =
-    &["config", "ledger", "lost", "packet", "read_outcome", "sent", "statistics", "status"];
+pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
+    "config",
+    "last_failure",
+    "ledger",
+    "lost",
+    "packet",
+    "has_answered",
+    "has_failed",
+    "sent",
+    "statistics",
+    "status",
+];
 
 impl Merge {
     pub(crate) fn fingerprint(self, state: &impl Debug) -> u64 {

@@ -65,6 +65,8 @@ fn feed_decoder<const LIE: u8, const N: usize>(bytes: &[u8], chunk: usize) {
         while decoder.decode(&mut input).is_some() {
             limit.step();
         }
+        // A frame longer than its input may stay there, and one without a view ends the events.
+        assert!(input.is_empty() || matches!(LIE, 0 | 2 | 9 | 12));
     }
     for &byte in bytes {
         if decoder.push(byte) {
@@ -81,7 +83,10 @@ fn feed_decoder<const LIE: u8, const N: usize>(bytes: &[u8], chunk: usize) {
         limit.step();
     }
     check_account(decoder.counters(), decoder.pending());
-    while decoder.pending() > 0 {
+    // Once more than needed: an idle line with nothing pending brings nothing.
+    let mut is_over = false;
+    while !is_over {
+        is_over = decoder.pending() == 0;
         limit.step();
         decoder.idle();
         while decoder.poll().is_some() {
@@ -94,6 +99,7 @@ fn feed_decoder<const LIE: u8, const N: usize>(bytes: &[u8], chunk: usize) {
 fn feed_slice<const LIE: u8>(bytes: &[u8]) {
     let mut limit = Limit(1000);
     let mut frames = Frames::<Liar<LIE>>::new(bytes);
+    frames.idle();
     while !frames.rest().is_empty() {
         limit.step();
         frames.by_ref().for_each(|_| limit.step());

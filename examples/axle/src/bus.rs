@@ -222,10 +222,10 @@ impl<B: Boards> Bus<B> {
                 )
             }
             Halt::Owed => {
-                let heard = match self.master.read_outcome(node) {
+                let heard = match self.master.last_failure(node) {
                     _ if self.is_online(node) => "",
-                    Some(Err(Cause::Damaged)) => " (damaged bytes received)",
-                    Some(Err(Cause::Unexpected)) => " (other answers received)",
+                    Some(Cause::Damaged) => " (damaged bytes received)",
+                    Some(Cause::Unexpected) => " (other answers received)",
                     _ => " (nothing received)",
                 };
                 format!(

@@ -32,7 +32,7 @@ where
         &mut self,
         deadline: Instant,
     ) -> Result<Duration, DriveError<P::Error>> {
-        let _old = self.pong();
+        self.role.take_round_trip();
         let pong = self.until_async(deadline, |driver| driver.pong()).await?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }

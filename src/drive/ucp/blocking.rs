@@ -27,7 +27,7 @@ where
     ///
     /// [`DriveError::Timeout`] at `deadline`, and port errors.
     pub fn ping(&mut self, deadline: Instant) -> Result<Duration, DriveError<P::Error>> {
-        let _old = self.pong();
+        self.role.take_round_trip();
         let pong = self.until(deadline, |driver| driver.pong())?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }

@@ -46,8 +46,11 @@ pub(super) struct Node<B: Board> {
     pub(super) is_asked: bool,
     /// Number of requests in the discovery in progress.
     pub(super) scans: u8,
-    /// Outcome of the latest READ.
-    pub(super) read_outcome: Option<Result<(), Cause>>,
+    pub(super) last_failure: Option<Cause>,
+    /// The node has answered since the application requested a READ.
+    pub(super) has_answered: bool,
+    /// A READ has failed since then.
+    pub(super) has_failed: bool,
     pub(super) stop: Option<Stop<B>>,
     pub(super) set_point: Option<SetPoint<B>>,
     /// Time before which it is not polled: a late answer may be on its way.
@@ -72,7 +75,9 @@ impl<B: Board> Node<B> {
             stop: None,
             standstill: Standstill::Unwatched,
             status: None,
-            read_outcome: None,
+            last_failure: None,
+            has_answered: false,
+            has_failed: false,
             strikes: 0,
             attempt: 0,
             is_asked: false,

@@ -106,7 +106,7 @@ impl<B: Board> Master<B> {
         }
         let node = self.node_mut(id);
         node.statistics.reply(latency);
-        node.read_outcome = Some(Ok(()));
+        node.has_answered = true;
         node.status = Some((status, now));
         self.events.push_frequent(MasterEvent::Status { node: id, status });
         let node = self.node_mut(id);

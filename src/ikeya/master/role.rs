@@ -246,7 +246,7 @@ impl<B: Board> Master<B> {
         if !it.is_online() {
             return Err(CommandError::NotOnline { node });
         }
-        (it.is_asked, it.read_outcome) = (true, None);
+        (it.is_asked, it.has_answered, it.has_failed) = (true, false, false);
         Ok(())
     }
 

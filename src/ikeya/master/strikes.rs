@@ -47,7 +47,7 @@ impl<B: Board> Master<B> {
         let is_failed = is_abnormal || node.attempt >= attempts;
         let mut is_unconfirmed = false;
         if is_failed {
-            (node.attempt, node.read_outcome) = (0, Some(Err(cause)));
+            (node.attempt, node.last_failure, node.has_failed) = (0, Some(cause), true);
             count_apart(&mut node.statistics.failures);
             is_unconfirmed =
                 core::mem::replace(&mut node.confirm, Confirm::Unasked) != Confirm::Unasked;

@@ -99,11 +99,22 @@ impl<B: Board> Master<B> {
         self.node(node).set_point.is_some_and(|set_point| !set_point.is_new)
     }
 
-    /// Outcome of a node's latest READ: an answer, or why it was given up. `None` before the first,
-    /// and after a call of [`read`](Self::read) until that read is decided.
+    /// Why the last READ of a node that was given up failed; `None` if none has.
+    #[must_use]
+    pub fn last_failure(&self, node: NodeId) -> Option<Cause> {
+        self.node(node).last_failure
+    }
+
+    /// Result of the latest [`read`](Self::read) of a node: `Ok` once it has answered after the call,
+    /// otherwise why the READ was given up. `None` while neither has happened.
     #[must_use]
     pub fn read_outcome(&self, node: NodeId) -> Option<Result<(), Cause>> {
-        self.node(node).read_outcome
+        let node = self.node(node);
+        match node.last_failure {
+            _ if node.has_answered => Some(Ok(())),
+            Some(cause) if node.has_failed => Some(Err(cause)),
+            _ => None,
+        }
     }
 
     /// Checks whether a command would be accepted now.

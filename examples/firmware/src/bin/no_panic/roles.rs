@@ -46,7 +46,7 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
             9 => keep((master.set_point(node), master.is_discovering(), master.stop_bound())),
             16 => keep(master.read_bound()),
             11 => {
-                keep((master.stop_progress(node), master.stops_owed(), master.read_outcome(node)))
+                keep((master.stop_progress(node), master.stops_owed(), master.last_failure(node)))
             }
             12 => keep((master.is_set_point_sent(node), master.is_mode_in_doubt(node))),
             13 => keep((master.check(node, &Target::Velocity(any(velocity))), master.config())),
