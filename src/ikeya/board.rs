@@ -1,5 +1,9 @@
 //! The two kinds of boards, with one motor and with three; the same master and slave serve both.
 
+use core::fmt;
+
+use crate::{encode::Encode, stream::Framing};
+
 use super::{
     framing::{Packet, Request, Response},
     three,
@@ -11,103 +15,105 @@ use super::{
 ///
 /// | | [`OneMotor`] | [`ThreeMotors`] |
 /// |---|---|---|
-/// | target speed, `Velocity` | [`Rps`] | `[Rps; 3]` |
-/// | measured speed, `RawVelocity` | `f32`, any bits | `[f32; 3]` |
-/// | target or measured position, `Position` | [`Position`] | `[Position; 3]` |
+/// | target speed, [`Velocity`](Units::Velocity) | [`Rps`] | `[Rps; 3]` |
+/// | measured speed, [`RawVelocity`](Units::RawVelocity) | `f32`, any bits | `[f32; 3]` |
+/// | target or measured position, [`Position`](Units::Position) | [`Position`] | `[Position; 3]` |
 /// | packets | [`ikeya`](crate::ikeya), 8 bytes | [`three`], 16 bytes |
 /// | a WRITE is answered | no | yes, with the status |
 ///
-/// Implemented by these two only.
+/// Implemented by these two only; how it makes packets is private:
+///
+/// ```compile_fail,E0624
+/// use axlewire::ikeya::{NodeId, board::Board};
+/// fn zero<B: Board>() {
+///     B::write_velocity(NodeId::N1, B::ZERO);
+/// }
+/// ```
+#[expect(private_bounds, reason = "only this crate implements it, and calls what it is made of")]
 pub trait Board: Packets {}
 
 impl Board for OneMotor {}
 impl Board for ThreeMotors {}
 
-pub(super) use packets::{Command, Heard, Packets};
+/// The units of a kind of board, see [`Board`].
+pub trait Units: Copy + fmt::Debug + PartialEq + 'static {
+    /// A target or current speed.
+    type Velocity: Copy + fmt::Debug + PartialEq;
+    /// A speed as carried in a packet: any bits.
+    type RawVelocity: Copy + fmt::Debug + PartialEq;
+    /// A target or current position.
+    type Position: Copy + fmt::Debug + PartialEq;
 
-/// Private, so that only this crate can implement [`Board`] and call its parts.
-mod packets {
-    use core::fmt;
+    /// Zero speed.
+    const ZERO: Self::Velocity;
 
-    use super::{Board, Status};
-    use crate::{encode::Encode, ikeya::NodeId, stream::Framing};
+    /// Whether a WRITE is answered with the status.
+    const ANSWERS_WRITE: bool;
+}
 
-    /// What a kind of board sends and understands.
-    pub trait Packets: Copy + fmt::Debug + PartialEq + Sized + 'static {
-        /// A target or current speed.
-        type Velocity: Copy + fmt::Debug + PartialEq;
-        /// A speed as carried in a packet: any bits.
-        type RawVelocity: Copy + fmt::Debug + PartialEq;
-        /// A target or current position.
-        type Position: Copy + fmt::Debug + PartialEq;
-        /// A WRITE packet.
-        type Write: Encode;
-        /// A velocity response.
-        type VelocityResponse: Encode;
-        /// A position response.
-        type PositionResponse: Encode;
-        /// Framing of the packets to slaves.
-        type ToSlave: Framing + Clone + fmt::Debug;
-        /// Framing of the packets to the master.
-        type ToMaster: Framing + Clone + fmt::Debug;
-        /// Framing of the packets that a slave hears on two wires.
-        type BothDirections: Framing + Clone + fmt::Debug;
+/// What a kind of board sends and understands.
+pub(crate) trait Packets: Units {
+    /// A WRITE packet.
+    type Write: Encode;
+    /// A velocity response.
+    type VelocityResponse: Encode;
+    /// A position response.
+    type PositionResponse: Encode;
+    /// Framing of the packets to slaves.
+    type ToSlave: Framing + Clone + fmt::Debug;
+    /// Framing of the packets to the master.
+    type ToMaster: Framing + Clone + fmt::Debug;
+    /// Framing of the packets that a slave hears on two wires.
+    type BothDirections: Framing + Clone + fmt::Debug;
 
-        /// Zero speed.
-        const ZERO: Self::Velocity;
+    /// A WRITE for a velocity node.
+    fn write_velocity(id: NodeId, target: Self::Velocity) -> Self::Write;
 
-        /// Whether a WRITE is answered with the status.
-        const ANSWERS_WRITE: bool;
+    /// A WRITE for a position node.
+    fn write_position(id: NodeId, target: Self::Position) -> Self::Write;
 
-        /// A WRITE for a velocity node.
-        fn write_velocity(id: NodeId, target: Self::Velocity) -> Self::Write;
+    /// The answer of a velocity node.
+    fn velocity_response(id: NodeId, current: Self::Velocity) -> Self::VelocityResponse;
 
-        /// A WRITE for a position node.
-        fn write_position(id: NodeId, target: Self::Position) -> Self::Write;
+    /// The answer of a position node.
+    fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse;
 
-        /// The answer of a velocity node.
-        fn velocity_response(id: NodeId, current: Self::Velocity) -> Self::VelocityResponse;
+    /// The speed that was meant; `None` for NaN and infinities.
+    fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
 
-        /// The answer of a position node.
-        fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse;
+    /// Whether the speed is below 0.05 rps, which counts as standstill (I12). NaN is not.
+    fn is_still(speed: Self::RawVelocity) -> bool;
 
-        /// The speed that was meant; `None` for NaN and infinities.
-        fn finite(raw: Self::RawVelocity) -> Option<Self::Velocity>;
+    /// Whether the two positions are within 8 counts of each other (I12).
+    fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
 
-        /// Whether the speed is below 0.05 rps, which counts as standstill (I12). NaN is not.
-        fn is_still(speed: Self::RawVelocity) -> bool;
+    /// Whether a velocity node would read a WRITE of this position as standstill: 0 to
+    /// 5e-10 rps (I11).
+    fn is_still_as_velocity(position: Self::Position) -> bool;
 
-        /// Whether the two positions are within 8 counts of each other (I12).
-        fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
+    /// The addressed node, and the command in both readings.
+    fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
 
-        /// Whether a velocity node would read a WRITE of this position as standstill: 0 to
-        /// 5e-10 rps (I11).
-        fn is_still_as_velocity(position: Self::Position) -> bool;
+    /// Same as [`request`](Self::request), on two wires; `None` for an answer of another node.
+    fn packet(frame: <Self::BothDirections as Framing>::Frame<'_>) -> Option<Heard<Self>>;
 
-        /// The addressed node, and the command in both readings.
-        fn request(frame: <Self::ToSlave as Framing>::Frame<'_>) -> Heard<Self>;
+    /// The responding node, and its status.
+    fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>)
+    where
+        Self: Board;
+}
 
-        /// Same as [`request`](Self::request), on two wires; `None` for an answer of another node.
-        fn packet(frame: <Self::BothDirections as Framing>::Frame<'_>) -> Option<Heard<Self>>;
+/// A request as a slave hears it: the addressed node and, for a WRITE, the command.
+pub(crate) type Heard<B> = (NodeId, Option<Command<B>>);
 
-        /// The responding node, and its status.
-        fn response(frame: <Self::ToMaster as Framing>::Frame<'_>) -> (NodeId, Status<Self>)
-        where
-            Self: Board;
-    }
-
-    /// A request as a slave hears it: the addressed node and, for a WRITE, the command.
-    pub(crate) type Heard<B> = (NodeId, Option<Command<B>>);
-
-    /// The payload of a WRITE in its two readings: its bytes do not say which one was meant (ruling
-    /// I3).
-    #[derive(Clone, Copy, Debug)]
-    pub struct Command<B: Packets> {
-        /// Read as a speed.
-        pub velocity: B::RawVelocity,
-        /// Read as a position.
-        pub position: B::Position,
-    }
+/// The payload of a WRITE in its two readings: its bytes do not say which one was meant (ruling
+/// I3).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Command<B: Packets> {
+    /// Read as a speed.
+    pub(crate) velocity: B::RawVelocity,
+    /// Read as a position.
+    pub(crate) position: B::Position,
 }
 
 /// Longest packet of either kind of board, bytes.
@@ -186,19 +192,22 @@ pub enum OneMotor {}
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ThreeMotors {}
 
-impl Packets for OneMotor {
+impl Units for OneMotor {
     type Velocity = Rps;
     type RawVelocity = f32;
     type Position = Position;
+
+    const ZERO: Rps = Rps::ZERO;
+    const ANSWERS_WRITE: bool = false;
+}
+
+impl Packets for OneMotor {
     type Write = WriteRequest;
     type VelocityResponse = super::VelocityResponse;
     type PositionResponse = super::PositionResponse;
     type ToSlave = super::ToSlave;
     type ToMaster = super::ToMaster;
     type BothDirections = super::BothDirections;
-
-    const ZERO: Rps = Rps::ZERO;
-    const ANSWERS_WRITE: bool = false;
 
     fn write_velocity(id: NodeId, target: Rps) -> WriteRequest {
         WriteRequest::velocity(id, target)
@@ -257,19 +266,22 @@ impl Packets for OneMotor {
     }
 }
 
-impl Packets for ThreeMotors {
+impl Units for ThreeMotors {
     type Velocity = [Rps; 3];
     type RawVelocity = [f32; 3];
     type Position = [Position; 3];
+
+    const ZERO: [Rps; 3] = [Rps::ZERO; 3];
+    const ANSWERS_WRITE: bool = true;
+}
+
+impl Packets for ThreeMotors {
     type Write = three::WriteRequest;
     type VelocityResponse = three::VelocityResponse;
     type PositionResponse = three::PositionResponse;
     type ToSlave = three::ToSlave;
     type ToMaster = three::ToMaster;
     type BothDirections = three::BothDirections;
-
-    const ZERO: [Rps; 3] = [Rps::ZERO; 3];
-    const ANSWERS_WRITE: bool = true;
 
     fn write_velocity(id: NodeId, target: [Rps; 3]) -> three::WriteRequest {
         three::WriteRequest::velocity(id, target)

@@ -117,6 +117,13 @@ pub trait Framing {
 ///
 /// It has no methods to implement: the framings of this crate have their own batches, and all
 /// others use [`OneByOne`].
+///
+/// ```compile_fail,E0624
+/// fn reject<B: axlewire::stream::Batch>(bytes: &[u8]) {
+///     B::reject_batch(bytes);
+/// }
+/// ```
+#[expect(private_bounds, reason = "only this crate implements it, and calls its methods")]
 pub trait Batch: Kernel {}
 
 /// No batches: byte after byte and frame after frame. The frames and gaps are the same.

@@ -6,7 +6,7 @@
 /// How a framing judges many bytes at once. Used on a host only.
 ///
 /// Private: framings of other crates use [`OneByOne`](super::OneByOne).
-pub trait Kernel {
+pub(crate) trait Kernel {
     /// Whether the batches may be compiled for AVX2 if feature `simd` is on.
     const USES_AVX2: bool = true;
 
@@ -41,7 +41,7 @@ pub trait Kernel {
 
 /// Bytes at the front that start no frame.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-pub struct Rejected {
+pub(crate) struct Rejected {
     /// Number of bytes.
     pub(crate) len: usize,
     /// Number of those rejected for [`Reason::Length`](super::Reason::Length).
@@ -53,7 +53,7 @@ pub struct Rejected {
 
 /// Adjacent frames at the front.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-pub struct Accepted {
+pub(crate) struct Accepted {
     /// Number of frames.
     pub(crate) frames: usize,
     /// Total length, bytes.

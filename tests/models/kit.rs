@@ -1,15 +1,18 @@
 //! Packets of both kinds of boards, read and written independently of the library.
 
-use axlewire::{
-    encode::Encode,
-    ikeya::{
-        Mode, NodeId, Position, Rps,
-        board::{Board, OneMotor, ThreeMotors},
-    },
+use axlewire::ikeya::{
+    Mode, NodeId, Position, Rps, Target,
+    board::{OneMotor, ThreeMotors},
 };
 
+#[path = "../support/board_packets.rs"]
+#[allow(dead_code, reason = "not every user of this kit writes and answers")]
+mod board_packets;
+
+pub(crate) use board_packets::BoardPackets;
+
 /// What a world needs of a kind of board. All three motors always get the same command.
-pub(crate) trait Kit: Board {
+pub(crate) trait Kit: BoardPackets {
     /// Offset of the first motor's rotation in a packet.
     const ROTATION_AT: usize;
 
@@ -85,15 +88,10 @@ pub(crate) struct Reply {
 
 impl Reply {
     pub(crate) fn bytes<B: Kit>(&self) -> Vec<u8> {
-        let mut buffer = [0; 16];
-        let place = B::place(Position::new(self.place.0, self.place.1));
-        match self.mode {
-            Mode::Velocity => {
-                B::velocity_response(self.node, B::speed(3.0)).encode(&mut buffer).unwrap().to_vec()
-            }
-            Mode::Position => {
-                B::position_response(self.node, place).encode(&mut buffer).unwrap().to_vec()
-            }
-        }
+        let measured = match self.mode {
+            Mode::Velocity => Target::Velocity(B::speed(3.0)),
+            Mode::Position => Target::Position(B::place(Position::new(self.place.0, self.place.1))),
+        };
+        B::answer(self.node, measured)
     }
 }

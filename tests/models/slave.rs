@@ -1,7 +1,6 @@
 //! A slave, node 1, and everything that can be received on its line.
 
 use axlewire::{
-    encode::Encode,
     endpoint::{Endpoint, Unsent},
     ikeya::{
         Mode, NodeId, Position, Slave, Target,
@@ -114,20 +113,12 @@ impl<B: Kit> SlaveLine<B> {
     }
 
     fn write(&self, number: u8) -> Vec<u8> {
-        let mut buffer = [0; 16];
-        match self.target(number) {
-            Target::Velocity(to) => B::write_velocity(NodeId::N1, to).encode(&mut buffer),
-            Target::Position(to) => B::write_position(NodeId::N1, to).encode(&mut buffer),
-        }
-        .unwrap()
-        .to_vec()
+        B::write(NodeId::N1, self.target(number))
     }
 
     /// A position whose bytes are not a number, in every group of four.
     fn nan() -> Vec<u8> {
-        let mut buffer = [0; 16];
-        let place = B::place(Position::new(0x7FC0, 0x7FC0));
-        B::write_position(NodeId::N1, place).encode(&mut buffer).unwrap().to_vec()
+        B::write(NodeId::N1, Target::Position(B::place(Position::new(0x7FC0, 0x7FC0))))
     }
 
     fn is_in_step(&self) -> bool {

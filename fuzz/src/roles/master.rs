@@ -3,12 +3,11 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
-    encode::Encode,
     endpoint::{Endpoint, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Status, Target,
         VelocityResponse,
-        board::{Board, OneMotor, ThreeMotors},
+        board::{OneMotor, ThreeMotors},
         master::{Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
         three,
     },
@@ -16,6 +15,11 @@ use axlewire::{
 };
 
 use super::{Clock, raw, serve};
+
+#[path = "../../../tests/support/board_packets.rs"]
+#[allow(dead_code, reason = "the models use more of it")]
+mod board_packets;
+use board_packets::BoardPackets;
 
 /// The master of a motor bus, with either kind of board.
 pub fn ikeya_master(data: &[u8]) {
@@ -36,20 +40,15 @@ pub fn ikeya_master(data: &[u8]) {
     };
 }
 
-fn packet(frame: &impl Encode) -> Vec<u8> {
-    let mut buffer = [0; 16];
-    frame.encode(&mut buffer).expect("room").to_vec()
-}
-
 /// Commands of the application for each node.
-struct Wishes<B: Board> {
+struct Wishes<B: BoardPackets> {
     /// The latest order, unless it is a stop or was withdrawn.
     orders: [Option<Target<B>>; 8],
     /// Nodes whose stop was owed at the last check.
     owed: NodeSet,
 }
 
-impl<B: Board> Wishes<B> {
+impl<B: BoardPackets> Wishes<B> {
     fn order(&mut self, id: NodeId) -> &mut Option<Target<B>> {
         &mut self.orders[usize::from(id.get() - 1)]
     }
@@ -92,10 +91,7 @@ impl<B: Board> Wishes<B> {
             return;
         }
         let order = self.order(id).expect("a WRITE without an order");
-        let expected = match order {
-            Target::Velocity(to) => packet(&B::write_velocity(id, to)),
-            Target::Position(to) => packet(&B::write_position(id, to)),
-        };
+        let expected = B::write(id, order);
         assert_eq!(sent, expected, "not the latest order");
         assert_eq!(master.mode(id), Some(order.mode()), "wrong mode");
         assert!(B::ANSWERS_WRITE || !master.is_mode_in_doubt(id), "mode in doubt");
@@ -108,7 +104,7 @@ struct Stops {
     position: Vec<u8>,
 }
 
-fn master<B: Board>(
+fn master<B: BoardPackets>(
     u: &mut Unstructured<'_>,
     turn: B::Velocity,
     place: B::Position,
@@ -200,7 +196,7 @@ fn master<B: Board>(
             }
             if sent[0] == 0xBB {
                 let stops = Stops {
-                    velocity: without_crc(packet(&B::write_velocity(id, B::ZERO))),
+                    velocity: without_crc(B::write(id, Target::Velocity(B::ZERO))),
                     position: without_crc(answer(id, Mode::Position)),
                 };
                 wishes.check(&sent, &master, &stops);
@@ -218,7 +214,7 @@ fn without_crc(mut packet: Vec<u8>) -> Vec<u8> {
     packet
 }
 
-fn check_counts<B: Board>(master: &Master<B>) {
+fn check_counts<B: BoardPackets>(master: &Master<B>) {
     for id in NodeId::ALL {
         let node = master.node_statistics(id);
         let closed = u64::from(node.replies) + u64::from(node.timeouts);
