@@ -134,7 +134,7 @@ def plain(text):
     return re.sub(r",? ([)\]])", r"\1", text).rstrip(",")
 
 
-def document():
+def document(features=("--all-features",)):
     """Runs rustdoc; returns the folder of its pages."""
     metadata = subprocess.run(
         ["cargo", "metadata", "--no-deps", "--format-version", "1"],
@@ -142,7 +142,7 @@ def document():
     folder = Path(json.loads(metadata.stdout)["target_directory"]) / "doc" / CRATE
     # So that cargo does not take for fresh what was written with other features.
     shutil.rmtree(folder, ignore_errors=True)
-    subprocess.run(["cargo", "doc", "--quiet", "--no-deps", "--all-features", "-p", CRATE],
+    subprocess.run(["cargo", "doc", "--quiet", "--no-deps", *features, "-p", CRATE],
                    cwd=ROOT, check=True)
     return folder
 
@@ -227,7 +227,15 @@ def members_of(path, page):
             if member[1].startswith("associated"):
                 yield impl, f"{path}: {impl}: {text}"
         elif member:
-            yield "", f"{path}::{member[2]}: {text}"
+            mark = " { provided }" if section.startswith("provided") else ""
+            yield "", f"{path}::{member[2]}: {text}{mark}"
+
+
+def behind_features(pages):
+    """What is there only with features beyond the default ones, a line each."""
+    by_default = read_pages(document(features=()))
+    absent = sorted(set(pages) - set(by_default))
+    return [f"{path}: not with the default features" for path in absent]
 
 
 def without_paths(text):
@@ -272,7 +280,8 @@ def without_format(pages):
     missing = []
     types = 0
     for path, (kind, page) in pages.items():
-        if kind in ("struct", "enum") and not page.declaration.endswith("{}"):
+        is_name = kind == "enum" and page.declaration.endswith("{}")
+        if kind in ("struct", "enum") and not is_name:
             types += 1
             if not any(re.match(r"impl(<.*>)? Format for ", text) for _, _, text in page.members):
                 missing.append(path)
@@ -301,7 +310,7 @@ def main():
         return counts(pages)
     if args.defmt:
         return without_format(pages) > 0
-    lines = listing(pages)
+    lines = listing(pages) + behind_features(pages)
     if args.check:
         return check(lines)
     if args.record:

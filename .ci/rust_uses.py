@@ -21,6 +21,8 @@ NO_CODE = re.compile(
 TOKEN = re.compile(r"\$?\w+|'\w+|::|\S")
 NAME = re.compile(r"[A-Za-z_]\w*$")
 
+ITEMS = set("async const enum extern fn impl macro_rules mod static struct trait type unsafe use".split())
+
 
 class Module:
     """A module: a file or a `mod x { }` in one. Bindings are ("item",), Module or ("use", path)."""
@@ -109,10 +111,20 @@ def closing(toks, i):
 
 
 def end_of_item(toks, i):
-    """The index behind the item that begins at `i`, its attributes included."""
-    while i < len(toks) and toks[i][0] not in (";", "{"):
+    """The index behind the item, field or variant that begins at `i`, its attributes included."""
+    ends = (";", "{") if starts_item(toks, i) else (";", "{", ",", "}")
+    while i < len(toks) and toks[i][0] not in ends:
         i = closing(toks, i) + 1 if toks[i][0] in ("(", "[") else i + 1
-    return i + 1 if i >= len(toks) or toks[i][0] == ";" else closing(toks, i) + 1
+    if i >= len(toks) or toks[i][0] in (";", ","):
+        return i + 1
+    return i if toks[i][0] == "}" else closing(toks, i) + 1
+
+
+def starts_item(toks, i):
+    """Whether a keyword of an item begins at `i`, behind attributes and a visibility."""
+    while i < len(toks) and (is_attribute(toks, i) or toks[i][0] in ("pub", "(")):
+        i = closing(toks, i + 1 if toks[i][0] == "#" else i) + 1 if toks[i][0] != "pub" else i + 1
+    return i < len(toks) and toks[i][0] in ITEMS
 
 
 def read_items(toks, module, inner, modules):

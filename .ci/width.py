@@ -6,8 +6,9 @@
 
 Why: rustfmt leaves comments as wide as they are, and nothing else in the gate measures them.
 
-The files are those that git knows. In Rust, Python, shell scripts and TOML, the lines that are
-comments are measured; in Markdown, all lines but those of fenced code. Rows of tables and lines
+The files are those that git knows. In Rust, Python, shell scripts and TOML, the lines that are or
+contain comments are measured, in Python also those of strings in triple quotes; in Markdown, all
+lines but those of fenced code. Rows of tables and lines
 that are only a link cannot be broken and may be wider, in comments as well.
 """
 
@@ -20,7 +21,7 @@ from pathlib import Path
 LIMIT = 100
 # Fewer files mean that the script did not read what it should.
 LEAST_FILES = 100
-HASH_SUFFIXES = (".sh", ".py", ".toml")
+HASH_SUFFIXES = (".sh", ".toml")
 ONLY_LINK = re.compile(r"\W*(\[[^\]]*\][(:]?\s*)?<?https?://\S+\W*$|\[[^\]]*\](: ?\S+|\(\S+\))\W*$")
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,9 +56,12 @@ def reader(name):
     """The function that picks the comments or the prose, by the name of the file."""
     path = Path(name)
     if path.suffix == ".rs":
-        return comments("//")
+        # `/*` as well: the crate has no such comments.
+        return lambda lines: [*comments("//")(lines), *comments("/*")(lines)]
     if path.suffix == ".md":
         return prose
+    if path.suffix == ".py":
+        return python
     if path.suffix in HASH_SUFFIXES or (path.parent.name == ".ci" and not path.suffix):
         return comments("#")
     return None
@@ -71,7 +75,15 @@ def wide_lines(name):
 
 def comments(mark):
     return lambda lines: [(number, line) for number, line in enumerate(lines, 1)
-                          if line.lstrip().startswith(mark)]
+                          if line.lstrip().startswith(mark) or f" {mark} " in line]
+
+
+def python(lines):
+    is_text = False
+    for number, line in enumerate(lines, 1):
+        was_text, is_text = is_text, is_text ^ (line.count('"""') % 2 == 1)
+        if was_text or '"""' in line or line.lstrip().startswith("#") or " # " in line:
+            yield number, line
 
 
 def prose(lines):

@@ -16,3 +16,25 @@ fn the_readme_turns_a_motor_with_the_code_that_its_command_runs() {
     let (turn, _) = turn.split_once("\n}\n").expect("it ends");
     assert!(README.contains(turn), "not in the README:\n{turn}");
 }
+
+#[test]
+fn the_table_of_features_has_each_feature_and_says_which_are_default() {
+    let manifest = include_str!("../Cargo.toml");
+    let (_, features) = manifest.split_once("\n[features]\n").expect("there are features");
+    let (features, _) = features.split_once("\n\n").expect("and then something else");
+    let mut lines = features.lines().filter(|line| !line.starts_with('#'));
+    let default = lines.next().and_then(|line| line.strip_prefix("default = ")).expect("first");
+    let mut declared: Vec<String> = lines
+        .map(|line| line.split_once(" = ").expect("a feature").0.to_string())
+        .map(|name| {
+            let is_default = default.contains(&format!("\"{name}\""));
+            format!("| `{name}` | {}|", if is_default { "yes " } else { "" })
+        })
+        .collect();
+    let table = include_str!("../src/features.md").lines().skip(2);
+    let mut told: Vec<String> =
+        table.map(|row| row.splitn(4, '|').take(3).collect::<Vec<_>>().join("|") + "|").collect();
+    declared.sort();
+    told.sort();
+    assert_eq!(declared, told);
+}

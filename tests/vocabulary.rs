@@ -64,6 +64,8 @@ fn what_commands_has_a_dead_man_and_what_obeys_has_a_watchdog() {
         (MasterConfig::default().dead_man, HostConfig::default().dead_man);
     let _: (Option<Duration>, Duration) =
         (SlaveConfig::default().watchdog, RobotConfig::default().watchdog);
+    let _: (Duration, Duration) =
+        (HostConfig::default().idle_margin, RobotConfig::default().idle_margin);
     let _: (MasterEvent, HostEvent) = (MasterEvent::DeadMan, HostEvent::DeadMan);
     let _: (SlaveEvent, RobotEvent) = (SlaveEvent::Watchdog, RobotEvent::Watchdog);
     let dead_man = (MasterStatistics::default().dead_man, HostStatistics::default().dead_man);

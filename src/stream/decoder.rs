@@ -317,8 +317,8 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
                     *input = found;
                     return Some(Found::Held(Held::Gap(gap)));
                 }
-                // Fails only if the framing breaks its contract; `input` then stays as it is, because
-                // anything else would cost every frame 4 % of its time.
+                // Fails only if the framing breaks its contract; `input` then stays as it is,
+                // because anything else would cost every frame 4 % of its time.
                 let (frame, rest) = found.split_at_checked(len)?;
                 *input = rest;
                 self.ledger.frame(len);

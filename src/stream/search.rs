@@ -16,7 +16,8 @@ pub(super) enum Front {
 
 /// Judges the front of `bytes`. A verdict that would make the search endless becomes the rejection
 /// of one byte: a frame shorter than the shortest, or a candidate that asks for more than the
-/// longest frame. An empty slice is always `Partial`. The compiler sees that neither happens with the framings of this crate.
+/// longest frame. An empty slice is always `Partial`. The compiler sees that none of this happens
+/// with the framings of this crate.
 ///
 /// A frame longer than `bytes` passes: the caller notices when it splits the frame off.
 #[inline(always)]

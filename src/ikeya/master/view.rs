@@ -105,8 +105,8 @@ impl<B: Board> Master<B> {
         self.node(node).last_failure
     }
 
-    /// Result of the latest [`read`](Self::read) of a node: `Ok` once it has answered after the call,
-    /// otherwise why the READ was given up. `None` while neither has happened.
+    /// Result of the latest [`read`](Self::read) of a node: `Ok` once it has answered after the
+    /// call, otherwise why the READ was given up. `None` while neither has happened.
     #[must_use]
     pub fn read_outcome(&self, node: NodeId) -> Option<Result<(), Cause>> {
         let node = self.node(node);
