@@ -94,6 +94,28 @@ fn an_earlier_pong_is_not_the_answer_to_a_ping() {
 }
 
 #[test]
+fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
+    for is_async in [false, true] {
+        let (world, mut rover, _) = story();
+        for _ in 0..500 {
+            rover.service().unwrap();
+            world.step(20);
+        }
+        rover.port_mut().is_mute = true;
+        rover.role_mut().stop(world.now());
+        let deadline = after(&world, 700);
+        let pong = if is_async {
+            world.block_on(rover.ping_async(deadline))
+        } else {
+            rover.ping(deadline)
+        };
+        assert!(matches!(pong, Err(DriveError::Port(_))), "{pong:?}");
+        let told: Vec<_> = std::iter::from_fn(|| rover.poll_event()).collect();
+        assert!(told.iter().any(|event| matches!(event, HostEvent::Pong { .. })), "{told:?}");
+    }
+}
+
+#[test]
 fn a_robot_that_never_answers_is_a_timeout_and_a_lost_link() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();

@@ -100,3 +100,42 @@ fn the_search_for_abnormal_nodes_costs_no_more_than_its_share() {
     }
     assert!((20_000..=50_000).contains(&probing), "{probing} us per second, 5 % is allowed");
 }
+
+#[test]
+fn a_read_has_succeeded_once_the_node_has_answered_whatever_fails_afterwards() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    let outcome = |desk: &Desk| desk.master.read_outcome(NodeId::N1);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    assert_eq!(outcome(&desk), None);
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    assert_eq!(outcome(&desk), Some(Ok(())));
+    // The reads of the cycle that follow fail before anyone looks.
+    for _ in 0..2 {
+        desk.turn();
+        desk.silence();
+    }
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.turn();
+    desk.silence();
+    assert_eq!(desk.master.last_failure(NodeId::N1), Some(Cause::Silent));
+    assert_eq!(outcome(&desk), Some(Err(Cause::Silent)));
+    // An answer after a failure counts as well.
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    assert_eq!(outcome(&desk), Some(Ok(())));
+}
+
+#[test]
+fn a_read_that_was_answered_is_not_undone_by_a_later_failure() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.turn();
+    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    for _ in 0..3 {
+        desk.turn();
+        desk.silence();
+    }
+    assert_eq!(desk.master.last_failure(NodeId::N1), Some(Cause::Silent));
+    assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Ok(())));
+}
