@@ -101,8 +101,7 @@ fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
             rover.service().unwrap();
             world.step(20);
         }
-        rover.port_mut().is_mute = true;
-        rover.role_mut().stop(world.now());
+        rover.port_mut().fails_read = true;
         let deadline = after(&world, 700);
         let pong = if is_async {
             world.block_on(rover.ping_async(deadline))
