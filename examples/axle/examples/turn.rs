@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn turn<P: Read + Write + ReadReady>(port: P) -> Result<(), DriveError<P::Error>> {
     let mut config = MasterConfig::usb_adapter();
     config.nodes = [NodeId::N1].into_iter().collect(); // the whole bus
-    config.accepts_early = true; // a simulated line takes no time; leave it out on a real one
+    config.accepts_early = true; // a simulated line takes no time; not on a real one
     let mut bus = Driver::with(|now| <Master>::new(config, now), port, StdClock::new());
     for (node, mode) in bus.discover()? {
         println!("node {node} is in {mode} mode");
