@@ -100,7 +100,7 @@ MENDS = [
     ("21", "an async port that fails at once does not let other tasks run", "src/drive/asynch.rs",
      "        if result.is_err() {\n            yield_once().await;\n        }\n        result\n    }\n\n    async fn round_async",
      "        result\n    }\n\n    async fn round_async", []),
-    ("21b", "set-points continue after the application has died", "src/ikeya/master/role.rs",
+    ("21b", "set-points continue after the application has died", "src/ikeya/master/dead_man.rs",
      "                if self.node(id).is_under_order {", "                if self.node(id).is_under_order && false {", []),
     ("22", "a motor command that starts an update is framed like any other", "src/ucp/motor.rs",
      "        if received.starts_update() {", "        if received.starts_update() && false {", ["ucp"]),

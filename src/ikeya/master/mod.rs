@@ -12,9 +12,11 @@
 //! | `discovery` | which ids are polled for the first time |
 //! | `mode` | whether a node has changed its mode (I11) |
 //! | `stop`, `set_point` | what a node is owed, and what it has been told (I12) |
+//! | `dead_man` | when a silent application has its nodes stopped (I13) |
 //! | `view` | what an application can query |
 
 mod config;
+mod dead_man;
 mod discovery;
 mod echo;
 mod event;

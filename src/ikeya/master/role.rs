@@ -18,9 +18,9 @@ use crate::{
         board::{Board, OneMotor, PACKET_LEN, Status, Target},
         units::NodeId,
     },
-    stats::{add, count_apart},
+    stats::add,
     stream::{Decoder, Framing},
-    time::{Duration, Instant, reached, wire_time},
+    time::{Duration, Instant, wire_time},
 };
 
 /// Capacity of the event queue.
@@ -258,13 +258,6 @@ impl<B: Board> Master<B> {
         Ok(())
     }
 
-    /// Records a sign of life, which does not revive an expired command.
-    fn sign_of_life(&mut self, now: Instant) {
-        self.now = now;
-        self.expire_commands(now);
-        self.alive_at = now;
-    }
-
     /// Drops the set-point, and reports that to an application waiting for its confirmation.
     pub(super) fn drop_set_point(&mut self, node: NodeId) {
         if self.node_mut(node).drop_set_point() {
@@ -293,24 +286,6 @@ impl<B: Board> Master<B> {
         let node = self.node_mut(id);
         (node.is_under_order, node.standstill) = (false, Standstill::Unwatched);
         self.drop_set_point(id);
-    }
-
-    /// Time at which the dead-man stops the nodes.
-    fn dead_man_at(&self) -> Option<Instant> {
-        let is_armed = self.nodes.iter().any(|node| node.is_under_order);
-        self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
-    }
-
-    pub(super) fn expire_commands(&mut self, now: Instant) {
-        if reached(self.dead_man_at(), now) {
-            count_apart(&mut self.statistics.dead_man);
-            self.tell(MasterEvent::DeadMan);
-            for id in NodeId::ALL {
-                if self.node(id).is_under_order {
-                    self.owe_stop(id);
-                }
-            }
-        }
     }
 }
 

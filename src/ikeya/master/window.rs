@@ -1,4 +1,5 @@
-//! The reply window: the node that was asked, and its deadline (I7).
+//! The reply window: the node that was asked, and its deadline (I7). `replies` decides which
+//! replies it accepts.
 
 use super::event::Cause;
 use crate::{ikeya::units::NodeId, time::Instant};
