@@ -143,8 +143,7 @@ impl BackOff {
 #[cold]
 #[inline(never)]
 fn reject_batch<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
-    let Rejected { len, length, crc } =
-        in_best_form::<F::Batch, _>(|_| F::Batch::reject_batch(bytes));
+    let Rejected { len, length, crc } = rejected::<F::Batch>(bytes);
     let Some(behind) = bytes.get(len..) else { return bytes };
     ledger.refuse(Reason::Length, length);
     ledger.refuse(Reason::Crc, crc);
@@ -183,7 +182,7 @@ impl Looks {
         if !IS_HOST || rest.len() > self.due {
             return None;
         }
-        let batch = in_best_form::<F::Batch, _>(|is_wide| F::Batch::accept_batch(rest, is_wide));
+        let batch = accepted::<F::Batch>(rest);
         let is_there = batch.frames > 0 && (1..=rest.len()).contains(&batch.len);
         let behind = if is_there { rest.len() - batch.len } else { rest.len() };
         self.wait = if is_there && batch.frames >= MANY {
@@ -196,14 +195,25 @@ impl Looks {
     }
 }
 
-/// Runs a batch, compiled for AVX2 if feature `simd` is on and the processor has it. Tells the
-/// batch whether that is so.
+/// What a batch rejects, with feature `simd` compiled for AVX2 where the processor has it.
+// The closure calls the batch itself: through another closure it would not be compiled for AVX2.
 #[inline(always)]
-fn in_best_form<K: Kernel, R>(batch: impl Fn(bool) -> R) -> R {
+fn rejected<K: Kernel>(bytes: &[u8]) -> Rejected {
     if K::USES_AVX2 {
-        if let Some(result) = machine::in_avx2(|| batch(true)) {
-            return result;
+        if let Some(rejected) = machine::in_avx2(|| K::reject_batch(bytes)) {
+            return rejected;
         }
     }
-    batch(false)
+    K::reject_batch(bytes)
+}
+
+/// What a batch accepts, likewise.
+#[inline(always)]
+fn accepted<K: Kernel>(bytes: &[u8]) -> Accepted {
+    if K::USES_AVX2 {
+        if let Some(accepted) = machine::in_avx2(|| K::accept_batch(bytes, true)) {
+            return accepted;
+        }
+    }
+    K::accept_batch(bytes, false)
 }
