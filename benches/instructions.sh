@@ -35,6 +35,8 @@ count() {
 measure() {
     local name frames once twice
     while read -r name frames; do
+        # Without AVX2 this is another program.
+        [[ $name != *_simd ]] || grep -qw avx2 /proc/cpuinfo || continue
         once=$(count "$name" 1)
         twice=$(count "$name" 2)
         awk -v name="$name" -v frames="$frames" -v once="$once" -v twice="$twice" \
@@ -61,7 +63,7 @@ case ${1:-} in
         { counted[$1] = $2; print $1, $2, "recorded", ($1 in recorded) ? recorded[$1] : "nothing" }
         END {
             for (name in counted) if (!(name in recorded)) { print name ": not recorded"; bad = 1 }
-            for (name in recorded) if (!(name in counted)) { print name ": recorded, but not counted"; bad = 1 }
+            for (name in recorded) if (!(name in counted) && name !~ /_simd$/) { print name ": recorded, but not counted"; bad = 1 }
             for (name in counted) if (name !~ /^c_/ && (name in recorded) && counted[name] > 1.03 * recorded[name]) {
                 print name ": more than 3 % over the recorded count"; bad = 1
             }
