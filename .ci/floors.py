@@ -40,7 +40,7 @@ FLOORS = [
     ["stream::event", "stream::kernel"],
     ["stream::framing"],
     ["stream::portable", "stream::search"],
-    ["stream::capture", "stream::decoder", "stream::frames"],
+    ["stream::capture", "stream::decoder", "stream::frames", "stream::split"],
     ["stream"],
     # The motor bus: packets, framings, then the two roles.
     ["ikeya::units"],

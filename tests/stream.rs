@@ -27,6 +27,9 @@ mod quiet_line;
 /// Packets for the scenarios, and a decoder's output for them.
 #[path = "stream/rig.rs"]
 mod rig;
+/// Decoding a capture in parts.
+#[path = "stream/split.rs"]
+mod split;
 /// How often a candidate is judged.
 #[path = "stream/work.rs"]
 mod work;

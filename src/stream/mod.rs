@@ -16,7 +16,8 @@
 //!   bytes, and [`Decoder::idle`] ends the delay when the line goes quiet.
 //! * **Reasons (B4).** A gap is one [`Event::Skipped`] with the [`Reason`] of its first byte, and
 //!   every skipped byte is counted under its own reason in [`Counters`].
-//! * **Chunks do not matter.** The same bytes give the same events, however they are cut.
+//! * **Chunks do not matter.** The same bytes give the same events, however they are cut. Whole
+//!   captures can be decoded in parallel: [`parts`].
 //! * **Bounded work.** A byte is examined once for each candidate that it may belong to, at most
 //!   `MAX_LEN` times; batches on a host add a bounded factor. Nothing allocates, nothing panics.
 
@@ -34,6 +35,7 @@ mod ledger;
 #[cfg(feature = "simd")]
 mod portable;
 mod search;
+mod split;
 
 #[cfg(feature = "alloc")]
 pub use capture::{Located, decode_capture};
@@ -52,3 +54,4 @@ pub(crate) use kernel::{Kernel, Rejected};
 pub use ledger::{Counters, Gap, Reason};
 #[cfg(feature = "simd")]
 pub use portable::Portable;
+pub use split::{Parts, parts, split_point};

@@ -12,7 +12,7 @@ use crate::{
     checked_line::{self, CheckedLine, Op},
     hostile_streams,
     known_framings::Known,
-    oracle,
+    oracle, split,
     work::check_work,
 };
 
@@ -42,6 +42,15 @@ macro_rules! properties {
                 #[test]
                 fn a_finished_slice_gives_what_the_oracle_says(stream in stream()) {
                     checked_line::check_finished_slice::<F>(&stream);
+                }
+
+                #[test]
+                fn parts_give_what_the_oracle_says_of_the_whole(
+                    stream in stream(),
+                    len in 0..300_usize,
+                ) {
+                    split::check_split_points::<F>(&stream);
+                    split::check_parts::<F>(&stream, len);
                 }
 
                 #[test]

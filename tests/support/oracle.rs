@@ -55,6 +55,14 @@ impl Answer {
         self.events.iter().filter_map(frame).collect()
     }
 
+    /// Moves all events by this many bytes.
+    pub(crate) fn move_by(&mut self, bytes: usize) {
+        for event in &mut self.events {
+            let (Event::Frame { offset, .. } | Event::Skipped { offset, .. }) = event;
+            *offset += bytes;
+        }
+    }
+
     /// Merges gaps separated only by a silence.
     pub(crate) fn join_gaps(&mut self) {
         let before = self.events.len();
