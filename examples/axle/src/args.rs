@@ -28,6 +28,15 @@ pub(crate) enum Protocol {
 }
 
 impl Protocol {
+    /// Its name on the command line and in JSON.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Ucp => "ucp",
+            Self::Ikeya => "ikeya",
+            Self::Ikeya3 => "ikeya-3",
+        }
+    }
+
     /// Column title of a frame's number.
     pub(crate) const fn number(self) -> &'static str {
         match self {

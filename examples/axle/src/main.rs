@@ -12,6 +12,7 @@ mod failure;
 mod flaky;
 mod human;
 mod input;
+mod pcapng;
 mod port;
 mod record;
 mod rover;

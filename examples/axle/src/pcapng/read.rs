@@ -1,0 +1,299 @@
+//! Reads the packets of a capture, whatever the bytes are.
+
+use std::{
+    fmt,
+    io::{self, ErrorKind, Read},
+    ops::Range,
+};
+
+use super::{BYTE_ORDER, Direction, MAGIC, block, option};
+
+/// Longest accepted block. Those of `axle record` are much shorter; other programs describe their
+/// interfaces in up to a few kilobytes and cut packets at 256 KiB.
+const LONGEST_BLOCK: usize = 1 << 20;
+
+/// An interface of the current section.
+#[derive(Clone, Debug)]
+pub(crate) struct Interface {
+    pub(crate) link_type: u16,
+    /// As text, however it was written.
+    pub(crate) name: Option<String>,
+    unit: Unit,
+    offset_s: i64,
+}
+
+/// Unit of time, as the option has it.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+struct Unit(u8);
+
+impl Unit {
+    /// A time in this unit, in microseconds.
+    fn micros(self, time: u64) -> u64 {
+        let (time, exponent) = (u128::from(time), u32::from(self.0 & 0x7F));
+        let per_second = if self.0 & 0x80 == 0 {
+            10_u128.checked_pow(exponent)
+        } else {
+            1_u128.checked_shl(exponent)
+        };
+        let micros = per_second.map_or(0, |per_second| time * 1_000_000 / per_second);
+        u64::try_from(micros).unwrap_or(u64::MAX)
+    }
+}
+
+/// Bytes that a line carried, and when.
+#[derive(Debug)]
+pub(crate) struct Packet<'a> {
+    /// Number of the interface, counted through all sections.
+    pub(crate) interface: usize,
+    /// Microseconds since 1970; `None` if the block has no time.
+    pub(crate) micros: Option<u64>,
+    pub(crate) direction: Option<Direction>,
+    pub(crate) bytes: &'a [u8],
+}
+
+/// Why reading ends before the end of the file.
+#[derive(Debug)]
+pub(crate) enum Problem {
+    /// The input failed.
+    Io(io::Error),
+    /// The block that begins at this offset is cut off by the end of the file.
+    CutOff { offset: u64 },
+    /// The block that begins at this offset is invalid.
+    Invalid { offset: u64, why: &'static str },
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Io(error) => error.fmt(f),
+            Self::CutOff { offset } => {
+                write!(f, "the file ends inside the pcapng block at byte {offset}")
+            }
+            Self::Invalid { offset, why } => {
+                write!(f, "invalid pcapng block at byte {offset}: {why}")
+            }
+        }
+    }
+}
+
+/// Reads a capture block by block; memory use does not depend on its length.
+pub(crate) struct Reader<R> {
+    input: R,
+    buffer: Vec<u8>,
+    /// The unread bytes of `buffer`.
+    start: usize,
+    end: usize,
+    /// Offset of `start` in the file.
+    offset: u64,
+    is_big_endian: bool,
+    interfaces: Vec<Interface>,
+    /// First interface of the current section.
+    section: usize,
+    is_cut_off: bool,
+}
+
+impl<R: Read> Reader<R> {
+    /// `input` begins with [`MAGIC`](super::MAGIC).
+    pub(crate) fn new(input: R) -> Self {
+        Self {
+            input,
+            buffer: vec![0; 64 * 1024],
+            start: 0,
+            end: 0,
+            offset: 0,
+            is_big_endian: false,
+            interfaces: Vec::new(),
+            section: 0,
+            is_cut_off: false,
+        }
+    }
+
+    /// The interfaces so far.
+    pub(crate) fn interfaces(&self) -> &[Interface] {
+        &self.interfaces
+    }
+
+    /// The next packet; `None` at the end. After a problem there is nothing more to read.
+    ///
+    /// The bytes of a packet that the end of the file cuts off are returned, followed by
+    /// [`Problem::CutOff`].
+    pub(crate) fn next(&mut self) -> Result<Option<Packet<'_>>, Problem> {
+        loop {
+            if self.is_cut_off {
+                return Err(Problem::CutOff { offset: self.offset });
+            }
+            if !self.fill(8)? {
+                return match self.end - self.start {
+                    0 => Ok(None),
+                    _ => Err(Problem::CutOff { offset: self.offset }),
+                };
+            }
+            if self.peek(0) == Some(u32::from_le_bytes(MAGIC)) {
+                self.begin_section()?;
+            }
+            let (kind, len) = (self.peek(0).unwrap_or(0), self.peek(4).unwrap_or(0) as usize);
+            if len < 12 || len % 4 != 0 {
+                return Err(self.invalid("its length is not a multiple of 4 above 8"));
+            }
+            if len > LONGEST_BLOCK {
+                return Err(self.invalid("it is longer than 1 MiB"));
+            }
+            let is_whole = self.fill(len)?;
+            let held = if is_whole { len } else { self.end - self.start };
+            if is_whole && self.peek(len - 4) != Some(len as u32) {
+                return Err(self.invalid("its two lengths differ"));
+            }
+            self.is_cut_off = !is_whole;
+            let (from, offset) = (self.start, self.offset);
+            if is_whole {
+                self.start += len;
+                self.offset += len as u64;
+            }
+            let body = from + 8..from + if is_whole { held - 4 } else { held };
+            match kind {
+                block::INTERFACE if is_whole => {
+                    let Some(interface) = self.interface(body) else {
+                        let why = "it is too short for an interface";
+                        return Err(Problem::Invalid { offset, why });
+                    };
+                    self.interfaces.push(interface);
+                }
+                block::PACKET | block::SIMPLE_PACKET if body.len() >= 20 || is_whole => {
+                    let begin = body.start;
+                    let found = self.buffer.get(body).unwrap_or_default();
+                    let (found, bytes) = self
+                        .packet(kind, found, is_whole)
+                        .map_err(|why| Problem::Invalid { offset, why })?;
+                    let bytes = begin + bytes.start..begin + bytes.end;
+                    let bytes = self.buffer.get(bytes).unwrap_or_default();
+                    return Ok(Some(Packet { bytes, ..found }));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Learns the byte order of a new section.
+    fn begin_section(&mut self) -> Result<(), Problem> {
+        if !self.fill(12)? {
+            return Err(Problem::CutOff { offset: self.offset });
+        }
+        self.is_big_endian = false;
+        if self.peek(8) != Some(BYTE_ORDER) {
+            self.is_big_endian = true;
+        }
+        if self.peek(8) != Some(BYTE_ORDER) {
+            return Err(self.invalid("it has no byte-order mark"));
+        }
+        self.section = self.interfaces.len();
+        Ok(())
+    }
+
+    fn interface(&self, body: Range<usize>) -> Option<Interface> {
+        let body = self.buffer.get(body)?;
+        let (link_type, options) = (self.u16(body.get(..2)?)?, body.get(8..)?);
+        let mut interface = Interface { link_type, name: None, unit: Unit(6), offset_s: 0 };
+        for (code, value) in self.options(options) {
+            match (code, value) {
+                (option::INTERFACE_NAME, name) => {
+                    interface.name = Some(String::from_utf8_lossy(name).into_owned());
+                }
+                (option::TIME_UNIT, &[unit]) => interface.unit = Unit(unit),
+                (option::TIME_OFFSET, value) => {
+                    let (high, low) = match self.is_big_endian {
+                        true => (value.get(..4), value.get(4..)),
+                        false => (value.get(4..), value.get(..4)),
+                    };
+                    let (high, low) = (self.u32(high?)?, self.u32(low?)?);
+                    interface.offset_s = (u64::from(high) << 32 | u64::from(low)) as i64;
+                }
+                _ => {}
+            }
+        }
+        Some(interface)
+    }
+
+    /// A packet without its bytes, and where they are in the body of its block.
+    fn packet(
+        &self,
+        kind: u32,
+        body: &[u8],
+        is_whole: bool,
+    ) -> Result<(Packet<'static>, Range<usize>), &'static str> {
+        const SHORT: &str = "it is too short for a packet";
+        let word = |at| self.u32(body.get(at..at + 4).ok_or(SHORT)?).ok_or(SHORT);
+        let (interface, len, begin) = match kind {
+            block::SIMPLE_PACKET => (self.section, word(0)?.min(body.len() as u32 - 4), 4),
+            _ => (self.section + word(0)? as usize, word(12)?, 20),
+        };
+        let described = self.interfaces.get(interface).ok_or("it names no interface")?;
+        let (len, held) = (len as usize, body.len().saturating_sub(begin));
+        if is_whole && held < len {
+            return Err("its packet is longer than the block");
+        }
+        let bytes = begin..begin + held.min(len);
+        let mut packet = Packet { interface, micros: None, direction: None, bytes: &[] };
+        if kind == block::PACKET {
+            let time = u64::from(word(4)?) << 32 | u64::from(word(8)?);
+            let offset_us = described.offset_s.saturating_mul(1_000_000);
+            packet.micros = Some(described.unit.micros(time).saturating_add_signed(offset_us));
+            let options = body.get(begin + len.next_multiple_of(4)..).unwrap_or_default();
+            let flags = self.options(options).find(|(code, _)| *code == option::FLAGS);
+            let flags = flags.and_then(|(_, flags)| self.u32(flags));
+            packet.direction = flags.and_then(Direction::from_flags);
+        }
+        Ok((packet, bytes))
+    }
+
+    /// Code and value of each option, up to the first that is cut off.
+    fn options<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = (u16, &'a [u8])> {
+        let mut rest = bytes;
+        core::iter::from_fn(move || {
+            let code = self.u16(rest.get(..2)?)?;
+            let len = usize::from(self.u16(rest.get(2..4)?)?);
+            let value = rest.get(4..4 + len)?;
+            rest = rest.get(4 + len.next_multiple_of(4)..).unwrap_or_default();
+            (code != option::END).then_some((code, value))
+        })
+    }
+
+    fn u16(&self, bytes: &[u8]) -> Option<u16> {
+        let bytes = bytes.try_into().ok()?;
+        Some(if self.is_big_endian { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
+    }
+
+    fn u32(&self, bytes: &[u8]) -> Option<u32> {
+        let bytes = bytes.try_into().ok()?;
+        Some(if self.is_big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+    }
+
+    /// The number at this place of the unread bytes.
+    fn peek(&self, at: usize) -> Option<u32> {
+        self.u32(self.buffer.get(self.start + at..self.start + at + 4)?)
+    }
+
+    /// Reads until `count` bytes are unread; `false` if the input ends before.
+    fn fill(&mut self, count: usize) -> Result<bool, Problem> {
+        if self.buffer.len() - self.start < count {
+            self.buffer.copy_within(self.start..self.end, 0);
+            (self.start, self.end) = (0, self.end - self.start);
+            if self.buffer.len() < count {
+                self.buffer.resize(count, 0);
+            }
+        }
+        while self.end - self.start < count {
+            let room = self.buffer.get_mut(self.end..).unwrap_or_default();
+            match self.input.read(room) {
+                Ok(0) => return Ok(false),
+                Ok(read) => self.end += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(Problem::Io(error)),
+            }
+        }
+        Ok(true)
+    }
+
+    fn invalid(&self, why: &'static str) -> Problem {
+        Problem::Invalid { offset: self.offset, why }
+    }
+}

@@ -1,0 +1,96 @@
+//! Writes a capture with one interface.
+
+use std::io::{self, Write};
+
+use super::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
+use crate::args::Protocol;
+
+/// Writes blocks, each with a single call: a full disk cuts off no more than one.
+#[derive(Debug)]
+pub(crate) struct Writer<W> {
+    out: W,
+    block: Vec<u8>,
+}
+
+impl<W: Write> Writer<W> {
+    /// Begins a capture of this line.
+    pub(crate) fn new(out: W, protocol: Protocol, port: &str, baud: u32) -> io::Result<Self> {
+        let mut writer = Self { out, block: Vec::new() };
+        writer.write(u32::from_le_bytes(MAGIC), |body| {
+            body.extend(BYTE_ORDER.to_le_bytes());
+            body.extend([1, 0, 0, 0]); // version 1.0
+            body.extend((-1_i64).to_le_bytes()); // length of the section: unknown
+            put_option(body, option::USER_APPLICATION, b"axle");
+            put_option(body, option::END, &[]);
+        })?;
+        writer.write(block::INTERFACE, |body| {
+            body.extend(link_type(protocol).to_le_bytes());
+            body.extend([0; 2]);
+            body.extend(0_u32.to_le_bytes()); // packets of any length
+            put_option(body, option::INTERFACE_NAME, port.as_bytes());
+            put_option(body, option::INTERFACE_DESCRIPTION, protocol.name().as_bytes());
+            put_option(body, option::SPEED, &u64::from(baud).to_le_bytes());
+            put_option(body, option::TIME_UNIT, &[6]); // 10^-6 s
+            put_option(body, option::END, &[]);
+        })?;
+        Ok(writer)
+    }
+
+    /// Appends bytes that were complete at this time, microseconds since 1970.
+    pub(crate) fn packet(
+        &mut self,
+        micros: u64,
+        direction: Option<Direction>,
+        bytes: &[u8],
+    ) -> io::Result<()> {
+        self.write(block::PACKET, |body| {
+            body.extend(0_u32.to_le_bytes()); // the interface
+            body.extend(((micros >> 32) as u32).to_le_bytes());
+            body.extend((micros as u32).to_le_bytes());
+            let len = bytes.len() as u32;
+            body.extend(len.to_le_bytes());
+            body.extend(len.to_le_bytes());
+            put_padded(body, bytes);
+            if let Some(direction) = direction {
+                put_option(body, option::FLAGS, &direction.flags().to_le_bytes());
+                put_option(body, option::END, &[]);
+            }
+        })
+    }
+
+    /// The output, for example to flush it.
+    pub(crate) const fn get_mut(&mut self) -> &mut W {
+        &mut self.out
+    }
+
+    #[cfg(test)]
+    pub(super) fn out_for_test(self) -> W {
+        self.out
+    }
+
+    fn write(&mut self, kind: u32, body: impl FnOnce(&mut Vec<u8>)) -> io::Result<()> {
+        self.block.clear();
+        self.block.extend(kind.to_le_bytes());
+        self.block.extend([0; 4]);
+        body(&mut self.block);
+        let len = (self.block.len() as u32 + 4).to_le_bytes();
+        self.block.extend(len);
+        if let Some(place) = self.block.get_mut(4..8) {
+            place.copy_from_slice(&len);
+        }
+        self.out.write_all(&self.block)
+    }
+}
+
+fn put_option(body: &mut Vec<u8>, code: u16, value: &[u8]) {
+    // A longer name than this does not exist; it would be cut.
+    let value = value.get(..usize::from(u16::MAX)).unwrap_or(value);
+    body.extend(code.to_le_bytes());
+    body.extend((value.len() as u16).to_le_bytes());
+    put_padded(body, value);
+}
+
+fn put_padded(body: &mut Vec<u8>, bytes: &[u8]) {
+    body.extend(bytes);
+    body.extend(core::iter::repeat_n(0, bytes.len().wrapping_neg() % 4));
+}
