@@ -164,6 +164,10 @@ mod ikeya;
 #[cfg(feature = "embedded-hal")]
 mod rs485;
 mod sending;
+#[cfg(feature = "serialport")]
+mod serial_port;
+#[cfg(feature = "serialport")]
+mod tty;
 #[cfg(feature = "ucp")]
 mod ucp;
 
@@ -178,3 +182,5 @@ pub use error::{DriveError, Operation};
 pub use ikeya::OnlineNodes;
 #[cfg(feature = "embedded-hal")]
 pub use rs485::{NoDelay, Rs485, Rs485Error};
+#[cfg(feature = "serialport")]
+pub use serial_port::SerialPort;

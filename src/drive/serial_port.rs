@@ -1,0 +1,251 @@
+//! A serial port of a PC, blocking.
+
+use alloc::boxed::Box;
+use core::{fmt, ops::Range, time::Duration};
+use std::{io, thread, time::Instant};
+
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+
+use super::tty::{self, STALL, WRITE_PATIENCE, lost};
+
+/// Length of the buffer for received bytes.
+const HELD_LEN: usize = 256;
+
+/// Longest wait in one call of the system, so that a port that has gone is noticed.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Pause between two looks at bytes that are being sent.
+const NAP: Duration = Duration::from_micros(200);
+
+/// A serial port of a PC, for the blocking calls of a [`Driver`](super::Driver). See the page
+/// `on_a_pc` for permissions, adapters and their delays.
+///
+/// ```no_run
+/// # #[cfg(feature = "ikeya")] {
+/// use axlewire::drive::{Driver, SerialPort, StdClock};
+/// use axlewire::ikeya::{BAUD, Master, master::MasterConfig};
+///
+/// let port = SerialPort::open("/dev/ttyUSB0", BAUD)?;
+/// let mut config = MasterConfig::usb_adapter();
+/// config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
+/// let mut bus = Driver::with(|now| <Master>::new(config, now), port, StdClock::new());
+/// println!("{} nodes", bus.discover()?.count());
+/// # }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # How long its calls take
+///
+/// * `read_ready` returns at once.
+/// * `read` waits until there is a byte or the port fails. A driver calls it only when there is.
+/// * `write` takes as many bytes as the system has room for. If that is none for 20 ms, it fails
+///   with [`TimedOut`](io::ErrorKind::TimedOut); the port may recover, so call the driver again.
+/// * `flush` waits until all bytes are out. If the system sends none for a second, it fails with
+///   `TimedOut`. The bytes that are left in the UART itself then take at most its own time, unless
+///   the driver of the operating system hangs.
+///
+/// Signals interrupt none of them.
+///
+/// # Errors
+///
+/// An unplugged port fails in every call, with "disconnected" and the system's words. Open it again
+/// by its path; what has been received from it before is still handed out.
+pub struct SerialPort {
+    tty: Box<dyn serialport::SerialPort>,
+    /// Bytes that were received and not handed out yet are at `unread`.
+    held: [u8; HELD_LEN],
+    unread: Range<usize>,
+}
+
+impl SerialPort {
+    /// Opens a port, such as `/dev/ttyUSB0` or `COM3`, at `baud` bit/s: 8 data bits, no parity, one
+    /// stop bit, no flow control. Bytes that the system received before are discarded.
+    ///
+    /// On Unix other programs cannot open it meanwhile (`TIOCEXCL` and `flock`); on Windows none
+    /// ever can.
+    ///
+    /// # Errors
+    ///
+    /// A text with the path and the reason: no such path, permission denied, in use, not a serial
+    /// port, or a speed that the UART cannot run at, if it is off by more than 3 %.
+    pub fn open(path: &str, baud: u32) -> io::Result<Self> {
+        let tty = tty::open(path, baud, |builder| {
+            let tty = builder.clone().open_native()?;
+            never_wait(&tty)?;
+            Ok(tty)
+        })?;
+        Ok(Self::from(Box::new(tty) as Box<dyn serialport::SerialPort>))
+    }
+
+    /// Whether the port is a pseudo-terminal, by its name. It has no line speed: an answer may come
+    /// before a real line could have carried it. So set
+    /// [`MasterConfig::accepts_early`](crate::ikeya::master::MasterConfig::accepts_early) to this.
+    #[must_use]
+    pub fn is_pseudo_terminal(&self) -> bool {
+        tty::is_pseudo_terminal(&*self.tty)
+    }
+
+    /// Checks that the port runs at `baud` bit/s, as [`open`](Self::open) does, where the system
+    /// can tell.
+    ///
+    /// # Errors
+    ///
+    /// A text with both speeds, if they differ by more than 3 %: a UART would not read the bytes.
+    pub fn check_baud(&self, baud: u32) -> io::Result<()> {
+        tty::check_baud(&*self.tty, baud)
+            .map_err(|cause| io::Error::new(io::ErrorKind::InvalidInput, cause))
+    }
+
+    /// The port of the `serialport` crate.
+    #[must_use]
+    pub fn get_ref(&self) -> &dyn serialport::SerialPort {
+        &*self.tty
+    }
+
+    /// The port of the `serialport` crate, to change its settings. Its timeout is changed by every
+    /// call here.
+    pub fn get_mut(&mut self) -> &mut dyn serialport::SerialPort {
+        &mut *self.tty
+    }
+
+    /// The port of the `serialport` crate. Bytes that were received and not handed out are
+    /// discarded.
+    #[must_use]
+    pub fn into_inner(self) -> Box<dyn serialport::SerialPort> {
+        self.tty
+    }
+
+    /// Waits for bytes, at most for `patience` after the latest signal; returns whether there are
+    /// some.
+    fn receive(&mut self, patience: Duration) -> io::Result<bool> {
+        self.tty.set_timeout(patience).map_err(lost)?;
+        loop {
+            match self.tty.read(&mut self.held) {
+                Ok(0) => return Err(lost(io::ErrorKind::UnexpectedEof)),
+                Ok(count) => {
+                    self.unread = 0..count.min(HELD_LEN);
+                    return Ok(true);
+                }
+                Err(error) => match error.kind() {
+                    io::ErrorKind::Interrupted => {}
+                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => return Ok(false),
+                    _ => return Err(lost(error)),
+                },
+            }
+        }
+    }
+}
+
+/// A port that is already open, as it is: bytes that it has received are not discarded, and its
+/// speed is not checked; see [`check_baud`](SerialPort::check_baud).
+///
+/// On Unix, its `write` may wait without limit if the system has room for a part of a frame only,
+/// as a pseudo-terminal has whose other end does not read. Ports from [`SerialPort::open`] never
+/// do.
+impl From<Box<dyn serialport::SerialPort>> for SerialPort {
+    fn from(tty: Box<dyn serialport::SerialPort>) -> Self {
+        Self { tty, held: [0; HELD_LEN], unread: 0..0 }
+    }
+}
+
+impl fmt::Debug for SerialPort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unread = self.unread.len();
+        f.debug_struct("SerialPort")
+            .field("name", &self.tty.name())
+            .field("unread", &unread)
+            .finish()
+    }
+}
+
+impl ErrorType for SerialPort {
+    type Error = io::Error;
+}
+
+impl ReadReady for SerialPort {
+    fn read_ready(&mut self) -> io::Result<bool> {
+        if !self.unread.is_empty() {
+            return Ok(true);
+        }
+        // Windows has no read that returns at once. Elsewhere the count would be zero for ever if
+        // the other end has gone, but a read fails.
+        if cfg!(windows) {
+            let count = self.tty.bytes_to_read().map_err(lost)?;
+            return if count > 0 { self.receive(LOOK) } else { Ok(false) };
+        }
+        self.receive(Duration::ZERO)
+    }
+}
+
+impl Read for SerialPort {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if buffer.is_empty() {
+            return Ok(0);
+        }
+        while self.unread.is_empty() {
+            self.receive(LOOK)?;
+        }
+        let unread = self.held.get(self.unread.clone()).unwrap_or_default();
+        let count = unread.len().min(buffer.len());
+        buffer.iter_mut().zip(unread).for_each(|(slot, byte)| *slot = *byte);
+        self.unread.start += count;
+        Ok(count)
+    }
+}
+
+impl Write for SerialPort {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if bytes.is_empty() {
+            return Ok(0);
+        }
+        let deadline = Instant::now() + WRITE_PATIENCE;
+        self.tty.set_timeout(WRITE_PATIENCE).map_err(lost)?;
+        loop {
+            match self.tty.write(bytes) {
+                Ok(count) => return Ok(count),
+                Err(error) => match error.kind() {
+                    io::ErrorKind::Interrupted if Instant::now() < deadline => {}
+                    io::ErrorKind::Interrupted
+                    | io::ErrorKind::TimedOut
+                    | io::ErrorKind::WouldBlock => return Err(io::ErrorKind::TimedOut.into()),
+                    _ => return Err(lost(error)),
+                },
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let mut least = u32::MAX;
+        let mut deadline = Instant::now();
+        loop {
+            let queued = self.tty.bytes_to_write().map_err(lost)?;
+            if queued == 0 {
+                return self.tty.flush().map_err(lost);
+            }
+            if queued < least {
+                (least, deadline) = (queued, Instant::now() + STALL);
+            }
+            if Instant::now() >= deadline {
+                return Err(tty::stalled(queued));
+            }
+            thread::sleep(NAP);
+        }
+    }
+}
+
+/// Lets a write return with a part of the bytes. Otherwise it waits for room for all of them,
+/// whatever the timeout.
+#[cfg(unix)]
+fn never_wait(tty: &serialport::TTYPort) -> serialport::Result<()> {
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
+    use std::os::fd::AsRawFd;
+
+    fcntl(tty.as_raw_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(io::Error::from)?;
+    Ok(())
+}
+
+/// A write returns at its timeout.
+#[cfg(windows)]
+fn never_wait(_: &serialport::COMPort) -> serialport::Result<()> {
+    Ok(())
+}
