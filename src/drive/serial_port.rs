@@ -115,8 +115,19 @@ impl SerialPort {
         self.tty
     }
 
-    /// Waits for bytes, at most for `patience` after the latest signal; returns whether there are
-    /// some.
+    /// Waits for received bytes, at most for `patience` after the latest signal; returns whether
+    /// there are some. A [`Clock`](super::Clock) of your own can idle with it.
+    ///
+    /// # Errors
+    ///
+    /// The port has gone.
+    pub fn wait(&mut self, patience: Duration) -> io::Result<bool> {
+        if !self.unread.is_empty() {
+            return Ok(true);
+        }
+        self.receive(patience)
+    }
+
     fn receive(&mut self, patience: Duration) -> io::Result<bool> {
         self.tty.set_timeout(patience).map_err(lost)?;
         loop {

@@ -3,11 +3,10 @@
 use std::{thread, time};
 
 use axlewire::{
-    endpoint::Endpoint,
     ikeya::{
         self, Master, Mode, NodeId, Status,
         board::{Board, OneMotor, ThreeMotors},
-        master::{Cause, Health, MasterConfig, NodeSet, Polling, StopProgress},
+        master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
     time::{Duration, Instant},
 };
@@ -15,7 +14,8 @@ use axlewire::{
 use crate::{
     args,
     failure::Failure,
-    port::{Port, Transport},
+    line::Line,
+    session::Session,
     signals::{ABSENCE, Awake, Signals},
 };
 
@@ -49,13 +49,19 @@ pub(crate) struct MasterArgs {
     /// adapter may need; for a UART built into this machine
     #[arg(long)]
     direct: bool,
+
+    /// The adapter hears what it sends, as on two wires with the receiver always on: take these
+    /// echoes out
+    #[arg(long)]
+    echo: bool,
 }
 
 /// A port and the master on it.
 pub(crate) struct Bus<B: Board = OneMotor> {
-    pub(crate) port: Port,
-    pub(crate) master: Master<B>,
+    session: Session<Master<B>>,
     pub(crate) baud: u32,
+    /// The master's dead-man has stopped the nodes.
+    pub(crate) has_dead_man_fired: bool,
 }
 
 /// Outcome of a stop for one node.
@@ -77,14 +83,17 @@ pub(crate) enum Halt {
 
 impl Bus {
     pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
-        let config = if args.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+        let mut config =
+            if args.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+        config.removes_echo = args.echo;
         Self::open_with(&args.line, config)
     }
 
     /// Asks all ids for their status; `false` if a signal came first.
     pub(crate) fn discover(&mut self, signals: &Signals) -> Result<bool, Failure> {
-        self.master.discover(self.port.now());
-        while self.master.is_discovering() && !signals.is_raised() {
+        let now = self.now();
+        self.master_mut().discover(now);
+        while self.master().is_discovering() && !signals.is_raised() {
             self.look()?;
         }
         Ok(!signals.is_raised())
@@ -97,15 +106,15 @@ impl Bus {
         node: NodeId,
         signals: &Signals,
     ) -> Result<Option<Status<OneMotor>>, Failure> {
-        let start = self.port.now();
-        let end = start + self.master.stop_bound();
-        if self.master.read(node, start).is_err() {
+        let start = self.now();
+        let end = start + self.master().stop_bound();
+        if self.master_mut().read(node, start).is_err() {
             return Ok(None);
         }
-        while !signals.is_raised() && self.is_online(node) && self.port.now() < end {
+        while !signals.is_raised() && self.is_online(node) && self.now() < end {
             self.look()?;
-            match self.master.status(node) {
-                Some((status, at)) if at > start && !self.master.is_mode_in_doubt(node) => {
+            match self.master().status(node) {
+                Some((status, at)) if at > start && !self.master().is_mode_in_doubt(node) => {
                     return Ok(Some(status));
                 }
                 _ => {}
@@ -117,30 +126,58 @@ impl Bus {
 
 impl<B: Boards> Bus<B> {
     pub(crate) fn open_with(line: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
-        let port = Port::open(line, ikeya::BAUD)?;
+        let line_open = Line::open(line, ikeya::BAUD)?;
         let mut config = config;
         config.baud = line.baud.unwrap_or(ikeya::BAUD);
         config.polling = Polling::Every(PERIOD);
-        config.accepts_early = port.is_pseudo_terminal();
+        config.accepts_early = line_open.is_instant();
         config.dead_man = Some(ABSENCE);
-        let master = Master::new(config, port.now());
-        Ok(Self { port, master, baud: config.baud })
+        Ok(Self::new(line_open, config))
     }
 
+    pub(crate) fn new(line: Line, config: MasterConfig) -> Self {
+        let session = Session::new(line, |now| Master::new(config, now));
+        Self { session, baud: config.baud, has_dead_man_fired: false }
+    }
+
+    pub(crate) fn now(&mut self) -> Instant {
+        self.session.now()
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        self.session.path()
+    }
+
+    pub(crate) const fn master(&self) -> &Master<B> {
+        self.session.role()
+    }
+
+    pub(crate) const fn master_mut(&mut self) -> &mut Master<B> {
+        self.session.role_mut()
+    }
+
+    /// Runs until something happens, at most until `until`. Callers query the master for what has
+    /// happened; only the dead-man's event would be lost on them.
     pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
-        self.port.round(&mut self.master, until)
+        let (mut next, result) = match self.session.round(until) {
+            Ok(event) => (event, Ok(())),
+            Err(failure) => (self.session.poll_event(), Err(failure)),
+        };
+        while let Some(event) = next {
+            self.has_dead_man_fired |= event == MasterEvent::DeadMan;
+            next = self.session.poll_event();
+        }
+        result
     }
 
-    /// One round without its events; callers query the master instead.
     fn look(&mut self) -> Result<(), Failure> {
-        let round = self.round(self.port.now() + LOOK_PERIOD);
-        while self.master.poll_event().is_some() {}
-        round
+        let until = self.now() + LOOK_PERIOD;
+        self.round(until)
     }
 
     /// Last measurement of a node.
     pub(crate) fn status(&self, node: NodeId) -> Option<Status<B>> {
-        self.master.status(node).map(|(status, _)| status)
+        self.master().status(node).map(|(status, _)| status)
     }
 
     /// The nodes that have answered so far, each with its mode and status.
@@ -153,11 +190,11 @@ impl<B: Boards> Bus<B> {
 
     /// Whether an id has given only damaged answers.
     pub(crate) fn is_damaged(&self, node: NodeId) -> bool {
-        self.status(node).is_none() && self.master.node_statistics(node).crc_errors > 0
+        self.status(node).is_none() && self.master().node_statistics(node).crc_errors > 0
     }
 
     pub(crate) fn is_online(&self, node: NodeId) -> bool {
-        matches!(self.master.health(node), Some(Health::Online | Health::Suspect(_)))
+        matches!(self.master().health(node), Some(Health::Online | Health::Suspect(_)))
     }
 
     /// Stops these nodes and waits until the outcome of each is known. Port failures do not end the
@@ -165,13 +202,13 @@ impl<B: Boards> Bus<B> {
     ///
     /// The wait is bounded, and no signal ends it early.
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
-        let begin = self.port.now();
-        nodes.iter().for_each(|node| self.master.stop(node, begin));
-        let bound = self.master.stop_bound().max(STOP_PATIENCE);
+        let begin = self.now();
+        nodes.iter().for_each(|node| self.master_mut().stop(node, begin));
+        let bound = self.master().stop_bound().max(STOP_PATIENCE);
         let (mut awake, mut confirmed_at) = (Awake::new(begin), None);
         loop {
             let result = self.look();
-            let time = awake.time(self.port.now());
+            let time = awake.time(self.now());
             let is_any = |halt| nodes.iter().any(|node| self.halt(node) == halt);
             let is_asking = time < SILENCE || nodes.iter().any(|node| self.is_unasked(node));
             let deadline = if is_any(Halt::Owed) || is_any(Halt::Doubtful) {
@@ -194,18 +231,18 @@ impl<B: Boards> Bus<B> {
 
     /// Whether an id has never answered, but was not asked often enough to count as silent.
     fn is_unasked(&self, node: NodeId) -> bool {
-        let attempts = u32::from(self.master.config().attempts);
-        self.status(node).is_none() && self.master.node_statistics(node).requests < attempts
+        let attempts = u32::from(self.master().config().attempts);
+        self.status(node).is_none() && self.master().node_statistics(node).requests < attempts
     }
 
     /// Outcome so far for a node that was told to stop.
     pub(crate) fn halt(&self, node: NodeId) -> Halt {
-        match self.master.stop_progress(node) {
+        match self.master().stop_progress(node) {
             StopProgress::StandingStill => Halt::Still,
             StopProgress::Paid => Halt::Moving,
             _ if self.is_damaged(node) => Halt::Damaged,
             _ if self.status(node).is_none() => Halt::Silent,
-            _ if self.master.is_mode_in_doubt(node) => Halt::Doubtful,
+            _ if self.master().is_mode_in_doubt(node) => Halt::Doubtful,
             _ => Halt::Owed,
         }
     }
@@ -222,7 +259,7 @@ impl<B: Boards> Bus<B> {
                 )
             }
             Halt::Owed => {
-                let heard = match self.master.last_failure(node) {
+                let heard = match self.master().last_failure(node) {
                     _ if self.is_online(node) => "",
                     Some(Cause::Damaged) => " (damaged bytes received)",
                     Some(Cause::Unexpected) => " (other answers received)",

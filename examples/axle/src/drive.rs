@@ -8,7 +8,6 @@ use axlewire::{
 use crate::{
     MOTION_HELP, args,
     failure::Failure,
-    port::Transport,
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
@@ -77,7 +76,7 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     // Print before anything moves: a terminal may suspend a background process that prints.
     let announced = format!("target: {}", rover::describe(&command));
     teller::print(&line(0.0, &announced)).map_err(Failure::Write)?;
-    let start = rover.port.now();
+    let start = rover.now();
     let mut drive = Drive { rover, start, teller: Teller::new() };
 
     let driven = drive.drive(command, args.micros, signals);
@@ -108,25 +107,25 @@ impl Drive {
         let mut print_at = self.start + PRINT_PERIOD;
         let mut attendance = Attendance::new(self.start);
         while !signals.is_raised() {
-            let now = self.rover.port.now();
+            let now = self.rover.now();
             // An absence ends the drive: the host stops the robot after one, but the next command
             // would drive it again.
             attendance.check(now)?;
             if now >= end {
                 break;
             }
-            let driven = self.rover.host.drive(command, now);
+            let driven = self.rover.host_mut().drive(command, now);
             driven.map_err(|error| Failure::Failed(error.to_string()))?;
             self.rover.round((now + CALL_PERIOD).min(end).min(print_at))?;
-            attendance.check(self.rover.port.now())?;
+            attendance.check(self.rover.now())?;
             if self.rover.has_dead_man_fired {
                 return Err(Failure::Failed(DEAD_MAN.to_owned()));
             }
-            if self.rover.host.link() == Link::Down {
+            if self.rover.host().link() == Link::Down {
                 return Err(Failure::Failed("the robot is no longer heard".to_owned()));
             }
-            if self.rover.port.now() >= print_at {
-                print_at = self.rover.port.now() + PRINT_PERIOD;
+            if self.rover.now() >= print_at {
+                print_at = self.rover.now() + PRINT_PERIOD;
                 self.say_report("")?;
             }
         }
@@ -142,7 +141,7 @@ impl Drive {
 
     fn say_report(&mut self, what: &str) -> Result<(), Failure> {
         let Some(report) = self.rover.describe() else { return Ok(()) };
-        let seconds = (self.rover.port.now() - self.start).as_micros() as f64 / 1e6;
+        let seconds = (self.rover.now() - self.start).as_micros() as f64 / 1e6;
         self.teller.say(line(seconds, &format!("{report}{what}")))
     }
 }

@@ -20,8 +20,6 @@ pub(crate) enum Failure {
     Read { path: Option<PathBuf>, error: io::Error },
     /// Writing the output failed.
     Write(io::Error),
-    /// The port cannot be used.
-    Port { path: String, cause: String },
     /// The port failed after it was opened; `moving` is the consequence for a moving motor or
     /// rover.
     PortLost { path: String, cause: String, moving: Option<String> },
@@ -37,6 +35,11 @@ impl Failure {
         let words: Vec<_> = paragraph.split_whitespace().collect();
         let line = words.join(" ");
         Self::Usage(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
+    }
+
+    /// A port that failed after it was opened.
+    pub(crate) fn lost(path: &str, cause: &str) -> Self {
+        Self::PortLost { path: path.to_owned(), cause: cause.to_owned(), moving: None }
     }
 
     /// Adds the consequence for what is moving, if the port was lost.
@@ -84,7 +87,6 @@ impl fmt::Display for Failure {
             Self::Read { path: Some(path), error } => write!(f, "cannot read {path:?}: {error}"),
             Self::Read { path: None, error } => write!(f, "cannot read standard input: {error}"),
             Self::Write(error) => write!(f, "cannot write the output: {error}"),
-            Self::Port { path, cause } => write!(f, "cannot use port {path:?}: {cause}"),
             Self::PortLost { path, cause, moving: None } => {
                 write!(f, "port {path:?} failed: {cause}")
             }

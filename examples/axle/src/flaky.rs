@@ -11,11 +11,12 @@ use std::{
 };
 
 use axlewire::{
+    drive,
     endpoint::Endpoint,
-    ikeya::{Master, Mode, NodeId, master::MasterConfig},
+    ikeya::{Mode, NodeId, master::MasterConfig},
     sim::MotorNode,
     time::Instant,
-    ucp::{Host, Robot, Telemetry, host::HostConfig, robot::RobotConfig},
+    ucp::{Robot, Telemetry, host::HostConfig, robot::RobotConfig},
 };
 use serialport::{
     ClearBuffer, DataBits, FlowControl, Parity, Result, SerialPort, StopBits, TTYPort,
@@ -23,7 +24,7 @@ use serialport::{
 
 use crate::{
     bus::{Bus, Halt},
-    port::{Port, Transport},
+    line::Line,
     rover::Rover,
 };
 
@@ -101,7 +102,7 @@ impl SerialPort for Flaky {
 fn broken_for_a_while<E: Endpoint + Send + 'static>(
     role: impl FnOnce(Instant) -> E,
     mut react: impl FnMut(&mut E, Instant) + Send + 'static,
-) -> Port {
+) -> Line {
     let (mut theirs, ours) = TTYPort::pair().unwrap();
     let is_broken = Arc::new(AtomicBool::new(true));
     let flaky = Flaky { port: ours, is_broken: Arc::clone(&is_broken) };
@@ -125,17 +126,17 @@ fn broken_for_a_while<E: Endpoint + Send + 'static>(
             }
         }
     });
-    Port::new("flaky".to_owned(), Box::new(flaky))
+    let port: Box<dyn SerialPort> = Box::new(flaky);
+    Line::new("flaky", drive::SerialPort::from(port), true)
 }
 
 #[test]
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
     let node = |_| MotorNode::new(NodeId::N1, Mode::Velocity);
-    let port = broken_for_a_while(node, |_, _| {});
+    let line = broken_for_a_while(node, |_, _| {});
     let mut config = MasterConfig::usb_adapter();
     config.accepts_early = true;
-    let master = Master::new(config, port.now());
-    let mut bus: Bus = Bus { port, master, baud: config.baud };
+    let mut bus: Bus = Bus::new(line, config);
     bus.stop(NodeId::N1.into()).unwrap();
     assert_eq!(bus.halt(NodeId::N1), Halt::Still);
 }
@@ -143,11 +144,10 @@ fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
 #[test]
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
     let robot = |now| Robot::new(RobotConfig::default(), now);
-    let port = broken_for_a_while(robot, |robot, now| {
+    let line = broken_for_a_while(robot, |robot, now| {
         robot.set_telemetry(&Telemetry::default(), now);
     });
-    let host = Host::new(HostConfig::default(), port.now());
-    let mut rover = Rover::new(port, host);
+    let mut rover = Rover::new(line, HostConfig::default());
     rover.stop().unwrap();
-    assert!(rover.host.is_stop_sent());
+    assert!(rover.host().is_stop_sent());
 }

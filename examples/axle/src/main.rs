@@ -12,11 +12,12 @@ mod failure;
 mod flaky;
 mod human;
 mod input;
+mod line;
 mod pcapng;
-mod port;
 mod record;
 mod rover;
 mod scan;
+mod session;
 mod signals;
 #[cfg(unix)]
 mod sim;

@@ -3,7 +3,6 @@
 use std::{thread, time};
 
 use axlewire::{
-    endpoint::Endpoint,
     time::{Duration, Instant},
     ucp::{
         self, Host, MotorControl,
@@ -11,12 +10,7 @@ use axlewire::{
     },
 };
 
-use crate::{
-    args,
-    failure::Failure,
-    port::{Port, Transport},
-    signals::Awake,
-};
+use crate::{args, failure::Failure, line::Line, session::Session, signals::Awake};
 
 /// Time allowed for a robot to be heard for the first time.
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
@@ -44,8 +38,7 @@ pub(crate) const OUT_OF_REACH: &str = "the robot can no longer be told to stop: 
 
 /// A port and the host on it.
 pub(crate) struct Rover {
-    pub(crate) port: Port,
-    pub(crate) host: Host,
+    session: Session<Host>,
     /// The host's dead-man has stopped the robot.
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
@@ -54,24 +47,36 @@ pub(crate) struct Rover {
 
 impl Rover {
     pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
-        let port = Port::open(line, ucp::BAUD)?;
+        let line_open = Line::open(line, ucp::BAUD)?;
         let mut config = HostConfig::default();
         config.baud = line.baud.unwrap_or(ucp::BAUD);
-        let host = Host::new(config, port.now());
-        Ok(Self::new(port, host))
+        Ok(Self::new(line_open, config))
     }
 
-    pub(crate) const fn new(port: Port, host: Host) -> Self {
-        Self { port, host, has_dead_man_fired: false, still_reports: 0 }
+    pub(crate) fn new(line: Line, config: HostConfig) -> Self {
+        let session = Session::new(line, |now| Host::new(config, now));
+        Self { session, has_dead_man_fired: false, still_reports: 0 }
+    }
+
+    pub(crate) fn now(&mut self) -> Instant {
+        self.session.now()
+    }
+
+    pub(crate) const fn host(&self) -> &Host {
+        self.session.role()
+    }
+
+    pub(crate) const fn host_mut(&mut self) -> &mut Host {
+        self.session.role_mut()
     }
 
     /// Waits until the robot is heard; `false` if `is_over` returns `true` first.
     pub(crate) fn find(&mut self, is_over: impl Fn() -> bool) -> Result<bool, Failure> {
-        let end = self.port.now() + LINK_PATIENCE;
-        while self.host.link() != Link::Up && !is_over() {
-            if self.port.now() >= end {
-                let (path, seconds) = (self.port.path(), LINK_PATIENCE.as_micros() / 1_000_000);
-                let heard = match self.host.counters().received {
+        let end = self.now() + LINK_PATIENCE;
+        while self.host().link() != Link::Up && !is_over() {
+            if self.now() >= end {
+                let (path, seconds) = (self.session.path(), LINK_PATIENCE.as_micros() / 1_000_000);
+                let heard = match self.host().counters().received {
                     0 => "nothing".to_owned(),
                     bytes => format!("{bytes} bytes but no message"),
                 };
@@ -86,8 +91,11 @@ impl Rover {
 
     /// Runs one round and handles its events.
     pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
-        let result = self.port.round(&mut self.host, until);
-        while let Some(event) = self.host.poll_event() {
+        let (mut next, result) = match self.session.round(until) {
+            Ok(event) => (event, Ok(())),
+            Err(failure) => (self.session.poll_event(), Err(failure)),
+        };
+        while let Some(event) = next {
             match event {
                 // Turning on the spot is also motion: every wheel counts.
                 HostEvent::Report(report) if report.telemetry.rpm == [0; 4] => {
@@ -97,6 +105,7 @@ impl Rover {
                 HostEvent::DeadMan => self.has_dead_man_fired = true,
                 _ => {}
             }
+            next = self.session.poll_event();
         }
         result
     }
@@ -104,21 +113,22 @@ impl Rover {
     /// Repeats the stop until the robot's reports show all wheels at rest. Failures of the port and
     /// of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
-        let (begin, sent) = (self.port.now(), self.host.statistics().commands);
+        let (begin, sent) = (self.now(), self.host().statistics().commands);
         let (mut awake, mut has_told) = (Awake::new(begin), false);
-        self.host.stop(begin);
+        self.host_mut().stop(begin);
         let failure = loop {
-            let result = self.round(self.port.now() + CALL_PERIOD);
-            let told = self.host.statistics().commands.saturating_sub(sent);
+            let until = self.now() + CALL_PERIOD;
+            let result = self.round(until);
+            let told = self.host().statistics().commands.saturating_sub(sent);
             if !has_told && told >= STOPS {
                 // Earlier reports do not count.
                 (has_told, self.still_reports) = (true, 0);
             }
-            let is_told = has_told && self.host.is_stop_sent();
+            let is_told = has_told && self.host().is_stop_sent();
             if result.is_ok() && is_told && self.still_reports >= STILL_REPORTS {
                 return Ok(());
             }
-            if awake.time(self.port.now()) >= STOP_PATIENCE {
+            if awake.time(self.now()) >= STOP_PATIENCE {
                 break result.err();
             }
             if result.is_err() {
@@ -128,8 +138,8 @@ impl Rover {
         if let Some(failure) = failure {
             return Err(failure.while_moving(OUT_OF_REACH));
         }
-        let sent = self.host.statistics().commands.saturating_sub(sent);
-        Err(Failure::Failed(match self.host.link() {
+        let sent = self.host().statistics().commands.saturating_sub(sent);
+        Err(Failure::Failed(match self.host().link() {
             Link::Up => {
                 format!("the robot was told {sent} times to stop, but its wheels are still turning")
             }
@@ -142,8 +152,8 @@ impl Rover {
 
     /// The latest report on one line.
     pub(crate) fn describe(&self) -> Option<String> {
-        let report = self.host.last_report()?;
-        let (now, lost) = (report.telemetry, self.host.statistics().reports_lost);
+        let report = self.host().last_report()?;
+        let (now, lost) = (report.telemetry, self.host().statistics().reports_lost);
         let [front_left, front_right, back_left, back_right] = now.rpm;
         Some(format!(
             "rpm {front_left:4} {front_right:4} {back_left:4} {back_right:4}  heading {:3} deg  \

@@ -124,7 +124,7 @@ fn print_table(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
             "id {node}: only damaged answers: noise, two boards with this id, or a wrong --baud"
         )?;
     }
-    let (path, baud) = (bus.port.path(), bus.baud);
+    let (path, baud) = (bus.path(), bus.baud);
     match (count, damaged.is_empty()) {
         (0, true) => writeln!(
             out,

@@ -1,8 +1,7 @@
 //! `axle spin`: turns one motor, and stops it before the tool exits.
 
 use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{Mode, NodeId, Position, Rps, Status, Target, board::OneMotor, master::MasterEvent},
+    ikeya::{Mode, NodeId, Position, Rps, Status, Target, board::OneMotor},
     time::{Duration, Instant},
 };
 
@@ -10,7 +9,6 @@ use crate::{
     MOTION_HELP, args,
     bus::{self, Boards, Bus},
     failure::Failure,
-    port::Transport,
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
 };
@@ -105,11 +103,11 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     if signals.is_raised() {
         return signals.interrupted();
     }
-    if bus.master.is_mode_in_doubt(node) {
+    if bus.master().is_mode_in_doubt(node) {
         return Err(Failure::Failed(format!("the mode of node {node} is in doubt")));
     }
     let target = choose(args, &bus, status)?;
-    let start = bus.port.now();
+    let start = bus.now();
     let mut spin = Spin { bus, node, start, teller: Teller::new() };
 
     let spun = spin.spin(target, args.micros, signals);
@@ -185,17 +183,17 @@ impl Spin {
         let mut print_at = self.start + PRINT_PERIOD;
         let mut attendance = Attendance::new(self.start);
         while !signals.is_raised() {
-            let now = self.bus.port.now();
+            let now = self.bus.now();
             attendance.check(now)?;
             if now >= end {
                 return self.check_reached(target);
             }
-            self.bus.master.keep_alive(now);
+            self.bus.master_mut().keep_alive(now);
             self.bus.round(end.min(print_at).min(now + CALL_PERIOD))?;
-            attendance.check(self.bus.port.now())?;
+            attendance.check(self.bus.now())?;
             self.check_follows(target)?;
-            if self.bus.port.now() >= print_at {
-                print_at = self.bus.port.now() + PRINT_PERIOD;
+            if self.bus.now() >= print_at {
+                print_at = self.bus.now() + PRINT_PERIOD;
                 self.say_status("")?;
             }
         }
@@ -204,7 +202,7 @@ impl Spin {
 
     /// The master refuses a target for any mode other than the last one reported.
     fn command(&mut self, target: Target) -> Result<(), Failure> {
-        let (master, node) = (&mut self.bus.master, self.node);
+        let (master, node) = (self.bus.master_mut(), self.node);
         match target {
             Target::Velocity(rps) => master.set_velocity(node, rps, self.start),
             Target::Position(position) => master.set_position(node, position, self.start),
@@ -213,27 +211,23 @@ impl Spin {
     }
 
     /// Fails if the node no longer follows its command.
-    fn check_follows(&mut self, target: Target) -> Result<(), Failure> {
-        let (bus, node) = (&mut self.bus, self.node);
-        let mut has_dead_man_fired = false;
-        while let Some(event) = bus.master.poll_event() {
-            has_dead_man_fired |= event == MasterEvent::DeadMan;
-        }
+    fn check_follows(&self, target: Target) -> Result<(), Failure> {
+        let (bus, node) = (&self.bus, self.node);
         let refuse = |line: String| Err(Failure::Failed(line));
-        match bus.master.mode(node) {
+        match bus.master().mode(node) {
             _ if !bus.is_online(node) => refuse(format!("node {node} no longer answers")),
             Some(mode) if mode != target.mode() => {
                 refuse(format!("node {node} has changed to {mode} mode"))
             }
-            _ if bus.master.is_mode_in_doubt(node) => {
+            _ if bus.master().is_mode_in_doubt(node) => {
                 let other = match target.mode() {
                     Mode::Velocity => Mode::Position,
                     Mode::Position => Mode::Velocity,
                 };
                 refuse(format!("node {node} has answered in {other} mode"))
             }
-            _ if has_dead_man_fired => refuse(DEAD_MAN.to_owned()),
-            _ if bus.master.set_point(node) != Some(target) => {
+            _ if bus.has_dead_man_fired => refuse(DEAD_MAN.to_owned()),
+            _ if bus.master().set_point(node) != Some(target) => {
                 refuse(format!("node {node} has lost its command"))
             }
             _ => Ok(()),
@@ -241,9 +235,9 @@ impl Spin {
     }
 
     /// Checks at the end that the motor has reached its target.
-    fn check_reached(&self, target: Target) -> Result<(), Failure> {
-        let (node, now) = (self.node, self.bus.port.now());
-        let measured = self.bus.master.status(node);
+    fn check_reached(&mut self, target: Target) -> Result<(), Failure> {
+        let (node, now) = (self.node, self.bus.now());
+        let measured = self.bus.master().status(node);
         let fresh = measured.filter(|&(_, at)| at > self.start && now - at <= FRESH);
         let line = match fresh {
             Some((status, _)) if is_reached(target, status) => return Ok(()),
@@ -272,7 +266,7 @@ impl Spin {
 
     fn say_status(&mut self, what: &str) -> Result<(), Failure> {
         let Some(status) = self.bus.status(self.node) else { return Ok(()) };
-        let seconds = (self.bus.port.now() - self.start).as_micros() as f64 / 1e6;
+        let seconds = (self.bus.now() - self.start).as_micros() as f64 / 1e6;
         let what = format!("{}{what}", OneMotor::describe(status));
         self.teller.say(line(seconds, self.node, &what))
     }

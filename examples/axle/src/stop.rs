@@ -115,7 +115,7 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
     let failure = bus.stop(nodes).err();
     let mut silent = Vec::new();
     let mut stopped = Stopped {
-        path: bus.port.path().to_owned(),
+        path: bus.path().to_owned(),
         answered: bus.nodes().count(),
         damaged: nodes.iter().filter(|&node| bus.is_damaged(node)).count(),
         complaints: Vec::new(),

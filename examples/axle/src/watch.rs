@@ -3,9 +3,11 @@
 use std::{
     collections::BTreeMap,
     io::{self, IsTerminal, Write},
+    time::Duration as Span,
 };
 
 use axlewire::{
+    drive::Clock,
     ikeya::{self, three},
     stream::{Counters, Decoder, Event, Framing, Reason},
     time::{Duration, Instant},
@@ -18,7 +20,7 @@ use crate::{
     decode::BUFFER_LEN,
     failure::Failure,
     human,
-    port::{Port, Transport},
+    line::Line,
     record::{Frame, Summary},
     signals::Signals,
 };
@@ -49,6 +51,9 @@ const PRINT_PERIOD: Duration = Duration::from_millis(1000);
 /// The time over which a rate is measured.
 const RATE_PERIOD: Duration = Duration::from_millis(1000);
 
+/// Longest wait for bytes, so that signals are noticed in time.
+const PATIENCE: Duration = Duration::from_millis(50);
+
 /// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
 const QUIET: Duration = Duration::from_millis(30);
 
@@ -67,29 +72,32 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Into<Frame<'a>>,
 {
-    let mut port = Port::open(&args.line, baud)?;
+    let mut line = Line::open(&args.line, baud)?;
+    let mut clock = line.clock();
+    let mut buffer = [0; 4096];
     let mut out = io::stdout().lock();
     let is_live = out.is_terminal();
     let mut decoder = Decoder::<F, BUFFER_LEN>::new();
-    let mut table = Table::new(args.protocol, port.now());
+    let mut table = Table::new(args.protocol, clock.now());
     let period = if is_live { REDRAW_PERIOD } else { PRINT_PERIOD };
-    let (mut print_at, mut heard_at) = (port.now() + period, port.now());
+    let (mut print_at, mut heard_at) = (clock.now() + period, clock.now());
 
     let broken = loop {
         if signals.is_raised() {
             break Ok(());
         }
-        let received = match port.receive(print_at) {
-            Ok(received) => received.to_vec(),
+        let patience = (print_at - clock.now()).min(PATIENCE).as_micros();
+        let received = match line.receive(&mut buffer, Span::from_micros(patience.into())) {
+            Ok(received) => received,
             Err(failure) => break Err(failure),
         };
-        let now = port.now();
+        let now = clock.now();
         if !received.is_empty() {
             heard_at = now;
         } else if now >= heard_at + QUIET && decoder.pending() > 0 {
             decoder.idle();
         }
-        table.take(&mut decoder, &received);
+        table.take(&mut decoder, received);
         if now >= print_at {
             print_at = now + period;
             table.measure(now);
@@ -101,7 +109,7 @@ where
         }
     };
     table
-        .finish(&mut out, &decoder.counters(), decoder.pending(), port.now())
+        .finish(&mut out, &decoder.counters(), decoder.pending(), clock.now())
         .map_err(Failure::Write)?;
     broken
 }

@@ -1,7 +1,7 @@
 //! Motors on a bus.
 
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     ikeya::{
         Mode, NodeId, Slave, Target,
         slave::{SlaveConfig, SlaveEvent},
@@ -11,7 +11,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, args, failure::Failure, port::Transport, signals::Signals};
+use crate::{EXIT_CODES, args, failure::Failure, session::Session, signals::Signals};
 
 /// Simulate motors on a bus, which answer and turn as commanded
 #[derive(Debug, clap::Args)]
@@ -52,37 +52,39 @@ const STEP: Duration = Duration::from_millis(20);
 
 /// Runs the subcommand.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let mut nodes = Nodes(Vec::new());
+    let mut nodes = Nodes { all: Vec::new(), sender: 0 };
     for &(node, mode) in &args.nodes {
-        if nodes.0.iter().any(|other| other.motor.slave().node() == node) {
+        if nodes.all.iter().any(|other| other.motor.slave().node() == node) {
             return Err(Failure::Usage(format!("node {node} is given twice")));
         }
-        nodes.0.push(Node::new(node, mode, args.watchdog));
+        nodes.all.push(Node::new(node, mode, args.watchdog));
     }
     let signals = Signals::listen()?;
-    let mut pty = Pty::open(args.faults)?;
+    let mut session = Session::new(Pty::open(args.faults)?, |_| nodes);
     while !signals.is_raised() {
-        let until = pty.now() + STEP;
-        pty.round(&mut nodes, until)?;
-        let now = pty.now();
-        nodes.handle_input(&[], now);
-        while let Some(line) = nodes.poll_event() {
+        let until = session.now() + STEP;
+        let mut told = session.round(until)?;
+        let now = session.now();
+        while let Some(line) = told {
             say(now, &line)?;
+            told = session.poll_event();
         }
-        for node in &mut nodes.0 {
+        session.role_mut().handle_input(&[], now);
+        for node in &mut session.role_mut().all {
             if let Some(line) = node.arrival() {
                 say(now, &line)?;
             }
         }
     }
-    for node in &nodes.0 {
+    let now = session.now();
+    for node in &session.role().all {
         let slave = node.motor.slave();
         let (id, seen) = (slave.node(), slave.statistics());
         let line = format!(
             "node {id}: {} READ, {} WRITE, {} answers",
             seen.reads, seen.writes, seen.replies
         );
-        say(pty.now(), &line)?;
+        say(now, &line)?;
     }
     Ok(())
 }
@@ -149,31 +151,68 @@ impl Node {
 }
 
 /// All nodes receive every byte, and each sends its own answers.
-struct Nodes(Vec<Node>);
+struct Nodes {
+    all: Vec<Node>,
+    /// The node that sent last.
+    sender: usize,
+}
 
 impl Endpoint for Nodes {
     type Event = String;
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.0.iter_mut().for_each(|node| node.motor.handle_input(bytes, now));
+        self.all.iter_mut().for_each(|node| node.motor.handle_input(bytes, now));
+    }
+
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        self.all.iter_mut().for_each(|node| node.motor.handle_old_input(bytes, since, now));
+    }
+
+    fn held_up_after(&self) -> Option<Duration> {
+        self.all.iter().filter_map(|node| node.motor.held_up_after()).min()
+    }
+
+    fn frame_pause(&self) -> Duration {
+        let pauses = self.all.iter().map(|node| node.motor.frame_pause());
+        pauses.min().unwrap_or(Duration::ZERO)
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        self.all.first().map_or(Duration::ZERO, |node| node.motor.wire_time(bytes))
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        self.0.iter_mut().for_each(|node| node.motor.handle_timeout(now));
+        self.all.iter_mut().for_each(|node| node.motor.handle_timeout(now));
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        self.0.iter_mut().find_map(|node| node.motor.poll_transmit(now))
+        for (at, node) in self.all.iter_mut().enumerate() {
+            if let Some(frame) = node.motor.poll_transmit(now) {
+                self.sender = at;
+                return Some(frame);
+            }
+        }
+        None
+    }
+
+    fn is_outdated(&self) -> bool {
+        self.all.get(self.sender).is_some_and(|node| node.motor.is_outdated())
+    }
+
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        if let Some(node) = self.all.get_mut(self.sender) {
+            node.motor.handle_unsent(unsent, now);
+        }
     }
 
     fn poll_event(&mut self) -> Option<String> {
-        self.0.iter_mut().find_map(|node| {
+        self.all.iter_mut().find_map(|node| {
             let event = node.motor.poll_event()?;
             node.describe(event)
         })
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        self.0.iter().filter_map(|node| node.motor.poll_timeout()).min()
+        self.all.iter().filter_map(|node| node.motor.poll_timeout()).min()
     }
 }

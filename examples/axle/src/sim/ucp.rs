@@ -3,7 +3,7 @@
 use axlewire::{
     endpoint::Endpoint,
     sim::Rover,
-    time::Duration,
+    time::{Duration, Instant},
     ucp::{
         MotorControl, Robot,
         message::{CalibrationKind, ImuBias, MagBias},
@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, failure::Failure, port::Transport, signals::Signals};
+use crate::{EXIT_CODES, failure::Failure, session::Session, signals::Signals};
 
 /// Simulate a rover, which reports, drives as commanded, and stops without commands
 #[derive(Debug, clap::Args)]
@@ -28,18 +28,20 @@ const STEP: Duration = Duration::from_millis(10);
 /// Runs the subcommand.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
-    let mut pty = Pty::open(args.faults)?;
-    let mut last = pty.now();
-    let (mut robot, mut rover) = (Robot::new(RobotConfig::default(), last), Rover::new());
+    let mut session =
+        Session::new(Pty::open(args.faults)?, |now| Robot::new(RobotConfig::default(), now));
+    let (mut rover, mut last) = (Rover::new(), session.now());
     let mut is_moving = false;
     while !signals.is_raised() {
-        let until = pty.now() + STEP;
-        pty.round(&mut robot, until)?;
-        let now = pty.now();
-        while let Some(event) = robot.poll_event() {
-            if let Some(line) = react(&mut robot, event, now) {
+        let until = session.now() + STEP;
+        let mut next = session.round(until)?;
+        let now = session.now();
+        let robot = session.role_mut();
+        while let Some(event) = next {
+            if let Some(line) = react(robot, event, now) {
                 say(now, &line)?;
             }
+            next = robot.poll_event();
         }
         rover.step(now - last);
         rover.command(&robot.command(now));
@@ -56,14 +58,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             say(now, &format!("at rest after {way:.2} m, heading {heading:.0} deg"))?;
         }
     }
-    let seen = robot.statistics();
+    let seen = session.role().statistics();
     let line =
         format!("{} commands, {} pings, {} reports", seen.commands, seen.pings, seen.reports);
     say(last, &line)
 }
 
 /// Does what the host requests, and returns a line about it.
-fn react(robot: &mut Robot, event: RobotEvent, now: axlewire::time::Instant) -> Option<String> {
+fn react(robot: &mut Robot, event: RobotEvent, now: Instant) -> Option<String> {
     Some(match event {
         RobotEvent::Motor(command) => describe(&command),
         RobotEvent::Watchdog => "watchdog: no command for 500 ms".to_owned(),

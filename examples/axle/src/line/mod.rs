@@ -1,0 +1,140 @@
+//! An open line: the port of a driver, and the clock that waits for its bytes.
+
+mod tcp;
+
+use std::{
+    cell::RefCell,
+    io,
+    rc::Rc,
+    time::{Duration, Instant as Clock},
+};
+
+use axlewire::{
+    drive::{self, SerialPort},
+    time::Instant,
+};
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+
+use crate::{args, failure::Failure};
+use tcp::TcpPort;
+
+/// What may be at the other end of a path.
+pub(crate) trait Wire: Read + ReadReady + Write + ErrorType<Error = io::Error> {
+    /// Waits for bytes, at most for `patience`; returns whether there are some.
+    fn wait(&mut self, patience: Duration) -> io::Result<bool>;
+}
+
+impl Wire for SerialPort {
+    fn wait(&mut self, patience: Duration) -> io::Result<bool> {
+        SerialPort::wait(self, patience)
+    }
+}
+
+/// A port for a driver. Its clones are the same port.
+#[derive(Clone)]
+pub(crate) struct Line {
+    wire: Rc<RefCell<dyn Wire>>,
+    path: Rc<str>,
+    /// Whether an answer may come before a line of this speed could have carried it.
+    is_instant: bool,
+}
+
+impl Line {
+    /// Opens a port for exclusive use, without the bytes that were received before.
+    pub(crate) fn open(args: &args::PortArgs, default_baud: u32) -> Result<Self, Failure> {
+        let (path, baud) = (&*args.port, args.baud.unwrap_or(default_baud));
+        if let Some(address) = path.strip_prefix("tcp:") {
+            let refused =
+                |error: io::Error| Failure::Failed(format!("cannot use port {path:?}: {error}"));
+            let port = TcpPort::connect(address).map_err(refused)?;
+            let is_instant = port.is_local();
+            return Ok(Self::new(path, port, is_instant));
+        }
+        let port =
+            SerialPort::open(path, baud).map_err(|error| Failure::Failed(error.to_string()))?;
+        let is_instant = port.is_pseudo_terminal();
+        Ok(Self::new(path, port, is_instant))
+    }
+
+    pub(crate) fn new(path: &str, wire: impl Wire + 'static, is_instant: bool) -> Self {
+        Self { wire: Rc::new(RefCell::new(wire)), path: path.into(), is_instant }
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether the line takes no time, as a pseudo-terminal and a connection within this machine:
+    /// an answer may come before a real line could have carried it.
+    pub(crate) const fn is_instant(&self) -> bool {
+        self.is_instant
+    }
+
+    /// A clock that starts now and that idles until bytes have come.
+    pub(crate) fn clock(&self) -> LineClock {
+        LineClock { wire: Rc::clone(&self.wire), start: Clock::now() }
+    }
+
+    /// The bytes that come within `patience`, as soon as there are some.
+    pub(crate) fn receive<'b>(
+        &mut self,
+        buffer: &'b mut [u8],
+        patience: Duration,
+    ) -> Result<&'b [u8], Failure> {
+        let mut wire = self.wire.borrow_mut();
+        let count = match wire.wait(patience) {
+            Ok(false) => Ok(0),
+            Ok(true) => wire.read(buffer),
+            Err(error) => Err(error),
+        };
+        match count {
+            Ok(count) => Ok(buffer.get(..count).unwrap_or_default()),
+            Err(error) => Err(Failure::lost(&self.path, &error.to_string())),
+        }
+    }
+}
+
+impl ErrorType for Line {
+    type Error = io::Error;
+}
+
+impl ReadReady for Line {
+    fn read_ready(&mut self) -> io::Result<bool> {
+        self.wire.borrow_mut().read_ready()
+    }
+}
+
+impl Read for Line {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.wire.borrow_mut().read(buffer)
+    }
+}
+
+impl Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.wire.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.wire.borrow_mut().flush()
+    }
+}
+
+/// The clock of a driver on this line. Waits for bytes instead of sleeping, so that answers are
+/// taken in at once and an idle tool needs hardly any processor time.
+pub(crate) struct LineClock {
+    wire: Rc<RefCell<dyn Wire>>,
+    start: Clock,
+}
+
+impl drive::Clock for LineClock {
+    fn now(&mut self) -> Instant {
+        Instant::from_micros(self.start.elapsed().as_micros() as u64)
+    }
+
+    fn idle_until(&mut self, until: Instant) {
+        let patience = (until - self.now()).as_micros();
+        // A failure is found again, and handled, when the driver reads.
+        let _ = self.wire.borrow_mut().wait(Duration::from_micros(patience.into()));
+    }
+}

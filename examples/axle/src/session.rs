@@ -1,0 +1,91 @@
+//! A role on an open line, run by the library's driver.
+
+use std::{
+    io,
+    time::{Duration as Span, Instant as Clock},
+};
+
+use axlewire::{
+    drive::{DriveError, Driver},
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    failure::Failure,
+    line::{Line, LineClock},
+};
+
+/// Longest wait for bytes, so that signals are noticed in time.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Time after which a port that accepts no byte has failed. Until then it may recover.
+const STUCK: Span = Span::from_secs(1);
+
+/// A role on an open line.
+pub(crate) struct Session<R> {
+    driver: Driver<R, Line, LineClock>,
+    /// Time since which the port has accepted no byte, if it is stuck.
+    stuck_since: Option<Clock>,
+}
+
+impl<R: Endpoint> Session<R> {
+    pub(crate) fn new(line: Line, role: impl FnOnce(Instant) -> R) -> Self {
+        let clock = line.clock();
+        Self { driver: Driver::with(role, line, clock), stuck_since: None }
+    }
+
+    /// The time since the line was opened.
+    pub(crate) fn now(&mut self) -> Instant {
+        self.driver.now()
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        self.driver.port().path()
+    }
+
+    pub(crate) const fn role(&self) -> &R {
+        self.driver.role()
+    }
+
+    pub(crate) const fn role_mut(&mut self) -> &mut R {
+        self.driver.role_mut()
+    }
+
+    /// Runs the role until it has an event, which is returned, or until `until` or the next moment
+    /// to look for signals.
+    ///
+    /// Events from before a failure stay in the role's queue. The caller goes on with the next
+    /// round, if it has to stop something.
+    pub(crate) fn round(&mut self, until: Instant) -> Result<Option<R::Event>, Failure> {
+        let until = until.min(self.now() + PATIENCE);
+        match self.driver.next_event(until) {
+            Ok(event) => {
+                self.stuck_since = None;
+                Ok(event)
+            }
+            Err(error) => self.judge(error).map_or(Ok(None), Err),
+        }
+    }
+
+    /// The next event in the queue.
+    pub(crate) fn poll_event(&mut self) -> Option<R::Event> {
+        self.driver.poll_event()
+    }
+
+    /// The failure for an error of the driver, unless the port may still recover.
+    fn judge(&mut self, error: DriveError<io::Error>) -> Option<Failure> {
+        let cause = match error {
+            DriveError::Port(error) if error.kind() == io::ErrorKind::TimedOut => {
+                let since = *self.stuck_since.get_or_insert_with(Clock::now);
+                if since.elapsed() < STUCK {
+                    return None;
+                }
+                "it accepts no more bytes".to_owned()
+            }
+            DriveError::Port(error) => error.to_string(),
+            other => other.to_string(),
+        };
+        Some(Failure::lost(self.path(), &cause))
+    }
+}
