@@ -33,7 +33,7 @@ from rust_uses import Item, Module, lookup, macro_of_ancestor, read_crate, resol
 # Modules on one floor may use each other where that closes no circle.
 FLOORS = [
     ["machine", "time", "error"],
-    ["crc16", "encode", "endpoint", "inbox", "stats"],
+    ["crc16", "encode", "endpoint", "inbox", "stats", "text"],
     ["events", "outbox"],
     # Bytes to frames.
     ["stream::ledger", "stream::fill"],
@@ -49,6 +49,8 @@ FLOORS = [
     ["ikeya::judge"],
     ["ikeya::batch"],
     ["ikeya::framing"],
+    ["ikeya::contents"],
+    ["ikeya::serialize"],
     ["ikeya::board"],
     ["ikeya::master::health", "ikeya::master::nodes", "ikeya::master::schedule"],
     ["ikeya::master::config", "ikeya::master::event", "ikeya::master::statistics"],
@@ -66,6 +68,7 @@ FLOORS = [
     ["ucp::body"],
     ["ucp::motor", "ucp::report", "ucp::update"],
     ["ucp::message"],
+    ["ucp::contents", "ucp::serialize"],
     ["ucp::batch"],
     ["ucp::framing"],
     ["ucp::role"],

@@ -90,6 +90,8 @@ pub mod sim;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 pub mod stats;
 pub mod stream;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod text;
 pub mod time;
 #[cfg(feature = "ucp")]
 pub mod ucp;

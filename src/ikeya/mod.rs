@@ -113,9 +113,12 @@
 
 mod batch;
 pub mod board;
+mod contents;
 mod framing;
 mod judge;
 pub mod master;
+#[cfg(feature = "serde")]
+mod serialize;
 pub mod slave;
 pub mod three;
 mod units;
@@ -123,6 +126,7 @@ mod wire;
 
 #[doc(inline)]
 pub use board::{Status, Target};
+pub use contents::Contents;
 pub use framing::{BothDirections, Decoder, MAX_LEN, Packet, Request, Response, ToMaster, ToSlave};
 #[doc(inline)]
 pub use master::Master;

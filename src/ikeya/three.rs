@@ -79,7 +79,7 @@ pub enum Packet<'a> {
 /// assert_eq!(packet.as_bytes()[..6], [0xBB, 0x01, 0x00, 0x00, 0xC0, 0x3F]);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -135,7 +135,7 @@ impl WriteRequest {
 }
 
 /// Slave to master, status of a velocity node with three motors: 16 bytes.
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -172,7 +172,7 @@ impl VelocityResponse {
 }
 
 /// Slave to master, status of a position node with three motors: 16 bytes.
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -208,7 +208,11 @@ impl PositionResponse {
     }
 }
 
-packet!(WriteRequest, VelocityResponse, PositionResponse);
+packet! {
+    WriteRequest { id: id, velocity: as_velocity, position: as_position }
+    VelocityResponse { id: id, rps: rps }
+    PositionResponse { id: id, positions: positions }
+}
 
 /// Three counts, then three rotations: not three pairs.
 fn positions_to_wire([a, b, c]: [Position; 3]) -> [[u8; 4]; 3] {

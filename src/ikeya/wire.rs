@@ -45,7 +45,7 @@ pub(super) mod header {
 /// use axlewire::ikeya::{NodeId, ReadRequest};
 /// assert_eq!(ReadRequest::new(NodeId::N1).as_bytes(), &[0xAA, 0x01, 0xBE, 0xD0]);
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -94,7 +94,7 @@ impl ReadRequest {
 /// assert_eq!(go.as_bytes(), &[0xBB, 0x06, 0x00, 0x10, 0x01, 0x00, 0x93, 0x05]);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -164,7 +164,7 @@ impl WriteRequest {
 /// assert_eq!((response.id(), response.rps()), (NodeId::N2, 1.0));
 /// # Ok::<(), axlewire::error::ParseError>(())
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -212,7 +212,7 @@ impl VelocityResponse {
 /// let response = PositionResponse::new(NodeId::N3, Position::new(4096, 1));
 /// assert_eq!(response.as_bytes(), &[0x56, 0x03, 0x00, 0x10, 0x01, 0x00, 0x48, 0x78]);
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -248,9 +248,17 @@ impl PositionResponse {
     }
 }
 
-/// Common to all packets of both variants: parsing and encoding.
+/// Common to all packets of both variants: parsing, encoding, and `{:?}` with these values.
 macro_rules! packet {
-    ($($packet:ident),+) => {$(
+    ($($packet:ident { $($name:ident: $getter:ident),+ })+) => {$(
+        impl core::fmt::Debug for $packet {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.debug_struct(stringify!($packet))
+                    $(.field(stringify!($name), &self.$getter()))+
+                    .finish()
+            }
+        }
+
         impl $packet {
             /// Borrows `bytes` as this packet.
             ///
@@ -290,7 +298,12 @@ macro_rules! packet {
 }
 pub(super) use packet;
 
-packet!(ReadRequest, WriteRequest, VelocityResponse, PositionResponse);
+packet! {
+    ReadRequest { id: id }
+    WriteRequest { id: id, velocity: as_velocity, position: as_position }
+    VelocityResponse { id: id, rps: rps }
+    PositionResponse { id: id, position: position }
+}
 
 /// Borrows `bytes` as a packet if header, id and CRC are valid.
 pub(super) fn parsed<P>(bytes: &[u8]) -> Result<&P, ParseError>

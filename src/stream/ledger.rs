@@ -33,6 +33,18 @@ impl Reason {
             Self::Idle => "idle",
         }
     }
+
+    /// The reason in a few words, for people: `no frame starts here`.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        match self {
+            Self::Header => "no frame starts here",
+            Self::Length => "invalid length",
+            Self::Id => "invalid node id",
+            Self::Crc => "damaged, or not a frame",
+            Self::Idle => "truncated at the end",
+        }
+    }
 }
 
 impl fmt::Display for Reason {
@@ -46,10 +58,20 @@ impl fmt::Display for Reason {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gap {
-    /// Length, bytes; at least 1.
+    /// Length, bytes; at least 1. In `serde` its name is `length`, as that of a frame.
+    #[cfg_attr(feature = "serde", serde(rename = "length"))]
     pub len: u64,
     /// Why its first byte was skipped.
     pub reason: Reason,
+}
+
+/// Length and reason: `3 bytes skipped: header, no frame starts here`.
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { len, reason } = self;
+        let bytes = if *len == 1 { "byte" } else { "bytes" };
+        write!(f, "{len} {bytes} skipped: {reason}, {}", reason.meaning())
+    }
 }
 
 /// The account of every byte: `received == framed + skipped() + pending`. All counts wrap at 2^64,

@@ -3,14 +3,15 @@
 use super::codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus};
 use crate::error::EncodeError;
 
-/// Declares bodies: a struct of private byte fields, alignment 1, and the id of its message.
+/// Declares bodies: a struct of private byte fields, alignment 1, the id of its message, and the
+/// getters whose values `{:?}` shows.
 macro_rules! body {
     ($(
         $(#[$meta:meta])*
-        pub struct $name:ident($id:ident) { $($field:ident: $ty:ty),* }
+        pub struct $name:ident($id:ident) { $($field:ident: $ty:ty),* } => $($getter:ident),*;
     )+) => {$(
         $(#[$meta])*
-        #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+        #[derive(Clone, Copy, Eq, Hash, PartialEq)]
         #[derive(
             zerocopy::FromBytes, zerocopy::IntoBytes, zerocopy::Immutable, zerocopy::KnownLayout,
             zerocopy::Unaligned,
@@ -19,6 +20,8 @@ macro_rules! body {
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(C)]
         pub struct $name { $($field: $ty),* }
+
+        $crate::ucp::frame::debug_values! { $name: $($getter),* }
 
         impl $crate::ucp::frame::sealed::Sealed for $name {}
 
@@ -31,43 +34,43 @@ pub(super) use body;
 
 body! {
     /// Host to robot: checks that the robot is there. No body.
-    pub struct Ping(Ping) {}
+    pub struct Ping(Ping) {} =>;
 
     /// Robot to host, answers a ping: `err`, 1 byte.
-    pub struct Pong(Ping) { err: u8 }
+    pub struct Pong(Ping) { err: u8 } => err;
 
     /// Host to robot, begins a calibration: `type`, 1 byte (ruling U11).
-    pub struct CalibrationStart(CalibrationStart) { kind: u8 }
+    pub struct CalibrationStart(CalibrationStart) { kind: u8 } => kind;
 
     /// Robot to host, answers the start at once: `type | err`, 2 bytes.
-    pub struct CalibrationStartAck(CalibrationStart) { kind: u8, err: u8 }
+    pub struct CalibrationStartAck(CalibrationStart) { kind: u8, err: u8 } => kind, err;
 
     /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11).
-    pub struct CalibrationEnd(CalibrationEnd) { kind: u8 }
+    pub struct CalibrationEnd(CalibrationEnd) { kind: u8 } => kind;
 
     /// Robot to host, answers the end at once: `type | err`, 2 bytes.
     ///
     /// The vendor firmware returns the type of the last *start* here.
-    pub struct CalibrationEndAck(CalibrationEnd) { kind: u8, err: u8 }
+    pub struct CalibrationEndAck(CalibrationEnd) { kind: u8, err: u8 } => kind, err;
 
     /// Robot to host, the result of an IMU calibration: `acc: 3 × i16 | gyro: 3 × i16`, 12 bytes.
     ///
     /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
-    pub struct ImuBias(ImuBias) { acc: [[u8; 2]; 3], gyro: [[u8; 2]; 3] }
+    pub struct ImuBias(ImuBias) { acc: [[u8; 2]; 3], gyro: [[u8; 2]; 3] } => acc, gyro;
 
     /// Host to robot, acknowledges an [`ImuBias`]: `err`, 1 byte.
-    pub struct ImuBiasAck(ImuBias) { err: u8 }
+    pub struct ImuBiasAck(ImuBias) { err: u8 } => err;
 
     /// Robot to host, the result of a magnetometer calibration: `mag: 3 × i16`, 6 bytes.
     ///
     /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
-    pub struct MagBias(MagBias) { mag: [[u8; 2]; 3] }
+    pub struct MagBias(MagBias) { mag: [[u8; 2]; 3] } => mag;
 
     /// Host to robot, acknowledges a [`MagBias`]: `err`, 1 byte.
-    pub struct MagBiasAck(MagBias) { err: u8 }
+    pub struct MagBiasAck(MagBias) { err: u8 } => err;
 
     /// Robot to host, asks for the stored biases at boot, every 1000 ms until answered. No body.
-    pub struct BiasRequest(Biases) {}
+    pub struct BiasRequest(Biases) {} =>;
 
     /// Host to robot, the stored biases: `err | acc: 3 × i16 | gyro: 3 × i16 | mag: 3 × i16`, 19
     /// bytes. The vendor firmware accepts them whatever `err` says.
@@ -76,19 +79,19 @@ body! {
         acc: [[u8; 2]; 3],
         gyro: [[u8; 2]; 3],
         mag: [[u8; 2]; 3]
-    }
+    } => err, imu, mag;
 
     /// Robot to host, answers an [`OtaRequest`](super::message::OtaRequest): `err`, 1 byte.
     /// Shipped robots never send it.
-    pub struct OtaAck(Ota) { status: u8 }
+    pub struct OtaAck(Ota) { status: u8 } => status;
 
     /// Host to robot, state of the host's network: 1 byte; the form that a host should send (ruling
     /// U8).
-    pub struct SetNetworkState(NetworkState) { state: u8 }
+    pub struct SetNetworkState(NetworkState) { state: u8 } => state;
 
     /// Host to robot, state of the host's network in 4 bytes, the size of a Linux `enum`. Only
     /// received, never built.
-    pub struct SetNetworkStateWide(NetworkState) { state: [u8; 4] }
+    pub struct SetNetworkStateWide(NetworkState) { state: [u8; 4] } => state;
 }
 
 impl Pong {

@@ -1,5 +1,7 @@
 //! Frames as received and as sent.
 
+use core::fmt;
+
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
 use super::header::{Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, MessageId, OUTSIDE_LEN};
@@ -23,7 +25,7 @@ use crate::{
 /// assert!(matches!(frame.message(), Message::Pong(_)));
 /// # Ok::<(), axlewire::error::ParseError>(())
 /// ```
-#[derive(Debug, Eq, Hash, PartialEq)]
+#[derive(Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[repr(C)]
 pub struct Frame {
@@ -138,6 +140,20 @@ pub trait Body: IntoBytes + Immutable + KnownLayout + Unaligned + Copy + sealed:
     }
 }
 
+/// Implements `Debug` for a type of bytes with the values of its getters.
+macro_rules! debug_values {
+    ($name:ident: $($getter:ident),*) => {
+        impl core::fmt::Debug for $name {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.debug_struct(stringify!($name))
+                    $(.field(stringify!($getter), &self.$getter()))*
+                    .finish()
+            }
+        }
+    };
+}
+pub(super) use debug_values;
+
 pub(super) mod sealed {
     /// Limits `Body` to this crate.
     pub trait Sealed {}
@@ -153,7 +169,7 @@ pub(super) mod sealed {
 /// use axlewire::ucp::{message::Ping, Body};
 /// assert_eq!(Ping {}.frame(0).as_bytes(), [0xFD, 0xFF, 0x04, 0, 0x01, 0, 0x01, 0x42]);
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
@@ -200,6 +216,12 @@ impl<B> FrameOf<B> {
     #[must_use]
     pub const fn body(&self) -> &B {
         &self.body
+    }
+}
+
+impl<B: fmt::Debug> fmt::Debug for FrameOf<B> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FrameOf").field("index", &self.index()).field("body", self.body()).finish()
     }
 }
 

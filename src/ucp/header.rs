@@ -1,5 +1,7 @@
 //! The six bytes before every body, the names of the ids, and the sizes of a frame.
 
+use core::fmt;
+
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
 /// Speed of the line, bit/s.
@@ -41,7 +43,7 @@ enum SecondSync {
 pub const SYNC: [u8; 2] = [FirstSync::Value as u8, SecondSync::Value as u8];
 
 /// The fields before every body: `FD | FF | len: u16 | id | index`, 6 bytes (ruling U1).
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(TryFromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::CheckedBitPattern, bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -86,6 +88,16 @@ impl Header {
     #[must_use]
     pub const fn index(&self) -> u8 {
         self.index
+    }
+}
+
+impl fmt::Debug for Header {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Header")
+            .field("len", &self.len())
+            .field("id", &self.id())
+            .field("index", &self.index())
+            .finish()
     }
 }
 

@@ -1,6 +1,9 @@
 //! The content of frames: the messages, their bodies and their values (ruling U4).
 //!
-//! [`Frame::message`] reads one, [`Body::frame`](super::Body::frame) builds one.
+//! [`Frame::message`] reads one, [`Body::frame`](super::Body::frame) builds one. A message prints
+//! itself, as a whole or without its name: [`Message::contents`].
+
+use core::fmt;
 
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
@@ -11,6 +14,7 @@ pub use super::{
         SetNetworkState, SetNetworkStateWide,
     },
     codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+    contents::Contents,
     motor::RawMotorControl,
     report::{DocumentReport, FirmwareReport, Report},
     update::{OtaRequest, RawOtaRequest},
@@ -56,6 +60,16 @@ impl Frame {
     }
 }
 
+impl fmt::Debug for Frame {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Frame")
+            .field("id", &self.id())
+            .field("index", &self.index())
+            .field("message", &self.message())
+            .finish()
+    }
+}
+
 #[cfg(feature = "defmt")]
 impl defmt::Format for Frame {
     fn format(&self, f: defmt::Formatter<'_>) {
@@ -64,6 +78,51 @@ impl defmt::Format for Frame {
 }
 
 impl<'a> Message<'a> {
+    /// The name in snake case, as in the JSON of `axle decode`: `ping`, `motor_control`. The two
+    /// widths of a network state have one name, and so have the two layouts of a report.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Ping(_) => "ping",
+            Self::Pong(_) => "pong",
+            Self::MotorControl(_) => "motor_control",
+            Self::CalibrationStart(_) => "calibration_start",
+            Self::CalibrationStartAck(_) => "calibration_start_ack",
+            Self::CalibrationEnd(_) => "calibration_end",
+            Self::CalibrationEndAck(_) => "calibration_end_ack",
+            Self::Report(_) => "report",
+            Self::ImuBias(_) => "imu_bias",
+            Self::ImuBiasAck(_) => "imu_bias_ack",
+            Self::MagBias(_) => "mag_bias",
+            Self::MagBiasAck(_) => "mag_bias_ack",
+            Self::BiasRequest(_) => "bias_request",
+            Self::Biases(_) => "biases",
+            Self::OtaRequest(_) => "ota_request",
+            Self::OtaAck(_) => "ota_ack",
+            Self::SetNetworkState(_) | Self::SetNetworkStateWide(_) => "network_state",
+            Self::Unknown(_) => "unknown",
+        }
+    }
+
+    /// The id on the wire (ruling U4).
+    #[must_use]
+    pub const fn id(&self) -> u8 {
+        let id = match self {
+            Self::Ping(_) | Self::Pong(_) => MessageId::Ping,
+            Self::MotorControl(_) => MessageId::MotorControl,
+            Self::CalibrationStart(_) | Self::CalibrationStartAck(_) => MessageId::CalibrationStart,
+            Self::CalibrationEnd(_) | Self::CalibrationEndAck(_) => MessageId::CalibrationEnd,
+            Self::Report(_) => MessageId::Report,
+            Self::ImuBias(_) | Self::ImuBiasAck(_) => MessageId::ImuBias,
+            Self::MagBias(_) | Self::MagBiasAck(_) => MessageId::MagBias,
+            Self::BiasRequest(_) | Self::Biases(_) => MessageId::Biases,
+            Self::OtaRequest(_) | Self::OtaAck(_) => MessageId::Ota,
+            Self::SetNetworkState(_) | Self::SetNetworkStateWide(_) => MessageId::NetworkState,
+            Self::Unknown(frame) => return frame.id,
+        };
+        id as u8
+    }
+
     /// Determines the message from the id and the length of the body; the first match is the only
     /// one.
     fn of(frame: &'a Frame) -> Self {

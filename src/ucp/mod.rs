@@ -127,6 +127,7 @@
 mod batch;
 mod body;
 mod codes;
+mod contents;
 mod frame;
 mod framing;
 mod header;
@@ -137,6 +138,8 @@ mod motor;
 mod report;
 pub mod robot;
 mod role;
+#[cfg(feature = "serde")]
+mod serialize;
 mod update;
 
 pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};

@@ -3,7 +3,7 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned, transmute};
 
 use super::{
-    frame::{Body, sealed::Sealed},
+    frame::{Body, debug_values, sealed::Sealed},
     header::MessageId,
 };
 use crate::error::EncodeError;
@@ -37,7 +37,7 @@ use crate::error::EncodeError;
 /// [`yaw_left`](Self::yaw_left) turn the nose, in reverse too.
 ///
 /// A speed of -5..=5 counts as 0: the robot then turns on the spot if `angular` is beyond ±10.
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -59,6 +59,8 @@ const fn limited(percent: i32) -> i16 {
         percent as i16
     }
 }
+
+debug_values! { MotorControl: speed, angular, front_led }
 
 impl Sealed for MotorControl {}
 
@@ -276,7 +278,7 @@ impl TryFrom<RawMotorControl> for MotorControl {
 ///     let _ = received.frame(0); // no such method
 /// }
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -289,6 +291,10 @@ pub struct RawMotorControl {
     version: [u8; 2],
     reserve1: [u8; 2],
     reserve2: [u8; 4],
+}
+
+debug_values! {
+    RawMotorControl: speed, angular, front_led, back_led, version, reserve1, reserve2
 }
 
 impl RawMotorControl {

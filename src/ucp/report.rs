@@ -18,7 +18,7 @@ body! {
         voltage: u8,
         current: [u8; 2],
         version: [u8; 2]
-    }
+    } => telemetry, version;
 
     /// The report as printed in the protocol document: 34 bytes, `len` 38. No known robot sends it.
     ///
@@ -34,7 +34,7 @@ body! {
         gyro: [[u8; 2]; 3],
         mag: [[u8; 2]; 3],
         heading: [u8; 2]
-    }
+    } => telemetry;
 }
 
 /// The values of a report: the layouts differ in the order of their fields, not in their names.

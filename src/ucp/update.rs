@@ -3,7 +3,7 @@
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout, Unaligned, transmute};
 
 use super::{
-    frame::{Body, sealed::Sealed},
+    frame::{Body, debug_values, sealed::Sealed},
     header::MessageId,
 };
 
@@ -18,7 +18,7 @@ use super::{
 /// use zerocopy::FromBytes;
 /// let request = OtaRequest::read_from_bytes(&[40, 0]); // no such method
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::NoUninit))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -26,6 +26,8 @@ use super::{
 pub struct OtaRequest {
     version: [u8; 2],
 }
+
+debug_values! { OtaRequest: version }
 
 impl Sealed for OtaRequest {}
 
@@ -58,7 +60,7 @@ impl OtaRequest {
 ///     let _ = received.frame(0); // no such method
 /// }
 /// ```
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Eq, Hash, PartialEq)]
 #[derive(FromBytes, IntoBytes, Immutable, KnownLayout, Unaligned)]
 #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -66,6 +68,8 @@ impl OtaRequest {
 pub struct RawOtaRequest {
     version: [u8; 2],
 }
+
+debug_values! { RawOtaRequest: version }
 
 impl RawOtaRequest {
     /// The version offered.

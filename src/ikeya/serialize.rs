@@ -1,0 +1,111 @@
+//! Packets as data for `serde`: flat maps with the fields of `axle decode --json`.
+
+use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use super::{
+    contents::{Motors, Values},
+    framing::{Packet, Request, Response},
+    three::{Packet as PacketOfThree, Request as RequestOfThree, Response as ResponseOfThree},
+    units::{NodeId, Position},
+};
+use crate::text::Hex;
+
+/// What the packets of both kinds of boards have in common.
+struct Parts<'a> {
+    protocol: &'static str,
+    message: &'static str,
+    node: NodeId,
+    values: Values,
+    bytes: &'a [u8],
+}
+
+macro_rules! serialized {
+    ($($protocol:literal: $($packet:ident),+;)+) => {$($(
+        /// A map: `length`, `protocol`, `message`, `node`, the values, and `bytes`: the whole packet
+        /// in lower-case hex digits. The page `fields` describes each.
+        impl Serialize for $packet<'_> {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                Parts {
+                    protocol: $protocol,
+                    message: self.name(),
+                    node: self.id(),
+                    values: self.values(),
+                    bytes: self.as_bytes(),
+                }
+                .serialize(serializer)
+            }
+        }
+    )+)+};
+}
+
+serialized! {
+    "ikeya": Request, Response, Packet;
+    "ikeya-3": RequestOfThree, ResponseOfThree, PacketOfThree;
+}
+
+impl Serialize for Parts<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        // The number of fields depends on the packet.
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("length", &self.bytes.len())?;
+        map.serialize_entry("protocol", self.protocol)?;
+        map.serialize_entry("message", self.message)?;
+        map.serialize_entry("node", &self.node)?;
+        match &self.values {
+            Values::None => {}
+            Values::Command(speed, position) => {
+                map.serialize_entry("rps", &Speeds(speed))?;
+                positions(position, &mut map)?;
+                let payload = match self.bytes {
+                    [_, _, payload @ .., _, _] => payload,
+                    _ => &[],
+                };
+                map.serialize_entry("payload", &Hex(payload))?;
+            }
+            Values::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed))?,
+            Values::Positions(position) => positions(position, &mut map)?,
+        }
+        map.serialize_entry("bytes", &Hex(self.bytes))?;
+        map.end()
+    }
+}
+
+/// As on the wire, all counts precede all rotations.
+fn positions<M: SerializeMap>(positions: &Motors<Position>, map: &mut M) -> Result<(), M::Error> {
+    match positions {
+        Motors::One([position]) => {
+            map.serialize_entry("count", &position.count())?;
+            map.serialize_entry("rotation", &position.rotation())
+        }
+        Motors::Three(positions) => {
+            map.serialize_entry("count", &positions.map(Position::count))?;
+            map.serialize_entry("rotation", &positions.map(Position::rotation))
+        }
+    }
+}
+
+/// One speed or three.
+struct Speeds<'a>(&'a Motors<f32>);
+
+impl Serialize for Speeds<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            Motors::One([speed]) => Speed(*speed).serialize(serializer),
+            Motors::Three(speeds) => speeds.map(Speed).serialize(serializer),
+        }
+    }
+}
+
+/// Revolutions per second; JSON has no number for NaN and infinities, so they are strings.
+struct Speed(f32);
+
+impl Serialize for Speed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.0 {
+            rps if rps.is_nan() => serializer.serialize_str("nan"),
+            f32::INFINITY => serializer.serialize_str("inf"),
+            f32::NEG_INFINITY => serializer.serialize_str("-inf"),
+            rps => serializer.serialize_f32(rps),
+        }
+    }
+}
