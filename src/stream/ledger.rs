@@ -125,6 +125,27 @@ impl Counters {
     }
 }
 
+/// Adds the account of another part of a stream, such as a part of a capture
+/// ([`parts`](super::parts)).
+impl core::ops::AddAssign for Counters {
+    fn add_assign(&mut self, more: Self) {
+        let sums = [
+            (&mut self.received, more.received),
+            (&mut self.framed, more.framed),
+            (&mut self.frames, more.frames),
+            (&mut self.gaps, more.gaps),
+            (&mut self.header, more.header),
+            (&mut self.length, more.length),
+            (&mut self.id, more.id),
+            (&mut self.crc, more.crc),
+            (&mut self.idle, more.idle),
+        ];
+        for (sum, more) in sums {
+            *sum = sum.wrapping_add(more);
+        }
+    }
+}
+
 /// The only place where bytes are booked.
 ///
 /// Counts only what cannot be derived: a frame costs two additions, and a byte that starts no frame

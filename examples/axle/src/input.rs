@@ -21,6 +21,10 @@ pub(crate) struct Input {
     path: Option<PathBuf>,
     reader: Box<dyn Read>,
     chunk: Box<[u8]>,
+    /// Bytes at the front that were read ahead, to look at them first.
+    ahead: Vec<u8>,
+    /// Whether it is a file that is there as a whole.
+    is_file: bool,
     progress: Option<ProgressBar>,
 }
 
@@ -30,7 +34,8 @@ impl Input {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
-            return Ok(Self { path: None, reader, chunk, progress: None });
+            let (ahead, is_file) = (Vec::new(), false);
+            return Ok(Self { path: None, reader, chunk, ahead, is_file, progress: None });
         };
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
@@ -38,12 +43,50 @@ impl Input {
         if metadata.is_dir() {
             return Err(Failure::Directory { path: path.to_owned() });
         }
-        let progress = metadata.is_file().then(|| progress(metadata.len())).flatten();
-        Ok(Self { path: Some(path.to_owned()), reader: Box::new(file), chunk, progress })
+        let is_file = metadata.is_file();
+        let progress = is_file.then(|| progress(metadata.len())).flatten();
+        let (reader, path) = (Box::new(file), Some(path.to_owned()));
+        Ok(Self { path, reader, chunk, ahead: Vec::new(), is_file, progress })
+    }
+
+    /// Whether the input is a file that is there as a whole, not a stream.
+    pub(crate) const fn is_file(&self) -> bool {
+        self.is_file
+    }
+
+    /// Its path; `None` is standard input.
+    pub(crate) fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// Reads ahead: up to `len` bytes, fewer at the end of the input, or once there are enough of
+    /// them for `is_enough`. They come again with the next `read`.
+    pub(crate) fn peek(
+        &mut self,
+        len: usize,
+        is_enough: impl Fn(&[u8]) -> bool,
+    ) -> Result<&[u8], Failure> {
+        let mut ahead = core::mem::take(&mut self.ahead);
+        while ahead.len() < len && !is_enough(&ahead) {
+            let bytes = self.read()?;
+            if bytes.is_empty() {
+                break;
+            }
+            ahead.extend_from_slice(bytes);
+        }
+        self.ahead = ahead;
+        Ok(&self.ahead)
     }
 
     /// The next bytes; empty at the end.
     pub(crate) fn read(&mut self) -> Result<&[u8], Failure> {
+        if !self.ahead.is_empty() {
+            self.chunk = core::mem::take(&mut self.ahead).into_boxed_slice();
+            return Ok(&self.chunk);
+        }
+        if self.chunk.len() < CHUNK_LEN {
+            self.chunk = vec![0; CHUNK_LEN].into_boxed_slice();
+        }
         let read = loop {
             match self.reader.read(&mut self.chunk) {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -55,6 +98,23 @@ impl Input {
             progress.inc(read as u64);
         }
         Ok(self.chunk.get(..read).unwrap_or_default())
+    }
+}
+
+/// For readers of a format: the same bytes.
+impl Read for &mut Input {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let Input { ahead, reader, progress, .. } = &mut **self;
+        if !ahead.is_empty() {
+            let count = ahead.len().min(buffer.len());
+            buffer.iter_mut().zip(ahead.drain(..count)).for_each(|(slot, byte)| *slot = byte);
+            return Ok(count);
+        }
+        let count = reader.read(buffer)?;
+        if let Some(progress) = progress {
+            progress.inc(count as u64);
+        }
+        Ok(count)
     }
 }
 

@@ -13,6 +13,7 @@ mod flaky;
 mod human;
 mod input;
 mod line;
+mod listing;
 mod pcapng;
 mod record;
 mod rover;

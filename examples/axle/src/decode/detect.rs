@@ -1,0 +1,92 @@
+//! Which protocol a stream of bytes is.
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{Frames, Framing},
+    ucp,
+};
+
+use crate::args::Protocol;
+
+/// How many of some bytes belong to frames of a protocol.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) struct Share {
+    pub(super) protocol: Protocol,
+    pub(super) framed: u64,
+    pub(super) frames: u64,
+}
+
+/// The most bytes that are looked at.
+pub(super) const SAMPLE_LEN: usize = 64 * 1024;
+
+/// Frames that make a guess sure enough to begin with.
+const SURE_FRAMES: u64 = 3;
+
+/// The share of each protocol in `sample`, the largest first.
+pub(super) fn shares(sample: &[u8]) -> [Share; 3] {
+    let mut shares = [
+        share::<ucp::Ucp>(Protocol::Ucp, sample),
+        share::<ikeya::BothDirections>(Protocol::Ikeya, sample),
+        share::<three::BothDirections>(Protocol::Ikeya3, sample),
+    ];
+    // Stable: of equals, the first is the likelier.
+    shares.sort_by_key(|share| core::cmp::Reverse(share.framed));
+    shares
+}
+
+/// Whether more bytes would hardly change the result: several frames, in most of the bytes.
+pub(super) fn is_sure(shares: &[Share; 3], sample_len: usize) -> bool {
+    let [best, next, _] = shares;
+    best.frames >= SURE_FRAMES
+        && 2 * best.framed >= sample_len as u64
+        && best.framed > 2 * next.framed
+}
+
+fn share<F: Framing>(protocol: Protocol, sample: &[u8]) -> Share {
+    let mut frames = Frames::<F>::new(sample);
+    frames.each(|_| {});
+    let counters = frames.counters();
+    Share { protocol, framed: counters.framed, frames: counters.frames }
+}
+
+#[cfg(test)]
+mod tests {
+    use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse};
+
+    use super::*;
+
+    const UCP: &[u8] = include_bytes!("../../../captures/ucp.bin");
+    const IKEYA: &[u8] = include_bytes!("../../../captures/ikeya.bin");
+
+    #[test]
+    fn captures_are_recognised() {
+        for (bytes, protocol) in [(UCP, Protocol::Ucp), (IKEYA, Protocol::Ikeya)] {
+            let shares = shares(bytes);
+            assert_eq!(shares[0].protocol, protocol);
+            assert!(is_sure(&shares, bytes.len()), "{shares:?}");
+        }
+        let one = three::VelocityResponse::new(NodeId::N1, [Rps::ZERO; 3]);
+        let shares = shares(&one.as_bytes().repeat(4));
+        assert_eq!((shares[0].protocol, shares[0].framed), (Protocol::Ikeya3, 64));
+        assert_eq!(shares[1].framed, 0);
+    }
+
+    #[test]
+    fn requests_alone_do_not_tell_the_boards_apart() {
+        let reads = ReadRequest::new(NodeId::N1).as_bytes().repeat(10);
+        let found = shares(&reads);
+        assert_eq!((found[0].protocol, found[1].protocol), (Protocol::Ikeya, Protocol::Ikeya3));
+        assert!(!is_sure(&found, reads.len()));
+        let answer = VelocityResponse::new(NodeId::N1, Rps::ZERO);
+        let more = [reads, answer.as_bytes().repeat(12)].concat();
+        assert!(is_sure(&shares(&more), more.len()));
+    }
+
+    #[test]
+    fn noise_is_no_protocol() {
+        let noise: Vec<u8> = (0..2000_u32).map(|at| (at * at % 251) as u8).collect();
+        let shares = shares(&noise);
+        assert_eq!(shares[0].framed, 0);
+        assert!(!is_sure(&shares, noise.len()) && !is_sure(&super::shares(&[]), 0));
+    }
+}

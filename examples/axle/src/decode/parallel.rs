@@ -1,0 +1,251 @@
+//! Decoding a file with several threads; the output is the same byte for byte.
+//!
+//! The file is read in parts that end where decoding can begin anew
+//! ([`split_point`](stream::split_point)). Each worker lists one part at a time, and the lines are
+//! written in the order of the parts. What a part has to know of those before it, the modes of the
+//! nodes, a worker finds in a quick first pass and hands on before it writes a line.
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Mutex,
+        mpsc::{self, Receiver, Sender, SyncSender},
+    },
+    thread,
+};
+
+use axlewire::stream::{self, Counters, Frames, Framing};
+
+use super::stream::{Sheet, Stream, StreamOf};
+use crate::{
+    failure::Failure,
+    input::Input,
+    listing::{Modes, Shown, Style},
+};
+
+/// Bytes of all parts of which only the account is needed.
+const ACCOUNTED: usize = 2 * 1024 * 1024;
+
+/// Bytes of all parts of which lines are written: the lines are up to 25 times as long.
+const LISTED: usize = 256 * 1024;
+
+/// A stretch without a place to split becomes a part of at most this length; then the rest of the
+/// file is decoded by one thread.
+const LONGEST_PART: usize = 4 * 1024 * 1024;
+
+/// A part of the file.
+struct Part {
+    number: usize,
+    offset: u64,
+    bytes: Vec<u8>,
+    /// The modes before this part, and where to send those after it.
+    modes: Receiver<Modes>,
+    next: SyncSender<Modes>,
+}
+
+/// Lines and account of a part.
+struct Listed {
+    number: usize,
+    lines: Vec<u8>,
+    account: Counters,
+    /// Its bytes, for the next part.
+    buffer: Vec<u8>,
+}
+
+/// What one thread has to go on with: bytes for which there was no place to split, and what is
+/// known before them.
+pub(super) struct Rest {
+    pub(super) offset: u64,
+    pub(super) bytes: Vec<u8>,
+    pub(super) modes: Modes,
+    pub(super) account: Counters,
+    /// The input's failure, which comes behind all this.
+    pub(super) failure: Option<Failure>,
+}
+
+/// Lists the input with `jobs` threads, and passes the lines of each part to `write`. Returns what
+/// is left for one thread: at least the bytes behind the last place to split.
+pub(super) fn list<F>(
+    input: &mut Input,
+    style: Option<Style>,
+    jobs: usize,
+    mut write: impl FnMut(&[u8]) -> Result<(), Failure>,
+) -> Result<Rest, Failure>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let all = if style.is_none() { ACCOUNTED } else { LISTED };
+    let part_len = (all / jobs).clamp(16 * 1024, 512 * 1024);
+    let (parts, queue) = mpsc::channel::<Part>();
+    let (done, results) = mpsc::channel();
+    let queue = Mutex::new(queue);
+    thread::scope(|scope| {
+        for _ in 0..jobs {
+            let (queue, done) = (&queue, done.clone());
+            scope.spawn(move || work::<F>(queue, &done, style));
+        }
+        drop(done);
+        let (first, modes) = mpsc::sync_channel(1);
+        // The channel has room.
+        let _ = first.send(Modes::default());
+        let mut reading =
+            Reading { input, rest: Vec::new(), offset: 0, is_over: false, failure: None, modes };
+        let mut writing = Writing::default();
+        let (mut sent, mut written) = (0, 0);
+        loop {
+            // One part more than there are threads, so that none waits for the reading.
+            while sent <= written + jobs && !reading.is_over {
+                let buffer = writing.spare.pop().unwrap_or_default();
+                match reading.next_part::<F>(part_len, buffer, sent) {
+                    Ok(Some(part)) => {
+                        sent += 1;
+                        // The workers live as long as this end of the queue.
+                        let _ = parts.send(part);
+                    }
+                    Ok(None) => {}
+                    Err(failure) => {
+                        reading.is_over = true;
+                        reading.failure = Some(failure);
+                    }
+                }
+            }
+            if written == sent {
+                break;
+            }
+            // The workers live as long as the queue.
+            let Ok(listed) = results.recv() else { break };
+            writing.waiting.insert(listed.number, listed);
+            while let Some(listed) = writing.waiting.remove(&written) {
+                written += 1;
+                writing.account += listed.account;
+                if let Err(failure) = write(&listed.lines) {
+                    // The reader of the output has gone: nothing else matters.
+                    drop(parts);
+                    return Err(failure);
+                }
+                writing.spare.push(listed.buffer);
+            }
+        }
+        drop(parts);
+        let modes = reading.modes.recv().unwrap_or_default();
+        Ok(Rest {
+            offset: reading.offset,
+            bytes: reading.rest,
+            modes,
+            account: writing.account,
+            failure: reading.failure,
+        })
+    })
+}
+
+/// What has been listed.
+#[derive(Default)]
+struct Writing {
+    /// Parts that were done before one in front of them.
+    waiting: BTreeMap<usize, Listed>,
+    account: Counters,
+    spare: Vec<Vec<u8>>,
+}
+
+/// The input, cut into parts.
+struct Reading<'a> {
+    input: &'a mut Input,
+    /// Bytes read behind the last part.
+    rest: Vec<u8>,
+    /// Their offset.
+    offset: u64,
+    is_over: bool,
+    failure: Option<Failure>,
+    /// The modes after the last part.
+    modes: Receiver<Modes>,
+}
+
+impl Reading<'_> {
+    /// The next part; `None` when the input has ended, or has no place to split for too long.
+    fn next_part<F: Framing>(
+        &mut self,
+        part_len: usize,
+        buffer: Vec<u8>,
+        number: usize,
+    ) -> Result<Option<Part>, Failure> {
+        let mut len = part_len;
+        let end = loop {
+            while self.rest.len() < len + F::MAX_LEN && !self.is_over {
+                let bytes = self.input.read()?;
+                self.is_over = bytes.is_empty();
+                self.rest.extend_from_slice(bytes);
+            }
+            let from = len.saturating_sub(part_len / 2);
+            match stream::split_point::<F>(&self.rest, from) {
+                Some(end) => break end,
+                None if self.is_over => return Ok(None),
+                None if self.rest.len() >= LONGEST_PART => {
+                    self.is_over = true;
+                    return Ok(None);
+                }
+                None => len = self.rest.len(),
+            }
+        };
+        let mut bytes = buffer;
+        bytes.clear();
+        bytes.extend_from_slice(self.rest.get(end..).unwrap_or_default());
+        self.rest.truncate(end);
+        core::mem::swap(&mut bytes, &mut self.rest);
+        let (next, modes) = mpsc::sync_channel(1);
+        let modes = core::mem::replace(&mut self.modes, modes);
+        let offset = self.offset;
+        self.offset += end as u64;
+        Ok(Some(Part { number, offset, bytes, modes, next }))
+    }
+}
+
+/// Lists parts until there are no more.
+fn work<F>(queue: &Mutex<Receiver<Part>>, done: &Sender<Listed>, style: Option<Style>)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    loop {
+        let next = match queue.lock() {
+            Ok(queue) => queue.recv(),
+            Err(_) => return,
+        };
+        let Ok(part) = next else { return };
+        let listed = match style {
+            None => account::<F>(part),
+            Some(_) => lines::<F>(part, style),
+        };
+        if done.send(listed).is_err() {
+            return;
+        }
+    }
+}
+
+fn account<F: Framing>(part: Part) -> Listed {
+    let mut frames = Frames::<F>::new(&part.bytes);
+    frames.each(|_| {});
+    let account = frames.counters();
+    // Nobody asks for the modes, but the next part waits for them.
+    let _ = part.next.send(Modes::default());
+    Listed { number: part.number, lines: Vec::new(), account, buffer: part.bytes }
+}
+
+fn lines<F>(part: Part, style: Option<Style>) -> Listed
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let mut learned = Modes::default();
+    Frames::<F>::new(&part.bytes).each(|frame| frame.teach(&mut learned));
+    let mut sheet = Sheet::new(style);
+    sheet.modes = part.modes.recv().unwrap_or_default();
+    let mut after = sheet.modes;
+    after.update(&learned);
+    // The next part, or the reading thread, waits for them.
+    let _ = part.next.send(after);
+    let mut stream = StreamOf::<F>::new(part.offset);
+    stream.feed(&part.bytes, None, &mut sheet);
+    let account = stream.counters();
+    Listed { number: part.number, lines: sheet.out.0, account, buffer: part.bytes }
+}

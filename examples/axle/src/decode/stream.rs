@@ -1,0 +1,175 @@
+//! The events of one stream of bytes, as lines.
+
+use std::collections::VecDeque;
+
+use axlewire::stream::{Counters, Decoder, Event, Framing};
+
+use crate::{
+    listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style},
+    pcapng::Direction,
+};
+
+/// Length of the longest frame of any protocol.
+pub(crate) const BUFFER_LEN: usize = axlewire::ucp::MAX_LEN;
+
+/// The lines of a listing, and what they need to know of the lines before.
+#[derive(Debug)]
+pub(super) struct Sheet {
+    /// `None` if only the account matters.
+    style: Option<Style>,
+    pub(super) out: Out,
+    clock: LineClock,
+    pub(super) modes: Modes,
+}
+
+impl Sheet {
+    pub(super) fn new(style: Option<Style>) -> Self {
+        Self { style, out: Out::default(), clock: LineClock::default(), modes: Modes::default() }
+    }
+}
+
+/// The bytes of one interface in one direction.
+pub(super) trait Stream {
+    /// Lists the events in `bytes`, all of which had been received at this time.
+    fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet);
+
+    /// Lists what is left: nothing will follow.
+    fn finish(&mut self, sheet: &mut Sheet);
+
+    fn counters(&self) -> Counters;
+}
+
+/// A stream of frames that this framing finds.
+pub(super) struct StreamOf<F> {
+    decoder: Decoder<F, BUFFER_LEN>,
+    /// Place of the next event; only its offset changes.
+    place: Place,
+    /// The last gap, held back: at the end of the input a second gap may follow directly, and the
+    /// two are printed as one.
+    gap: Option<(Place, SkippedBytes)>,
+    /// The account at the end of the gap before.
+    booked: Counters,
+    /// End and time of the chunks that the next events may end in.
+    chunks: VecDeque<(u64, u64)>,
+}
+
+impl<F> StreamOf<F>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    /// A stream whose first byte has this offset.
+    pub(super) fn new(offset: u64) -> Self {
+        let place = Place { offset, ..Place::default() };
+        let decoder = Decoder::new();
+        let booked = Counters::default();
+        Self { decoder, place, gap: None, booked, chunks: VecDeque::new() }
+    }
+
+    /// The bytes of this interface of a capture with times.
+    pub(super) fn of_interface(interface: usize, direction: Option<Direction>) -> Self {
+        let mut stream = Self::new(0);
+        (stream.place.interface, stream.place.direction) = (Some(interface), direction);
+        stream
+    }
+
+    fn drain(&mut self, bytes: &mut &[u8], sheet: &mut Sheet) {
+        while let Some(event) = self.decoder.decode(bytes) {
+            match event {
+                Event::Skipped(gap) => {
+                    let at = place_of(&mut self.place, &mut self.chunks, gap.len);
+                    let account = self.decoder.counters();
+                    let skipped = SkippedBytes {
+                        length: gap.len,
+                        reason: gap.reason,
+                        account: skipped_since(&self.booked, &account),
+                    };
+                    self.booked = account;
+                    match &mut self.gap {
+                        Some((held_at, held)) => {
+                            held_at.micros = at.micros;
+                            held.length += skipped.length;
+                            held.account += skipped.account;
+                        }
+                        None => self.gap = Some((at, skipped)),
+                    }
+                }
+                Event::Frame(frame) => {
+                    if let Some((at, gap)) = self.gap.take() {
+                        list_gap(sheet, at, &gap);
+                    }
+                    let length = frame.bytes().len() as u64;
+                    let at = place_of(&mut self.place, &mut self.chunks, length);
+                    if let Some(style) = sheet.style {
+                        style.frame(&mut sheet.out, &mut sheet.clock, at, &frame, &sheet.modes);
+                        frame.teach(&mut sheet.modes);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl<F> Stream for StreamOf<F>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet) {
+        if let Some(micros) = micros {
+            let end = self.decoder.received() + bytes.len() as u64;
+            self.chunks.push_back((end, micros));
+        }
+        self.drain(&mut &*bytes, sheet);
+    }
+
+    fn finish(&mut self, sheet: &mut Sheet) {
+        // Each call rejects a truncated frame and continues the search inside it, so that a frame
+        // behind a false header is still found (ruling B3).
+        loop {
+            self.decoder.idle();
+            self.drain(&mut &[][..], sheet);
+            if self.decoder.pending() == 0 {
+                break;
+            }
+        }
+        if let Some((at, gap)) = self.gap.take() {
+            list_gap(sheet, at, &gap);
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        self.decoder.counters()
+    }
+}
+
+fn list_gap(sheet: &mut Sheet, at: Place, gap: &SkippedBytes) {
+    if let Some(style) = sheet.style {
+        style.gap(&mut sheet.out, &mut sheet.clock, at, gap);
+    }
+}
+
+/// The place of the next event, with the time of its last byte; moves on behind it.
+fn place_of(next: &mut Place, chunks: &mut VecDeque<(u64, u64)>, length: u64) -> Place {
+    let mut place = *next;
+    next.offset += length;
+    while let Some(&(end, micros)) = chunks.front() {
+        if next.offset <= end {
+            place.micros = Some(micros);
+            break;
+        }
+        chunks.pop_front();
+    }
+    place
+}
+
+/// The account of the bytes skipped in between.
+fn skipped_since(before: &Counters, now: &Counters) -> Counters {
+    let mut since = Counters::default();
+    since.header = now.header - before.header;
+    since.length = now.length - before.length;
+    since.id = now.id - before.id;
+    since.crc = now.crc - before.crc;
+    since.idle = now.idle - before.idle;
+    since
+}

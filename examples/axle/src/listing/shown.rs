@@ -1,0 +1,153 @@
+//! What the frames of all protocols have in common when they are printed.
+
+use std::fmt::Write;
+
+use axlewire::{
+    ikeya::{self, Mode, NodeId, three},
+    ucp,
+};
+use serde::Serialize;
+
+use super::Out;
+
+/// The modes of the nodes of a bus, as far as their answers have told them: the bytes of a WRITE do
+/// not say whether they are a speed or a position (ruling I3).
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Modes([Option<Mode>; NodeId::ALL.len()]);
+
+impl Modes {
+    pub(crate) fn of(&self, node: NodeId) -> Option<Mode> {
+        self.0.get(usize::from(node.get()) - 1).copied().flatten()
+    }
+
+    fn learn(&mut self, node: NodeId, mode: Mode) {
+        if let Some(known) = self.0.get_mut(usize::from(node.get()) - 1) {
+            *known = Some(mode);
+        }
+    }
+
+    /// Takes over what is known later.
+    pub(crate) fn update(&mut self, later: &Self) {
+        for (known, later) in self.0.iter_mut().zip(later.0) {
+            *known = later.or(*known);
+        }
+    }
+}
+
+/// A frame of any protocol.
+pub(crate) trait Shown: Serialize + Copy {
+    fn name(&self) -> &'static str;
+
+    fn bytes(&self) -> &[u8];
+
+    /// The node, or the index of the sender.
+    fn number(&self) -> u8;
+
+    /// Contents as text, with units.
+    fn contents(&self, out: &mut Out, modes: &Modes);
+
+    /// The mode of the node that this frame commands, where its bytes do not tell it.
+    fn unsaid_mode(&self, _modes: &Modes) -> Option<Mode> {
+        None
+    }
+
+    /// Learns the mode of the node that answers.
+    fn teach(&self, _modes: &mut Modes) {}
+}
+
+impl Shown for &ucp::Frame {
+    fn name(&self) -> &'static str {
+        self.message().name()
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.as_bytes()
+    }
+
+    fn number(&self) -> u8 {
+        self.index()
+    }
+
+    fn contents(&self, out: &mut Out, _: &Modes) {
+        // The output never fails.
+        let _ = write!(out, "{}", self.message().contents());
+    }
+}
+
+/// Packets of one kind of board: those of a direction, and of both.
+macro_rules! shown {
+    ($of:path) => {
+        const _: () = {
+            use $of as of;
+
+            fn teach(response: &of::Response<'_>, modes: &mut Modes) {
+                let mode = match response {
+                    of::Response::Velocity(_) => Mode::Velocity,
+                    of::Response::Position(_) => Mode::Position,
+                };
+                modes.learn(response.id(), mode);
+            }
+
+            fn unsaid_mode(request: &of::Request<'_>, modes: &Modes) -> Option<Mode> {
+                match request {
+                    of::Request::Read(_) => None,
+                    of::Request::Write(write) => modes.of(write.id()),
+                }
+            }
+
+            impl Shown for of::Request<'_> {
+                shown!(@ common);
+
+                fn unsaid_mode(&self, modes: &Modes) -> Option<Mode> {
+                    unsaid_mode(self, modes)
+                }
+            }
+
+            impl Shown for of::Response<'_> {
+                shown!(@ common);
+
+                fn teach(&self, modes: &mut Modes) {
+                    teach(self, modes);
+                }
+            }
+
+            impl Shown for of::Packet<'_> {
+                shown!(@ common);
+
+                fn unsaid_mode(&self, modes: &Modes) -> Option<Mode> {
+                    match self {
+                        Self::Request(request) => unsaid_mode(request, modes),
+                        Self::Response(_) => None,
+                    }
+                }
+
+                fn teach(&self, modes: &mut Modes) {
+                    if let Self::Response(response) = self {
+                        teach(response, modes);
+                    }
+                }
+            }
+        };
+    };
+    (@ common) => {
+        fn name(&self) -> &'static str {
+            self.name()
+        }
+
+        fn bytes(&self) -> &[u8] {
+            self.as_bytes()
+        }
+
+        fn number(&self) -> u8 {
+            self.id().get()
+        }
+
+        fn contents(&self, out: &mut Out, modes: &Modes) {
+            // The output never fails.
+            let _ = write!(out, "{}", self.contents().in_mode(modes.of(self.id())));
+        }
+    };
+}
+
+shown!(ikeya);
+shown!(three);
