@@ -1,13 +1,13 @@
 //! `axle decode`: reads a byte stream, prints one line per frame and per gap.
 
 use std::{
-    io::{self, BufWriter, Write},
+    io::{self, Write},
     path::PathBuf,
 };
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{Decoder, Event, Framing, Gap},
+    stream::{Counters, Decoder, Event, Framing, Gap},
     ucp,
 };
 use clap::ValueEnum;
@@ -16,9 +16,9 @@ use crate::{
     EXIT_CODES,
     args::Protocol,
     failure::Failure,
-    human,
+    frame::Frame,
     input::{self, Input},
-    record::{Frame, Record, Summary},
+    listing::{Reasons, Skipped, Summary, json, text},
 };
 
 /// List the frames of a captured byte stream, and the gaps between them
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let input = Input::open(args.file.as_deref())?;
     let style = match args.json {
         true => Style::Json,
-        false => Style::Human(human::Listing::new(args.protocol.number())),
+        false => Style::Text { number: args.protocol.number(), titled: false },
     };
     decode(input, Listing::new(style))
 }
@@ -82,7 +82,7 @@ pub(crate) const BUFFER_LEN: usize = ucp::MAX_LEN;
 fn decode<F>(mut input: Input, mut listing: Listing) -> Result<(), Failure>
 where
     F: Framing,
-    for<'a> F::Frame<'a>: Into<Frame<'a>>,
+    for<'a> F::Frame<'a>: Frame,
 {
     let mut decoder = Decoder::<F, BUFFER_LEN>::new();
     let broken = loop {
@@ -118,24 +118,37 @@ where
 /// Output style.
 enum Style {
     Json,
-    Human(human::Listing),
+    /// Columns; `number` is the title of that of node or index.
+    Text {
+        number: &'static str,
+        titled: bool,
+    },
 }
+
+/// Bytes of output that are collected before they are written.
+const OUTPUT_LEN: usize = 64 * 1024;
 
 /// Prints each event with its offset.
 struct Listing {
-    out: BufWriter<io::StdoutLock<'static>>,
+    out: io::StdoutLock<'static>,
+    /// Lines that are not yet written.
+    lines: Vec<u8>,
     style: Style,
     /// Offset of the next event, or of the held gap.
     offset: u64,
     /// The last gap, held back: at the end of the input a second gap may follow directly, and the
     /// two are printed as one.
     gap: Option<Gap>,
+    /// Counters at the end of the last gap, and of the printed gap before it.
+    counted: Counters,
+    printed: Counters,
 }
 
 impl Listing {
     fn new(style: Style) -> Self {
-        let out = BufWriter::with_capacity(64 * 1024, io::stdout().lock());
-        Self { out, style, offset: 0, gap: None }
+        let lines = Vec::with_capacity(OUTPUT_LEN + 4096);
+        let (counted, printed) = (Counters::default(), Counters::default());
+        Self { out: io::stdout().lock(), lines, style, offset: 0, gap: None, counted, printed }
     }
 
     /// Prints all events in `bytes`.
@@ -146,49 +159,87 @@ impl Listing {
     ) -> io::Result<()>
     where
         F: Framing,
-        for<'a> F::Frame<'a>: Into<Frame<'a>>,
+        for<'a> F::Frame<'a>: Frame,
     {
-        while let Some(event) = decoder.decode(bytes) {
-            match event {
-                Event::Skipped(gap) => match &mut self.gap {
-                    Some(held) => held.len += gap.len,
-                    None => self.gap = Some(gap),
-                },
-                Event::Frame(frame) => {
+        loop {
+            let gap = match decoder.decode(bytes) {
+                None => return Ok(()),
+                Some(Event::Frame(frame)) => {
                     self.end_gap()?;
-                    let (frame, offset) = (frame.into(), self.offset);
-                    self.offset += frame.length() as u64;
-                    self.print(&Record::Frame { offset, frame })?;
+                    self.frame(&frame)?;
+                    continue;
                 }
+                Some(Event::Skipped(gap)) => gap,
+            };
+            match &mut self.gap {
+                Some(held) => held.len += gap.len,
+                None => self.gap = Some(gap),
             }
+            // No later gap is counted before this one is reported.
+            self.counted = decoder.counters();
         }
-        Ok(())
+    }
+
+    fn frame(&mut self, frame: &impl Frame) -> io::Result<()> {
+        self.titles()?;
+        match self.style {
+            Style::Json => json::frame(&mut self.lines, self.offset, frame)?,
+            Style::Text { .. } => text::frame(&mut self.lines, self.offset, frame)?,
+        }
+        self.offset += frame.bytes().len() as u64;
+        self.write_full()
     }
 
     fn end_gap(&mut self) -> io::Result<()> {
         let Some(Gap { len: length, reason }) = self.gap.take() else { return Ok(()) };
-        let offset = self.offset;
+        let reasons = Reasons::between(&self.printed, &self.counted);
+        self.printed = self.counted;
+        let gap = Skipped { offset: self.offset, length, reason, reasons };
         self.offset += length;
-        self.print(&Record::Skipped { offset, length, reason })
+        self.titles()?;
+        match self.style {
+            Style::Json => json::gap(&mut self.lines, &gap)?,
+            Style::Text { .. } => text::gap(&mut self.lines, &gap)?,
+        }
+        self.write_full()
+    }
+
+    /// Prints the titles before the first event.
+    fn titles(&mut self) -> io::Result<()> {
+        match &mut self.style {
+            Style::Text { number, titled: titled @ false } => {
+                *titled = true;
+                text::titles(&mut self.lines, number)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn finish(&mut self, summary: Summary) -> io::Result<()> {
         self.end_gap()?;
-        self.print(&Record::Summary(summary))?;
+        match self.style {
+            Style::Json => json::summary(&mut self.lines, &summary)?,
+            Style::Text { titled, .. } => text::summary(&mut self.lines, &summary, titled)?,
+        }
         self.flush()
     }
 
-    fn print(&mut self, record: &Record<'_>) -> io::Result<()> {
-        match &mut self.style {
-            Style::Json => {
-                serde_json::to_writer(&mut self.out, record)?;
-                self.out.write_all(b"\n")
-            }
-            Style::Human(listing) => listing.print(&mut self.out, record),
+    /// Writes the lines if there are enough.
+    fn write_full(&mut self) -> io::Result<()> {
+        if self.lines.len() < OUTPUT_LEN {
+            return Ok(());
         }
+        self.write()
+    }
+
+    fn write(&mut self) -> io::Result<()> {
+        let written = self.out.write_all(&self.lines);
+        self.lines.clear();
+        written
     }
 
     fn flush(&mut self) -> io::Result<()> {
+        self.write()?;
         self.out.flush()
     }
 }

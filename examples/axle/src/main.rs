@@ -10,10 +10,10 @@ mod drive;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
-mod human;
+mod frame;
 mod input;
+mod listing;
 mod port;
-mod record;
 mod rover;
 mod scan;
 mod signals;

@@ -7,7 +7,7 @@ use std::{
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{Counters, Decoder, Event, Framing, Reason},
+    stream::{Counters, Decoder, Event, Framing},
     time::{Duration, Instant},
     ucp,
 };
@@ -17,9 +17,9 @@ use crate::{
     args::{self, Protocol},
     decode::BUFFER_LEN,
     failure::Failure,
-    human,
+    frame::Frame,
+    listing::{REASONS, Summary, text},
     port::{Port, Transport},
-    record::{Frame, Summary},
     signals::Signals,
 };
 
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn watch<F>(args: &Args, baud: u32, signals: &Signals) -> Result<(), Failure>
 where
     F: Framing,
-    for<'a> F::Frame<'a>: Into<Frame<'a>>,
+    for<'a> F::Frame<'a>: Frame,
 {
     let mut port = Port::open(&args.line, baud)?;
     let mut out = io::stdout().lock();
@@ -135,19 +135,14 @@ impl Table {
     fn take<F>(&mut self, decoder: &mut Decoder<F, BUFFER_LEN>, mut bytes: &[u8])
     where
         F: Framing,
-        for<'a> F::Frame<'a>: Into<Frame<'a>>,
+        for<'a> F::Frame<'a>: Frame,
     {
         while let Some(event) = decoder.decode(&mut bytes) {
             // Gaps are already in the counters.
             let Event::Frame(frame) = event else { continue };
-            let frame = frame.into();
-            let key = match &frame {
-                Frame::Ikeya(frame) => (frame.node.get(), frame.message),
-                Frame::Ucp(frame) => (frame.id, frame.message),
-            };
-            let row = self.rows.entry(key).or_default();
+            let row = self.rows.entry((frame.key(), frame.name())).or_default();
             row.count += 1;
-            row.last = human::contents(&frame);
+            row.last = frame.contents().to_string();
         }
     }
 
@@ -238,7 +233,7 @@ impl Table {
         if counters.received == 0 {
             writeln!(out, "Nothing was heard in {seconds:.0} s.")?;
         } else {
-            human::print_summary(out, &Summary::new(counters, pending), !self.rows.is_empty())?;
+            text::summary(out, &Summary::new(counters, pending), !self.rows.is_empty())?;
         }
         out.flush()
     }
@@ -248,8 +243,7 @@ impl Table {
 fn account(counters: &Counters) -> String {
     let mut text = format!("{} bytes, {} frames", counters.received, counters.frames);
     text.push_str(&format!(", {} skipped", counters.skipped()));
-    let reasons = [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
-    for reason in reasons.into_iter().filter(|reason| counters.skipped_for(*reason) > 0) {
+    for reason in REASONS.into_iter().filter(|reason| counters.skipped_for(*reason) > 0) {
         text.push_str(&format!(" {reason} {}", counters.skipped_for(reason)));
     }
     text
