@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
+    board::{OneMotor, Status, ThreeMotors},
     contents::{Motors, Values},
     framing::{Packet, Request, Response},
     three::{Packet as PacketOfThree, Request as RequestOfThree, Response as ResponseOfThree},
@@ -51,22 +52,56 @@ impl Serialize for Parts<'_> {
         map.serialize_entry("protocol", self.protocol)?;
         map.serialize_entry("message", self.message)?;
         map.serialize_entry("node", &self.node)?;
-        match &self.values {
-            Values::None => {}
-            Values::Command(speed, position) => {
-                map.serialize_entry("rps", &Speeds(speed))?;
-                positions(position, &mut map)?;
-                let payload = match self.bytes {
-                    [_, _, payload @ .., _, _] => payload,
-                    _ => &[],
-                };
-                map.serialize_entry("payload", &Hex(payload))?;
-            }
-            Values::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed))?,
-            Values::Positions(position) => positions(position, &mut map)?,
+        fields(&self.values, &mut map)?;
+        if let (Values::Command(..), [_, _, payload @ .., _, _]) = (&self.values, self.bytes) {
+            map.serialize_entry("payload", &Hex(payload))?;
         }
         map.serialize_entry("bytes", &Hex(self.bytes))?;
         map.end()
+    }
+}
+
+/// A map: `rps`, or `count` and `rotation`, as in the JSON of a response.
+impl Serialize for Status<OneMotor> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        status(
+            match *self {
+                Self::Velocity(speed) => Values::Speeds(speed.into()),
+                Self::Position(position) => Values::Positions(position.into()),
+            },
+            serializer,
+        )
+    }
+}
+
+/// The same with three values each.
+impl Serialize for Status<ThreeMotors> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        status(
+            match *self {
+                Self::Velocity(speeds) => Values::Speeds(speeds.into()),
+                Self::Position(positions) => Values::Positions(positions.into()),
+            },
+            serializer,
+        )
+    }
+}
+
+fn status<S: Serializer>(values: Values, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(None)?;
+    fields(&values, &mut map)?;
+    map.end()
+}
+
+fn fields<M: SerializeMap>(values: &Values, map: &mut M) -> Result<(), M::Error> {
+    match values {
+        Values::None => Ok(()),
+        Values::Command(speed, position) => {
+            map.serialize_entry("rps", &Speeds(speed))?;
+            positions(position, map)
+        }
+        Values::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed)),
+        Values::Positions(position) => positions(position, map),
     }
 }
 

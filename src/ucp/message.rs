@@ -14,7 +14,6 @@ pub use super::{
         SetNetworkState, SetNetworkStateWide,
     },
     codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
-    contents::Contents,
     motor::RawMotorControl,
     report::{DocumentReport, FirmwareReport, Report},
     update::{OtaRequest, RawOtaRequest},

@@ -142,6 +142,7 @@ mod role;
 mod serialize;
 mod update;
 
+pub use contents::Contents;
 pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};
 pub use framing::{Decoder, Ucp};
 pub use header::{BAUD, Header, MAX_BODY_LEN, MAX_LEN, MessageId, SYNC};

@@ -10,12 +10,10 @@ mod drive;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
-mod human;
 mod input;
 mod line;
 mod listing;
 mod pcapng;
-mod record;
 mod rover;
 mod scan;
 mod session;

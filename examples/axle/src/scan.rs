@@ -13,7 +13,6 @@ use crate::{
     EXIT_CODES,
     bus::{self, Boards, Bus},
     failure::Failure,
-    record::ikeya::{Fields, Motors, Positions, Rps},
     signals::Signals,
 };
 
@@ -42,7 +41,7 @@ enum Record {
         node: NodeId,
         mode: Mode,
         #[serde(flatten)]
-        status: Fields<'static>,
+        status: Status,
         dip: Dip,
     },
     /// An id that gave only damaged answers.
@@ -87,11 +86,8 @@ fn damaged(bus: &Bus) -> Vec<NodeId> {
 
 fn print_json(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
     let nodes = bus.nodes().map(|(node, mode, status)| {
-        let status = match status {
-            Status::Velocity(rps) => Fields::Velocity { rps: Motors::One(Rps(rps)) },
-            Status::Position(position) => Fields::Position(Positions(Motors::One(position))),
-        };
-        Record::Node { node, mode, status, dip: Dip::of(node, mode) }
+        let dip = Dip::of(node, mode);
+        Record::Node { node, mode, status, dip }
     });
     let damaged = damaged(bus);
     let summary = Record::Summary { nodes: bus.nodes().count(), damaged: damaged.len() };

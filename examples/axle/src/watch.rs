@@ -9,7 +9,7 @@ use std::{
 use axlewire::{
     drive::Clock,
     ikeya::{self, three},
-    stream::{Counters, Decoder, Event, Framing, Reason},
+    stream::{Counters, Decoder, Event, Framing},
     time::{Duration, Instant},
     ucp,
 };
@@ -19,9 +19,8 @@ use crate::{
     args::{self, Protocol},
     decode::BUFFER_LEN,
     failure::Failure,
-    human,
     line::Line,
-    record::{Frame, Summary},
+    listing::{self, Modes, Out, REASONS, Shown},
     signals::Signals,
 };
 
@@ -70,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn watch<F>(args: &Args, baud: u32, signals: &Signals) -> Result<(), Failure>
 where
     F: Framing,
-    for<'a> F::Frame<'a>: Into<Frame<'a>>,
+    for<'a> F::Frame<'a>: Shown,
 {
     let mut line = Line::open(&args.line, baud)?;
     let mut clock = line.clock();
@@ -120,6 +119,7 @@ struct Table {
     rows: BTreeMap<(u8, &'static str), Row>,
     start: Instant,
     measured_at: Instant,
+    modes: Modes,
     /// Number of lines on the screen that the next table replaces.
     drawn: usize,
 }
@@ -136,26 +136,31 @@ struct Row {
 
 impl Table {
     fn new(protocol: Protocol, now: Instant) -> Self {
-        Self { protocol, rows: BTreeMap::new(), start: now, measured_at: now, drawn: 0 }
+        Self {
+            protocol,
+            rows: BTreeMap::new(),
+            start: now,
+            measured_at: now,
+            modes: Modes::default(),
+            drawn: 0,
+        }
     }
 
     /// Counts the frames in `bytes`.
     fn take<F>(&mut self, decoder: &mut Decoder<F, BUFFER_LEN>, mut bytes: &[u8])
     where
         F: Framing,
-        for<'a> F::Frame<'a>: Into<Frame<'a>>,
+        for<'a> F::Frame<'a>: Shown,
     {
         while let Some(event) = decoder.decode(&mut bytes) {
             // Gaps are already in the counters.
             let Event::Frame(frame) = event else { continue };
-            let frame = frame.into();
-            let key = match &frame {
-                Frame::Ikeya(frame) => (frame.node.get(), frame.message),
-                Frame::Ucp(frame) => (frame.id, frame.message),
-            };
-            let row = self.rows.entry(key).or_default();
+            frame.teach(&mut self.modes);
+            let mut contents = Out::default();
+            frame.contents(&mut contents, &self.modes);
+            let row = self.rows.entry((frame.key(), frame.name())).or_default();
             row.count += 1;
-            row.last = human::contents(&frame);
+            row.last = String::from_utf8(contents.0).unwrap_or_default();
         }
     }
 
@@ -246,7 +251,7 @@ impl Table {
         if counters.received == 0 {
             writeln!(out, "Nothing was heard in {seconds:.0} s.")?;
         } else {
-            human::print_summary(out, &Summary::new(counters, pending), !self.rows.is_empty())?;
+            listing::print_summary(out, counters, pending, !self.rows.is_empty())?;
         }
         out.flush()
     }
@@ -256,8 +261,7 @@ impl Table {
 fn account(counters: &Counters) -> String {
     let mut text = format!("{} bytes, {} frames", counters.received, counters.frames);
     text.push_str(&format!(", {} skipped", counters.skipped()));
-    let reasons = [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
-    for reason in reasons.into_iter().filter(|reason| counters.skipped_for(*reason) > 0) {
+    for reason in REASONS.into_iter().filter(|reason| counters.skipped_for(*reason) > 0) {
         text.push_str(&format!(" {reason} {}", counters.skipped_for(reason)));
     }
     text

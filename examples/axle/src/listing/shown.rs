@@ -43,6 +43,11 @@ pub(crate) trait Shown: Serialize + Copy {
     /// The node, or the index of the sender.
     fn number(&self) -> u8;
 
+    /// The number that, with the name, identifies messages of one kind: node or id.
+    fn key(&self) -> u8 {
+        self.number()
+    }
+
     /// Contents as text, with units.
     fn contents(&self, out: &mut Out, modes: &Modes);
 
@@ -66,6 +71,10 @@ impl Shown for &ucp::Frame {
 
     fn number(&self) -> u8 {
         self.index()
+    }
+
+    fn key(&self) -> u8 {
+        self.id()
     }
 
     fn contents(&self, out: &mut Out, _: &Modes) {
