@@ -6,12 +6,13 @@ use clap::ValueEnum;
 /// The port of a subcommand.
 #[derive(Debug, clap::Args)]
 pub(crate) struct PortArgs {
-    /// The serial port, such as /dev/ttyUSB0
-    #[arg(long, value_name = "PATH")]
+    /// The serial port, such as /dev/ttyUSB0 or COM3; or tcp:HOST:PORT, a server that passes the
+    /// bytes on as they are, such as ser2net's raw
+    #[arg(short, long, value_name = "PATH")]
     pub(crate) port: String,
 
     /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) baud: Option<u32>,
 }
 

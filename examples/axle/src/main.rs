@@ -14,6 +14,7 @@ mod input;
 mod line;
 mod listing;
 mod pcapng;
+mod record;
 mod rover;
 mod scan;
 mod session;
@@ -73,6 +74,7 @@ enum Command {
     Drive(drive::Args),
     Stop(stop::Args),
     Watch(watch::Args),
+    Record(record::Args),
     #[cfg(unix)]
     Sim(sim::Args),
 }
@@ -98,6 +100,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Drive(args) => drive::run(args),
         Command::Stop(args) => stop::run(args),
         Command::Watch(args) => watch::run(args),
+        Command::Record(args) => record::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
     }

@@ -45,7 +45,7 @@ use stream::{Sheet, Stream, StreamOf};
 pub(crate) struct Args {
     /// Protocol of the line; auto takes that of a pcapng file, or the one with the most frames at
     /// the beginning of raw bytes
-    #[arg(short, long, value_enum, default_value = "auto")]
+    #[arg(short = 'P', long, value_enum, default_value = "auto")]
     protocol: Choice,
 
     /// Ikeya: decode packets of one direction only; by default, of both
