@@ -65,6 +65,12 @@ pub(crate) fn max_rps(text: &str) -> Result<Rps, String> {
     if limit.get() > 0.0 { Ok(limit) } else { Err("a limit must be above 0".to_owned()) }
 }
 
+/// A limit of a distance, above 0.
+pub(crate) fn max_turns(text: &str) -> Result<f64, String> {
+    let limit: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if limit > 0.0 { Ok(limit) } else { Err("a limit must be above 0".to_owned()) }
+}
+
 /// A finite distance that fits on the wire (rulings I4, I5).
 pub(crate) fn revolutions(text: &str) -> Result<Position, String> {
     let revolutions: f64 = text.parse().map_err(|_| "not a number".to_owned())?;

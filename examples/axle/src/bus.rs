@@ -4,7 +4,7 @@ use std::{thread, time};
 
 use axlewire::{
     ikeya::{
-        self, Master, Mode, NodeId, Status,
+        self, Master, Mode, NodeId, Position, Status,
         board::{Board, OneMotor, ThreeMotors},
         master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
@@ -81,12 +81,39 @@ pub(crate) enum Halt {
     Silent,
 }
 
-impl Bus {
-    pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
+impl MasterArgs {
+    pub(crate) const fn line(&self) -> &args::PortArgs {
+        &self.line
+    }
+
+    /// Settings of a master for this adapter.
+    pub(crate) const fn config(&self) -> MasterConfig {
         let mut config =
-            if args.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
-        config.removes_echo = args.echo;
-        Self::open_with(&args.line, config)
+            if self.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
+        config.removes_echo = self.echo;
+        config
+    }
+}
+
+/// Completes the settings of a master for this line.
+pub(crate) fn complete(config: MasterConfig, args: &args::PortArgs, line: &Line) -> MasterConfig {
+    let mut config = config;
+    config.baud = args.baud.unwrap_or(ikeya::BAUD);
+    config.polling = Polling::Every(PERIOD);
+    config.accepts_early = line.is_instant();
+    config.dead_man = Some(ABSENCE);
+    config
+}
+
+impl<B: Boards> Bus<B> {
+    pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
+        Self::open_with(&args.line, args.config())
+    }
+
+    pub(crate) fn open_with(args: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
+        let line = Line::open(args, ikeya::BAUD)?;
+        let config = complete(config, args, &line);
+        Ok(Self::new(line, config))
     }
 
     /// Asks all ids for their status; `false` if a signal came first.
@@ -105,7 +132,7 @@ impl Bus {
         &mut self,
         node: NodeId,
         signals: &Signals,
-    ) -> Result<Option<Status<OneMotor>>, Failure> {
+    ) -> Result<Option<Status<B>>, Failure> {
         let start = self.now();
         let end = start + self.master().stop_bound();
         if self.master_mut().read(node, start).is_err() {
@@ -121,18 +148,6 @@ impl Bus {
             }
         }
         Ok(None)
-    }
-}
-
-impl<B: Boards> Bus<B> {
-    pub(crate) fn open_with(line: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
-        let line_open = Line::open(line, ikeya::BAUD)?;
-        let mut config = config;
-        config.baud = line.baud.unwrap_or(ikeya::BAUD);
-        config.polling = Polling::Every(PERIOD);
-        config.accepts_early = line_open.is_instant();
-        config.dead_man = Some(ABSENCE);
-        Ok(Self::new(line_open, config))
     }
 
     pub(crate) fn new(line: Line, config: MasterConfig) -> Self {
@@ -283,6 +298,9 @@ impl<B: Boards> Bus<B> {
 /// Boards whose status can be printed.
 pub(crate) trait Boards: Board {
     fn describe(status: Status<Self>) -> String;
+
+    /// The positions of its motors, in position mode.
+    fn positions(status: Status<Self>) -> Option<Vec<Position>>;
 }
 
 impl Boards for OneMotor {
@@ -290,6 +308,13 @@ impl Boards for OneMotor {
         match status {
             Status::Velocity(rps) => format!("{rps:.2} rps"),
             Status::Position(position) => format!("{:.4} turns", position.revolutions()),
+        }
+    }
+
+    fn positions(status: Status<Self>) -> Option<Vec<Position>> {
+        match status {
+            Status::Velocity(_) => None,
+            Status::Position(position) => Some(vec![position]),
         }
     }
 }
@@ -302,6 +327,13 @@ impl Boards for ThreeMotors {
                 let [a, b, c] = positions.map(|position| position.revolutions());
                 format!("{a:.4} {b:.4} {c:.4} turns")
             }
+        }
+    }
+
+    fn positions(status: Status<Self>) -> Option<Vec<Position>> {
+        match status {
+            Status::Velocity(_) => None,
+            Status::Position(positions) => Some(positions.to_vec()),
         }
     }
 }

@@ -7,7 +7,7 @@ use axlewire::{
 
 use crate::{
     MOTION_HELP, args,
-    failure::Failure,
+    failure::{Failure, guarded},
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
@@ -79,7 +79,7 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     let start = rover.now();
     let mut drive = Drive { rover, start, teller: Teller::new() };
 
-    let driven = drive.drive(command, args.micros, signals);
+    let driven = guarded(|| drive.drive(command, args.micros, signals));
     // In any case, stop the wheels first and report errors afterwards. That the wheels may still
     // turn is the most serious one.
     let stopped = drive.stop();

@@ -3,6 +3,7 @@
 use core::fmt;
 use std::{
     io::{self, Write},
+    panic,
     path::PathBuf,
     process::ExitCode,
 };
@@ -77,6 +78,13 @@ impl Failure {
     }
 }
 
+/// Runs what moves something: if it panics, that is a failure like others, so that the caller stops
+/// what moves. The panic's own message has gone to standard error.
+pub(crate) fn guarded<T>(run: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    let bug = |_| Err(Failure::Failed("the tool has a bug and gave up".to_owned()));
+    panic::catch_unwind(panic::AssertUnwindSafe(run)).unwrap_or_else(bug)
+}
+
 /// Control characters in paths are escaped, so that the message stays on one line.
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -94,5 +102,17 @@ impl fmt::Display for Failure {
                 write!(f, "port {path:?} failed: {cause}; {consequence}")
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Failure, guarded};
+
+    #[test]
+    fn a_panic_is_a_failure_so_that_what_moves_is_stopped() {
+        assert_eq!(guarded(|| Ok(1)).unwrap(), 1);
+        let failure = guarded(|| -> Result<(), Failure> { panic!("planted") }).unwrap_err();
+        assert_eq!(failure.to_string(), "the tool has a bug and gave up");
     }
 }

@@ -8,7 +8,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
-use crate::failure::Failure;
+use crate::{failure::Failure, pcapng::MAGIC};
 
 /// Maximum number of bytes read at once.
 pub(crate) const CHUNK_LEN: usize = 64 * 1024;
@@ -57,6 +57,12 @@ impl Input {
     /// Its path; `None` is standard input.
     pub(crate) fn path(&self) -> Option<&Path> {
         self.path.as_deref()
+    }
+
+    /// Whether the input is a capture with times.
+    pub(crate) fn is_pcapng(&mut self) -> Result<bool, Failure> {
+        let front = self.peek(MAGIC.len(), |front| !MAGIC.starts_with(front))?;
+        Ok(front.starts_with(&MAGIC))
     }
 
     /// Reads ahead: up to `len` bytes, fewer at the end of the input, or once there are enough of

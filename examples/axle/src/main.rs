@@ -14,9 +14,12 @@ mod input;
 mod line;
 mod listing;
 mod pcapng;
+mod play;
 mod record;
+mod replay;
 mod rover;
 mod scan;
+mod send;
 mod session;
 mod signals;
 #[cfg(unix)]
@@ -75,6 +78,8 @@ enum Command {
     Stop(stop::Args),
     Watch(watch::Args),
     Record(record::Args),
+    Replay(replay::Args),
+    Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
 }
@@ -101,6 +106,8 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Stop(args) => stop::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(args),
+        Command::Replay(args) => replay::run(args),
+        Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
     }

@@ -71,7 +71,7 @@ impl Dip {
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
-    let mut bus = Bus::open(&args.bus)?;
+    let mut bus = Bus::<OneMotor>::open(&args.bus)?;
     if !bus.discover(&signals)? {
         return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
     }

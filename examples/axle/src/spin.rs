@@ -8,7 +8,7 @@ use axlewire::{
 use crate::{
     MOTION_HELP, args,
     bus::{self, Boards, Bus},
-    failure::Failure,
+    failure::{Failure, guarded},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
 };
@@ -110,7 +110,7 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     let start = bus.now();
     let mut spin = Spin { bus, node, start, teller: Teller::new() };
 
-    let spun = spin.spin(target, args.micros, signals);
+    let spun = guarded(|| spin.spin(target, args.micros, signals));
     // In any case, stop the motor first and report errors afterwards. That it may still turn is the
     // most serious one.
     let stopped = spin.stop();

@@ -1,6 +1,9 @@
 //! Captures with times: pcapng.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    path::PathBuf,
+};
 
 use axlewire::{
     ikeya::{self, three},
@@ -13,69 +16,29 @@ use crate::{
     args::Protocol,
     failure::Failure,
     input::Input,
-    pcapng::{self, Direction, Packet, Problem, Reader},
+    pcapng::{self, Direction, Problem, Reader},
 };
 
 /// Lists a capture; each interface and each direction is a stream of its own.
 pub(super) fn run(args: &Args, mut input: Input, chosen: Option<Protocol>) -> Result<(), Failure> {
     let path = input.path().map(ToOwned::to_owned);
-    let mut reader = Reader::new(&mut input);
-    let mut streams = BTreeMap::<(usize, u8), Box<dyn Stream>>::new();
-    let (mut lister, mut latest, mut times_back) = (None::<(Sheet, Printer)>, 0, 0);
-    let problem = loop {
-        let packet = match reader.next() {
-            Ok(None) => break None,
-            Err(problem) => break Some(problem),
-            // The packet borrows the reader, which knows the interfaces.
-            Ok(Some(Packet { interface, micros, direction, bytes })) => {
-                (interface, micros, direction, bytes.to_vec())
-            }
-        };
-        let (interface, micros, direction, bytes) = packet;
-        let key = (interface, direction.map_or(0, |direction| direction as u8 + 1));
-        if !streams.contains_key(&key) {
-            let protocol = match chosen {
-                Some(protocol) => protocol,
-                None => protocol_of(&reader, interface).map_err(Failure::Failed)?,
-            };
-            streams.insert(key, stream(protocol, interface, direction));
-            lister.get_or_insert_with(|| {
-                let style = style(args, protocol, true);
-                (Sheet::new(style), Printer::new(args.json, style))
-            });
-        }
-        let (Some((sheet, printer)), Some(stream)) = (&mut lister, streams.get_mut(&key)) else {
-            continue;
-        };
-        if let Some(micros) = micros {
-            times_back += u64::from(micros < latest);
-            latest = micros;
-        }
-        stream.feed(&bytes, micros, sheet);
-        if sheet.out.0.len() > 32 * 1024 {
-            printer.print_sheet(sheet)?;
-        }
-    };
-    let (mut sheet, mut printer) =
-        lister.unwrap_or_else(|| (Sheet::new(None), Printer::new(args.json, None)));
-    let mut account = Counters::default();
-    for stream in streams.values_mut() {
-        // What is cut off is not the end of the line, but nothing more will come.
-        stream.finish(&mut sheet);
-        account += stream.counters();
-    }
-    printer.print_sheet(&mut sheet)?;
-    if let Some(problem) = problem {
-        printer.flush()?;
-        return Err(match problem {
-            Problem::Io(error) => Failure::Read { path, error },
-            problem => {
-                let path = path.unwrap_or_else(|| "standard input".into());
-                Failure::Failed(format!("{path:?}: {problem}"))
-            }
+    let mut sheet = Sheet::new(None);
+    let mut printer = None;
+    let walked = walk(&mut input, chosen, &mut sheet, |protocol, sheet| {
+        let printer = printer.get_or_insert_with(|| {
+            sheet.style = style(args, protocol, true);
+            Printer::new(args.json, sheet.style)
         });
+        if sheet.out.0.len() > 32 * 1024 { printer.print_sheet(sheet) } else { Ok(()) }
+    })?;
+    let mut printer = printer.unwrap_or_else(|| Printer::new(args.json, None));
+    printer.print_sheet(&mut sheet)?;
+    if let Some(problem) = walked.problem {
+        printer.flush()?;
+        return Err(failure(problem, path));
     }
-    printer.finish(&account, times_back)?;
+    let account = walked.account;
+    printer.finish(&account, walked.times_back)?;
     if account.frames == 0 && account.received > 0 {
         let received = account.received;
         let line = format!("no frame in {received} bytes: use --protocol if it is another one");
@@ -84,14 +47,91 @@ pub(super) fn run(args: &Args, mut input: Input, chosen: Option<Protocol>) -> Re
     Ok(())
 }
 
-fn stream(protocol: Protocol, interface: usize, direction: Option<Direction>) -> Box<dyn Stream> {
+/// The failure for a capture that cannot be read to its end.
+pub(super) fn failure(problem: Problem, path: Option<PathBuf>) -> Failure {
+    match problem {
+        Problem::Io(error) => Failure::Read { path, error },
+        problem => {
+            let path = path.unwrap_or_else(|| "standard input".into());
+            Failure::Failed(format!("{path:?}: {problem}"))
+        }
+    }
+}
+
+/// A capture that has been read.
+pub(super) struct Walked {
+    pub(super) account: Counters,
+    /// Number of packets with a time before that of the packet in front of them.
+    times_back: u64,
+    /// Why it was not read to its end.
+    pub(super) problem: Option<Problem>,
+}
+
+/// Lists all packets on a sheet. `go_on` is called in front of each, with its protocol, and may
+/// print and empty the sheet.
+pub(super) fn walk(
+    input: &mut Input,
+    chosen: Option<Protocol>,
+    sheet: &mut Sheet,
+    mut go_on: impl FnMut(Protocol, &mut Sheet) -> Result<(), Failure>,
+) -> Result<Walked, Failure> {
+    let mut reader = Reader::new(input);
+    let mut streams = BTreeMap::<(usize, u8), (Protocol, Box<dyn Stream>)>::new();
+    let mut walked = Walked { account: Counters::default(), times_back: 0, problem: None };
+    let (mut latest, mut bytes) = (0, Vec::new());
+    loop {
+        let (interface, micros, direction) = match reader.next() {
+            Ok(Some(packet)) => {
+                // The packet borrows the reader, which knows the interfaces.
+                bytes.clear();
+                bytes.extend_from_slice(packet.bytes);
+                (packet.interface, packet.micros, packet.direction)
+            }
+            Ok(None) => break,
+            Err(problem) => {
+                walked.problem = Some(problem);
+                break;
+            }
+        };
+        let key = (interface, direction.map_or(0, |direction| direction as u8 + 1));
+        let (protocol, stream) = match streams.entry(key) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(new) => {
+                let protocol = match chosen {
+                    Some(protocol) => protocol,
+                    None => protocol_of(&reader, interface).map_err(Failure::Failed)?,
+                };
+                new.insert((protocol, stream(protocol, interface, direction)))
+            }
+        };
+        go_on(*protocol, sheet)?;
+        if let Some(micros) = micros {
+            walked.times_back += u64::from(micros < latest);
+            latest = micros;
+        }
+        stream.feed(&bytes, micros, sheet);
+    }
+    for (_, stream) in streams.values_mut() {
+        // Nothing more will come, even if the file was cut off.
+        stream.finish(sheet);
+        walked.account += stream.counters();
+    }
+    Ok(walked)
+}
+
+pub(super) fn stream(
+    protocol: Protocol,
+    interface: impl Into<Option<usize>>,
+    direction: Option<Direction>,
+) -> Box<dyn Stream> {
+    let interface = interface.into();
     match protocol {
-        Protocol::Ucp => Box::new(StreamOf::<ucp::Ucp>::of_interface(interface, direction)),
+        Protocol::Ucp => Box::new(StreamOf::<ucp::Ucp>::of_line(interface, direction)),
         Protocol::Ikeya => {
-            Box::new(StreamOf::<ikeya::BothDirections>::of_interface(interface, direction))
+            Box::new(StreamOf::<ikeya::BothDirections>::of_line(interface, direction))
         }
         Protocol::Ikeya3 => {
-            Box::new(StreamOf::<three::BothDirections>::of_interface(interface, direction))
+            Box::new(StreamOf::<three::BothDirections>::of_line(interface, direction))
         }
     }
 }

@@ -7,7 +7,7 @@ mod stream;
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     thread,
 };
 
@@ -23,12 +23,12 @@ use crate::{
     args::Protocol,
     failure::Failure,
     input::{self, Input},
-    listing::{self, Shown, Style, TimeColumn},
+    listing::{self, Modes, Shown, Style, TimeColumn},
     pcapng,
 };
 use detect::Share;
-pub(crate) use stream::BUFFER_LEN;
-use stream::{Sheet, Stream, StreamOf};
+use stream::StreamOf;
+pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 
 /// List the frames of a capture, and the gaps between them
 ///
@@ -113,8 +113,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Usage(line.to_owned()));
     }
     let mut input = Input::open(args.file.as_deref())?;
-    let front = input.peek(pcapng::MAGIC.len(), |front| !pcapng::MAGIC.starts_with(front))?;
-    if front.starts_with(&pcapng::MAGIC) {
+    if input.is_pcapng()? {
         return capture::run(args, input, chosen);
     }
     let protocol = match chosen {
@@ -141,6 +140,48 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(&sample))));
     }
     Ok(())
+}
+
+/// A stream of this protocol, in one direction of a line.
+pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box<dyn Stream> {
+    capture::stream(protocol, None, Some(direction))
+}
+
+/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw bytes.
+pub(crate) fn frames_of(
+    path: &Path,
+    chosen: Option<Protocol>,
+) -> Result<(Protocol, Vec<Taken>, Modes), Failure> {
+    let mut input = Input::open(Some(path))?;
+    let (mut sheet, mut found) = (Sheet::new(None), chosen);
+    sheet.taken = Some(Vec::new());
+    if input.is_pcapng()? {
+        let mut mixed = false;
+        let walked = capture::walk(&mut input, chosen, &mut sheet, |protocol, _| {
+            mixed |= *found.get_or_insert(protocol) != protocol;
+            Ok(())
+        })?;
+        if let Some(problem) = walked.problem {
+            return Err(capture::failure(problem, Some(path.to_owned())));
+        }
+        if mixed {
+            return Err(Failure::Failed(format!("{path:?} has lines of several protocols")));
+        }
+    } else if let Some(protocol) = chosen {
+        let mut stream = capture::stream(protocol, None, None);
+        loop {
+            let bytes = input.read()?;
+            if bytes.is_empty() {
+                break;
+            }
+            stream.feed(bytes, None, &mut sheet);
+        }
+        stream.finish(&mut sheet);
+    }
+    let protocol = found.ok_or_else(|| {
+        Failure::Usage("--protocol is needed for a capture of raw bytes".to_owned())
+    })?;
+    Ok((protocol, sheet.taken.take().unwrap_or_default(), sheet.modes))
 }
 
 /// What to say if there was no frame of `protocol`.

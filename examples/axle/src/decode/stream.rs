@@ -2,7 +2,10 @@
 
 use std::collections::VecDeque;
 
-use axlewire::stream::{Counters, Decoder, Event, Framing};
+use axlewire::{
+    ikeya::NodeId,
+    stream::{Counters, Decoder, Event, Framing},
+};
 
 use crate::{
     listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style},
@@ -14,22 +17,39 @@ pub(crate) const BUFFER_LEN: usize = axlewire::ucp::MAX_LEN;
 
 /// The lines of a listing, and what they need to know of the lines before.
 #[derive(Debug)]
-pub(super) struct Sheet {
-    /// `None` if only the account matters.
-    style: Option<Style>,
-    pub(super) out: Out,
+pub(crate) struct Sheet {
+    /// `None` if no lines are wanted.
+    pub(crate) style: Option<Style>,
+    pub(crate) out: Out,
     clock: LineClock,
-    pub(super) modes: Modes,
+    pub(crate) modes: Modes,
+    /// The frames themselves, if they are wanted.
+    pub(crate) taken: Option<Vec<Taken>>,
+}
+
+/// A frame of a capture.
+#[derive(Clone, Debug)]
+pub(crate) struct Taken {
+    pub(crate) micros: Option<u64>,
+    pub(crate) bytes: Box<[u8]>,
+    /// The node whose mode says how to read it, if there is one.
+    pub(crate) commands: Option<NodeId>,
 }
 
 impl Sheet {
-    pub(super) fn new(style: Option<Style>) -> Self {
-        Self { style, out: Out::default(), clock: LineClock::default(), modes: Modes::default() }
+    pub(crate) fn new(style: Option<Style>) -> Self {
+        Self {
+            style,
+            out: Out::default(),
+            clock: LineClock::default(),
+            modes: Modes::default(),
+            taken: None,
+        }
     }
 }
 
 /// The bytes of one interface in one direction.
-pub(super) trait Stream {
+pub(crate) trait Stream {
     /// Lists the events in `bytes`, all of which had been received at this time.
     fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet);
 
@@ -40,7 +60,7 @@ pub(super) trait Stream {
 }
 
 /// A stream of frames that this framing finds.
-pub(super) struct StreamOf<F> {
+pub(crate) struct StreamOf<F> {
     decoder: Decoder<F, BUFFER_LEN>,
     /// Place of the next event; only its offset changes.
     place: Place,
@@ -66,10 +86,10 @@ where
         Self { decoder, place, gap: None, booked, chunks: VecDeque::new() }
     }
 
-    /// The bytes of this interface of a capture with times.
-    pub(super) fn of_interface(interface: usize, direction: Option<Direction>) -> Self {
+    /// The bytes of a line with times.
+    pub(super) fn of_line(interface: Option<usize>, direction: Option<Direction>) -> Self {
         let mut stream = Self::new(0);
-        (stream.place.interface, stream.place.direction) = (Some(interface), direction);
+        (stream.place.interface, stream.place.direction) = (interface, direction);
         stream
     }
 
@@ -102,8 +122,13 @@ where
                     let at = place_of(&mut self.place, &mut self.chunks, length);
                     if let Some(style) = sheet.style {
                         style.frame(&mut sheet.out, &mut sheet.clock, at, &frame, &sheet.modes);
-                        frame.teach(&mut sheet.modes);
                     }
+                    if let Some(taken) = &mut sheet.taken {
+                        let (micros, bytes) = (at.micros, frame.bytes().into());
+                        let commands = frame.commands();
+                        taken.push(Taken { micros, bytes, commands });
+                    }
+                    frame.teach(&mut sheet.modes);
                 }
             }
         }

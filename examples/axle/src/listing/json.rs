@@ -14,7 +14,7 @@ pub(super) fn frame(out: &mut Out, at: Place, frame: &impl Shown, modes: &Modes)
     if let Some(brace) = out.0.get_mut(object) {
         *brace = b',';
     }
-    if let Some(mode) = frame.unsaid_mode(modes) {
+    if let Some(mode) = frame.commands().and_then(|node| modes.of(node)) {
         out.0.pop();
         out.text(match mode {
             Mode::Velocity => r#","mode":"velocity"}"#,

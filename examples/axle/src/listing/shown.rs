@@ -20,7 +20,7 @@ impl Modes {
         self.0.get(usize::from(node.get()) - 1).copied().flatten()
     }
 
-    fn learn(&mut self, node: NodeId, mode: Mode) {
+    pub(crate) fn learn(&mut self, node: NodeId, mode: Mode) {
         if let Some(known) = self.0.get_mut(usize::from(node.get()) - 1) {
             *known = Some(mode);
         }
@@ -51,8 +51,8 @@ pub(crate) trait Shown: Serialize + Copy {
     /// Contents as text, with units.
     fn contents(&self, out: &mut Out, modes: &Modes);
 
-    /// The mode of the node that this frame commands, where its bytes do not tell it.
-    fn unsaid_mode(&self, _modes: &Modes) -> Option<Mode> {
+    /// The node that this frame commands, if its bytes do not tell a speed from a position.
+    fn commands(&self) -> Option<NodeId> {
         None
     }
 
@@ -97,18 +97,18 @@ macro_rules! shown {
                 modes.learn(response.id(), mode);
             }
 
-            fn unsaid_mode(request: &of::Request<'_>, modes: &Modes) -> Option<Mode> {
+            fn commands(request: &of::Request<'_>) -> Option<NodeId> {
                 match request {
                     of::Request::Read(_) => None,
-                    of::Request::Write(write) => modes.of(write.id()),
+                    of::Request::Write(write) => Some(write.id()),
                 }
             }
 
             impl Shown for of::Request<'_> {
                 shown!(@ common);
 
-                fn unsaid_mode(&self, modes: &Modes) -> Option<Mode> {
-                    unsaid_mode(self, modes)
+                fn commands(&self) -> Option<NodeId> {
+                    commands(self)
                 }
             }
 
@@ -123,9 +123,9 @@ macro_rules! shown {
             impl Shown for of::Packet<'_> {
                 shown!(@ common);
 
-                fn unsaid_mode(&self, modes: &Modes) -> Option<Mode> {
+                fn commands(&self) -> Option<NodeId> {
                     match self {
-                        Self::Request(request) => unsaid_mode(request, modes),
+                        Self::Request(request) => commands(request),
                         Self::Response(_) => None,
                     }
                 }

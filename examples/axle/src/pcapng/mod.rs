@@ -12,7 +12,7 @@
 mod read;
 mod write;
 
-pub(crate) use read::{Packet, Problem, Reader};
+pub(crate) use read::{Problem, Reader};
 pub(crate) use write::Writer;
 
 use crate::args::Protocol;

@@ -1,0 +1,270 @@
+//! What a frame does to the device that receives it, and whether it may be sent at all.
+
+use axlewire::{
+    ikeya::{self, Mode, NodeId, Position, Status, three},
+    stream::{Frames, Framing},
+    ucp::{self, Message, MotorControl},
+};
+
+use crate::{args::Protocol, bus::Boards};
+
+/// The end of a line that sends a frame.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, clap::ValueEnum)]
+pub(crate) enum Side {
+    /// The master of a bus, or the host of a rover
+    Commander,
+    /// A node of a bus, or the robot
+    Device,
+}
+
+/// What a frame does.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Effect {
+    /// Moves nothing.
+    Nothing,
+    /// Commands the motors of a node.
+    Write(Write),
+    /// Drives a rover.
+    Drive,
+}
+
+/// A command in both readings: its bytes do not say which one is meant (ruling I3).
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Write {
+    pub(crate) node: NodeId,
+    speeds: Vec<f32>,
+    positions: Vec<Position>,
+}
+
+/// What is refused.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Speeds above this.
+    pub(crate) max_rps: f32,
+    /// Positions farther than this from where the motor is, turns.
+    pub(crate) max_turns: f64,
+}
+
+/// The sender and the effect of one frame; an error if it is not a frame, or may not be sent.
+pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), String> {
+    match protocol {
+        Protocol::Ikeya => Ok(match whole::<ikeya::BothDirections>(bytes)? {
+            ikeya::Packet::Request(ikeya::Request::Read(_)) => (Side::Commander, Effect::Nothing),
+            ikeya::Packet::Request(ikeya::Request::Write(write)) => {
+                let (speeds, positions) = (vec![write.as_velocity()], vec![write.as_position()]);
+                (Side::Commander, Effect::Write(Write { node: write.id(), speeds, positions }))
+            }
+            ikeya::Packet::Response(_) => (Side::Device, Effect::Nothing),
+        }),
+        Protocol::Ikeya3 => Ok(match whole::<three::BothDirections>(bytes)? {
+            three::Packet::Request(three::Request::Read(_)) => (Side::Commander, Effect::Nothing),
+            three::Packet::Request(three::Request::Write(write)) => {
+                let (speeds, positions) =
+                    (write.as_velocity().to_vec(), write.as_position().to_vec());
+                (Side::Commander, Effect::Write(Write { node: write.id(), speeds, positions }))
+            }
+            three::Packet::Response(_) => (Side::Device, Effect::Nothing),
+        }),
+        Protocol::Ucp => of_message(&whole::<ucp::Ucp>(bytes)?.message()),
+    }
+}
+
+/// The frame that these bytes are, all of them.
+fn whole<F: Framing>(bytes: &[u8]) -> Result<F::Frame<'_>, String> {
+    let mut frames = Frames::<F>::new(bytes);
+    let (frame, counters) = (frames.next(), frames.counters());
+    match frame {
+        Some(frame) if counters.framed == bytes.len() as u64 => Ok(frame),
+        _ => Err("not one whole frame with a correct CRC".to_owned()),
+    }
+}
+
+fn of_message(message: &Message<'_>) -> Result<(Side, Effect), String> {
+    let commander = |effect| Ok((Side::Commander, effect));
+    match message {
+        Message::MotorControl(command) => match MotorControl::try_from(**command) {
+            Ok(command) if command.stands_still() => commander(Effect::Nothing),
+            Ok(_) => commander(Effect::Drive),
+            Err(_) if command.starts_update() => {
+                Err("a motor command that starts a firmware update (ruling U7)".to_owned())
+            }
+            Err(error) => Err(format!("a motor command out of range (ruling U7): {error}")),
+        },
+        Message::OtaRequest(_) => {
+            Err("a request for a firmware update: after it the robot leaves the protocol"
+                .to_owned())
+        }
+        Message::Ping(_)
+        | Message::CalibrationStart(_)
+        | Message::CalibrationEnd(_)
+        | Message::ImuBiasAck(_)
+        | Message::MagBiasAck(_)
+        | Message::Biases(_)
+        | Message::SetNetworkState(_)
+        | Message::SetNetworkStateWide(_) => commander(Effect::Nothing),
+        Message::Pong(_)
+        | Message::CalibrationStartAck(_)
+        | Message::CalibrationEndAck(_)
+        | Message::Report(_)
+        | Message::ImuBias(_)
+        | Message::MagBias(_)
+        | Message::BiasRequest(_)
+        | Message::OtaAck(_) => Ok((Side::Device, Effect::Nothing)),
+        Message::Unknown(frame) if ucp::MessageId::from_u8(frame.id).is_some() => Err(format!(
+            "message id {} with a body of {} bytes, which shipped robots misread (ruling U13)",
+            frame.id,
+            frame.body.len()
+        )),
+        Message::Unknown(_) => commander(Effect::Nothing),
+        _ => Err("a message that this version does not know".to_owned()),
+    }
+}
+
+impl Write {
+    /// Checks the command for its node, which is at `status`. `meant` is the mode that it was meant
+    /// for, if that is known.
+    pub(crate) fn check<B: Boards>(
+        &self,
+        status: Status<B>,
+        meant: Option<Mode>,
+        limits: &Limits,
+    ) -> Result<(), String> {
+        let (node, mode) = (self.node, status.mode());
+        if let Some(meant) = meant.filter(|meant| *meant != mode) {
+            return Err(format!(
+                "node {node} is in {mode} mode, but a command is for {meant} mode"
+            ));
+        }
+        let Some(positions) = B::positions(status) else {
+            return self.check_speeds(limits.max_rps);
+        };
+        for (from, to) in positions.iter().zip(&self.positions) {
+            let (from, to) = (from.revolutions(), to.revolutions());
+            if (to - from).abs() > limits.max_turns {
+                return Err(format!(
+                    "{to:.4} turns for node {node}, which is at {from:.4}, is farther than \
+                     --max-turns {}: a speed, or a typo?",
+                    limits.max_turns
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_speeds(&self, max_rps: f32) -> Result<(), String> {
+        for &rps in &self.speeds {
+            if rps.is_nan() || rps.abs() > max_rps {
+                let node = self.node;
+                return Err(format!(
+                    "{rps:?} rps for node {node} is more than --max-rps {max_rps}: a position, or \
+                     a typo?"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axlewire::{
+        encode::Encode,
+        ikeya::{Rps, WriteRequest, board::OneMotor},
+        ucp::RawFrame,
+    };
+
+    use super::*;
+
+    const LIMITS: Limits = Limits { max_rps: 20.0, max_turns: 100.0 };
+
+    fn write(packet: &WriteRequest) -> Write {
+        match of(Protocol::Ikeya, packet.as_bytes()) {
+            Ok((Side::Commander, Effect::Write(write))) => write,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn velocity(rps: f32) -> Write {
+        write(&WriteRequest::velocity(NodeId::N3, Rps::new(rps).unwrap()))
+    }
+
+    fn frame(id: u8, body: &[u8]) -> Result<(Side, Effect), String> {
+        let mut buffer = [0; 64];
+        let frame = RawFrame { id, index: 0, body };
+        of(Protocol::Ucp, frame.encode(&mut buffer).unwrap())
+    }
+
+    #[test]
+    fn a_command_for_the_other_mode_is_refused_if_that_is_known() {
+        let at = Status::<OneMotor>::Position(Position::new(0, 0));
+        let error = velocity(1.0).check(at, Some(Mode::Velocity), &LIMITS).unwrap_err();
+        assert_eq!(error, "node 3 is in position mode, but a command is for velocity mode");
+        let still = Status::<OneMotor>::Velocity(0.0);
+        velocity(1.0).check(still, Some(Mode::Velocity), &LIMITS).unwrap();
+        velocity(1.0).check(still, None, &LIMITS).unwrap();
+    }
+
+    #[test]
+    fn a_speed_that_a_position_node_would_take_for_a_place_is_too_far() {
+        let at = Status::<OneMotor>::Position(Position::new(0, 0));
+        let error = velocity(1.0).check(at, None, &LIMITS).unwrap_err();
+        assert!(error.starts_with("16256.0000 turns for node 3, which is at 0.0000"), "{error}");
+        let near = write(&WriteRequest::position(NodeId::N3, Position::new(0, -100)));
+        near.check(at, None, &LIMITS).unwrap();
+        let far = write(&WriteRequest::position(NodeId::N3, Position::new(1, 100)));
+        far.check(at, None, &LIMITS).unwrap_err();
+    }
+
+    #[test]
+    fn a_speed_above_the_limit_or_none_at_all_is_refused() {
+        let still = Status::<OneMotor>::Velocity(0.0);
+        velocity(-20.0).check(still, None, &LIMITS).unwrap();
+        velocity(-20.1).check(still, None, &LIMITS).unwrap_err();
+        let nan = write(&WriteRequest::position(NodeId::N1, Position::new(0, 0x7FC0)));
+        nan.check(still, None, &LIMITS).unwrap_err();
+    }
+
+    #[test]
+    fn what_harms_a_robot_is_refused() {
+        let mut update = [0; 16];
+        (update[8], update[0]) = (39, 10);
+        assert!(frame(2, &update).unwrap_err().contains("firmware update (ruling U7)"));
+        let mut fast = [0; 16];
+        fast[0] = 101;
+        assert!(frame(2, &fast).unwrap_err().contains("out of range (ruling U7)"));
+        assert!(frame(9, &[1, 0]).unwrap_err().contains("firmware update"));
+        for (id, len) in [(1, 2), (2, 15), (3, 0), (5, 1), (8, 5), (10, 2)] {
+            assert!(frame(id, &vec![0; len]).unwrap_err().contains("U13"), "{id} {len}");
+        }
+    }
+
+    #[test]
+    fn zero_moves_nothing_on_a_rover_and_something_on_a_bus() {
+        assert_eq!(frame(2, &[0; 16]), Ok((Side::Commander, Effect::Nothing)));
+        let mut slow = [0; 16];
+        slow[2] = 1;
+        assert_eq!(frame(2, &slow), Ok((Side::Commander, Effect::Drive)));
+        assert!(matches!(velocity(0.0), Write { node: NodeId::N3, .. }));
+    }
+
+    #[test]
+    fn every_message_has_a_sender() {
+        let robots = [(1, 1), (3, 2), (4, 2), (5, 36), (6, 12), (7, 6), (8, 0), (9, 1)];
+        for (id, len) in robots {
+            assert_eq!(frame(id, &vec![0; len]).unwrap().0, Side::Device, "{id}");
+        }
+        let hosts = [(1, 0), (3, 1), (4, 1), (6, 1), (7, 1), (8, 19), (10, 1), (10, 4), (0x40, 3)];
+        for (id, len) in hosts {
+            assert_eq!(frame(id, &vec![0; len]).unwrap(), (Side::Commander, Effect::Nothing));
+        }
+    }
+
+    #[test]
+    fn what_is_not_one_whole_frame_is_not_sent() {
+        let read = [0xAA, 0x01, 0xBE, 0xD0];
+        assert!(of(Protocol::Ikeya, &read).is_ok());
+        for bytes in [&read[..3], &[&read[..], &[0]].concat(), &[&read[..], &read].concat(), &[]] {
+            assert!(of(Protocol::Ikeya, bytes).is_err(), "{bytes:?}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! `axle replay`: sends the frames of a capture, at their own pace or faster.
+
+use std::path::PathBuf;
+
+use axlewire::{ikeya::Rps, time::Duration};
+
+use crate::{
+    MOTION_HELP,
+    args::{self, Protocol},
+    bus,
+    decode::{self, Taken},
+    failure::Failure,
+    play::{self, Due, Effect, Limits, Plan, Side},
+};
+
+/// Send the frames of a capture, at their own pace or faster
+///
+/// Sends what one side of the line sent, frame by frame, and shows both sides. Bytes between frames
+/// are not sent. Raw bytes have no times: their frames follow each other at --every.
+///
+/// If the frames command motors or a rover, --move is needed. Then the modes of all nodes that are
+/// commanded are read first, and nothing is sent if a node does not answer, if it is not in the
+/// mode that it had in the capture, or if it would get more than --max-rps or go farther than
+/// --max-turns: a speed looks like a far position, and the reverse. At the end, on every error and on every signal that can be caught, what was commanded is stopped. Firmware
+/// updates, motor commands out of range and bodies of a wrong length are refused (rulings U7 and
+/// U13).
+///
+/// The capture is held in memory, about six times its size.
+#[derive(Debug, clap::Args)]
+#[command(after_help = MOTION_HELP)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    bus: bus::MasterArgs,
+
+    /// Protocol of the line; needed for raw bytes
+    #[arg(short = 'P', long, value_enum)]
+    protocol: Option<Protocol>,
+
+    /// Whose frames to send
+    #[arg(long = "as", value_enum, default_value = "commander")]
+    side: Side,
+
+    /// How much faster than recorded; 0.5 is half as fast
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = factor)]
+    speed: f64,
+
+    /// Interval between two frames of raw bytes, seconds
+    #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = args::seconds)]
+    every: u64,
+
+    /// Send commands that move something
+    #[arg(long = "move")]
+    moves: bool,
+
+    /// Refuse a speed above this, in either direction
+    #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
+    max_rps: Rps,
+
+    /// Refuse a position farther than this from where the motor is before the first frame, turns
+    #[arg(long, value_name = "X", default_value = "100", value_parser = args::max_turns)]
+    max_turns: f64,
+
+    /// Print one JSON object per line
+    #[arg(short, long)]
+    json: bool,
+
+    /// The capture: pcapng or raw bytes
+    file: PathBuf,
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let factor: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.001..=1000.0).contains(&factor) {
+        Ok(factor)
+    } else {
+        Err(format!("{factor:?} is not within 0.001..=1000"))
+    }
+}
+
+/// How long to listen behind the last frame.
+const LINGER: Duration = Duration::from_millis(200);
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
+    let (mut frames, mut moving) = (Vec::new(), 0_u64);
+    let (mut first, mut last_us) = (None, 0);
+    for Taken { micros, bytes, commands } in taken {
+        let (side, effect) = match play::effect_of(protocol, &bytes) {
+            Ok(found) => found,
+            // Only a commander's frames can be refused.
+            Err(why) if args.side == Side::Commander => {
+                return Err(Failure::Failed(format!("the capture has {why}: nothing is sent")));
+            }
+            Err(_) => continue,
+        };
+        if side != args.side {
+            continue;
+        }
+        moving += u64::from(effect != Effect::Nothing);
+        let after_us = match micros {
+            Some(micros) => {
+                let begin = *first.get_or_insert(micros);
+                (micros.saturating_sub(begin) as f64 / args.speed) as u64
+            }
+            None => frames.len() as u64 * args.every,
+        };
+        // Time may run backwards in a capture, but not here.
+        last_us = after_us.max(last_us);
+        // The answers in the capture say how its commands were meant.
+        let meant = commands.and_then(|node| modes.of(node));
+        frames.push(Due { after_us: last_us, bytes, meant });
+    }
+    if frames.is_empty() {
+        let line = format!("no frame of the {:?} in the capture", args.side).to_lowercase();
+        return Err(Failure::Failed(line));
+    }
+    if moving > 0 && !args.moves {
+        return Err(Failure::Failed(format!(
+            "{moving} of {} frames move something: use --move if you mean it; nothing is sent",
+            frames.len()
+        )));
+    }
+    play::run(Plan {
+        bus: &args.bus,
+        protocol,
+        frames: frames.into(),
+        linger: LINGER,
+        limits: Limits { max_rps: args.max_rps.get(), max_turns: args.max_turns },
+        is_json: args.json,
+    })
+}
