@@ -166,7 +166,9 @@ mod rs485;
 mod sending;
 #[cfg(feature = "serialport")]
 mod serial_port;
-#[cfg(feature = "serialport")]
+#[cfg(feature = "tokio")]
+mod tokio;
+#[cfg(any(feature = "serialport", feature = "tokio"))]
 mod tty;
 #[cfg(feature = "ucp")]
 mod ucp;
@@ -184,3 +186,5 @@ pub use ikeya::OnlineNodes;
 pub use rs485::{NoDelay, Rs485, Rs485Error};
 #[cfg(feature = "serialport")]
 pub use serial_port::SerialPort;
+#[cfg(feature = "tokio")]
+pub use tokio::{TokioClock, TokioSerialPort};
