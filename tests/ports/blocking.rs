@@ -169,3 +169,10 @@ fn a_write_to_a_full_port_takes_what_fits_then_fails_and_loses_nothing() {
     far.read_exact(&mut more).unwrap();
     assert_eq!(&more, b"more");
 }
+
+#[test]
+fn a_long_write_does_not_wait_until_all_of_it_has_left() {
+    let (mut port, _far, _held) = line();
+    let count = in_time(move || port.write(&[0; 100_000]).unwrap());
+    assert!((1..=256).contains(&count), "{count}");
+}
