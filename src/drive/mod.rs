@@ -105,6 +105,11 @@
 //! ports, such as embassy's `BufferedUart`, comply; ports that lend the caller's buffer to a DMA
 //! channel for one call do not.
 //!
+//! # On a PC
+//!
+//! `SerialPort` (feature `serialport`) with `StdClock`, or `TokioSerialPort` with `TokioClock`
+//! (feature `tokio`): see the page `on_a_pc`.
+//!
 //! # With embassy
 //!
 //! ```text
