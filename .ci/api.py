@@ -27,13 +27,14 @@ from pathlib import Path
 NO_FORMAT = {
     f"axlewire::{path}": reason
     for reason, paths in {
+        "a port of the operating system": "drive::SerialPort drive::TokioSerialPort",
         "state: log its events, statistics and counters": (
             "drive::Driver drive::Rs485 ikeya::Master ikeya::Slave ikeya::master::Master"
             " ikeya::slave::Slave io::FrameReader io::FrameWriter stream::Decoder stream::Frames"
             " ucp::Host ucp::Robot ucp::host::Host ucp::robot::Robot"
         ),
         "a clock or a delay, nothing to log": (
-            "drive::NoDelay drive::StdClock drive::WithDelay"
+            "drive::NoDelay drive::StdClock drive::TokioClock drive::WithDelay"
         ),
         "a name for a framing": "stream::Portable",
         "made by the derive of bytemuck": (

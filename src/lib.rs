@@ -19,6 +19,7 @@
 //! | decode a capture or a stream, build a packet | the pages `ikeya` and `ucp` |
 //! | decode another protocol with the same resync | [`stream::Framing`] |
 //! | bring it to a board | the page `porting` |
+//! | use a serial port or a USB adapter of a PC | the page `on_a_pc` |
 //! | test an application without hardware | `sim` |
 //!
 //! # The floors
@@ -78,7 +79,10 @@ pub mod io;
 mod machine;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
-// Pages, not code. The examples of the first use one more feature than its links.
+// Pages, not code. The examples of the first two use one more feature than their links.
+#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+#[cfg_attr(any(not(doctest), feature = "serialport"), doc = include_str!("on_a_pc.md"))]
+pub mod on_a_pc {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[cfg_attr(any(not(doctest), feature = "embedded-hal"), doc = include_str!("porting.md"))]
 pub mod porting {}
@@ -97,6 +101,6 @@ pub mod time;
 pub mod ucp;
 
 /// Runs the examples of the README as tests.
-#[cfg(all(doctest, feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+#[cfg(all(doctest, feature = "serialport", feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -10,11 +10,11 @@ fn the_guarantees_and_the_features_of_the_readme_are_those_of_the_docs() {
 }
 
 #[test]
-fn the_readme_turns_a_motor_with_the_code_that_its_command_runs() {
-    let example = include_str!("../examples/axle/examples/turn.rs");
-    let (_, turn) = example.split_once("fn turn<").expect("there is such a function");
-    let (turn, _) = turn.split_once("\n}\n").expect("it ends");
-    assert!(README.contains(turn), "not in the README:\n{turn}");
+fn the_readme_turns_a_motor_with_the_program_that_its_command_runs() {
+    let program = include_str!("../examples/host/src/bin/spin.rs");
+    let (_, code) = program.split_once("\n\n").expect("its docs end");
+    assert!(code.starts_with("use axlewire") && code.ends_with("}\n"));
+    assert!(README.contains(&format!("```rust,no_run\n{code}```\n")), "not in the README:\n{code}");
 }
 
 #[test]

@@ -105,6 +105,11 @@
 //! ports, such as embassy's `BufferedUart`, comply; ports that lend the caller's buffer to a DMA
 //! channel for one call do not.
 //!
+//! # On a PC
+//!
+//! `SerialPort` (feature `serialport`) with `StdClock`, or `TokioSerialPort` with `TokioClock`
+//! (feature `tokio`): see the page `on_a_pc`.
+//!
 //! # With embassy
 //!
 //! ```text
@@ -166,7 +171,9 @@ mod rs485;
 mod sending;
 #[cfg(feature = "serialport")]
 mod serial_port;
-#[cfg(feature = "serialport")]
+#[cfg(feature = "tokio")]
+mod tokio;
+#[cfg(any(feature = "serialport", feature = "tokio"))]
 mod tty;
 #[cfg(feature = "ucp")]
 mod ucp;
@@ -184,3 +191,5 @@ pub use ikeya::OnlineNodes;
 pub use rs485::{NoDelay, Rs485, Rs485Error};
 #[cfg(feature = "serialport")]
 pub use serial_port::SerialPort;
+#[cfg(feature = "tokio")]
+pub use tokio::{TokioClock, TokioSerialPort};

@@ -14,6 +14,10 @@ const HELD_LEN: usize = 256;
 /// Longest wait in one call of the system, so that a port that has gone is noticed.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// Longest piece written at once. A system that says that it has room, has room for that much, and
+/// would wait until it has taken all of a longer one.
+const PIECE_LEN: usize = 256;
+
 /// Pause between two looks at bytes that are being sent.
 const NAP: Duration = Duration::from_micros(200);
 
@@ -29,7 +33,7 @@ const NAP: Duration = Duration::from_micros(200);
 /// let mut config = MasterConfig::usb_adapter();
 /// config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
 /// let mut bus = Driver::with(|now| <Master>::new(config, now), port, StdClock::new());
-/// println!("{} nodes", bus.discover()?.count());
+/// println!("{} nodes", bus.discover()?.len());
 /// # }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -38,7 +42,7 @@ const NAP: Duration = Duration::from_micros(200);
 ///
 /// * `read_ready` returns at once.
 /// * `read` waits until there is a byte or the port fails. A driver calls it only when there is.
-/// * `write` takes as many bytes as the system has room for. If that is none for 20 ms, it fails
+/// * `write` takes up to 256 bytes. If the system has no room for any for 20 ms, it fails
 ///   with [`TimedOut`](io::ErrorKind::TimedOut); the port may recover, so call the driver again.
 /// * `flush` waits until all bytes are out. If the system sends none for a second, it fails with
 ///   `TimedOut`. The bytes that are left in the UART itself then take at most its own time, unless
@@ -69,11 +73,7 @@ impl SerialPort {
     /// A text with the path and the reason: no such path, permission denied, in use, not a serial
     /// port, or a speed that the UART cannot run at, if it is off by more than 3 %.
     pub fn open(path: &str, baud: u32) -> io::Result<Self> {
-        let tty = tty::open(path, baud, |builder| {
-            let tty = builder.clone().open_native()?;
-            never_wait(&tty)?;
-            Ok(tty)
-        })?;
+        let tty = tty::open(path, baud, |builder| builder.clone().open_native())?;
         Ok(Self::from(Box::new(tty) as Box<dyn serialport::SerialPort>))
     }
 
@@ -149,10 +149,6 @@ impl SerialPort {
 
 /// A port that is already open, as it is: bytes that it has received are not discarded, and its
 /// speed is not checked; see [`check_baud`](SerialPort::check_baud).
-///
-/// On Unix, its `write` may wait without limit if the system has room for a part of a frame only,
-/// as a pseudo-terminal has whose other end does not read. Ports from [`SerialPort::open`] never
-/// do.
 impl From<Box<dyn serialport::SerialPort>> for SerialPort {
     fn from(tty: Box<dyn serialport::SerialPort>) -> Self {
         Self { tty, held: [0; HELD_LEN], unread: 0..0 }
@@ -209,10 +205,11 @@ impl Write for SerialPort {
         if bytes.is_empty() {
             return Ok(0);
         }
+        let piece = bytes.get(..PIECE_LEN).unwrap_or(bytes);
         let deadline = Instant::now() + WRITE_PATIENCE;
         self.tty.set_timeout(WRITE_PATIENCE).map_err(lost)?;
         loop {
-            match self.tty.write(bytes) {
+            match self.tty.write(piece) {
                 Ok(count) => return Ok(count),
                 Err(error) => match error.kind() {
                     io::ErrorKind::Interrupted if Instant::now() < deadline => {}
@@ -242,21 +239,4 @@ impl Write for SerialPort {
             thread::sleep(NAP);
         }
     }
-}
-
-/// Lets a write return with a part of the bytes. Otherwise it waits for room for all of them,
-/// whatever the timeout.
-#[cfg(unix)]
-fn never_wait(tty: &serialport::TTYPort) -> serialport::Result<()> {
-    use nix::fcntl::{FcntlArg, OFlag, fcntl};
-    use std::os::fd::AsRawFd;
-
-    fcntl(tty.as_raw_fd(), FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(io::Error::from)?;
-    Ok(())
-}
-
-/// A write returns at its timeout.
-#[cfg(windows)]
-fn never_wait(_: &serialport::COMPort) -> serialport::Result<()> {
-    Ok(())
 }

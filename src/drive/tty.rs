@@ -10,7 +10,8 @@ use serialport::{ClearBuffer, ErrorKind, SerialPortBuilder};
 /// send, so that no outdated command leaves late (ruling U16).
 pub(super) const WRITE_PATIENCE: Duration = Duration::from_millis(20);
 
-/// Time after which a port that sends none of its bytes has stalled.
+/// Time after which a blocking port that sends none of its bytes has stalled.
+#[cfg(feature = "serialport")]
 pub(super) const STALL: Duration = Duration::from_secs(1);
 
 /// Deviation from the requested baud rate at which a UART still reads the bytes, percent.
@@ -91,6 +92,7 @@ pub(super) fn lost(error: impl Into<io::Error>) -> io::Error {
 }
 
 /// The error of a port that keeps its bytes.
+#[cfg(feature = "serialport")]
 pub(super) fn stalled(queued: u32) -> io::Error {
     let cause = format!("{queued} bytes have waited for a second to be sent");
     io::Error::new(io::ErrorKind::TimedOut, cause)

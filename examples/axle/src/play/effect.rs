@@ -168,9 +168,8 @@ impl Write {
 #[cfg(test)]
 mod tests {
     use axlewire::{
-        encode::Encode,
+        crc16,
         ikeya::{Rps, WriteRequest, board::OneMotor},
-        ucp::RawFrame,
     };
 
     use super::*;
@@ -189,9 +188,10 @@ mod tests {
     }
 
     fn frame(id: u8, body: &[u8]) -> Result<(Side, Effect), String> {
-        let mut buffer = [0; 64];
-        let frame = RawFrame { id, index: 0, body };
-        of(Protocol::Ucp, frame.encode(&mut buffer).unwrap())
+        let mut frame = vec![0xFD, 0xFF, body.len() as u8 + 4, 0, id, 0];
+        frame.extend(body);
+        frame.extend(crc16::compute(&frame).to_le_bytes());
+        of(Protocol::Ucp, &frame)
     }
 
     #[test]

@@ -1,0 +1,36 @@
+//! Drives a rover forward for two seconds and prints its reports: `rover PORT`.
+//!
+//! After Ctrl-C nothing is sent any more, and the rover stops by itself within half a second.
+
+use std::{env, error::Error, io};
+
+use axlewire::{
+    drive::{DriveError, Driver, SerialPort, StdClock},
+    time::Duration,
+    ucp::{BAUD, Host, host::HostConfig},
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = env::args().nth(1).ok_or("which port?")?;
+    let port = SerialPort::open(&path, BAUD)?;
+    let host = |now| Host::new(HostConfig::usb_adapter(), now);
+    let mut rover = Driver::with(host, port, StdClock::new());
+    let driven = drive(&mut rover);
+    // Whatever has happened. An error here means that the rover may be driving: say so.
+    rover.stop()?;
+    println!("stopped");
+    Ok(driven?)
+}
+
+fn drive(rover: &mut Driver<Host, SerialPort, StdClock>) -> Result<(), DriveError<io::Error>> {
+    let end = rover.now() + Duration::from_millis(2000);
+    while rover.now() < end {
+        rover.drive(30, 0)?; // percent; counts for half a second
+        let soon = rover.now() + Duration::from_millis(100);
+        if let Some(report) = rover.next_report(soon)? {
+            let seen = report.telemetry;
+            println!("{:?} rpm, {:.1} V", seen.rpm, seen.volts());
+        }
+    }
+    Ok(())
+}
