@@ -19,6 +19,7 @@
 //! | decode a capture or a stream, build a packet | the pages `ikeya` and `ucp` |
 //! | decode another protocol with the same resync | [`stream::Framing`] |
 //! | bring it to a board | the page `porting` |
+//! | read packets as JSON, or elsewhere with `serde` | the page `fields` |
 //! | test an application without hardware | `sim` |
 //!
 //! # The floors
@@ -78,7 +79,10 @@ pub mod io;
 mod machine;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
-// Pages, not code. The examples of the first use one more feature than its links.
+// Pages, not code. The examples of the second use one more feature than its links.
+#[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
+#[doc = include_str!("fields.md")]
+pub mod fields {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[cfg_attr(any(not(doctest), feature = "embedded-hal"), doc = include_str!("porting.md"))]
 pub mod porting {}
