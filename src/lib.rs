@@ -20,6 +20,7 @@
 //! | decode another protocol with the same resync | [`stream::Framing`] |
 //! | bring it to a board | the page `porting` |
 //! | use a serial port or a USB adapter of a PC | the page `on_a_pc` |
+//! | read packets as JSON, or elsewhere with `serde` | the page `fields` |
 //! | test an application without hardware | `sim` |
 //!
 //! # The floors
@@ -79,7 +80,10 @@ pub mod io;
 mod machine;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
-// Pages, not code. The examples of the first two use one more feature than their links.
+// Pages, not code. The examples of two of them use one more feature than their links.
+#[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
+#[doc = include_str!("fields.md")]
+pub mod fields {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[cfg_attr(any(not(doctest), feature = "serialport"), doc = include_str!("on_a_pc.md"))]
 pub mod on_a_pc {}

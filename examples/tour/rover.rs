@@ -63,7 +63,7 @@ fn tell(link: &mut Link, booted: &mut bool) {
                 line(at, "host", "the robot requests biases, but none are stored")
             }
             HostEvent::CalibrationStarted(kind) => {
-                line(at, "host", &format!("calibrating: {kind:?}"))
+                line(at, "host", &format!("calibrating: {kind}"))
             }
             HostEvent::ImuBias(bias) => {
                 line(at, "host", &format!("stored the result: {:?}", bias.acc()))
@@ -75,7 +75,7 @@ fn tell(link: &mut Link, booted: &mut bool) {
     for (at, _, event) in link.take_tail_events() {
         match event {
             RobotEvent::NetworkState(state) if !*booted => {
-                line(at, "robot", &format!("network lamp: {state:?}"))
+                line(at, "robot", &format!("network lamp: {state}"))
             }
             RobotEvent::Watchdog => line(at, "robot", "no valid command for 500 ms: stopping"),
             RobotEvent::CalibrationEnd(_) => {

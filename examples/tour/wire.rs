@@ -1,23 +1,22 @@
 //! Parts one and two: decoding a noisy capture of each protocol, and building one packet of each
 //! kind.
 
+use core::fmt::Display;
+
 use crate::title;
 use axlewire::{
     error::EncodeError,
-    ikeya::{self, NodeId, Packet, Position, Request, Response, Rps, three},
-    stream::{Counters, Decoder, Event, Framing},
-    ucp::{self, Body, Message, MotorControl, RawFrame, Telemetry, Ucp},
+    ikeya::{self, NodeId, Position, Rps, three},
+    stream::{Counters, Decoder, Framing},
+    ucp::{self, Body, MotorControl, RawFrame, Telemetry, Ucp},
 };
-
-/// Printed parts of a frame: its length, its name and its meaning.
-type Line = (usize, &'static str, String);
 
 pub(crate) fn decode_captures() {
     title("Ikeya MD: a capture of an RS485 line with noise");
-    decode::<ikeya::BothDirections>(include_bytes!("../captures/ikeya.bin"), ikeya_line);
+    decode::<ikeya::BothDirections>(include_bytes!("../captures/ikeya.bin"));
 
     title("UCP: a capture of a rover's UART with noise");
-    decode::<Ucp>(include_bytes!("../captures/ucp.bin"), ucp_line);
+    decode::<Ucp>(include_bytes!("../captures/ucp.bin"));
 }
 
 pub(crate) fn build_packets() -> Result<(), EncodeError> {
@@ -29,47 +28,38 @@ pub(crate) fn build_packets() -> Result<(), EncodeError> {
 
 /// Feeds a capture to a decoder in pieces of 10 bytes, as a serial port would, and prints the
 /// events.
-fn decode<F: Framing>(capture: &[u8], line: fn(F::Frame<'_>) -> Line) {
+fn decode<F>(capture: &[u8])
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Display,
+{
     let mut decoder = Decoder::<F, 64>::new();
     let mut offset = 0;
     for mut piece in capture.chunks(10) {
-        while let Some(event) = decoder.decode(&mut piece) {
-            offset += print(offset, event, line);
-        }
+        drain(&mut decoder, &mut piece, &mut offset);
     }
     // The capture has ended, so pending bytes will not be completed.
     while decoder.pending() > 0 {
         decoder.idle();
-        while let Some(event) = decoder.decode(&mut [].as_slice()) {
-            offset += print(offset, event, line);
-        }
+        drain(&mut decoder, &mut [].as_slice(), &mut offset);
     }
     account(&decoder.counters(), decoder.pending());
 }
 
-/// Prints one event and returns the number of bytes that it covers.
-fn print<T>(offset: usize, event: Event<T>, line: fn(T) -> Line) -> usize {
-    match event {
-        Event::Frame(frame) => {
-            let (length, name, meaning) = line(frame);
-            println!("{offset:5} {length:4}  {name:<22} {meaning}");
-            length
+/// Prints the events in `bytes`, each behind its offset: frames and gaps print themselves.
+fn drain<F>(decoder: &mut Decoder<F, 64>, bytes: &mut &[u8], offset: &mut u64)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Display,
+{
+    loop {
+        match decoder.decode(bytes) {
+            Some(event) => println!("{offset:5}  {event}"),
+            None => return,
         }
-        Event::Skipped(gap) => {
-            println!("{offset:5} {:4}  ·· skipped ··          {}", gap.len, why(gap.reason.name()));
-            gap.len as usize
-        }
-    }
-}
-
-fn why(reason: &str) -> &str {
-    match reason {
-        "header" => "no frame starts here",
-        "length" => "invalid length",
-        "id" => "a complete packet with an invalid node id",
-        "crc" => "damaged: CRC mismatch",
-        "idle" => "truncated at the end of the capture",
-        other => other,
+        // The event ends where the counted bytes end.
+        let counters = decoder.counters();
+        *offset = counters.framed + counters.skipped();
     }
 }
 
@@ -79,96 +69,6 @@ fn account(counters: &Counters, pending: usize) {
     println!(
         "\n{received} bytes = {framed} in {frames} frames + {skipped} in {gaps} gaps + {pending} pending"
     );
-}
-
-fn ikeya_line(packet: Packet<'_>) -> Line {
-    match packet {
-        Packet::Request(Request::Read(it)) => {
-            (it.as_bytes().len(), "READ", format!("node {}: status request", it.id()))
-        }
-        Packet::Request(Request::Write(it)) => {
-            let (rps, to) = (it.as_velocity(), it.as_position());
-            let meaning = format!(
-                "node {}: turn at {rps} rps, or go to {:.4} turns, depending on its mode",
-                it.id(),
-                to.revolutions()
-            );
-            (it.as_bytes().len(), "WRITE", meaning)
-        }
-        Packet::Response(Response::Velocity(it)) => {
-            let rps = it.rps();
-            let meaning = match Rps::new(rps) {
-                Ok(speed) => format!("node {}: {rps} rps = {:.1} rpm", it.id(), speed.rpm()),
-                Err(error) => format!("node {}: {error}", it.id()),
-            };
-            (it.as_bytes().len(), "velocity", meaning)
-        }
-        Packet::Response(Response::Position(it)) => {
-            let at = it.position();
-            let meaning =
-                format!("node {}: {} counts = {:.4} turns", it.id(), at.counts(), at.revolutions());
-            (it.as_bytes().len(), "position", meaning)
-        }
-    }
-}
-
-fn ucp_line(frame: &ucp::Frame) -> Line {
-    let (name, meaning) = match frame.message() {
-        Message::Ping(_) => ("ping", "keep-alive".into()),
-        Message::Pong(it) => ("pong", format!("{:?}", it.err())),
-        Message::MotorControl(it) => {
-            let lamp = if it.front_led() == 0 { "off" } else { "on" };
-            let meaning = format!("speed {} %, angular {}, lamp {lamp}", it.speed(), it.angular());
-            ("motor control", meaning)
-        }
-        Message::CalibrationStart(it) => ("calibration start", format!("{:?}", it.kind())),
-        Message::CalibrationStartAck(it) => {
-            ("calibration start ack", format!("{:?}, {:?}", it.kind(), it.err()))
-        }
-        Message::CalibrationEnd(it) => ("calibration end", format!("{:?}", it.kind())),
-        Message::CalibrationEndAck(it) => {
-            ("calibration end ack", format!("{:?}, {:?}", it.kind(), it.err()))
-        }
-        Message::Report(it) => {
-            let values = it.telemetry();
-            let battery = values.battery().map_or("? ".into(), |percent| format!("{percent} "));
-            let meaning = format!(
-                "#{} battery {battery}%, {:.1} V, {:.2} A, heading {}°, rpm {:?}, acc {:.2?} g",
-                frame.index(),
-                values.volts(),
-                values.amperes(),
-                values.heading_deg,
-                values.rpm,
-                values.acc_g()
-            );
-            ("report", meaning)
-        }
-        Message::ImuBias(it) => ("IMU bias", format!("acc {:?}, gyro {:?}", it.acc(), it.gyro())),
-        Message::ImuBiasAck(it) => ("IMU bias ack", format!("{:?}", it.err())),
-        Message::MagBias(it) => ("magnetometer bias", format!("{:?}", it.mag())),
-        Message::MagBiasAck(it) => ("magnetometer bias ack", format!("{:?}", it.err())),
-        Message::BiasRequest(_) => ("bias request", "the robot has just booted".into()),
-        Message::Biases(it) => {
-            let meaning = format!(
-                "acc {:?}, gyro {:?}, mag {:?}",
-                it.imu().acc(),
-                it.imu().gyro(),
-                it.mag().mag()
-            );
-            ("biases", meaning)
-        }
-        Message::OtaRequest(it) => ("OTA request", format!("version {}", it.version())),
-        Message::OtaAck(it) => ("OTA ack", format!("{:?}", it.status())),
-        Message::SetNetworkState(it) => ("network state", format!("{:?}", it.state())),
-        Message::SetNetworkStateWide(it) => {
-            ("network state", format!("{:?}, in four bytes", it.state()))
-        }
-        Message::Unknown(it) => {
-            ("unknown", format!("id {:#04x}, {} bytes of body", it.id, it.body.len()))
-        }
-        other => ("new to this tour", format!("{other:?}")),
-    };
-    (frame.as_bytes().len(), name, meaning)
 }
 
 fn show(name: &str, bytes: &[u8]) {

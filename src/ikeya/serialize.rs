@@ -22,8 +22,8 @@ struct Parts<'a> {
 
 macro_rules! serialized {
     ($($protocol:literal: $($packet:ident),+;)+) => {$($(
-        /// A map: `length`, `protocol`, `message`, `node`, the values, and `bytes`: the whole packet
-        /// in lower-case hex digits. The page `fields` describes each.
+        /// A map: `length`, `protocol`, `message`, `node`, the values, and `bytes`: the whole
+        /// packet in lower-case hex digits. The page `fields` describes each.
         impl Serialize for $packet<'_> {
             fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 Parts {

@@ -3,6 +3,7 @@
 //! Packets are printed by the hundred thousand, and core's formatting machinery costs more than
 //! the numbers themselves. The writers here give the same text as core, which tests prove for each.
 
+#[cfg(any(feature = "serde", feature = "ucp"))]
 mod hex;
 mod line;
 #[cfg(feature = "ikeya")]
@@ -10,6 +11,7 @@ mod shortest;
 #[cfg(all(test, feature = "std"))]
 mod tests;
 
+#[cfg(any(feature = "serde", feature = "ucp"))]
 pub(crate) use hex::Hex;
 pub(crate) use line::Line;
 #[cfg(feature = "ikeya")]

@@ -1,9 +1,9 @@
 //! The shortest decimal number that reads back as the same `f32`, as core's `{:?}` prints it.
 //!
 //! The method is Raffaello Giulietti's Schubfach: of the decimal numbers between the two halfway
-//! points around a float, take the one with the fewest digits, the nearest if there are several. It
-//! needs one product of 64 and 32 bits for the float and for each halfway point. A test compares all
-//! 2^32 floats with core.
+//! points around a float, take the one with the fewest digits, the nearest if there are several.
+//! The float and each halfway point take one product of 64 and 32 bits. A test compares all 2^32
+//! floats with core.
 
 use super::line::Line;
 
@@ -30,12 +30,14 @@ impl Shortest {
         if value.is_infinite() {
             return line.text("inf");
         }
+        if value == 0.0 {
+            return line.text("0.0");
+        }
         let Decimal { digits, exponent } = Decimal::shortest(value.abs());
         let count = digits.checked_ilog10().map_or(1, |log| log as i32 + 1);
         // Position of the point behind the first digit.
         let point = count + exponent;
         match point {
-            _ if value == 0.0 => line.text("0.0"),
             -3..=0 => {
                 line.text("0.");
                 line.text(zeros(-point));
@@ -83,7 +85,7 @@ struct Decimal {
 }
 
 impl Decimal {
-    /// The shortest decimal number for `value`, which is finite and not negative.
+    /// The shortest decimal number for `value`, which is finite and positive.
     fn shortest(value: f32) -> Self {
         let fraction = value.to_bits() & ((1 << SIGNIFICAND_BITS) - 1);
         let biased = (value.to_bits() >> SIGNIFICAND_BITS) as i32;
@@ -132,7 +134,7 @@ impl Decimal {
     }
 
     fn without_zeros(mut self) -> Self {
-        while self.digits != 0 && self.digits % 10 == 0 {
+        while self.digits != 0 && self.digits.is_multiple_of(10) {
             self.digits /= 10;
             self.exponent += 1;
         }
@@ -140,8 +142,8 @@ impl Decimal {
     }
 }
 
-/// `factor` · `quarters` / 2^64, rounded to odd: the last bit is set if anything was cut off, so that
-/// comparing the result is as good as comparing the whole product.
+/// `factor` · `quarters` / 2^64, rounded to odd: the last bit is set if anything was cut off, so
+/// that comparing the result is as good as comparing the whole product.
 #[inline(always)]
 fn product(factor: u64, quarters: u32) -> u32 {
     let product = u128::from(factor) * u128::from(quarters);

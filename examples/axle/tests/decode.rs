@@ -15,7 +15,7 @@ use axlewire::{
     ucp::{Body, message::Ping},
 };
 use serde_json::{Value, json};
-use support::{Capture, axle, bytes, decode, file, run, run_in_pieces, stdout};
+use support::{Capture, axle, bytes, decode, file, run, run_in_pieces, skipped_by, stdout};
 
 /// Frames of running implementations, and their meaning.
 fn vectors(name: &str) -> Vec<Value> {
@@ -67,7 +67,7 @@ fn ucp_frames_say_what_running_implementations_mean() {
         let length = fields["len"].as_u64().unwrap() + 4;
         let mut expected = json!({
             "event": "frame", "offset": 0, "length": length, "protocol": "ucp",
-            "message": message(fields),
+            "message": message(fields), "bytes": &hex(&vector)[..2 * length as usize],
         });
         for (name, value) in fields.as_object().unwrap() {
             match (&**name, value.as_str()) {
@@ -112,10 +112,15 @@ fn ikeya_packets_say_what_running_implementations_mean() {
         };
         if !reason.is_empty() {
             refused += 1;
-            let gap = json!({
+            let mut gap = json!({
                 "event": "skipped", "offset": 0, "length": input.len(), "reason": reason,
             });
+            // Header bytes inside it fail as well, or are cut off by the end.
+            if let Some(reasons) = events[0].get("reasons") {
+                gap["reasons"] = reasons.clone();
+            }
             assert_eq!(events, [gap], "{vector}");
+            assert_eq!(skipped_by(&events), summary["skipped_by"]);
             assert_eq!(summary["skipped"], input.len());
             continue;
         }
@@ -129,7 +134,7 @@ fn ikeya_packets_say_what_running_implementations_mean() {
         };
         let has = json!({
             "event": "frame", "offset": 0, "length": input.len(), "protocol": protocol,
-            "message": name, "node": id,
+            "message": name, "node": id, "bytes": hex(&vector),
         });
         for (field, value) in has.as_object().unwrap() {
             assert_eq!(&frame[field], value, "{field} of {vector}");
@@ -145,10 +150,10 @@ fn ikeya_packets_say_what_running_implementations_mean() {
         let payload = (name == "write").then(|| &hex(&vector)[4..hex(&vector).len() - 4]);
         assert_eq!(frame["payload"].as_str(), payload);
         let keys = match name {
-            "read_request" => 6,
-            "velocity_response" => 7,
-            "position_response" => 8,
-            _ => 10,
+            "read_request" => 7,
+            "velocity_response" => 8,
+            "position_response" => 9,
+            _ => 11,
         };
         assert_eq!(frame.as_object().unwrap().len(), keys, "{frame}");
     }
@@ -180,7 +185,7 @@ fn a_speed_has_no_more_digits_than_it_needs() {
     let listing = stdout(run(&["decode", "--protocol", "ikeya", "--json"], packet.as_bytes()));
     assert_eq!(
         listing.lines().next().unwrap(),
-        r#"{"event":"frame","offset":0,"length":8,"protocol":"ikeya","message":"velocity_response","node":1,"rps":0.1}"#
+        r#"{"event":"frame","offset":0,"length":8,"protocol":"ikeya","message":"velocity_response","node":1,"rps":0.1,"bytes":"5501cdcccc3d5b9c"}"#
     );
 }
 
@@ -240,7 +245,7 @@ fn events_tile_the_input_and_add_up() {
             summary,
             json!({
                 "event": "summary", "received": end, "framed": framed, "skipped": skipped,
-                "pending": 0, "frames": frames,
+                "pending": 0, "frames": frames, "skipped_by": skipped_by(&events),
             })
         );
     }
@@ -268,15 +273,23 @@ fn a_frame_behind_a_false_header_at_the_end_is_not_lost() {
     assert_eq!(
         events,
         [
-            json!({"event": "skipped", "offset": 0, "length": 8, "reason": "idle"}),
+            // Two gaps, printed as one.
+            json!({
+                "event": "skipped", "offset": 0, "length": 8, "reason": "idle",
+                "reasons": {"idle": 2, "header": 6},
+            }),
             json!({
                 "event": "frame", "offset": 8, "length": 8, "protocol": "ucp",
-                "message": "ping", "id": 1, "index": 0,
+                "message": "ping", "id": 1, "index": 0, "bytes": "fdff040001000142",
             }),
-            json!({"event": "skipped", "offset": 16, "length": 4, "reason": "idle"}),
+            json!({
+                "event": "skipped", "offset": 16, "length": 4, "reason": "idle",
+                "reasons": {"idle": 1, "header": 3},
+            }),
         ]
     );
     assert_eq!((&summary["pending"], &summary["skipped"]), (&json!(0), &json!(12)));
+    assert_eq!(summary["skipped_by"], json!({"idle": 3, "header": 9}));
 }
 
 #[test]
@@ -298,6 +311,7 @@ fn chunk_boundaries_change_nothing() {
     }
     assert_eq!(found.len(), capture.events.len());
     assert_eq!(summary["received"], capture.bytes.len());
+    assert_eq!(summary["skipped_by"], skipped_by(&capture.events));
 }
 
 #[test]
@@ -331,7 +345,7 @@ fn a_live_line_is_listed_as_it_speaks() {
     for index in 0..3 {
         line.write_all(Ping {}.frame(index).as_bytes()).unwrap();
         let event = listing.recv_timeout(Duration::from_secs(10)).unwrap();
-        assert!(event.ends_with(&format!(r#""index":{index}}}"#)), "{event}");
+        assert!(event.contains(&format!(r#""index":{index},"#)), "{event}");
     }
     drop(line);
     assert!(listing.recv().unwrap().contains("summary"));
@@ -351,7 +365,7 @@ fn an_empty_input_is_all_zeros() {
         summary,
         json!({
             "event": "summary", "received": 0, "framed": 0, "skipped": 0, "pending": 0,
-            "frames": 0,
+            "frames": 0, "skipped_by": {},
         })
     );
 }

@@ -30,8 +30,12 @@ pub(super) fn gap(out: &mut Out, at: Place, gap: &SkippedBytes) {
     out.number(gap.length);
     out.text(r#","reason":""#);
     out.text(gap.reason.name());
-    out.text(r#"","reasons":"#);
-    reasons(out, &gap.account);
+    out.text("\"");
+    // If it is the only one, that says all.
+    if gap.account.skipped_for(gap.reason) < gap.length {
+        out.text(r#","reasons":"#);
+        reasons(out, &gap.account);
+    }
     out.text("}\n");
 }
 

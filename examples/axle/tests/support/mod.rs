@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 pub(crate) mod process;
+pub(crate) mod schema;
 
 use std::{
     fs,
@@ -15,7 +16,7 @@ use axlewire::{
     encode::Encode,
     ucp::{Body, MotorControl, RawFrame, message::Ping},
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// The tool with these arguments.
 pub(crate) fn axle(args: &[&str]) -> Command {
@@ -67,6 +68,26 @@ pub(crate) fn decode(args: &[&str], input: &[u8]) -> (Vec<Value>, Value) {
     events(&stdout(run(&args, input)))
 }
 
+/// Skipped bytes by reason in all gaps among `events`.
+pub(crate) fn skipped_by(events: &[Value]) -> Value {
+    let mut all = Map::new();
+    for event in events.iter().filter(|event| event["event"] == "skipped") {
+        let reason = event["reason"].as_str().unwrap();
+        let of_one = Map::from_iter([(reason.to_owned(), event["length"].clone())]);
+        let reasons = event.get("reasons").map_or(&of_one, |reasons| reasons.as_object().unwrap());
+        assert!(event.get("reasons").is_none() || reasons.len() > 1, "{event}");
+        let bytes = |reasons: &Map<String, Value>| -> u64 {
+            reasons.values().map(|bytes| bytes.as_u64().unwrap()).sum()
+        };
+        assert_eq!(event["length"], bytes(reasons), "{event}");
+        for (reason, bytes) in reasons {
+            let so_far = all.get(reason).and_then(Value::as_u64).unwrap_or_default();
+            all.insert(reason.clone(), (so_far + bytes.as_u64().unwrap()).into());
+        }
+    }
+    all.into()
+}
+
 /// A file with these bytes in the build directory.
 pub(crate) fn file(name: &str, bytes: &[u8]) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -86,6 +107,8 @@ pub(crate) fn bytes(hex: &str) -> Vec<u8> {
 pub(crate) struct Capture {
     pub(crate) bytes: Vec<u8>,
     pub(crate) events: Vec<Value>,
+    /// Skipped bytes by reason in the gap at the end.
+    headers_and_crcs: [usize; 2],
 }
 
 impl Capture {
@@ -141,6 +164,8 @@ impl Capture {
         event["protocol"] = "ucp".into();
         event["offset"] = self.bytes.len().into();
         event["length"] = frame.len().into();
+        event["bytes"] = frame.iter().map(|byte| format!("{byte:02x}")).collect::<String>().into();
+        self.headers_and_crcs = [0; 2];
         self.events.push(event);
         self.bytes.extend(frame);
     }
@@ -157,6 +182,13 @@ impl Capture {
             })),
         }
         self.bytes.extend(bytes);
+        let [headers, crcs] = &mut self.headers_and_crcs;
+        let damaged = usize::from(reason == "crc");
+        *headers += bytes.len() - damaged;
+        *crcs += damaged;
+        if let (1.., 1.., Some(event)) = (*headers, *crcs, self.events.last_mut()) {
+            event["reasons"] = json!({"header": headers, "crc": crcs});
+        }
     }
 }
 

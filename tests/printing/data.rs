@@ -1,0 +1,136 @@
+//! Packets and messages as data: the fields of `axle decode --json`, and the bytes.
+#![cfg(feature = "serde")]
+
+use axlewire::{
+    ikeya::{
+        NodeId, Packet, Position, PositionResponse, ReadRequest, Request, Response, Rps, Status,
+        VelocityResponse, WriteRequest, board::ThreeMotors, three,
+    },
+    stream::{Gap, Reason},
+    ucp::{
+        Body, Frame, MotorControl, Telemetry,
+        message::{FirmwareReport, Ping},
+    },
+};
+use serde_json::{Value, json, to_string, to_value};
+
+use super::ucp::{each_kind, frame};
+
+#[test]
+fn a_frame_has_its_fields_in_order_and_its_bytes() {
+    let telemetry = Telemetry {
+        battery_pct: 87,
+        rpm: [1, -2, 3, -4],
+        acc: [5, 6, 7],
+        gyro: [8, 9, 10],
+        mag: [11, 12, 13],
+        heading_deg: 180,
+        power_w: 6,
+        voltage_dv: 119,
+        current_ca: 55,
+    };
+    let sent = FirmwareReport::new(&telemetry, 38).frame(3);
+    let hex: String = sent.as_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
+    let expected = r#"{"length":44,"protocol":"ucp","message":"report","id":5,"index":3,"layout":"firmware","battery_pct":87,"rpm":[1,-2,3,-4],"acc":[5,6,7],"gyro":[8,9,10],"mag":[11,12,13],"heading":180,"power_w":6,"voltage_dv":119,"current_ca":55,"version":38,"bytes":"HEX"}"#;
+    assert_eq!(
+        to_string(Frame::parse(sent.as_bytes()).unwrap()).unwrap(),
+        expected.replace("HEX", &hex)
+    );
+}
+
+#[test]
+fn a_message_alone_has_its_name_its_id_and_its_fields() {
+    each_kind(|message, id, name, _| {
+        let data = to_value(message).unwrap();
+        assert_eq!((&data["message"], &data["id"]), (&json!(name), &json!(id)));
+        assert!(data.get("bytes").is_none() && data.get("index").is_none());
+    });
+    let command = MotorControl::new(-60, 20).unwrap().into();
+    assert_eq!(
+        to_value(axlewire::ucp::Message::MotorControl(&command)).unwrap(),
+        json!({
+            "message": "motor_control", "id": 2, "speed": -60, "angular": 20, "front_led": 0,
+            "back_led": 0, "version": 0, "reserve1": 0, "reserve2": 0,
+        })
+    );
+}
+
+#[test]
+fn the_longest_frame_has_all_its_bytes() {
+    let body: Vec<u8> = (0..248).collect();
+    let bytes = frame(0x20, 1, &body);
+    let data = to_value(Frame::parse(&bytes).unwrap()).unwrap();
+    let hex = |bytes: &[u8]| -> String { bytes.iter().map(|byte| format!("{byte:02x}")).collect() };
+    assert_eq!((&data["body"], &data["bytes"]), (&json!(hex(&body)), &json!(hex(&bytes))));
+    assert_eq!(data["length"], 256);
+}
+
+#[test]
+fn packets_have_their_node_their_values_and_their_bytes() {
+    let (rps, position) = (Rps::new(-0.5).unwrap(), Position::new(4096, 1));
+    let read = ReadRequest::new(NodeId::N1);
+    assert_eq!(
+        to_string(&Request::Read(&read)).unwrap(),
+        r#"{"length":4,"protocol":"ikeya","message":"read_request","node":1,"bytes":"aa01bed0"}"#
+    );
+    let write = WriteRequest::velocity(NodeId::N1, rps);
+    let text = r#"{"length":8,"protocol":"ikeya","message":"write","node":1,"rps":-0.5,"count":0,"rotation":-16640,"payload":"000000bf","bytes":"bb01000000bf6720"}"#;
+    assert_eq!(to_string(&Request::Write(&write)).unwrap(), text);
+    assert_eq!(to_string(&Packet::Request(Request::Write(&write))).unwrap(), text);
+    let at = PositionResponse::new(NodeId::N3, position);
+    assert_eq!(
+        to_string(&Response::Position(&at)).unwrap(),
+        r#"{"length":8,"protocol":"ikeya","message":"position_response","node":3,"count":4096,"rotation":1,"bytes":"5603001001004878"}"#
+    );
+}
+
+#[test]
+fn three_motors_have_three_values() {
+    let (rps, position) = (Rps::new(1.5).unwrap(), Position::new(4096, 1));
+    let write = three::WriteRequest::position(NodeId::N5, [position; 3]);
+    let data = to_value(three::Request::Write(&write)).unwrap();
+    assert_eq!(data["protocol"], "ikeya-3");
+    assert_eq!(
+        (&data["count"], &data["rotation"]),
+        (&json!([4096, 4096, 4096]), &json!([1, 1, 1]))
+    );
+    assert_eq!(data["payload"], "001000100010010001000100");
+    assert_eq!(data["rps"].as_array().map(Vec::len), Some(3));
+    let velocity = three::VelocityResponse::new(NodeId::N5, [rps; 3]);
+    let data = to_value(three::Packet::Response(three::Response::Velocity(&velocity))).unwrap();
+    assert_eq!(data["rps"], json!([1.5, 1.5, 1.5]));
+    let read = ReadRequest::new(NodeId::N1);
+    assert_eq!(to_value(three::Request::Read(&read)).unwrap()["protocol"], "ikeya-3");
+}
+
+#[test]
+fn a_speed_that_is_no_number_is_a_string() {
+    let speed = |bits: [u8; 4]| -> Value {
+        let mut packet = [0x55, 1, bits[0], bits[1], bits[2], bits[3], 0, 0];
+        let crc = axlewire::crc16::compute(&packet[..6]).to_le_bytes();
+        packet[6..].copy_from_slice(&crc);
+        let response = VelocityResponse::parse(&packet).unwrap();
+        to_value(Response::Velocity(response)).unwrap()["rps"].clone()
+    };
+    assert_eq!(speed(f32::NAN.to_le_bytes()), "nan");
+    assert_eq!(speed(f32::INFINITY.to_le_bytes()), "inf");
+    assert_eq!(speed(f32::NEG_INFINITY.to_le_bytes()), "-inf");
+    assert_eq!(speed((-0.0f32).to_le_bytes()), -0.0);
+}
+
+#[test]
+fn a_status_has_the_values_of_its_response() {
+    let status: Status = Status::Velocity(1.5);
+    assert_eq!(to_value(status).unwrap(), json!({"rps": 1.5}));
+    let status: Status<ThreeMotors> = Status::Position([Position::new(1, 2); 3]);
+    assert_eq!(to_value(status).unwrap(), json!({"count": [1, 1, 1], "rotation": [2, 2, 2]}));
+}
+
+#[test]
+fn a_gap_has_its_length_and_its_reason() {
+    let gap = Gap { len: 3, reason: Reason::Crc };
+    let text = r#"{"length":3,"reason":"crc"}"#;
+    assert_eq!(to_string(&gap).unwrap(), text);
+    assert_eq!(serde_json::from_str::<Gap>(text).unwrap(), gap);
+    assert!(to_value(Frame::parse(Ping {}.frame(0).as_bytes()).unwrap()).is_ok());
+}
