@@ -1,6 +1,11 @@
 //! Arguments shared by several subcommands, and their validation.
 
-use axlewire::ikeya::{NodeId, Position, Rps};
+use std::path::PathBuf;
+
+use axlewire::{
+    ikeya::{self, NodeId, Position, Rps},
+    ucp,
+};
 use clap::ValueEnum;
 
 /// The port of a subcommand.
@@ -14,6 +19,10 @@ pub(crate) struct PortArgs {
     /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
     #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) baud: Option<u32>,
+
+    /// Record what is sent and received, as pcapng
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
 }
 
 /// Protocol of a line.
@@ -35,6 +44,14 @@ impl Protocol {
             Self::Ucp => "ucp",
             Self::Ikeya => "ikeya",
             Self::Ikeya3 => "ikeya-3",
+        }
+    }
+
+    /// Speed of its lines, bit/s, unless they are set to another.
+    pub(crate) const fn default_baud(self) -> u32 {
+        match self {
+            Self::Ucp => ucp::BAUD,
+            Self::Ikeya | Self::Ikeya3 => ikeya::BAUD,
         }
     }
 

@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use crate::{
-    args,
+    args::{self, Protocol},
     failure::Failure,
     line::Line,
     session::Session,
@@ -111,7 +111,7 @@ impl<B: Boards> Bus<B> {
     }
 
     pub(crate) fn open_with(args: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
-        let line = Line::open(args, ikeya::BAUD)?;
+        let line = Line::open(args, B::PROTOCOL)?;
         let config = complete(config, args, &line);
         Ok(Self::new(line, config))
     }
@@ -161,6 +161,11 @@ impl<B: Boards> Bus<B> {
 
     pub(crate) fn path(&self) -> &str {
         self.session.path()
+    }
+
+    /// The failure of the recording, if there is one that is incomplete.
+    pub(crate) fn check_recording(&self) -> Result<(), Failure> {
+        self.session.check_recording()
     }
 
     pub(crate) const fn master(&self) -> &Master<B> {
@@ -297,6 +302,8 @@ impl<B: Boards> Bus<B> {
 
 /// Boards whose status can be printed.
 pub(crate) trait Boards: Board {
+    const PROTOCOL: Protocol;
+
     fn describe(status: Status<Self>) -> String;
 
     /// The positions of its motors, in position mode.
@@ -304,6 +311,8 @@ pub(crate) trait Boards: Board {
 }
 
 impl Boards for OneMotor {
+    const PROTOCOL: Protocol = Protocol::Ikeya;
+
     fn describe(status: Status<Self>) -> String {
         match status {
             Status::Velocity(rps) => format!("{rps:.2} rps"),
@@ -320,6 +329,8 @@ impl Boards for OneMotor {
 }
 
 impl Boards for ThreeMotors {
+    const PROTOCOL: Protocol = Protocol::Ikeya3;
+
     fn describe(status: Status<Self>) -> String {
         match status {
             Status::Velocity([a, b, c]) => format!("{a:.2} {b:.2} {c:.2} rps"),

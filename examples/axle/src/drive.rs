@@ -84,9 +84,10 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     // turn is the most serious one.
     let stopped = drive.stop();
     let told = drive.teller.finish();
+    let recorded = drive.rover.check_recording();
     stopped?;
     driven.map_err(|failure| failure.and("it was stopped and is at rest"))?;
-    told
+    told.and(recorded)
 }
 
 struct Drive {

@@ -2,10 +2,9 @@
 
 use std::{
     collections::VecDeque,
-    fs::File,
-    io::{self, IsTerminal, Seek, Write},
+    io::{self, Write},
     path::{Path, PathBuf},
-    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+    time::{Duration, Instant},
 };
 
 use axlewire::{
@@ -17,10 +16,11 @@ use axlewire::{
 use crate::{
     EXIT_CODES,
     args::{self, Protocol},
+    decode::BUFFER_LEN,
     failure::Failure,
     line::Line,
     listing::{self, Shown},
-    pcapng::{Direction, Writer},
+    pcapng::{Direction, Recording},
     signals::Signals,
 };
 
@@ -36,8 +36,13 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    #[command(flatten)]
-    line: args::PortArgs,
+    /// The serial port, such as /dev/ttyUSB0 or COM3; or tcp:HOST:PORT
+    #[arg(short, long, value_name = "PATH")]
+    port: String,
+
+    /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
+    #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
+    baud: Option<u32>,
 
     /// Protocol of the line
     #[arg(short = 'P', long, value_enum)]
@@ -65,22 +70,22 @@ const QUIET: Duration = Duration::from_millis(30);
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match args.protocol {
-        Protocol::Ucp => record::<ucp::Ucp>(args, ucp::BAUD),
-        Protocol::Ikeya => record::<ikeya::BothDirections>(args, ikeya::BAUD),
-        Protocol::Ikeya3 => record::<three::BothDirections>(args, ikeya::BAUD),
+        Protocol::Ucp => record::<ucp::Ucp>(args),
+        Protocol::Ikeya => record::<ikeya::BothDirections>(args),
+        Protocol::Ikeya3 => record::<three::BothDirections>(args),
     }
 }
 
-fn record<F>(args: &Args, default_baud: u32) -> Result<(), Failure>
+fn record<F>(args: &Args) -> Result<(), Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
     let signals = Signals::listen()?;
-    let mut line = Line::open(&args.line, default_baud)?;
-    let baud = args.line.baud.unwrap_or(default_baud);
-    let mut recording =
-        Recording::<F>::create(&args.output, args.force, args.protocol, line.path(), baud)?;
+    let baud = args.baud.unwrap_or(args.protocol.default_baud());
+    let mut line = Line::connect(&args.port, baud)?;
+    let file = Recording::create(&args.output, args.force, args.protocol, line.path(), baud)?;
+    let mut frames = Frames::<F>::new(file);
     let start = Instant::now();
     let end = args.micros.map(|micros| start + Duration::from_micros(micros));
     let mut buffer = [0; 4096];
@@ -91,12 +96,12 @@ where
         }
         let patience = end.map_or(PATIENCE, |end| PATIENCE.min(end - now));
         match line.receive(&mut buffer, patience) {
-            Ok(bytes) => recording.take(bytes, Some(Direction::In))?,
+            Ok(bytes) => frames.take(bytes)?,
             Err(failure) => break Err(failure),
         }
     };
-    let account = recording.finish()?;
-    if args.output != Path::new("-") || io::stdout().is_terminal() {
+    let account = frames.finish()?;
+    if args.output != Path::new("-") {
         let mut out = io::stdout().lock();
         let told = listing::print_summary(&mut out, &account, 0, false);
         told.and_then(|()| out.flush()).map_err(Failure::Write)?;
@@ -104,141 +109,80 @@ where
     broken
 }
 
-/// A growing file, and the frames in it.
-struct Recording<F> {
-    writer: Writer<Output>,
-    path: PathBuf,
-    decoder: Decoder<F, { crate::decode::BUFFER_LEN }>,
-    /// Bytes received and not written yet, each chunk with its time.
+/// Cuts what is received into frames and the bytes between them, a packet each.
+struct Frames<F> {
+    file: Recording,
+    decoder: Decoder<F, BUFFER_LEN>,
+    /// Bytes received and not written yet, and the end and the time of each chunk of them.
     unwritten: VecDeque<u8>,
     chunks: VecDeque<(u64, u64)>,
-    /// Bytes written so far.
+    /// Number of bytes written so far.
     written: u64,
-    packets: u64,
     heard_at: Instant,
-    /// The same moment on both clocks: the system's may be set while we record.
-    start: (Instant, SystemTime),
 }
 
-/// A file or standard output.
-enum Output {
-    File(File),
-    Stdout(io::Stdout),
-}
-
-impl Write for Output {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::File(file) => file.write(bytes),
-            Self::Stdout(stdout) => stdout.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::File(file) => file.flush(),
-            Self::Stdout(stdout) => stdout.flush(),
-        }
-    }
-}
-
-impl<F> Recording<F>
+impl<F> Frames<F>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    fn create(
-        path: &Path,
-        force: bool,
-        protocol: Protocol,
-        port: &str,
-        baud: u32,
-    ) -> Result<Self, Failure> {
-        let cannot = |error: io::Error| {
-            let hint = match error.kind() {
-                io::ErrorKind::AlreadyExists => ": use --force to overwrite it",
-                _ => "",
-            };
-            Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
-        };
-        let output = if path == Path::new("-") {
-            if io::stdout().is_terminal() {
-                let line = "a recording is not text: use -o FILE, or pipe it";
-                return Err(Failure::Usage(line.to_owned()));
-            }
-            Output::Stdout(io::stdout())
-        } else {
-            let mut options = File::options();
-            options.write(true).create(true).truncate(true).create_new(!force);
-            Output::File(options.open(path).map_err(cannot)?)
-        };
-        let writer = Writer::new(output, protocol, port, baud).map_err(cannot)?;
-        let now = Instant::now();
-        Ok(Self {
-            writer,
-            path: path.to_owned(),
+    fn new(file: Recording) -> Self {
+        Self {
+            file,
             decoder: Decoder::new(),
             unwritten: VecDeque::new(),
             chunks: VecDeque::new(),
             written: 0,
-            packets: 0,
-            heard_at: now,
-            start: (now, SystemTime::now()),
-        })
+            heard_at: Instant::now(),
+        }
     }
 
     /// Takes in what has just been received, possibly nothing, and writes all that is decided.
-    fn take(&mut self, bytes: &[u8], direction: Option<Direction>) -> Result<(), Failure> {
-        let now = Instant::now();
+    fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         if bytes.is_empty() {
-            if now >= self.heard_at + QUIET && self.decoder.pending() > 0 {
+            if self.heard_at.elapsed() >= QUIET && self.decoder.pending() > 0 {
                 self.decoder.idle();
-                return self.write(&[], direction);
+                return self.write(&[]);
             }
             return Ok(());
         }
-        self.heard_at = now;
-        let time = self.start.1 + (now - self.start.0);
-        let micros = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64);
-        self.chunks.push_back((self.decoder.received() + bytes.len() as u64, micros));
+        self.heard_at = Instant::now();
+        let end = self.decoder.received() + bytes.len() as u64;
+        self.chunks.push_back((end, self.file.micros()));
         self.unwritten.extend(bytes);
-        self.write(bytes, direction)
+        self.write(bytes)
     }
 
-    /// Writes each frame in `bytes`, and the bytes between frames as soon as they are decided.
-    fn write(&mut self, bytes: &[u8], direction: Option<Direction>) -> Result<(), Failure> {
-        let mut input = bytes;
-        let mut frames = VecDeque::new();
+    /// Writes each frame that `bytes` complete, and the bytes between frames as soon as they are
+    /// decided.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let (mut input, mut frames) = (bytes, Vec::new());
         let mut next = self.written;
         while let Some(event) = self.decoder.decode(&mut input) {
-            let len = match event {
-                Event::Frame(frame) => {
-                    let len = frame.bytes().len() as u64;
-                    frames.push_back((next, len));
-                    len
-                }
-                // Part of it may be written already.
-                Event::Skipped(_) => {
-                    let decided = self.decoder.counters();
-                    next = decided.framed + decided.skipped();
-                    continue;
-                }
-            };
-            next += len;
+            if let Event::Frame(frame) = event {
+                let len = frame.bytes().len() as u64;
+                frames.push((next, len));
+                next += len;
+                continue;
+            }
+            // Part of the gap may have been written already.
+            let decided = self.decoder.counters();
+            next = decided.framed + decided.skipped();
         }
-        while let Some((at, len)) = frames.pop_front() {
-            self.packet(at - self.written, direction)?;
-            self.packet(len, direction)?;
+        for (at, len) in frames {
+            self.packet(at - self.written);
+            self.packet(len);
         }
         let decided = self.decoder.received() - self.decoder.pending() as u64;
-        self.packet(decided - self.written, direction)?;
-        self.flush()
+        self.packet(decided - self.written);
+        self.file.flush();
+        self.file.check()
     }
 
     /// Writes the next `len` bytes, with the time of the last.
-    fn packet(&mut self, len: u64, direction: Option<Direction>) -> Result<(), Failure> {
+    fn packet(&mut self, len: u64) {
         if len == 0 {
-            return Ok(());
+            return;
         }
         self.written += len;
         while self.chunks.front().is_some_and(|(end, _)| *end < self.written) {
@@ -246,42 +190,14 @@ where
         }
         let micros = self.chunks.front().map_or(0, |(_, micros)| *micros);
         let bytes: Vec<u8> = self.unwritten.drain(..len as usize).collect();
-        let good = match self.writer.get_mut() {
-            Output::File(file) => file.stream_position().ok(),
-            Output::Stdout(_) => None,
-        };
-        let result = self.writer.packet(micros, direction, &bytes);
-        if result.is_err()
-            && let (Output::File(file), Some(good)) = (self.writer.get_mut(), good)
-        {
-            // The beginning of a packet would make the file invalid. A full disk permits this.
-            let _ = file.set_len(good);
-        }
-        result.map_err(|error| self.failure(&error))?;
-        self.packets += 1;
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<(), Failure> {
-        let flushed = self.writer.get_mut().flush();
-        flushed.map_err(|error| self.failure(&error))
-    }
-
-    fn failure(&self, error: &io::Error) -> Failure {
-        let (path, packets) = (&self.path, self.packets);
-        if path == Path::new("-") {
-            return Failure::Write(io::Error::new(error.kind(), error.to_string()));
-        }
-        Failure::Failed(format!(
-            "cannot write {path:?}: {error}; the {packets} packets in it are complete"
-        ))
+        self.file.packet(micros, Some(Direction::In), &bytes);
     }
 
     /// Writes what is left; returns the account.
     fn finish(mut self) -> Result<Counters, Failure> {
         loop {
             self.decoder.idle();
-            self.write(&[], Some(Direction::In))?;
+            self.write(&[])?;
             if self.decoder.pending() == 0 {
                 return Ok(self.decoder.counters());
             }

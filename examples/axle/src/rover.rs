@@ -47,7 +47,7 @@ pub(crate) struct Rover {
 
 impl Rover {
     pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
-        let line_open = Line::open(line, ucp::BAUD)?;
+        let line_open = Line::open(line, Protocol::Ucp)?;
         let mut config = HostConfig::default();
         config.baud = line.baud.unwrap_or(ucp::BAUD);
         Ok(Self::new(line_open, config))
@@ -60,6 +60,11 @@ impl Rover {
 
     pub(crate) fn now(&mut self) -> Instant {
         self.session.now()
+    }
+
+    /// The failure of the recording, if there is one that is incomplete.
+    pub(crate) fn check_recording(&self) -> Result<(), Failure> {
+        self.session.check_recording()
     }
 
     pub(crate) const fn host(&self) -> &Host {

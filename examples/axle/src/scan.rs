@@ -76,7 +76,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
     }
     let print = if args.json { print_json } else { print_table };
-    print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)
+    print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)?;
+    bus.check_recording()
 }
 
 /// Ids that have given only damaged answers.

@@ -44,6 +44,11 @@ impl<R: Endpoint> Session<R> {
         self.driver.port().path()
     }
 
+    /// The failure of the recording, if there is one that is incomplete.
+    pub(crate) fn check_recording(&self) -> Result<(), Failure> {
+        self.driver.port().check_recording()
+    }
+
     pub(crate) const fn role(&self) -> &R {
         self.driver.role()
     }

@@ -115,9 +115,10 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     // most serious one.
     let stopped = spin.stop();
     let told = spin.teller.finish();
+    let recorded = spin.bus.check_recording();
     stopped?;
     spun.map_err(|failure| failure.and("it was stopped and is at rest"))?;
-    told
+    told.and(recorded)
 }
 
 /// The target for this node, if it answers and is in the right mode.

@@ -112,7 +112,7 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
     config.nodes = args.node.map_or(NodeSet::ALL, NodeSet::from);
     let nodes = config.nodes;
     let mut bus = Bus::<B>::open_with(&args.line, config)?;
-    let failure = bus.stop(nodes).err();
+    let failure = bus.stop(nodes).and_then(|()| bus.check_recording()).err();
     let mut silent = Vec::new();
     let mut stopped = Stopped {
         path: bus.path().to_owned(),
@@ -147,5 +147,5 @@ fn stop_rover(line: &args::PortArgs) -> Result<(), Failure> {
     if let Some(report) = rover.describe() {
         drop(teller::print(&format!("robot: {report}, stopped")));
     }
-    Ok(())
+    rover.check_recording()
 }

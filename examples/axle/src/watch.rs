@@ -60,18 +60,18 @@ const QUIET: Duration = Duration::from_millis(30);
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     match args.protocol {
-        Protocol::Ucp => watch::<ucp::Ucp>(args, ucp::BAUD, &signals),
-        Protocol::Ikeya => watch::<ikeya::BothDirections>(args, ikeya::BAUD, &signals),
-        Protocol::Ikeya3 => watch::<three::BothDirections>(args, ikeya::BAUD, &signals),
+        Protocol::Ucp => watch::<ucp::Ucp>(args, &signals),
+        Protocol::Ikeya => watch::<ikeya::BothDirections>(args, &signals),
+        Protocol::Ikeya3 => watch::<three::BothDirections>(args, &signals),
     }
 }
 
-fn watch<F>(args: &Args, baud: u32, signals: &Signals) -> Result<(), Failure>
+fn watch<F>(args: &Args, signals: &Signals) -> Result<(), Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    let mut line = Line::open(&args.line, baud)?;
+    let mut line = Line::open(&args.line, args.protocol)?;
     let mut clock = line.clock();
     let mut buffer = [0; 4096];
     let mut out = io::stdout().lock();

@@ -433,7 +433,7 @@ fn people_get_columns_and_units_of_a_motor_bus() {
         12      8  position_response          6  32770.9999 turns (rotation 32767, count 32767)
         20      4  (skipped)                     id: invalid node id
         24      8  velocity_response          2  -3.4028235e38 rps
-        32      8  write                      2  inf rps or 32640.0000 turns (rotation 32640, count 0)
+        32      8  write                      2  inf rps
         40      2  (skipped)                     idle: truncated at the end
 
         42 bytes received

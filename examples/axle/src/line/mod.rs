@@ -15,7 +15,11 @@ use axlewire::{
 };
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
-use crate::{args, failure::Failure};
+use crate::{
+    args::{PortArgs, Protocol},
+    failure::Failure,
+    pcapng::{Direction, Recording},
+};
 use tcp::TcpPort;
 
 /// What may be at the other end of a path.
@@ -37,12 +41,23 @@ pub(crate) struct Line {
     path: Rc<str>,
     /// Whether an answer may come before a line of this speed could have carried it.
     is_instant: bool,
+    recording: Option<Rc<RefCell<Recording>>>,
 }
 
 impl Line {
     /// Opens a port for exclusive use, without the bytes that were received before.
-    pub(crate) fn open(args: &args::PortArgs, default_baud: u32) -> Result<Self, Failure> {
-        let (path, baud) = (&*args.port, args.baud.unwrap_or(default_baud));
+    pub(crate) fn open(args: &PortArgs, protocol: Protocol) -> Result<Self, Failure> {
+        let (path, baud) = (&*args.port, args.baud.unwrap_or(protocol.default_baud()));
+        let mut line = Self::connect(path, baud)?;
+        if let Some(file) = &args.record {
+            let recording = Recording::create(file, false, protocol, path, baud)?;
+            line.recording = Some(Rc::new(RefCell::new(recording)));
+        }
+        Ok(line)
+    }
+
+    /// The same without a recording.
+    pub(crate) fn connect(path: &str, baud: u32) -> Result<Self, Failure> {
         if let Some(address) = path.strip_prefix("tcp:") {
             let refused =
                 |error: io::Error| Failure::Failed(format!("cannot use port {path:?}: {error}"));
@@ -57,7 +72,7 @@ impl Line {
     }
 
     pub(crate) fn new(path: &str, wire: impl Wire + 'static, is_instant: bool) -> Self {
-        Self { wire: Rc::new(RefCell::new(wire)), path: path.into(), is_instant }
+        Self { wire: Rc::new(RefCell::new(wire)), path: path.into(), is_instant, recording: None }
     }
 
     pub(crate) fn path(&self) -> &str {
@@ -81,15 +96,33 @@ impl Line {
         buffer: &'b mut [u8],
         patience: Duration,
     ) -> Result<&'b [u8], Failure> {
-        let mut wire = self.wire.borrow_mut();
-        let count = match wire.wait(patience) {
+        let is_there = self.wire.borrow_mut().wait(patience);
+        let count = match is_there {
             Ok(false) => Ok(0),
-            Ok(true) => wire.read(buffer),
+            Ok(true) => self.read(buffer),
             Err(error) => Err(error),
         };
         match count {
             Ok(count) => Ok(buffer.get(..count).unwrap_or_default()),
             Err(error) => Err(Failure::lost(&self.path, &error.to_string())),
+        }
+    }
+}
+
+impl Line {
+    /// A recording that fails does not keep anything from being sent; what failed is told at the
+    /// end.
+    fn record(&self, direction: Direction, bytes: &[u8]) {
+        if let Some(recording) = &self.recording {
+            recording.borrow_mut().add(direction, bytes);
+        }
+    }
+
+    /// The failure of the recording, if it is incomplete.
+    pub(crate) fn check_recording(&self) -> Result<(), Failure> {
+        match &self.recording {
+            Some(recording) => recording.borrow_mut().check(),
+            None => Ok(()),
         }
     }
 }
@@ -106,13 +139,17 @@ impl ReadReady for Line {
 
 impl Read for Line {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        self.wire.borrow_mut().read(buffer)
+        let count = self.wire.borrow_mut().read(buffer)?;
+        self.record(Direction::In, buffer.get(..count).unwrap_or_default());
+        Ok(count)
     }
 }
 
 impl Write for Line {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.wire.borrow_mut().write(bytes)
+        let count = self.wire.borrow_mut().write(bytes)?;
+        self.record(Direction::Out, bytes.get(..count).unwrap_or_default());
+        Ok(count)
     }
 
     fn flush(&mut self) -> io::Result<()> {

@@ -10,9 +10,11 @@
 //! `syn`, the other `futures`. Format: draft-ietf-opsawg-pcapng.
 
 mod read;
+mod recording;
 mod write;
 
 pub(crate) use read::{Problem, Reader};
+pub(crate) use recording::Recording;
 pub(crate) use write::Writer;
 
 use crate::args::Protocol;

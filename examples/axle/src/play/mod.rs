@@ -78,7 +78,7 @@ fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
         })
         .collect();
     let commanded: NodeSet = writes.iter().map(|(write, _)| write.node).collect();
-    let line = Line::open(plan.bus.line(), axlewire::ikeya::BAUD)?;
+    let line = Line::open(plan.bus.line(), plan.protocol)?;
     let mut modes = Modes::default();
     if !commanded.is_empty() {
         let mut bus = Bus::<B>::new(line.clone(), config(&plan, commanded, &line));
@@ -134,7 +134,7 @@ fn config(plan: &Plan<'_>, nodes: NodeSet, line: &Line) -> MasterConfig {
 
 fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
     let drives = effects(&plan)?.contains(&Effect::Drive);
-    let line = Line::open(plan.bus.line(), ucp::BAUD)?;
+    let line = Line::open(plan.bus.line(), plan.protocol)?;
     let mut config = HostConfig::default();
     config.baud = plan.bus.line().baud.unwrap_or(ucp::BAUD);
     if drives {
@@ -184,7 +184,7 @@ fn play(
     drop(session);
     // In any case, stop first and report errors afterwards.
     let stopped = stop();
-    let told = teller.finish();
+    let told = teller.finish().and(line.check_recording());
     for line in stopped? {
         // If the output fails, what moved has stopped all the same.
         drop(teller::print(&line));

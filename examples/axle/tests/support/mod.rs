@@ -62,10 +62,18 @@ pub(crate) fn events(listing: &str) -> (Vec<Value>, Value) {
     (records, summary)
 }
 
-/// Decodes `input` to JSON.
+/// Decodes `input` to JSON. Without any frame in it, that is a failure with a hint.
 pub(crate) fn decode(args: &[&str], input: &[u8]) -> (Vec<Value>, Value) {
     let args = [&["decode", "--json"], args].concat();
-    events(&stdout(run(&args, input)))
+    let output = run(&args, input);
+    let listing = String::from_utf8(output.stdout).unwrap();
+    let (events, summary) = events(&listing);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    let has_failed = summary["frames"] == 0 && summary["received"] != 0;
+    assert_eq!(output.status.code(), Some(i32::from(has_failed)), "{stderr}");
+    let is_told = stderr.starts_with("axle: no ") && stderr.contains(" frame in ");
+    assert!(if has_failed { is_told } else { stderr.is_empty() }, "{stderr}");
+    (events, summary)
 }
 
 /// Skipped bytes by reason in all gaps among `events`.

@@ -1,0 +1,139 @@
+//! A capture that grows in a file.
+
+use std::{
+    fs::File,
+    io::{self, IsTerminal, Seek, Write},
+    path::{Path, PathBuf},
+    time::{Instant, SystemTime, UNIX_EPOCH},
+};
+
+use super::{Direction, Writer};
+use crate::{args::Protocol, failure::Failure};
+
+/// A capture in a file or on standard output, and the clock of its times.
+pub(crate) struct Recording {
+    writer: Writer<Output>,
+    path: PathBuf,
+    packets: u64,
+    /// The same moment on both clocks: the system's may be set while we record.
+    start: (Instant, SystemTime),
+    /// The first failure. Nothing is written behind it.
+    failure: Option<Failure>,
+}
+
+/// A file or standard output.
+enum Output {
+    File(File),
+    Stdout(io::Stdout),
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Stdout(stdout) => stdout.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Stdout(stdout) => stdout.flush(),
+        }
+    }
+}
+
+impl Recording {
+    /// Creates the file, and does not overwrite one unless `force` is set; `-` is standard output.
+    pub(crate) fn create(
+        path: &Path,
+        force: bool,
+        protocol: Protocol,
+        port: &str,
+        baud: u32,
+    ) -> Result<Self, Failure> {
+        let cannot = |error: io::Error| {
+            let hint = match error.kind() {
+                io::ErrorKind::AlreadyExists => ": remove it first, or choose another name",
+                _ => "",
+            };
+            Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
+        };
+        let output = if path == Path::new("-") {
+            if io::stdout().is_terminal() {
+                let line = "a recording is not text: name a file, or pipe it";
+                return Err(Failure::Usage(line.to_owned()));
+            }
+            Output::Stdout(io::stdout())
+        } else {
+            let mut options = File::options();
+            options.write(true);
+            let options = match force {
+                true => options.create(true).truncate(true),
+                false => options.create_new(true),
+            };
+            Output::File(options.open(path).map_err(cannot)?)
+        };
+        let writer = Writer::new(output, protocol, port, baud).map_err(cannot)?;
+        let start = (Instant::now(), SystemTime::now());
+        Ok(Self { writer, path: path.to_owned(), packets: 0, start, failure: None })
+    }
+
+    /// The time, microseconds since 1970. It never goes backwards.
+    pub(crate) fn micros(&self) -> u64 {
+        let time = self.start.1 + self.start.0.elapsed();
+        time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
+    }
+
+    /// Writes what has just been sent or received.
+    pub(crate) fn add(&mut self, direction: Direction, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.packet(self.micros(), Some(direction), bytes);
+            self.flush();
+        }
+    }
+
+    /// Writes a packet of this time.
+    pub(crate) fn packet(&mut self, micros: u64, direction: Option<Direction>, bytes: &[u8]) {
+        if self.failure.is_some() {
+            return;
+        }
+        let good = match self.writer.get_mut() {
+            Output::File(file) => file.stream_position().ok(),
+            Output::Stdout(_) => None,
+        };
+        match self.writer.packet(micros, direction, bytes) {
+            Ok(()) => self.packets += 1,
+            Err(error) => {
+                if let (Output::File(file), Some(good)) = (self.writer.get_mut(), good) {
+                    // The beginning of a packet would make the file invalid. A full disk permits
+                    // this.
+                    let _ = file.set_len(good);
+                }
+                self.fail(error);
+            }
+        }
+    }
+
+    pub(crate) fn flush(&mut self) {
+        if let Err(error) = self.writer.get_mut().flush() {
+            self.fail(error);
+        }
+    }
+
+    /// The failure, if there was one.
+    pub(crate) fn check(&mut self) -> Result<(), Failure> {
+        self.failure.take().map_or(Ok(()), Err)
+    }
+
+    fn fail(&mut self, error: io::Error) {
+        let (path, packets) = (&self.path, self.packets);
+        let failure = match path == Path::new("-") {
+            true => Failure::Write(error),
+            false => Failure::Failed(format!(
+                "cannot write {path:?}: {error}; the {packets} packets in it are complete"
+            )),
+        };
+        self.failure.get_or_insert(failure);
+    }
+}
