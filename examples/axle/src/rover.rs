@@ -10,7 +10,13 @@ use axlewire::{
     },
 };
 
-use crate::{args, failure::Failure, line::Line, session::Session, signals::Awake};
+use crate::{
+    args::{self, Protocol},
+    failure::Failure,
+    line::Line,
+    session::Session,
+    signals::Awake,
+};
 
 /// Time allowed for a robot to be heard for the first time.
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
