@@ -4,6 +4,7 @@
 use axlewire::{
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Slave,
+        board::ThreeMotors,
         master::{Health, MasterConfig, MasterEvent, Schedule},
         slave::SlaveConfig,
     },
@@ -145,7 +146,7 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 fn a_node_without_commands_stops_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
+    let slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
     let master: Master = Master::new(MasterConfig::direct(), at(0));
     let mut line = Line::new(500_000, 0, master);
     line.add(MotorNode::from_parts(slave, Motor::new()));
@@ -159,4 +160,37 @@ fn a_node_without_commands_stops_after_its_watchdog() {
     line.head_mut().release(NodeId::N1);
     line.run_for(Duration::from_millis(1000)).unwrap();
     assert!(line.tail(0).motor().velocity().get() < 0.01);
+}
+
+#[test]
+fn the_three_motors_of_a_board_turn_go_and_stop_independently() {
+    let (config, nodes) = (MasterConfig::direct(), [NodeId::N1, NodeId::N2]);
+    let master: Master<ThreeMotors> = Master::new(config, at(0));
+    let mut line = Line::new(config.baud, 1, master);
+    for node in nodes {
+        line.add(MotorNode::three_motors(node, mode_of(node)));
+    }
+    line.head_mut().discover(at(0));
+    line.run_for(Duration::from_millis(100)).unwrap();
+
+    let speeds = [3.0, 0.0, -1.5].map(|rps| Rps::new(rps).unwrap());
+    let targets = [-1.25, 0.0, 2.0].map(|way| Position::from_revolutions(way).unwrap());
+    let now = line.now();
+    line.head_mut().set_velocity(NodeId::N1, speeds, now).unwrap();
+    line.head_mut().set_position(NodeId::N2, targets, now).unwrap();
+    line.run_for(Duration::from_millis(2000)).unwrap();
+    for (motor, target) in line.tail(0).motor().iter().zip(speeds) {
+        assert!((motor.velocity().get() - target.get()).abs() < 1e-3, "{motor:?}");
+    }
+    assert_eq!(line.tail(1).motor().each_ref().map(Motor::position), targets);
+
+    let now = line.now();
+    line.head_mut().stop_all(now);
+    line.run_for(Duration::from_millis(2000)).unwrap();
+    assert!(line.tail(0).motor().iter().all(|motor| motor.velocity().get().abs() < 1e-3));
+    // Without a command, as after a switch of the mode, all three stand still.
+    line.tail_mut(0).set_mode(Mode::Position);
+    let held = line.tail(0).motor().each_ref().map(Motor::position);
+    line.run_for(Duration::from_millis(500)).unwrap();
+    assert_eq!(line.tail(0).motor().each_ref().map(Motor::position), held);
 }
