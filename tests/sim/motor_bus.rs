@@ -2,6 +2,7 @@
 //! visited, and nodes that are unplugged or left without commands.
 
 use axlewire::{
+    endpoint::Endpoint,
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Slave,
         board::ThreeMotors,
@@ -188,9 +189,18 @@ fn the_three_motors_of_a_board_turn_go_and_stop_independently() {
     line.head_mut().stop_all(now);
     line.run_for(Duration::from_millis(2000)).unwrap();
     assert!(line.tail(0).motor().iter().all(|motor| motor.velocity().get().abs() < 1e-3));
-    // Without a command, as after a switch of the mode, all three stand still.
-    line.tail_mut(0).set_mode(Mode::Position);
-    let held = line.tail(0).motor().each_ref().map(Motor::position);
-    line.run_for(Duration::from_millis(500)).unwrap();
-    assert_eq!(line.tail(0).motor().each_ref().map(Motor::position), held);
+}
+
+#[test]
+fn the_motors_of_a_board_hold_where_they_are_until_the_first_command() {
+    let mut node = MotorNode::three_motors(NodeId::N1, Mode::Position);
+    let places = [-1.25, 0.0, 2.0].map(|way| Position::from_revolutions(way).unwrap());
+    *node.motor_mut() = places.map(|place| Motor::new().at(place));
+    node.handle_timeout(at(0));
+    node.handle_timeout(at(1_000_000));
+    assert_eq!(node.motor().each_ref().map(Motor::position), places);
+    // What turns when the switch is moved is held too.
+    node.motor_mut()[1].turn(Rps::new(1.0).unwrap());
+    node.handle_timeout(at(2_000_000));
+    assert_eq!(node.motor()[1].velocity(), Rps::ZERO);
 }
