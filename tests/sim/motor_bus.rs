@@ -199,8 +199,9 @@ fn the_motors_of_a_board_hold_where_they_are_until_the_first_command() {
     node.handle_timeout(at(0));
     node.handle_timeout(at(1_000_000));
     assert_eq!(node.motor().each_ref().map(Motor::position), places);
-    // What turns when the switch is moved is held too.
+    // What turns without a command is held from the next call on.
     node.motor_mut()[1].turn(Rps::new(1.0).unwrap());
     node.handle_timeout(at(2_000_000));
+    node.handle_timeout(at(2_000_001));
     assert_eq!(node.motor()[1].velocity(), Rps::ZERO);
 }
