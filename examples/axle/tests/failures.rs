@@ -21,10 +21,8 @@ fn complaint(output: Output, code: i32) -> String {
 
 #[test]
 fn a_wrong_command_line_is_explained_in_one_line() {
-    let cases: [(&[&str], &str); 8] = [
-        (&[], "requires a subcommand"),
+    let cases: [(&[&str], &str); 6] = [
         (&["encode"], "unrecognized subcommand 'encode'"),
-        (&["decode"], "--protocol <PROTOCOL>"),
         (
             &["decode", "--protocol", "can"],
             "'can' for '--protocol <PROTOCOL>' [possible values: ucp, ikeya, ikeya-3]",
@@ -45,6 +43,17 @@ fn a_wrong_command_line_is_explained_in_one_line() {
         assert!(line.contains(expected), "{args:?} gives {line:?}");
         assert!(!line.starts_with("error") && !line.contains("Usage"), "{line:?}");
     }
+}
+
+#[test]
+fn without_a_subcommand_a_short_help_is_a_usage_error() {
+    let output = run(&[], &[]);
+    let help = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), &*output.stdout), (Some(2), &b""[..]));
+    for expected in ["Usage: axle <COMMAND>", "  decode ", "  ping ", "Exit codes:"] {
+        assert!(help.contains(expected), "{expected} is not in {help}");
+    }
+    assert!(!help.contains('\x1b'), "no colours in a pipe");
 }
 
 #[test]

@@ -6,15 +6,18 @@
 mod support;
 
 mod drive;
+mod faults;
 mod input;
 mod played;
 #[path = "../../../../tests/support/quiet.rs"]
 mod quiet;
+mod rover;
 mod scan;
 mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod three;
 mod watch;
 
 use std::{

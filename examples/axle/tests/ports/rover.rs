@@ -1,0 +1,181 @@
+//! `axle ping`, `calibrate`, `lamp` and `network`: a rover that does not move because of them.
+
+use std::{io::Write, process::Stdio};
+
+use serde_json::Value;
+
+use super::{Process, played::parrot, sim, support::axle, undisturbed};
+
+fn objects(lines: &[String]) -> Vec<Value> {
+    lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// No command that moves anything was among what the rover got.
+fn assert_nothing_moved(sim: Process) {
+    sim.signal("INT");
+    let lines = sim.success();
+    let is_motion = |line: &&String| line.contains("command: speed") || line.contains("moving");
+    for line in lines.iter().filter(is_motion) {
+        assert!(line.contains("command: speed 0 %, turn 0 %"), "{line}");
+    }
+}
+
+#[test]
+fn ping_counts_its_pongs_and_their_times() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let lines = Process::start(&format!("ping -p {port} --count 3 --every 0.05")).success();
+        assert_eq!(
+            lines.iter().filter(|line| line.contains("pong after ")).count(),
+            3,
+            "{lines:?}"
+        );
+        let summary = lines.last().unwrap();
+        assert!(summary.starts_with("3 pings, 3 pongs, 0 lost; round trip: min "), "{summary}");
+
+        let lines = Process::start(&format!("ping -p {port} -c 2 -j")).success();
+        let records = objects(&lines);
+        let [one, two, summary] = &records[..] else { panic!("{lines:?}") };
+        let times: Vec<_> = [one, two].map(|pong| pong["round_trip_us"].as_u64().unwrap()).to_vec();
+        assert_eq!((&one["event"], &one["damaged"]), (&"pong".into(), &false.into()));
+        assert_eq!(summary["min_us"].as_u64(), times.iter().copied().min());
+        assert_eq!(summary["max_us"].as_u64(), times.iter().copied().max());
+        let mean = summary["mean_us"].as_u64().unwrap();
+        assert_eq!(mean, (times[0] + times[1]) / 2);
+        assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn ping_ends_after_its_time_and_on_a_signal_with_a_summary() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let lines = Process::start(&format!("ping -p {port} --for 0.5")).success();
+        assert!(lines.last().unwrap().contains(" pongs, 0 lost"), "{lines:?}");
+        let ping = Process::start(&format!("ping -p {port}"));
+        ping.line("pong after ");
+        ping.signal("INT");
+        let lines = ping.success();
+        assert!(lines.last().unwrap().contains(" pongs, 0 lost"), "{lines:?}");
+    });
+}
+
+#[test]
+fn pings_without_a_pong_are_lost_and_the_exit_code_says_so() {
+    undisturbed(|| {
+        let line = parrot(&[]);
+        let ended = Process::start(&format!("ping -p {} -c 2 --every 0.05", line.path)).end();
+        assert_eq!(ended.code, Some(1));
+        assert_eq!(ended.stdout.last().unwrap(), "2 pings, 0 pongs, 2 lost");
+        assert_eq!(ended.stdout.iter().filter(|it| it.ends_with("no pong")).count(), 2);
+        assert_eq!(ended.stderr, [format!("axle: no robot answers on {:?}", line.path)]);
+        let heard = line.lock();
+        // The first frame is a stop: a motor command of zeros (ruling U16).
+        assert_eq!(heard[..5], [0xFD, 0xFF, 20, 0, 2]);
+        assert!(heard[6..22].iter().all(|byte| *byte == 0), "{:02x?}", &heard[..24]);
+    });
+}
+
+#[test]
+fn the_lamp_goes_on_and_off_and_the_wheels_stand_still() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let on = Process::start(&format!("lamp -p {port} on")).success();
+        assert_eq!(on, ["lamp on: told 3 times"]);
+        sim.line("command: speed 0 %, turn 0 %, lamp on");
+        let off = Process::start(&format!("lamp -p {port} off")).success();
+        assert_eq!(off, ["lamp off: told 3 times"]);
+        let lines = sim.lines();
+        let lamps: Vec<_> = lines.iter().filter(|line| line.contains("lamp")).collect();
+        assert!(lamps.last().unwrap().ends_with("lamp off"), "{lamps:?}");
+        assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn a_state_of_the_network_reaches_the_rover() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        for (state, shown) in
+            [("connected", "connected"), ("sim-absent", "SIM absent"), ("ota", "firmware update")]
+        {
+            let lines = Process::start(&format!("network -p {port} {state}")).success();
+            assert_eq!(lines, [format!("network {shown}: sent")]);
+            sim.line(&format!("network state: {shown}"));
+        }
+        assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn a_calibration_says_what_to_do_and_prints_the_biases() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let lines = Process::start(&format!("calibrate -p {port} --kind imu --for 0.3")).success();
+        assert!(lines[0].contains("keep the robot still until the time is up"), "{lines:?}");
+        let biases = "biases: accelerometer 12 -7 30, gyroscope 4 -2 1";
+        assert!(lines.last().unwrap().ends_with(biases), "{lines:?}");
+        sim.line("calibration begins: IMU");
+        sim.line("calibration ends: IMU");
+
+        let args = format!("calibrate -p {port} -k magnetometer -f 0.3 -j");
+        let lines = Process::start(&args).success();
+        let records = objects(&lines);
+        let names: Vec<_> = records.iter().map(|it| it["event"].as_str().unwrap()).collect();
+        assert_eq!(names, ["started", "ended", "mag_bias"]);
+        assert_eq!(records[2]["mag"], serde_json::json!([105, -48, 260]));
+        assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn a_calibration_ends_on_enter_and_on_a_signal() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let args = ["calibrate", "--port", &port, "--kind", "magnetometer"];
+        let mut child = axle(&args).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        sim.line("calibration begins: magnetometer");
+        child.stdin.take().unwrap().write_all(b"\n").unwrap();
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success() && text.contains("then press Enter"), "{text}");
+        assert!(text.contains("biases: magnetometer 105 -48 260"), "{text}");
+
+        let calibrate = Process::start(&format!("calibrate --port {port} --kind imu"));
+        sim.line("calibration begins: IMU");
+        calibrate.line("then press Enter");
+        calibrate.signal("INT");
+        assert_eq!(calibrate.complaint(1), "interrupted: the calibration was ended");
+        sim.line("calibration ends: IMU");
+        assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn each_of_them_stops_a_rover_that_another_program_has_left_moving() {
+    undisturbed(|| {
+        let cases = ["ping -c 1", "lamp on", "network connected", "calibrate -k imu -f 0.1"];
+        for case in cases {
+            let (sim, port) = sim("ucp");
+            let drive = Process::start(&format!("drive -p {port} --speed 60 --turn 0 -f 600"));
+            sim.line("moving");
+            drive.kill();
+            let (name, rest) = case.split_once(' ').unwrap();
+            Process::start(&format!("{name} -p {port} {rest}")).success();
+            sim.line("command: speed 0 %, turn 0 %");
+            sim.line("at rest after");
+        }
+    });
+}
+
+#[test]
+fn a_rover_that_does_not_answer_is_named() {
+    undisturbed(|| {
+        for case in ["lamp on", "network unknown", "calibrate --kind imu"] {
+            let line = parrot(&[]);
+            let (name, rest) = case.split_once(' ').unwrap();
+            let complaint = Process::start(&format!("{name} -p {} {rest}", line.path)).complaint(1);
+            assert!(complaint.starts_with("no robot answers on "), "{complaint}");
+        }
+    });
+}
