@@ -23,6 +23,9 @@ pub(crate) struct Input {
     chunk: Box<[u8]>,
     /// Bytes at the front that were read ahead, to look at them first.
     ahead: Vec<u8>,
+    /// The first bytes, up to the length that was asked for.
+    first: Vec<u8>,
+    first_len: usize,
     /// Whether it is a file that is there as a whole.
     is_file: bool,
     progress: Option<ProgressBar>,
@@ -31,11 +34,9 @@ pub(crate) struct Input {
 impl Input {
     /// Opens `path`, or standard input for `None` and `-`.
     pub(crate) fn open(path: Option<&Path>) -> Result<Self, Failure> {
-        let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
-            let (ahead, is_file) = (Vec::new(), false);
-            return Ok(Self { path: None, reader, chunk, ahead, is_file, progress: None });
+            return Ok(Self::new(None, reader, false, None));
         };
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
@@ -45,8 +46,28 @@ impl Input {
         }
         let is_file = metadata.is_file();
         let progress = is_file.then(|| progress(metadata.len())).flatten();
-        let (reader, path) = (Box::new(file), Some(path.to_owned()));
-        Ok(Self { path, reader, chunk, ahead: Vec::new(), is_file, progress })
+        Ok(Self::new(Some(path.to_owned()), Box::new(file), is_file, progress))
+    }
+
+    fn new(
+        path: Option<PathBuf>,
+        reader: Box<dyn Read>,
+        is_file: bool,
+        progress: Option<ProgressBar>,
+    ) -> Self {
+        let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
+        let (ahead, first) = (Vec::new(), Vec::new());
+        Self { path, reader, chunk, ahead, first, first_len: 0, is_file, progress }
+    }
+
+    /// Keeps the first `len` bytes.
+    pub(crate) const fn keep_first(&mut self, len: usize) {
+        self.first_len = len;
+    }
+
+    /// The first bytes that were kept.
+    pub(crate) fn first(&self) -> &[u8] {
+        &self.first
     }
 
     /// Whether the input is a file that is there as a whole, not a stream.
@@ -88,6 +109,7 @@ impl Input {
     pub(crate) fn read(&mut self) -> Result<&[u8], Failure> {
         if !self.ahead.is_empty() {
             self.chunk = core::mem::take(&mut self.ahead).into_boxed_slice();
+            self.keep(self.chunk.len());
             return Ok(&self.chunk);
         }
         if self.chunk.len() < CHUNK_LEN {
@@ -103,7 +125,15 @@ impl Input {
         if let Some(progress) = &self.progress {
             progress.inc(read as u64);
         }
+        self.keep(read);
         Ok(self.chunk.get(..read).unwrap_or_default())
+    }
+
+    fn keep(&mut self, read: usize) {
+        let missing = self.first_len - self.first.len();
+        if missing > 0 {
+            self.first.extend(self.chunk.iter().take(read.min(missing)));
+        }
     }
 }
 

@@ -130,14 +130,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         (Protocol::Ikeya3, Some(Direction::ToSlave)) => decode::<three::ToSlave>,
         (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
     };
-    let sample = match (chosen, input.is_file()) {
-        // For a hint at the end, if there are no frames.
-        (Some(_), true) => input.peek(detect::SAMPLE_LEN, |_| false)?.to_vec(),
-        _ => Vec::new(),
-    };
-    let account = run(args, protocol, input)?;
+    // For a hint at the end, if there are no frames.
+    input.keep_first(detect::SAMPLE_LEN);
+    let account = run(args, protocol, &mut input)?;
     if account.frames == 0 && account.received > 0 {
-        return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(&sample))));
+        return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(input.first()))));
     }
     Ok(())
 }
@@ -249,7 +246,7 @@ fn style(args: &Args, protocol: Protocol, has_times: bool) -> Option<Style> {
     }
 }
 
-fn decode<F>(args: &Args, protocol: Protocol, mut input: Input) -> Result<Counters, Failure>
+fn decode<F>(args: &Args, protocol: Protocol, input: &mut Input) -> Result<Counters, Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
@@ -267,7 +264,7 @@ where
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
     if jobs > 1 {
-        let rest = parallel::list::<F>(&mut input, style, jobs, |lines| printer.print(lines))?;
+        let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
         stream = StreamOf::new(rest.offset);
         (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
         stream.feed(&rest.bytes, None, &mut sheet);
