@@ -330,7 +330,7 @@ fn ucp(message: &UcpMessage, index: u8) -> Result<Vec<u8>, String> {
 fn hex(words: &[String]) -> Result<Vec<u8>, String> {
     let digits: String = words.concat();
     let digits = digits.replace([':', ','], "");
-    if digits.len() % 2 != 0 || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+    if !digits.len().is_multiple_of(2) || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
         return Err(format!("{digits:?} is not an even number of hex digits"));
     }
     let pairs = (0..digits.len() / 2).map(|at| digits.get(2 * at..2 * at + 2).unwrap_or_default());
