@@ -19,7 +19,7 @@ use axlewire::{
 
 use crate::{
     args::Protocol,
-    bus::{self, Boards, Bus},
+    bus::{self, Boards, Bus, Halt},
     failure::{Failure, guarded},
     line::Line,
     listing::{Modes, Style, TimeColumn},
@@ -107,7 +107,14 @@ fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
         }
         let mut bus = Bus::<B>::new(line.clone(), config);
         let failure = bus.stop(commanded).err();
-        let complaints: Vec<_> = commanded.iter().filter_map(|node| bus.complaint(node)).collect();
+        let complaint = |node| match bus.halt(node) {
+            // This master has not heard it, but the one before has.
+            Halt::Silent => Some(format!(
+                "node {node} was commanded and does not answer any more: it may be moving"
+            )),
+            _ => bus.complaint(node),
+        };
+        let complaints: Vec<_> = commanded.iter().filter_map(complaint).collect();
         if !complaints.is_empty() {
             let complaint = complaints.join("; ");
             return Err(match failure {

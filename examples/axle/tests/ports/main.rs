@@ -10,7 +10,10 @@ mod input;
 mod played;
 #[path = "../../../../tests/support/quiet.rs"]
 mod quiet;
+mod record;
+mod replay;
 mod scan;
+mod send;
 mod signals;
 mod sim;
 mod spin;
