@@ -14,23 +14,17 @@ pub(crate) fn frame(
     out.extend_from_slice(br#"{"event":"frame","offset":"#);
     number::append(out, offset);
     fields(out, frame)?;
-    end(out)
+    out.extend_from_slice(b"}\n");
+    Ok(())
 }
 
-/// Appends the fields of the frame behind those of an object that is not empty.
+/// Appends the fields of the frame to an object that has some and is not closed.
 pub(crate) fn fields(out: &mut Vec<u8>, frame: &impl Frame) -> Result<(), serde_json::Error> {
-    // An object of its own, whose first brace becomes a comma: flattening takes several times as
-    // long.
+    // An object of its own, without its braces: flattening would take longer.
     let start = out.len();
     serde_json::to_writer(&mut *out, frame)?;
     out[start] = b',';
     out.pop();
-    Ok(())
-}
-
-/// Ends a line.
-fn end(out: &mut Vec<u8>) -> Result<(), serde_json::Error> {
-    out.extend_from_slice(b"}\n");
     Ok(())
 }
 
