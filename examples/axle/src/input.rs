@@ -129,6 +129,37 @@ impl Input {
         Ok(self.chunk.get(..read).unwrap_or_default())
     }
 
+    /// Reads on at the end of `bytes`, until there are `len` of them or the input ends; returns
+    /// whether it has ended.
+    pub(crate) fn fill(&mut self, bytes: &mut Vec<u8>, len: usize) -> Result<bool, Failure> {
+        if !self.ahead.is_empty() {
+            let ahead = self.read()?;
+            bytes.extend_from_slice(ahead);
+        }
+        let begin = bytes.len();
+        let mut held = begin;
+        bytes.resize(len.max(held), 0);
+        let is_over = loop {
+            let room = bytes.get_mut(held..).unwrap_or_default();
+            if room.is_empty() {
+                break Ok(false);
+            }
+            match self.reader.read(room) {
+                Ok(0) => break Ok(true),
+                Ok(read) => held += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => break Err(Failure::Read { path: self.path.clone(), error }),
+            }
+        };
+        bytes.truncate(held);
+        let missing = self.first_len - self.first.len();
+        self.first.extend(bytes.iter().skip(begin).take(missing));
+        if let Some(progress) = &self.progress {
+            progress.inc((held - begin) as u64);
+        }
+        is_over
+    }
+
     fn keep(&mut self, read: usize) {
         let missing = self.first_len - self.first.len();
         if missing > 0 {

@@ -253,17 +253,13 @@ where
 {
     let style = style(args, protocol, false);
     let mut printer = Printer::new(args.json, style);
-    let jobs = args.jobs.map(usize::from).unwrap_or_else(|| {
-        if input.is_file() {
-            thread::available_parallelism().map_or(1, |cores| cores.get())
-        } else {
-            1
-        }
-    });
+    let cores = || thread::available_parallelism().map_or(1, |cores| cores.get());
+    let jobs = args.jobs.map_or_else(cores, usize::from);
     let (mut sheet, mut account, mut stream) =
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
-    if jobs > 1 {
+    // A stream may be slow, and its lines are wanted as they come.
+    if input.is_file() && jobs > 1 {
         let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
         stream = StreamOf::new(rest.offset);
         (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
