@@ -18,6 +18,7 @@ mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod tcp;
 mod watch;
 
 use std::{
