@@ -144,7 +144,8 @@ pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box
     capture::stream(protocol, None, Some(direction))
 }
 
-/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw bytes.
+/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw
+/// bytes.
 pub(crate) fn frames_of(
     path: &Path,
     chosen: Option<Protocol>,

@@ -37,8 +37,8 @@ pub(crate) struct Plan<'a> {
     pub(crate) bus: &'a bus::MasterArgs,
     pub(crate) protocol: Protocol,
     pub(crate) frames: VecDeque<Due>,
-    /// How long to listen behind the last frame; what moves does so meanwhile.
-    pub(crate) linger: Duration,
+    /// How long to listen behind the last frame, microseconds; what moves does so meanwhile.
+    pub(crate) linger_us: u64,
     pub(crate) limits: Limits,
     pub(crate) is_json: bool,
 }
@@ -178,8 +178,8 @@ fn play(
         true => Style::Json,
         false => Style::text(plan.protocol.number(), TimeColumn::Relative),
     };
-    let Plan { protocol, frames, linger, .. } = plan;
-    let player = |now| Player::new(protocol, frames, linger, style, modes, now);
+    let Plan { protocol, frames, linger_us, .. } = plan;
+    let player = |now| Player::new(protocol, frames, linger_us, style, modes, now);
     let mut session = Session::new(line.clone(), player);
     let mut teller = Teller::new();
     let played = guarded(|| until_over(&mut session, &mut teller, signals));
