@@ -26,8 +26,8 @@ pub(crate) struct Input {
     /// The first bytes, up to the length that was asked for.
     first: Vec<u8>,
     first_len: usize,
-    /// Whether it is a file that is there as a whole.
-    is_file: bool,
+    /// A second handle and the length, if it is a file that is there as a whole.
+    file: Option<(File, u64)>,
     progress: Option<ProgressBar>,
 }
 
@@ -36,7 +36,7 @@ impl Input {
     pub(crate) fn open(path: Option<&Path>) -> Result<Self, Failure> {
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
-            return Ok(Self::new(None, reader, false, None));
+            return Ok(Self::new(None, reader, None, None));
         };
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
@@ -44,20 +44,23 @@ impl Input {
         if metadata.is_dir() {
             return Err(Failure::Directory { path: path.to_owned() });
         }
-        let is_file = metadata.is_file();
-        let progress = is_file.then(|| progress(metadata.len())).flatten();
-        Ok(Self::new(Some(path.to_owned()), Box::new(file), is_file, progress))
+        let mut whole = None;
+        if metadata.is_file() {
+            whole = Some((file.try_clone().map_err(cannot_open)?, metadata.len()));
+        }
+        let progress = whole.as_ref().and_then(|(_, len)| progress(*len));
+        Ok(Self::new(Some(path.to_owned()), Box::new(file), whole, progress))
     }
 
     fn new(
         path: Option<PathBuf>,
         reader: Box<dyn Read>,
-        is_file: bool,
+        file: Option<(File, u64)>,
         progress: Option<ProgressBar>,
     ) -> Self {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let (ahead, first) = (Vec::new(), Vec::new());
-        Self { path, reader, chunk, ahead, first, first_len: 0, is_file, progress }
+        Self { path, reader, chunk, ahead, first, first_len: 0, file, progress }
     }
 
     /// Keeps the first `len` bytes.
@@ -70,9 +73,9 @@ impl Input {
         &self.first
     }
 
-    /// Whether the input is a file that is there as a whole, not a stream.
-    pub(crate) const fn is_file(&self) -> bool {
-        self.is_file
+    /// The file and its length, if the input is there as a whole and not a stream.
+    pub(crate) fn file(&self) -> Option<(&File, u64)> {
+        self.file.as_ref().map(|(file, len)| (file, *len))
     }
 
     /// Its path; `None` is standard input.

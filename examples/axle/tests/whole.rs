@@ -79,6 +79,30 @@ fn any_number_of_threads_gives_the_same_output_byte_for_byte() {
 }
 
 #[test]
+fn any_number_of_threads_gives_the_same_account_of_a_long_file() {
+    // Long enough for threads that read the file themselves; the second ends in the middle of a
+    // frame, the third has no place to split in a part of it.
+    let mut gap = bus(900_000);
+    gap.extend(vec![0x55; 600_000]);
+    gap.extend(bus(300_000));
+    let inputs = [
+        ("ucp", Capture::noisy(1_200_000, 5).bytes),
+        ("ikeya", bus(1_500_000)[..1_499_997].to_vec()),
+        ("ikeya", gap),
+    ];
+    for (at, (protocol, bytes)) in inputs.iter().enumerate() {
+        let path = file(&format!("long-{at}.bin"), bytes);
+        let path = path.to_str().unwrap();
+        let args = ["--protocol", protocol, "--json", "--summary"];
+        let one = decode(&[&args[..], &["--jobs", "1"]].concat(), path);
+        assert!(one.0.contains(&format!("\"received\":{},", bytes.len())), "{}", one.0);
+        for jobs in ["2", "3", "16"] {
+            assert_eq!(decode(&[&args[..], &["--jobs", jobs]].concat(), path), one, "{at} {jobs}");
+        }
+    }
+}
+
+#[test]
 fn a_file_that_cannot_be_read_to_its_end_is_listed_as_far_as_it_goes() {
     // Reading a directory entry of a process fails at once; standard output has nothing.
     if cfg!(target_os = "linux") {

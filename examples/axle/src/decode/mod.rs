@@ -1,5 +1,6 @@
 //! `axle decode`: reads a capture, prints one line per frame and per gap.
 
+mod account;
 mod capture;
 mod detect;
 mod parallel;
@@ -259,8 +260,14 @@ where
     let (mut sheet, mut account, mut stream) =
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
+    if let (Some((file, len)), None, 2..) = (input.file(), style, jobs)
+        && let Some(account) = account::of_file::<F>(file, len, jobs)
+    {
+        printer.finish(&account, 0)?;
+        return Ok(account);
+    }
     // A stream may be slow, and its lines are wanted as they come.
-    if input.is_file() && jobs > 1 {
+    if input.file().is_some() && jobs > 1 {
         let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
         stream = StreamOf::new(rest.offset);
         (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
