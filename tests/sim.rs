@@ -25,3 +25,6 @@ mod rover;
 /// An endpoint that sends what a test tells it to.
 #[path = "sim/talker.rs"]
 mod talker;
+/// A wire in real time.
+#[path = "sim/wire.rs"]
+mod wire;

@@ -133,3 +133,16 @@ pub struct PairStatistics {
     /// Bytes inserted.
     pub inserted: u64,
 }
+
+impl PairStatistics {
+    /// [`default`](Self::default), for constants.
+    pub(super) const NONE: Self = Self {
+        bytes: 0,
+        busy_us: 0,
+        collided: 0,
+        bit_errors: 0,
+        lost: 0,
+        duplicated: 0,
+        inserted: 0,
+    };
+}

@@ -426,7 +426,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
             (false, false) => &[],
         };
         for &byte in echo {
-            self.ports[port].receive(byte, sent.end);
+            self.ports[port].arrivals.add(byte, sent.end);
         }
         if faults.unplugged {
             return;
@@ -443,7 +443,7 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
             }
             for &byte in &through {
                 let held_up = faults.hold_up(rng) + stub.hold_up(rng);
-                receiver.receive(byte, sent.end + held_up);
+                receiver.arrivals.add(byte, sent.end + held_up);
             }
         }
     }

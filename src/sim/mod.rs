@@ -7,7 +7,8 @@
 //! driver spin is an error, [`Stuck`].
 //!
 //! `Motor` and `Rover` are models without a line, for tests that have their own. `MotorNode` and
-//! `RoverNode` combine them with the slave or the robot that drives them.
+//! `RoverNode` combine them with the slave or the robot that drives them. [`Wire`] is a line with
+//! the same faults for simulations in real time.
 //!
 //! ```
 //! # #[cfg(feature = "ikeya")] {
@@ -30,26 +31,33 @@
 //! # Ok::<(), axlewire::sim::Stuck>(())
 //! ```
 
+mod arrivals;
 mod faults;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod lag;
 mod line;
 #[cfg(feature = "ikeya")]
 mod motor;
+#[cfg(feature = "ikeya")]
+mod motor_node;
 mod port;
 mod rng;
 #[cfg(feature = "ucp")]
 mod rover;
 #[cfg(feature = "ucp")]
 mod rover_node;
+mod wire;
 
 pub use faults::{Faults, PairStatistics};
 pub use line::{Direction, Line, Stuck, Traced, Who};
 #[cfg(feature = "ikeya")]
-pub use motor::{Motor, MotorNode};
+pub use motor::Motor;
+#[cfg(feature = "ikeya")]
+pub use motor_node::{MotorBoard, MotorNode};
 pub use port::{Input, Timing};
 pub use rng::Rng;
 #[cfg(feature = "ucp")]
 pub use rover::Rover;
 #[cfg(feature = "ucp")]
 pub use rover_node::RoverNode;
+pub use wire::Wire;

@@ -1,14 +1,9 @@
-//! A motor, and a bus node that drives it.
+//! A motor.
 
 use super::lag::{Lag, seconds};
 use crate::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Mode, NodeId, Position, Rps,
-        board::Target,
-        slave::{Slave, SlaveConfig, SlaveEvent},
-    },
-    time::{Duration, Instant},
+    ikeya::{Position, Rps},
+    time::Duration,
 };
 
 /// A motor that approaches a speed with a time constant, or moves to a position at a limited speed.
@@ -121,136 +116,5 @@ impl Motor {
 impl Default for Motor {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// A node of a motor bus: a [`Slave`] whose commands move a [`Motor`], and whose answers are the
-/// motor's state at that moment.
-///
-/// Without a command, and after the slave's watchdog has fired, a velocity node stands still and a
-/// position node holds.
-///
-/// ```
-/// use axlewire::{
-///     endpoint::Endpoint,
-///     ikeya::{Mode, NodeId, Rps, WriteRequest},
-///     sim::MotorNode,
-///     time::Instant,
-/// };
-///
-/// let mut node = MotorNode::new(NodeId::N1, Mode::Velocity);
-/// let turn = WriteRequest::velocity(NodeId::N1, Rps::new(-1.0)?);
-/// node.handle_input(turn.as_bytes(), Instant::from_millis(0));
-/// node.handle_input(&[], Instant::from_millis(1000));
-/// assert!((node.motor().velocity().get() + 1.0).abs() < 1e-6);
-/// # Ok::<(), axlewire::error::EncodeError>(())
-/// ```
-#[derive(Debug)]
-pub struct MotorNode {
-    slave: Slave,
-    motor: Motor,
-    /// The time up to which the motor has run.
-    now: Option<Instant>,
-}
-
-impl MotorNode {
-    /// A node with a [`Motor::new`] and a [`SlaveConfig::direct`].
-    #[must_use]
-    pub fn new(node: NodeId, mode: Mode) -> Self {
-        let slave = Slave::new(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
-        Self::from_parts(slave, Motor::new())
-    }
-
-    /// Combines this slave and this motor.
-    #[must_use]
-    pub fn from_parts(slave: Slave, motor: Motor) -> Self {
-        let mut node = Self { slave, motor, now: None };
-        node.show();
-        node
-    }
-
-    /// The slave.
-    #[must_use]
-    pub const fn slave(&self) -> &Slave {
-        &self.slave
-    }
-
-    /// The motor, as it was when the node was last called.
-    #[must_use]
-    pub const fn motor(&self) -> &Motor {
-        &self.motor
-    }
-
-    /// The motor, to block or to turn it by hand.
-    pub const fn motor_mut(&mut self) -> &mut Motor {
-        &mut self.motor
-    }
-
-    /// Moves the mode switch. The command is forgotten.
-    pub fn set_mode(&mut self, mode: Mode) {
-        self.slave.set_mode(mode);
-        self.obey(self.now.unwrap_or_default());
-    }
-
-    /// Runs the motor up to `now`.
-    fn run(&mut self, now: Instant) {
-        let dt = self.now.replace(now).map_or(Duration::ZERO, |last| now - last);
-        if dt != Duration::ZERO {
-            self.motor.step(dt);
-        }
-        self.show();
-    }
-
-    /// Gives the state of the motor to the slave.
-    fn show(&mut self) {
-        self.slave.set_velocity(self.motor.velocity());
-        self.slave.set_position(self.motor.position());
-    }
-
-    /// Lets the motor carry out the slave's command.
-    fn obey(&mut self, now: Instant) {
-        match (self.slave.command(now), self.slave.mode()) {
-            (Some(Target::Velocity(target)), _) => self.motor.turn(target),
-            (Some(Target::Position(target)), _) => self.motor.go_to(target),
-            (None, Mode::Velocity) => self.motor.turn(Rps::ZERO),
-            (None, Mode::Position) => self.motor.hold(),
-        }
-    }
-}
-
-impl Endpoint for MotorNode {
-    type Event = SlaveEvent;
-
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.run(now);
-        self.slave.handle_input(bytes, now);
-        self.obey(now);
-    }
-
-    fn handle_timeout(&mut self, now: Instant) {
-        self.run(now);
-        self.slave.handle_timeout(now);
-        self.obey(now);
-    }
-
-    fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        self.run(now);
-        self.slave.poll_transmit(now)
-    }
-
-    fn is_outdated(&self) -> bool {
-        self.slave.is_outdated()
-    }
-
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.slave.handle_unsent(unsent, now);
-    }
-
-    fn poll_event(&mut self) -> Option<SlaveEvent> {
-        self.slave.poll_event()
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.slave.poll_timeout()
     }
 }

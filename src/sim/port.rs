@@ -2,7 +2,7 @@
 
 use alloc::{collections::VecDeque, vec::Vec};
 
-use super::faults::Faults;
+use super::{arrivals::Arrivals, faults::Faults};
 use crate::{
     endpoint::Endpoint,
     time::{Duration, Instant, wire_time},
@@ -119,9 +119,7 @@ pub(super) struct Port {
     /// Bytes sent, but not yet at the end of the wire.
     pub(super) sending: VecDeque<WireByte>,
     run: Option<Run>,
-    /// Received bytes in order, with their times of arrival, some in the future.
-    arrivals: VecDeque<(Instant, u8)>,
-    last_arrival: Option<Instant>,
+    pub(super) arrivals: Arrivals,
     /// The endpoint's last `poll_timeout`.
     deadline: Option<Instant>,
     /// When the application may have given a command.
@@ -139,8 +137,7 @@ impl Port {
             polls: 0,
             sending: VecDeque::new(),
             run: None,
-            arrivals: VecDeque::new(),
-            last_arrival: None,
+            arrivals: Arrivals::new(),
             deadline: None,
             touched: Some(now),
             fruitless: 0,
@@ -178,13 +175,6 @@ impl Port {
         older
     }
 
-    /// Notes a byte that arrives at `at`, but not before the previous one.
-    pub(super) fn receive(&mut self, byte: u8, at: Instant) {
-        let at = self.last_arrival.map_or(at, |last| last.max(at));
-        self.last_arrival = Some(at);
-        self.arrivals.push_back((at, byte));
-    }
-
     /// When the next byte on the wire is complete.
     pub(super) fn sent_at(&self) -> Option<Instant> {
         self.sending.front().map(|byte| byte.end)
@@ -199,9 +189,10 @@ impl Port {
 
     /// The next piece of input: when it is complete, and its number of bytes.
     fn next_piece(&self) -> Option<(Instant, usize)> {
-        let first = self.arrivals.front()?.0;
-        let arrived_by = |limit: Instant| self.arrivals.partition_point(|(at, _)| *at <= limit);
-        let arrival = |index: usize| self.arrivals.get(index).map(|(at, _)| *at);
+        let first = self.arrivals.bytes.front()?.0;
+        let arrived_by =
+            |limit: Instant| self.arrivals.bytes.partition_point(|(at, _)| *at <= limit);
+        let arrival = |index: usize| self.arrivals.bytes.get(index).map(|(at, _)| *at);
         match self.timing.input {
             Input::Bytes => Some((first, 1)),
             Input::AfterFirst { wait, at_most } => match arrival(at_most.max(1) - 1) {
@@ -235,7 +226,7 @@ impl Port {
         let is_seen = |at: &Instant| now >= *at + latency;
         let mut is_fruitful = self.touched.take_if(|at| is_seen(at)).is_some();
         while let Some((_, len)) = self.next_piece().filter(|(at, _)| is_seen(at)) {
-            let piece: Vec<u8> = self.arrivals.drain(..len).map(|(_, byte)| byte).collect();
+            let piece: Vec<u8> = self.arrivals.bytes.drain(..len).map(|(_, byte)| byte).collect();
             endpoint.handle_input(&piece, now);
             is_fruitful = true;
         }

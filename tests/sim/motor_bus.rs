@@ -2,8 +2,10 @@
 //! visited, and nodes that are unplugged or left without commands.
 
 use axlewire::{
+    endpoint::Endpoint,
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Slave,
+        board::ThreeMotors,
         master::{Health, MasterConfig, MasterEvent, Schedule},
         slave::SlaveConfig,
     },
@@ -145,7 +147,7 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 fn a_node_without_commands_stops_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
+    let slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
     let master: Master = Master::new(MasterConfig::direct(), at(0));
     let mut line = Line::new(500_000, 0, master);
     line.add(MotorNode::from_parts(slave, Motor::new()));
@@ -159,4 +161,47 @@ fn a_node_without_commands_stops_after_its_watchdog() {
     line.head_mut().release(NodeId::N1);
     line.run_for(Duration::from_millis(1000)).unwrap();
     assert!(line.tail(0).motor().velocity().get() < 0.01);
+}
+
+#[test]
+fn the_three_motors_of_a_board_turn_go_and_stop_independently() {
+    let (config, nodes) = (MasterConfig::direct(), [NodeId::N1, NodeId::N2]);
+    let master: Master<ThreeMotors> = Master::new(config, at(0));
+    let mut line = Line::new(config.baud, 1, master);
+    for node in nodes {
+        line.add(MotorNode::three_motors(node, mode_of(node)));
+    }
+    line.head_mut().discover(at(0));
+    line.run_for(Duration::from_millis(100)).unwrap();
+
+    let speeds = [3.0, 0.0, -1.5].map(|rps| Rps::new(rps).unwrap());
+    let targets = [-1.25, 0.0, 2.0].map(|way| Position::from_revolutions(way).unwrap());
+    let now = line.now();
+    line.head_mut().set_velocity(NodeId::N1, speeds, now).unwrap();
+    line.head_mut().set_position(NodeId::N2, targets, now).unwrap();
+    line.run_for(Duration::from_millis(2000)).unwrap();
+    for (motor, target) in line.tail(0).motor().iter().zip(speeds) {
+        assert!((motor.velocity().get() - target.get()).abs() < 1e-3, "{motor:?}");
+    }
+    assert_eq!(line.tail(1).motor().each_ref().map(Motor::position), targets);
+
+    let now = line.now();
+    line.head_mut().stop_all(now);
+    line.run_for(Duration::from_millis(2000)).unwrap();
+    assert!(line.tail(0).motor().iter().all(|motor| motor.velocity().get().abs() < 1e-3));
+}
+
+#[test]
+fn the_motors_of_a_board_hold_where_they_are_until_the_first_command() {
+    let mut node = MotorNode::three_motors(NodeId::N1, Mode::Position);
+    let places = [-1.25, 0.0, 2.0].map(|way| Position::from_revolutions(way).unwrap());
+    *node.motor_mut() = places.map(|place| Motor::new().at(place));
+    node.handle_timeout(at(0));
+    node.handle_timeout(at(1_000_000));
+    assert_eq!(node.motor().each_ref().map(Motor::position), places);
+    // What turns without a command is held from the next call on.
+    node.motor_mut()[1].turn(Rps::new(1.0).unwrap());
+    node.handle_timeout(at(2_000_000));
+    node.handle_timeout(at(2_000_001));
+    assert_eq!(node.motor()[1].velocity(), Rps::ZERO);
 }

@@ -64,6 +64,16 @@ impl Protocol {
     }
 }
 
+/// Protocol of a motor bus.
+#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
+pub(crate) enum BusProtocol {
+    /// One motor per board
+    Ikeya,
+    /// Three motors per board
+    #[value(name = "ikeya-3")]
+    Ikeya3,
+}
+
 /// A node id, 1 to 8.
 pub(crate) fn node(text: &str) -> Result<NodeId, String> {
     let id: u8 = text.parse().map_err(|_| "a node is a number from 1 to 8".to_owned())?;
@@ -104,4 +114,18 @@ pub(crate) fn seconds(text: &str) -> Result<u64, String> {
         return Err(format!("{seconds} s is not within 0..={LONGEST} s"));
     }
     Ok((seconds * 1e6) as u64)
+}
+
+/// A probability.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
+    let rate: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err("it is not within 0..=1".to_owned()) }
+}
+
+/// A byte in two hex digits, with or without 0x.
+pub(crate) fn hex_byte(text: &str) -> Result<u8, String> {
+    let digits = text.strip_prefix("0x").unwrap_or(text);
+    let is_hex = digits.len() == 2 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let byte = is_hex.then(|| u8::from_str_radix(digits, 16).ok()).flatten();
+    byte.ok_or("expected two hex digits, such as ff".to_owned())
 }

@@ -4,20 +4,22 @@ use std::{thread, time};
 
 use axlewire::{
     ikeya::{
-        self, Master, Mode, NodeId, Position, Status,
-        board::{Board, OneMotor, ThreeMotors},
+        self, Master, Mode, NodeId, Status,
+        board::OneMotor,
         master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
     time::{Duration, Instant},
 };
 
 use crate::{
-    args::{self, Protocol},
+    args,
     failure::Failure,
     line::Line,
     session::Session,
     signals::{ABSENCE, Awake, Signals},
 };
+
+pub(crate) use crate::boards::Boards;
 
 /// Period at which each node is read and its set-point repeated: short enough for every motor, and
 /// a USB adapter keeps up with three nodes.
@@ -57,7 +59,7 @@ pub(crate) struct MasterArgs {
 }
 
 /// A port and the master on it.
-pub(crate) struct Bus<B: Board = OneMotor> {
+pub(crate) struct Bus<B: Boards = OneMotor> {
     session: Session<Master<B>>,
     pub(crate) baud: u32,
     /// The master's dead-man has stopped the nodes.
@@ -297,54 +299,5 @@ impl<B: Boards> Bus<B> {
             }
             Halt::Silent => format!("node {node} does not answer"),
         })
-    }
-}
-
-/// Boards whose status can be printed.
-pub(crate) trait Boards: Board {
-    const PROTOCOL: Protocol;
-
-    fn describe(status: Status<Self>) -> String;
-
-    /// The positions of its motors, in position mode.
-    fn positions(status: Status<Self>) -> Option<Vec<Position>>;
-}
-
-impl Boards for OneMotor {
-    const PROTOCOL: Protocol = Protocol::Ikeya;
-
-    fn describe(status: Status<Self>) -> String {
-        match status {
-            Status::Velocity(rps) => format!("{rps:.2} rps"),
-            Status::Position(position) => format!("{:.4} turns", position.revolutions()),
-        }
-    }
-
-    fn positions(status: Status<Self>) -> Option<Vec<Position>> {
-        match status {
-            Status::Velocity(_) => None,
-            Status::Position(position) => Some(vec![position]),
-        }
-    }
-}
-
-impl Boards for ThreeMotors {
-    const PROTOCOL: Protocol = Protocol::Ikeya3;
-
-    fn describe(status: Status<Self>) -> String {
-        match status {
-            Status::Velocity([a, b, c]) => format!("{a:.2} {b:.2} {c:.2} rps"),
-            Status::Position(positions) => {
-                let [a, b, c] = positions.map(|position| position.revolutions());
-                format!("{a:.4} {b:.4} {c:.4} turns")
-            }
-        }
-    }
-
-    fn positions(status: Status<Self>) -> Option<Vec<Position>> {
-        match status {
-            Status::Velocity(_) => None,
-            Status::Position(positions) => Some(positions.to_vec()),
-        }
     }
 }

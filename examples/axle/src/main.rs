@@ -4,6 +4,7 @@
 //! that distinguishes usage errors from other failures.
 
 mod args;
+mod boards;
 mod bus;
 mod decode;
 mod drive;
@@ -17,6 +18,7 @@ mod pcapng;
 mod play;
 mod record;
 mod replay;
+mod report;
 mod rover;
 mod scan;
 mod send;

@@ -1,19 +1,28 @@
 //! `axle spin`: turns one motor, and stops it before the tool exits.
 
+use std::fmt;
+
 use axlewire::{
-    ikeya::{Mode, NodeId, Position, Rps, Status, Target, board::OneMotor},
+    ikeya::{
+        Mode, NodeId, Position, Rps, Status, Target,
+        board::{OneMotor, ThreeMotors},
+    },
     time::{Duration, Instant},
 };
+use serde::Serialize;
 
 use crate::{
-    MOTION_HELP, args,
-    bus::{self, Boards, Bus},
+    MOTION_HELP,
+    args::{self, BusProtocol},
+    boards::{Boards, Data},
+    bus::{self, Bus},
     failure::{Failure, guarded},
+    report::{Form, Outcome},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
 };
 
-/// Turn one motor of a motor bus for a set time
+/// Turn one motor of a motor bus, or the three of a board, for a set time
 ///
 /// Finds the node, reads it again, commands it and prints its measurements. At the end, on every
 /// error and on every signal that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not
@@ -25,15 +34,20 @@ use crate::{
 ///
 /// The exit code is also 1 if the target is not reached when the time is up: the last speed must be
 /// within 10 % or 0.1 rps of it, whichever is more, but not off by more than half of it or 0.05
-/// rps, whichever is more; the last position must be within 8 counts.
+/// rps, whichever is more; the last position must be within 8 counts. On a board with three motors
+/// that holds for each.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::MasterArgs,
 
+    /// Boards on the bus; three-motor boards take three values for --rps and --revolutions
+    #[arg(short = 'P', long, value_enum, default_value = "ikeya")]
+    protocol: BusProtocol,
+
     /// The node, 1 to 8
-    #[arg(long, value_name = "N", value_parser = args::node)]
+    #[arg(short, long, value_name = "N", value_parser = args::node)]
     node: NodeId,
 
     #[command(flatten)]
@@ -44,20 +58,24 @@ pub(crate) struct Args {
     max_rps: Rps,
 
     /// Duration, seconds
-    #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
+    #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
+
+    /// Print one JSON object per line; the last is the outcome
+    #[arg(short, long)]
+    json: bool,
 }
 
 #[derive(Debug, clap::Args)]
 #[group(required = true, multiple = false)]
 struct GoalArgs {
     /// For a velocity node: turn at this speed, revolutions per second
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::rps)]
-    rps: Option<Rps>,
+    #[arg(long, value_name = "X", num_args = 1..=3, allow_negative_numbers = true, value_parser = args::rps)]
+    rps: Vec<Rps>,
 
     /// For a position node: move by this many revolutions from where it is
-    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = args::revolutions)]
-    revolutions: Option<Position>,
+    #[arg(long, value_name = "X", num_args = 1..=3, allow_negative_numbers = true, value_parser = args::revolutions)]
+    revolutions: Vec<Position>,
 }
 
 /// Interval between printed measurements.
@@ -69,116 +87,198 @@ const CALL_PERIOD: Duration = Duration::from_millis(50);
 /// Maximum age of a measurement that counts as current.
 const FRESH: Duration = Duration::from_millis(250);
 
-/// Largest difference between a position and its target, counts.
-const TARGET_COUNTS: u32 = 8;
-
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if let Some(rps) = args.goal.rps
-        && rps.get().abs() > args.max_rps.get()
-    {
-        let (rps, limit) = (rps.get(), args.max_rps.get());
+    let limit = args.max_rps.get();
+    if let Some(rps) = args.goal.rps.iter().map(|rps| rps.get()).find(|rps| rps.abs() > limit) {
         return Err(Failure::Usage(format!(
             "--rps {rps} is faster than --max-rps {limit}: raise the limit if you mean it"
         )));
     }
+    match args.protocol {
+        BusProtocol::Ikeya => run_on::<OneMotor>(args),
+        BusProtocol::Ikeya3 => run_on::<ThreeMotors>(args),
+    }
+}
+
+fn run_on<B: Boards>(args: &Args) -> Result<(), Failure> {
+    let goal = Goal::<B>::new(&args.goal).ok_or_else(|| {
+        let (one, name) = (B::MOTORS == 1, B::PROTOCOL.name());
+        let count = if one { "one value" } else { "three values" };
+        Failure::Usage(format!("with --protocol {name}, --rps and --revolutions take {count}"))
+    })?;
     let signals = Signals::listen_to_all()?;
-    let result = prepare_and_spin(args, &signals);
+    let form = Form::of(args.json);
+    let result = match prepare(args, &goal, form, &signals) {
+        Ok(Some((spin, target))) => spin.run(target, args.micros, &signals),
+        Ok(None) => signals.interrupted(),
+        Err(failure) => Err(failure),
+    };
     // The port is closed here.
     signals.suspend_if_wanted(result)
 }
 
-fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
+/// What was asked for.
+#[derive(Clone, Debug)]
+enum Goal<B: Boards> {
+    Speed(B::Velocity),
+    /// A way from where the motors are.
+    Way(Vec<Position>),
+}
+
+impl<B: Boards> Goal<B> {
+    /// The goal, if it has a value for each motor.
+    fn new(args: &GoalArgs) -> Option<Self> {
+        match &args.revolutions[..] {
+            [] => B::velocity(&args.rps).map(Self::Speed),
+            way if way.len() == B::MOTORS => Some(Self::Way(way.to_vec())),
+            _ => None,
+        }
+    }
+
+    /// The target for this node, if it answers and is in the right mode.
+    fn target(
+        &self,
+        node: NodeId,
+        bus: &Bus<B>,
+        status: Option<Status<B>>,
+    ) -> Result<Target<B>, Failure> {
+        let refuse = |line: String| Err(Failure::Failed(line));
+        match (self, status) {
+            (Self::Speed(speed), Some(Status::Velocity(_))) => Ok(Target::Velocity(*speed)),
+            (Self::Way(way), Some(status @ Status::Position(_))) => {
+                let starts = B::positions(status).unwrap_or_default();
+                let mut goals = Vec::new();
+                for (at, way) in starts.iter().zip(way) {
+                    let goal = at.counts().checked_add(way.counts()).map(Position::from_counts);
+                    let Some(Ok(goal)) = goal else {
+                        return refuse(format!(
+                            "node {node} is at {:.4} turns: {:.4} turns more exceed the range of \
+                             a position",
+                            at.revolutions(),
+                            way.revolutions(),
+                        ));
+                    };
+                    goals.push(goal);
+                }
+                match B::position(&goals) {
+                    Some(goal) => Ok(Target::Position(goal)),
+                    None => refuse(format!("node {node} has another number of motors")),
+                }
+            }
+            (Self::Way(_), Some(Status::Velocity(_))) => {
+                refuse(format!("node {node} is in velocity mode: use --rps"))
+            }
+            (Self::Speed(_), Some(Status::Position(_))) => {
+                refuse(format!("node {node} is in position mode: use --revolutions"))
+            }
+            (_, None) => {
+                let found: Vec<_> = bus
+                    .nodes()
+                    .filter(|(other, ..)| *other != node)
+                    .map(|(node, mode, _)| format!("{node} ({mode})"))
+                    .collect();
+                let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
+                refuse(format!("node {node} does not answer; nodes that do: {found}"))
+            }
+        }
+    }
+}
+
+/// Opens the port and chooses the target. `None` if a signal came first.
+fn prepare<B: Boards>(
+    args: &Args,
+    goal: &Goal<B>,
+    form: Form,
+    signals: &Signals,
+) -> Result<Option<(Spin<B>, Target<B>)>, Failure> {
     let mut bus = Bus::open(&args.bus)?;
     if !bus.discover(signals)? {
-        return signals.interrupted();
+        return Ok(None);
     }
     let node = args.node;
-    let found = choose(args, &bus, bus.status(node))?;
+    let found = goal.target(node, &bus, bus.status(node))?;
     // Print before anything moves: a terminal may suspend a background process that prints.
-    teller::print(&line(0.0, node, &announce(found))).map_err(Failure::Write)?;
+    let event = Event::Target { node, target: data(found) };
+    teller::print(&form.line(0, &event)).map_err(Failure::Write)?;
 
     // Discovery took a while, and so may the reader of that line: the mode may have changed.
     let status = bus.read(node, signals)?;
     if signals.is_raised() {
-        return signals.interrupted();
+        return Ok(None);
     }
     if bus.master().is_mode_in_doubt(node) {
         return Err(Failure::Failed(format!("the mode of node {node} is in doubt")));
     }
-    let target = choose(args, &bus, status)?;
+    let target = goal.target(node, &bus, status)?;
     let start = bus.now();
-    let mut spin = Spin { bus, node, start, teller: Teller::new() };
-
-    let spun = guarded(|| spin.spin(target, args.micros, signals));
-    // In any case, stop the motor first and report errors afterwards. That it may still turn is the
-    // most serious one.
-    let stopped = spin.stop();
-    let told = spin.teller.finish();
-    let recorded = spin.bus.check_recording();
-    stopped?;
-    spun.map_err(|failure| failure.and("it was stopped and is at rest"))?;
-    told.and(recorded)
+    Ok(Some((Spin { bus, node, start, form, teller: Teller::new() }, target)))
 }
 
-/// The target for this node, if it answers and is in the right mode.
-fn choose(args: &Args, bus: &Bus, status: Option<Status<OneMotor>>) -> Result<Target, Failure> {
-    let node = args.node;
-    let refuse = |line: String| Err(Failure::Failed(line));
-    match (status, args.goal.rps, args.goal.revolutions) {
-        (Some(Status::Velocity(_)), Some(rps), _) => Ok(Target::Velocity(rps)),
-        (Some(Status::Position(at)), _, Some(way)) => {
-            let goal = at.counts().checked_add(way.counts()).map(Position::from_counts);
-            match goal {
-                Some(Ok(goal)) => Ok(Target::Position(goal)),
-                _ => refuse(format!(
-                    "node {node} is at {:.4} turns: {:.4} turns more exceed the range of a \
-                     position",
-                    at.revolutions(),
-                    way.revolutions(),
-                )),
+fn data<B: Boards>(target: Target<B>) -> Data {
+    B::data(B::reached(target))
+}
+
+/// What happens to the node.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event {
+    Target {
+        node: NodeId,
+        #[serde(flatten)]
+        target: Data,
+    },
+    Measured {
+        node: NodeId,
+        #[serde(flatten)]
+        status: Data,
+    },
+    Stopped {
+        node: NodeId,
+        #[serde(flatten)]
+        status: Data,
+    },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Target { node, target } => write!(f, "node {node}: target {target}"),
+            Self::Measured { node, status } => write!(f, "node {node}: {status}"),
+            Self::Stopped { node, status } => {
+                write!(f, "node {node}: {status}, stopped and confirmed")
             }
         }
-        (Some(Status::Velocity(_)), ..) => {
-            refuse(format!("node {node} is in velocity mode: use --rps"))
-        }
-        (Some(Status::Position(_)), ..) => {
-            refuse(format!("node {node} is in position mode: use --revolutions"))
-        }
-        (None, ..) => {
-            let found: Vec<_> = bus
-                .nodes()
-                .filter(|(other, ..)| *other != node)
-                .map(|(node, mode, _)| format!("{node} ({mode})"))
-                .collect();
-            let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
-            refuse(format!("node {node} does not answer; nodes that do: {found}"))
-        }
     }
 }
 
-fn announce(target: Target) -> String {
-    match target {
-        Target::Velocity(rps) => format!("target {:.2} rps", rps.get()),
-        Target::Position(position) => format!("target {:.4} turns", position.revolutions()),
-    }
-}
-
-fn line(seconds: f64, node: NodeId, what: &str) -> String {
-    format!("{seconds:7.2} s  node {node}: {what}")
-}
-
-struct Spin {
-    bus: Bus,
+struct Spin<B: Boards> {
+    bus: Bus<B>,
     node: NodeId,
     /// Time at which the motor was commanded.
     start: Instant,
+    form: Form,
     teller: Teller,
 }
 
-impl Spin {
+impl<B: Boards> Spin<B> {
+    /// Commands the motor and watches it; then stops it, whatever happened.
+    fn run(mut self, target: Target<B>, micros: u64, signals: &Signals) -> Result<(), Failure> {
+        let spun = guarded(|| self.spin(target, micros, signals));
+        // In any case, stop the motor first and report errors afterwards. That it may still turn is
+        // the most serious one.
+        let stopped = self.stop();
+        let recorded = self.bus.check_recording();
+        let is_at_rest = stopped.is_ok();
+        let besides = |failure: Failure| failure.and("it was stopped and is at rest");
+        let result = stopped.and(spun.map_err(besides));
+        Outcome::of(&result, is_at_rest).say(self.form, &mut self.teller);
+        let told = self.teller.finish();
+        result.and(told).and(recorded)
+    }
+
     /// Commands the motor and watches it until the time is up or a signal comes.
-    fn spin(&mut self, target: Target, micros: u64, signals: &Signals) -> Result<(), Failure> {
+    fn spin(&mut self, target: Target<B>, micros: u64, signals: &Signals) -> Result<(), Failure> {
         self.command(target)?;
         let end = Instant::from_micros(self.start.as_micros() + micros);
         let mut print_at = self.start + PRINT_PERIOD;
@@ -195,14 +295,14 @@ impl Spin {
             self.check_follows(target)?;
             if self.bus.now() >= print_at {
                 print_at = self.bus.now() + PRINT_PERIOD;
-                self.say_status("")?;
+                self.say_status(false)?;
             }
         }
         Ok(())
     }
 
     /// The master refuses a target for any mode other than the last one reported.
-    fn command(&mut self, target: Target) -> Result<(), Failure> {
+    fn command(&mut self, target: Target<B>) -> Result<(), Failure> {
         let (master, node) = (self.bus.master_mut(), self.node);
         match target {
             Target::Velocity(rps) => master.set_velocity(node, rps, self.start),
@@ -212,7 +312,7 @@ impl Spin {
     }
 
     /// Fails if the node no longer follows its command.
-    fn check_follows(&self, target: Target) -> Result<(), Failure> {
+    fn check_follows(&self, target: Target<B>) -> Result<(), Failure> {
         let (bus, node) = (&self.bus, self.node);
         let refuse = |line: String| Err(Failure::Failed(line));
         match bus.master().mode(node) {
@@ -236,15 +336,15 @@ impl Spin {
     }
 
     /// Checks at the end that the motor has reached its target.
-    fn check_reached(&mut self, target: Target) -> Result<(), Failure> {
+    fn check_reached(&mut self, target: Target<B>) -> Result<(), Failure> {
         let (node, now) = (self.node, self.bus.now());
         let measured = self.bus.master().status(node);
         let fresh = measured.filter(|&(_, at)| at > self.start && now - at <= FRESH);
         let line = match fresh {
-            Some((status, _)) if is_reached(target, status) => return Ok(()),
+            Some((status, _)) if B::is_reached(target, status) => return Ok(()),
             Some((status, _)) => {
-                let (now, target) = (OneMotor::describe(status), announce(target));
-                format!("node {node} was at {now} when the time was up, {target}")
+                let (now, target) = (B::data(status), data(target));
+                format!("node {node} was at {now} when the time was up, target {target}")
             }
             None => format!("node {node} has no current measurement at the end of the time"),
         };
@@ -256,7 +356,7 @@ impl Spin {
         let failure = self.bus.stop(self.node.into()).err();
         let Some(complaint) = self.bus.complaint(self.node) else {
             // If the output fails, the motor has stopped all the same.
-            drop(self.say_status(", stopped and confirmed"));
+            drop(self.say_status(true));
             return Ok(());
         };
         Err(match failure {
@@ -265,60 +365,14 @@ impl Spin {
         })
     }
 
-    fn say_status(&mut self, what: &str) -> Result<(), Failure> {
+    fn say_status(&mut self, is_stopped: bool) -> Result<(), Failure> {
         let Some(status) = self.bus.status(self.node) else { return Ok(()) };
-        let seconds = (self.bus.now() - self.start).as_micros() as f64 / 1e6;
-        let what = format!("{}{what}", OneMotor::describe(status));
-        self.teller.say(line(seconds, self.node, &what))
-    }
-}
-
-fn is_reached(target: Target, status: Status<OneMotor>) -> bool {
-    match (target, status) {
-        (Target::Velocity(target), Status::Velocity(now)) => {
-            (now - target.get()).abs() <= tolerance(target)
-        }
-        (Target::Position(target), Status::Position(now)) => {
-            now.counts().abs_diff(target.counts()) <= TARGET_COUNTS
-        }
-        _ => false,
-    }
-}
-
-/// Largest difference between a speed and its target, rps. A motor at rest has not reached a slow
-/// target speed, unless that speed itself counts as rest.
-fn tolerance(target: Rps) -> f32 {
-    let target = target.get().abs();
-    (target * 0.1).max((target * 0.5).min(0.1)).max(0.05)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn velocity(target: f32, now: f32) -> bool {
-        is_reached(Target::Velocity(Rps::new(target).unwrap()), Status::Velocity(now))
-    }
-
-    #[test]
-    fn a_speed_is_reached_within_10_percent_or_a_tenth() {
-        assert!(velocity(10.0, 9.01) && velocity(10.0, 10.99) && velocity(-10.0, -9.01));
-        assert!(!velocity(10.0, 8.99) && !velocity(10.0, 11.01) && !velocity(-10.0, 10.0));
-        assert!(velocity(0.5, 0.41) && !velocity(0.5, 0.39));
-    }
-
-    #[test]
-    fn a_motor_that_stands_still_has_not_reached_a_slow_speed() {
-        assert!(!velocity(0.12, 0.0) && !velocity(-0.12, 0.0) && velocity(0.12, 0.08));
-        assert!(velocity(0.0, 0.04) && !velocity(0.0, 0.06) && !velocity(1.0, f32::NAN));
-    }
-
-    #[test]
-    fn a_position_is_reached_within_8_counts_and_no_speed_is_a_position() {
-        let target = Target::Position(Position::from_counts(8000).unwrap());
-        let at = |counts| Status::Position(Position::from_counts(counts).unwrap());
-        assert!(is_reached(target, at(8008)) && is_reached(target, at(7992)));
-        assert!(!is_reached(target, at(8009)) && !is_reached(target, at(7991)));
-        assert!(!is_reached(target, Status::Velocity(8000.0)));
+        let (node, status) = (self.node, B::data(status));
+        let event = match is_stopped {
+            true => Event::Stopped { node, status },
+            false => Event::Measured { node, status },
+        };
+        let micros = self.bus.now().as_micros().saturating_sub(self.start.as_micros());
+        self.teller.say(self.form.line(micros, &event))
     }
 }

@@ -1,5 +1,7 @@
 //! A rover.
 
+use std::fmt;
+
 use axlewire::{
     endpoint::Endpoint,
     sim::Rover,
@@ -10,16 +12,22 @@ use axlewire::{
         robot::{RobotConfig, RobotEvent},
     },
 };
+use serde::Serialize;
 
-use super::{Faults, pty::Pty, say};
-use crate::{EXIT_CODES, failure::Failure, session::Session, signals::Signals};
+use super::stage::{Stage, StageArgs};
+use crate::{EXIT_CODES, failure::Failure, session::Session};
 
 /// Simulate a rover, which reports, drives as commanded, and stops without commands
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Args {
+    /// Never ask the host for biases, for hosts that cannot take that message, such as the vendor's
+    /// Python SDK; without this, the rover asks every second until it gets them
+    #[arg(long)]
+    no_bias_requests: bool,
+
     #[command(flatten)]
-    faults: Faults,
+    stage: StageArgs,
 }
 
 /// Interval between two checks of the rover, which reports every 20 ms.
@@ -27,19 +35,22 @@ const STEP: Duration = Duration::from_millis(10);
 
 /// Runs the subcommand.
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let signals = Signals::listen()?;
-    let mut session =
-        Session::new(Pty::open(args.faults)?, |now| Robot::new(RobotConfig::default(), now));
+    let (mut stage, line) = Stage::open(&args.stage)?;
+    let mut config = RobotConfig::default();
+    if args.no_bias_requests {
+        config.bias_request_period = None;
+    }
+    let mut session = Session::new(line, |now| Robot::new(config, now));
     let (mut rover, mut last) = (Rover::new(), session.now());
     let mut is_moving = false;
-    while !signals.is_raised() {
+    while stage.goes_on(session.now())? {
         let until = session.now() + STEP;
         let mut next = session.round(until)?;
         let now = session.now();
         let robot = session.role_mut();
         while let Some(event) = next {
-            if let Some(line) = react(robot, event, now) {
-                say(now, &line)?;
+            if let Some(event) = react(robot, event, now) {
+                stage.say(now, &event)?;
             }
             next = robot.poll_event();
         }
@@ -51,57 +62,97 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         let was_moving = is_moving;
         is_moving = rover.telemetry().rpm != [0; 4];
         if is_moving && !was_moving {
-            say(now, "moving")?;
+            stage.say(now, &Event::Moving)?;
         }
         if was_moving && !is_moving {
-            let (way, heading) = (rover.distance_m(), rover.heading_deg());
-            say(now, &format!("at rest after {way:.2} m, heading {heading:.0} deg"))?;
+            let (distance_m, heading_deg) = (rover.distance_m(), rover.heading_deg());
+            stage.say(now, &Event::AtRest { distance_m, heading_deg })?;
         }
     }
     let seen = session.role().statistics();
-    let line =
-        format!("{} commands, {} pings, {} reports", seen.commands, seen.pings, seen.reports);
-    say(last, &line)
+    let (commands, pings, reports) = (seen.commands, seen.pings, seen.reports);
+    stage.say(last, &Event::Statistics { commands, pings, reports })
 }
 
-/// Does what the host requests, and returns a line about it.
-fn react(robot: &mut Robot, event: RobotEvent, now: Instant) -> Option<String> {
+/// What happens to the rover.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event {
+    Command { speed: i16, angular: i16, front_led: i16 },
+    Watchdog,
+    CalibrationStart { kind: String },
+    CalibrationEnd { kind: String },
+    NetworkState { state: String },
+    UpdateRequest { version: i16 },
+    Moving,
+    AtRest { distance_m: f64, heading_deg: f64 },
+    Statistics { commands: u32, pings: u32, reports: u32 },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Command { speed, angular, front_led } => {
+                let side = match angular {
+                    ..=-1 => " left",
+                    0 => "",
+                    1.. => " right",
+                };
+                let lamp = if *front_led == 0 { "off" } else { "on" };
+                write!(f, "command: speed {speed} %, turn {} %{side}, lamp {lamp}", angular.abs())
+            }
+            Self::Watchdog => f.write_str("watchdog: no command for 500 ms"),
+            Self::CalibrationStart { kind } => write!(f, "calibration begins: {kind}"),
+            Self::CalibrationEnd { kind } => write!(f, "calibration ends: {kind}"),
+            Self::NetworkState { state } => write!(f, "network state: {state}"),
+            Self::UpdateRequest { version } => {
+                write!(f, "firmware update to version {version} requested and ignored")
+            }
+            Self::Moving => f.write_str("moving"),
+            Self::AtRest { distance_m, heading_deg } => {
+                write!(f, "at rest after {distance_m:.2} m, heading {heading_deg:.0} deg")
+            }
+            Self::Statistics { commands, pings, reports } => {
+                write!(f, "{commands} commands, {pings} pings, {reports} reports")
+            }
+        }
+    }
+}
+
+/// The results of a calibration: some biases, so that they can be told from none.
+const IMU_BIAS: ([i16; 3], [i16; 3]) = ([12, -7, 30], [4, -2, 1]);
+const MAG_BIAS: [i16; 3] = [105, -48, 260];
+
+/// Does what the host requests, and returns what to print about it.
+fn react(robot: &mut Robot, event: RobotEvent, now: Instant) -> Option<Event> {
     Some(match event {
-        RobotEvent::Motor(command) => describe(&command),
-        RobotEvent::Watchdog => "watchdog: no command for 500 ms".to_owned(),
+        RobotEvent::Motor(command) => Event::from(&command),
+        RobotEvent::Watchdog => Event::Watchdog,
         RobotEvent::CalibrationStart { kind, repeated: false } => {
-            format!("calibration begins: {kind:?}")
+            Event::CalibrationStart { kind: kind.to_string() }
         }
         RobotEvent::CalibrationEnd(kind) => {
-            // A perfect sensor has no bias.
             match kind {
                 CalibrationKind::Imu => {
-                    robot.calibration_result_imu(ImuBias::new([0; 3], [0; 3]), now);
+                    let (accelerometer, gyroscope) = IMU_BIAS;
+                    robot.calibration_result_imu(ImuBias::new(accelerometer, gyroscope), now);
                 }
                 CalibrationKind::Magnetometer => {
-                    robot.calibration_result_mag(MagBias::new([0; 3]), now);
+                    robot.calibration_result_mag(MagBias::new(MAG_BIAS), now);
                 }
                 CalibrationKind::Other(_) => {}
             }
-            format!("calibration ends: {kind:?}")
+            Event::CalibrationEnd { kind: kind.to_string() }
         }
-        RobotEvent::NetworkState(state) => format!("network state: {state:?}"),
-        RobotEvent::UpdateRequested { version, .. } => {
-            format!("firmware update to version {version} requested and ignored")
-        }
+        RobotEvent::NetworkState(state) => Event::NetworkState { state: state.to_string() },
+        RobotEvent::UpdateRequested { version, .. } => Event::UpdateRequest { version },
         _ => return None,
     })
 }
 
-fn describe(command: &MotorControl) -> String {
-    let (speed, turn) = (command.speed(), command.angular());
-    let side = if turn < 0 {
-        " left"
-    } else if turn > 0 {
-        " right"
-    } else {
-        ""
-    };
-    let lamp = if command.front_led() == 0 { "off" } else { "on" };
-    format!("command: speed {speed} %, turn {} %{side}, lamp {lamp}", turn.abs())
+impl From<&MotorControl> for Event {
+    fn from(command: &MotorControl) -> Self {
+        let (speed, angular) = (command.speed(), command.angular());
+        Self::Command { speed, angular, front_led: command.front_led() }
+    }
 }

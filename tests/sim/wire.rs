@@ -1,0 +1,119 @@
+//! A wire for simulations in real time: the faults of a line, with the time given from outside.
+
+use axlewire::{
+    sim::{Faults, Wire},
+    time::{Duration, Instant},
+};
+
+use crate::talker::{at, random_bytes, us};
+
+/// Everything that is due by `now`.
+fn due(wire: &mut Wire, now: Instant) -> Vec<u8> {
+    let mut buffer = [0; 7];
+    let mut all = Vec::new();
+    loop {
+        match wire.receive(&mut buffer, now) {
+            0 => return all,
+            count => all.extend_from_slice(&buffer[..count]),
+        }
+    }
+}
+
+/// What 100,000 bytes become with `faults`, and how many were affected in what way.
+fn after(faults: impl Fn(&mut Faults)) -> (Vec<u8>, axlewire::sim::PairStatistics) {
+    let mut wire = Wire::new(Faults::CLEAN, 5);
+    faults(wire.faults_mut());
+    assert_eq!(wire.send(&random_bytes(100_000), at(0)), b"");
+    (due(&mut wire, at(0)), *wire.statistics())
+}
+
+#[test]
+fn a_clean_wire_hands_out_the_same_bytes_at_once() {
+    let (through, statistics) = after(|_| {});
+    assert_eq!(through, random_bytes(100_000));
+    assert_eq!((statistics.bytes, statistics.bit_errors), (100_000, 0));
+    assert_eq!((statistics.lost, statistics.duplicated, statistics.inserted), (0, 0, 0));
+}
+
+#[test]
+fn each_fault_occurs_at_its_rate_and_is_counted() {
+    let expected = 9_700..10_300;
+    let (through, statistics) = after(|faults| faults.lost = 0.1);
+    assert!(expected.contains(&statistics.lost), "{statistics:?}");
+    assert_eq!(through.len() as u64, 100_000 - statistics.lost);
+
+    let (through, statistics) = after(|faults| faults.duplicated = 0.1);
+    assert!(expected.contains(&statistics.duplicated), "{statistics:?}");
+    assert_eq!(through.len() as u64, 100_000 + statistics.duplicated);
+
+    let (through, statistics) = after(|faults| faults.inserted = 0.1);
+    assert!(expected.contains(&statistics.inserted), "{statistics:?}");
+    assert_eq!(through.len() as u64, 100_000 + statistics.inserted);
+
+    let (through, statistics) = after(|faults| faults.bit_errors = 0.01);
+    let pairs = through.iter().zip(random_bytes(100_000));
+    let wrong: u32 = pairs.map(|(heard, sent)| (heard ^ sent).count_ones()).sum();
+    assert_eq!(u64::from(wrong), statistics.bit_errors);
+    assert!((7_600..8_400).contains(&wrong), "{wrong} of 800,000");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_faults_and_another_seed_others() {
+    let heard = |seed| {
+        let mut wire = Wire::new(Faults::noise(0.01), seed);
+        wire.send(&[0; 10_000], at(0));
+        due(&mut wire, at(0))
+    };
+    assert_eq!(heard(1), heard(1));
+    assert_ne!(heard(1), heard(2));
+}
+
+#[test]
+fn a_stray_byte_comes_before_every_transmission() {
+    let mut wire = Wire::new(Faults::CLEAN, 1);
+    wire.faults_mut().stray = Some(0xFF);
+    wire.send(b"ab", at(0));
+    wire.send(b"cd", at(1));
+    assert_eq!(due(&mut wire, at(1)), [0xFF, b'a', b'b', 0xFF, b'c', b'd']);
+}
+
+#[test]
+fn bytes_are_due_after_the_delay_and_the_jitter_and_in_order() {
+    let sent: Vec<u8> = (0..=255).collect();
+    let mut wire = Wire::new(Faults::CLEAN, 3);
+    (wire.faults_mut().delay, wire.faults_mut().jitter) = (us(300), us(100));
+    wire.send(&sent, at(1000));
+    assert_eq!(due(&mut wire, at(1299)), b"");
+    let soon = due(&mut wire, at(1350));
+    assert!(soon.len() < 256, "some have more than half of the jitter");
+    let next = wire.next().expect("the rest is on its way");
+    assert!(next > at(1350) && next <= at(1400), "{next:?}");
+    assert_eq!([soon, due(&mut wire, at(1400))].concat(), sent);
+    assert_eq!(wire.next(), None);
+}
+
+#[test]
+fn a_later_transmission_does_not_overtake_when_the_delay_is_taken_away() {
+    let mut wire = Wire::new(Faults::CLEAN, 3);
+    wire.faults_mut().delay = Duration::from_millis(1);
+    wire.send(b"first", at(0));
+    wire.faults_mut().delay = Duration::ZERO;
+    wire.send(b"second", at(10));
+    assert_eq!(due(&mut wire, at(999)), b"");
+    assert_eq!(due(&mut wire, at(1000)), b"firstsecond");
+}
+
+#[test]
+fn a_sender_hears_its_own_damaged_bytes_even_if_the_wire_is_unplugged() {
+    let mut faults = Faults::noise(1.0);
+    faults.echo = true;
+    let mut wire = Wire::new(faults, 1);
+    assert_eq!(wire.send(&[0x0F, 0xF0], at(0)), [0xF0, 0x0F]);
+    assert_eq!(due(&mut wire, at(0)), [0xF0, 0x0F]);
+    wire.faults_mut().unplugged = true;
+    assert_eq!(wire.send(&[0x01], at(0)), [0xFE]);
+    assert_eq!((due(&mut wire, at(0)), wire.next()), (vec![], None));
+    (wire.faults_mut().unplugged, wire.faults_mut().echo) = (false, false);
+    assert_eq!(wire.send(&[0x01], at(0)), b"");
+    assert_eq!(due(&mut wire, at(0)), [0xFE]);
+}
