@@ -79,8 +79,9 @@ where
     let signals = Signals::listen()?;
     let mut line = Line::open(&args.line, default_baud)?;
     let baud = args.line.baud.unwrap_or(default_baud);
+    let hint = "--force to overwrite it";
     let mut recording =
-        Recording::<F>::create(&args.output, args.force, args.protocol, line.path(), baud)?;
+        Recording::<F>::create(&args.output, args.force, args.protocol, line.path(), baud, hint)?;
     let start = Instant::now();
     let end = args.micros.map(|micros| start + Duration::from_micros(micros));
     let mut buffer = [0; 4096];
@@ -105,7 +106,7 @@ where
 }
 
 /// A growing file, and the frames in it.
-struct Recording<F> {
+pub(crate) struct Recording<F> {
     writer: Writer<Output>,
     path: PathBuf,
     decoder: Decoder<F, { crate::decode::BUFFER_LEN }>,
@@ -147,17 +148,19 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    fn create(
+    /// Begins a file. `otherwise` says what helps if there is one of that name.
+    pub(crate) fn create(
         path: &Path,
         force: bool,
         protocol: Protocol,
         port: &str,
         baud: u32,
+        otherwise: &str,
     ) -> Result<Self, Failure> {
         let cannot = |error: io::Error| {
             let hint = match error.kind() {
-                io::ErrorKind::AlreadyExists => ": use --force to overwrite it",
-                _ => "",
+                io::ErrorKind::AlreadyExists => format!(": use {otherwise}"),
+                _ => String::new(),
             };
             Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
         };
@@ -188,7 +191,11 @@ where
     }
 
     /// Takes in what has just been received, possibly nothing, and writes all that is decided.
-    fn take(&mut self, bytes: &[u8], direction: Option<Direction>) -> Result<(), Failure> {
+    pub(crate) fn take(
+        &mut self,
+        bytes: &[u8],
+        direction: Option<Direction>,
+    ) -> Result<(), Failure> {
         let now = Instant::now();
         if bytes.is_empty() {
             if now >= self.heard_at + QUIET && self.decoder.pending() > 0 {
@@ -278,7 +285,7 @@ where
     }
 
     /// Writes what is left; returns the account.
-    fn finish(mut self) -> Result<Counters, Failure> {
+    pub(crate) fn finish(mut self) -> Result<Counters, Failure> {
         loop {
             self.decoder.idle();
             self.write(&[], Some(Direction::In))?;

@@ -47,10 +47,15 @@ pub(crate) struct Rover {
 
 impl Rover {
     pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
-        let line_open = Line::open(line, ucp::BAUD)?;
+        let baud = line.baud.unwrap_or(ucp::BAUD);
+        Ok(Self::on(Line::open(line, ucp::BAUD)?, baud))
+    }
+
+    /// A rover on an open line.
+    pub(crate) fn on(line: Line, baud: u32) -> Self {
         let mut config = HostConfig::default();
-        config.baud = line.baud.unwrap_or(ucp::BAUD);
-        Ok(Self::new(line_open, config))
+        config.baud = baud;
+        Self::new(line, config)
     }
 
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {

@@ -1,16 +1,19 @@
 //! `axle spin`: turns one motor, and stops it before the tool exits.
 
 use axlewire::{
-    ikeya::{Mode, NodeId, Position, Rps, Status, Target, board::OneMotor},
+    ikeya::{self, Mode, NodeId, Position, Rps, Status, Target, board::OneMotor},
     time::{Duration, Instant},
 };
 
 use crate::{
-    MOTION_HELP, args,
+    MOTION_HELP,
+    args::{self, Protocol},
     bus::{self, Boards, Bus},
     failure::{Failure, guarded},
+    line::Line,
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
+    watch::moving::{About, Page, PageArgs},
 };
 
 /// Turn one motor of a motor bus for a set time
@@ -38,6 +41,9 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     goal: GoalArgs,
+
+    #[command(flatten)]
+    page: PageArgs,
 
     /// Refuse an --rps faster than this, in either direction, to guard against typos
     #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
@@ -89,14 +95,26 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
-    let mut bus = Bus::open(&args.bus)?;
+    let port = args.bus.line();
+    let wire = Line::open(port, ikeya::BAUD)?;
+    let about = About {
+        command: "spin",
+        protocol: Protocol::Ikeya,
+        baud: port.baud.unwrap_or(ikeya::BAUD),
+        has_echo: args.bus.config().removes_echo,
+    };
+    let (page, wire) = args.page.open::<ikeya::BothDirections>(wire, &about, signals)?;
+    let config = bus::complete(args.bus.config(), port, &wire);
+    let mut bus = Bus::new(wire, config);
     if !bus.discover(signals)? {
         return signals.interrupted();
     }
     let node = args.node;
     let found = choose(args, &bus, bus.status(node))?;
     // Print before anything moves: a terminal may suspend a background process that prints.
-    teller::print(&line(0.0, node, &announce(found))).map_err(Failure::Write)?;
+    if let Some(line) = page.note(line(0.0, node, &announce(found))) {
+        teller::print(&line).map_err(Failure::Write)?;
+    }
 
     // Discovery took a while, and so may the reader of that line: the mode may have changed.
     let status = bus.read(node, signals)?;
@@ -108,7 +126,7 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     }
     let target = choose(args, &bus, status)?;
     let start = bus.now();
-    let mut spin = Spin { bus, node, start, teller: Teller::new() };
+    let mut spin = Spin { bus, node, start, teller: Teller::new(), page, left: Ok(()) };
 
     let spun = guarded(|| spin.spin(target, args.micros, signals));
     // In any case, stop the motor first and report errors afterwards. That it may still turn is the
@@ -117,6 +135,7 @@ fn prepare_and_spin(args: &Args, signals: &Signals) -> Result<(), Failure> {
     let told = spin.teller.finish();
     stopped?;
     spun.map_err(|failure| failure.and("it was stopped and is at rest"))?;
+    spin.left?;
     told
 }
 
@@ -173,6 +192,9 @@ struct Spin {
     /// Time at which the motor was commanded.
     start: Instant,
     teller: Teller,
+    page: Page,
+    /// Whether the page could be left.
+    left: Result<(), Failure>,
 }
 
 impl Spin {
@@ -252,7 +274,9 @@ impl Spin {
 
     /// Stops the motor and waits until it is at rest (rulings I6, I12).
     fn stop(&mut self) -> Result<(), Failure> {
+        self.page.stopping();
         let failure = self.bus.stop(self.node.into()).err();
+        self.left = self.page.leave();
         let Some(complaint) = self.bus.complaint(self.node) else {
             // If the output fails, the motor has stopped all the same.
             drop(self.say_status(", stopped and confirmed"));
@@ -268,7 +292,8 @@ impl Spin {
         let Some(status) = self.bus.status(self.node) else { return Ok(()) };
         let seconds = (self.bus.now() - self.start).as_micros() as f64 / 1e6;
         let what = format!("{}{what}", OneMotor::describe(status));
-        self.teller.say(line(seconds, self.node, &what))
+        let line = self.page.note(line(seconds, self.node, &what));
+        line.map_or(Ok(()), |line| self.teller.say(line))
     }
 }
 
