@@ -9,9 +9,7 @@ use axlewire::{
 };
 
 use super::{PATIENCE, QUIET, Watched, recorder::Recorder, table::Table};
-use crate::{
-    decode::BUFFER_LEN, failure::Failure, line::Line, listing::Shown, signals::Signals,
-};
+use crate::{decode::BUFFER_LEN, failure::Failure, line::Line, listing::Shown, signals::Signals};
 
 /// Interval at which a line is printed.
 const PRINT_PERIOD: Duration = Duration::from_millis(1000);

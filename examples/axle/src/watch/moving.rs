@@ -55,12 +55,7 @@ impl PageArgs {
 
     /// There is no page.
     #[cfg(not(all(unix, feature = "dashboard")))]
-    pub(crate) fn open<F>(
-        self,
-        line: Line,
-        _: &About,
-        _: &Signals,
-    ) -> Result<(Page, Line), Failure>
+    pub(crate) fn open<F>(self, line: Line, _: &About, _: &Signals) -> Result<(Page, Line), Failure>
     where
         F: Framing,
         for<'a> F::Frame<'a>: Frames,

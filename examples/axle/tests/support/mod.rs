@@ -3,6 +3,8 @@
 
 pub(crate) mod process;
 pub(crate) mod schema;
+#[cfg(unix)]
+pub(crate) mod terminal;
 
 use std::{
     fs,

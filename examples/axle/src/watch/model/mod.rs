@@ -16,7 +16,7 @@ use crate::{args::Protocol, listing::Shown};
 pub(crate) use bus::{Bus, Health, Node, Values};
 pub(crate) use log::{Entry, Kind, Log};
 pub(crate) use rover::{Link, Rover};
-pub(crate) use trend::{Rate, Trend};
+pub(crate) use trend::{PER_SECOND, Rate, Trend};
 
 /// The time over which a rate is measured.
 const RATE_PERIOD: u64 = 1_000_000;

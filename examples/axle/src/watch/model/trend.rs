@@ -18,9 +18,12 @@ impl Rate {
 }
 
 /// Interval between two values of a trend, microseconds.
-const STEP: u64 = 250_000;
+const STEP: u64 = 500_000;
 
-/// Number of values in a trend: 30 s.
+/// Number of values in a second.
+pub(crate) const PER_SECOND: u16 = 2;
+
+/// Number of values in a trend: a minute.
 const LEN: usize = 120;
 
 /// The last values, at equal intervals. `NaN` is a time without a value.
@@ -72,7 +75,7 @@ mod tests {
         }
         seldom.tick(Some(5.0), 3_000_000);
         let count = |trend: &Trend| trend.last(LEN).filter(|value| *value == 5.0).count();
-        assert_eq!((count(&often), count(&seldom)), (13, 13));
+        assert_eq!((count(&often), count(&seldom)), (7, 7));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::{
     ALARM, DOUBT, FAINT, GOOD, PLAIN, View,
     text::{cut, millis, put, sparkline, values},
 };
-use crate::watch::model::{Bus, Health, Node};
+use crate::watch::model::{Bus, Health, Node, PER_SECOND};
 
 /// A column, in the order in which they are shown.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -78,10 +78,9 @@ impl Columns {
             Column::Health if is_narrow => 6,
             Column::Health => 9,
             Column::Value | Column::Commanded => value,
-            Column::Trend => 8,
+            Column::Trend => 9,
             Column::Rate => 6,
-            Column::Latency => 8,
-            Column::Missing | Column::Damaged => 7,
+            Column::Latency | Column::Missing | Column::Damaged => 7,
         };
         let (mut left, mut chosen) = (width + 1, Vec::new());
         for column in BY_WEIGHT {
@@ -94,7 +93,7 @@ impl Columns {
             }
         }
         let columns = SHOWN.into_iter().filter(|column| chosen.contains(column)).map(|column| {
-            let more = if column == Column::Trend { left.min(TREND_WIDTH - 8) } else { 0 };
+            let more = if column == Column::Trend { left.min(TREND_WIDTH - 9) } else { 0 };
             (column, width_of(column) + more)
         });
         Self { columns: columns.collect(), is_narrow }
@@ -117,7 +116,11 @@ pub(super) fn draw(view: &View, bus: &Bus, now: u64, area: Rect, buffer: &mut Bu
         let mut x = area.x;
         for &(column, width) in &columns.columns {
             let (name, is_right) = title(column, columns.is_narrow);
-            cell(buffer, area, (x, y, width), name, is_right, FAINT);
+            let name = match column {
+                Column::Trend => format!("last {} s", width / PER_SECOND),
+                _ => name.to_owned(),
+            };
+            cell(buffer, area, (x, y, width), &name, is_right, FAINT);
             x += width + 1;
         }
         y += 1;
@@ -143,7 +146,7 @@ const fn title(column: Column, is_narrow: bool) -> (&'static str, bool) {
         Column::Health => ("state", false),
         Column::Value => ("value", true),
         Column::Commanded => ("commanded", true),
-        Column::Trend => ("last 30 s", false),
+        Column::Trend => ("trend", false),
         Column::Rate => ("per s", true),
         Column::Latency => ("latency", true),
         Column::Missing => ("missing", true),

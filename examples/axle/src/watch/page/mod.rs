@@ -4,9 +4,9 @@
 mod bus;
 mod log;
 mod rover;
-mod text;
 #[cfg(test)]
 mod tests;
+mod text;
 
 use axlewire::ikeya::NodeId;
 use ratatui_core::{

@@ -34,8 +34,7 @@ pub(super) fn cut(text: &str, width: u16) -> String {
 pub(super) fn values(values: &Values, unit: &str, digits: usize, width: u16) -> String {
     let short = unit.chars().take(1).collect::<String>();
     for precision in (0..=digits).rev() {
-        let numbers: Vec<_> =
-            values.all().iter().map(|value| number(*value, precision)).collect();
+        let numbers: Vec<_> = values.all().iter().map(|value| number(*value, precision)).collect();
         let numbers = numbers.join(" ");
         for text in [format!("{numbers} {unit}"), format!("{numbers} {short}"), numbers.clone()] {
             // A short unit is better than a coarse number.
@@ -64,9 +63,8 @@ const ASCII: [char; 8] = ['_', '.', '-', '~', '=', '*', '%', '#'];
 /// One column per value, as high as the value within those shown.
 pub(super) fn sparkline(values: impl Iterator<Item = f32> + Clone, is_ascii: bool) -> String {
     let known = values.clone().filter(|value| value.is_finite());
-    let (low, high) = known.fold((f32::MAX, f32::MIN), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
+    let (low, high) =
+        known.fold((f32::MAX, f32::MIN), |(low, high), value| (low.min(value), high.max(value)));
     // The noise of a steady value is not a change.
     let span = (f64::from(high) - f64::from(low)).max(f64::from(high).abs() * 0.02).max(0.02);
     let levels = if is_ascii { ASCII } else { BLOCKS };
@@ -114,7 +112,7 @@ mod tests {
     #[test]
     fn a_sparkline_shows_changes_and_neither_noise_nor_missing_values() {
         let of = |values: &[f32]| sparkline(values.iter().copied(), false);
-        assert_eq!(of(&[0.0, 1.0, 2.0]), "▁▄█");
+        assert_eq!(of(&[0.0, 1.0, 2.0]), "▁▅█");
         assert_eq!(of(&[-1.0, f32::NAN, 1.0]), "▁ █");
         assert_eq!(of(&[5.0, 5.01, 5.0]), "▁▁▁");
         assert_eq!(of(&[f32::NAN, f32::INFINITY]), "  ");

@@ -69,7 +69,8 @@ pub(crate) fn is_possible() -> bool {
 /// Whether the terminal is likely to show only ASCII.
 pub(crate) fn is_ascii() -> bool {
     let variables = ["LC_ALL", "LC_CTYPE", "LANG"];
-    let set = variables.iter().find_map(|name| std::env::var(name).ok().filter(|it| !it.is_empty()));
+    let set =
+        variables.iter().find_map(|name| std::env::var(name).ok().filter(|it| !it.is_empty()));
     set.is_some_and(|locale| {
         let locale = locale.to_lowercase();
         !locale.contains("utf-8") && !locale.contains("utf8")
