@@ -5,6 +5,8 @@ mod bus;
 mod log;
 mod rover;
 #[cfg(test)]
+mod shots;
+#[cfg(test)]
 mod tests;
 mod text;
 

@@ -70,7 +70,7 @@ mod tests {
         let stop = Arc::new(AtomicBool::new(false));
         let (keys, _queue) = mpsc::sync_channel(QUEUE);
         // The end of the input stops too, so it is left out here.
-        let endless = std::io::Read::chain(&mut typed, Panics);
+        let endless = Read::chain(&mut typed, Panics);
         let sink = Sink { stop: Some(Arc::clone(&stop)) };
         let passed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             pass_on(endless, &keys, &sink);

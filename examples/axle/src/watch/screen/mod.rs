@@ -7,6 +7,8 @@
 mod ansi;
 mod keys;
 mod panics;
+#[cfg(test)]
+mod tests;
 
 use std::{
     fs::File,
