@@ -1,6 +1,9 @@
 //! The bytes of a line on their way into the model.
 
-use axlewire::stream::{Counters, Decoder, Event, Framing};
+use axlewire::{
+    ikeya::NodeId,
+    stream::{Counters, Decoder, Event, Framing},
+};
 
 use super::{
     QUIET,
@@ -30,6 +33,8 @@ pub(crate) struct Feed<F> {
 struct Direction<F> {
     decoder: Decoder<F, BUFFER_LEN>,
     heard_at: u64,
+    /// The node that the waiting bytes are near.
+    near: Option<NodeId>,
 }
 
 impl<F> Direction<F>
@@ -38,7 +43,7 @@ where
     for<'a> F::Frame<'a>: Heard,
 {
     fn new() -> Self {
-        Self { decoder: Decoder::new(), heard_at: 0 }
+        Self { decoder: Decoder::new(), heard_at: 0, near: None }
     }
 
     fn take(&mut self, mut bytes: &[u8], at: u64, model: &mut Model, table: &mut Option<Table>) {
@@ -49,16 +54,25 @@ where
         } else {
             return;
         }
+        // Bytes that wait came near an earlier packet than those that follow.
+        let mut near = self.near.take();
         while let Some(event) = self.decoder.decode(&mut bytes) {
             match event {
                 Event::Frame(frame) => {
+                    near = None;
                     if let Some(table) = table {
                         table.count(&frame);
                     }
                     model.frame(&frame, at);
                 }
-                Event::Skipped(gap) => model.gap(gap, at),
+                Event::Skipped(gap) => {
+                    let near = near.take().or_else(|| model.near());
+                    model.gap(gap, near, at);
+                }
             }
+        }
+        if self.decoder.pending() > 0 {
+            self.near = near.or_else(|| model.near());
         }
     }
 }

@@ -203,11 +203,19 @@ impl Bus {
         }
     }
 
+    /// The node whose answer is due, or that of the last packet.
+    pub(super) const fn near(&self) -> Option<NodeId> {
+        match self.asked {
+            Some((id, _)) => Some(id),
+            None => self.last,
+        }
+    }
+
     /// Books skipped bytes on the node that they are near.
-    pub(super) fn damage(&mut self, bytes: u64) -> Option<NodeId> {
-        let id = self.asked.map(|(id, _)| id).or(self.last)?;
-        self.node(id)?.damaged += bytes;
-        Some(id)
+    pub(super) fn damage(&mut self, id: NodeId, bytes: u64) {
+        if let Some(node) = self.node(id) {
+            node.damaged += bytes;
+        }
     }
 
     pub(super) fn tick(&mut self, now: u64, log: &mut Log) {

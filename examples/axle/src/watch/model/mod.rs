@@ -7,7 +7,7 @@ mod rover;
 mod trend;
 
 use axlewire::{
-    ikeya::{self, Mode, three},
+    ikeya::{self, Mode, NodeId, three},
     stream::{Counters, Gap},
     ucp,
 };
@@ -74,13 +74,20 @@ impl Model {
         frame.tell(self, at);
     }
 
-    /// Takes in bytes that belong to no frame.
-    pub(crate) fn gap(&mut self, gap: Gap, at: u64) {
-        self.revision += 1;
-        let node = match &mut self.line {
-            OfLine::Bus(bus) => bus.damage(gap.len),
+    /// The node that bytes of this moment are near, on a bus.
+    pub(crate) const fn near(&self) -> Option<NodeId> {
+        match &self.line {
+            OfLine::Bus(bus) => bus.near(),
             OfLine::Rover(_) => None,
-        };
+        }
+    }
+
+    /// Takes in bytes that belong to no frame, near this node.
+    pub(crate) fn gap(&mut self, gap: Gap, node: Option<NodeId>, at: u64) {
+        self.revision += 1;
+        if let (OfLine::Bus(bus), Some(node)) = (&mut self.line, node) {
+            bus.damage(node, gap.len);
+        }
         let bytes = if gap.len == 1 { "byte" } else { "bytes" };
         let text = format!("{} {bytes} skipped, {}: {}", gap.len, gap.reason, gap.reason.meaning());
         self.log.push(Entry { at, kind: Kind::Gap, node, text });

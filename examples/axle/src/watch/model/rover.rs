@@ -1,6 +1,9 @@
 //! A rover, as far as the traffic tells.
 
-use axlewire::ucp::{Frame, Message, Telemetry, message::ErrorCode};
+use axlewire::ucp::{
+    Frame, Message, Telemetry,
+    message::{ErrorCode, NetworkState},
+};
 
 use super::{Log, Rate, Trend};
 
@@ -42,7 +45,7 @@ pub(crate) struct Rover {
     pub(crate) round_trip: Option<u64>,
     /// The last step of a calibration.
     pub(crate) calibration: Option<String>,
-    pub(crate) network: Option<String>,
+    pub(crate) network: Option<NetworkState>,
     /// Mean speed of the wheels.
     pub(crate) trend: Trend,
     last_index: Option<u8>,
@@ -92,13 +95,8 @@ impl Rover {
                     log.event(at, None, format!("{message}"));
                 }
             }
-            Message::SetNetworkState(_) | Message::SetNetworkStateWide(_) => {
-                let state = message.contents().to_string();
-                if self.network.as_ref() != Some(&state) {
-                    log.event(at, None, format!("network {state}"));
-                }
-                self.network = Some(state);
-            }
+            Message::SetNetworkState(set) => self.set_network(set.state(), at, log),
+            Message::SetNetworkStateWide(set) => self.set_network(set.state(), at, log),
             Message::CalibrationStart(_)
             | Message::CalibrationStartAck(_)
             | Message::CalibrationEnd(_)
@@ -110,6 +108,13 @@ impl Rover {
             }
             _ => log.event(at, None, format!("{message}")),
         }
+    }
+
+    fn set_network(&mut self, state: NetworkState, at: u64, log: &mut Log) {
+        if self.network != Some(state) {
+            log.event(at, None, format!("network {state}"));
+        }
+        self.network = Some(state);
     }
 
     /// Counts a report and those missing in front of it.

@@ -106,7 +106,7 @@ fn lines(view: &View, rover: &Rover) -> Vec<Line> {
     );
     let text = |text: &Option<String>| vec![text.clone().unwrap_or_else(|| "-".to_owned())];
     add(["calibr.", "cal"], PLAIN, text(&rover.calibration));
-    add(["network", "net"], PLAIN, text(&rover.network));
+    add(["network", "net"], PLAIN, text(&rover.network.map(|state| state.to_string())));
     add(["firmware", "fw"], PLAIN, text(&rover.firmware.map(|version| version.to_string())));
     lines
 }
@@ -126,6 +126,7 @@ fn command(rover: &Rover) -> Vec<String> {
     let turn = turn.unsigned_abs();
     vec![
         format!("speed {speed} %, turn {turn} %{side}{lamp}  ({:.0}/s)", rover.commands.per_second),
+        format!("speed {speed} %, turn {turn} %{side}{lamp}"),
         format!("speed {speed} %, turn {turn} %{side}"),
         format!("{speed} % {letter}{turn} %"),
         format!("{speed} {letter}{turn}"),

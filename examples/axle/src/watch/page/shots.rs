@@ -11,7 +11,12 @@ use axlewire::{
     },
     sim::{Line, MotorNode, RoverNode, Who},
     time::{Duration, Instant},
-    ucp::{Host, MotorControl, Ucp, host::HostConfig, message::NetworkState, robot::RobotConfig},
+    ucp::{
+        Host, MotorControl, Ucp,
+        host::{HostConfig, MemoryStore},
+        message::NetworkState,
+        robot::RobotConfig,
+    },
 };
 use ratatui_core::{backend::TestBackend, terminal::Terminal};
 
@@ -42,7 +47,10 @@ where
     let mut feed = Feed::<F>::new(Model::new(protocol), None);
     for traced in line.trace() {
         let at = traced.at.as_micros();
-        feed.take(Source::Received, &[traced.byte], at);
+        // A host and a robot talk at the same time.
+        let is_sent = protocol == Protocol::Ucp && traced.who == Who::Head;
+        let source = if is_sent { Source::Sent } else { Source::Received };
+        feed.take(source, &[traced.byte], at);
         feed.tick(at);
     }
     feed.tick(line.now().as_micros());
@@ -54,13 +62,14 @@ fn bus() -> Buffer {
     let mut config = MasterConfig::direct();
     config.nodes = NodeSet::ALL;
     config.polling = Polling::Every(Duration::from_millis(10));
-    let mut line = Line::new(500_000, 7, Master::new(config, start()));
+    let mut line: Line<Master, MotorNode> = Line::new(500_000, 7, Master::new(config, start()));
     for node in NodeId::ALL {
         let mode = if node.get() % 4 == 3 { Mode::Position } else { Mode::Velocity };
         line.add(MotorNode::new(node, mode));
     }
     line.stub_mut(Who::Tail(6)).bit_errors = 4e-4;
     line.record();
+    line.head_mut().discover(start());
     line.run_for(Duration::from_millis(500)).unwrap();
     for step in 0..24_u32 {
         let now = line.now();
@@ -83,12 +92,14 @@ fn bus() -> Buffer {
         line.run_for(Duration::from_millis(500)).unwrap();
     }
     let model = hear::<BothDirections, _, _>(&line, Protocol::Ikeya);
-    picture("axle watch  /dev/ttyUSB0  ikeya  500000 bit/s", 500_000, &model)
+    let title = "axle watch  /dev/ttyUSB0  ikeya  500000 bit/s".to_owned();
+    picture(&View { title, baud: 500_000, ..View::default() }, &model)
 }
 
 /// A rover that drives a bend with its lamp on; some reports are lost.
 fn rover() -> Buffer {
-    let mut line = Line::new(115_200, 3, Host::new(HostConfig::default(), start()));
+    let host = Host::with_store(HostConfig::default(), MemoryStore::default(), start());
+    let mut line = Line::new(115_200, 3, host);
     line.add(RoverNode::new(RobotConfig::default(), start()));
     line.record();
     line.stub_mut(Who::Tail(0)).bit_errors = 1e-5;
@@ -103,13 +114,13 @@ fn rover() -> Buffer {
         line.run_for(Duration::from_millis(200)).unwrap();
     }
     let model = hear::<Ucp, _, _>(&line, Protocol::Ucp);
-    picture("axle watch  /dev/ttyUSB0  ucp  115200 bit/s", 115_200, &model)
+    let title = "axle drive  /dev/ttyUSB0  ucp  115200 bit/s".to_owned();
+    picture(&View { title, baud: 115_200, role: Role::Moving, ..View::default() }, &model)
 }
 
-fn picture(title: &str, baud: u32, model: &Model) -> Buffer {
-    let view = View { title: title.to_owned(), baud, ..View::default() };
+fn picture(view: &View, model: &Model) -> Buffer {
     let mut terminal = Terminal::new(TestBackend::new(SIZE.0, SIZE.1)).unwrap();
-    terminal.draw(|frame| draw(&view, model, frame.buffer_mut())).unwrap();
+    terminal.draw(|frame| draw(view, model, frame.buffer_mut())).unwrap();
     terminal.backend().buffer().clone()
 }
 
