@@ -2,15 +2,18 @@
 
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{MotorControl, host::Link},
+    ucp::{self, MotorControl, host::Link},
 };
 
 use crate::{
-    MOTION_HELP, args,
+    MOTION_HELP,
+    args::{self, Protocol},
     failure::{Failure, guarded},
+    line::Line,
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
+    watch::moving::{About, Page, PageArgs},
 };
 
 /// Drive a rover for a set time
@@ -41,6 +44,9 @@ pub(crate) struct Args {
     /// Duration, seconds
     #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
+
+    #[command(flatten)]
+    page: PageArgs,
 }
 
 fn percent() -> clap::builder::RangedI64ValueParser<i16> {
@@ -69,15 +75,21 @@ fn command(args: &Args) -> Result<MotorControl, axlewire::error::EncodeError> {
 }
 
 fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {
-    let mut rover = Rover::open(&args.line)?;
+    let baud = args.line.baud.unwrap_or(ucp::BAUD);
+    let about = About { command: "drive", protocol: Protocol::Ucp, baud, has_echo: false };
+    let wire = Line::open(&args.line, Protocol::Ucp)?;
+    let (page, wire) = args.page.open(wire, &about, signals)?;
+    let mut rover = Rover::on(wire, baud);
     if !rover.find(|| signals.is_raised())? {
         return signals.interrupted();
     }
     // Print before anything moves: a terminal may suspend a background process that prints.
     let announced = format!("target: {}", rover::describe(&command));
-    teller::print(&line(0.0, &announced)).map_err(Failure::Write)?;
+    if let Some(line) = page.note(line(0.0, &announced)) {
+        teller::print(&line).map_err(Failure::Write)?;
+    }
     let start = rover.now();
-    let mut drive = Drive { rover, start, teller: Teller::new() };
+    let mut drive = Drive { rover, start, teller: Teller::new(), page, left: Ok(()) };
 
     let driven = guarded(|| drive.drive(command, args.micros, signals));
     // In any case, stop the wheels first and report errors afterwards. That the wheels may still
@@ -87,6 +99,7 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     let recorded = drive.rover.check_recording();
     stopped?;
     driven.map_err(|failure| failure.and("it was stopped and is at rest"))?;
+    drive.left?;
     told.and(recorded)
 }
 
@@ -94,6 +107,9 @@ struct Drive {
     rover: Rover,
     start: Instant,
     teller: Teller,
+    page: Page,
+    /// Whether the page could be left.
+    left: Result<(), Failure>,
 }
 
 impl Drive {
@@ -134,7 +150,10 @@ impl Drive {
     }
 
     fn stop(&mut self) -> Result<(), Failure> {
-        self.rover.stop()?;
+        self.page.stopping();
+        let stopped = self.rover.stop();
+        self.left = self.page.leave();
+        stopped?;
         // If the output fails, the rover has stopped all the same.
         drop(self.say_report(", stopped"));
         Ok(())
@@ -143,7 +162,8 @@ impl Drive {
     fn say_report(&mut self, what: &str) -> Result<(), Failure> {
         let Some(report) = self.rover.describe() else { return Ok(()) };
         let seconds = (self.rover.now() - self.start).as_micros() as f64 / 1e6;
-        self.teller.say(line(seconds, &format!("{report}{what}")))
+        let line = self.page.note(line(seconds, &format!("{report}{what}")));
+        line.map_or(Ok(()), |line| self.teller.say(line))
     }
 }
 

@@ -53,10 +53,15 @@ pub(crate) struct Rover {
 
 impl Rover {
     pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
-        let line_open = Line::open(line, Protocol::Ucp)?;
+        let baud = line.baud.unwrap_or(ucp::BAUD);
+        Ok(Self::on(Line::open(line, Protocol::Ucp)?, baud))
+    }
+
+    /// A rover on an open line.
+    pub(crate) fn on(line: Line, baud: u32) -> Self {
         let mut config = HostConfig::default();
-        config.baud = line.baud.unwrap_or(ucp::BAUD);
-        Ok(Self::new(line_open, config))
+        config.baud = baud;
+        Self::new(line, config)
     }
 
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {

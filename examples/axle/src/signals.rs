@@ -113,6 +113,32 @@ impl Signals {
     }
 }
 
+#[cfg(all(unix, feature = "dashboard"))]
+impl Signals {
+    /// Whether Ctrl-Z was pressed. It counts once: for a subcommand that moves nothing, which goes
+    /// on after it.
+    pub(crate) fn take_suspension(&self) -> bool {
+        self.suspend.swap(false, Ordering::SeqCst)
+    }
+
+    /// Whether a signal to end has come.
+    pub(crate) fn is_end(&self) -> bool {
+        self.end.load(Ordering::SeqCst)
+    }
+
+    /// A flag for keys that end the tool as Ctrl-C does.
+    pub(crate) fn end_flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.end)
+    }
+}
+
+/// Suspends the process so that the shell notices; returns when it goes on.
+#[cfg(all(unix, feature = "dashboard"))]
+pub(crate) fn suspend() {
+    // SIGSTOP cannot fail for the process itself.
+    let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
+}
+
 fn listen_to(signals: &[i32], flag: &Arc<AtomicBool>) -> Result<(), Failure> {
     let register = |&signal: &i32| flag::register(signal, Arc::clone(flag)).map(drop);
     signals

@@ -24,10 +24,10 @@ fn a_wrong_command_line_is_explained_in_one_line() {
     let cases: [(&[&str], &str); 8] = [
         (&[], "requires a subcommand"),
         (&["encode"], "unrecognized subcommand 'encode'"),
-        (&["decode"], "--protocol <PROTOCOL>"),
+        (&["decode", "--jobs", "0"], "0 is not in 1..=256"),
         (
             &["decode", "--protocol", "can"],
-            "'can' for '--protocol <PROTOCOL>' [possible values: ucp, ikeya, ikeya-3]",
+            "'can' for '--protocol <PROTOCOL>' [possible values: auto, ucp, ikeya, ikeya-3]",
         ),
         (
             &["decode", "--protocol", "ikeya", "--direction", "up"],

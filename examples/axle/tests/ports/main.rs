@@ -7,6 +7,8 @@ mod support;
 
 mod drive;
 mod input;
+#[cfg(feature = "dashboard")]
+mod page;
 mod played;
 #[path = "../../../../tests/support/quiet.rs"]
 mod quiet;

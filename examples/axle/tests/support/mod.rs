@@ -4,6 +4,8 @@
 pub(crate) mod pcapng;
 pub(crate) mod process;
 pub(crate) mod schema;
+#[cfg(unix)]
+pub(crate) mod terminal;
 
 use std::{
     fs,

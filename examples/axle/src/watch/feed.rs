@@ -1,0 +1,124 @@
+//! The bytes of a line on their way into the model.
+
+use axlewire::{
+    ikeya::NodeId,
+    stream::{Counters, Decoder, Event, Framing},
+};
+
+use super::{
+    QUIET,
+    model::{Heard, Model},
+    table::Table,
+};
+use crate::decode::BUFFER_LEN;
+
+/// Where bytes come from.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Source {
+    Received,
+    /// By this tool.
+    Sent,
+}
+
+/// Decoders and the model that they fill.
+pub(crate) struct Feed<F> {
+    received: Direction<F>,
+    sent: Direction<F>,
+    pub(crate) model: Model,
+    /// Counts the messages, for a summary at the end.
+    table: Option<Table>,
+}
+
+/// The bytes of one source. They are no part of the frames of the other.
+struct Direction<F> {
+    decoder: Decoder<F, BUFFER_LEN>,
+    heard_at: u64,
+    /// The node that the waiting bytes are near.
+    near: Option<NodeId>,
+}
+
+impl<F> Direction<F>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Heard,
+{
+    fn new() -> Self {
+        Self { decoder: Decoder::new(), heard_at: 0, near: None }
+    }
+
+    fn take(&mut self, mut bytes: &[u8], at: u64, model: &mut Model, table: &mut Option<Table>) {
+        if !bytes.is_empty() {
+            self.heard_at = at;
+        } else if at >= self.heard_at + u64::from(QUIET.as_micros()) && self.decoder.pending() > 0 {
+            self.decoder.idle();
+        } else {
+            return;
+        }
+        // Bytes that wait came near an earlier packet than those that follow.
+        let mut near = self.near.take();
+        while let Some(event) = self.decoder.decode(&mut bytes) {
+            match event {
+                Event::Frame(frame) => {
+                    near = None;
+                    if let Some(table) = table {
+                        table.count(&frame);
+                    }
+                    model.frame(&frame, at);
+                }
+                Event::Skipped(gap) => {
+                    let near = near.take().or_else(|| model.near());
+                    model.gap(gap, near, at);
+                }
+            }
+        }
+        if self.decoder.pending() > 0 {
+            self.near = near.or_else(|| model.near());
+        }
+    }
+}
+
+impl<F> Feed<F>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Heard,
+{
+    pub(crate) fn new(model: Model, table: Option<Table>) -> Self {
+        Self { received: Direction::new(), sent: Direction::new(), model, table }
+    }
+
+    /// Takes in bytes, at a time in microseconds. No bytes may mean that a partial frame has ended
+    /// (ruling B3).
+    pub(crate) fn take(&mut self, source: Source, bytes: &[u8], at: u64) {
+        let direction = match source {
+            Source::Received => &mut self.received,
+            Source::Sent => &mut self.sent,
+        };
+        direction.take(bytes, at, &mut self.model, &mut self.table);
+    }
+
+    /// Takes in the time.
+    pub(crate) fn tick(&mut self, now: u64) {
+        for source in [Source::Received, Source::Sent] {
+            self.take(source, &[], now);
+        }
+        let counters = self.counters();
+        self.model.tick(counters, now);
+    }
+
+    /// The account of all bytes.
+    pub(crate) fn counters(&self) -> Counters {
+        let mut counters = self.received.decoder.counters();
+        counters += self.sent.decoder.counters();
+        counters
+    }
+
+    /// Number of bytes that may still become a frame.
+    pub(crate) const fn pending(&self) -> usize {
+        self.received.decoder.pending() + self.sent.decoder.pending()
+    }
+
+    /// The counts, if there are any.
+    pub(crate) fn into_table(self) -> Option<Table> {
+        self.table
+    }
+}
