@@ -76,7 +76,7 @@ pub(crate) enum BusProtocol {
 
 /// A node id, 1 to 8.
 pub(crate) fn node(text: &str) -> Result<NodeId, String> {
-    let id: u8 = text.parse().map_err(|_| "a node is a number from 1 to 8".to_owned())?;
+    let id: u8 = text.parse().map_err(|_| "a node id is a number within 1..=8".to_owned())?;
     NodeId::new(id).map_err(|error| error.to_string())
 }
 
@@ -111,7 +111,7 @@ const LONGEST: f64 = 86_400.0;
 pub(crate) fn seconds(text: &str) -> Result<u64, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if !(0.0..=LONGEST).contains(&seconds) {
-        return Err(format!("{seconds} s is not within 0..={LONGEST} s"));
+        return Err(format!("it is not within 0..={LONGEST} seconds"));
     }
     Ok((seconds * 1e6) as u64)
 }

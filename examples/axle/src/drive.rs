@@ -1,15 +1,19 @@
 //! `axle drive`: drives a rover, and stops it before the tool exits.
 
+use std::fmt;
+
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{self, MotorControl, host::Link},
+    ucp::{self, MotorControl, Telemetry, host::Link},
 };
+use serde::Serialize;
 
 use crate::{
     MOTION_HELP,
     args::{self, Protocol},
     failure::{Failure, guarded},
     line::Line,
+    report::{Form, Outcome},
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
@@ -42,11 +46,15 @@ pub(crate) struct Args {
     turn: i16,
 
     /// Duration, seconds
-    #[arg(long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
+    #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
 
     #[command(flatten)]
     page: PageArgs,
+
+    /// Print one JSON object per line; if the rover was commanded, the last is the outcome
+    #[arg(short, long)]
+    json: bool,
 }
 
 fn percent() -> clap::builder::RangedI64ValueParser<i16> {
@@ -84,28 +92,71 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
         return signals.interrupted();
     }
     // Print before anything moves: a terminal may suspend a background process that prints.
-    let announced = format!("target: {}", rover::describe(&command));
-    if let Some(line) = page.note(line(0.0, &announced)) {
+    let (form, target) = (Form::of(args.json), Event::target(&command));
+    if let Some(line) = page.note(form.line(0, &target)) {
         teller::print(&line).map_err(Failure::Write)?;
     }
     let start = rover.now();
-    let mut drive = Drive { rover, start, teller: Teller::new(), page, left: Ok(()) };
+    let mut drive = Drive { rover, start, form, teller: Teller::new(), page, left: Ok(()) };
 
     let driven = guarded(|| drive.drive(command, args.micros, signals));
     // In any case, stop the wheels first and report errors afterwards. That the wheels may still
     // turn is the most serious one.
     let stopped = drive.stop();
-    let told = drive.teller.finish();
     let recorded = drive.rover.check_recording();
-    stopped?;
-    driven.map_err(|failure| failure.and("it was stopped and is at rest"))?;
-    drive.left?;
-    told.and(recorded)
+    let is_at_rest = stopped.is_ok();
+    let besides = |failure: Failure| failure.and("it was stopped and is at rest");
+    let result = stopped.and(driven.map_err(besides));
+    Outcome::of(&result, is_at_rest).say(form, &mut drive.teller);
+    let told = drive.teller.finish();
+    result.and(drive.left).and(told).and(recorded)
+}
+
+/// What happens to the rover.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event {
+    Target {
+        speed: i16,
+        angular: i16,
+        #[serde(skip)]
+        text: String,
+    },
+    Report(Report),
+    Stopped(Report),
+}
+
+/// The robot's latest report.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    telemetry: Telemetry,
+    reports_lost: u32,
+    #[serde(skip)]
+    text: String,
+}
+
+impl Event {
+    fn target(command: &MotorControl) -> Self {
+        let text = rover::describe(command);
+        Self::Target { speed: command.speed(), angular: command.angular(), text }
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Target { text, .. } => write!(f, "target: {text}"),
+            Self::Report(report) => f.write_str(&report.text),
+            Self::Stopped(report) => write!(f, "{}, stopped", report.text),
+        }
+    }
 }
 
 struct Drive {
     rover: Rover,
     start: Instant,
+    form: Form,
     teller: Teller,
     page: Page,
     /// Whether the page could be left.
@@ -143,7 +194,7 @@ impl Drive {
             }
             if self.rover.now() >= print_at {
                 print_at = self.rover.now() + PRINT_PERIOD;
-                self.say_report("")?;
+                self.say_report(Event::Report)?;
             }
         }
         Ok(())
@@ -155,18 +206,20 @@ impl Drive {
         self.left = self.page.leave();
         stopped?;
         // If the output fails, the rover has stopped all the same.
-        drop(self.say_report(", stopped"));
+        drop(self.say_report(Event::Stopped));
         Ok(())
     }
 
-    fn say_report(&mut self, what: &str) -> Result<(), Failure> {
-        let Some(report) = self.rover.describe() else { return Ok(()) };
-        let seconds = (self.rover.now() - self.start).as_micros() as f64 / 1e6;
-        let line = self.page.note(line(seconds, &format!("{report}{what}")));
+    fn say_report(&mut self, event: fn(Report) -> Event) -> Result<(), Failure> {
+        let Some(text) = self.rover.describe() else { return Ok(()) };
+        let host = self.rover.host();
+        let Some(telemetry) = host.last_report().map(|report| report.telemetry) else {
+            return Ok(());
+        };
+        let reports_lost = host.statistics().reports_lost;
+        let event = event(Report { telemetry, reports_lost, text });
+        let micros = self.rover.now().as_micros().saturating_sub(self.start.as_micros());
+        let line = self.page.note(self.form.line(micros, &event));
         line.map_or(Ok(()), |line| self.teller.say(line))
     }
-}
-
-fn line(seconds: f64, what: &str) -> String {
-    format!("{seconds:7.2} s  {what}")
 }

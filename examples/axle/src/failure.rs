@@ -8,6 +8,11 @@ use std::{
     process::ExitCode,
 };
 
+use anstyle::{AnsiColor, Effects, Style};
+use clap::error::{ContextKind, ContextValue};
+
+const ERROR: Style = AnsiColor::Red.on_default().effects(Effects::BOLD);
+
 /// Reason why the tool exits early.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -29,13 +34,29 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
-    /// The first paragraph of clap's message on one line; --help shows usage and tips.
+    /// The first paragraph of clap's message on one line, with what was probably meant; --help
+    /// shows usage and tips.
     pub(crate) fn usage(error: &clap::Error) -> Self {
         let text = error.render().to_string();
         let paragraph = text.split("\n\n").next().unwrap_or_default();
         let words: Vec<_> = paragraph.split_whitespace().collect();
         let line = words.join(" ");
-        Self::Usage(line.strip_prefix("error: ").unwrap_or(&line).to_owned())
+        let line = line.strip_prefix("error: ").unwrap_or(&line);
+        let suggestions = [
+            ContextKind::SuggestedSubcommand,
+            ContextKind::SuggestedArg,
+            ContextKind::SuggestedValue,
+        ];
+        let suggestion = suggestions.into_iter().find_map(|kind| match error.get(kind)? {
+            ContextValue::String(one) => Some(one.clone()),
+            // The best one is the last.
+            ContextValue::Strings(several) => several.last().cloned(),
+            _ => None,
+        });
+        Self::Usage(match suggestion {
+            Some(suggestion) => format!("{line}; did you mean '{suggestion}'?"),
+            None => line.to_owned(),
+        })
     }
 
     /// A port that failed after it was opened.
@@ -69,7 +90,7 @@ impl Failure {
                 return ExitCode::SUCCESS;
             }
             // If standard error is closed, there is nowhere left to report.
-            _ => drop(writeln!(io::stderr(), "axle: {self}")),
+            _ => drop(writeln!(anstream::stderr(), "{ERROR}axle:{ERROR:#} {self}")),
         }
         match self {
             Self::Usage(_) => ExitCode::from(2),

@@ -193,9 +193,8 @@ fn progress(len: u64) -> Option<ProgressBar> {
     if len <= NO_PROGRESS_UP_TO || !io::stderr().is_terminal() || io::stdout().is_terminal() {
         return None;
     }
-    let style = ProgressStyle::with_template(
-        "{bytes} of {total_bytes} [{bar:30}] {bytes_per_sec}, {eta} left",
-    )
-    .unwrap_or_else(|_| ProgressStyle::default_bar());
+    // The bar takes what the texts leave of the width of the terminal, so that no line wraps.
+    let style = ProgressStyle::with_template("{bytes} of {total_bytes} [{wide_bar}] {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
     Some(ProgressBar::new(len).with_style(style).with_finish(ProgressFinish::AndClear))
 }

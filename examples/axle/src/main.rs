@@ -6,16 +6,22 @@
 mod args;
 mod boards;
 mod bus;
+mod calibrate;
 mod decode;
 mod drive;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
 mod input;
+mod lamp;
 mod line;
 mod listing;
+mod manual;
+mod network;
 mod pcapng;
+mod ping;
 mod play;
+mod ports;
 mod record;
 mod replay;
 mod report;
@@ -33,7 +39,9 @@ mod watch;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{
+    Command as Description, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind,
+};
 
 use failure::Failure;
 
@@ -65,7 +73,7 @@ After a kill -9, a SIGSTOP or a power cut of this machine (no program can preven
 
 /// Host tool for Ikeya MD and UCP lines
 #[derive(Debug, Parser)]
-#[command(name = "axle", version, after_help = EXIT_CODES, arg_required_else_help = false)]
+#[command(name = "axle", version, after_help = EXIT_CODES, arg_required_else_help = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -78,25 +86,53 @@ enum Command {
     Spin(spin::Args),
     Drive(drive::Args),
     Stop(stop::Args),
+    Ping(ping::Args),
+    Calibrate(calibrate::Args),
+    Lamp(lamp::Args),
+    Network(network::Args),
     Watch(watch::Args),
     Record(record::Args),
     Replay(replay::Args),
     Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
+    Ports(ports::Args),
+    Completions(manual::CompletionsArgs),
+    Man(manual::ManArgs),
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::try_parse() {
+    let parsed = description().try_get_matches().and_then(|matches| {
+        Cli::from_arg_matches(&matches).map_err(|error| error.with_cmd(&description()))
+    });
+    let result = match parsed {
         Ok(Cli { command }) => run(&command),
         // --help and --version are "errors" that go to standard output.
         Err(error) if !error.use_stderr() => error.print().map_err(Failure::Write),
+        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            // If standard error is closed, there is nowhere to print it.
+            let _ = error.print();
+            return ExitCode::from(2);
+        }
         Err(error) => Err(Failure::usage(&error)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
+}
+
+/// All subcommands with their arguments.
+fn description() -> Description {
+    with_negative_numbers(Cli::command())
+}
+
+/// Takes a negative number for a value, so that the message names the range, not an unknown option.
+fn with_negative_numbers(command: Description) -> Description {
+    command.mut_subcommands(with_negative_numbers).mut_args(|arg| {
+        let takes_value = arg.get_action().takes_values() && !arg.is_positional();
+        if takes_value { arg.allow_negative_numbers(true) } else { arg }
+    })
 }
 
 fn run(command: &Command) -> Result<(), Failure> {
@@ -106,11 +142,18 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Spin(args) => spin::run(args),
         Command::Drive(args) => drive::run(args),
         Command::Stop(args) => stop::run(args),
+        Command::Ping(args) => ping::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Lamp(args) => lamp::run(args),
+        Command::Network(args) => network::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
+        Command::Ports(args) => ports::run(args),
+        Command::Completions(args) => manual::print_completions(args),
+        Command::Man(args) => manual::write_pages(args),
     }
 }

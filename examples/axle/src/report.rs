@@ -4,7 +4,10 @@ use std::fmt::Display;
 
 use serde::Serialize;
 
-use crate::{failure::Failure, teller::Teller};
+use crate::{
+    failure::Failure,
+    teller::{self, Teller},
+};
 
 /// The form of the lines.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -53,6 +56,13 @@ pub(crate) struct Outcome {
 impl Outcome {
     pub(crate) fn of(result: &Result<(), Failure>, at_rest: bool) -> Self {
         Self { at_rest, failure: result.as_ref().err().map(ToString::to_string) }
+    }
+
+    /// Prints it as the last line, for use while nothing moves.
+    pub(crate) fn print(&self, form: Form) {
+        if form == Form::Json {
+            drop(teller::print(&object(self)));
+        }
     }
 
     /// Queues it as the last line. People read the failure on standard error.

@@ -53,8 +53,13 @@ pub(crate) struct Rover {
 
 impl Rover {
     pub(crate) fn open(line: &args::PortArgs) -> Result<Self, Failure> {
-        let baud = line.baud.unwrap_or(ucp::BAUD);
-        Ok(Self::on(Line::open(line, Protocol::Ucp)?, baud))
+        Self::open_with(line, HostConfig::default())
+    }
+
+    pub(crate) fn open_with(args: &args::PortArgs, config: HostConfig) -> Result<Self, Failure> {
+        let (line, mut config) = (Line::open(args, Protocol::Ucp)?, config);
+        config.baud = args.baud.unwrap_or(ucp::BAUD);
+        Ok(Self::new(line, config))
     }
 
     /// A rover on an open line.
@@ -107,11 +112,21 @@ impl Rover {
 
     /// Runs one round and handles its events.
     pub(crate) fn round(&mut self, until: Instant) -> Result<(), Failure> {
+        self.round_with(until, |_| {})
+    }
+
+    /// The same, and shows the events to `react`.
+    pub(crate) fn round_with(
+        &mut self,
+        until: Instant,
+        mut react: impl FnMut(&HostEvent),
+    ) -> Result<(), Failure> {
         let (mut next, result) = match self.session.round(until) {
             Ok(event) => (event, Ok(())),
             Err(failure) => (self.session.poll_event(), Err(failure)),
         };
         while let Some(event) = next {
+            react(&event);
             match event {
                 // Turning on the spot is also motion: every wheel counts.
                 HostEvent::Report(report) if report.telemetry.rpm == [0; 4] => {

@@ -2,16 +2,19 @@
 
 use std::io::{self, Write};
 
+use anstyle::{AnsiColor, Effects, Style};
 use axlewire::ikeya::{
-    Mode, NodeId, Status,
-    board::OneMotor,
+    Mode, NodeId,
+    board::{OneMotor, ThreeMotors},
     slave::{DipSwitch, IdReading},
 };
 use serde::Serialize;
 
 use crate::{
     EXIT_CODES,
-    bus::{self, Boards, Bus},
+    args::BusProtocol,
+    boards::{Boards, Data},
+    bus::{self, Bus},
     failure::Failure,
     signals::Signals,
 };
@@ -27,10 +30,17 @@ pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::MasterArgs,
 
+    /// Boards on the bus
+    #[arg(short = 'P', long, value_enum, default_value = "ikeya")]
+    protocol: BusProtocol,
+
     /// Print one JSON object per line
-    #[arg(long)]
+    #[arg(short, long)]
     json: bool,
 }
+
+const TITLE: Style = Style::new().effects(Effects::BOLD);
+const WARNING: Style = AnsiColor::Yellow.on_default();
 
 /// One line of output.
 #[derive(Debug, Serialize)]
@@ -41,7 +51,7 @@ enum Record {
         node: NodeId,
         mode: Mode,
         #[serde(flatten)]
-        status: Status,
+        status: Data,
         dip: Dip,
     },
     /// An id that gave only damaged answers.
@@ -70,25 +80,35 @@ impl Dip {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    match args.protocol {
+        BusProtocol::Ikeya => scan::<OneMotor>(args),
+        BusProtocol::Ikeya3 => scan::<ThreeMotors>(args),
+    }
+}
+
+fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
-    let mut bus = Bus::<OneMotor>::open(&args.bus)?;
+    let mut bus = Bus::<B>::open(&args.bus)?;
     if !bus.discover(&signals)? {
         return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
     }
-    let print = if args.json { print_json } else { print_table };
-    print(&bus, &mut io::stdout().lock()).map_err(Failure::Write)?;
+    match args.json {
+        true => print_json(&bus, &mut io::stdout().lock()),
+        false => print_table(&bus, &mut anstream::stdout().lock()),
+    }
+    .map_err(Failure::Write)?;
     bus.check_recording()
 }
 
 /// Ids that have given only damaged answers.
-fn damaged(bus: &Bus) -> Vec<NodeId> {
+fn damaged<B: Boards>(bus: &Bus<B>) -> Vec<NodeId> {
     NodeId::ALL.into_iter().filter(|&node| bus.is_damaged(node)).collect()
 }
 
-fn print_json(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
+fn print_json<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
     let nodes = bus.nodes().map(|(node, mode, status)| {
         let dip = Dip::of(node, mode);
-        Record::Node { node, mode, status, dip }
+        Record::Node { node, mode, status: B::data(status), dip }
     });
     let damaged = damaged(bus);
     let summary = Record::Summary { nodes: bus.nodes().count(), damaged: damaged.len() };
@@ -100,32 +120,32 @@ fn print_json(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
     out.flush()
 }
 
-fn print_table(bus: &Bus, out: &mut dyn Write) -> io::Result<()> {
+fn print_table<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
     let count = bus.nodes().count();
     if count > 0 {
-        writeln!(out, "node  mode      DIP, id = value + 1  DIP, id = value  status")?;
+        writeln!(
+            out,
+            "{TITLE}node  mode      DIP, id = value + 1  DIP, id = value  status{TITLE:#}"
+        )?;
     }
     for (node, mode, status) in bus.nodes() {
         let Dip { value_plus_one, value } = Dip::of(node, mode);
         let [first, second] = [value_plus_one, value].map(|it| it.unwrap_or("none".to_owned()));
-        writeln!(
-            out,
-            "{node:>4}  {mode:<8}  {first:<19}  {second:<15}  {}",
-            OneMotor::describe(status)
-        )?;
+        writeln!(out, "{node:>4}  {mode:<8}  {first:<19}  {second:<15}  {}", B::describe(status))?;
     }
     let damaged = damaged(bus);
     for node in &damaged {
         writeln!(
             out,
-            "id {node}: only damaged answers: noise, two boards with this id, or a wrong --baud"
+            "{WARNING}id {node}: only damaged answers{WARNING:#}: noise, two boards with this id, an \
+             adapter that hears itself (--echo), another --protocol, or a wrong --baud"
         )?;
     }
     let (path, baud) = (bus.path(), bus.baud);
     match (count, damaged.is_empty()) {
         (0, true) => writeln!(
             out,
-            "No node answers on {path:?} at {baud} bit/s: check power, wires A and B, and --baud."
+            "No node answers on {path:?} at {baud} bit/s: check power, wires A and B, --protocol and --baud."
         ),
         (0, false) => {
             writeln!(out, "No node answers on {path:?} at {baud} bit/s: all answers are damaged.")

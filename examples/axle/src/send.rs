@@ -45,7 +45,7 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 struct Times {
     /// How often to send the message
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(short, long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     count: u32,
 
     /// Interval between two of them, seconds

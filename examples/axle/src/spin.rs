@@ -66,7 +66,7 @@ pub(crate) struct Args {
     #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
 
-    /// Print one JSON object per line; the last is the outcome
+    /// Print one JSON object per line; if the motor was commanded, the last is the outcome
     #[arg(short, long)]
     json: bool,
 }

@@ -1,16 +1,21 @@
 //! `axle stop`: stops whatever answers on a line.
 
+use std::fmt;
+
 use axlewire::ikeya::{
     NodeId,
     board::{OneMotor, ThreeMotors},
     master::{MasterConfig, NodeSet},
 };
+use serde::Serialize;
 
 use crate::{
     MOTION_HELP,
     args::{self, Protocol},
-    bus::{Boards, Bus, Halt},
+    boards::{Boards, Data},
+    bus::{Bus, Halt},
     failure::Failure,
+    report::{Form, Outcome},
     rover::Rover,
     signals::Signals,
     teller,
@@ -39,12 +44,53 @@ pub(crate) struct Args {
     line: args::PortArgs,
 
     /// Protocol of the line; by default ikeya is tried first, then ucp
-    #[arg(long, value_enum)]
+    #[arg(short = 'P', long, value_enum)]
     protocol: Option<Protocol>,
 
     /// Stop only this node of a motor bus, 1 to 8; it must answer
-    #[arg(long, value_name = "N", value_parser = args::node)]
+    #[arg(short, long, value_name = "N", value_parser = args::node)]
     node: Option<NodeId>,
+
+    /// Print one JSON object per line; the last is the outcome
+    #[arg(short, long)]
+    json: bool,
+}
+
+/// One line of output.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event {
+    /// A node, or the robot, was stopped and measured at rest.
+    Stopped {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        node: Option<NodeId>,
+        #[serde(flatten)]
+        status: Option<Data>,
+        #[serde(skip)]
+        text: String,
+    },
+    /// Ids that have never answered.
+    Silent { nodes: Vec<NodeId> },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stopped { node: Some(node), text, .. } => {
+                write!(f, "node {node}: {text}, stopped and confirmed")
+            }
+            Self::Stopped { node: None, text, .. } => write!(f, "robot: {text}, stopped"),
+            Self::Silent { nodes } => {
+                let nodes: Vec<_> = nodes.iter().map(ToString::to_string).collect();
+                write!(f, "silent: {}", nodes.join(", "))
+            }
+        }
+    }
+}
+
+/// If the output fails, what moved has stopped all the same.
+fn tell(args: &Args, event: &Event) {
+    drop(teller::print(&Form::of(args.json).plain(event)));
 }
 
 /// Runs the subcommand.
@@ -55,12 +101,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     // Signals do not interrupt a stop, which is bounded.
     let _signals = Signals::listen_to_all()?;
-    match args.protocol {
+    let result = match args.protocol {
         Some(Protocol::Ikeya) => stop_bus::<OneMotor>(args)?.judge(),
         Some(Protocol::Ikeya3) => stop_bus::<ThreeMotors>(args)?.judge(),
-        Some(Protocol::Ucp) => stop_rover(&args.line),
+        Some(Protocol::Ucp) => stop_rover(args),
         None => stop_whatever(args),
-    }
+    };
+    Outcome::of(&result, result.is_ok()).print(Form::of(args.json));
+    result
 }
 
 /// Stops a bus if a node answers, otherwise a rover.
@@ -69,7 +117,7 @@ fn stop_whatever(args: &Args) -> Result<(), Failure> {
     if bus.answered > 0 || args.node.is_some() {
         return bus.judge();
     }
-    stop_rover(&args.line).map_err(|failure| match failure {
+    stop_rover(args).map_err(|failure| match failure {
         Failure::Failed(line) => Failure::Failed(format!("{}; {line}", bus.nothing())),
         other => other,
     })
@@ -122,30 +170,29 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
         failure,
     };
     for node in nodes.iter() {
-        let status = bus.status(node).map(B::describe).unwrap_or_default();
         match bus.halt(node) {
             Halt::Still => {
-                let line = format!("node {node}: {status}, stopped and confirmed");
-                // If the output fails, the motor has stopped all the same.
-                drop(teller::print(&line));
+                let status = bus.status(node).map(B::data);
+                let text = status.map(|it| it.to_string()).unwrap_or_default();
+                tell(args, &Event::Stopped { node: Some(node), status, text });
             }
-            Halt::Silent if args.node.is_none() => silent.push(node.to_string()),
+            Halt::Silent if args.node.is_none() => silent.push(node),
             _ => stopped.complaints.extend(bus.complaint(node)),
         }
     }
     if stopped.answered > 0 && !silent.is_empty() {
-        drop(teller::print(&format!("silent: {}", silent.join(", "))));
+        tell(args, &Event::Silent { nodes: silent });
     }
     Ok(stopped)
 }
 
-fn stop_rover(line: &args::PortArgs) -> Result<(), Failure> {
-    let mut rover = Rover::open(line)?;
+fn stop_rover(args: &Args) -> Result<(), Failure> {
+    let mut rover = Rover::open(&args.line)?;
     // The host's first frames are stops, whether or not the robot is heard.
     rover.find(|| false)?;
     rover.stop()?;
-    if let Some(report) = rover.describe() {
-        drop(teller::print(&format!("robot: {report}, stopped")));
+    if let Some(text) = rover.describe() {
+        tell(args, &Event::Stopped { node: None, status: None, text });
     }
     rover.check_recording()
 }

@@ -1,0 +1,229 @@
+//! `axle calibrate`: calibrates sensors of a rover.
+
+use std::{
+    fmt, io,
+    sync::mpsc::{self, Receiver},
+    thread,
+};
+
+use axlewire::{
+    time::{Duration, Instant},
+    ucp::{
+        host::{CalibrationFailure, CalibrationStep, FailureCause, HostEvent},
+        message::{CalibrationKind, ImuBias, MagBias},
+    },
+};
+use serde::Serialize;
+
+use crate::{
+    EXIT_CODES, args,
+    failure::Failure,
+    report::Form,
+    rover::{CALL_PERIOD, Rover},
+    send::Kind,
+    signals::Signals,
+    teller,
+};
+
+/// Calibrate sensors of a rover
+///
+/// Starts the calibration, says what to do, ends it after --for or when Enter is pressed, and
+/// prints the biases. On Ctrl-C the calibration is ended too, and the exit code is 1. The biases are
+/// not kept here: give them to the program that answers when the robot boots, or send them with
+/// `axle send ucp biases`.
+///
+/// The robot does not move by itself, and this subcommand does not move it: the first frame is a
+/// stop, and stops are repeated every 0.1 s (ruling U16), so a rover that is driven by another
+/// program stops, and its lamp goes off. For the magnetometer, turn it by hand.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    line: args::PortArgs,
+
+    /// What to calibrate
+    #[arg(short, long, value_enum)]
+    kind: Kind,
+
+    /// Duration, seconds; by default, until Enter
+    #[arg(short = 'f', long = "for", value_name = "SECONDS", value_parser = args::seconds)]
+    micros: Option<u64>,
+
+    /// Print one JSON object per line
+    #[arg(short, long)]
+    json: bool,
+}
+
+/// Longest wait for the result: the robot repeats it every second until it is acknowledged.
+const RESULT_PATIENCE: Duration = Duration::from_millis(5000);
+
+/// What happens.
+#[derive(Debug, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+enum Event {
+    Started { kind: String, what_to_do: &'static str },
+    Ended { kind: String },
+    ImuBias { acc: [i16; 3], gyro: [i16; 3] },
+    MagBias { mag: [i16; 3] },
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Started { kind, what_to_do } => {
+                write!(f, "calibration of the {kind} has begun: {what_to_do}")
+            }
+            Self::Ended { kind } => write!(f, "calibration of the {kind} has ended"),
+            Self::ImuBias { acc: [ax, ay, az], gyro: [gx, gy, gz] } => {
+                write!(f, "biases: accelerometer {ax} {ay} {az}, gyroscope {gx} {gy} {gz}")
+            }
+            Self::MagBias { mag: [x, y, z] } => write!(f, "biases: magnetometer {x} {y} {z}"),
+        }
+    }
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let signals = Signals::listen()?;
+    let mut rover = Rover::open(&args.line)?;
+    if !rover.find(|| signals.is_raised())? {
+        return Err(Failure::Failed("interrupted before the calibration began".to_owned()));
+    }
+    let start = rover.now();
+    let form = Form::of(args.json);
+    let mut calibration = Calibration { rover, start, form, result: None };
+    calibration.request(CalibrationStep::Start, args.kind.kind())?;
+    let told = calibration.say_started(args);
+    let listened = told.and_then(|()| calibration.listen(args, &signals));
+    // In any case, the robot is told that the calibration is over.
+    let ended = calibration.request(CalibrationStep::End, args.kind.kind());
+    listened?;
+    ended?;
+    if signals.is_raised() {
+        return Err(Failure::Failed("interrupted: the calibration was ended".to_owned()));
+    }
+    calibration.say(&Event::Ended { kind: args.kind.kind().to_string() })?;
+    let result = calibration.result()?;
+    calibration.say(&result)?;
+    calibration.rover.check_recording()
+}
+
+struct Calibration {
+    rover: Rover,
+    start: Instant,
+    form: Form,
+    result: Option<Event>,
+}
+
+impl Calibration {
+    fn say(&mut self, event: &Event) -> Result<(), Failure> {
+        let micros = self.rover.now().as_micros().saturating_sub(self.start.as_micros());
+        teller::print(&self.form.line(micros, event)).map_err(Failure::Write)
+    }
+
+    fn say_started(&mut self, args: &Args) -> Result<(), Failure> {
+        let kind = args.kind.kind();
+        let what_to_do = match (kind, args.micros.is_some()) {
+            (CalibrationKind::Magnetometer, true) => "turn the robot by hand until the time is up",
+            (CalibrationKind::Magnetometer, false) => "turn the robot by hand, then press Enter",
+            (_, true) => "keep the robot still until the time is up",
+            (_, false) => "keep the robot still, then press Enter",
+        };
+        self.say(&Event::Started { kind: kind.to_string(), what_to_do })
+    }
+
+    /// Runs one round, and keeps a result.
+    fn round(&mut self) -> Result<(), Failure> {
+        let until = self.rover.now() + CALL_PERIOD;
+        let mut found = None;
+        let round = self.rover.round_with(until, |event| match event {
+            HostEvent::ImuBias(bias) => found = Some(Event::of_imu(bias)),
+            HostEvent::MagBias(bias) => found = Some(Event::of_mag(bias)),
+            _ => {}
+        });
+        self.result = found.or(self.result.take());
+        round
+    }
+
+    /// Asks the robot to begin or to end, and waits for its answer.
+    fn request(&mut self, step: CalibrationStep, kind: CalibrationKind) -> Result<(), Failure> {
+        let now = self.rover.now();
+        let host = self.rover.host_mut();
+        match step {
+            CalibrationStep::Start => host.start_calibration(kind, now),
+            CalibrationStep::End => host.end_calibration(kind, now),
+        }
+        .map_err(|error| Failure::Failed(error.to_string()))?;
+        loop {
+            match self.rover.host().calibration_outcome() {
+                Some(Ok(())) => return Ok(()),
+                Some(Err(failure)) => return Err(Failure::Failed(describe(&failure))),
+                None => self.round()?,
+            }
+        }
+    }
+
+    /// Waits until the time is up, Enter is pressed, or a signal comes.
+    fn listen(&mut self, args: &Args, signals: &Signals) -> Result<(), Failure> {
+        let begin = self.rover.now().as_micros();
+        let end = args.micros.map(|micros| Instant::from_micros(begin + micros));
+        let enter = if end.is_none() { Some(enter()) } else { None };
+        let is_pressed = || enter.as_ref().is_some_and(|enter| enter.try_recv().is_ok());
+        while !signals.is_raised() && !is_pressed() {
+            if end.is_some_and(|end| self.rover.now() >= end) {
+                break;
+            }
+            self.round()?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the result.
+    fn result(&mut self) -> Result<Event, Failure> {
+        let end = self.rover.now() + RESULT_PATIENCE;
+        while self.rover.now() < end {
+            if let Some(result) = self.result.take() {
+                return Ok(result);
+            }
+            self.round()?;
+        }
+        let seconds = RESULT_PATIENCE.as_micros() / 1_000_000;
+        Err(Failure::Failed(format!("the robot has sent no result for {seconds} s")))
+    }
+}
+
+impl Event {
+    fn of_imu(bias: &ImuBias) -> Self {
+        Self::ImuBias { acc: bias.acc(), gyro: bias.gyro() }
+    }
+
+    fn of_mag(bias: &MagBias) -> Self {
+        Self::MagBias { mag: bias.mag() }
+    }
+}
+
+/// Gets a message when Enter is pressed. The end of the input is no Enter.
+fn enter() -> Receiver<()> {
+    let (pressed, enter) = mpsc::channel();
+    thread::spawn(move || {
+        let mut line = String::new();
+        if io::stdin().read_line(&mut line).is_ok_and(|count| count > 0) {
+            // Fails only if nobody waits any more.
+            let _ = pressed.send(());
+        }
+    });
+    enter
+}
+
+fn describe(failure: &CalibrationFailure) -> String {
+    let step = match failure.step {
+        CalibrationStep::Start => "begin",
+        CalibrationStep::End => "end",
+    };
+    let cause = match failure.cause {
+        FailureCause::Refused(code) => format!("the robot refuses ({code})"),
+        _ => "the robot does not answer".to_owned(),
+    };
+    let (kind, attempts) = (failure.kind, failure.attempts);
+    format!("the calibration of the {kind} does not {step}: {cause}, asked {attempts} times")
+}
