@@ -1,6 +1,6 @@
 //! The page of `watch`, `spin` and `drive`, on a terminal that the test holds.
 
-use std::{fs, thread, time::Duration};
+use std::{fs, process::Command, thread, time::Duration};
 
 use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse};
 
@@ -282,6 +282,24 @@ fn a_terminal_that_goes_away_stops_the_motor() {
 }
 
 #[test]
+fn a_port_that_disappears_while_a_motor_turns_is_told_behind_the_page() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        let args = format!("spin --page --port {port} --node 1 --rps 2 --for 600");
+        let spin = Terminal::start(&args, (200, 30));
+        sim.line("node 1: turning at 2.00 rps");
+        spin.row("MOVING");
+        sim.kill();
+        let left = spin.end();
+        assert_eq!(left.code, Some(1), "{left:?}");
+        let line = left.text.trim_end();
+        assert!(line.starts_with(&format!("axle: port {port:?} failed: disconnected")), "{line}");
+        assert!(line.contains("has not confirmed it: it may be moving"), "{line}");
+        assert_eq!(line.lines().count(), 1, "{line}");
+    });
+}
+
+#[test]
 fn ctrl_z_stops_the_motor_leaves_the_page_and_only_then_suspends() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
@@ -310,6 +328,41 @@ fn a_page_that_is_not_possible_is_a_usage_error_before_anything_moves() {
         let spin = Process::start(&format!("spin --page --port {port} --node 1 --rps 2"));
         assert!(spin.complaint(2).starts_with("--page needs a terminal"));
         assert!(!sim.lines().iter().any(|line| line.contains("command")));
+    });
+}
+
+/// A shell's job control, on a terminal that is that of the session.
+#[test]
+fn in_the_background_there_are_lines_and_after_ctrl_z_and_bg_the_page_waits_for_fg() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let mut shell = Command::new("setsid");
+        // It reads no files of the user, and says nothing of its own.
+        shell.args(["--ctty", "--wait", "bash", "--norc", "--noprofile", "-i"]).env("PS1", "");
+        if Command::new("setsid").arg("--version").output().is_err() {
+            eprintln!("skipped: there is no setsid");
+            return;
+        }
+        let mut shell = Terminal::spawn(&mut shell, SIZE);
+        let tool = env!("CARGO_BIN_EXE_axle");
+        shell.press(&format!("{tool} watch --port {port} -P ucp --for 1.5 & wait; echo ready\n"));
+        shell.row("bytes received");
+        shell.row("ready");
+        assert!(!shell.text().contains("link     up"), "{}", shell.text());
+        shell.press(&format!("clear; {tool} watch --port {port} -P ucp\n"));
+        shell.row("reports/s");
+        shell.press("\x1a");
+        shell.wait("the shell", || !shell.has_page());
+        shell.press("bg\n");
+        thread::sleep(Duration::from_millis(500));
+        assert!(!shell.has_page(), "it is in the background");
+        shell.press("fg\n");
+        shell.row("reports/s");
+        // Ctrl-C as a key.
+        shell.press("\x03");
+        shell.row("bytes received");
+        shell.press("exit 0\n");
+        assert_eq!(shell.end().code, Some(0));
     });
 }
 
