@@ -282,6 +282,11 @@ fn any_bytes_at_any_times_are_shown_and_booked() {
                 drawn(&view(), &feed.model, *sizes.next().unwrap());
             }
         }
+        // The line goes quiet: what waits is decided.
+        for late in 11..30 {
+            feed.tick(late * 1_000_000);
+        }
+        assert_eq!(feed.pending(), 0);
         let counters = feed.counters();
         let OfLine::Bus(bus) = &feed.model.line else { panic!() };
         let packets: u64 = bus.nodes().map(|(_, node)| node.packets.count).sum();
