@@ -10,7 +10,7 @@ use super::{
     model::{Heard, Model},
     table::Table,
 };
-use crate::decode::BUFFER_LEN;
+use crate::{decode::BUFFER_LEN, listing::Shown};
 
 /// Where bytes come from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
