@@ -1,6 +1,15 @@
 //! The page of `watch`, `spin` and `drive`, on a terminal that the test holds.
 
-use std::{fs, process::Command, thread, time::Duration};
+use std::{
+    fs,
+    process::Command,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
 
 use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse};
 
@@ -264,6 +273,49 @@ fn a_terminal_that_takes_nothing_does_not_delay_the_stop() {
         let left = spin.end();
         // The last lines may be lost on such a terminal; then the exit code says so.
         assert!(left.code == Some(0) || left.text.contains("stalled"), "{left:?}");
+    });
+}
+
+#[test]
+fn a_terminal_that_takes_nothing_costs_the_watch_no_byte() {
+    /// More than any buffer in between holds.
+    const TOTAL: usize = 100_000;
+    undisturbed(|| {
+        let read = ReadRequest::new(NodeId::N1);
+        let answer = VelocityResponse::new(NodeId::N1, Rps::new(2.5).unwrap());
+        let round = [read.as_bytes().as_slice(), answer.as_bytes()].concat();
+        let piece = round.repeat(20);
+        let total = TOTAL.next_multiple_of(piece.len());
+        let (is_due, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
+        let (due, count) = (Arc::clone(&is_due), Arc::clone(&sent));
+        let bus = PlayedLine::new((), move |_, _| {
+            if !due.load(Ordering::SeqCst) || count.load(Ordering::SeqCst) >= total {
+                return Vec::new();
+            }
+            count.fetch_add(piece.len(), Ordering::SeqCst);
+            piece.clone()
+        });
+        let path = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("stalled.pcapng");
+        let _ = fs::remove_file(&path);
+        let path = path.to_str().unwrap();
+        let args = format!("watch --port {} -P ikeya --record {path}", bus.path);
+        let mut watch = Terminal::start(&args, (200, 60));
+        watch.row("REC ");
+        watch.stall(true);
+        is_due.store(true, Ordering::SeqCst);
+        wait_until("all is sent", || {
+            let at = sent.load(Ordering::SeqCst);
+            watch.resize((200 + (at / 500 % 2) as u16, 60));
+            at == total
+        });
+        thread::sleep(Duration::from_millis(200));
+        watch.stall(false);
+        watch.row(&format!("{total} bytes"));
+        watch.press("q");
+        assert_eq!(watch.end().code, Some(0));
+        let recorded = stdout(axle(&["watch", path, "--json"]).output().unwrap());
+        let recorded: serde_json::Value = serde_json::from_str(recorded.trim()).unwrap();
+        assert_eq!((&recorded["received"], &recorded["skipped"]), (&total.into(), &0.into()));
     });
 }
 
