@@ -97,12 +97,13 @@ where
         self.is_new = true;
     }
 
-    /// Gives the terminal to somebody else for a while.
-    pub(crate) fn away(&mut self, meanwhile: impl FnOnce()) -> Result<(), Failure> {
+    /// Gives the terminal to somebody else until `meanwhile` returns whether to come back.
+    pub(crate) fn away(&mut self, meanwhile: impl FnOnce() -> bool) -> Result<(), Failure> {
         self.screen.leave();
-        meanwhile();
-        self.screen = Screen::enter()?;
-        (self.is_new, self.drawn_at) = (true, None);
+        if meanwhile() {
+            self.screen = Screen::enter()?;
+            (self.is_new, self.drawn_at) = (true, None);
+        }
         Ok(())
     }
 

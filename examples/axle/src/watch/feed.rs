@@ -10,7 +10,7 @@ use super::{
     model::{Heard, Model},
     table::Table,
 };
-use crate::decode::BUFFER_LEN;
+use crate::{decode::BUFFER_LEN, listing::Shown};
 
 /// Where bytes come from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -33,7 +33,9 @@ pub(crate) struct Feed<F> {
 struct Direction<F> {
     decoder: Decoder<F, BUFFER_LEN>,
     heard_at: u64,
-    /// The node that the waiting bytes are near.
+    /// Number of bytes in the events so far.
+    reported: u64,
+    /// The node that the bytes behind them are near.
     near: Option<NodeId>,
 }
 
@@ -43,35 +45,43 @@ where
     for<'a> F::Frame<'a>: Heard,
 {
     fn new() -> Self {
-        Self { decoder: Decoder::new(), heard_at: 0, near: None }
+        Self { decoder: Decoder::new(), heard_at: 0, reported: 0, near: None }
     }
 
-    fn take(&mut self, mut bytes: &[u8], at: u64, model: &mut Model, table: &mut Option<Table>) {
+    /// Whether there are bytes that may become part of a frame, or of a longer gap.
+    const fn is_open(&self) -> bool {
+        self.decoder.received() > self.reported
+    }
+
+    fn take(&mut self, bytes: &[u8], at: u64, model: &mut Model, table: &mut Option<Table>) {
         if !bytes.is_empty() {
             self.heard_at = at;
-        } else if at >= self.heard_at + u64::from(QUIET.as_micros()) && self.decoder.pending() > 0 {
+        } else if self.is_open() && at >= self.heard_at + u64::from(QUIET.as_micros()) {
             self.decoder.idle();
         } else {
             return;
         }
-        // Bytes that wait came near an earlier packet than those that follow.
+        let mut bytes = bytes;
+        // Bytes that have waited came near an earlier packet than those that follow.
         let mut near = self.near.take();
         while let Some(event) = self.decoder.decode(&mut bytes) {
             match event {
                 Event::Frame(frame) => {
                     near = None;
+                    self.reported += frame.bytes().len() as u64;
                     if let Some(table) = table {
                         table.count(&frame);
                     }
                     model.frame(&frame, at);
                 }
                 Event::Skipped(gap) => {
+                    self.reported += gap.len;
                     let near = near.take().or_else(|| model.near());
                     model.gap(gap, near, at);
                 }
             }
         }
-        if self.decoder.pending() > 0 {
+        if self.is_open() {
             self.near = near.or_else(|| model.near());
         }
     }

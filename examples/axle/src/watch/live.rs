@@ -74,7 +74,7 @@ impl Live {
         for<'a> F::Frame<'a>: Heard,
     {
         if !screen::is_possible() {
-            let line = "--page needs a terminal as standard output, and its name in TERM";
+            let line = "--page needs a terminal as standard output, in the foreground";
             return Err(Failure::Usage(line.to_owned()));
         }
         let view = View {

@@ -25,6 +25,10 @@ pub(crate) struct Page {
 }
 
 /// What the page says of its line.
+#[cfg_attr(
+    not(all(unix, feature = "dashboard")),
+    expect(dead_code, reason = "there is no page to say it")
+)]
 pub(crate) struct About {
     pub(crate) command: &'static str,
     pub(crate) protocol: Protocol,

@@ -58,6 +58,17 @@ where
     watch.failed.map_or(recorded, Err)
 }
 
+/// Suspends the tool until the terminal listens to it again: not yet after `bg`. Returns `false` if
+/// it is to end instead.
+fn suspend(signals: &Signals) -> bool {
+    loop {
+        signals::suspend();
+        if signals.is_end() || screen::is_in_front() {
+            return !signals.is_end();
+        }
+    }
+}
+
 /// The title of a page.
 pub(super) fn title(command: &str, path: &str, protocol: &str, baud: u32) -> String {
     format!("axle {command}  {path}  {protocol}  {baud} bit/s")
@@ -87,7 +98,7 @@ where
         let mut buffer = vec![0; BUFFER_LEN];
         loop {
             if signals.take_suspension() {
-                self.dashboard.away(signals::suspend)?;
+                self.dashboard.away(|| suspend(signals))?;
             }
             let frames = self.dashboard.feed.counters().frames;
             if signals.is_end() || self.watched.is_over(self.start, clock.now(), frames) {

@@ -1,6 +1,15 @@
 //! The page of `watch`, `spin` and `drive`, on a terminal that the test holds.
 
-use std::{fs, thread, time::Duration};
+use std::{
+    fs,
+    process::Command,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+    thread,
+    time::Duration,
+};
 
 use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse};
 
@@ -268,6 +277,49 @@ fn a_terminal_that_takes_nothing_does_not_delay_the_stop() {
 }
 
 #[test]
+fn a_terminal_that_takes_nothing_costs_the_watch_no_byte() {
+    /// More than any buffer in between holds.
+    const TOTAL: usize = 100_000;
+    undisturbed(|| {
+        let read = ReadRequest::new(NodeId::N1);
+        let answer = VelocityResponse::new(NodeId::N1, Rps::new(2.5).unwrap());
+        let round = [read.as_bytes().as_slice(), answer.as_bytes()].concat();
+        let piece = round.repeat(20);
+        let total = TOTAL.next_multiple_of(piece.len());
+        let (is_due, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
+        let (due, count) = (Arc::clone(&is_due), Arc::clone(&sent));
+        let bus = PlayedLine::new((), move |_, _| {
+            if !due.load(Ordering::SeqCst) || count.load(Ordering::SeqCst) >= total {
+                return Vec::new();
+            }
+            count.fetch_add(piece.len(), Ordering::SeqCst);
+            piece.clone()
+        });
+        let path = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("stalled.pcapng");
+        let _ = fs::remove_file(&path);
+        let path = path.to_str().unwrap();
+        let args = format!("watch --port {} -P ikeya --record {path}", bus.path);
+        let mut watch = Terminal::start(&args, (200, 60));
+        watch.row("REC ");
+        watch.stall(true);
+        is_due.store(true, Ordering::SeqCst);
+        wait_until("all is sent", || {
+            let at = sent.load(Ordering::SeqCst);
+            watch.resize((200 + (at / 500 % 2) as u16, 60));
+            at == total
+        });
+        thread::sleep(Duration::from_millis(200));
+        watch.stall(false);
+        watch.row(&format!("{total} bytes"));
+        watch.press("q");
+        assert_eq!(watch.end().code, Some(0));
+        let recorded = stdout(axle(&["watch", path, "--json"]).output().unwrap());
+        let recorded: serde_json::Value = serde_json::from_str(recorded.trim()).unwrap();
+        assert_eq!((&recorded["received"], &recorded["skipped"]), (&total.into(), &0.into()));
+    });
+}
+
+#[test]
 fn a_terminal_that_goes_away_stops_the_motor() {
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
@@ -278,6 +330,24 @@ fn a_terminal_that_goes_away_stops_the_motor() {
         sim.line("node 1: command 0.00 rps");
         sim.line("node 1: at rest");
         assert!(spin.code().is_some());
+    });
+}
+
+#[test]
+fn a_port_that_disappears_while_a_motor_turns_is_told_behind_the_page() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        let args = format!("spin --page --port {port} --node 1 --rps 2 --for 600");
+        let spin = Terminal::start(&args, (200, 30));
+        sim.line("node 1: turning at 2.00 rps");
+        spin.row("MOVING");
+        sim.kill();
+        let left = spin.end();
+        assert_eq!(left.code, Some(1), "{left:?}");
+        let line = left.text.trim_end();
+        assert!(line.starts_with(&format!("axle: port {port:?} failed: disconnected")), "{line}");
+        assert!(line.contains("has not confirmed it: it may be moving"), "{line}");
+        assert_eq!(line.lines().count(), 1, "{line}");
     });
 }
 
@@ -310,6 +380,41 @@ fn a_page_that_is_not_possible_is_a_usage_error_before_anything_moves() {
         let spin = Process::start(&format!("spin --page --port {port} --node 1 --rps 2"));
         assert!(spin.complaint(2).starts_with("--page needs a terminal"));
         assert!(!sim.lines().iter().any(|line| line.contains("command")));
+    });
+}
+
+/// A shell's job control, on a terminal that is that of the session.
+#[test]
+fn in_the_background_there_are_lines_and_after_ctrl_z_and_bg_the_page_waits_for_fg() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let mut shell = Command::new("setsid");
+        // It reads no files of the user, and says nothing of its own.
+        shell.args(["--ctty", "--wait", "bash", "--norc", "--noprofile", "-i"]).env("PS1", "");
+        if Command::new("setsid").arg("--version").output().is_err() {
+            eprintln!("skipped: there is no setsid");
+            return;
+        }
+        let mut shell = Terminal::spawn(&mut shell, SIZE);
+        let tool = env!("CARGO_BIN_EXE_axle");
+        shell.press(&format!("{tool} watch --port {port} -P ucp --for 1.5 & wait; echo ready\n"));
+        shell.row("bytes received");
+        shell.row("ready");
+        assert!(!shell.text().contains("link     up"), "{}", shell.text());
+        shell.press(&format!("clear; {tool} watch --port {port} -P ucp\n"));
+        shell.row("reports/s");
+        shell.press("\x1a");
+        shell.wait("the shell", || !shell.has_page());
+        shell.press("bg\n");
+        thread::sleep(Duration::from_millis(500));
+        assert!(!shell.has_page(), "it is in the background");
+        shell.press("fg\n");
+        shell.row("reports/s");
+        // Ctrl-C as a key.
+        shell.press("\x03");
+        shell.row("bytes received");
+        shell.press("exit 0\n");
+        assert_eq!(shell.end().code, Some(0));
     });
 }
 

@@ -89,7 +89,9 @@ impl Model {
             bus.damage(node, gap.len);
         }
         let bytes = if gap.len == 1 { "byte" } else { "bytes" };
-        let text = format!("{} {bytes} skipped, {}: {}", gap.len, gap.reason, gap.reason.meaning());
+        let near = node.map(|node| format!(" near node {node}")).unwrap_or_default();
+        let (len, reason, meaning) = (gap.len, gap.reason, gap.reason.meaning());
+        let text = format!("{len} {bytes} skipped{near}, {reason}: {meaning}");
         self.log.push(Entry { at, kind: Kind::Gap, node, text });
     }
 

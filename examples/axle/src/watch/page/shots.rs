@@ -14,7 +14,7 @@ use axlewire::{
     ucp::{
         Host, MotorControl, Ucp,
         host::{HostConfig, MemoryStore},
-        message::NetworkState,
+        message::{ImuBias, MagBias, NetworkState},
         robot::RobotConfig,
     },
 };
@@ -98,7 +98,9 @@ fn bus() -> Buffer {
 
 /// A rover that drives a bend with its lamp on; some reports are lost.
 fn rover() -> Buffer {
-    let host = Host::with_store(HostConfig::default(), MemoryStore::default(), start());
+    let imu = ImuBias::new([12, -7, 90], [3, 1, -2]);
+    let store = MemoryStore { imu: Some(imu), mag: Some(MagBias::new([5, 0, -9])) };
+    let host = Host::with_store(HostConfig::default(), store, start());
     let mut line = Line::new(115_200, 3, host);
     line.add(RoverNode::new(RobotConfig::default(), start()));
     line.record();

@@ -239,3 +239,58 @@ fn text_from_the_line_is_never_a_control_sequence() {
         assert!(!row.contains(char::is_control), "{row:?}");
     }
 }
+
+/// Whatever is on a line, in whatever pieces and at whatever times, the page shows it, and every
+/// frame and every skipped byte of a bus is booked on a node.
+#[test]
+fn any_bytes_at_any_times_are_shown_and_booked() {
+    let mut seed = 1_u64;
+    let mut random = |below: u64| {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        seed % below
+    };
+    for _ in 0..20 {
+        let mut feed = Feed::<ikeya::BothDirections>::new(Model::new(Protocol::Ikeya), None);
+        // Bytes before the first frame are near nobody.
+        feed.take(Source::Received, ReadRequest::new(NodeId::N1).as_bytes(), 0);
+        let mut sizes = SIZES.iter().cycle();
+        for _ in 0..300 {
+            let id = NodeId::ALL[random(8) as usize];
+            let value = f32::from_bits(random(1 << 32) as u32);
+            let rps = Rps::new(value).unwrap_or(Rps::ZERO);
+            let counts = random(1 << 29) as i32 - (1 << 28);
+            let position = Position::from_counts(counts / 2).unwrap();
+            let mut bytes = match random(5) {
+                0 => ReadRequest::new(id).as_bytes().to_vec(),
+                1 => WriteRequest::velocity(id, rps).as_bytes().to_vec(),
+                2 => VelocityResponse::new(id, rps).as_bytes().to_vec(),
+                3 => PositionResponse::new(id, position).as_bytes().to_vec(),
+                _ => (0..random(30)).map(|_| random(256) as u8).collect(),
+            };
+            if random(4) == 0 && !bytes.is_empty() {
+                let at = random(bytes.len() as u64) as usize;
+                bytes[at] ^= 1 << random(8);
+            }
+            let at = random(10_000_000);
+            let split = random(bytes.len() as u64 + 1) as usize;
+            feed.take(Source::Received, &bytes[..split], at);
+            feed.take(Source::Received, &bytes[split..], at);
+            if random(10) == 0 {
+                feed.tick(at);
+                drawn(&view(), &feed.model, *sizes.next().unwrap());
+            }
+        }
+        // The line goes quiet: what waits is decided.
+        for late in 11..30 {
+            feed.tick(late * 1_000_000);
+        }
+        assert_eq!(feed.pending(), 0);
+        let counters = feed.counters();
+        let OfLine::Bus(bus) = &feed.model.line else { panic!() };
+        let packets: u64 = bus.nodes().map(|(_, node)| node.packets.count).sum();
+        let damaged: u64 = bus.nodes().map(|(_, node)| node.damaged).sum();
+        assert_eq!((packets, damaged), (counters.frames, counters.skipped()));
+    }
+}

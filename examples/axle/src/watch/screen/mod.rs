@@ -20,7 +20,10 @@ use std::{
 };
 
 use ratatui_core::{buffer::Buffer, layout::Rect};
-use rustix::termios::{self, InputModes, LocalModes, OptionalActions, SpecialCodeIndex, Termios};
+use rustix::{
+    process::getpgrp,
+    termios::{self, InputModes, LocalModes, OptionalActions, SpecialCodeIndex, Termios},
+};
 
 use crate::failure::Failure;
 pub(crate) use keys::{Keys, Sink};
@@ -65,7 +68,17 @@ impl Desk {
 /// Whether standard output is a terminal that can show a page.
 pub(crate) fn is_possible() -> bool {
     let is_dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
-    io::stdout().is_terminal() && !is_dumb
+    io::stdout().is_terminal() && !is_dumb && is_in_front()
+}
+
+/// Whether the terminal listens to this process. One in the background must not touch it: each try
+/// would only be another signal.
+pub(crate) fn is_in_front() -> bool {
+    match termios::tcgetpgrp(io::stdout()) {
+        Ok(group) => group == getpgrp(),
+        // It is not the terminal of this session, so nobody minds.
+        Err(_) => true,
+    }
 }
 
 /// Whether the terminal is likely to show only ASCII.
@@ -143,7 +156,9 @@ impl Screen {
             work = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
         drop(work);
-        if let Some(before) = &self.before {
+        if let Some(before) = &self.before
+            && is_in_front()
+        {
             // A terminal that has gone away needs nothing.
             let _ = termios::tcsetattr(io::stdin(), OptionalActions::Now, before);
         }
