@@ -125,7 +125,7 @@ fn messages_of_a_host_are_answered_by_a_robot() {
             assert!(lines.iter().any(|line| line.contains(answer)), "{message}: {lines:?}");
         }
         Process::start(&format!("send -p {port} ucp network-state connected")).success();
-        sim.line("network state: Connected");
+        sim.line("network state: connected");
     });
 }
 
