@@ -16,8 +16,13 @@ mod input;
 mod lamp;
 mod line;
 mod listing;
+<<<<<<< HEAD
 mod manual;
 mod network;
+=======
+#[cfg(not(unix))]
+mod no_sim;
+>>>>>>> wt-e
 mod pcapng;
 mod ping;
 mod play;
@@ -68,7 +73,11 @@ After a kill -9, a SIGSTOP or a power cut of this machine (no program can preven
   rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts,
              including noise and bytes from other programs
   After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise run axle stop. A machine that
-  can injure people needs an emergency stop that cuts power."
+  can injure people needs an emergency stop that cuts power.
+
+On Windows the tool stops what it moves on Ctrl-C, Ctrl-Break and when its window is closed. Windows
+gives it about 5 seconds for that after the window is closed and at logoff and shutdown, at which
+some programs are not told at all. It gives none after `End task` and taskkill /F."
 );
 
 /// Host tool for Ikeya MD and UCP lines
@@ -96,9 +105,14 @@ enum Command {
     Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
+<<<<<<< HEAD
     Ports(ports::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
+=======
+    #[cfg(not(unix))]
+    Sim(no_sim::Args),
+>>>>>>> wt-e
 }
 
 fn main() -> ExitCode {
@@ -152,8 +166,13 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
+<<<<<<< HEAD
         Command::Ports(args) => ports::run(args),
         Command::Completions(args) => manual::print_completions(args),
         Command::Man(args) => manual::write_pages(args),
+=======
+        #[cfg(not(unix))]
+        Command::Sim(_) => no_sim::run(),
+>>>>>>> wt-e
     }
 }

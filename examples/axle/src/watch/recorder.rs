@@ -59,7 +59,7 @@ where
         match &self.named {
             Some(named) if self.count == 0 => named.clone(),
             Some(named) => numbered(named, self.count + 1),
-            None => automatic(SystemTime::now()),
+            None => unused(&automatic(SystemTime::now())),
         }
     }
 
@@ -87,6 +87,14 @@ where
     pub(super) fn drop_it(&mut self) {
         self.running = None;
     }
+}
+
+/// The path, or with a number if there is a file of that name: two recordings may begin within a
+/// second.
+fn unused(path: &Path) -> PathBuf {
+    let numbers = (2..100).map(|number| numbered(path, number));
+    let mut paths = std::iter::once(path.to_owned()).chain(numbers);
+    paths.find(|path| !path.exists()).unwrap_or_else(|| path.to_owned())
 }
 
 /// `line.pcapng` as `line-2.pcapng`.

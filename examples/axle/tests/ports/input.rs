@@ -26,7 +26,7 @@ fn a_wrong_value_is_explained_in_one_line_before_any_port_is_touched() {
             ("spin --port /none --node 1 --revolutions 32769", "outside -268443647..=268435455"),
             ("spin --port /none --node 0 --rps 1", "node id 0 is outside 1..=8"),
             ("spin --port /none --node 9 --rps 1", "node id 9 is outside 1..=8"),
-            ("spin --port /none --node 1", "--rps <X>|--revolutions <X>"),
+            ("spin --port /none --node 1", "--rps <X>...|--revolutions <X>..."),
             ("spin --port /none --node 1 --rps 1 --revolutions 1", "cannot be used with"),
             ("spin --port /none --node 1 --rps 1 --for -1", "-1"),
             ("spin --port /none --node 1 --rps 1 --for NaN", "NaN s is not within 0..=86400 s"),

@@ -125,7 +125,7 @@ fn a_recording_is_switched_with_a_key_and_holds_what_was_received() {
         let left = Terminal::start(&args, (200, 10)).end();
         assert_eq!(left.code, Some(1));
         assert!(left.text.starts_with("axle: cannot create"), "{left:?}");
-        assert!(left.text.trim_end().ends_with("use another name"), "{left:?}");
+        assert!(left.text.trim_end().ends_with("choose another name"), "{left:?}");
     });
 }
 
