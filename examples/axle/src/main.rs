@@ -16,13 +16,10 @@ mod input;
 mod lamp;
 mod line;
 mod listing;
-<<<<<<< HEAD
 mod manual;
 mod network;
-=======
 #[cfg(not(unix))]
 mod no_sim;
->>>>>>> wt-e
 mod pcapng;
 mod ping;
 mod play;
@@ -105,14 +102,11 @@ enum Command {
     Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
-<<<<<<< HEAD
     Ports(ports::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
-=======
     #[cfg(not(unix))]
     Sim(no_sim::Args),
->>>>>>> wt-e
 }
 
 fn main() -> ExitCode {
@@ -166,13 +160,10 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
-<<<<<<< HEAD
         Command::Ports(args) => ports::run(args),
         Command::Completions(args) => manual::print_completions(args),
         Command::Man(args) => manual::write_pages(args),
-=======
         #[cfg(not(unix))]
         Command::Sim(_) => no_sim::run(),
->>>>>>> wt-e
     }
 }

@@ -127,7 +127,6 @@ impl Signals {
     }
 }
 
-<<<<<<< HEAD
 #[cfg(all(unix, feature = "dashboard"))]
 impl Signals {
     /// Whether Ctrl-Z was pressed. It counts once: for a subcommand that moves nothing, which goes
@@ -154,9 +153,7 @@ pub(crate) fn suspend() {
     let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
 }
 
-=======
 #[cfg(unix)]
->>>>>>> wt-e
 fn listen_to(signals: &[i32], flag: &Arc<AtomicBool>) -> Result<(), Failure> {
     let register = |&signal: &i32| flag::register(signal, Arc::clone(flag)).map(drop);
     signals.iter().try_for_each(register).map_err(deaf)
