@@ -13,7 +13,7 @@ use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals};
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct PageArgs {
     /// Show the page of axle watch meanwhile; space, s, q and Esc stop at once, as Ctrl-C does
-    #[arg(long)]
+    #[arg(long, conflicts_with = "json")]
     page: bool,
 }
 
