@@ -48,7 +48,6 @@ pub(crate) struct Node {
     in_a_row: u32,
     /// Time from the last answered READ to its answer, microseconds: both as heard here.
     pub(crate) latency: Option<u64>,
-    pub(crate) latency_max: u64,
     /// Skipped bytes after a request to this node, or after its own packets.
     pub(crate) damaged: u64,
     pub(crate) trend: Trend,
@@ -166,9 +165,7 @@ impl Bus {
         let Some(node) = self.packet(id, at) else { return };
         match asked {
             Some((asked, since)) if asked == id => {
-                let latency = at.saturating_sub(since);
-                node.latency = Some(latency);
-                node.latency_max = node.latency_max.max(latency);
+                node.latency = Some(at.saturating_sub(since));
             }
             Some((asked, _)) => {
                 log.event(at, id, format!("node {id} answered when node {asked} was asked"));
@@ -179,6 +176,8 @@ impl Bus {
             None => log.event(at, id, format!("node {id} answers, in {mode} mode")),
             Some(before) if before != mode => {
                 log.event(at, id, format!("node {id} has changed from {before} to {mode} mode"));
+                // The change ends the set-point (ruling I11).
+                node.command = None;
             }
             Some(_) if node.in_a_row >= STRIKES => {
                 let missing = node.in_a_row;

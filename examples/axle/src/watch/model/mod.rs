@@ -4,6 +4,8 @@
 mod bus;
 mod log;
 mod rover;
+#[cfg(test)]
+mod tests;
 mod trend;
 
 use axlewire::{
