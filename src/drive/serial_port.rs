@@ -14,8 +14,8 @@ const HELD_LEN: usize = 256;
 /// Longest wait in one call of the system, so that a port that has gone is noticed.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Shortest wait in one call of the system. Windows counts milliseconds, and 0 of them may mean
-/// that it waits for ever.
+/// Shortest wait in one call of the system. Windows counts milliseconds, and a driver may take 0 of
+/// them as no limit.
 const SHORTEST_WAIT: Duration =
     if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
 
