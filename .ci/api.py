@@ -30,7 +30,7 @@ NO_FORMAT = {
         "a port of the operating system": "drive::SerialPort drive::TokioSerialPort",
         "state: log its events, statistics and counters": (
             "drive::Driver drive::Rs485 ikeya::Master ikeya::Slave ikeya::master::Master"
-            " ikeya::slave::Slave io::FrameReader io::FrameWriter stream::Decoder stream::Frames"
+            " ikeya::slave::Slave io::FrameReader io::FrameWriter stream::Decoder stream::Frames stream::Parts"
             " ucp::Host ucp::Robot ucp::host::Host ucp::robot::Robot"
         ),
         "a clock or a delay, nothing to log": (

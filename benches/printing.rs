@@ -1,8 +1,8 @@
 //! Speed of printing: frames as text for people, over the same frames as JSON; one line per figure,
 //! `name value goal`, higher is better.
 //!
-//! `cargo bench -p axlewire-benches --bench printing` takes a few seconds once it is built. It fails
-//! if an output has the wrong length, never because a figure is low.
+//! `cargo bench -p axlewire-benches --bench printing` takes a few seconds once it is built. It
+//! fails if an output has the wrong length, never because a figure is low.
 
 use std::{env, fmt::Display, io::Write};
 

@@ -14,6 +14,11 @@ const HELD_LEN: usize = 256;
 /// Longest wait in one call of the system, so that a port that has gone is noticed.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// Shortest wait in one call of the system. Windows counts milliseconds, and a driver may take 0 of
+/// them as no limit.
+const SHORTEST_WAIT: Duration =
+    if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
+
 /// Longest piece written at once. A system that says that it has room, has room for that much, and
 /// would wait until it has taken all of a longer one.
 const PIECE_LEN: usize = 256;
@@ -129,17 +134,34 @@ impl SerialPort {
     }
 
     fn receive(&mut self, patience: Duration) -> io::Result<bool> {
-        self.tty.set_timeout(patience).map_err(lost)?;
+        self.tty.set_timeout(patience.max(SHORTEST_WAIT)).map_err(lost)?;
+        // Not every Windows driver returns a read at its first byte, so ask for one byte there.
+        let asked = if cfg!(windows) { 1 } else { HELD_LEN };
+        let count = self.read_at(0, asked)?;
+        self.unread = 0..count;
+        if cfg!(windows) && count > 0 {
+            let more = self.tty.bytes_to_read().map_err(lost)?;
+            // What is there already comes at once.
+            self.unread.end += self.read_at(count, more as usize)?;
+        }
+        Ok(count > 0)
+    }
+
+    /// Reads up to `len` bytes into the buffer, from `at`; 0 if none has come in time.
+    fn read_at(&mut self, at: usize, len: usize) -> io::Result<usize> {
+        let free = self.held.get_mut(at..).unwrap_or_default();
+        let len = len.min(free.len());
+        let free = free.get_mut(..len).unwrap_or_default();
+        if free.is_empty() {
+            return Ok(0);
+        }
         loop {
-            match self.tty.read(&mut self.held) {
+            match self.tty.read(free) {
                 Ok(0) => return Err(lost(io::ErrorKind::UnexpectedEof)),
-                Ok(count) => {
-                    self.unread = 0..count.min(HELD_LEN);
-                    return Ok(true);
-                }
+                Ok(count) => return Ok(count.min(len)),
                 Err(error) => match error.kind() {
                     io::ErrorKind::Interrupted => {}
-                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => return Ok(false),
+                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => return Ok(0),
                     _ => return Err(lost(error)),
                 },
             }
@@ -210,6 +232,8 @@ impl Write for SerialPort {
         self.tty.set_timeout(WRITE_PATIENCE).map_err(lost)?;
         loop {
             match self.tty.write(piece) {
+                // So Windows says that the time is over.
+                Ok(0) => return Err(io::ErrorKind::TimedOut.into()),
                 Ok(count) => return Ok(count),
                 Err(error) => match error.kind() {
                     io::ErrorKind::Interrupted if Instant::now() < deadline => {}

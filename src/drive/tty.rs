@@ -65,6 +65,13 @@ fn explain(error: &serialport::Error, path: &str) -> (io::ErrorKind, String) {
         ErrorKind::NoDevice if cfg!(unix) => {
             (io::ErrorKind::ResourceBusy, "another program is using it".into())
         }
+        // Windows says the same of a port that is not there and of one that is taken, except in
+        // words of the user's language.
+        ErrorKind::NoDevice if cfg!(windows) => {
+            let words = error.description.trim_end_matches('.');
+            let cause = format!("{words} (no such port, or another program is using it)");
+            (io::ErrorKind::NotFound, cause)
+        }
         _ => {
             let error = io::Error::from(error.clone());
             (error.kind(), format!("{error}"))

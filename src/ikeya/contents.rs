@@ -12,6 +12,7 @@ use crate::text::{Line, Shortest};
 /// Contents of a packet as text without its name and node, on one line, with units; empty for a
 /// READ. From `contents` of a packet, such as [`Packet::contents`]; three motors give three values.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Contents {
     values: Values,
     mode: Option<Mode>,
@@ -41,6 +42,7 @@ impl Contents {
 
 /// What a packet of either kind of board says.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Values {
     /// A READ: nothing.
     None,
@@ -53,6 +55,7 @@ pub(super) enum Values {
 
 /// One value, or one for each of three motors.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) enum Motors<T> {
     One([T; 1]),
     Three([T; 3]),

@@ -35,6 +35,24 @@
 //! assert_eq!(decoder.counters().framed, 4);
 //! ```
 //!
+//! # Printing
+//!
+//! [`Packet`], [`Request`] and [`Response`] print themselves on one line, with units;
+//! [`name`](Packet::name), [`id`](Packet::id) and [`contents`](Packet::contents) are the parts for
+//! a table. With feature `serde` they are data, whose fields are described on the page `fields`.
+//! Nothing allocates. A WRITE shows both readings, unless you know the mode of its node:
+//! [`Contents::in_mode`].
+//!
+//! ```
+//! use axlewire::ikeya::{NodeId, Position, PositionResponse, Response};
+//!
+//! let at = PositionResponse::new(NodeId::N3, Position::new(4096, 1));
+//! assert_eq!(
+//!     Response::Position(&at).to_string(),
+//!     "position_response, node 3: 1.5000 turns (rotation 1, count 4096)",
+//! );
+//! ```
+//!
 //! # Encoding
 //!
 //! A packet is built by a constructor, which takes only values that exist, and knows its bytes.

@@ -33,7 +33,7 @@ impl<'a> Line<'a> {
         self.result
     }
 
-    /// Appends `text`, which must be ASCII.
+    /// Appends `text`, which must be ASCII and at most 256 bytes long.
     #[inline(always)]
     pub(crate) fn text(&mut self, text: &str) {
         self.reserve(text.len());
@@ -54,7 +54,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// Appends an integer of up to 16 bits, right-aligned in `width` columns, at most 15.
+    /// Appends an integer, right-aligned in `width` columns, at most 15.
     #[inline]
     pub(crate) fn integer(&mut self, value: i32, width: usize) {
         self.fixed::<0>(value < 0, value.unsigned_abs(), width);
@@ -62,8 +62,8 @@ impl<'a> Line<'a> {
 
     /// Appends `magnitude` / 10^`DECIMALS`, right-aligned in `width` columns.
     ///
-    /// The sign is on its own, because core prints that of a number that rounds to 0. A number of
-    /// more than `width` columns takes as many as it needs; more than 15 there cannot be.
+    /// The sign is a separate argument, because core prints it for a number that rounds to 0, too.
+    /// A number that needs more than `width` columns takes them; none needs more than 12.
     pub(crate) fn fixed<const DECIMALS: usize>(
         &mut self,
         is_negative: bool,

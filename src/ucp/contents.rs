@@ -16,6 +16,7 @@ use crate::text::{Hex, Line};
 ///
 /// Numbers of a report have fixed widths, so that reports below each other form columns.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Contents<'a>(Message<'a>);
 
 impl<'a> Message<'a> {

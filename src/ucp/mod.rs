@@ -44,6 +44,23 @@
 //! assert_eq!(decoder.counters().framed, 8);
 //! ```
 //!
+//! # Printing
+//!
+//! Frames and messages print themselves on one line, with units; [`Message::name`] and
+//! [`Message::contents`] are the parts for a table. With feature `serde` they are data, whose
+//! fields are described on the page `fields`. Nothing allocates.
+//!
+//! ```
+//! use axlewire::ucp::{Body, Frame, message::{ErrorCode, Pong}};
+//!
+//! let sent = Pong::new(ErrorCode::Fine).frame(7);
+//! let frame = Frame::parse(sent.as_bytes())?;
+//! assert_eq!(frame.to_string(), "pong, index 7: fine");
+//! let message = frame.message();
+//! assert_eq!((message.name(), &*message.contents().to_string()), ("pong", "fine"));
+//! # Ok::<(), axlewire::error::ParseError>(())
+//! ```
+//!
 //! # Encoding
 //!
 //! [`Body::frame`] makes a whole frame of a message that may be sent.

@@ -56,6 +56,79 @@ fn a_message_alone_has_its_name_its_id_and_its_fields() {
 }
 
 #[test]
+fn each_message_has_its_own_fields_with_the_values_of_its_body() {
+    const IMU: [&str; 2] = ["acc_bias", "gyro_bias"];
+    let ack = &["err"][..];
+    let rows: [(u8, usize, &str, &[&str]); 18] = [
+        (1, 0, "ping", &[]),
+        (1, 1, "pong", ack),
+        (
+            2,
+            16,
+            "motor_control",
+            &["speed", "angular", "front_led", "back_led", "version", "reserve1", "reserve2"],
+        ),
+        (3, 1, "calibration_start", &["type"]),
+        (3, 2, "calibration_start_ack", &["type", "err"]),
+        (4, 1, "calibration_end", &["type"]),
+        (4, 2, "calibration_end_ack", &["type", "err"]),
+        (6, 12, "imu_bias", &IMU),
+        (6, 1, "imu_bias_ack", ack),
+        (7, 6, "mag_bias", &["mag_bias"]),
+        (7, 1, "mag_bias_ack", ack),
+        (8, 0, "bias_request", &[]),
+        (8, 19, "biases", &["err", "acc_bias", "gyro_bias", "mag_bias"]),
+        (9, 2, "ota_request", &["version"]),
+        (9, 1, "ota_ack", ack),
+        (10, 1, "network_state", &["state", "state_width"]),
+        (10, 4, "network_state", &["state", "state_width"]),
+        (10, 5, "unknown", &["body"]),
+    ];
+    // Sizes of the values, to cut the body of ascending bytes into them.
+    let width = |name: &str, field: &str, len: usize| match field {
+        "err" | "type" => 1,
+        "reserve2" => 4,
+        "acc_bias" | "gyro_bias" | "mag_bias" => 6,
+        "state" => len,
+        _ if name == "unknown" => len,
+        _ => 2,
+    };
+    for (id, len, name, fields) in rows {
+        let body: Vec<u8> = (1..=len as u8).collect();
+        let bytes = frame(id, 9, &body);
+        let received = Frame::parse(&bytes).unwrap();
+        let mut expected = json!({
+            "length": len + 8, "protocol": "ucp", "message": name, "id": id, "index": 9,
+            "bytes": bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>(),
+        });
+        let mut rest = &body[..];
+        for field in fields {
+            if *field == "state_width" {
+                expected[field] = len.into();
+                continue;
+            }
+            let (value, behind) = rest.split_at(width(name, field, len));
+            rest = behind;
+            let number = |bytes: &[u8]| -> u64 {
+                bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+            };
+            expected[field] = match value.len() {
+                _ if name == "unknown" => "0102030405".into(),
+                6 => value.chunks(2).map(number).collect(),
+                _ => number(value).into(),
+            };
+        }
+        assert!(rest.is_empty(), "{name}");
+        assert_eq!(to_value(received).unwrap(), expected);
+
+        for field in ["length", "protocol", "index", "bytes"] {
+            expected.as_object_mut().unwrap().remove(field);
+        }
+        assert_eq!(to_value(received.message()).unwrap(), expected);
+    }
+}
+
+#[test]
 fn the_longest_frame_has_all_its_bytes() {
     let body: Vec<u8> = (0..248).collect();
     let bytes = frame(0x20, 1, &body);

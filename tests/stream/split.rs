@@ -115,8 +115,8 @@ fn a_packet_of_an_impossible_node_that_overlaps_the_next_is_no_place() {
 
 #[test]
 fn a_damaged_frame_that_reaches_over_the_place_moves_it() {
-    // The header promises 40 bytes more, into the second command behind it. Without what follows, the front could not tell a wrong CRC
-    // from a frame that was cut off.
+    // The header promises 40 bytes more, into the second command behind it. Without what follows,
+    // the front could not tell a wrong CRC from a frame that was cut off.
     let bytes = [&[0xFD, 0xFF, 40, 0][..], &motor(), &motor(), &motor()].concat();
     let place = stream::split_point::<axlewire::ucp::Ucp>(&bytes, 0).unwrap();
     assert_eq!(place, 4 + 2 * motor().len());

@@ -20,6 +20,11 @@ pub(crate) struct PortArgs {
     #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) baud: Option<u32>,
 
+    /// The port has no line speed, such as one of com0com: accept an answer that comes sooner than
+    /// --baud allows. Pseudo-terminals and tcp: to this machine are known
+    #[arg(long)]
+    pub(crate) instant: bool,
+
     /// Record what is sent and received, as pcapng
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,

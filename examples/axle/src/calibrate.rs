@@ -28,8 +28,8 @@ use crate::{
 /// Calibrate sensors of a rover
 ///
 /// Starts the calibration, says what to do, ends it after --for or when Enter is pressed, and
-/// prints the biases. On Ctrl-C the calibration is ended too, and the exit code is 1. The biases are
-/// not kept here: give them to the program that answers when the robot boots, or send them with
+/// prints the biases. On Ctrl-C the calibration is ended too, and the exit code is 1. The biases
+/// are not kept here: give them to the program that answers when the robot boots, or send them with
 /// `axle send ucp biases`.
 ///
 /// The robot does not move by itself, and this subcommand does not move it: the first frame is a

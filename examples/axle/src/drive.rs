@@ -4,17 +4,20 @@ use std::fmt;
 
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{MotorControl, Telemetry, host::Link},
+    ucp::{self, MotorControl, Telemetry, host::Link},
 };
 use serde::Serialize;
 
 use crate::{
-    MOTION_HELP, args,
+    MOTION_HELP,
+    args::{self, Protocol},
     failure::{Failure, guarded},
+    line::Line,
     report::{Form, Outcome},
     rover::{self, CALL_PERIOD, Rover},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
+    watch::moving::{About, Page, PageArgs},
 };
 
 /// Drive a rover for a set time
@@ -45,6 +48,9 @@ pub(crate) struct Args {
     /// Duration, seconds
     #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "3", value_parser = args::seconds)]
     micros: u64,
+
+    #[command(flatten)]
+    page: PageArgs,
 
     /// Print one JSON object per line; if the rover was commanded, the last is the outcome
     #[arg(short, long)]
@@ -77,15 +83,21 @@ fn command(args: &Args) -> Result<MotorControl, axlewire::error::EncodeError> {
 }
 
 fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {
-    let mut rover = Rover::open(&args.line)?;
+    let baud = args.line.baud.unwrap_or(ucp::BAUD);
+    let about = About { command: "drive", protocol: Protocol::Ucp, baud, has_echo: false };
+    let wire = Line::open(&args.line, Protocol::Ucp)?;
+    let (page, wire) = args.page.open(wire, &about, signals)?;
+    let mut rover = Rover::on(wire, baud);
     if !rover.find(|| signals.is_raised())? {
         return signals.interrupted();
     }
     // Print before anything moves: a terminal may suspend a background process that prints.
     let (form, target) = (Form::of(args.json), Event::target(&command));
-    teller::print(&form.line(0, &target)).map_err(Failure::Write)?;
+    if let Some(line) = page.note(form.line(0, &target)) {
+        teller::print(&line).map_err(Failure::Write)?;
+    }
     let start = rover.now();
-    let mut drive = Drive { rover, start, form, teller: Teller::new() };
+    let mut drive = Drive { rover, start, form, teller: Teller::new(), page, left: Ok(()) };
 
     let driven = guarded(|| drive.drive(command, args.micros, signals));
     // In any case, stop the wheels first and report errors afterwards. That the wheels may still
@@ -97,7 +109,7 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     let result = stopped.and(driven.map_err(besides));
     Outcome::of(&result, is_at_rest).say(form, &mut drive.teller);
     let told = drive.teller.finish();
-    result.and(told).and(recorded)
+    result.and(drive.left).and(told).and(recorded)
 }
 
 /// What happens to the rover.
@@ -146,6 +158,9 @@ struct Drive {
     start: Instant,
     form: Form,
     teller: Teller,
+    page: Page,
+    /// Whether the page could be left.
+    left: Result<(), Failure>,
 }
 
 impl Drive {
@@ -186,7 +201,10 @@ impl Drive {
     }
 
     fn stop(&mut self) -> Result<(), Failure> {
-        self.rover.stop()?;
+        self.page.stopping();
+        let stopped = self.rover.stop();
+        self.left = self.page.leave();
+        stopped?;
         // If the output fails, the rover has stopped all the same.
         drop(self.say_report(Event::Stopped));
         Ok(())
@@ -201,6 +219,7 @@ impl Drive {
         let reports_lost = host.statistics().reports_lost;
         let event = event(Report { telemetry, reports_lost, text });
         let micros = self.rover.now().as_micros().saturating_sub(self.start.as_micros());
-        self.teller.say(self.form.line(micros, &event))
+        let line = self.page.note(self.form.line(micros, &event));
+        line.map_or(Ok(()), |line| self.teller.say(line))
     }
 }

@@ -23,19 +23,20 @@ pub(crate) struct Input {
     chunk: Box<[u8]>,
     /// Bytes at the front that were read ahead, to look at them first.
     ahead: Vec<u8>,
-    /// Whether it is a file that is there as a whole.
-    is_file: bool,
+    /// The first bytes, up to the length that was asked for.
+    first: Vec<u8>,
+    first_len: usize,
+    /// A second handle and the length, if it is a file that is there as a whole.
+    file: Option<(File, u64)>,
     progress: Option<ProgressBar>,
 }
 
 impl Input {
     /// Opens `path`, or standard input for `None` and `-`.
     pub(crate) fn open(path: Option<&Path>) -> Result<Self, Failure> {
-        let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
-            let (ahead, is_file) = (Vec::new(), false);
-            return Ok(Self { path: None, reader, chunk, ahead, is_file, progress: None });
+            return Ok(Self::new(None, reader, None, None));
         };
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
@@ -43,15 +44,38 @@ impl Input {
         if metadata.is_dir() {
             return Err(Failure::Directory { path: path.to_owned() });
         }
-        let is_file = metadata.is_file();
-        let progress = is_file.then(|| progress(metadata.len())).flatten();
-        let (reader, path) = (Box::new(file), Some(path.to_owned()));
-        Ok(Self { path, reader, chunk, ahead: Vec::new(), is_file, progress })
+        let mut whole = None;
+        if metadata.is_file() {
+            whole = Some((file.try_clone().map_err(cannot_open)?, metadata.len()));
+        }
+        let progress = whole.as_ref().and_then(|(_, len)| progress(*len));
+        Ok(Self::new(Some(path.to_owned()), Box::new(file), whole, progress))
     }
 
-    /// Whether the input is a file that is there as a whole, not a stream.
-    pub(crate) const fn is_file(&self) -> bool {
-        self.is_file
+    fn new(
+        path: Option<PathBuf>,
+        reader: Box<dyn Read>,
+        file: Option<(File, u64)>,
+        progress: Option<ProgressBar>,
+    ) -> Self {
+        let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
+        let (ahead, first) = (Vec::new(), Vec::new());
+        Self { path, reader, chunk, ahead, first, first_len: 0, file, progress }
+    }
+
+    /// Keeps the first `len` bytes.
+    pub(crate) const fn keep_first(&mut self, len: usize) {
+        self.first_len = len;
+    }
+
+    /// The first bytes that were kept.
+    pub(crate) fn first(&self) -> &[u8] {
+        &self.first
+    }
+
+    /// The file and its length, if the input is there as a whole and not a stream.
+    pub(crate) fn file(&self) -> Option<(&File, u64)> {
+        self.file.as_ref().map(|(file, len)| (file, *len))
     }
 
     /// Its path; `None` is standard input.
@@ -88,6 +112,7 @@ impl Input {
     pub(crate) fn read(&mut self) -> Result<&[u8], Failure> {
         if !self.ahead.is_empty() {
             self.chunk = core::mem::take(&mut self.ahead).into_boxed_slice();
+            self.keep(self.chunk.len());
             return Ok(&self.chunk);
         }
         if self.chunk.len() < CHUNK_LEN {
@@ -103,7 +128,46 @@ impl Input {
         if let Some(progress) = &self.progress {
             progress.inc(read as u64);
         }
+        self.keep(read);
         Ok(self.chunk.get(..read).unwrap_or_default())
+    }
+
+    /// Reads on at the end of `bytes`, until there are `len` of them or the input ends; returns
+    /// whether it has ended.
+    pub(crate) fn fill(&mut self, bytes: &mut Vec<u8>, len: usize) -> Result<bool, Failure> {
+        if !self.ahead.is_empty() {
+            let ahead = self.read()?;
+            bytes.extend_from_slice(ahead);
+        }
+        let begin = bytes.len();
+        let mut held = begin;
+        bytes.resize(len.max(held), 0);
+        let is_over = loop {
+            let room = bytes.get_mut(held..).unwrap_or_default();
+            if room.is_empty() {
+                break Ok(false);
+            }
+            match self.reader.read(room) {
+                Ok(0) => break Ok(true),
+                Ok(read) => held += read,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => break Err(Failure::Read { path: self.path.clone(), error }),
+            }
+        };
+        bytes.truncate(held);
+        let missing = self.first_len - self.first.len();
+        self.first.extend(bytes.iter().skip(begin).take(missing));
+        if let Some(progress) = &self.progress {
+            progress.inc((held - begin) as u64);
+        }
+        is_over
+    }
+
+    fn keep(&mut self, read: usize) {
+        let missing = self.first_len - self.first.len();
+        if missing > 0 {
+            self.first.extend(self.chunk.iter().take(read.min(missing)));
+        }
     }
 }
 

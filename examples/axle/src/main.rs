@@ -18,6 +18,8 @@ mod line;
 mod listing;
 mod manual;
 mod network;
+#[cfg(not(unix))]
+mod no_sim;
 mod pcapng;
 mod ping;
 mod play;
@@ -68,7 +70,11 @@ After a kill -9, a SIGSTOP or a power cut of this machine (no program can preven
   rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts,
              including noise and bytes from other programs
   After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise run axle stop. A machine that
-  can injure people needs an emergency stop that cuts power."
+  can injure people needs an emergency stop that cuts power.
+
+On Windows the tool stops what it moves on Ctrl-C, Ctrl-Break and when its window is closed. Windows
+gives it about 5 seconds for that after the window is closed and at logoff and shutdown, at which
+some programs are not told at all. It gives none after `End task` and taskkill /F."
 );
 
 /// Host tool for Ikeya MD and UCP lines
@@ -99,6 +105,8 @@ enum Command {
     Ports(ports::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
+    #[cfg(not(unix))]
+    Sim(no_sim::Args),
 }
 
 fn main() -> ExitCode {
@@ -155,5 +163,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Ports(args) => ports::run(args),
         Command::Completions(args) => manual::print_completions(args),
         Command::Man(args) => manual::write_pages(args),
+        #[cfg(not(unix))]
+        Command::Sim(_) => no_sim::run(),
     }
 }

@@ -14,8 +14,8 @@ use crate::{
 /// Show a state of the network on the lamp of a rover
 ///
 /// It is sent once, after the robot is heard; no robot acknowledges it. The first frame is a stop,
-/// and stops are repeated every 0.1 s (ruling U16): a rover that is driven by another program stops,
-/// and its front lamp goes off. Nothing moves because of this subcommand.
+/// and stops are repeated every 0.1 s (ruling U16): a rover that is driven by another program
+/// stops, and its front lamp goes off. Nothing moves because of this subcommand.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {

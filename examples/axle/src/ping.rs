@@ -24,11 +24,12 @@ use crate::{
 ///
 /// Sends a ping every --every seconds, prints the round trip of each pong, and at the end the
 /// shortest, the mean and the longest, and how many pings were lost. A pong that takes longer than
-/// 0.5 s counts as lost, and the next ping waits until then. The times include those of the bytes on
-/// the line and of the adapter.
+/// 0.5 s counts as lost, and the next ping waits until then. The times include those of the bytes
+/// on the line and of the adapter.
 ///
 /// The first frame is a stop, and stops are repeated every 0.1 s (ruling U16): a rover that is
-/// driven by another program stops, and its lamp goes off. Nothing moves because of this subcommand.
+/// driven by another program stops, and its lamp goes off. Nothing moves because of this
+/// subcommand.
 ///
 /// The exit code is 1 if no ping was answered.
 #[derive(Debug, clap::Args)]

@@ -110,7 +110,7 @@ where
 }
 
 /// Cuts what is received into frames and the bytes between them, a packet each.
-struct Frames<F> {
+pub(crate) struct Frames<F> {
     file: Recording,
     decoder: Decoder<F, BUFFER_LEN>,
     /// Bytes received and not written yet, and the end and the time of each chunk of them.
@@ -126,7 +126,7 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    fn new(file: Recording) -> Self {
+    pub(crate) fn new(file: Recording) -> Self {
         Self {
             file,
             decoder: Decoder::new(),
@@ -138,7 +138,7 @@ where
     }
 
     /// Takes in what has just been received, possibly nothing, and writes all that is decided.
-    fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+    pub(crate) fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         if bytes.is_empty() {
             if self.heard_at.elapsed() >= QUIET && self.decoder.pending() > 0 {
                 self.decoder.idle();
@@ -194,7 +194,7 @@ where
     }
 
     /// Writes what is left; returns the account.
-    fn finish(mut self) -> Result<Counters, Failure> {
+    pub(crate) fn finish(mut self) -> Result<Counters, Failure> {
         loop {
             self.decoder.idle();
             self.write(&[])?;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use axlewire::{ikeya::Rps, time::Duration};
+use axlewire::ikeya::Rps;
 
 use crate::{
     MOTION_HELP,
@@ -21,11 +21,11 @@ use crate::{
 /// If the frames command motors or a rover, --move is needed. Then the modes of all nodes that are
 /// commanded are read first, and nothing is sent if a node does not answer, if it is not in the
 /// mode that it had in the capture, or if it would get more than --max-rps or go farther than
-/// --max-turns: a speed looks like a far position, and the reverse. At the end, on every error and on every signal that can be caught, what was commanded is stopped. Firmware
-/// updates, motor commands out of range and bodies of a wrong length are refused (rulings U7 and
-/// U13).
+/// --max-turns: a speed looks like a far position, and the reverse. At the end, on every error and
+/// on every signal that can be caught, what was commanded is stopped. Firmware updates, motor
+/// commands out of range and bodies of a wrong length are refused (rulings U7 and U13).
 ///
-/// The capture is held in memory, about six times its size.
+/// The capture is held in memory: 3 to 12 times its size, most for the short packets of a bus.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
@@ -77,8 +77,8 @@ fn factor(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How long to listen behind the last frame.
-const LINGER: Duration = Duration::from_millis(200);
+/// How long to listen behind the last frame, microseconds.
+const LINGER_US: u64 = 200_000;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -125,7 +125,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         bus: &args.bus,
         protocol,
         frames: frames.into(),
-        linger: LINGER,
+        linger_us: LINGER_US,
         limits: Limits { max_rps: args.max_rps.get(), max_turns: args.max_turns },
         is_json: args.json,
     })

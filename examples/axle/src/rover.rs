@@ -62,6 +62,13 @@ impl Rover {
         Ok(Self::new(line, config))
     }
 
+    /// A rover on an open line.
+    pub(crate) fn on(line: Line, baud: u32) -> Self {
+        let mut config = HostConfig::default();
+        config.baud = baud;
+        Self::new(line, config)
+    }
+
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {
         let session = Session::new(line, |now| Host::new(config, now));
         Self { session, has_dead_man_fired: false, still_reports: 0 }

@@ -1,10 +1,7 @@
 //! `axle send`: sends single messages, and shows what is said on the line.
 
-use std::time::Duration as Span;
-
 use axlewire::{
     ikeya::{self, Mode, NodeId, Position, Rps, three},
-    time::Duration,
     ucp::{
         Body, MotorControl,
         message::{
@@ -25,10 +22,9 @@ use crate::{
 /// Send one message, and show what is said on the line
 ///
 /// The message is sent once, or --count times every --every seconds, and the line is shown for
-/// --for seconds more. Before a WRITE, the mode of its node is read: a node that does not answer, or
-/// is in the other mode, gets none, and none gets a speed above --max-rps or a position farther away
-/// than --max-turns. Before a motor command that is not zero, a
-/// robot must be heard.
+/// --for seconds more. Before a WRITE, the mode of its node is read. A node that does not answer,
+/// or is in the other mode, gets none, and none gets a speed above --max-rps or a position farther
+/// away than --max-turns. Before a motor command that is not zero, a robot must be heard.
 ///
 /// At the end, on every error and on every signal that can be caught, what was commanded is
 /// stopped, as by `axle spin` and `axle drive`. Firmware updates, motor commands out of range and
@@ -58,7 +54,7 @@ struct Times {
 
     /// How long to listen behind the last one, seconds; what moves does so meanwhile
     #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "0.5", value_parser = args::seconds)]
-    linger: u64,
+    linger_us: u64,
 
     /// Refuse a speed above this, in either direction
     #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
@@ -252,16 +248,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         bus: &args.bus,
         protocol,
         frames: frames.collect(),
-        linger: span(times.linger),
+        linger_us: times.linger_us,
         limits: Limits { max_rps: times.max_rps.get(), max_turns: times.max_turns },
         is_json: times.json,
     })
-}
-
-/// At most the longest span there is: 71 minutes.
-fn span(micros: u64) -> Duration {
-    let span = Span::from_micros(micros).as_micros();
-    Duration::from_micros(u32::try_from(span).unwrap_or(u32::MAX))
 }
 
 fn one(packet: &Packet) -> Result<Vec<u8>, String> {
@@ -330,7 +320,7 @@ fn ucp(message: &UcpMessage, index: u8) -> Result<Vec<u8>, String> {
 fn hex(words: &[String]) -> Result<Vec<u8>, String> {
     let digits: String = words.concat();
     let digits = digits.replace([':', ','], "");
-    if digits.len() % 2 != 0 || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+    if !digits.len().is_multiple_of(2) || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
         return Err(format!("{digits:?} is not an even number of hex digits"));
     }
     let pairs = (0..digits.len() / 2).map(|at| digits.get(2 * at..2 * at + 2).unwrap_or_default());

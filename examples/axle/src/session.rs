@@ -94,3 +94,66 @@ impl<R: Endpoint> Session<R> {
         Some(Failure::lost(self.path(), &cause))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use axlewire::ikeya::{Master, master::MasterConfig};
+    use embedded_io::{ErrorType, Read, ReadReady, Write};
+
+    use super::*;
+    use crate::line::Wire;
+
+    /// A port whose system takes no byte, as behind a stuck adapter.
+    struct Stuck;
+
+    impl ErrorType for Stuck {
+        type Error = io::Error;
+    }
+
+    impl Wire for Stuck {
+        fn wait(&mut self, _: Span) -> io::Result<bool> {
+            Ok(false)
+        }
+    }
+
+    impl ReadReady for Stuck {
+        fn read_ready(&mut self) -> io::Result<bool> {
+            Ok(false)
+        }
+    }
+
+    impl Read for Stuck {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Ok(0)
+        }
+    }
+
+    impl Write for Stuck {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(io::ErrorKind::TimedOut.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_port_that_takes_nothing_for_a_second_has_failed_and_not_before() {
+        let line = Line::new("stuck", Stuck, true);
+        let mut session =
+            Session::<Master>::new(line, |now| Master::new(MasterConfig::usb_adapter(), now));
+        let now = session.now();
+        session.role_mut().discover(now);
+        let start = Clock::now();
+        let failure = loop {
+            let until = session.now() + PATIENCE;
+            if let Err(failure) = session.round(until) {
+                break failure;
+            }
+            assert!(start.elapsed() < 20 * STUCK, "it never fails");
+        };
+        assert_eq!(failure.to_string(), "port \"stuck\" failed: it accepts no more bytes");
+        assert!(start.elapsed() >= STUCK, "{:?}", start.elapsed());
+    }
+}

@@ -1,5 +1,8 @@
 //! Signals as flags, checked between rounds, so that motors are stopped first.
 
+#[cfg(windows)]
+mod console;
+
 use std::{
     io,
     sync::{
@@ -9,8 +12,9 @@ use std::{
 };
 
 use axlewire::time::{Duration, Instant};
+#[cfg(unix)]
 use signal_hook::{
-    consts::{SIGINT, SIGTERM},
+    consts::{SIGHUP, SIGINT, SIGTERM},
     flag,
 };
 
@@ -18,9 +22,7 @@ use crate::failure::Failure;
 
 /// Ctrl-C, SIGTERM and a closed terminal end every subcommand.
 #[cfg(unix)]
-const ENDS: &[i32] = &[SIGINT, SIGTERM, signal_hook::consts::SIGHUP];
-#[cfg(not(unix))]
-const ENDS: &[i32] = &[SIGINT, SIGTERM];
+const ENDS: &[i32] = &[SIGINT, SIGTERM, SIGHUP];
 
 /// Ctrl-Z, and the signals that a terminal sends to a background process.
 #[cfg(unix)]
@@ -43,16 +45,24 @@ const LEFT_ALONE: &[i32] = {
 const LAST_SIGNAL: i32 = 64;
 
 /// The signals received so far. Flags are never cleared: a second Ctrl-C adds nothing to the first.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Signals {
     end: Arc<AtomicBool>,
     suspend: Arc<AtomicBool>,
+    #[cfg(windows)]
+    console: std::cell::RefCell<console::Console>,
 }
 
 impl Signals {
     /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag.
     pub(crate) fn listen() -> Result<Self, Failure> {
-        let signals = Self::default();
+        let signals = Self {
+            end: Arc::default(),
+            suspend: Arc::default(),
+            #[cfg(windows)]
+            console: console::Console::listen().map_err(deaf)?.into(),
+        };
+        #[cfg(unix)]
         listen_to(ENDS, &signals.end)?;
         Ok(signals)
     }
@@ -79,6 +89,10 @@ impl Signals {
 
     /// Whether any signal has come.
     pub(crate) fn is_raised(&self) -> bool {
+        #[cfg(windows)]
+        if self.console.borrow_mut().has_told() {
+            self.end.store(true, Ordering::SeqCst);
+        }
         self.end.load(Ordering::SeqCst) || self.suspend.load(Ordering::SeqCst)
     }
 
@@ -113,12 +127,40 @@ impl Signals {
     }
 }
 
+#[cfg(all(unix, feature = "dashboard"))]
+impl Signals {
+    /// Whether Ctrl-Z was pressed. It counts once: for a subcommand that moves nothing, which goes
+    /// on after it.
+    pub(crate) fn take_suspension(&self) -> bool {
+        self.suspend.swap(false, Ordering::SeqCst)
+    }
+
+    /// Whether a signal to end has come.
+    pub(crate) fn is_end(&self) -> bool {
+        self.end.load(Ordering::SeqCst)
+    }
+
+    /// A flag for keys that end the tool as Ctrl-C does.
+    pub(crate) fn end_flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.end)
+    }
+}
+
+/// Suspends the process so that the shell notices; returns when it goes on.
+#[cfg(all(unix, feature = "dashboard"))]
+pub(crate) fn suspend() {
+    // SIGSTOP cannot fail for the process itself.
+    let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
+}
+
+#[cfg(unix)]
 fn listen_to(signals: &[i32], flag: &Arc<AtomicBool>) -> Result<(), Failure> {
     let register = |&signal: &i32| flag::register(signal, Arc::clone(flag)).map(drop);
-    signals
-        .iter()
-        .try_for_each(register)
-        .map_err(|error: io::Error| Failure::Failed(format!("cannot listen for signals: {error}")))
+    signals.iter().try_for_each(register).map_err(deaf)
+}
+
+fn deaf(error: io::Error) -> Failure {
+    Failure::Failed(format!("cannot listen for signals: {error}"))
 }
 
 /// Time for which the tool was running, for deadlines: a suspended stop still gets all of its time

@@ -17,9 +17,11 @@ use crate::{
     boards::{Boards, Data},
     bus::{self, Bus},
     failure::{Failure, guarded},
+    line::Line,
     report::{Form, Outcome},
     signals::{Attendance, DEAD_MAN, Signals},
     teller::{self, Teller},
+    watch::moving::{About, Page, PageArgs},
 };
 
 /// Turn one motor of a motor bus, or the three of a board, for a set time
@@ -52,6 +54,9 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     goal: GoalArgs,
+
+    #[command(flatten)]
+    page: PageArgs,
 
     /// Refuse an --rps faster than this, in either direction, to guard against typos
     #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
@@ -185,14 +190,27 @@ impl<B: Boards> Goal<B> {
     }
 }
 
-/// Opens the port and chooses the target. `None` if a signal came first.
+/// What is ready to turn, and how; `None` if a signal came first.
+type Ready<B> = Option<(Spin<B>, Target<B>)>;
+
+/// Opens the port and chooses the target.
 fn prepare<B: Boards>(
     args: &Args,
     goal: &Goal<B>,
     form: Form,
     signals: &Signals,
-) -> Result<Option<(Spin<B>, Target<B>)>, Failure> {
-    let mut bus = Bus::open(&args.bus)?;
+) -> Result<Ready<B>, Failure> {
+    let port = args.bus.line();
+    let wire = Line::open(port, B::PROTOCOL)?;
+    let about = About {
+        command: "spin",
+        protocol: B::PROTOCOL,
+        baud: port.baud.unwrap_or(B::PROTOCOL.default_baud()),
+        has_echo: args.bus.config().removes_echo,
+    };
+    let (page, wire) = args.page.open(wire, &about, signals)?;
+    let config = bus::complete(args.bus.config(), port, &wire);
+    let mut bus = Bus::new(wire, config);
     if !bus.discover(signals)? {
         return Ok(None);
     }
@@ -200,7 +218,9 @@ fn prepare<B: Boards>(
     let found = goal.target(node, &bus, bus.status(node))?;
     // Print before anything moves: a terminal may suspend a background process that prints.
     let event = Event::Target { node, target: data(found) };
-    teller::print(&form.line(0, &event)).map_err(Failure::Write)?;
+    if let Some(line) = page.note(form.line(0, &event)) {
+        teller::print(&line).map_err(Failure::Write)?;
+    }
 
     // Discovery took a while, and so may the reader of that line: the mode may have changed.
     let status = bus.read(node, signals)?;
@@ -212,7 +232,8 @@ fn prepare<B: Boards>(
     }
     let target = goal.target(node, &bus, status)?;
     let start = bus.now();
-    Ok(Some((Spin { bus, node, start, form, teller: Teller::new() }, target)))
+    let (teller, left) = (Teller::new(), Ok(()));
+    Ok(Some((Spin { bus, node, start, form, teller, page, left }, target)))
 }
 
 fn data<B: Boards>(target: Target<B>) -> Data {
@@ -259,6 +280,9 @@ struct Spin<B: Boards> {
     start: Instant,
     form: Form,
     teller: Teller,
+    page: Page,
+    /// Whether the page could be left.
+    left: Result<(), Failure>,
 }
 
 impl<B: Boards> Spin<B> {
@@ -274,7 +298,7 @@ impl<B: Boards> Spin<B> {
         let result = stopped.and(spun.map_err(besides));
         Outcome::of(&result, is_at_rest).say(self.form, &mut self.teller);
         let told = self.teller.finish();
-        result.and(told).and(recorded)
+        result.and(self.left).and(told).and(recorded)
     }
 
     /// Commands the motor and watches it until the time is up or a signal comes.
@@ -353,7 +377,9 @@ impl<B: Boards> Spin<B> {
 
     /// Stops the motor and waits until it is at rest (rulings I6, I12).
     fn stop(&mut self) -> Result<(), Failure> {
+        self.page.stopping();
         let failure = self.bus.stop(self.node.into()).err();
+        self.left = self.page.leave();
         let Some(complaint) = self.bus.complaint(self.node) else {
             // If the output fails, the motor has stopped all the same.
             drop(self.say_status(true));
@@ -373,6 +399,7 @@ impl<B: Boards> Spin<B> {
             false => Event::Measured { node, status },
         };
         let micros = self.bus.now().as_micros().saturating_sub(self.start.as_micros());
-        self.teller.say(self.form.line(micros, &event))
+        let line = self.page.note(self.form.line(micros, &event));
+        line.map_or(Ok(()), |line| self.teller.say(line))
     }
 }

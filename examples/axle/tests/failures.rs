@@ -21,11 +21,12 @@ fn complaint(output: Output, code: i32) -> String {
 
 #[test]
 fn a_wrong_command_line_is_explained_in_one_line() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
         (&["encode"], "unrecognized subcommand 'encode'"),
+        (&["decode", "--jobs", "0"], "0 is not in 1..=256"),
         (
             &["decode", "--protocol", "can"],
-            "'can' for '--protocol <PROTOCOL>' [possible values: ucp, ikeya, ikeya-3]",
+            "'can' for '--protocol <PROTOCOL>' [possible values: auto, ucp, ikeya, ikeya-3]",
         ),
         (
             &["decode", "--protocol", "ikeya", "--direction", "up"],

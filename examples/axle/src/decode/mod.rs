@@ -1,5 +1,6 @@
 //! `axle decode`: reads a capture, prints one line per frame and per gap.
 
+mod account;
 mod capture;
 mod detect;
 mod parallel;
@@ -130,14 +131,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         (Protocol::Ikeya3, Some(Direction::ToSlave)) => decode::<three::ToSlave>,
         (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
     };
-    let sample = match (chosen, input.is_file()) {
-        // For a hint at the end, if there are no frames.
-        (Some(_), true) => input.peek(detect::SAMPLE_LEN, |_| false)?.to_vec(),
-        _ => Vec::new(),
-    };
-    let account = run(args, protocol, input)?;
+    // For a hint at the end, if there are no frames.
+    input.keep_first(detect::SAMPLE_LEN);
+    let account = run(args, protocol, &mut input)?;
     if account.frames == 0 && account.received > 0 {
-        return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(&sample))));
+        return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(input.first()))));
     }
     Ok(())
 }
@@ -147,7 +145,8 @@ pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box
     capture::stream(protocol, None, Some(direction))
 }
 
-/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw bytes.
+/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw
+/// bytes.
 pub(crate) fn frames_of(
     path: &Path,
     chosen: Option<Protocol>,
@@ -249,25 +248,27 @@ fn style(args: &Args, protocol: Protocol, has_times: bool) -> Option<Style> {
     }
 }
 
-fn decode<F>(args: &Args, protocol: Protocol, mut input: Input) -> Result<Counters, Failure>
+fn decode<F>(args: &Args, protocol: Protocol, input: &mut Input) -> Result<Counters, Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
     let style = style(args, protocol, false);
     let mut printer = Printer::new(args.json, style);
-    let jobs = args.jobs.map(usize::from).unwrap_or_else(|| {
-        if input.is_file() {
-            thread::available_parallelism().map_or(1, |cores| cores.get())
-        } else {
-            1
-        }
-    });
+    let cores = || thread::available_parallelism().map_or(1, |cores| cores.get());
+    let jobs = args.jobs.map_or_else(cores, usize::from);
     let (mut sheet, mut account, mut stream) =
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
-    if jobs > 1 {
-        let rest = parallel::list::<F>(&mut input, style, jobs, |lines| printer.print(lines))?;
+    if let (Some((file, len)), None, 2..) = (input.file(), style, jobs)
+        && let Some(account) = account::of_file::<F>(file, len, jobs)
+    {
+        printer.finish(&account, 0)?;
+        return Ok(account);
+    }
+    // A stream may be slow, and its lines are wanted as they come.
+    if input.file().is_some() && jobs > 1 {
+        let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
         stream = StreamOf::new(rest.offset);
         (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
         stream.feed(&rest.bytes, None, &mut sheet);

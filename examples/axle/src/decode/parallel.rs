@@ -33,11 +33,16 @@ const LISTED: usize = 256 * 1024;
 /// file is decoded by one thread.
 const LONGEST_PART: usize = 4 * 1024 * 1024;
 
+/// How far in front of the end of what was read a place to split is looked for first.
+const NEAR_END: usize = 1024;
+
 /// A part of the file.
 struct Part {
     number: usize,
     offset: u64,
     bytes: Vec<u8>,
+    /// Room for its lines.
+    lines: Vec<u8>,
     /// The modes before this part, and where to send those after it.
     modes: Receiver<Modes>,
     next: SyncSender<Modes>,
@@ -96,8 +101,8 @@ where
         loop {
             // One part more than there are threads, so that none waits for the reading.
             while sent <= written + jobs && !reading.is_over {
-                let buffer = writing.spare.pop().unwrap_or_default();
-                match reading.next_part::<F>(part_len, buffer, sent) {
+                let room = writing.spare.pop().unwrap_or_default();
+                match reading.next_part::<F>(part_len, room, sent) {
                     Ok(Some(part)) => {
                         sent += 1;
                         // The workers live as long as this end of the queue.
@@ -124,7 +129,7 @@ where
                     drop(parts);
                     return Err(failure);
                 }
-                writing.spare.push(listed.buffer);
+                writing.spare.push((listed.buffer, listed.lines));
             }
         }
         drop(parts);
@@ -145,7 +150,8 @@ struct Writing {
     /// Parts that were done before one in front of them.
     waiting: BTreeMap<usize, Listed>,
     account: Counters,
-    spare: Vec<Vec<u8>>,
+    /// Buffers for bytes and lines, to be used again: new ones would be zeroed by the system.
+    spare: Vec<(Vec<u8>, Vec<u8>)>,
 }
 
 /// The input, cut into parts.
@@ -166,29 +172,30 @@ impl Reading<'_> {
     fn next_part<F: Framing>(
         &mut self,
         part_len: usize,
-        buffer: Vec<u8>,
+        (mut bytes, mut lines): (Vec<u8>, Vec<u8>),
         number: usize,
     ) -> Result<Option<Part>, Failure> {
         let mut len = part_len;
         let end = loop {
-            while self.rest.len() < len + F::MAX_LEN && !self.is_over {
-                let bytes = self.input.read()?;
-                self.is_over = bytes.is_empty();
-                self.rest.extend_from_slice(bytes);
+            if !self.is_over {
+                self.is_over = self.input.fill(&mut self.rest, len)?;
             }
-            let from = len.saturating_sub(part_len / 2);
-            match stream::split_point::<F>(&self.rest, from) {
+            // Little is left behind the place, because it has to be copied.
+            let near = |back: usize| {
+                stream::split_point::<F>(&self.rest, self.rest.len().saturating_sub(back))
+            };
+            match near(NEAR_END).or_else(|| near(part_len / 2)) {
                 Some(end) => break end,
                 None if self.is_over => return Ok(None),
                 None if self.rest.len() >= LONGEST_PART => {
                     self.is_over = true;
                     return Ok(None);
                 }
-                None => len = self.rest.len(),
+                None => len = self.rest.len() + part_len / 2,
             }
         };
-        let mut bytes = buffer;
         bytes.clear();
+        lines.clear();
         bytes.extend_from_slice(self.rest.get(end..).unwrap_or_default());
         self.rest.truncate(end);
         core::mem::swap(&mut bytes, &mut self.rest);
@@ -196,7 +203,7 @@ impl Reading<'_> {
         let modes = core::mem::replace(&mut self.modes, modes);
         let offset = self.offset;
         self.offset += end as u64;
-        Ok(Some(Part { number, offset, bytes, modes, next }))
+        Ok(Some(Part { number, offset, bytes, lines, modes, next }))
     }
 }
 
@@ -228,7 +235,7 @@ fn account<F: Framing>(part: Part) -> Listed {
     let account = frames.counters();
     // Nobody asks for the modes, but the next part waits for them.
     let _ = part.next.send(Modes::default());
-    Listed { number: part.number, lines: Vec::new(), account, buffer: part.bytes }
+    Listed { number: part.number, lines: part.lines, account, buffer: part.bytes }
 }
 
 fn lines<F>(part: Part, style: Option<Style>) -> Listed
@@ -239,6 +246,7 @@ where
     let mut learned = Modes::default();
     Frames::<F>::new(&part.bytes).each(|frame| frame.teach(&mut learned));
     let mut sheet = Sheet::new(style);
+    sheet.out.0 = part.lines;
     sheet.modes = part.modes.recv().unwrap_or_default();
     let mut after = sheet.modes;
     after.update(&learned);

@@ -120,6 +120,9 @@ where
                     }
                     let length = frame.bytes().len() as u64;
                     let at = place_of(&mut self.place, &mut self.chunks, length);
+                    if sheet.style.is_none() && sheet.taken.is_none() {
+                        continue;
+                    }
                     if let Some(style) = sheet.style {
                         style.frame(&mut sheet.out, &mut sheet.clock, at, &frame, &sheet.modes);
                     }

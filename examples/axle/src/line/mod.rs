@@ -49,6 +49,7 @@ impl Line {
     pub(crate) fn open(args: &PortArgs, protocol: Protocol) -> Result<Self, Failure> {
         let (path, baud) = (&*args.port, args.baud.unwrap_or(protocol.default_baud()));
         let mut line = Self::connect(path, baud)?;
+        line.is_instant |= args.instant;
         if let Some(file) = &args.record {
             let recording = Recording::create(file, false, protocol, path, baud)?;
             line.recording = Some(Rc::new(RefCell::new(recording)));

@@ -93,7 +93,7 @@ pub(crate) struct Reader<R> {
 }
 
 impl<R: Read> Reader<R> {
-    /// `input` begins with [`MAGIC`](super::MAGIC).
+    /// `input` begins with [`MAGIC`].
     pub(crate) fn new(input: R) -> Self {
         Self {
             input,

@@ -19,7 +19,7 @@ use axlewire::{
 
 use crate::{
     args::Protocol,
-    bus::{self, Boards, Bus},
+    bus::{self, Boards, Bus, Halt},
     failure::{Failure, guarded},
     line::Line,
     listing::{Modes, Style, TimeColumn},
@@ -37,8 +37,8 @@ pub(crate) struct Plan<'a> {
     pub(crate) bus: &'a bus::MasterArgs,
     pub(crate) protocol: Protocol,
     pub(crate) frames: VecDeque<Due>,
-    /// How long to listen behind the last frame; what moves does so meanwhile.
-    pub(crate) linger: Duration,
+    /// How long to listen behind the last frame, microseconds; what moves does so meanwhile.
+    pub(crate) linger_us: u64,
     pub(crate) limits: Limits,
     pub(crate) is_json: bool,
 }
@@ -107,7 +107,14 @@ fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
         }
         let mut bus = Bus::<B>::new(line.clone(), config);
         let failure = bus.stop(commanded).err();
-        let complaints: Vec<_> = commanded.iter().filter_map(|node| bus.complaint(node)).collect();
+        let complaint = |node| match bus.halt(node) {
+            // This master has not heard it, but the one before has.
+            Halt::Silent => Some(format!(
+                "node {node} was commanded and does not answer any more: it may be moving"
+            )),
+            _ => bus.complaint(node),
+        };
+        let complaints: Vec<_> = commanded.iter().filter_map(complaint).collect();
         if !complaints.is_empty() {
             let complaint = complaints.join("; ");
             return Err(match failure {
@@ -171,8 +178,8 @@ fn play(
         true => Style::Json,
         false => Style::text(plan.protocol.number(), TimeColumn::Relative),
     };
-    let Plan { protocol, frames, linger, .. } = plan;
-    let player = |now| Player::new(protocol, frames, linger, style, modes, now);
+    let Plan { protocol, frames, linger_us, .. } = plan;
+    let player = |now| Player::new(protocol, frames, linger_us, style, modes, now);
     let mut session = Session::new(line.clone(), player);
     let mut teller = Teller::new();
     let played = guarded(|| until_over(&mut session, &mut teller, signals));

@@ -8,7 +8,7 @@ use std::{
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{Mode, NodeId},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use crate::{
@@ -32,8 +32,8 @@ pub(crate) struct Due {
 pub(crate) struct Player {
     due: VecDeque<Due>,
     start: Instant,
-    /// How long to listen behind the last frame.
-    linger: Duration,
+    /// How long to listen behind the last frame, microseconds.
+    linger_us: u64,
     last_at: Instant,
     /// The frame handed out last.
     sending: Box<[u8]>,
@@ -53,7 +53,7 @@ impl Player {
     pub(crate) fn new(
         protocol: Protocol,
         due: VecDeque<Due>,
-        linger: Duration,
+        linger_us: u64,
         style: Style,
         modes: Modes,
         now: Instant,
@@ -65,7 +65,7 @@ impl Player {
         Self {
             due,
             start: now,
-            linger,
+            linger_us,
             last_at: now,
             sending: Box::default(),
             sheet,
@@ -80,7 +80,7 @@ impl Player {
 
     /// Whether everything was sent, and the time to listen is over.
     pub(crate) fn is_over(&self, now: Instant) -> bool {
-        self.due.is_empty() && now >= self.last_at + self.linger
+        self.due.is_empty() && now.as_micros() >= self.last_at.as_micros() + self.linger_us
     }
 
     /// A node that has answered in another mode than the one its commands were meant for.

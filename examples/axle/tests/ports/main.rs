@@ -8,15 +8,21 @@ mod support;
 mod drive;
 mod faults;
 mod input;
+#[cfg(feature = "dashboard")]
+mod page;
 mod played;
 #[path = "../../../../tests/support/quiet.rs"]
 mod quiet;
+mod record;
+mod replay;
 mod rover;
 mod scan;
+mod send;
 mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod tcp;
 mod three;
 mod watch;
 

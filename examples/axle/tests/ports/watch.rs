@@ -1,6 +1,14 @@
 //! `axle watch`: shows the traffic on a line, without sending anything.
 
-use super::{Process, played::parrot, sim, undisturbed};
+use serde_json::Value;
+
+use super::{
+    Process,
+    played::parrot,
+    sim,
+    support::{Capture, axle, decode, file, run, stdout},
+    undisturbed,
+};
 
 #[test]
 fn watch_counts_the_messages_of_a_rover() {
@@ -44,4 +52,88 @@ fn watch_sends_nothing_and_names_the_noise() {
         let is_summed_up = ended.stdout.iter().any(|line| line.contains(" skipped: "));
         assert!(is_summed_up, "what was heard is not lost: {ended:?}");
     });
+}
+
+#[test]
+fn watch_prints_one_json_object_per_second_and_one_at_the_end() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let lines =
+            Process::start(&format!("watch --port {port} -P ucp --json --for 2.5")).success();
+        let records: Vec<Value> =
+            lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let events: Vec<_> = records.iter().map(|record| record["event"].clone()).collect();
+        assert_eq!(events, ["second", "second", "summary"]);
+        let [.., summary] = &records[..] else { panic!("{lines:?}") };
+        let of_report = |message: &&Value| message["message"] == "report" && message["id"] == 5;
+        let messages = summary["messages"].as_array().unwrap();
+        let report = messages.iter().find(of_report).expect("reports");
+        let sum: u64 = messages.iter().map(|message| message["count"].as_u64().unwrap()).sum();
+        assert_eq!(summary["frames"], sum);
+        assert_eq!(summary["skipped"], 0);
+        assert!(report["last"].as_str().unwrap().contains("battery"), "{report}");
+        let rate = report["per_second"].as_f64().unwrap();
+        assert!((30.0..70.0).contains(&rate), "{rate}");
+    });
+}
+
+#[test]
+fn watch_ends_after_a_time_or_a_number_of_frames() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let counted = Process::start(&format!("watch --port {port} -P ucp --count 10")).success();
+        assert!(counted.last().unwrap().contains("0 skipped"), "{counted:?}");
+        let timed = Process::start(&format!("watch --port {port} -P ucp --for 0.2")).success();
+        assert!(timed.iter().any(|line| line.starts_with("   5  report")), "{timed:?}");
+    });
+}
+
+#[test]
+fn watch_records_all_that_it_counts() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp --noise 0.001");
+        let path = file("watched.pcapng", &[]);
+        std::fs::remove_file(&path).unwrap();
+        let path = path.to_str().unwrap();
+        let args = format!("watch --port {port} -P ucp --json --for 1.5 --record {path}");
+        let watched = Process::start(&args).success();
+        let watched: Value = serde_json::from_str(watched.last().unwrap()).unwrap();
+        let recorded = stdout(axle(&["watch", path, "--json"]).output().unwrap());
+        let recorded: Value = serde_json::from_str(recorded.trim()).unwrap();
+        assert!(watched["frames"].as_u64().unwrap() > 30, "{watched}");
+        assert_eq!(
+            (&recorded["frames"], &recorded["received"]),
+            (&watched["frames"], &watched["received"],)
+        );
+    });
+}
+
+#[test]
+fn watch_sums_a_capture_up() {
+    let capture = Capture::noisy(50_000, 7);
+    let (_, listed) = decode(&["--protocol", "ucp"], &capture.bytes);
+    let summed = stdout(run(&["watch", "-P", "ucp", "--json", "-"], &capture.bytes));
+    let summed: Value = serde_json::from_str(&summed).unwrap();
+    for field in ["received", "framed", "frames", "skipped", "skipped_by"] {
+        assert_eq!(summed[field], listed[field], "{field}");
+    }
+    let table = stdout(run(&["watch", "--protocol", "ucp", "-"], &capture.bytes));
+    assert!(table.starts_with("  id  message"), "{table}");
+    assert!(table.contains("   1  ping") && table.contains("   2  motor_control"), "{table}");
+}
+
+#[test]
+fn watch_refuses_a_command_line_without_a_source_or_a_protocol() {
+    let complaint = |args: &[&str]| {
+        let output = run(args, &[]);
+        assert_eq!(output.status.code(), Some(2), "{output:?}");
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(text.lines().count(), 1, "{text}");
+        text
+    };
+    assert!(complaint(&["watch"]).contains("--port"));
+    assert!(complaint(&["watch", "--port", "x"]).contains("--protocol"));
+    assert!(complaint(&["watch", "--port", "x", "-P", "ucp", "file"]).contains("cannot be used"));
+    assert!(complaint(&["watch", "-"]).contains("use --protocol"));
+    assert!(complaint(&["watch", "-", "-P", "ucp", "--record", "x"]).contains("--record"));
 }

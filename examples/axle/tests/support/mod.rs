@@ -1,8 +1,11 @@
 //! Runs the real binary, and builds captures with known events.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod pcapng;
 pub(crate) mod process;
 pub(crate) mod schema;
+#[cfg(unix)]
+pub(crate) mod terminal;
 
 use std::{
     fs,

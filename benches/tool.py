@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+"""Speed and memory of `axle decode`: a line per figure, `name value goal`.
+
+    python3 benches/tool.py [--quick] [--mb 100]
+
+Builds the tool, writes captures of clean frames to a temporary folder, and runs each contender in
+turns; a figure is the ratio of medians of one run. Every output is checked: its number of lines
+and its summary. It fails if an output is wrong, never because a figure is low.
+"""
+
+import argparse
+import json
+import random
+import re
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+AXLE = ROOT / "target/release/axle"
+
+
+def crc(data):
+    value = 0xFFFF
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return struct.pack("<H", value)
+
+
+def reports(count):
+    """Telemetry of a driving rover."""
+    dice = random.Random(1)
+    for index in range(count):
+        values = [dice.randrange(101)] + [dice.randrange(-300, 300) for _ in range(4)]
+        values += [dice.randrange(-17_000, 17_000) for _ in range(9)] + [dice.randrange(360)]
+        body = struct.pack("<H14h", *values) + struct.pack("<BBHH", 9, 120, dice.randrange(300), 38)
+        frame = b"\xfd\xff" + struct.pack("<HBB", len(body) + 4, 5, index % 256) + body
+        yield frame + crc(frame)
+
+
+def packets(count):
+    """A bus of four velocity and four position nodes, polled and commanded."""
+    dice = random.Random(2)
+    for at in range(count):
+        node = 1 + at // 3 % 8
+        speed = struct.pack("<f", round(dice.uniform(-20, 20), 2))
+        place = struct.pack("<hh", dice.randrange(-8191, 8192), dice.randrange(-50, 50))
+        value = speed if node <= 4 else place
+        frame = [
+            bytes([0xAA, node]),
+            bytes([0x55 if node <= 4 else 0x56, node]) + value,
+            bytes([0xBB, node]) + value,
+        ][at % 3]
+        yield frame + crc(frame)
+
+
+def run(args, path):
+    """Seconds and peak memory in MB of a run."""
+    begin = time.perf_counter()
+    child = subprocess.Popen([AXLE, "decode", *args, path], stdout=subprocess.DEVNULL)
+    peak = 0
+    while child.poll() is None:
+        try:
+            # A high-water mark, so that the last look counts.
+            status = Path(f"/proc/{child.pid}/status").read_text()
+            peak = max(peak, *(int(kb) for kb in re.findall(r"VmHWM:\s+(\d+) kB", status)), 0)
+        except OSError:
+            pass
+        time.sleep(0.002)
+    seconds = time.perf_counter() - begin
+    if child.returncode != 0:
+        sys.exit(f"axle decode {args} failed")
+    return seconds, peak / 1024
+
+
+def check(args, frames, path, protocol):
+    """Every frame has a line, and the summary counts them all."""
+    output = subprocess.run([AXLE, "decode", *args, path], capture_output=True, check=True).stdout
+    lines = output.splitlines()
+    if "--json" in args:
+        summary = json.loads(lines[-1])
+        found, skipped, expected = summary["frames"], summary["skipped"], frames + 1
+    else:
+        found = int(lines[-2].split()[2])
+        skipped, expected = int(lines[-1].split()[0]), frames + 5
+    if "--summary" in args:
+        expected -= frames + (0 if "--json" in args else 2)
+    if (found, skipped, len(lines)) != (frames, 0, expected):
+        sys.exit(f"{protocol} {args}: {found} of {frames} frames, {len(lines)} of {expected} lines")
+
+
+def read(path):
+    """Seconds that reading the file alone takes."""
+    begin = time.perf_counter()
+    with open(path, "rb", buffering=0) as file:
+        block = bytearray(64 * 1024)
+        while file.readinto(block):
+            pass
+    return time.perf_counter() - begin
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="one round on 1 MB, as a test")
+    parser.add_argument("--mb", type=int, default=100, help="length of a capture")
+    options = parser.parse_args()
+    length = (1 if options.quick else options.mb) * 1_000_000
+    rounds = 1 if options.quick else 5
+    subprocess.run(["cargo", "build", "--release", "--quiet", "-p", "axle"], cwd=ROOT, check=True)
+    styles = {"text": [], "json": ["--json"], "summary": ["--summary"]}
+    with tempfile.TemporaryDirectory() as folder:
+        for protocol, make in [("ucp", reports), ("ikeya", packets)]:
+            unit = list(make(2400))
+            block = b"".join(unit)
+            times = max(1, length // len(block))
+            path, small = Path(folder, protocol), Path(folder, protocol + "-small")
+            with open(path, "wb") as file:
+                for _ in range(times):
+                    file.write(block)
+            small.write_bytes(block)
+            size, frames = len(block) * times, len(unit) * times
+            contenders = {}
+            for style, args in styles.items():
+                for jobs in ["1", "2"]:
+                    args = [*styles[style], "--protocol", protocol, "--jobs", jobs]
+                    contenders[style, jobs] = args
+                    check(args, len(unit), small, protocol)
+            seconds = {name: [] for name in [*contenders, "read"]}
+            memory = 0
+            for _ in range(rounds):
+                seconds["read"].append(read(path))
+                for name, args in contenders.items():
+                    took, megabytes = run(args, path)
+                    seconds[name].append(took)
+                    memory = max(memory, megabytes)
+            median = {name: statistics.median(all) for name, all in seconds.items()}
+            figure = lambda name, value, goal: print(f"{name}_{protocol} {value:.3f} {goal}")
+            figure("tool_text_over_json", median["json", "1"] / median["text", "1"], 1)
+            for style in styles:
+                ratio = median[style, "1"] / median[style, "2"]
+                figure(f"tool_jobs2_over_jobs1_{style}", ratio, 1.7)
+            best = min(median["summary", "1"], median["summary", "2"])
+            half_read = size / median["read"] / 2 / 1e9
+            figure("tool_summary_gb_per_s", size / best / 1e9, f"{min(1.5, half_read):.3f}")
+            figure("tool_peak_memory_mb", memory, "20, at most")
+            for style in styles:
+                figure(f"tool_{style}_mb_per_s", size / median[style, "1"] / 1e6, "-")
+
+
+if __name__ == "__main__":
+    main()

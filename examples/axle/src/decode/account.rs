@@ -1,0 +1,108 @@
+//! The account of a whole file with several threads: each reads its own parts.
+//!
+//! Part *k* begins at the first place to split ([`split_point`](stream::split_point)) behind *k*
+//! times the length of a part. Each thread finds both ends of its parts by itself, because whether
+//! a place is one depends only on the bytes around it.
+
+use std::{
+    fs::File,
+    io,
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+};
+
+use axlewire::stream::{self, Counters, Frames, Framing};
+
+/// Length of a part: it stays in a processor's own cache between reading and decoding.
+const PART: usize = 256 * 1024;
+
+/// How far behind its beginning or end a part may really begin or end.
+const SLACK: usize = 16 * 1024;
+
+/// The account of a file of `len` bytes, its end included. `None` if it is short, if it cannot be
+/// read, or if there is no place to split where one is needed: then one thread has to do it.
+pub(super) fn of_file<F: Framing>(file: &File, len: u64, jobs: usize) -> Option<Counters> {
+    let parts = len / PART as u64;
+    if parts < 2 {
+        return None;
+    }
+    let (next, sum) = (AtomicU64::new(0), Mutex::new(Some(Counters::default())));
+    thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| {
+                let mut bytes = vec![0; F::MAX_LEN + PART + SLACK];
+                loop {
+                    let part = next.fetch_add(1, Ordering::Relaxed);
+                    if part >= parts {
+                        return;
+                    }
+                    let end = (part + 1 < parts).then_some((part + 1) * PART as u64);
+                    let found = account::<F>(file, part * PART as u64, end, len, &mut bytes);
+                    let Ok(mut sum) = sum.lock() else { return };
+                    match (found, &mut *sum) {
+                        (Some(found), Some(sum)) => *sum += found,
+                        // No need to go on.
+                        (None, sum) => {
+                            *sum = None;
+                            next.store(parts, Ordering::Relaxed);
+                        }
+                        (Some(_), None) => {}
+                    }
+                }
+            });
+        }
+    });
+    sum.into_inner().ok().flatten()
+}
+
+/// The account from the first place behind `begin` to the first behind `end`, or to the end of the
+/// file.
+fn account<F: Framing>(
+    file: &File,
+    begin: u64,
+    end: Option<u64>,
+    len: u64,
+    buffer: &mut Vec<u8>,
+) -> Option<Counters> {
+    // What is in front tells whether a place is one.
+    let from = begin.saturating_sub(F::MAX_LEN as u64);
+    let to = end.map_or(len, |end| (end + SLACK as u64).min(len));
+    buffer.resize((to - from) as usize, 0);
+    read_at(file, buffer, from).ok()?;
+    let place = |at: u64| stream::split_point::<F>(buffer, (at - from) as usize);
+    let first = if begin == 0 { 0 } else { place(begin)? };
+    let last = match end {
+        Some(end) => place(end)?,
+        None => buffer.len(),
+    };
+    let mut frames = Frames::<F>::new(buffer.get(first..last)?);
+    frames.each(|_| {});
+    while !frames.rest().is_empty() {
+        // Only at the end of the file: a candidate that it cuts off.
+        frames.idle();
+        frames.each(|_| {});
+    }
+    Some(frames.counters())
+}
+
+/// Fills `bytes` from this offset.
+fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
+    #[cfg(unix)]
+    return std::os::unix::fs::FileExt::read_exact_at(file, bytes, offset);
+    #[cfg(windows)]
+    {
+        let (mut rest, mut at) = (bytes, offset);
+        while !rest.is_empty() {
+            let read = std::os::windows::fs::FileExt::seek_read(file, rest, at)?;
+            if read == 0 {
+                return Err(io::ErrorKind::UnexpectedEof.into());
+            }
+            rest = rest.get_mut(read..).unwrap_or_default();
+            at += read as u64;
+        }
+        Ok(())
+    }
+}

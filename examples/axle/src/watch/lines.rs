@@ -1,0 +1,73 @@
+//! One line per second, for pipes and plain terminals.
+
+use std::{io, time::Duration as Span};
+
+use axlewire::{
+    drive::Clock,
+    stream::{Decoder, Framing},
+    time::Duration,
+};
+
+use super::{PATIENCE, QUIET, Watched, recorder::Recorder, table::Table};
+use crate::{decode::BUFFER_LEN, failure::Failure, line::Line, listing::Shown, signals::Signals};
+
+/// Interval at which a line is printed.
+const PRINT_PERIOD: Duration = Duration::from_millis(1000);
+
+pub(super) fn watch<F>(watched: &Watched<'_>) -> Result<(), Failure>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let signals = Signals::listen()?;
+    let mut line = Line::connect(watched.port, watched.baud)?;
+    let mut recorder = Recorder::<F>::new(watched)?;
+    let mut clock = line.clock();
+    let mut buffer = [0; 4096];
+    let mut out = io::stdout().lock();
+    let mut decoder = Decoder::<F, BUFFER_LEN>::new();
+    let start = clock.now();
+    let mut table = Table::new(watched.protocol, start);
+    let (mut print_at, mut heard_at) = (start + PRINT_PERIOD, start);
+
+    let broken = loop {
+        let frames = decoder.counters().frames;
+        if signals.is_raised() || watched.is_over(start, clock.now(), frames) {
+            break Ok(());
+        }
+        let patience = (print_at - clock.now()).min(PATIENCE).as_micros();
+        let received = match line.receive(&mut buffer, Span::from_micros(patience.into())) {
+            Ok(received) => received,
+            Err(failure) => break Err(failure),
+        };
+        let now = clock.now();
+        if !received.is_empty() {
+            heard_at = now;
+        } else if now >= heard_at + QUIET && decoder.pending() > 0 {
+            decoder.idle();
+        }
+        recorder.take(received)?;
+        table.take(&mut decoder, received);
+        if now >= print_at {
+            print_at = now + PRINT_PERIOD;
+            table.measure(now);
+            let counters = decoder.counters();
+            let printed = match watched.args.json {
+                true => table.print_json(&mut out, "second", &counters, now),
+                false => table.print_line(&mut out, &counters, now),
+            };
+            printed.map_err(Failure::Write)?;
+        }
+    };
+    let recorded = recorder.finish();
+    let (counters, now) = (decoder.counters(), clock.now());
+    let told = if watched.args.json {
+        table.measure_all(now);
+        table.print_json(&mut out, "summary", &counters, now)
+    } else {
+        table.finish(&mut out, &counters, decoder.pending(), now)
+    };
+    told.map_err(Failure::Write)?;
+    broken?;
+    recorded
+}

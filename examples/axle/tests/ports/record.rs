@@ -1,0 +1,207 @@
+//! `axle record`: the traffic of a line, with times, in a file that is always complete.
+
+use std::{
+    fs,
+    path::PathBuf,
+    process::{Command, Stdio},
+    sync::atomic::{AtomicU32, Ordering},
+};
+
+use serde_json::Value;
+
+use super::{Process, TWO_NODES, sim, support::axle, undisturbed};
+
+/// A file that does not exist yet, in the build directory.
+pub(crate) fn fresh(name: &str) -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::SeqCst);
+    let name = format!("{}-{count}-{name}", std::process::id());
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_file(&path);
+    path.to_str().unwrap().to_owned()
+}
+
+/// The events and the summary of a recording; fails unless it is complete.
+pub(crate) fn decoded(path: &str) -> (Vec<Value>, Value) {
+    let lines = Process::start(&format!("decode --json {path}")).success();
+    let mut lines: Vec<Value> =
+        lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let summary = lines.pop().unwrap();
+    (lines, summary)
+}
+
+/// Checks that each frame of a rover's line is a report, in order and with times.
+fn assert_reports(events: &[Value]) {
+    let t = |event: &Value| event["t"].as_f64().unwrap();
+    assert!(events.is_sorted_by_key(t));
+    let is_frame = |event: &&Value| event["event"] == "frame";
+    let index = |event: &Value| event["index"].as_u64().unwrap();
+    let frames: Vec<_> = events.iter().filter(is_frame).collect();
+    assert!(frames.iter().all(|frame| frame["direction"] == "in"), "{events:?}");
+    let reports: Vec<_> = frames.into_iter().filter(|frame| frame["message"] == "report").collect();
+    assert!(reports.windows(2).all(|pair| (index(pair[0]) + 1) % 256 == index(pair[1])));
+    assert!(reports.len() > 5, "{reports:?}");
+}
+
+#[test]
+fn a_recording_has_every_frame_with_its_time() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("rover.pcapng");
+        let told = Process::start(&format!(
+            "record --port {port} --protocol ucp --for 0.5 --output {path}"
+        ));
+        let told = told.success();
+        let (events, summary) = decoded(&path);
+        assert_reports(&events);
+        assert_eq!(
+            told[0],
+            format!("{:>10} bytes received", summary["received"].as_u64().unwrap())
+        );
+        // Each frame is a packet of its own, as Wireshark wants it.
+        let file = fs::read(&path).unwrap();
+        let (mut packets, mut at) = (0, 0);
+        while let Some(block) = file.get(at..at + 8) {
+            packets += u64::from(block[0] == 6);
+            at += u32::from_le_bytes(block[4..].try_into().unwrap()) as usize;
+        }
+        assert_eq!(packets, summary["frames"].as_u64().unwrap());
+    });
+}
+
+#[test]
+fn a_recording_that_a_signal_ends_is_complete() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        for signal in ["INT", "TERM", "HUP"] {
+            let path = fresh("signal.pcapng");
+            let record = Process::start(&format!("record -p {port} -P ucp -o {path}"));
+            super::wait_until("a kilobyte", || {
+                fs::metadata(&path).is_ok_and(|file| file.len() > 1000)
+            });
+            record.signal(signal);
+            record.success();
+            assert_reports(&decoded(&path).0);
+        }
+    });
+}
+
+#[test]
+fn a_recording_of_an_unplugged_port_is_complete() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let path = fresh("unplugged.pcapng");
+        let record = Process::start(&format!("record -p {port} -P ucp -o {path}"));
+        super::wait_until("a kilobyte", || fs::metadata(&path).is_ok_and(|file| file.len() > 1000));
+        sim.kill();
+        let error = record.complaint(1);
+        assert!(error.starts_with(&format!("port {port:?} failed: disconnected")), "{error}");
+        assert_reports(&decoded(&path).0);
+    });
+}
+
+#[test]
+fn what_was_recorded_before_the_disk_is_full_stays_readable() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("full.pcapng");
+        // The system refuses to let the file grow beyond 4 kB.
+        let axle = axle(&["record", "-p", &port, "-P", "ucp", "-o", &path]);
+        let (program, args) = (axle.get_program(), axle.get_args());
+        let mut limited = Command::new("bash");
+        limited
+            .args(["-c", "trap '' XFSZ; ulimit -f 4; exec \"$0\" \"$@\""])
+            .arg(program)
+            .args(args);
+        let error = Process::spawn(&mut limited).unwrap().complaint(1);
+        let says = format!("cannot write {path:?}: File too large (os error 27); the ");
+        assert!(
+            error.starts_with(&says) && error.ends_with("packets in it are complete"),
+            "{error}"
+        );
+        let (events, _) = decoded(&path);
+        assert_reports(&events);
+        let packets = events.len().to_string();
+        assert!(error.contains(&format!("the {packets} packets")), "{error} {packets}");
+    });
+}
+
+#[test]
+fn a_file_that_is_there_is_not_overwritten_without_being_told() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("there.pcapng");
+        fs::write(&path, "dear to somebody").unwrap();
+        let record = format!("record -p {port} -P ucp --for 0.1 -o {path}");
+        let error = Process::start(&record).complaint(1);
+        assert!(error.starts_with(&format!("cannot create {path:?}: File exists")), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"dear to somebody");
+        Process::start(&format!("{record} --force")).success();
+        decoded(&path);
+    });
+}
+
+#[test]
+fn a_recording_can_be_piped() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let mut record = axle(&["record", "-p", &port, "-P", "ucp", "-f", "0.3", "-o", "-"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let decode =
+            axle(&["decode", "--json"]).stdin(record.stdout.take().unwrap()).output().unwrap();
+        assert!(record.wait().unwrap().success() && decode.status.success());
+        let lines = String::from_utf8(decode.stdout).unwrap();
+        let mut events: Vec<Value> =
+            lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        events.pop();
+        assert_reports(&events);
+    });
+}
+
+#[test]
+fn two_tools_do_not_share_a_port() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("first.pcapng");
+        let first = Process::start(&format!("record -p {port} -P ucp -o {path}"));
+        super::wait_until("a kilobyte", || fs::metadata(&path).is_ok_and(|file| file.len() > 1000));
+        let other = fresh("second.pcapng");
+        for second in [
+            format!("record -p {port} -P ucp -o {other}"),
+            format!("watch -p {port} --protocol ucp"),
+            format!("scan -p {port}"),
+            format!("send -p {port} ucp ping"),
+            format!("drive -p {port} --speed 1 --turn 0"),
+            format!("stop -p {port} --protocol ucp"),
+        ] {
+            let error = Process::start(&second).complaint(1);
+            assert_eq!(error, format!("cannot use port {port:?}: another program is using it"));
+        }
+        assert!(fs::metadata(&other).is_err(), "no empty file is left");
+        first.signal("INT");
+        first.success();
+    });
+}
+
+#[test]
+fn every_subcommand_can_record_what_it_says_and_hears() {
+    undisturbed(|| {
+        let (_sim, port) = sim(TWO_NODES);
+        let path = fresh("spin.pcapng");
+        Process::start(&format!("spin -p {port} --node 1 --rps 2 --for 1 --record {path}"))
+            .success();
+        let (events, summary) = decoded(&path);
+        assert_eq!(summary["skipped"], 0, "{summary}");
+        let messages = |name: &str| -> Vec<&Value> {
+            events.iter().filter(|event| event["message"] == name).collect()
+        };
+        assert!(messages("read_request").iter().all(|event| event["direction"] == "out"));
+        let writes = messages("write");
+        assert!(writes.iter().any(|event| event["rps"] == 2.0 && event["mode"] == "velocity"));
+        assert_eq!(writes.last().unwrap()["rps"], 0.0);
+        let answers = messages("velocity_response");
+        assert!(answers.len() > 10 && answers.iter().all(|event| event["direction"] == "in"));
+    });
+}

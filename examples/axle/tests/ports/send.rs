@@ -1,0 +1,183 @@
+//! `axle send`: single messages; what they move is stopped.
+
+use axlewire::ikeya::Position;
+
+use super::{
+    Process, TWO_NODES,
+    played::{self, Node, Said, confirmable_stops, speeds},
+    sim, undisturbed,
+};
+
+/// The error line of a run that sends no command to anybody.
+fn refused(nodes: &[Node], message: &str) -> String {
+    let line = played::bus(nodes, |_, _| {});
+    let error = Process::start(&format!("send --port {} {message}", line.path)).complaint(1);
+    let is_write = |said: &Said| matches!(said, Said::Write(..));
+    assert!(!line.said().iter().any(is_write), "{message}: {:?}", line.said());
+    error
+}
+
+#[test]
+fn a_question_and_its_answer_are_listed() {
+    undisturbed(|| {
+        let (_sim, port) = sim(TWO_NODES);
+        let lines = Process::start(&format!("send -p {port} ikeya read 3")).success();
+        assert!(lines[1].contains("  out           0      4  read_request               3"));
+        assert!(lines[2].contains("  in            0      8  position_response          3"));
+        assert_eq!(lines.len(), 3, "{lines:?}");
+        let json = Process::start(&format!("send -p {port} --json ikeya hex AA01 BED0")).success();
+        assert!(json[0].contains(r#""direction":"out","length":4,"#), "{json:?}");
+        assert!(json[1].contains(r#""message":"velocity_response","node":1,"rps":0.0"#));
+    });
+}
+
+#[test]
+fn a_motor_that_is_commanded_is_stopped_at_the_end() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        let lines =
+            Process::start(&format!("send -p {port} --for 0.3 ikeya velocity 1 2.5")).success();
+        assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+        sim.line("node 1: command 2.50 rps");
+        sim.line("node 1: command 0.00 rps");
+        Process::start(&format!("send -p {port} --for 1 ikeya position 3 -0.5")).success();
+        sim.line("node 3: at rest at -0.5000 turns");
+        let json = Process::start(&format!("send -p {port} -j -f 0 ikeya velocity 1 1")).success();
+        assert_eq!(json.last().unwrap(), r#"{"event":"stopped","node":1}"#);
+    });
+}
+
+#[test]
+fn a_signal_or_a_lost_port_stops_what_was_commanded() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        for (signal, rps) in [("INT", "3.00"), ("TERM", "4.00"), ("USR1", "5.00")] {
+            let send = format!("send -p {port} --for 600 ikeya velocity 1 {rps}");
+            let send = Process::start(&send);
+            sim.line(&format!("node 1: command {rps} rps"));
+            send.signal(signal);
+            let lines = send.success();
+            assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+        }
+        let send = Process::start(&format!("send -p {port} --for 600 ikeya velocity 1 6"));
+        sim.line("node 1: command 6.00 rps");
+        sim.kill();
+        let error = send.complaint(1);
+        assert!(error.contains("disconnected"), "{error}");
+        let says = "; node 1 was commanded and does not answer any more: it may be moving";
+        assert!(error.ends_with(says), "{error}");
+    });
+}
+
+#[test]
+fn a_command_for_the_other_mode_reaches_nobody() {
+    undisturbed(|| {
+        let error = refused(&[Node::position(3, 0)], "ikeya velocity 3 1");
+        assert_eq!(error, "node 3 is in position mode, but a command is for velocity mode");
+        let error = refused(&[Node::velocity(1)], "ikeya position 1 1");
+        assert_eq!(error, "node 1 is in velocity mode, but a command is for position mode");
+        // 1.0 rps as hex digits, to a node that would take it for 16,256 turns.
+        let error = refused(&[Node::position(1, 0)], "ikeya hex BB010000803F0740");
+        assert!(error.starts_with("16256.0000 turns for node 1, which is at 0.0000"), "{error}");
+    });
+}
+
+#[test]
+fn what_is_too_fast_or_too_far_or_without_a_node_reaches_nobody() {
+    undisturbed(|| {
+        let error = refused(&[Node::velocity(1)], "ikeya velocity 1 20.5");
+        assert!(error.starts_with("20.5 rps for node 1 is more than --max-rps 20"), "{error}");
+        let error = refused(&[Node::velocity(1)], "--max-rps 1 ikeya velocity 1 -1.5");
+        assert!(error.starts_with("-1.5 rps for node 1 is more than --max-rps 1"), "{error}");
+        let far = format!("ikeya position 3 {}", Position::new(0, 101).revolutions());
+        let error = refused(&[Node::position(3, 0)], &far);
+        assert!(error.contains("is farther than --max-turns 100"), "{error}");
+        let error = refused(&[Node::velocity(1)], "ikeya velocity 2 1");
+        assert_eq!(error, "node 2 does not answer: without its mode, nothing is sent to it");
+    });
+}
+
+#[test]
+fn a_rover_that_is_commanded_is_stopped_at_the_end() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let lines =
+            Process::start(&format!("send -p {port} --count 5 ucp motor 40 -10 --lamp")).success();
+        assert!(lines.last().unwrap().ends_with(", stopped"), "{lines:?}");
+        sim.line("command: speed 40 %, turn 10 % left, lamp on");
+        sim.line("at rest after");
+        let zero = Process::start(&format!("send -p {port} --for 0.1 ucp motor 0 0")).success();
+        assert!(!zero.last().unwrap().ends_with("stopped"), "nothing moved: {zero:?}");
+    });
+}
+
+#[test]
+fn messages_of_a_host_are_answered_by_a_robot() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let pairs = [
+            ("ping", "pong"),
+            ("calibration-start imu", "calibration_start_ack"),
+            ("calibration-end imu", "calibration_end_ack"),
+        ];
+        for (message, answer) in pairs {
+            let lines = Process::start(&format!("send -p {port} ucp {message}")).success();
+            assert!(lines.iter().any(|line| line.contains(answer)), "{message}: {lines:?}");
+        }
+        Process::start(&format!("send -p {port} ucp network-state connected")).success();
+        sim.line("network state: connected");
+    });
+}
+
+#[test]
+fn what_harms_a_robot_is_refused_before_the_port_is_opened() {
+    let frames = [
+        // version 39, id 9, a report.
+        ("FDFF140002000000000000000000270000000000000000000000", "not one whole frame"),
+        ("FDFF060009000100", "not one whole frame"),
+        ("FDFF0400050086 41", "not one whole frame"),
+    ];
+    for (hex, why) in frames {
+        let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(1);
+        assert!(error.contains(why), "{hex}: {error}");
+    }
+    let mut update = vec![0xFD, 0xFF, 20, 0, 2, 0];
+    update.extend([0; 16]);
+    update[14] = 39;
+    update.extend(axlewire::crc16::compute(&update).to_le_bytes());
+    let hex: String = update.iter().map(|byte| format!("{byte:02x}")).collect();
+    let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(1);
+    assert_eq!(
+        error,
+        "frame 1 is not sent: a motor command that starts a firmware update (ruling U7)"
+    );
+}
+
+#[test]
+fn wrong_words_are_usage_errors() {
+    let cases = [
+        ("ikeya velocity 9 1", "9"),
+        ("ikeya velocity 1 nan", "nan"),
+        ("ikeya velocity 1 1 2 3", "a board with one motor takes one speed"),
+        ("ikeya-3 velocity 1 1", "a board with three motors takes three speeds"),
+        ("ikeya hex AA0", "not an even number of hex digits"),
+        ("ucp motor 101 0", "101 is not in -100..=100"),
+        ("ucp biases 1 2 3", "9 values required"),
+    ];
+    for (message, expected) in cases {
+        let error = Process::start(&format!("send -p /dev/none {message}")).complaint(2);
+        assert!(error.contains(expected), "{message}: {error}");
+    }
+}
+
+#[test]
+fn a_stop_is_repeated_until_it_is_confirmed() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        Process::start(&format!("send -p {} --for 0.1 ikeya velocity 1 2", line.path)).success();
+        let said = line.said();
+        assert_eq!(speeds(&said)[0], 2.0);
+        assert!(speeds(&said)[1..].iter().all(|&rps| rps == 0.0), "{said:?}");
+        assert!(confirmable_stops(&said, 1) >= 2, "{said:?}");
+    });
+}
