@@ -225,3 +225,23 @@ fn in_reverse_the_nose_swings_the_other_way_and_the_tool_says_so() {
         }
     });
 }
+
+#[test]
+fn drive_as_json_has_a_target_reports_a_stop_and_an_outcome() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let drive = format!("drive -p {port} --speed 50 --turn 20 -f 1 -j");
+        let lines = Process::start(&drive).success();
+        let records: Vec<serde_json::Value> =
+            lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let [target, reports @ .., stopped, outcome] = &records[..] else { panic!("{lines:?}") };
+        let expected = serde_json::json!(
+            {"event": "target", "speed": 50, "angular": 20, "seconds": 0.0}
+        );
+        assert_eq!(*target, expected);
+        assert!(!reports.is_empty() && reports.iter().all(|it| it["event"] == "report"));
+        assert!(reports.last().unwrap()["rpm"][0].as_i64().unwrap() > 0, "{reports:?}");
+        assert_eq!((&stopped["event"], &stopped["rpm"][0]), (&"stopped".into(), &0.into()));
+        assert_eq!(*outcome, serde_json::json!({"event": "outcome", "at_rest": true}));
+    });
+}

@@ -77,6 +77,22 @@ fn a_position_node_under_way_is_stopped_where_it_is() {
 }
 
 #[test]
+fn a_way_that_is_too_long_for_its_time_is_no_success() {
+    undisturbed(|| {
+        let (_sim, port) = sim(TWO_NODES);
+        let spin = format!("spin -p {port} -n 3 --revolutions 8000 -f 1 --json");
+        let ended = Process::start(&spin).end();
+        assert_eq!(ended.code, Some(1));
+        assert!(ended.stderr[0].contains(" when the time was up, target 8000.0000 turns"));
+        let outcome: serde_json::Value =
+            serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!((&outcome["event"], &outcome["at_rest"]), (&"outcome".into(), &true.into()));
+        let failure = outcome["failure"].as_str().unwrap();
+        assert_eq!(ended.stderr, [format!("axle: {failure}")]);
+    });
+}
+
+#[test]
 fn a_reader_that_goes_away_stops_the_motor_too() {
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
