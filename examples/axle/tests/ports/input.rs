@@ -86,16 +86,33 @@ fn a_wrong_value_is_explained_in_one_line_before_any_port_is_touched() {
     });
 }
 
-const USERS: [&str; 8] = [
-    "scan",
-    "spin --node 1 --rps 1",
-    "drive --speed 1 --turn 1",
-    "watch --protocol ucp",
-    "stop",
-    "stop --protocol ikeya --node 1",
-    "stop --protocol ikeya-3",
-    "stop --protocol ucp",
+const USERS: [&str; 16] = [
+    "scan --port",
+    "spin --node 1 --rps 1 --port",
+    "drive --speed 1 --turn 1 --port",
+    "watch --protocol ucp --port",
+    "stop --port",
+    "stop --protocol ikeya --node 1 --port",
+    "stop --protocol ikeya-3 --port",
+    "stop --protocol ucp --port",
+    "record --protocol ucp --output /dev/full --force --port",
+    "ping --port",
+    "calibrate --kind imu --port",
+    "lamp on --port",
+    "network connected --port",
+    // The port comes first.
+    "send --port PORT ikeya read 1",
+    "send --port PORT ucp ping",
+    "send --port PORT ikeya-3 velocity 1 0 0 0",
 ];
+
+/// A subcommand with this port.
+fn on_port(user: &str, path: &str) -> String {
+    match user.contains("PORT") {
+        true => user.replace("PORT", path),
+        false => format!("{user} {path}"),
+    }
+}
 
 #[test]
 fn a_path_that_is_no_port_is_named() {
@@ -109,7 +126,7 @@ fn a_path_that_is_no_port_is_named() {
         ];
         for (path, cause) in cases {
             for user in USERS {
-                let line = Process::start(&format!("{user} --port {path}")).complaint(1);
+                let line = Process::start(&on_port(user, path)).complaint(1);
                 assert_eq!(line, format!("cannot use port {path:?}: {cause}"));
             }
         }
@@ -122,7 +139,7 @@ fn a_port_that_may_not_be_opened_is_named() {
         let (_sim, port) = sim(TWO_NODES);
         fs::set_permissions(&port, Permissions::from_mode(0o000)).unwrap();
         for user in USERS {
-            let args = format!("{user} --port {port}");
+            let args = on_port(user, &port);
             let args: Vec<_> = args.split(' ').collect();
             let mut command = axle(&args);
             if fs::metadata("/proc/self").is_ok_and(|process| process.uid() == 0) {
@@ -149,7 +166,7 @@ fn a_port_that_another_program_uses_is_left_to_it() {
         let watch = Process::start(&format!("watch --port {port} --protocol ucp"));
         watch.line("report");
         for user in USERS {
-            let line = Process::start(&format!("{user} --port {port}")).complaint(1);
+            let line = Process::start(&on_port(user, &port)).complaint(1);
             assert_eq!(line, format!("cannot use port {port:?}: another program is using it"));
         }
         assert!(!sim.lines().iter().any(|line| line.contains("command")));

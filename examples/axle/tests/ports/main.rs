@@ -7,6 +7,7 @@ mod support;
 
 mod drive;
 mod faults;
+mod gone;
 mod input;
 #[cfg(feature = "dashboard")]
 mod page;
