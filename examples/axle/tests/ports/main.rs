@@ -12,6 +12,7 @@ mod input;
 #[cfg(feature = "dashboard")]
 mod page;
 mod played;
+mod progress;
 #[path = "../../../../tests/support/quiet.rs"]
 mod quiet;
 mod record;
