@@ -54,7 +54,6 @@ where
 
     /// The file of the next recording: as named on the command line, then with a number, or named
     /// after the time.
-    #[cfg_attr(not(feature = "dashboard"), allow(dead_code, reason = "without keys, one is all"))]
     fn next_path(&self) -> PathBuf {
         match &self.named {
             Some(named) if self.count == 0 => named.clone(),
