@@ -10,6 +10,7 @@ and its summary. It fails if an output is wrong, never because a figure is low.
 
 import argparse
 import json
+import os
 import random
 import re
 import statistics
@@ -21,7 +22,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-AXLE = ROOT / "target/release/axle"
+AXLE = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "release/axle"
 
 
 def crc(data):
