@@ -79,7 +79,8 @@ some programs are not told at all. It gives none after `End task` and taskkill /
 
 /// Host tool for Ikeya MD and UCP lines
 #[derive(Debug, Parser)]
-#[command(name = "axle", version, after_help = EXIT_CODES, arg_required_else_help = true)]
+#[command(name = "axle", bin_name = "axle", version)]
+#[command(after_help = EXIT_CODES, arg_required_else_help = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
