@@ -122,6 +122,39 @@ impl<'a> Message<'a> {
         id as u8
     }
 
+    /// Whether only a host sends it, `Some(false)` if only a robot does (ruling U4). `None` for
+    /// [`Unknown`](Self::Unknown), which either side may send.
+    ///
+    /// ```
+    /// use axlewire::ucp::{Message, message::Ping};
+    ///
+    /// assert_eq!(Message::Ping(&Ping {}).is_from_host(), Some(true));
+    /// ```
+    #[must_use]
+    pub const fn is_from_host(&self) -> Option<bool> {
+        Some(match self {
+            Self::Ping(_)
+            | Self::MotorControl(_)
+            | Self::CalibrationStart(_)
+            | Self::CalibrationEnd(_)
+            | Self::ImuBiasAck(_)
+            | Self::MagBiasAck(_)
+            | Self::Biases(_)
+            | Self::OtaRequest(_)
+            | Self::SetNetworkState(_)
+            | Self::SetNetworkStateWide(_) => true,
+            Self::Pong(_)
+            | Self::CalibrationStartAck(_)
+            | Self::CalibrationEndAck(_)
+            | Self::Report(_)
+            | Self::ImuBias(_)
+            | Self::MagBias(_)
+            | Self::BiasRequest(_)
+            | Self::OtaAck(_) => false,
+            Self::Unknown(_) => return None,
+        })
+    }
+
     /// Determines the message from the id and the length of the body; the first match is the only
     /// one.
     fn of(frame: &'a Frame) -> Self {

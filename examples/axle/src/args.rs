@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use axlewire::{
     ikeya::{self, NodeId, Position, Rps},
-    ucp,
+    ucp::{self, MotorControl},
 };
-use clap::ValueEnum;
+use clap::{ValueEnum, builder::RangedI64ValueParser};
 
 /// The port of a subcommand.
 #[derive(Debug, clap::Args)]
@@ -101,6 +101,12 @@ pub(crate) fn max_rps(text: &str) -> Result<Rps, String> {
 pub(crate) fn max_turns(text: &str) -> Result<f64, String> {
     let limit: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     if limit > 0.0 { Ok(limit) } else { Err("a limit must be above 0".to_owned()) }
+}
+
+/// A speed or a steering of a rover, percent (ruling U6).
+pub(crate) fn percent() -> RangedI64ValueParser<i16> {
+    let limit = i64::from(MotorControl::LIMIT);
+    clap::value_parser!(i16).range(-limit..=limit)
 }
 
 /// A finite distance that fits on the wire (rulings I4, I5).

@@ -36,13 +36,13 @@ pub(crate) struct Args {
     line: args::PortArgs,
 
     /// Speed, -100 to 100 percent; positive is forward
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = percent())]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = args::percent())]
     speed: i16,
 
     /// Steering, -100 to 100 percent; positive is to the right, as on shipped robots (the protocol
     /// document says left). Going forward or turning on the spot, the nose then swings right; in
     /// reverse, with a speed below -5, it swings left, as in a car
-    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = percent())]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = args::percent())]
     turn: i16,
 
     /// Duration, seconds
@@ -57,29 +57,17 @@ pub(crate) struct Args {
     json: bool,
 }
 
-fn percent() -> clap::builder::RangedI64ValueParser<i16> {
-    let limit = i64::from(MotorControl::LIMIT);
-    clap::value_parser!(i16).range(-limit..=limit)
-}
-
 /// Interval between printed reports; the robot sends one every 20 ms.
 const PRINT_PERIOD: Duration = Duration::from_millis(250);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let command = command(args).map_err(|error| Failure::Usage(error.to_string()))?;
+    let command = rover::motor_control(args.speed, args.turn)
+        .map_err(|error| Failure::Usage(error.to_string()))?;
     let signals = Signals::listen_to_all()?;
     let result = prepare_and_drive(args, command, &signals);
     // The port is closed here.
     signals.suspend_if_wanted(result)
-}
-
-/// Builds the turn by direction name, so that the sign is the one that robots use (ruling U6).
-fn command(args: &Args) -> Result<MotorControl, axlewire::error::EncodeError> {
-    match args.turn {
-        turn @ 0.. => MotorControl::turn_right(args.speed, turn),
-        turn => MotorControl::turn_left(args.speed, -turn),
-    }
 }
 
 fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {

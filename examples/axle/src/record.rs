@@ -18,7 +18,7 @@ use crate::{
     args::{self, Protocol},
     decode::BUFFER_LEN,
     failure::Failure,
-    line::Line,
+    line::{Line, PATIENCE, QUIET},
     listing::{self, Shown},
     pcapng::{Direction, Recording},
     signals::Signals,
@@ -60,12 +60,6 @@ pub(crate) struct Args {
     #[arg(long)]
     force: bool,
 }
-
-/// Longest wait for bytes, so that signals are noticed in time.
-const PATIENCE: Duration = Duration::from_millis(50);
-
-/// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
-const QUIET: Duration = Duration::from_millis(30);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -140,7 +134,9 @@ where
     /// Takes in what has just been received, possibly nothing, and writes all that is decided.
     pub(crate) fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         if bytes.is_empty() {
-            if self.heard_at.elapsed() >= QUIET && self.decoder.pending() > 0 {
+            if self.heard_at.elapsed().as_micros() >= QUIET.as_micros().into()
+                && self.decoder.pending() > 0
+            {
                 self.decoder.idle();
                 return self.write(&[]);
             }

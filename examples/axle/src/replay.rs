@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use axlewire::ikeya::Rps;
-
 use crate::{
     MOTION_HELP,
     args::{self, Protocol},
@@ -52,13 +50,8 @@ pub(crate) struct Args {
     #[arg(long = "move")]
     moves: bool,
 
-    /// Refuse a speed above this, in either direction
-    #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
-    max_rps: Rps,
-
-    /// Refuse a position farther than this from where the motor is before the first frame, turns
-    #[arg(long, value_name = "X", default_value = "100", value_parser = args::max_turns)]
-    max_turns: f64,
+    #[command(flatten)]
+    limits: Limits,
 
     /// Print one JSON object per line
     #[arg(short, long)]
@@ -126,7 +119,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         protocol,
         frames: frames.into(),
         linger_us: LINGER_US,
-        limits: Limits { max_rps: args.max_rps.get(), max_turns: args.max_turns },
+        limits: args.limits,
         is_json: args.json,
     })
 }

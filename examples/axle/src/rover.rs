@@ -3,6 +3,7 @@
 use std::{thread, time};
 
 use axlewire::{
+    error::EncodeError,
     time::{Duration, Instant},
     ucp::{
         self, Host, MotorControl,
@@ -194,6 +195,15 @@ impl Rover {
             now.amperes(),
             now.battery_pct,
         ))
+    }
+}
+
+/// A motor command; a positive `turn` is to the right. Named by its direction, so that the sign is
+/// the one that robots use (ruling U6).
+pub(crate) fn motor_control(speed: i16, turn: i16) -> Result<MotorControl, EncodeError> {
+    match turn {
+        0.. => MotorControl::turn_right(speed, turn),
+        _ => MotorControl::turn_left(speed, -turn),
     }
 }
 

@@ -3,7 +3,7 @@
 use axlewire::{
     ikeya::{self, Mode, NodeId, Position, Rps, three},
     ucp::{
-        Body, MotorControl,
+        Body,
         message::{
             Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode, ImuBias,
             ImuBiasAck, MagBias, MagBiasAck, NetworkState, Ping, SetNetworkState,
@@ -17,6 +17,7 @@ use crate::{
     bus,
     failure::Failure,
     play::{self, Due, Limits, Plan},
+    rover,
 };
 
 /// Send one message, and show what is said on the line
@@ -56,13 +57,8 @@ struct Times {
     #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "0.5", value_parser = args::seconds)]
     linger_us: u64,
 
-    /// Refuse a speed above this, in either direction
-    #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
-    max_rps: Rps,
-
-    /// Refuse a position farther than this from where the motor is, turns
-    #[arg(long, value_name = "X", default_value = "100", value_parser = args::max_turns)]
-    max_turns: f64,
+    #[command(flatten)]
+    limits: Limits,
 
     /// Print one JSON object per line
     #[arg(short, long)]
@@ -123,10 +119,10 @@ enum UcpMessage {
     /// Drive
     Motor {
         /// Speed, -100 to 100 percent; positive is forward
-        #[arg(allow_negative_numbers = true, value_parser = percent())]
+        #[arg(allow_negative_numbers = true, value_parser = args::percent())]
         speed: i16,
         /// Steering, -100 to 100 percent; positive is to the right
-        #[arg(allow_negative_numbers = true, value_parser = percent())]
+        #[arg(allow_negative_numbers = true, value_parser = args::percent())]
         turn: i16,
         /// Switch the front lamp on
         #[arg(long)]
@@ -213,11 +209,6 @@ impl Network {
     }
 }
 
-fn percent() -> clap::builder::RangedI64ValueParser<i16> {
-    let limit = i64::from(MotorControl::LIMIT);
-    clap::value_parser!(i16).range(-limit..=limit)
-}
-
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (protocol, bytes) = match &args.message {
@@ -249,7 +240,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         protocol,
         frames: frames.collect(),
         linger_us: times.linger_us,
-        limits: Limits { max_rps: times.max_rps.get(), max_turns: times.max_turns },
+        limits: times.limits,
         is_json: times.json,
     })
 }
@@ -290,11 +281,7 @@ fn ucp(message: &UcpMessage, index: u8) -> Result<Vec<u8>, String> {
     Ok(match message {
         UcpMessage::Ping => frame(Ping {}, index),
         UcpMessage::Motor { speed, turn, lamp } => {
-            let command = match *turn {
-                turn @ 0.. => MotorControl::turn_right(*speed, turn),
-                turn => MotorControl::turn_left(*speed, -turn),
-            };
-            let command = command.map_err(|error| error.to_string())?;
+            let command = rover::motor_control(*speed, *turn).map_err(|error| error.to_string())?;
             frame(command.with_front_led(*lamp), index)
         }
         UcpMessage::CalibrationStart { kind } => frame(CalibrationStart::new(kind.kind()), index),

@@ -24,7 +24,6 @@ use crate::{
         frame::{Frame, RawFrame},
         message::Message,
         report::Report,
-        role::is_from_host,
     },
 };
 
@@ -213,7 +212,7 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant) {
         let message = frame.message();
-        if is_from_host(&message) == Some(true) {
+        if message.is_from_host() == Some(true) {
             count(&mut self.stats.misdirected);
             return;
         }

@@ -18,7 +18,6 @@ use crate::{
         message::Message,
         motor::{MotorControl, RawMotorControl},
         report::Telemetry,
-        role::is_from_host,
         update::RawOtaRequest,
     },
 };
@@ -116,7 +115,7 @@ impl State {
     /// Processes a frame that arrived at `at`.
     pub(super) fn receive(&mut self, frame: &Frame, at: Instant, now: Instant) {
         let message = frame.message();
-        if is_from_host(&message) == Some(false) {
+        if message.is_from_host() == Some(false) {
             count(&mut self.stats.misdirected);
             return;
         }

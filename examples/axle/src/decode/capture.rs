@@ -1,9 +1,6 @@
 //! Captures with times: pcapng.
 
-use std::{
-    collections::{BTreeMap, btree_map::Entry},
-    path::PathBuf,
-};
+use std::collections::{BTreeMap, btree_map::Entry};
 
 use axlewire::{
     ikeya::{self, three},
@@ -35,7 +32,7 @@ pub(super) fn run(args: &Args, mut input: Input, chosen: Option<Protocol>) -> Re
     printer.print_sheet(&mut sheet)?;
     if let Some(problem) = walked.problem {
         printer.flush()?;
-        return Err(failure(problem, path));
+        return Err(problem.failure(path));
     }
     let account = walked.account;
     printer.finish(&account, walked.times_back)?;
@@ -45,17 +42,6 @@ pub(super) fn run(args: &Args, mut input: Input, chosen: Option<Protocol>) -> Re
         return Err(Failure::Failed(line));
     }
     Ok(())
-}
-
-/// The failure for a capture that cannot be read to its end.
-pub(super) fn failure(problem: Problem, path: Option<PathBuf>) -> Failure {
-    match problem {
-        Problem::Io(error) => Failure::Read { path, error },
-        problem => {
-            let path = path.unwrap_or_else(|| "standard input".into());
-            Failure::Failed(format!("{path:?}: {problem}"))
-        }
-    }
 }
 
 /// A capture that has been read.
@@ -76,7 +62,7 @@ pub(super) fn walk(
     mut go_on: impl FnMut(Protocol, &mut Sheet) -> Result<(), Failure>,
 ) -> Result<Walked, Failure> {
     let mut reader = Reader::new(input);
-    let mut streams = BTreeMap::<(usize, u8), (Protocol, Box<dyn Stream>)>::new();
+    let mut streams = BTreeMap::<(usize, Option<Direction>), (Protocol, Box<dyn Stream>)>::new();
     let mut walked = Walked { account: Counters::default(), times_back: 0, problem: None };
     let (mut latest, mut bytes) = (0, Vec::new());
     loop {
@@ -93,8 +79,7 @@ pub(super) fn walk(
                 break;
             }
         };
-        let key = (interface, direction.map_or(0, |direction| direction as u8 + 1));
-        let (protocol, stream) = match streams.entry(key) {
+        let (protocol, stream) = match streams.entry((interface, direction)) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(new) => {
                 let protocol = match chosen {

@@ -161,7 +161,7 @@ pub(crate) fn frames_of(
             Ok(())
         })?;
         if let Some(problem) = walked.problem {
-            return Err(capture::failure(problem, Some(path.to_owned())));
+            return Err(problem.failure(Some(path.to_owned())));
         }
         if mixed {
             return Err(Failure::Failed(format!("{path:?} has lines of several protocols")));

@@ -11,7 +11,7 @@ use std::{
 
 use axlewire::{
     drive::{self, SerialPort},
-    time::Instant,
+    time::{self, Instant},
 };
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
@@ -21,6 +21,12 @@ use crate::{
     pcapng::{Direction, Recording},
 };
 use tcp::TcpPort;
+
+/// Longest wait for bytes, so that signals and keys are noticed in time.
+pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
+pub(crate) const QUIET: time::Duration = time::Duration::from_millis(30);
 
 /// What may be at the other end of a path.
 pub(crate) trait Wire: Read + ReadReady + Write + ErrorType<Error = io::Error> {

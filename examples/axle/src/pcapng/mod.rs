@@ -45,7 +45,7 @@ mod option {
 }
 
 /// Direction of a packet, as its flags say it.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
 pub(crate) enum Direction {
     /// Received by the recording program.
     In,

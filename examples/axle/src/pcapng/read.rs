@@ -4,9 +4,11 @@ use std::{
     fmt,
     io::{self, ErrorKind, Read},
     ops::Range,
+    path::PathBuf,
 };
 
 use super::{BYTE_ORDER, Direction, MAGIC, block, option};
+use crate::failure::Failure;
 
 /// Longest accepted block. Those of `axle record` are much shorter; other programs describe their
 /// interfaces in up to a few kilobytes and cut packets at 256 KiB.
@@ -60,6 +62,19 @@ pub(crate) enum Problem {
     CutOff { offset: u64 },
     /// The block that begins at this offset is invalid.
     Invalid { offset: u64, why: &'static str },
+}
+
+impl Problem {
+    /// The failure of the tool, for a capture in this file; `None` is standard input.
+    pub(crate) fn failure(self, path: Option<PathBuf>) -> Failure {
+        match self {
+            Self::Io(error) => Failure::Read { path, error },
+            problem => {
+                let path = path.unwrap_or_else(|| "standard input".into());
+                Failure::Failed(format!("{path:?}: {problem}"))
+            }
+        }
+    }
 }
 
 impl fmt::Display for Problem {

@@ -1,12 +1,15 @@
 //! What a frame does to the device that receives it, and whether it may be sent at all.
 
 use axlewire::{
-    ikeya::{self, Mode, NodeId, Position, Status, three},
+    ikeya::{self, Mode, NodeId, Position, Rps, Status, three},
     stream::{Frames, Framing},
     ucp::{self, Message, MotorControl},
 };
 
-use crate::{args::Protocol, bus::Boards};
+use crate::{
+    args::{self, Protocol},
+    bus::Boards,
+};
 
 /// The end of a line that sends a frame.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, clap::ValueEnum)]
@@ -37,11 +40,14 @@ pub(crate) struct Write {
 }
 
 /// What is refused.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Limits {
-    /// Speeds above this.
-    pub(crate) max_rps: f32,
-    /// Positions farther than this from where the motor is, turns.
+    /// Refuse a speed above this, in either direction
+    #[arg(long, value_name = "X", default_value = "20", value_parser = args::max_rps)]
+    pub(crate) max_rps: Rps,
+
+    /// Refuse a position farther than this from where the motor is before the first frame, turns
+    #[arg(long, value_name = "X", default_value = "100", value_parser = args::max_turns)]
     pub(crate) max_turns: f64,
 }
 
@@ -102,14 +108,7 @@ fn of_message(message: &Message<'_>) -> Result<(Side, Effect), String> {
         | Message::Biases(_)
         | Message::SetNetworkState(_)
         | Message::SetNetworkStateWide(_) => commander(Effect::Nothing),
-        Message::Pong(_)
-        | Message::CalibrationStartAck(_)
-        | Message::CalibrationEndAck(_)
-        | Message::Report(_)
-        | Message::ImuBias(_)
-        | Message::MagBias(_)
-        | Message::BiasRequest(_)
-        | Message::OtaAck(_) => Ok((Side::Device, Effect::Nothing)),
+        _ if message.is_from_host() == Some(false) => Ok((Side::Device, Effect::Nothing)),
         Message::Unknown(frame) if ucp::MessageId::from_u8(frame.id).is_some() => Err(format!(
             "message id {} with a body of {} bytes, which shipped robots misread (ruling U13)",
             frame.id,
@@ -136,7 +135,7 @@ impl Write {
             ));
         }
         let Some(positions) = B::positions(status) else {
-            return self.check_speeds(limits.max_rps);
+            return self.check_speeds(limits.max_rps.get());
         };
         for (from, to) in positions.iter().zip(&self.positions) {
             let (from, to) = (from.revolutions(), to.revolutions());
@@ -174,7 +173,9 @@ mod tests {
 
     use super::*;
 
-    const LIMITS: Limits = Limits { max_rps: 20.0, max_turns: 100.0 };
+    fn limits() -> Limits {
+        Limits { max_rps: Rps::new(20.0).unwrap(), max_turns: 100.0 }
+    }
 
     fn write(packet: &WriteRequest) -> Write {
         match of(Protocol::Ikeya, packet.as_bytes()) {
@@ -197,31 +198,31 @@ mod tests {
     #[test]
     fn a_command_for_the_other_mode_is_refused_if_that_is_known() {
         let at = Status::<OneMotor>::Position(Position::new(0, 0));
-        let error = velocity(1.0).check(at, Some(Mode::Velocity), &LIMITS).unwrap_err();
+        let error = velocity(1.0).check(at, Some(Mode::Velocity), &limits()).unwrap_err();
         assert_eq!(error, "node 3 is in position mode, but a command is for velocity mode");
         let still = Status::<OneMotor>::Velocity(0.0);
-        velocity(1.0).check(still, Some(Mode::Velocity), &LIMITS).unwrap();
-        velocity(1.0).check(still, None, &LIMITS).unwrap();
+        velocity(1.0).check(still, Some(Mode::Velocity), &limits()).unwrap();
+        velocity(1.0).check(still, None, &limits()).unwrap();
     }
 
     #[test]
     fn a_speed_that_a_position_node_would_take_for_a_place_is_too_far() {
         let at = Status::<OneMotor>::Position(Position::new(0, 0));
-        let error = velocity(1.0).check(at, None, &LIMITS).unwrap_err();
+        let error = velocity(1.0).check(at, None, &limits()).unwrap_err();
         assert!(error.starts_with("16256.0000 turns for node 3, which is at 0.0000"), "{error}");
         let near = write(&WriteRequest::position(NodeId::N3, Position::new(0, -100)));
-        near.check(at, None, &LIMITS).unwrap();
+        near.check(at, None, &limits()).unwrap();
         let far = write(&WriteRequest::position(NodeId::N3, Position::new(1, 100)));
-        far.check(at, None, &LIMITS).unwrap_err();
+        far.check(at, None, &limits()).unwrap_err();
     }
 
     #[test]
     fn a_speed_above_the_limit_or_none_at_all_is_refused() {
         let still = Status::<OneMotor>::Velocity(0.0);
-        velocity(-20.0).check(still, None, &LIMITS).unwrap();
-        velocity(-20.1).check(still, None, &LIMITS).unwrap_err();
+        velocity(-20.0).check(still, None, &limits()).unwrap();
+        velocity(-20.1).check(still, None, &limits()).unwrap_err();
         let nan = write(&WriteRequest::position(NodeId::N1, Position::new(0, 0x7FC0)));
-        nan.check(still, None, &LIMITS).unwrap_err();
+        nan.check(still, None, &limits()).unwrap_err();
     }
 
     #[test]

@@ -6,11 +6,10 @@ use axlewire::{
 };
 
 use super::{
-    QUIET,
     model::{Heard, Model},
     table::Table,
 };
-use crate::{decode::BUFFER_LEN, listing::Shown};
+use crate::{decode::BUFFER_LEN, line::QUIET, listing::Shown};
 
 /// Where bytes come from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

@@ -16,7 +16,7 @@ use crate::{
     failure::Failure,
     input::Input,
     listing::Shown,
-    pcapng::{self, Problem, Reader},
+    pcapng::{self, Direction, Reader},
 };
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
@@ -47,26 +47,17 @@ fn protocol_of(args: &Args) -> Result<Protocol, Failure> {
     let mut reader = Reader::new(&mut input);
     let interface = match reader.next() {
         Ok(packet) => packet.map_or(0, |packet| packet.interface),
-        Err(problem) => return Err(failure(problem, args)),
+        Err(problem) => return Err(problem.failure(args.from.file.clone())),
     };
     let link_type = reader.interfaces().get(interface).map(|found| found.link_type);
     link_type.and_then(pcapng::protocol_of).ok_or_else(unknown)
-}
-
-/// The failure for a capture that cannot be read to its end.
-fn failure(problem: Problem, args: &Args) -> Failure {
-    let path = args.from.file.clone();
-    match problem {
-        Problem::Io(error) => Failure::Read { path, error },
-        problem => Failure::Failed(format!("{:?}: {problem}", path.unwrap_or_default())),
-    }
 }
 
 /// The messages of a capture.
 struct Sum<F> {
     table: Table,
     /// One per interface and direction.
-    decoders: BTreeMap<(usize, u8), Decoder<F, BUFFER_LEN>>,
+    decoders: BTreeMap<(usize, Option<Direction>), Decoder<F, BUFFER_LEN>>,
 }
 
 impl<F> Sum<F>
@@ -74,7 +65,7 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    fn take(&mut self, stream: (usize, u8), bytes: &[u8]) {
+    fn take(&mut self, stream: (usize, Option<Direction>), bytes: &[u8]) {
         let decoder = self.decoders.entry(stream).or_default();
         self.table.take(decoder, bytes);
     }
@@ -123,12 +114,11 @@ where
                             break;
                         }
                     }
-                    let direction = packet.direction.map_or(0, |direction| direction as u8 + 1);
-                    sum.take((packet.interface, direction), packet.bytes);
+                    sum.take((packet.interface, packet.direction), packet.bytes);
                 }
                 Ok(None) => break,
                 Err(problem) => {
-                    broken = Err(failure(problem, args));
+                    broken = Err(problem.failure(args.from.file.clone()));
                     break;
                 }
             }
@@ -139,7 +129,7 @@ where
             if bytes.is_empty() {
                 break;
             }
-            sum.take((0, 0), bytes);
+            sum.take((0, None), bytes);
         }
     }
     let counters = sum.finish();

@@ -8,8 +8,14 @@ use axlewire::{
     time::Duration,
 };
 
-use super::{PATIENCE, QUIET, Watched, recorder::Recorder, table::Table};
-use crate::{decode::BUFFER_LEN, failure::Failure, line::Line, listing::Shown, signals::Signals};
+use super::{Watched, recorder::Recorder, table::Table};
+use crate::{
+    decode::BUFFER_LEN,
+    failure::Failure,
+    line::{Line, PATIENCE, QUIET},
+    listing::Shown,
+    signals::Signals,
+};
 
 /// Interval at which a line is printed.
 const PRINT_PERIOD: Duration = Duration::from_millis(1000);
@@ -35,8 +41,8 @@ where
         if signals.is_raised() || watched.is_over(start, clock.now(), frames) {
             break Ok(());
         }
-        let patience = (print_at - clock.now()).min(PATIENCE).as_micros();
-        let received = match line.receive(&mut buffer, Span::from_micros(patience.into())) {
+        let to_print = Span::from_micros((print_at - clock.now()).as_micros().into());
+        let received = match line.receive(&mut buffer, to_print.min(PATIENCE)) {
             Ok(received) => received,
             Err(failure) => break Err(failure),
         };

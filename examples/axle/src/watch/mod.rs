@@ -24,7 +24,7 @@ use std::path::PathBuf;
 
 use axlewire::{
     ikeya::{self, three},
-    time::{Duration, Instant},
+    time::Instant,
     ucp,
 };
 
@@ -102,12 +102,6 @@ struct Watched<'a> {
     baud: u32,
     args: &'a Args,
 }
-
-/// Longest wait for bytes, so that signals and keys are noticed in time.
-const PATIENCE: Duration = Duration::from_millis(50);
-
-/// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
-const QUIET: Duration = Duration::from_millis(30);
 
 /// Message of a build without the page.
 #[cfg(not(all(unix, feature = "dashboard")))]

@@ -1,11 +1,11 @@
 //! The page of `axle watch`.
 
-use std::{io, time::Duration as Span};
+use std::io;
 
 use axlewire::{drive::Clock, stream::Framing, time::Instant};
 
 use super::{
-    PATIENCE, Watched,
+    Watched,
     dashboard::Dashboard,
     feed::{Feed, Source},
     model::{Heard, Model},
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    line::Line,
+    line::{Line, PATIENCE},
     signals::{self, Signals},
 };
 
@@ -104,8 +104,7 @@ where
             if signals.is_end() || self.watched.is_over(self.start, clock.now(), frames) {
                 return Ok(());
             }
-            let patience = Span::from_micros(PATIENCE.as_micros().into());
-            let received = line.receive(&mut buffer, patience)?;
+            let received = line.receive(&mut buffer, PATIENCE)?;
             let now = clock.now().as_micros();
             self.dashboard.feed.take(Source::Received, received, now);
             if let Err(failure) = self.recorder.take(received) {

@@ -56,7 +56,7 @@ pub(crate) struct Rover {
 impl Rover {
     pub(super) fn frame(&mut self, frame: &Frame, at: u64, log: &mut Log) {
         let message = frame.message();
-        if is_of_robot(&message) {
+        if message.is_from_host() == Some(false) {
             self.heard_at = at;
             if self.link != Link::Up {
                 let before = core::mem::replace(&mut self.link, Link::Up);
@@ -149,19 +149,4 @@ impl Rover {
         self.reports.measure(seconds);
         self.commands.measure(seconds);
     }
-}
-
-/// Whether only a robot sends this message (ruling U4).
-const fn is_of_robot(message: &Message<'_>) -> bool {
-    matches!(
-        message,
-        Message::Pong(_)
-            | Message::CalibrationStartAck(_)
-            | Message::CalibrationEndAck(_)
-            | Message::Report(_)
-            | Message::ImuBias(_)
-            | Message::MagBias(_)
-            | Message::BiasRequest(_)
-            | Message::OtaAck(_)
-    )
 }
