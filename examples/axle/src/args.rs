@@ -1,12 +1,15 @@
 //! Arguments shared by several subcommands, and their validation.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use axlewire::{
     ikeya::{self, NodeId, Position, Rps},
     ucp::{self, MotorControl},
 };
-use clap::{ValueEnum, builder::RangedI64ValueParser};
+use clap::{
+    ValueEnum,
+    builder::{PathBufValueParser, RangedI64ValueParser, TypedValueParser},
+};
 
 /// The port of a subcommand.
 #[derive(Debug, clap::Args)]
@@ -16,8 +19,8 @@ pub(crate) struct PortArgs {
     #[arg(short, long, value_name = "PATH")]
     pub(crate) port: String,
 
-    /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
-    #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Line speed, bit/s, at least 9600; by default 500000 for Ikeya and 115200 for UCP
+    #[arg(short, long, value_parser = baud())]
     pub(crate) baud: Option<u32>,
 
     /// The port has no line speed, such as one of com0com: accept an answer that comes sooner than
@@ -26,8 +29,28 @@ pub(crate) struct PortArgs {
     pub(crate) instant: bool,
 
     /// Record what is sent and received, as pcapng
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = recording())]
     pub(crate) record: Option<PathBuf>,
+}
+
+impl PortArgs {
+    /// The line speed for this protocol, bit/s.
+    pub(crate) fn baud_for(&self, protocol: Protocol) -> u32 {
+        self.baud.unwrap_or(protocol.default_baud())
+    }
+}
+
+/// A line speed. On slower ones a stop would take minutes.
+pub(crate) fn baud() -> RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(9600..)
+}
+
+/// A file for a recording.
+fn recording() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match path == Path::new("-") {
+        true => Err("standard output has the lines of this subcommand: name a file"),
+        false => Ok(path),
+    })
 }
 
 /// Protocol of a line.

@@ -4,7 +4,7 @@ use std::{thread, time};
 
 use axlewire::{
     ikeya::{
-        self, Master, Mode, NodeId, Status,
+        Master, Mode, NodeId, Status,
         board::OneMotor,
         master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
@@ -12,7 +12,7 @@ use axlewire::{
 };
 
 use crate::{
-    args,
+    args::{self, Protocol},
     failure::Failure,
     line::Line,
     session::Session,
@@ -100,7 +100,7 @@ impl MasterArgs {
 /// Completes the settings of a master for this line.
 pub(crate) fn complete(config: MasterConfig, args: &args::PortArgs, line: &Line) -> MasterConfig {
     let mut config = config;
-    config.baud = args.baud.unwrap_or(ikeya::BAUD);
+    config.baud = args.baud_for(Protocol::Ikeya);
     config.polling = Polling::Every(PERIOD);
     config.accepts_early = line.is_instant();
     config.dead_man = Some(ABSENCE);
@@ -109,12 +109,8 @@ pub(crate) fn complete(config: MasterConfig, args: &args::PortArgs, line: &Line)
 
 impl<B: Boards> Bus<B> {
     pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
-        Self::open_with(&args.line, args.config())
-    }
-
-    pub(crate) fn open_with(args: &args::PortArgs, config: MasterConfig) -> Result<Self, Failure> {
-        let line = Line::open(args, B::PROTOCOL)?;
-        let config = complete(config, args, &line);
+        let line = Line::open(&args.line, B::PROTOCOL)?;
+        let config = complete(args.config(), &args.line, &line);
         Ok(Self::new(line, config))
     }
 
@@ -165,7 +161,7 @@ impl<B: Boards> Bus<B> {
         self.session.path()
     }
 
-    /// The failure of the recording, if there is one that is incomplete.
+    /// Ends the recording, if there is one, for use while nothing moves; fails if it is incomplete.
     pub(crate) fn check_recording(&self) -> Result<(), Failure> {
         self.session.check_recording()
     }

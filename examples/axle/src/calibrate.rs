@@ -45,7 +45,7 @@ pub(crate) struct Args {
     #[arg(short, long, value_enum)]
     kind: Kind,
 
-    /// Duration, seconds; by default, until Enter
+    /// Duration, seconds, at least 1.2; by default, until Enter
     #[arg(short = 'f', long = "for", value_name = "SECONDS", value_parser = args::seconds)]
     micros: Option<u64>,
 
@@ -91,18 +91,22 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let start = rover.now();
     let form = Form::of(args.json);
-    let mut calibration = Calibration { rover, start, form, result: None };
-    calibration.request(CalibrationStep::Start, args.kind.kind())?;
-    let told = calibration.say_started(args);
+    let kind = args.kind.kind();
+    let mut calibration =
+        Calibration { rover, start, form, kind, result: None, earlier: 0, taken: 0 };
+    let started = calibration.request(CalibrationStep::Start);
+    let told = started.and_then(|()| calibration.say_started(args));
     let listened = told.and_then(|()| calibration.listen(args, &signals));
-    // In any case, the robot is told that the calibration is over.
-    let ended = calibration.request(CalibrationStep::End, args.kind.kind());
+    // In any case, the robot is told that the calibration is over: it may have begun even if its
+    // answer was lost.
+    calibration.earlier = calibration.results();
+    let ended = calibration.request(CalibrationStep::End);
     listened?;
     ended?;
     if signals.is_raised() {
         return Err(Failure::Failed("interrupted: the calibration was ended".to_owned()));
     }
-    calibration.say(&Event::Ended { kind: args.kind.kind().to_string() })?;
+    calibration.say(&Event::Ended { kind: kind.to_string() })?;
     let result = calibration.result()?;
     calibration.say(&result)?;
     calibration.rover.check_recording()
@@ -112,8 +116,19 @@ struct Calibration {
     rover: Rover,
     start: Instant,
     form: Form,
+    kind: CalibrationKind,
+    /// The latest result.
     result: Option<Event>,
+    /// Number of results that had come before the end was asked for. They are of an earlier
+    /// calibration: robots repeat theirs every second until it is acknowledged.
+    earlier: u32,
+    /// Number of results that were no repetition.
+    taken: u32,
 }
+
+/// Shortest time between beginning and end: in it, a result that the robot still repeats comes, and
+/// is acknowledged.
+const SHORTEST_US: u64 = 1_200_000;
 
 impl Calibration {
     fn say(&mut self, event: &Event) -> Result<(), Failure> {
@@ -122,7 +137,7 @@ impl Calibration {
     }
 
     fn say_started(&mut self, args: &Args) -> Result<(), Failure> {
-        let kind = args.kind.kind();
+        let kind = self.kind;
         let what_to_do = match (kind, args.micros.is_some()) {
             (CalibrationKind::Magnetometer, true) => "turn the robot by hand until the time is up",
             (CalibrationKind::Magnetometer, false) => "turn the robot by hand, then press Enter",
@@ -132,22 +147,34 @@ impl Calibration {
         self.say(&Event::Started { kind: kind.to_string(), what_to_do })
     }
 
+    /// Number of results received.
+    fn results(&self) -> u32 {
+        self.taken.saturating_add(self.rover.host().statistics().results_repeated)
+    }
+
     /// Runs one round, and keeps a result.
     fn round(&mut self) -> Result<(), Failure> {
         let until = self.rover.now() + CALL_PERIOD;
         let mut found = None;
+        let kind = self.kind;
         let round = self.rover.round_with(until, |event| match event {
-            HostEvent::ImuBias(bias) => found = Some(Event::of_imu(bias)),
-            HostEvent::MagBias(bias) => found = Some(Event::of_mag(bias)),
+            HostEvent::ImuBias(bias) if kind == CalibrationKind::Imu => {
+                found = Some(Event::of_imu(bias));
+            }
+            HostEvent::MagBias(bias) if kind == CalibrationKind::Magnetometer => {
+                found = Some(Event::of_mag(bias));
+            }
             _ => {}
         });
-        self.result = found.or(self.result.take());
+        if found.is_some() {
+            (self.result, self.taken) = (found, self.taken.saturating_add(1));
+        }
         round
     }
 
     /// Asks the robot to begin or to end, and waits for its answer.
-    fn request(&mut self, step: CalibrationStep, kind: CalibrationKind) -> Result<(), Failure> {
-        let now = self.rover.now();
+    fn request(&mut self, step: CalibrationStep) -> Result<(), Failure> {
+        let (kind, now) = (self.kind, self.rover.now());
         let host = self.rover.host_mut();
         match step {
             CalibrationStep::Start => host.start_calibration(kind, now),
@@ -166,13 +193,16 @@ impl Calibration {
     /// Waits until the time is up, Enter is pressed, or a signal comes.
     fn listen(&mut self, args: &Args, signals: &Signals) -> Result<(), Failure> {
         let begin = self.rover.now().as_micros();
+        let soonest = Instant::from_micros(begin + SHORTEST_US);
         let end = args.micros.map(|micros| Instant::from_micros(begin + micros));
         let enter = if end.is_none() { Some(enter()) } else { None };
         let is_pressed = || enter.as_ref().is_some_and(|enter| enter.try_recv().is_ok());
-        while !signals.is_raised() && !is_pressed() {
-            if end.is_some_and(|end| self.rover.now() >= end) {
+        let mut is_over = false;
+        while !signals.is_raised() {
+            if is_over && self.rover.now() >= soonest {
                 break;
             }
+            is_over |= is_pressed() || end.is_some_and(|end| self.rover.now() >= end);
             self.round()?;
         }
         Ok(())
@@ -182,8 +212,10 @@ impl Calibration {
     fn result(&mut self) -> Result<Event, Failure> {
         let end = self.rover.now() + RESULT_PATIENCE;
         while self.rover.now() < end {
-            if let Some(result) = self.result.take() {
-                return Ok(result);
+            // The same numbers once more are a result too.
+            match self.result.take() {
+                Some(result) if self.results() > self.earlier => return Ok(result),
+                result => self.result = result,
             }
             self.round()?;
         }

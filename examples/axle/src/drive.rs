@@ -4,7 +4,7 @@ use std::fmt;
 
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{self, MotorControl, Telemetry, host::Link},
+    ucp::{MotorControl, Telemetry, host::Link},
 };
 use serde::Serialize;
 
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {
-    let baud = args.line.baud.unwrap_or(ucp::BAUD);
+    let baud = args.line.baud_for(Protocol::Ucp);
     let about = About { command: "drive", protocol: Protocol::Ucp, baud, has_echo: false };
     let wire = Line::open(&args.line, Protocol::Ucp)?;
     let (page, wire) = args.page.open(wire, &about, signals)?;

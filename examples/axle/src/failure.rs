@@ -74,10 +74,11 @@ impl Failure {
         }
     }
 
-    /// Adds `besides` to the message of a failed operation.
+    /// Adds `besides` to the message of a failed operation, or of a port that was lost.
     pub(crate) fn and(self, besides: &str) -> Self {
         match self {
             Self::Failed(line) => Self::Failed(format!("{line}; {besides}")),
+            lost @ Self::PortLost { moving: None, .. } => lost.while_moving(besides),
             other => other,
         }
     }

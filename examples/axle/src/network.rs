@@ -13,7 +13,8 @@ use crate::{
 
 /// Show a state of the network on the lamp of a rover
 ///
-/// It is sent once, after the robot is heard; no robot acknowledges it. The first frame is a stop,
+/// It is sent once, after the robot is heard; no robot acknowledges it, so the tool waits for the
+/// answer to a ping behind it. The first frame is a stop,
 /// and stops are repeated every 0.1 s (ruling U16): a rover that is driven by another program
 /// stops, and its front lamp goes off. Nothing moves because of this subcommand.
 #[derive(Debug, clap::Args)]
@@ -27,8 +28,8 @@ pub(crate) struct Args {
     state: Network,
 }
 
-/// Time for the message to leave: much longer than the queue of a host takes.
-const SEND_TIME: Duration = Duration::from_millis(300);
+/// Longest wait for an answer to a ping behind the message.
+const PATIENCE: Duration = Duration::from_millis(2000);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -40,9 +41,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (state, begin) = (args.state.state(), rover.now());
     let shown = rover.host_mut().set_network_state(state, begin);
     shown.map_err(|error| Failure::Failed(error.to_string()))?;
-    while rover.now() < begin + SEND_TIME {
-        let until = rover.now() + CALL_PERIOD;
-        rover.round(until)?;
+    // It leaves in this round, in front of the pings to come.
+    rover.round(begin + CALL_PERIOD)?;
+    let pings = rover.host().statistics().pings;
+    while !rover.has_answered_since(pings) {
+        let now = rover.now();
+        if now >= begin + PATIENCE || signals.is_raised() {
+            let line = format!("network {state}: sent, but the robot does not answer any more");
+            return Err(Failure::Failed(line));
+        }
+        rover.round(now + CALL_PERIOD)?;
     }
     teller::print(&format!("network {state}: sent")).map_err(Failure::Write)?;
     rover.check_recording()

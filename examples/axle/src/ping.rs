@@ -23,9 +23,10 @@ use crate::{
 /// Measure round trips to a rover
 ///
 /// Sends a ping every --every seconds, prints the round trip of each pong, and at the end the
-/// shortest, the mean and the longest, and how many pings were lost. A pong that takes longer than
-/// 0.5 s counts as lost, and the next ping waits until then. The times include those of the bytes
-/// on the line and of the adapter.
+/// shortest, the mean and the longest, and how many pings were lost. A ping that is not answered
+/// within 0.5 s counts as lost, and the next one waits until then. A pong does not say which ping
+/// it answers: one that comes even later is taken for that of the next ping. The times include
+/// those of the bytes on the line and of the adapter.
 ///
 /// The first frame is a stop, and stops are repeated every 0.1 s (ruling U16): a rover that is
 /// driven by another program stops, and its lamp goes off. Nothing moves because of this
@@ -38,7 +39,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     line: args::PortArgs,
 
-    /// Number of pings; by default, until --for or Ctrl-C
+    /// End when this many pings were answered or lost; by default, until --for or Ctrl-C
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
 
@@ -126,15 +127,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             break Ok(());
         }
         let until = end.map_or(now + CALL_PERIOD, |end| end.min(now + CALL_PERIOD));
-        let mut events = Vec::new();
+        let mut pongs = Vec::new();
         let result = rover.round_with(until, |event| {
             if let HostEvent::Pong { round_trip, err } = event {
                 let damaged = *err != ErrorCode::Fine;
-                events.push(Event::Pong { round_trip_us: round_trip.as_micros(), damaged });
+                pongs.push(Event::Pong { round_trip_us: round_trip.as_micros(), damaged });
             }
         });
         let lost_by_now = rover.host().statistics().pings_lost;
-        events.extend((lost..lost_by_now).map(|_| Event::Lost));
+        // A round is shorter than the time after which a ping is lost: the loss came first.
+        let events = (lost..lost_by_now).map(|_| Event::Lost).chain(pongs);
         lost = lost_by_now;
         let micros = rover.now().as_micros().saturating_sub(start.as_micros());
         for event in events {

@@ -8,13 +8,15 @@ use crate::{
     bus,
     decode::{self, Taken},
     failure::Failure,
-    play::{self, Due, Effect, Limits, Plan, Side},
+    play::{self, Due, Limits, Plan, Side},
 };
 
 /// Send the frames of a capture, at their own pace or faster
 ///
 /// Sends what one side of the line sent, frame by frame, and shows both sides. Bytes between frames
-/// are not sent. Raw bytes have no times: their frames follow each other at --every.
+/// are not sent. Raw bytes have no times: their frames follow each other at --every. No frame is
+/// sent faster than --baud allows. A robot is told to stop first, and every 0.1 s until the first
+/// motor command of the capture (ruling U16): it would drive on while it hears anything.
 ///
 /// If the frames command motors or a rover, --move is needed. Then the modes of all nodes that are
 /// commanded are read first, and nothing is sent if a node does not answer, if it is not in the
@@ -90,7 +92,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         if side != args.side {
             continue;
         }
-        moving += u64::from(effect != Effect::Nothing);
+        moving += u64::from(effect.moves());
         let after_us = match micros {
             Some(micros) => {
                 let begin = *first.get_or_insert(micros);
@@ -102,10 +104,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         last_us = after_us.max(last_us);
         // The answers in the capture say how its commands were meant.
         let meant = commands.and_then(|node| modes.of(node));
-        frames.push(Due { after_us: last_us, bytes, meant });
+        frames.push(Due { after_us: last_us, bytes, meant, effect });
     }
     if frames.is_empty() {
-        let line = format!("no frame of the {:?} in the capture", args.side).to_lowercase();
+        let line = format!("no frame of a {} in the capture", args.side);
         return Err(Failure::Failed(line));
     }
     if moving > 0 && !args.moves {
@@ -117,6 +119,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     play::run(Plan {
         bus: &args.bus,
         protocol,
+        side: args.side,
         frames: frames.into(),
         linger_us: LINGER_US,
         limits: args.limits,

@@ -6,7 +6,7 @@ use axlewire::{
     error::EncodeError,
     time::{Duration, Instant},
     ucp::{
-        self, Host, MotorControl,
+        Host, MotorControl,
         host::{HostConfig, HostEvent, Link},
     },
 };
@@ -29,6 +29,10 @@ const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 /// any may be lost.
 const STOPS: u32 = 3;
 
+/// Longest round trip of a line: an adapter, or a network in between. What was measured before the
+/// robot heard of a stop says nothing about it.
+const LONGEST_TRIP: Duration = Duration::from_millis(1500);
+
 /// Number of consecutive reports with all wheels at rest. A single one may show a wheel that is
 /// changing direction.
 const STILL_REPORTS: u32 = 3;
@@ -50,6 +54,9 @@ pub(crate) struct Rover {
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
+    /// When a ping was found to be lost. It may only be late, and then its pong is taken for that of
+    /// the next one.
+    lost_at: Option<Instant>,
 }
 
 impl Rover {
@@ -59,7 +66,7 @@ impl Rover {
 
     pub(crate) fn open_with(args: &args::PortArgs, config: HostConfig) -> Result<Self, Failure> {
         let (line, mut config) = (Line::open(args, Protocol::Ucp)?, config);
-        config.baud = args.baud.unwrap_or(ucp::BAUD);
+        config.baud = args.baud_for(Protocol::Ucp);
         Ok(Self::new(line, config))
     }
 
@@ -72,14 +79,14 @@ impl Rover {
 
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {
         let session = Session::new(line, |now| Host::new(config, now));
-        Self { session, has_dead_man_fired: false, still_reports: 0 }
+        Self { session, has_dead_man_fired: false, still_reports: 0, lost_at: None }
     }
 
     pub(crate) fn now(&mut self) -> Instant {
         self.session.now()
     }
 
-    /// The failure of the recording, if there is one that is incomplete.
+    /// Ends the recording, if there is one, for use while nothing moves; fails if it is incomplete.
     pub(crate) fn check_recording(&self) -> Result<(), Failure> {
         self.session.check_recording()
     }
@@ -122,6 +129,7 @@ impl Rover {
         until: Instant,
         mut react: impl FnMut(&HostEvent),
     ) -> Result<(), Failure> {
+        let lost = self.host().statistics().pings_lost;
         let (mut next, result) = match self.session.round(until) {
             Ok(event) => (event, Ok(())),
             Err(failure) => (self.session.poll_event(), Err(failure)),
@@ -139,24 +147,45 @@ impl Rover {
             }
             next = self.session.poll_event();
         }
+        if self.host().statistics().pings_lost > lost {
+            self.lost_at = Some(self.now());
+        }
         result
     }
 
-    /// Repeats the stop until the robot's reports show all wheels at rest. Failures of the port and
+    /// Whether the robot has answered a ping that was sent behind the first `pings`: then it has
+    /// heard all that was sent before.
+    pub(crate) fn has_answered_since(&mut self, pings: u32) -> bool {
+        let (now, seen) = (self.now(), self.host().statistics());
+        let is_recent = |at: Instant| now - at < LONGEST_TRIP;
+        // Pings are settled one after the other.
+        let settled = seen.round_trip.count().saturating_add(seen.pings_lost);
+        settled > pings && !self.lost_at.is_some_and(is_recent)
+    }
+
+    /// Repeats the stop until the robot's reports show all wheels at rest; only those count that were
+    /// measured after the robot had heard of it: after its answer to a ping behind it. Failures of the port and
     /// of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, sent) = (self.now(), self.host().statistics().commands);
-        let (mut awake, mut has_told) = (Awake::new(begin), false);
+        let mut awake = Awake::new(begin);
+        // When enough stops had been sent, and how many pings by then.
+        let (mut told, mut has_heard) = (None, false);
         self.host_mut().stop(begin);
         let failure = loop {
             let until = self.now() + CALL_PERIOD;
             let result = self.round(until);
-            let told = self.host().statistics().commands.saturating_sub(sent);
-            if !has_told && told >= STOPS {
-                // Earlier reports do not count.
-                (has_told, self.still_reports) = (true, 0);
+            let (now, seen) = (self.now(), *self.host().statistics());
+            if told.is_none() && seen.commands.saturating_sub(sent) >= STOPS {
+                told = Some((now, seen.pings));
             }
-            let is_told = has_told && self.host().is_stop_sent();
+            let must_have_heard =
+                |(at, pings)| self.has_answered_since(pings) || now - at >= LONGEST_TRIP;
+            if !has_heard && told.is_some_and(must_have_heard) {
+                // Earlier reports do not count.
+                (has_heard, self.still_reports) = (true, 0);
+            }
+            let is_told = has_heard && self.host().is_stop_sent();
             if result.is_ok() && is_told && self.still_reports >= STILL_REPORTS {
                 return Ok(());
             }

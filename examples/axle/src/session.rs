@@ -44,7 +44,7 @@ impl<R: Endpoint> Session<R> {
         self.driver.port().path()
     }
 
-    /// The failure of the recording, if there is one that is incomplete.
+    /// Ends the recording, if there is one, for use while nothing moves; fails if it is incomplete.
     pub(crate) fn check_recording(&self) -> Result<(), Failure> {
         self.driver.port().check_recording()
     }

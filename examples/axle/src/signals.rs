@@ -3,6 +3,8 @@
 #[cfg(windows)]
 mod console;
 
+#[cfg(unix)]
+use std::sync::LazyLock;
 use std::{
     io,
     sync::{
@@ -14,15 +16,15 @@ use std::{
 use axlewire::time::{Duration, Instant};
 #[cfg(unix)]
 use signal_hook::{
-    consts::{SIGHUP, SIGINT, SIGTERM},
+    consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ},
     flag,
 };
 
 use crate::failure::Failure;
 
-/// Ctrl-C, SIGTERM and a closed terminal end every subcommand.
+/// Ctrl-C, Ctrl-\, SIGTERM and a closed terminal end every subcommand.
 #[cfg(unix)]
-const ENDS: &[i32] = &[SIGINT, SIGTERM, SIGHUP];
+const ENDS: &[i32] = &[SIGINT, SIGTERM, SIGHUP, SIGQUIT];
 
 /// Ctrl-Z, and the signals that a terminal sends to a background process.
 #[cfg(unix)]
@@ -54,8 +56,16 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag.
+    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. A second one ends
+    /// the tool at once, such as while it waits for a reader of its output.
     pub(crate) fn listen() -> Result<Self, Failure> {
+        let signals = Self::new()?;
+        #[cfg(unix)]
+        listen_to(ENDS, free())?;
+        Ok(signals)
+    }
+
+    fn new() -> Result<Self, Failure> {
         let signals = Self {
             end: Arc::default(),
             suspend: Arc::default(),
@@ -63,21 +73,30 @@ impl Signals {
             console: console::Console::listen().map_err(deaf)?.into(),
         };
         #[cfg(unix)]
-        listen_to(ENDS, &signals.end)?;
+        for &signal in ENDS {
+            // In this order: a signal does not free itself.
+            flag::register_conditional_default(signal, Arc::clone(free())).map_err(deaf)?;
+            flag::register(signal, Arc::clone(&signals.end)).map_err(deaf)?;
+        }
+        // A file that may not grow is then an error of the write, and not the end of the tool.
+        #[cfg(unix)]
+        listen_to(&[SIGXFSZ], &Arc::default())?;
         Ok(signals)
     }
 
     /// For a subcommand that moves something: no signal that can be caught ends or suspends the
     /// tool before the motors are stopped.
     pub(crate) fn listen_to_all() -> Result<Self, Failure> {
-        let signals = Self::listen()?;
+        let signals = Self::new()?;
         #[cfg(unix)]
         {
             listen_to(SUSPENSIONS, &signals.suspend)?;
             // Signals from a supervisor, a script or a resource limit would end the tool at once,
             // with the motors running.
             let is_other = |signal: &i32| {
-                [ENDS, SUSPENSIONS, LEFT_ALONE].iter().all(|known| !known.contains(signal))
+                [ENDS, SUSPENSIONS, LEFT_ALONE, &[SIGXFSZ]]
+                    .iter()
+                    .all(|known| !known.contains(signal))
             };
             for signal in (1..=LAST_SIGNAL).filter(is_other) {
                 // A system refuses numbers that it lacks or reserves.
@@ -151,6 +170,24 @@ impl Signals {
 pub(crate) fn suspend() {
     // SIGSTOP cannot fail for the process itself.
     let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
+}
+
+/// Does what may take forever, such as printing, while nothing moves: Ctrl-C and similar signals
+/// then end the tool at once.
+pub(crate) fn freely<T>(run: impl FnOnce() -> T) -> T {
+    #[cfg(unix)]
+    let before = free().swap(true, Ordering::SeqCst);
+    let done = run();
+    #[cfg(unix)]
+    free().store(before, Ordering::SeqCst);
+    done
+}
+
+/// Whether a signal of [`ENDS`] ends the tool at once.
+#[cfg(unix)]
+fn free() -> &'static Arc<AtomicBool> {
+    static FREE: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+    &FREE
 }
 
 #[cfg(unix)]

@@ -205,7 +205,7 @@ fn prepare<B: Boards>(
     let about = About {
         command: "spin",
         protocol: B::PROTOCOL,
-        baud: port.baud.unwrap_or(B::PROTOCOL.default_baud()),
+        baud: port.baud_for(B::PROTOCOL),
         has_echo: args.bus.config().removes_echo,
     };
     let (page, wire) = args.page.open(wire, &about, signals)?;

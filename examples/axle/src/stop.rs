@@ -5,16 +5,17 @@ use std::fmt;
 use axlewire::ikeya::{
     NodeId,
     board::{OneMotor, ThreeMotors},
-    master::{MasterConfig, NodeSet},
+    master::NodeSet,
 };
 use serde::Serialize;
 
 use crate::{
     MOTION_HELP,
-    args::{self, Protocol},
+    args::{self, PortArgs, Protocol},
     boards::{Boards, Data},
-    bus::{Bus, Halt},
+    bus::{self, Bus, Halt},
     failure::Failure,
+    line::{Line, SharedRecording},
     report::{Form, Outcome},
     rover::Rover,
     signals::Signals,
@@ -41,7 +42,7 @@ use crate::{
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
-    line: args::PortArgs,
+    bus: bus::MasterArgs,
 
     /// Protocol of the line; by default ikeya is tried first, then ucp
     #[arg(short = 'P', long, value_enum)]
@@ -101,23 +102,58 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     // Signals do not interrupt a stop, which is bounded.
     let _signals = Signals::listen_to_all()?;
-    let result = match args.protocol {
-        Some(Protocol::Ikeya) => stop_bus::<OneMotor>(args)?.judge(),
-        Some(Protocol::Ikeya3) => stop_bus::<ThreeMotors>(args)?.judge(),
-        Some(Protocol::Ucp) => stop_rover(args),
-        None => stop_whatever(args),
+    let mut lines = Lines { args: args.bus.line(), recording: None, failure: None };
+    let stopped = match args.protocol {
+        Some(Protocol::Ikeya) => stop_bus::<OneMotor>(args, &mut lines).and_then(Stopped::judge),
+        Some(Protocol::Ikeya3) => {
+            stop_bus::<ThreeMotors>(args, &mut lines).and_then(Stopped::judge)
+        }
+        Some(Protocol::Ucp) => stop_rover(args, &mut lines),
+        None => stop_whatever(args, &mut lines),
     };
+    let result = stopped.and(lines.finish());
     Outcome::of(&result, result.is_ok()).print(Form::of(args.json));
     result
 }
 
+/// The port, opened for one protocol after the other, with one recording. A recording that fails
+/// does not keep anything from being stopped; what failed is told at the end.
+struct Lines<'a> {
+    args: &'a PortArgs,
+    recording: Option<SharedRecording>,
+    failure: Option<Failure>,
+}
+
+impl Lines<'_> {
+    fn open(&mut self, protocol: Protocol) -> Result<Line, Failure> {
+        let line = Line::unrecorded(self.args, protocol)?;
+        match &self.recording {
+            Some(recording) => {
+                let (port, baud) = (&self.args.port, self.args.baud_for(protocol));
+                recording.borrow_mut().change_line(protocol, port, baud);
+            }
+            None => match Line::recording(self.args, protocol) {
+                Ok(recording) => self.recording = recording,
+                Err(failure) => self.failure = Some(failure),
+            },
+        }
+        Ok(line.recorded(self.recording.as_ref()))
+    }
+
+    /// Ends the recording; fails if it is incomplete.
+    fn finish(self) -> Result<(), Failure> {
+        let kept = self.recording.map_or(Ok(()), |recording| recording.borrow_mut().check());
+        kept.and(self.failure.map_or(Ok(()), Err))
+    }
+}
+
 /// Stops a bus if a node answers, otherwise a rover.
-fn stop_whatever(args: &Args) -> Result<(), Failure> {
-    let bus = stop_bus::<OneMotor>(args)?;
+fn stop_whatever(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
+    let bus = stop_bus::<OneMotor>(args, lines)?;
     if bus.answered > 0 || args.node.is_some() {
         return bus.judge();
     }
-    stop_rover(args).map_err(|failure| match failure {
+    stop_rover(args, lines).map_err(|failure| match failure {
         Failure::Failed(line) => Failure::Failed(format!("{}; {line}", bus.nothing())),
         other => other,
     })
@@ -155,12 +191,14 @@ impl Stopped {
     }
 }
 
-fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
-    let mut config = MasterConfig::usb_adapter();
+fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Failure> {
+    let mut config = args.bus.config();
     config.nodes = args.node.map_or(NodeSet::ALL, NodeSet::from);
     let nodes = config.nodes;
-    let mut bus = Bus::<B>::open_with(&args.line, config)?;
-    let failure = bus.stop(nodes).and_then(|()| bus.check_recording()).err();
+    let line = lines.open(B::PROTOCOL)?;
+    let config = bus::complete(config, args.bus.line(), &line);
+    let mut bus = Bus::<B>::new(line, config);
+    let failure = bus.stop(nodes).err();
     let mut silent = Vec::new();
     let mut stopped = Stopped {
         path: bus.path().to_owned(),
@@ -186,13 +224,14 @@ fn stop_bus<B: Boards>(args: &Args) -> Result<Stopped, Failure> {
     Ok(stopped)
 }
 
-fn stop_rover(args: &Args) -> Result<(), Failure> {
-    let mut rover = Rover::open(&args.line)?;
+fn stop_rover(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
+    let line = lines.open(Protocol::Ucp)?;
+    let mut rover = Rover::on(line, args.bus.line().baud_for(Protocol::Ucp));
     // The host's first frames are stops, whether or not the robot is heard.
     rover.find(|| false)?;
     rover.stop()?;
     if let Some(text) = rover.describe() {
         tell(args, &Event::Stopped { node: None, status: None, text });
     }
-    rover.check_recording()
+    Ok(())
 }

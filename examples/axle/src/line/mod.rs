@@ -18,7 +18,7 @@ use embedded_io::{ErrorType, Read, ReadReady, Write};
 use crate::{
     args::{PortArgs, Protocol},
     failure::Failure,
-    pcapng::{Direction, Recording},
+    pcapng::{Background, Direction, Recording},
 };
 use tcp::TcpPort;
 
@@ -47,23 +47,52 @@ pub(crate) struct Line {
     path: Rc<str>,
     /// Whether an answer may come before a line of this speed could have carried it.
     is_instant: bool,
-    recording: Option<Rc<RefCell<Recording>>>,
+    recording: Option<SharedRecording>,
 }
+
+/// A recording of one line after another.
+pub(crate) type SharedRecording = Rc<RefCell<Background>>;
 
 impl Line {
     /// Opens a port for exclusive use, without the bytes that were received before.
     pub(crate) fn open(args: &PortArgs, protocol: Protocol) -> Result<Self, Failure> {
-        let (path, baud) = (&*args.port, args.baud.unwrap_or(protocol.default_baud()));
-        let mut line = Self::connect(path, baud)?;
+        let line = Self::unrecorded(args, protocol)?;
+        let recording = Self::recording(args, protocol)?;
+        Ok(Self { recording, ..line })
+    }
+
+    /// The same without the recording.
+    pub(crate) fn unrecorded(args: &PortArgs, protocol: Protocol) -> Result<Self, Failure> {
+        let mut line = Self::connect(&args.port, args.baud_for(protocol))?;
         line.is_instant |= args.instant;
-        if let Some(file) = &args.record {
-            let recording = Recording::create(file, false, protocol, path, baud)?;
-            line.recording = Some(Rc::new(RefCell::new(recording)));
-        }
         Ok(line)
     }
 
-    /// The same without a recording.
+    /// The recording that is wanted of this line.
+    pub(crate) fn recording(
+        args: &PortArgs,
+        protocol: Protocol,
+    ) -> Result<Option<SharedRecording>, Failure> {
+        let Some(file) = &args.record else { return Ok(None) };
+        let baud = args.baud_for(protocol);
+        let recording = Recording::create(file, false, protocol, &args.port, baud)?;
+        Ok(Some(Rc::new(RefCell::new(Background::new(recording)))))
+    }
+
+    /// The same line, recorded there.
+    pub(crate) fn recorded(self, recording: Option<&SharedRecording>) -> Self {
+        Self { recording: recording.cloned(), ..self }
+    }
+
+    /// The same line, whose bytes go through `tap`.
+    pub(crate) fn through<W: Wire + 'static>(
+        self,
+        tap: impl FnOnce(Rc<RefCell<dyn Wire>>) -> W,
+    ) -> Self {
+        Self { wire: Rc::new(RefCell::new(tap(self.wire))), ..self }
+    }
+
+    /// A line at this path, at this speed.
     pub(crate) fn connect(path: &str, baud: u32) -> Result<Self, Failure> {
         if let Some(address) = path.strip_prefix("tcp:") {
             let refused =
@@ -125,7 +154,7 @@ impl Line {
         }
     }
 
-    /// The failure of the recording, if it is incomplete.
+    /// Ends the recording, for use while nothing moves; fails if it is incomplete.
     pub(crate) fn check_recording(&self) -> Result<(), Failure> {
         match &self.recording {
             Some(recording) => recording.borrow_mut().check(),

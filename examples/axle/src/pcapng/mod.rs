@@ -9,10 +9,12 @@
 //! other reads no binary units and no big-endian offsets, and to write files one pulls in a second
 //! `syn`, the other `futures`. Format: draft-ietf-opsawg-pcapng.
 
+mod background;
 mod read;
 mod recording;
 mod write;
 
+pub(crate) use background::Background;
 pub(crate) use read::{Problem, Reader};
 pub(crate) use recording::Recording;
 pub(crate) use write::Writer;

@@ -15,10 +15,29 @@ pub(crate) struct Recording {
     writer: Writer<Output>,
     path: PathBuf,
     packets: u64,
-    /// The same moment on both clocks: the system's may be set while we record.
-    start: (Instant, SystemTime),
+    stamp: Stamp,
     /// The first failure. Nothing is written behind it.
     failure: Option<Failure>,
+}
+
+/// The time on a clock that never goes backwards: the system's may be set while we record.
+#[derive(Clone, Copy)]
+pub(super) struct Stamp {
+    start: Instant,
+    /// The same moment on the system's clock.
+    is_then: SystemTime,
+}
+
+impl Stamp {
+    fn new() -> Self {
+        Self { start: Instant::now(), is_then: SystemTime::now() }
+    }
+
+    /// Microseconds since 1970.
+    pub(super) fn micros(self) -> u64 {
+        let time = self.is_then + self.start.elapsed();
+        time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
+    }
 }
 
 /// A file or standard output.
@@ -74,23 +93,45 @@ impl Recording {
             };
             Output::File(options.open(path).map_err(cannot)?)
         };
-        let writer = Writer::new(output, protocol, port, baud).map_err(cannot)?;
-        let start = (Instant::now(), SystemTime::now());
-        Ok(Self { writer, path: path.to_owned(), packets: 0, start, failure: None })
+        Self::begin(output, path, protocol, port, baud).map_err(cannot)
+    }
+
+    fn begin(
+        output: Output,
+        path: &Path,
+        protocol: Protocol,
+        port: &str,
+        baud: u32,
+    ) -> io::Result<Self> {
+        let (writer, path) = (Writer::new(output, protocol, port, baud)?, path.to_owned());
+        Ok(Self { writer, path, packets: 0, stamp: Stamp::new(), failure: None })
+    }
+
+    /// A recording to an open file.
+    #[cfg(all(test, unix))]
+    pub(super) fn to_file(file: File) -> Self {
+        Self::begin(Output::File(file), Path::new("file"), Protocol::Ucp, "port", 1).unwrap()
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) const fn stamp(&self) -> Stamp {
+        self.stamp
+    }
+
+    /// What follows is of another line.
+    pub(crate) fn change_line(&mut self, protocol: Protocol, port: &str, baud: u32) {
+        if self.failure.is_none() {
+            let written = self.writer.interface(protocol, port, baud);
+            written.unwrap_or_else(|error| self.fail(error));
+        }
     }
 
     /// The time, microseconds since 1970. It never goes backwards.
     pub(crate) fn micros(&self) -> u64 {
-        let time = self.start.1 + self.start.0.elapsed();
-        time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
-    }
-
-    /// Writes what has just been sent or received.
-    pub(crate) fn add(&mut self, direction: Direction, bytes: &[u8]) {
-        if !bytes.is_empty() {
-            self.packet(self.micros(), Some(direction), bytes);
-            self.flush();
-        }
+        self.stamp.micros()
     }
 
     /// Writes a packet of this time.

@@ -1,4 +1,4 @@
-//! Writes a capture with one interface.
+//! Writes a capture.
 
 use std::io::{self, Write};
 
@@ -10,12 +10,14 @@ use crate::args::Protocol;
 pub(crate) struct Writer<W> {
     out: W,
     block: Vec<u8>,
+    /// Number of interfaces so far; packets are of the last one.
+    interfaces: u32,
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a capture of this line.
+    /// Begins a capture, with this line.
     pub(crate) fn new(out: W, protocol: Protocol, port: &str, baud: u32) -> io::Result<Self> {
-        let mut writer = Self { out, block: Vec::new() };
+        let mut writer = Self { out, block: Vec::new(), interfaces: 0 };
         writer.write(u32::from_le_bytes(MAGIC), |body| {
             body.extend(BYTE_ORDER.to_le_bytes());
             body.extend([1, 0, 0, 0]); // version 1.0
@@ -23,7 +25,18 @@ impl<W: Write> Writer<W> {
             put_option(body, option::USER_APPLICATION, b"axle");
             put_option(body, option::END, &[]);
         })?;
-        writer.write(block::INTERFACE, |body| {
+        writer.interface(protocol, port, baud)?;
+        Ok(writer)
+    }
+
+    /// Goes on with another line, which is an interface of its own.
+    pub(crate) fn interface(
+        &mut self,
+        protocol: Protocol,
+        port: &str,
+        baud: u32,
+    ) -> io::Result<()> {
+        self.write(block::INTERFACE, |body| {
             body.extend(link_type(protocol).to_le_bytes());
             body.extend([0; 2]);
             body.extend(0_u32.to_le_bytes()); // packets of any length
@@ -33,7 +46,8 @@ impl<W: Write> Writer<W> {
             put_option(body, option::TIME_UNIT, &[6]); // 10^-6 s
             put_option(body, option::END, &[]);
         })?;
-        Ok(writer)
+        self.interfaces += 1;
+        Ok(())
     }
 
     /// Appends bytes that were complete at this time, microseconds since 1970.
@@ -43,8 +57,9 @@ impl<W: Write> Writer<W> {
         direction: Option<Direction>,
         bytes: &[u8],
     ) -> io::Result<()> {
+        let interface = self.interfaces.saturating_sub(1);
         self.write(block::PACKET, |body| {
-            body.extend(0_u32.to_le_bytes()); // the interface
+            body.extend(interface.to_le_bytes());
             body.extend(((micros >> 32) as u32).to_le_bytes());
             body.extend((micros as u32).to_le_bytes());
             let len = bytes.len() as u32;

@@ -1,9 +1,11 @@
 //! What a frame does to the device that receives it, and whether it may be sent at all.
 
+use core::fmt;
+
 use axlewire::{
     ikeya::{self, Mode, NodeId, Position, Rps, Status, three},
     stream::{Frames, Framing},
-    ucp::{self, Message, MotorControl},
+    ucp::{self, Body, Message, MotorControl},
 };
 
 use crate::{
@@ -20,6 +22,15 @@ pub(crate) enum Side {
     Device,
 }
 
+impl fmt::Display for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Commander => "commander",
+            Self::Device => "device",
+        })
+    }
+}
+
 /// What a frame does.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Effect {
@@ -29,6 +40,20 @@ pub(crate) enum Effect {
     Write(Write),
     /// Drives a rover.
     Drive,
+    /// Tells a rover to stand still.
+    Stand,
+}
+
+impl Effect {
+    /// Whether something moves because of it.
+    pub(crate) const fn moves(&self) -> bool {
+        matches!(self, Self::Write(_) | Self::Drive)
+    }
+
+    /// Whether it is a motor command for a rover.
+    pub(crate) const fn is_for_wheels(&self) -> bool {
+        matches!(self, Self::Drive | Self::Stand)
+    }
 }
 
 /// A command in both readings: its bytes do not say which one is meant (ruling I3).
@@ -71,7 +96,18 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             }
             three::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
-        Protocol::Ucp => of_message(&whole::<ucp::Ucp>(bytes)?.message()),
+        Protocol::Ucp => {
+            let frame = whole::<ucp::Ucp>(bytes)?;
+            let (side, effect) = of_message(&frame.message())?;
+            if let Message::MotorControl(command) = frame.message() {
+                let clean = MotorControl::try_from(*command).map(|it| it.frame(frame.index()));
+                if clean.is_ok_and(|clean| clean.as_bytes() != bytes) {
+                    let line = "a motor command with values that no host sends (ruling U7)";
+                    return Err(line.to_owned());
+                }
+            }
+            Ok((side, effect))
+        }
     }
 }
 
@@ -89,7 +125,7 @@ fn of_message(message: &Message<'_>) -> Result<(Side, Effect), String> {
     let commander = |effect| Ok((Side::Commander, effect));
     match message {
         Message::MotorControl(command) => match MotorControl::try_from(**command) {
-            Ok(command) if command.stands_still() => commander(Effect::Nothing),
+            Ok(command) if command.stands_still() => commander(Effect::Stand),
             Ok(_) => commander(Effect::Drive),
             Err(_) if command.starts_update() => {
                 Err("a motor command that starts a firmware update (ruling U7)".to_owned())
@@ -233,6 +269,14 @@ mod tests {
         let mut fast = [0; 16];
         fast[0] = 101;
         assert!(frame(2, &fast).unwrap_err().contains("out of range (ruling U7)"));
+        for field in [4, 6, 8, 10, 12, 15] {
+            let mut odd = [0; 16];
+            odd[field] = 1;
+            assert!(frame(2, &odd).unwrap_err().contains("(ruling U7)"), "{field}");
+        }
+        let mut lamp = [0; 16];
+        lamp[4] = 100;
+        assert_eq!(frame(2, &lamp), Ok((Side::Commander, Effect::Stand)));
         assert!(frame(9, &[1, 0]).unwrap_err().contains("firmware update"));
         for (id, len) in [(1, 2), (2, 15), (3, 0), (5, 1), (8, 5), (10, 2)] {
             assert!(frame(id, &vec![0; len]).unwrap_err().contains("U13"), "{id} {len}");
@@ -241,7 +285,7 @@ mod tests {
 
     #[test]
     fn zero_moves_nothing_on_a_rover_and_something_on_a_bus() {
-        assert_eq!(frame(2, &[0; 16]), Ok((Side::Commander, Effect::Nothing)));
+        assert_eq!(frame(2, &[0; 16]), Ok((Side::Commander, Effect::Stand)));
         let mut slow = [0; 16];
         slow[2] = 1;
         assert_eq!(frame(2, &slow), Ok((Side::Commander, Effect::Drive)));

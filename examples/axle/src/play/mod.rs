@@ -10,32 +10,34 @@ use std::collections::VecDeque;
 
 use axlewire::{
     ikeya::{
+        Mode, NodeId,
         board::{OneMotor, ThreeMotors},
         master::{MasterConfig, NodeSet},
     },
-    time::{Duration, Instant},
-    ucp::{self, host::HostConfig},
+    time::Duration,
+    ucp::host::HostConfig,
 };
 
 use crate::{
     args::Protocol,
-    bus::{self, Boards, Bus, Halt},
+    bus::{self, Boards, Bus},
     failure::{Failure, guarded},
     line::Line,
     listing::{Modes, Style, TimeColumn},
     rover::Rover,
     session::Session,
-    signals::{Attendance, Signals},
+    signals::Signals,
     teller::{self, Teller},
 };
 pub(crate) use effect::{Effect, Limits, Side, of as effect_of};
 pub(crate) use player::Due;
-use player::Player;
+use player::{Part, Player};
 
 /// What to send, and how.
 pub(crate) struct Plan<'a> {
     pub(crate) bus: &'a bus::MasterArgs,
     pub(crate) protocol: Protocol,
+    pub(crate) side: Side,
     pub(crate) frames: VecDeque<Due>,
     /// How long to listen behind the last frame, microseconds; what moves does so meanwhile.
     pub(crate) linger_us: u64,
@@ -58,30 +60,19 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
     signals.suspend_if_wanted(result)
 }
 
-/// The effect of each frame.
-fn effects(plan: &Plan<'_>) -> Result<Vec<Effect>, Failure> {
-    let effect = |(at, due): (usize, &Due)| match effect_of(plan.protocol, &due.bytes) {
-        Ok((_, effect)) => Ok(effect),
-        Err(why) => Err(Failure::Failed(format!("frame {} is not sent: {why}", at + 1))),
-    };
-    plan.frames.iter().enumerate().map(effect).collect()
-}
-
 fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
-    let meant = plan.frames.iter().map(|due| due.meant);
-    let writes: Vec<_> = effects(&plan)?
-        .into_iter()
-        .zip(meant)
-        .filter_map(|(effect, meant)| match effect {
-            Effect::Write(write) => Some((write, meant)),
-            _ => None,
-        })
-        .collect();
+    let write = |due: &Due| match &due.effect {
+        Effect::Write(write) => Some((write.clone(), due.meant)),
+        _ => None,
+    };
+    let writes: Vec<_> = plan.frames.iter().filter_map(write).collect();
     let commanded: NodeSet = writes.iter().map(|(write, _)| write.node).collect();
     let line = Line::open(plan.bus.line(), plan.protocol)?;
     let mut modes = Modes::default();
+    // The same master stops them in the end: it knows their modes, so it can even stop a node whose
+    // answers are lost meanwhile.
+    let mut bus = Bus::<B>::new(line.clone(), config(&plan, commanded, &line));
     if !commanded.is_empty() {
-        let mut bus = Bus::<B>::new(line.clone(), config(&plan, commanded, &line));
         if !bus.discover(signals)? {
             return signals.interrupted();
         }
@@ -100,27 +91,25 @@ fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
             }
         }
     }
-    let (is_json, config) = (plan.is_json, config(&plan, commanded, &line));
+    let is_json = plan.is_json;
     play(plan, &line, modes, signals, !commanded.is_empty(), || {
         if commanded.is_empty() {
             return Ok(Vec::new());
         }
-        let mut bus = Bus::<B>::new(line.clone(), config);
         let failure = bus.stop(commanded).err();
-        let complaint = |node| match bus.halt(node) {
-            // This master has not heard it, but the one before has.
-            Halt::Silent => Some(format!(
-                "node {node} was commanded and does not answer any more: it may be moving"
-            )),
-            _ => bus.complaint(node),
-        };
-        let complaints: Vec<_> = commanded.iter().filter_map(complaint).collect();
+        let complaints: Vec<_> = commanded.iter().filter_map(|node| bus.complaint(node)).collect();
         if !complaints.is_empty() {
             let complaint = complaints.join("; ");
             return Err(match failure {
                 Some(failure) => failure.while_moving(&complaint),
                 None => Failure::Failed(complaint),
             });
+        }
+        for node in commanded.iter() {
+            let (meant, now) = (modes.of(node), bus.master().mode(node));
+            if let (Some(meant), Some(now)) = (meant, now.filter(|&now| Some(now) != meant)) {
+                return Err(Failure::Failed(turned(node, now, meant)));
+            }
         }
         let told = commanded.iter().map(|node| match is_json {
             true => format!("{{\"event\":\"stopped\",\"node\":{node}}}"),
@@ -133,6 +122,10 @@ fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
     })
 }
 
+fn turned(node: NodeId, now: Mode, meant: Mode) -> String {
+    format!("node {node} has changed to {now} mode: it may have taken commands for {meant} mode")
+}
+
 fn config(plan: &Plan<'_>, nodes: NodeSet, line: &Line) -> MasterConfig {
     let mut config = plan.bus.config();
     config.nodes = nodes;
@@ -140,10 +133,10 @@ fn config(plan: &Plan<'_>, nodes: NodeSet, line: &Line) -> MasterConfig {
 }
 
 fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
-    let drives = effects(&plan)?.contains(&Effect::Drive);
+    let drives = plan.frames.iter().any(|due| due.effect.moves());
     let line = Line::open(plan.bus.line(), plan.protocol)?;
     let mut config = HostConfig::default();
-    config.baud = plan.bus.line().baud.unwrap_or(ucp::BAUD);
+    config.baud = plan.bus.line().baud_for(Protocol::Ucp);
     if drives {
         let mut rover = Rover::new(line.clone(), config);
         if !rover.find(|| signals.is_raised())? {
@@ -178,12 +171,15 @@ fn play(
         true => Style::Json,
         false => Style::text(plan.protocol.number(), TimeColumn::Relative),
     };
-    let Plan { protocol, frames, linger_us, .. } = plan;
-    let player = |now| Player::new(protocol, frames, linger_us, style, modes, now);
-    let mut session = Session::new(line.clone(), player);
+    let baud = plan.bus.line().baud_for(plan.protocol);
+    let holds_rover = plan.protocol == Protocol::Ucp && plan.side == Side::Commander;
+    let has_echo = plan.bus.config().removes_echo;
+    let Plan { protocol, frames: due, linger_us, .. } = plan;
+    let part = Part { protocol, baud, due, linger_us, holds_rover, has_echo, modes };
+    let mut session = Session::new(line.clone(), |now| Player::new(part, style, now));
     let mut teller = Teller::new();
     let played = guarded(|| until_over(&mut session, &mut teller, signals));
-    let lost = session.role().lost;
+    let (lost, left) = (session.role().lost, session.role().left());
     let last = guarded(|| Ok(session.role_mut().finish()));
     if let Ok(Some(lines)) = last {
         let _ = teller.say(lines);
@@ -198,9 +194,10 @@ fn play(
     }
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
-    if lost > 0 {
-        let line = format!("{lost} frames did not leave whole; {besides}");
-        return Err(Failure::Failed(line));
+    for (count, what) in [(lost, "did not leave whole"), (left, "were not sent: interrupted")] {
+        if count > 0 {
+            return Err(Failure::Failed(format!("{count} frames {what}; {besides}")));
+        }
     }
     told
 }
@@ -210,18 +207,17 @@ fn until_over(
     teller: &mut Teller,
     signals: &Signals,
 ) -> Result<(), Failure> {
-    let mut attendance = Attendance::new(session.now());
     while !signals.is_raised() {
-        let now: Instant = session.now();
-        attendance.check(now)?;
+        let now = session.now();
+        session.role_mut().check(now)?;
         if session.role().is_over(now) {
             break;
         }
         if let Some(lines) = session.round(now + CALL_PERIOD)? {
             teller.say(lines)?;
         }
-        if let Some((node, mode)) = session.role().turncoat() {
-            return Err(Failure::Failed(format!("node {node} has answered in {mode} mode")));
+        if let Some((node, now, meant)) = session.role().turncoat() {
+            return Err(Failure::Failed(turned(node, now, meant)));
         }
     }
     Ok(())

@@ -8,14 +8,18 @@ use std::{
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{Mode, NodeId},
-    time::Instant,
+    time::{Duration, Instant, wire_time},
+    ucp::{Body, MotorControl},
 };
 
+use super::effect::Effect;
 use crate::{
     args::Protocol,
     decode::{self, Sheet, Stream},
+    failure::Failure,
     listing::{Modes, Style},
     pcapng::Direction,
+    signals::Attendance,
 };
 
 /// A frame and when to send it.
@@ -26,17 +30,32 @@ pub(crate) struct Due {
     pub(crate) bytes: Box<[u8]>,
     /// For a WRITE, the mode that it was meant for, if that is known.
     pub(crate) meant: Option<Mode>,
+    pub(crate) effect: Effect,
 }
+
+/// Interval between the stops on a rover's line before its first motor command (ruling U16).
+const STOP_PERIOD: Duration = Duration::from_millis(100);
 
 /// A role that says what it is told to.
 pub(crate) struct Player {
     due: VecDeque<Due>,
     start: Instant,
+    /// Line speed, bit/s.
+    baud: u32,
+    /// What the line will return of what was sent, if it does that.
+    echo: Option<VecDeque<u8>>,
     /// How long to listen behind the last frame, microseconds.
     linger_us: u64,
     last_at: Instant,
+    /// When the line has carried all that was handed out.
+    is_free_at: Instant,
+    /// When the next stop is due, until a frame commands the motors of a rover.
+    stop_at: Option<Instant>,
     /// The frame handed out last.
     sending: Box<[u8]>,
+    attendance: Attendance,
+    /// Why nothing more is handed out.
+    absence: Option<Failure>,
     sheet: Sheet,
     sent: Box<dyn Stream>,
     received: Box<dyn Stream>,
@@ -44,20 +63,28 @@ pub(crate) struct Player {
     epoch_us: u64,
     /// The modes in which the commands were meant.
     modes: Modes,
-    pub(crate) frames: u64,
     /// Frames that did not leave whole. They are not sent again: they would come late.
-    pub(crate) lost: u64,
+    pub(crate) lost: usize,
+}
+
+/// What a line is told.
+pub(crate) struct Part {
+    pub(crate) protocol: Protocol,
+    pub(crate) baud: u32,
+    pub(crate) due: VecDeque<Due>,
+    pub(crate) linger_us: u64,
+    /// Whether a rover on this line must be kept from moving on: vendor robots drive while any
+    /// byte arrives.
+    pub(crate) holds_rover: bool,
+    /// Whether the line hears what it sends.
+    pub(crate) has_echo: bool,
+    /// The modes in which the commands are meant.
+    pub(crate) modes: Modes,
 }
 
 impl Player {
-    pub(crate) fn new(
-        protocol: Protocol,
-        due: VecDeque<Due>,
-        linger_us: u64,
-        style: Style,
-        modes: Modes,
-        now: Instant,
-    ) -> Self {
+    pub(crate) fn new(part: Part, style: Style, now: Instant) -> Self {
+        let Part { protocol, baud, due, linger_us, holds_rover, has_echo, modes } = part;
         let mut sheet = Sheet::new(Some(style));
         style.titles(&mut sheet.out);
         sheet.modes = modes;
@@ -65,16 +92,39 @@ impl Player {
         Self {
             due,
             start: now,
+            baud,
+            echo: has_echo.then(VecDeque::new),
             linger_us,
             last_at: now,
+            is_free_at: now,
+            stop_at: holds_rover.then_some(now),
             sending: Box::default(),
+            attendance: Attendance::new(now),
+            absence: None,
             sheet,
             sent: decode::stream_of(protocol, Direction::Out),
             received: decode::stream_of(protocol, Direction::In),
             epoch_us: epoch.map_or(0, |since| since.as_micros() as u64),
             modes,
-            frames: 0,
             lost: 0,
+        }
+    }
+
+    /// Number of frames that were not handed out.
+    pub(crate) fn left(&self) -> usize {
+        self.due.len()
+    }
+
+    /// Fails if the tool did not run for a while: what was due meanwhile is out of date, and nothing
+    /// more is sent. Call it in every round.
+    pub(crate) fn check(&mut self, now: Instant) -> Result<(), Failure> {
+        self.attend(now);
+        self.absence.take().map_or(Ok(()), Err)
+    }
+
+    fn attend(&mut self, now: Instant) {
+        if let Err(failure) = self.attendance.check(now) {
+            self.absence.get_or_insert(failure);
         }
     }
 
@@ -83,11 +133,11 @@ impl Player {
         self.due.is_empty() && now.as_micros() >= self.last_at.as_micros() + self.linger_us
     }
 
-    /// A node that has answered in another mode than the one its commands were meant for.
-    pub(crate) fn turncoat(&self) -> Option<(NodeId, Mode)> {
+    /// A node that has answered in another mode than its commands are meant for, and both modes.
+    pub(crate) fn turncoat(&self) -> Option<(NodeId, Mode, Mode)> {
         NodeId::ALL.into_iter().find_map(|node| {
             let (meant, now) = (self.modes.of(node)?, self.sheet.modes.of(node)?);
-            (meant != now).then_some((node, now))
+            (meant != now).then_some((node, now, meant))
         })
     }
 
@@ -96,6 +146,10 @@ impl Player {
         self.received.finish(&mut self.sheet);
         self.sent.finish(&mut self.sheet);
         self.poll_event()
+    }
+
+    fn time_of(&self, due: &Due) -> Instant {
+        Instant::from_micros(self.start.as_micros() + due.after_us)
     }
 
     fn micros(&self, now: Instant) -> Option<u64> {
@@ -108,6 +162,16 @@ impl Endpoint for Player {
     type Event = String;
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+        let mut bytes = bytes;
+        if let Some(echo) = &mut self.echo {
+            let same = echo.iter().zip(bytes).take_while(|(sent, heard)| sent == heard).count();
+            echo.drain(..same);
+            bytes = bytes.get(same..).unwrap_or_default();
+            if !bytes.is_empty() {
+                // Damaged, or something else came first: the rest is shown as it is.
+                echo.clear();
+            }
+        }
         if !bytes.is_empty() {
             let micros = self.micros(now);
             self.received.feed(bytes, micros, &mut self.sheet);
@@ -116,13 +180,31 @@ impl Endpoint for Player {
 
     fn handle_timeout(&mut self, _: Instant) {}
 
+    fn wire_time(&self, bytes: usize) -> Duration {
+        wire_time(bytes, self.baud)
+    }
+
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
-        let at = self.poll_timeout()?;
-        if now < at {
+        self.attend(now);
+        if self.absence.is_some() || now < self.poll_timeout()? {
             return None;
         }
-        self.sending = self.due.pop_front()?.bytes;
-        (self.last_at, self.frames) = (now, self.frames + 1);
+        let due = self.due.front().filter(|due| now >= self.time_of(due));
+        let is_motor = due.is_some_and(|due| due.effect.is_for_wheels());
+        if !is_motor && self.stop_at.is_some_and(|at| now >= at) {
+            self.stop_at = Some(now + STOP_PERIOD);
+            self.sending = MotorControl::STOP.frame(0).as_bytes().into();
+        } else {
+            let due = self.due.pop_front()?;
+            if is_motor {
+                self.stop_at = None;
+            }
+            (self.sending, self.last_at) = (due.bytes, now);
+        }
+        if let Some(echo) = &mut self.echo {
+            echo.extend(&self.sending);
+        }
+        self.is_free_at = now + self.wire_time(self.sending.len());
         let micros = self.micros(now);
         self.sent.feed(&self.sending, micros, &mut self.sheet);
         Some(&self.sending)
@@ -130,6 +212,8 @@ impl Endpoint for Player {
 
     fn handle_unsent(&mut self, _: Unsent, _: Instant) {
         self.lost += 1;
+        // An unknown part of it comes back.
+        self.echo.iter_mut().for_each(VecDeque::clear);
     }
 
     fn poll_event(&mut self) -> Option<String> {
@@ -142,7 +226,8 @@ impl Endpoint for Player {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let after_us = self.due.front()?.after_us;
-        Some(Instant::from_micros(self.start.as_micros() + after_us))
+        let next = self.time_of(self.due.front()?);
+        let next = self.stop_at.map_or(next, |at| at.min(next));
+        Some(next.max(self.is_free_at))
     }
 }

@@ -4,6 +4,7 @@
 use std::{
     cell::RefCell,
     io,
+    rc::Rc,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -13,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use axlewire::{drive::Clock, stream::Framing, time};
+use axlewire::stream::Framing;
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
 use super::{
@@ -27,7 +28,7 @@ use super::{
 use crate::{
     args::Protocol,
     failure::Failure,
-    line::{Line, LineClock, Wire},
+    line::{Line, Wire},
     signals::Signals,
 };
 
@@ -117,10 +118,7 @@ impl Live {
 
     /// The same line; the page is told of its bytes. With `has_echo`, the line hears what it sends.
     pub(crate) fn tap(&self, line: Line, has_echo: bool) -> Line {
-        let (path, is_instant) = (line.path().to_owned(), line.is_instant());
-        let clock = RefCell::new(line.clock());
-        let tap = Tap { line, clock, tell: self.tell.clone(), has_echo };
-        Line::new(&path, tap, is_instant)
+        line.through(|wire| Tap { wire, tell: self.tell.clone(), has_echo })
     }
 
     /// Adds a line to the log of the page.
@@ -232,22 +230,16 @@ impl Looker {
     }
 }
 
-/// A line whose bytes are also told.
+/// A port whose bytes are also told.
 struct Tap {
-    line: Line,
-    clock: RefCell<LineClock>,
+    wire: Rc<RefCell<dyn Wire>>,
     tell: Tell,
     has_echo: bool,
 }
 
 impl Wire for Tap {
     fn wait(&mut self, patience: Duration) -> io::Result<bool> {
-        let clock = self.clock.get_mut();
-        let micros = patience.as_micros().try_into().unwrap_or(u32::MAX);
-        let until = clock.now() + time::Duration::from_micros(micros);
-        // A failure is found again by `read_ready`, or by the driver when it reads.
-        clock.idle_until(until);
-        self.line.read_ready()
+        self.wire.borrow_mut().wait(patience)
     }
 }
 
@@ -257,13 +249,13 @@ impl ErrorType for Tap {
 
 impl ReadReady for Tap {
     fn read_ready(&mut self) -> io::Result<bool> {
-        self.line.read_ready()
+        self.wire.borrow_mut().read_ready()
     }
 }
 
 impl Read for Tap {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.line.read(buffer)?;
+        let count = self.wire.borrow_mut().read(buffer)?;
         let bytes = buffer.get(..count).unwrap_or_default();
         self.tell.tell(What::Bytes(Source::Received, bytes.into()));
         Ok(count)
@@ -272,7 +264,7 @@ impl Read for Tap {
 
 impl Write for Tap {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let count = self.line.write(bytes)?;
+        let count = self.wire.borrow_mut().write(bytes)?;
         if !self.has_echo {
             let sent = bytes.get(..count).unwrap_or_default();
             self.tell.tell(What::Bytes(Source::Sent, sent.into()));
@@ -281,6 +273,6 @@ impl Write for Tap {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.line.flush()
+        self.wire.borrow_mut().flush()
     }
 }

@@ -34,6 +34,21 @@ fn drive_moves_the_rover_and_stops_it_at_the_end() {
 }
 
 #[test]
+fn reports_from_before_the_robot_heard_of_the_stop_do_not_count() {
+    undisturbed(|| {
+        for delay in ["0.05", "0.3"] {
+            let (sim, port) = sim(&format!("ucp --delay {delay}"));
+            Process::start(&format!("drive -p {port} --speed 60 --turn 0 -f 0.1")).success();
+            // No wait: the rover is at rest already.
+            let lines = sim.lines();
+            let (moving, rest) = ("  moving", "at rest after");
+            assert!(lines.iter().any(|line| line.ends_with(moving)), "{delay}: {lines:?}");
+            assert!(lines.iter().any(|line| line.contains(rest)), "{delay}: {lines:?}");
+        }
+    });
+}
+
+#[test]
 fn a_rover_whose_host_dies_stops_by_its_watchdog() {
     undisturbed(|| {
         let (sim, port) = sim("ucp");

@@ -16,6 +16,7 @@ use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse};
 use super::{
     Process, TWO_NODES,
     played::{self, Node, PlayedLine, confirmable_stops},
+    record::{fresh, with_little_disk},
     sim,
     support::{axle, stdout, terminal::Terminal},
     undisturbed, wait_until,
@@ -93,6 +94,19 @@ fn a_paused_picture_stands_still_while_counting_goes_on() {
         watch.wait("more frames", || frames(&watch.text()) > frames(&frozen) + 10);
         watch.press("q");
         assert_eq!(watch.end().code, Some(0));
+    });
+}
+
+#[test]
+fn a_recording_of_a_page_that_fails_is_told() {
+    undisturbed(|| {
+        let (_sim, port) = sim(TWO_NODES);
+        let path = fresh("page.pcapng");
+        let spin = format!("spin -p {port} -n 1 --rps 2 -f 1 --page --record {path}");
+        let left = Terminal::spawn(&mut with_little_disk(&spin), SIZE).end();
+        assert_eq!(left.code, Some(1), "{left:?}");
+        assert!(left.text.contains("cannot write"), "{left:?}");
+        assert!(left.text.contains("stopped and confirmed"), "{left:?}");
     });
 }
 

@@ -100,19 +100,23 @@ fn a_recording_of_an_unplugged_port_is_complete() {
     });
 }
 
+/// The tool, for which the system refuses to let a file grow beyond 4 kB.
+pub(super) fn with_little_disk(args: &str) -> Command {
+    let args: Vec<_> = args.split(' ').collect();
+    let axle = axle(&args);
+    let mut limited = Command::new("bash");
+    limited.args(["-c", "ulimit -f 4; exec \"$0\" \"$@\""]);
+    limited.arg(axle.get_program()).args(axle.get_args());
+    limited
+}
+
 #[test]
 fn what_was_recorded_before_the_disk_is_full_stays_readable() {
     undisturbed(|| {
         let (_sim, port) = sim("ucp");
         let path = fresh("full.pcapng");
-        // The system refuses to let the file grow beyond 4 kB.
-        let axle = axle(&["record", "-p", &port, "-P", "ucp", "-o", &path]);
-        let (program, args) = (axle.get_program(), axle.get_args());
-        let mut limited = Command::new("bash");
-        limited
-            .args(["-c", "trap '' XFSZ; ulimit -f 4; exec \"$0\" \"$@\""])
-            .arg(program)
-            .args(args);
+        let record = format!("record -p {port} -P ucp -o {path}");
+        let mut limited = with_little_disk(&record);
         let error = Process::spawn(&mut limited).unwrap().complaint(1);
         let says = format!("cannot write {path:?}: File too large (os error 27); the ");
         assert!(

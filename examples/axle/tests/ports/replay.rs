@@ -101,7 +101,7 @@ fn a_node_that_changes_its_mode_ends_the_replay_and_is_stopped_in_its_new_mode()
         let path = file("turncoat.pcapng", &PcapNg::new(147, &packets).0);
         let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
         let error = Process::start(&replay).complaint(1);
-        assert!(error.starts_with("node 1 has answered in position mode; "), "{error}");
+        assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
         let said = line.said();
         let first = said.iter().position(|said| matches!(said, Said::Write(..))).unwrap();
         let later = &said[first + 1..];

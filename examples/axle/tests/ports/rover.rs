@@ -2,9 +2,16 @@
 
 use std::{io::Write, process::Stdio};
 
+use axlewire::{crc16, stream::Event, ucp};
 use serde_json::Value;
 
-use super::{Process, played::parrot, sim, support::axle, undisturbed};
+use super::{
+    Process,
+    played::{PlayedLine, parrot},
+    sim,
+    support::axle,
+    undisturbed,
+};
 
 fn objects(lines: &[String]) -> Vec<Value> {
     lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect()
@@ -126,6 +133,83 @@ fn a_calibration_says_what_to_do_and_prints_the_biases() {
         assert_eq!(records[2]["mag"], serde_json::json!([105, -48, 260]));
         assert_nothing_moved(sim);
     });
+}
+
+#[test]
+fn a_result_of_an_earlier_calibration_is_not_taken_for_this_one() {
+    undisturbed(|| {
+        let line = rover_that_calibrates(|sent, body| match sent {
+            // It has an old result of both kinds, and its acknowledgement of the start is late.
+            3 => vec![frame(7, &[9; 6]), frame(6, &[1; 12]), frame(3, &[body[0], 0])],
+            4 => vec![frame(4, &[body[0], 0]), frame(6, &[2; 12])],
+            _ => Vec::new(),
+        });
+        let args = format!("calibrate -p {} -k imu -f 0.1", line.path);
+        let lines = Process::start(&args).success();
+        let biases = "accelerometer 514 514 514, gyroscope 514 514 514";
+        assert!(lines.last().unwrap().ends_with(biases), "{lines:?}");
+    });
+}
+
+#[test]
+fn the_same_result_once_more_is_a_result() {
+    undisturbed(|| {
+        let line = rover_that_calibrates(|sent, body| match sent {
+            3 => vec![frame(6, &[1; 12]), frame(3, &[body[0], 0])],
+            4 => vec![frame(4, &[body[0], 0]), frame(6, &[1; 12])],
+            _ => Vec::new(),
+        });
+        let args = format!("calibrate -p {} -k imu -f 0.1", line.path);
+        let lines = Process::start(&args).success();
+        assert!(lines.last().unwrap().contains("accelerometer 257 257 257"), "{lines:?}");
+    });
+}
+
+#[test]
+fn a_calibration_whose_start_is_not_acknowledged_is_ended_all_the_same() {
+    undisturbed(|| {
+        let line = rover_that_calibrates(|_, _| Vec::new());
+        let error =
+            Process::start(&format!("calibrate -p {} -k imu -f 0.1", line.path)).complaint(1);
+        assert!(error.starts_with("the calibration of the IMU does not begin: "), "{error}");
+        let ids = line.lock().clone();
+        assert!(ids.contains(&3) && ids.contains(&4), "{ids:?}");
+    });
+}
+
+#[test]
+fn a_state_that_is_not_followed_by_an_answer_is_not_said_to_be_sent() {
+    undisturbed(|| {
+        let line = rover_that_calibrates(|_, _| Vec::new());
+        let error = Process::start(&format!("network -p {} connected", line.path)).complaint(1);
+        let expected = "network connected: sent, but the robot does not answer any more";
+        assert_eq!(error, expected);
+    });
+}
+
+/// A rover that reports, answers no ping, and answers calibration requests as told: it gets id and
+/// body. Holds the ids of all that it has heard.
+fn rover_that_calibrates(
+    answers: impl Fn(u8, &[u8]) -> Vec<Vec<u8>> + Send + 'static,
+) -> PlayedLine<Vec<u8>> {
+    let mut decoder = ucp::Decoder::new();
+    PlayedLine::new(Vec::new(), move |heard, mut bytes| {
+        let mut said = vec![frame(5, &[0; 36])];
+        while let Some(event) = decoder.decode(&mut bytes) {
+            let Event::Frame(frame) = event else { continue };
+            let bytes = frame.as_bytes();
+            heard.lock().unwrap().push(bytes[4]);
+            said.extend(answers(bytes[4], &bytes[6..]));
+        }
+        said.concat()
+    })
+}
+
+fn frame(id: u8, body: &[u8]) -> Vec<u8> {
+    let mut frame = vec![0xFD, 0xFF, body.len() as u8 + 4, 0, id, 0];
+    frame.extend(body);
+    frame.extend(crc16::compute(&frame).to_le_bytes());
+    frame
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! `axle send`: single messages; what they move is stopped.
 
+use std::{thread, time::Duration};
+
 use axlewire::ikeya::Position;
 
 use super::{
     Process, TWO_NODES,
     played::{self, Node, Said, confirmable_stops, speeds},
-    sim, undisturbed,
+    sim, undisturbed, wait_until,
 };
 
 /// The error line of a run that sends no command to anybody.
@@ -64,8 +66,8 @@ fn a_signal_or_a_lost_port_stops_what_was_commanded() {
         sim.kill();
         let error = send.complaint(1);
         assert!(error.contains("disconnected"), "{error}");
-        let says = "; node 1 was commanded and does not answer any more: it may be moving";
-        assert!(error.ends_with(says), "{error}");
+        assert!(error.contains("; node 1 was told to stop and has not confirmed it"), "{error}");
+        assert!(error.ends_with(": it may be moving"), "{error}");
     });
 }
 
@@ -138,7 +140,7 @@ fn what_harms_a_robot_is_refused_before_the_port_is_opened() {
         ("FDFF0400050086 41", "not one whole frame"),
     ];
     for (hex, why) in frames {
-        let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(1);
+        let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(2);
         assert!(error.contains(why), "{hex}: {error}");
     }
     let mut update = vec![0xFD, 0xFF, 20, 0, 2, 0];
@@ -146,11 +148,139 @@ fn what_harms_a_robot_is_refused_before_the_port_is_opened() {
     update[14] = 39;
     update.extend(axlewire::crc16::compute(&update).to_le_bytes());
     let hex: String = update.iter().map(|byte| format!("{byte:02x}")).collect();
-    let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(1);
-    assert_eq!(
-        error,
-        "frame 1 is not sent: a motor command that starts a firmware update (ruling U7)"
-    );
+    let error = Process::start(&format!("send -p /dev/none ucp hex {hex}")).complaint(2);
+    assert_eq!(error, "nothing is sent: a motor command that starts a firmware update (ruling U7)");
+}
+
+#[test]
+fn frames_of_a_device_are_sent_only_as_a_device() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        let mut report = vec![0xFD, 0xFF, 40, 0, 5, 0];
+        report.extend([0; 36]);
+        report.extend(axlewire::crc16::compute(&report).to_le_bytes());
+        let hex: String = report.iter().map(|byte| format!("{byte:02x}")).collect();
+        let send = format!("send -p {} ucp hex {hex}", line.path);
+        let error = Process::start(&send).complaint(2);
+        assert_eq!(error, "nothing is sent: the frame is one of a device, see --as");
+        assert_eq!(line.lock().bytes, 0);
+        let lines = Process::start(&send.replace(" ucp", " --as device ucp")).success();
+        assert!(lines.iter().any(|line| line.contains("out") && line.contains("report")));
+        assert!(line.lock().commands.is_empty(), "a device stops nobody");
+    });
+}
+
+#[test]
+fn a_robot_is_told_to_stop_before_and_between_frames_that_would_keep_it_driving() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        Process::start(&format!("send -p {} -c 10 --every 0.05 -f 0 ucp ping", line.path))
+            .success();
+        let commands = line.lock().commands.clone();
+        assert!((4..=6).contains(&commands.len()), "one every 0.1 s: {commands:?}");
+        assert!(commands.iter().all(|&command| command == (0, 0)), "{commands:?}");
+        // A motor command of the user's needs no other one in front of it.
+        let line = played::rover(None);
+        Process::start(&format!("send -p {} -c 3 -f 0 ucp motor 0 0 --lamp", line.path)).success();
+        assert_eq!(line.lock().commands.len(), 3);
+    });
+}
+
+#[test]
+fn frames_are_sent_no_faster_than_the_line_carries_them() {
+    undisturbed(|| {
+        let line = played::bus(&[], |_, _| {});
+        // 40 bytes of 10 bits at 9600 bit/s.
+        let send = format!("send -p {} -b 9600 -c 10 --every 0 -f 0 ikeya read 1", line.path);
+        Process::start(&send).success();
+        let at: Vec<_> = line.lock().said.iter().map(|(_, at)| *at).collect();
+        let span = *at.last().unwrap() - at[0];
+        assert!(at.len() == 10 && span >= Duration::from_millis(35), "{span:?}");
+    });
+}
+
+#[test]
+fn what_was_due_while_the_tool_was_suspended_is_not_sent() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let args = format!("send -p {} -c 1000 --every 0.02 ikeya velocity 1 2", line.path);
+        let send = Process::start(&args);
+        wait_until("a command", || speeds(&line.said()).contains(&2.0));
+        send.signal("STOP");
+        wait_until("a suspension", || send.state() == 'T');
+        thread::sleep(Duration::from_millis(1000));
+        let before = line.said().len();
+        send.signal("CONT");
+        let error = send.complaint(1);
+        assert!(error.starts_with("the tool did not run for 1."), "{error}");
+        assert!(error.ends_with("; what was commanded is stopped and at rest"), "{error}");
+        assert!(!speeds(&line.said()[before..]).contains(&2.0), "{:?}", &line.said()[before..]);
+    });
+}
+
+#[test]
+fn frames_that_a_signal_keeps_from_being_sent_are_counted() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let args = format!("send -p {} -c 1000 --every 10 ikeya velocity 1 2", line.path);
+        let send = Process::start(&args);
+        // The READ behind the WRITE.
+        wait_until("a command and a READ", || {
+            let said = line.said();
+            said.iter().rposition(|said| *said == Said::Read(1))
+                > said.iter().position(|said| matches!(said, Said::Write(..)))
+                && speeds(&said).contains(&2.0)
+        });
+        send.signal("INT");
+        let error = send.complaint(1);
+        let expected = "1998 frames were not sent: interrupted; what was commanded is stopped and \
+                        at rest";
+        assert_eq!(error, expected);
+    });
+}
+
+#[test]
+fn a_node_that_hears_but_is_not_heard_any_more_is_stopped() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |said, bus| {
+            bus.nodes[0].is_dumb |= matches!(said, Said::Write(..));
+        });
+        let args = format!("send -p {} -f 0.2 ikeya velocity 1 5", line.path);
+        let error = Process::start(&args).complaint(1);
+        assert_eq!(
+            error,
+            "node 1 was told to stop and has not confirmed it (nothing received): it may be moving"
+        );
+        assert_eq!(line.lock().nodes[0].rps, 0.0);
+    });
+}
+
+#[test]
+fn a_node_that_starts_anew_in_the_other_mode_gets_no_more_commands() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |said, bus| {
+            let said = bus.said.iter().filter(|(before, _)| *before == said).count();
+            if said == 3 && matches!(bus.said.last(), Some((Said::Write(..), _))) {
+                bus.nodes[0] = Node { follows: false, ..Node::position(1, 4096) };
+            }
+        });
+        let args = format!("send -p {} -c 20 --every 0.05 ikeya velocity 1 1", line.path);
+        let error = Process::start(&args).complaint(1);
+        assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
+        let said = speeds(&line.said());
+        assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 3, "{said:?}");
+    });
+}
+
+#[test]
+fn an_echo_is_not_taken_for_what_others_say() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ikeya --node 1:velocity --echo");
+        let lines = Process::start(&format!("send -p {port} --echo ikeya read 1")).success();
+        let names: Vec<_> =
+            lines[1..].iter().filter_map(|line| line.split_whitespace().nth(4)).collect();
+        assert_eq!(names, ["read_request", "velocity_response"], "{lines:?}");
+    });
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! Signals: motors are stopped before the tool exits or is suspended.
 
 use std::{
+    cell::RefCell,
+    io::Write,
+    process::{Command, Stdio},
     sync::{Arc, Mutex},
     thread,
     time::Duration,
@@ -9,7 +12,9 @@ use std::{
 use super::{
     Process,
     played::{self, Node, Said, confirmable_stops, speeds},
-    sim, undisturbed, values, wait_until,
+    sim,
+    support::axle,
+    undisturbed, values, wait_until,
 };
 
 const SUSPENDED: &str =
@@ -25,6 +30,35 @@ fn assert_stopped_for_good(said: &[Said]) {
     let first = speeds.iter().position(|&rps| rps == 0.0).expect("a stop");
     assert!(first <= 25, "kept turning: {speeds:?}");
     assert!(speeds[first..].iter().all(|&rps| rps == 0.0), "turned again: {speeds:?}");
+}
+
+#[test]
+fn a_reader_that_does_not_read_keeps_nobody_from_ending_the_tool_while_nothing_moves() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ikeya --node 1:velocity");
+        let (_rover, robot) = sim("ucp");
+        for (args, signals) in [
+            // The first line comes before anything moves.
+            (format!("spin -p {port} -n 1 --rps 2 -f 600"), 1),
+            (format!("stop -p {port} -P ikeya"), 1),
+            (format!("ping -p {robot} --every 0.01"), 2),
+        ] {
+            let (_reader, mut writer) = std::io::pipe().unwrap();
+            let args: Vec<_> = args.split(' ').collect();
+            // The pipe is full from the beginning.
+            writer.write_all(&[b' '; 65536]).unwrap();
+            let tool = axle(&args).stdout(writer).stderr(Stdio::null()).spawn().unwrap();
+            // Long enough to stop what moves.
+            thread::sleep(Duration::from_millis(1500));
+            for _ in 0..signals {
+                let kill = format!("kill -TERM {}", tool.id());
+                assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+                thread::sleep(Duration::from_millis(200));
+            }
+            let tool = RefCell::new(tool);
+            wait_until("the end", || tool.borrow_mut().try_wait().unwrap().is_some());
+        }
+    });
 }
 
 #[test]

@@ -14,10 +14,12 @@ use axlewire::{
     },
     time,
 };
+use serde_json::Value;
 
 use super::{
     Process, TWO_NODES,
     played::{self, Node, Said, confirmable_stops, parrot, speeds},
+    record::{decoded, fresh},
     sim, undisturbed, wait_until,
 };
 
@@ -44,6 +46,45 @@ fn stop_finds_what_a_killed_program_has_left_turning_and_stops_it() {
         assert_eq!(lines[2..], ["silent: 2, 4, 5, 6, 7, 8"]);
         sim.line("node 1: at rest");
         sim.line("node 3: at rest");
+    });
+}
+
+#[test]
+fn stop_records_a_bus_that_is_silent_and_then_the_rover() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        let drive = Process::start(&format!("drive -p {port} --speed 60 --turn 0 -f 600"));
+        sim.line("moving");
+        drive.kill();
+        let path = fresh("stop.pcapng");
+        Process::start(&format!("stop -p {port} --record {path}")).success();
+        let (events, _) = decoded(&path);
+        let is = |interface: u64, message: &str| {
+            let found =
+                |event: &Value| event["interface"] == interface && event["message"] == message;
+            events.iter().any(found)
+        };
+        assert!(is(0, "read_request") && is(1, "motor_control") && is(1, "report"));
+    });
+}
+
+#[test]
+fn a_recording_that_cannot_be_made_does_not_keep_a_motor_turning() {
+    undisturbed(|| {
+        let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |_, _| {});
+        let stop = format!("stop -p {} -P ikeya --record /dev/full", line.path);
+        let error = Process::start(&stop).complaint(1);
+        assert!(error.starts_with("cannot create \"/dev/full\": "), "{error}");
+        assert_eq!(line.lock().nodes[0].rps, 0.0);
+    });
+}
+
+#[test]
+fn on_a_line_with_echo_silent_ids_are_silent() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ikeya --node 1:velocity --echo");
+        let lines = Process::start(&format!("stop -p {port} -P ikeya --echo")).success();
+        assert_eq!(lines[1..], ["silent: 2, 3, 4, 5, 6, 7, 8"]);
     });
 }
 

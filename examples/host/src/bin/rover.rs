@@ -18,8 +18,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let driven = drive(&mut rover);
     // Whatever has happened. An error here means that the rover may be driving: say so.
     rover.stop()?;
-    println!("stopped");
-    Ok(driven?)
+    println!("told to stop");
+    driven?;
+    match rover.role().last_report() {
+        Some(_) => Ok(()),
+        None => Err("no robot answers".into()),
+    }
 }
 
 fn drive(rover: &mut Driver<Host, SerialPort, StdClock>) -> Result<(), DriveError<io::Error>> {
