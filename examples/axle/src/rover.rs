@@ -54,8 +54,8 @@ pub(crate) struct Rover {
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
-    /// When a ping was found to be lost. It may only be late, and then its pong is taken for that of
-    /// the next one.
+    /// When a ping was found to be lost. It may only be late, and then its pong is taken for that
+    /// of the next one.
     lost_at: Option<Instant>,
 }
 
@@ -163,9 +163,9 @@ impl Rover {
         settled > pings && !self.lost_at.is_some_and(is_recent)
     }
 
-    /// Repeats the stop until the robot's reports show all wheels at rest; only those count that were
-    /// measured after the robot had heard of it: after its answer to a ping behind it. Failures of the port and
-    /// of the link do not end it early, and neither do signals.
+    /// Repeats the stop until the robot's reports show all wheels at rest. Only those count that
+    /// came after the robot had heard of it: after its answer to a ping behind it. Failures of the
+    /// port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, sent) = (self.now(), self.host().statistics().commands);
         let mut awake = Awake::new(begin);

@@ -56,8 +56,8 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. A second one ends
-    /// the tool at once, such as while it waits for a reader of its output.
+    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. A second one
+    /// ends the tool at once, such as while it waits for a reader of its output.
     pub(crate) fn listen() -> Result<Self, Failure> {
         let signals = Self::new()?;
         #[cfg(unix)]

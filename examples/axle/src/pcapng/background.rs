@@ -1,5 +1,5 @@
-//! A recording while something moves, written by a separate thread: a stalled disk, or a reader that
-//! does not read, must not keep a stop from being sent.
+//! A recording while something moves, written by a separate thread: a stalled disk must not keep a
+//! stop from being sent.
 
 use std::{
     sync::mpsc::{self, Receiver, SyncSender, TrySendError},

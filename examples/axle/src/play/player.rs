@@ -115,8 +115,8 @@ impl Player {
         self.due.len()
     }
 
-    /// Fails if the tool did not run for a while: what was due meanwhile is out of date, and nothing
-    /// more is sent. Call it in every round.
+    /// Fails if the tool did not run for a while: what was due meanwhile is out of date, and
+    /// nothing more is sent. Call it in every round.
     pub(crate) fn check(&mut self, now: Instant) -> Result<(), Failure> {
         self.attend(now);
         self.absence.take().map_or(Ok(()), Err)

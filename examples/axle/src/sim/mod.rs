@@ -13,9 +13,9 @@ use crate::{EXIT_CODES, failure::Failure};
 
 /// Simulate motors or a rover on a pseudo-terminal
 ///
-/// The first line of the output is `pty: PATH`, or with --json an object with `path`: use that path,
-/// or that of --link, as the --port of another program. The following lines show what happens,
-/// until Ctrl-C or the end of --for.
+/// The first line of the output is `pty: PATH`, or with --json an object with `path`: use that
+/// path, or that of --link, as the --port of another program. The following lines show what
+/// happens, until Ctrl-C or the end of --for.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES, arg_required_else_help = false)]
 pub(crate) struct Args {

@@ -46,8 +46,13 @@ pub(super) struct Stage {
 #[derive(Debug, Serialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 enum LineEvent<'a> {
-    Pty { path: &'a str },
-    Link { path: &'a Path },
+    Pty {
+        path: &'a str,
+    },
+    /// As shown: a path need not be UTF-8.
+    Link {
+        path: String,
+    },
     Unplugged,
     PluggedIn,
 }
@@ -56,7 +61,7 @@ impl Display for LineEvent<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Pty { path } => write!(f, "pty: {path}"),
-            Self::Link { path } => write!(f, "link: {}", path.display()),
+            Self::Link { path } => write!(f, "link: {path}"),
             Self::Unplugged => f.write_str("the line is unplugged"),
             Self::PluggedIn => f.write_str("the line is plugged in again"),
         }
@@ -82,7 +87,7 @@ impl Stage {
         };
         print(&stage.form.plain(&LineEvent::Pty { path: &path }))?;
         if let Some(link) = &args.link {
-            print(&stage.form.plain(&LineEvent::Link { path: link }))?;
+            print(&stage.form.plain(&LineEvent::Link { path: link.display().to_string() }))?;
         }
         Ok((stage, Line::new(&path, pty, true)))
     }

@@ -98,6 +98,22 @@ fn a_paused_picture_stands_still_while_counting_goes_on() {
 }
 
 #[test]
+fn spin_shows_three_motors_on_the_page() {
+    undisturbed(|| {
+        let (sim, port) = sim("ikeya-3 --node 1:velocity");
+        let spin = format!("spin -P ikeya-3 -p {port} -n 1 --rps 1 -2 3 -f 600 --page");
+        let mut spin = Terminal::start(&spin, SIZE);
+        sim.line("node 1: command 1.00 -2.00 3.00 rps");
+        spin.row("1.00 -2.00 3.00 rps");
+        spin.press(" ");
+        let left = spin.end();
+        assert_eq!(left.code, Some(0), "{left:?}");
+        assert!(left.text.contains("stopped and confirmed"), "{left:?}");
+        sim.line("node 1: at rest");
+    });
+}
+
+#[test]
 fn a_recording_of_a_page_that_fails_is_told() {
     undisturbed(|| {
         let (_sim, port) = sim(TWO_NODES);

@@ -1,6 +1,4 @@
-//! `axle send`: sends single messages, and shows what is said on the line.
-
-use std::collections::VecDeque;
+//! The messages that can be sent, and their bytes.
 
 use axlewire::{
     ikeya::{self, Mode, NodeId, Position, Rps, three},
@@ -14,70 +12,12 @@ use axlewire::{
 };
 
 use crate::{
-    MOTION_HELP,
     args::{self, Protocol},
-    bus,
-    failure::Failure,
-    play::{self, Due, Effect, Limits, Plan, Side},
     rover,
 };
 
-/// Send one message, and show what is said on the line
-///
-/// The message is sent once, or --count times every --every seconds, and the line is shown for
-/// --for seconds more. Before a WRITE, the mode of its node is read. A node that does not answer,
-/// or is in the other mode, gets none, and none gets a speed above --max-rps or a position farther
-/// away than --max-turns. Behind each WRITE goes a READ, and a node that answers in the other mode
-/// gets no more commands. Before a motor command that is not zero, a robot must be heard.
-///
-/// At the end, on every error and on every signal that can be caught, what was commanded is
-/// stopped, as by `axle spin` and `axle drive`. Firmware updates, motor commands out of range and
-/// bodies of a wrong length are refused (rulings U7 and U13), also as hex digits.
-///
-/// Frames follow each other no faster than --baud allows. A robot is told to stop by the first
-/// frame, and every 0.1 s until a motor command of yours goes out (ruling U16): it would drive on
-/// while it hears anything.
-#[derive(Debug, clap::Args)]
-#[command(after_help = MOTION_HELP, arg_required_else_help = false)]
-pub(crate) struct Args {
-    #[command(flatten)]
-    bus: bus::MasterArgs,
-
-    #[command(flatten)]
-    times: Times,
-
-    #[command(subcommand)]
-    message: Message,
-}
-
-#[derive(Debug, clap::Args)]
-struct Times {
-    /// How often to send the message
-    #[arg(short, long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    count: u32,
-
-    /// Interval between two of them, seconds
-    #[arg(long, value_name = "SECONDS", default_value = "0.1", value_parser = args::seconds)]
-    every: u64,
-
-    /// How long to listen behind the last one, seconds; what moves does so meanwhile
-    #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "0.5", value_parser = args::seconds)]
-    linger_us: u64,
-
-    /// Whose frames these are: a device's would harm a robot, and are answers that no node gave
-    #[arg(long = "as", value_enum, default_value = "commander")]
-    side: Side,
-
-    #[command(flatten)]
-    limits: Limits,
-
-    /// Print one JSON object per line
-    #[arg(short, long)]
-    json: bool,
-}
-
 #[derive(Debug, clap::Subcommand)]
-enum Message {
+pub(super) enum Message {
     /// To a node of a motor bus with one motor per board
     #[command(subcommand)]
     Ikeya(Packet),
@@ -90,7 +30,7 @@ enum Message {
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum Packet {
+pub(super) enum Packet {
     /// Ask a node for its status
     Read {
         /// The node, 1 to 8
@@ -124,7 +64,7 @@ enum Packet {
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum UcpMessage {
+pub(super) enum UcpMessage {
     /// Ask the robot to answer
     Ping,
     /// Drive
@@ -220,57 +160,37 @@ impl Network {
     }
 }
 
-/// Time from a WRITE to the READ behind it, microseconds.
-const READ_AFTER_US: u64 = 2000;
+impl Message {
+    pub(super) const fn protocol(&self) -> Protocol {
+        match self {
+            Self::Ikeya(_) => Protocol::Ikeya,
+            Self::Ikeya3(_) => Protocol::Ikeya3,
+            Self::Ucp(_) => Protocol::Ucp,
+        }
+    }
 
-/// Runs the subcommand.
-pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let (protocol, bytes) = match &args.message {
-        Message::Ikeya(packet) => (Protocol::Ikeya, one(packet)),
-        Message::Ikeya3(packet) => (Protocol::Ikeya3, three(packet)),
-        Message::Ucp(message) => (Protocol::Ucp, ucp(message, 0)),
-    };
-    let meant = match &args.message {
-        Message::Ikeya(Packet::Velocity { .. }) | Message::Ikeya3(Packet::Velocity { .. }) => {
-            Some(Mode::Velocity)
-        }
-        Message::Ikeya(Packet::Position { .. }) | Message::Ikeya3(Packet::Position { .. }) => {
-            Some(Mode::Position)
-        }
-        _ => None,
-    };
-    let (first, times) = (bytes.map_err(Failure::Usage)?, &args.times);
-    let (side, effect) = play::effect_of(protocol, &first)
-        .map_err(|why| Failure::Usage(format!("nothing is sent: {why}")))?;
-    if side != times.side {
-        let line = format!("nothing is sent: the frame is one of a {side}, see --as");
-        return Err(Failure::Usage(line));
-    }
-    let mut frames = VecDeque::new();
-    for at in 0..times.count {
-        let bytes = match &args.message {
-            // Each has its own index, as of a host (U9).
-            Message::Ucp(message) => ucp(message, at as u8).unwrap_or_else(|_| first.clone()),
-            _ => first.clone(),
-        };
-        let after_us = u64::from(at) * times.every;
-        frames.push_back(Due { after_us, bytes: bytes.into(), meant, effect: effect.clone() });
-        if let Effect::Write(write) = &effect {
-            // A node may start anew in the other mode, and only its answers tell.
-            let bytes = ikeya::ReadRequest::new(write.node).as_bytes()[..].into();
-            let after_us = after_us + READ_AFTER_US.min(times.every / 2);
-            frames.push_back(Due { after_us, bytes, meant: None, effect: Effect::Nothing });
+    /// For a WRITE, the mode that it is meant for, if its bytes were not given.
+    pub(super) const fn mode(&self) -> Option<Mode> {
+        match self {
+            Self::Ikeya(Packet::Velocity { .. }) | Self::Ikeya3(Packet::Velocity { .. }) => {
+                Some(Mode::Velocity)
+            }
+            Self::Ikeya(Packet::Position { .. }) | Self::Ikeya3(Packet::Position { .. }) => {
+                Some(Mode::Position)
+            }
+            _ => None,
         }
     }
-    play::run(Plan {
-        bus: &args.bus,
-        protocol,
-        side,
-        frames,
-        linger_us: times.linger_us,
-        limits: times.limits,
-        is_json: times.json,
-    })
+
+    /// Its bytes, as the frame with this index of a host (ruling U9); those of hex digits are
+    /// always the same.
+    pub(super) fn bytes(&self, index: u8) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Ikeya(packet) => one(packet),
+            Self::Ikeya3(packet) => three(packet),
+            Self::Ucp(message) => ucp(message, index),
+        }
+    }
 }
 
 fn one(packet: &Packet) -> Result<Vec<u8>, String> {
