@@ -94,9 +94,7 @@ impl Signals {
             // Signals from a supervisor, a script or a resource limit would end the tool at once,
             // with the motors running.
             let is_other = |signal: &i32| {
-                [ENDS, SUSPENSIONS, LEFT_ALONE, &[SIGXFSZ]]
-                    .iter()
-                    .all(|known| !known.contains(signal))
+                [ENDS, SUSPENSIONS, LEFT_ALONE].iter().all(|known| !known.contains(signal))
             };
             for signal in (1..=LAST_SIGNAL).filter(is_other) {
                 // A system refuses numbers that it lacks or reserves.

@@ -64,6 +64,8 @@ fn suspend(signals: &Signals) -> bool {
     loop {
         signals::suspend();
         if signals.is_end() || screen::is_in_front() {
+            // One from meanwhile is of a thread that has touched the terminal in the background.
+            signals.take_suspension();
             return !signals.is_end();
         }
     }

@@ -92,11 +92,11 @@ fn a_direct_line_has_to_answer_at_once_and_an_adapter_has_20_ms() {
 #[test]
 fn a_pseudo_terminal_may_answer_before_its_line_speed_allows() {
     undisturbed(|| {
-        // At 1200 bit/s a READ alone takes 33 ms.
+        // At 9600 bit/s a READ and its answer take 12 ms.
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let link = std::env::temp_dir().join(format!("axle-link-{}", std::process::id()));
         std::os::unix::fs::symlink(&line.path, &link).unwrap();
-        let scan = Process::start(&format!("scan --baud 1200 --port {}", link.display()));
+        let scan = Process::start(&format!("scan --baud 9600 --port {}", link.display()));
         let lines = scan.success();
         std::fs::remove_file(&link).unwrap();
         assert_eq!(lines.last().unwrap(), "1 node answers.", "{lines:?}");
