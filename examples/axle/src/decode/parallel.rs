@@ -23,15 +23,12 @@ use crate::{
     listing::{Modes, Shown, Style},
 };
 
-/// Bytes of all parts of which only the account is needed.
-const ACCOUNTED: usize = 2 * 1024 * 1024;
-
-/// Bytes of all parts of which lines are written: the lines are up to 25 times as long.
+/// Bytes of all parts, one per thread: their lines are up to 40 times as long.
 const LISTED: usize = 256 * 1024;
 
 /// A stretch without a place to split becomes a part of at most this length; then the rest of the
 /// file is decoded by one thread.
-const LONGEST_PART: usize = 4 * 1024 * 1024;
+const LONGEST_PART: usize = 128 * 1024;
 
 /// How far in front of the end of what was read a place to split is looked for first.
 const NEAR_END: usize = 1024;
@@ -72,7 +69,7 @@ pub(super) struct Rest {
 /// is left for one thread: at least the bytes behind the last place to split.
 pub(super) fn list<F>(
     input: &mut Input,
-    style: Option<Style>,
+    style: Style,
     jobs: usize,
     mut write: impl FnMut(&[u8]) -> Result<(), Failure>,
 ) -> Result<Rest, Failure>
@@ -80,8 +77,7 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    let all = if style.is_none() { ACCOUNTED } else { LISTED };
-    let part_len = (all / jobs).clamp(16 * 1024, 512 * 1024);
+    let part_len = LISTED / jobs;
     let (parts, queue) = mpsc::channel::<Part>();
     let (done, results) = mpsc::channel();
     let queue = Mutex::new(queue);
@@ -208,7 +204,7 @@ impl Reading<'_> {
 }
 
 /// Lists parts until there are no more.
-fn work<F>(queue: &Mutex<Receiver<Part>>, done: &Sender<Listed>, style: Option<Style>)
+fn work<F>(queue: &Mutex<Receiver<Part>>, done: &Sender<Listed>, style: Style)
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
@@ -219,33 +215,20 @@ where
             Err(_) => return,
         };
         let Ok(part) = next else { return };
-        let listed = match style {
-            None => account::<F>(part),
-            Some(_) => lines::<F>(part, style),
-        };
-        if done.send(listed).is_err() {
+        if done.send(lines::<F>(part, style)).is_err() {
             return;
         }
     }
 }
 
-fn account<F: Framing>(part: Part) -> Listed {
-    let mut frames = Frames::<F>::new(&part.bytes);
-    frames.each(|_| {});
-    let account = frames.counters();
-    // Nobody asks for the modes, but the next part waits for them.
-    let _ = part.next.send(Modes::default());
-    Listed { number: part.number, lines: part.lines, account, buffer: part.bytes }
-}
-
-fn lines<F>(part: Part, style: Option<Style>) -> Listed
+fn lines<F>(part: Part, style: Style) -> Listed
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
     let mut learned = Modes::default();
     Frames::<F>::new(&part.bytes).each(|frame| frame.teach(&mut learned));
-    let mut sheet = Sheet::new(style);
+    let mut sheet = Sheet::new(Some(style));
     sheet.out.0 = part.lines;
     sheet.modes = part.modes.recv().unwrap_or_default();
     let mut after = sheet.modes;

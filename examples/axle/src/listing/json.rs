@@ -83,13 +83,14 @@ fn seconds(out: &mut Out, micros: u64) {
 }
 
 /// The last object of a listing.
-pub(crate) fn summary(out: &mut Out, account: &Counters, pending: usize, times_back: u64) {
+pub(crate) fn summary(out: &mut Out, account: &Counters, times_back: u64) {
     out.text(r#"{"event":"summary""#);
     let counts = [
         ("received", account.received),
         ("framed", account.framed),
         ("skipped", account.skipped()),
-        ("pending", pending as u64),
+        // A listing ends with its input, and then nothing is pending (ruling B3).
+        ("pending", 0),
         ("frames", account.frames),
     ];
     for (name, count) in counts {

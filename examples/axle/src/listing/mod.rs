@@ -3,6 +3,7 @@
 mod json;
 mod row;
 mod shown;
+mod table;
 
 use std::fmt;
 
@@ -12,6 +13,7 @@ use crate::pcapng::Direction;
 pub(crate) use json::summary as json_summary;
 pub(crate) use row::{TimeColumn, print_summary};
 pub(crate) use shown::{Modes, Shown};
+pub(crate) use table::Table;
 
 /// Where and when an event was on the line.
 #[derive(Clone, Copy, Debug, Default)]

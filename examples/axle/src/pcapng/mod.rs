@@ -13,7 +13,7 @@ mod read;
 mod recording;
 mod write;
 
-pub(crate) use read::{Problem, Reader};
+pub(crate) use read::{Packet, Reader};
 pub(crate) use recording::Recording;
 pub(crate) use write::Writer;
 
@@ -25,6 +25,8 @@ pub(crate) const MAGIC: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 /// Types of blocks.
 mod block {
     pub(super) const INTERFACE: u32 = 1;
+    /// What old programs wrote instead of [`PACKET`]; its flags are the same.
+    pub(super) const OBSOLETE_PACKET: u32 = 2;
     pub(super) const SIMPLE_PACKET: u32 = 3;
     pub(super) const PACKET: u32 = 6;
 }
@@ -77,17 +79,23 @@ impl Direction {
     }
 }
 
-/// Link types for private use: USER0 to USER2.
+/// Link types for private use: USER0, USER1 and USER3. Wireshark takes USER2 for PKTAP.
 pub(crate) const fn link_type(protocol: Protocol) -> u16 {
     match protocol {
         Protocol::Ikeya => 147,
         Protocol::Ikeya3 => 148,
-        Protocol::Ucp => 149,
+        Protocol::Ucp => 150,
     }
 }
 
+/// UCP in captures of the first versions: USER2.
+const OLD_UCP: u16 = 149;
+
 /// The protocol of a link type; `None` for those of others.
 pub(crate) fn protocol_of(link_type_found: u16) -> Option<Protocol> {
+    if link_type_found == OLD_UCP {
+        return Some(Protocol::Ucp);
+    }
     [Protocol::Ikeya, Protocol::Ikeya3, Protocol::Ucp]
         .into_iter()
         .find(|&protocol| link_type(protocol) == link_type_found)

@@ -5,11 +5,12 @@ use axlewire::{
     stream::{Counters, Decoder, Event, Framing},
 };
 
-use super::{
-    model::{Heard, Model},
-    table::Table,
+use super::model::{Heard, Model};
+use crate::{
+    decode::BUFFER_LEN,
+    line::QUIET,
+    listing::{Shown, Table},
 };
-use crate::{decode::BUFFER_LEN, line::QUIET, listing::Shown};
 
 /// Where bytes come from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

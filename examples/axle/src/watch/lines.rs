@@ -8,12 +8,12 @@ use axlewire::{
     time::Duration,
 };
 
-use super::{Watched, recorder::Recorder, table::Table};
+use super::{Watched, recorder::Recorder};
 use crate::{
     decode::BUFFER_LEN,
     failure::Failure,
     line::{Line, PATIENCE, QUIET},
-    listing::Shown,
+    listing::{Shown, Table},
     signals::Signals,
 };
 

@@ -12,11 +12,11 @@ use super::{
     page::View,
     recorder::Recorder,
     screen::{self, Sink},
-    table::Table,
 };
 use crate::{
     failure::Failure,
     line::{Line, PATIENCE},
+    listing::Table,
     signals::{self, Signals},
 };
 
