@@ -97,7 +97,7 @@ where
     let account = frames.finish()?;
     if args.output != Path::new("-") {
         let mut out = io::stdout().lock();
-        let told = listing::print_summary(&mut out, &account, 0, false);
+        let told = listing::print_summary(&mut out, &account, false);
         told.and_then(|()| out.flush()).map_err(Failure::Write)?;
     }
     broken

@@ -112,3 +112,13 @@ fn many_sections_take_a_time_in_proportion() {
     assert_eq!(summary(&[], &one.repeat(40_000))["frames"], 40_000);
     assert!(begin.elapsed().as_secs() < 10, "{:?}", begin.elapsed());
 }
+
+#[test]
+fn the_counts_add_up() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let raw = [&[1, 2][..], &ping, &ping[..5]].concat();
+    let found = summary(&["-P", "ucp"], &raw);
+    let count = |field: &str| found[field].as_u64().unwrap();
+    assert_eq!(count("received"), 15);
+    assert_eq!(count("received"), count("framed") + count("skipped") + count("pending"));
+}

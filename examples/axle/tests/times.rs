@@ -132,6 +132,17 @@ fn a_capture_that_ends_inside_a_block_gives_all_that_is_there_and_one_line() {
 }
 
 #[test]
+fn the_summary_of_a_capture_that_is_cut_off_counts_what_is_there() {
+    let capture = bus().0;
+    let cut = &capture[..capture.len() - 20];
+    for (style, expected) in [("-tnone", "16 bytes received"), ("--json", "\"received\":16,")] {
+        let (listing, code, error) = outcome(run(&["decode", style, "-s"], cut));
+        assert!(listing.contains(expected), "{listing}");
+        assert!(error.contains("ends inside the pcapng block") && code == Some(1), "{error}");
+    }
+}
+
+#[test]
 fn another_link_type_is_named_and_can_be_overruled() {
     let ethernet = PcapNg::new(1, &[(T, 0, Ping {}.frame(0).as_bytes())]).0;
     let (listing, code, error) = outcome(run(&["decode"], &ethernet));

@@ -22,11 +22,11 @@ pub(super) fn run(args: &Args, mut input: Input, choice: Choice) -> Result<(), F
     });
     let mut printer = printer.unwrap_or_else(|| Printer::new(args.json, None));
     printer.print_sheet(&mut sheet)?;
+    let account = walked.account;
     if let Some(failure) = walked.broken {
-        printer.flush()?;
+        printer.break_off(&account, walked.times_back)?;
         return Err(failure);
     }
-    let account = walked.account;
     printer.finish(&account, walked.times_back)?;
     if account.frames == 0 && account.received > 0 {
         let received = account.received;

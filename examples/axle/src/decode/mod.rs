@@ -286,9 +286,9 @@ where
         }
     }
     if let Some(failure) = broken {
-        // What was decoded is still valid; the missing summary shows that it is incomplete.
         printer.print_sheet(&mut sheet)?;
-        printer.flush()?;
+        account += stream.counters();
+        printer.break_off(&account, 0)?;
         return Err(failure);
     }
     stream.finish(&mut sheet);
@@ -339,13 +339,22 @@ impl Printer {
         self.out.flush().map_err(Failure::Write)
     }
 
+    /// Ends a listing that could not be finished: what was decoded is still valid, and the missing
+    /// summary shows that it is incomplete. But if the summary alone is wanted, it is all there is.
+    fn break_off(mut self, account: &Counters, times_back: u64) -> Result<(), Failure> {
+        match self.style {
+            None if account.received > 0 => self.finish(account, times_back),
+            _ => self.flush(),
+        }
+    }
+
     fn finish(mut self, account: &Counters, times_back: u64) -> Result<(), Failure> {
         let printed = if self.is_json {
             let mut line = listing::Out::default();
             listing::json_summary(&mut line, account, times_back);
             self.out.write_all(&line.0)
         } else {
-            listing::print_summary(&mut self.out, account, 0, self.has_lines).and_then(|()| {
+            listing::print_summary(&mut self.out, account, self.has_lines).and_then(|()| {
                 match times_back {
                     0 => Ok(()),
                     times => writeln!(self.out, "{times:>10} times the clock went backwards"),

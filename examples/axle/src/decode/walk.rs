@@ -13,7 +13,8 @@ use crate::{
     pcapng::{self, Direction, Packet, Reader},
 };
 
-/// The most bytes that are fed at once: their lines are up to 40 times as long.
+/// The most bytes that are fed at once: their lines are up to 40 times as long, and are held in
+/// memory.
 pub(super) const PIECE: usize = 16 * 1024;
 
 /// Bytes that come next.

@@ -2,7 +2,7 @@
 
 use axlewire::ikeya::Mode;
 
-use super::{Modes, Out, Place, REASONS, Shown, SkippedBytes};
+use super::{Modes, Out, Place, REASONS, Shown, SkippedBytes, pending};
 use axlewire::stream::Counters;
 
 pub(super) fn frame(out: &mut Out, at: Place, frame: &impl Shown, modes: &Modes) {
@@ -89,8 +89,7 @@ pub(crate) fn summary(out: &mut Out, account: &Counters, times_back: u64) {
         ("received", account.received),
         ("framed", account.framed),
         ("skipped", account.skipped()),
-        // A listing ends with its input, and then nothing is pending (ruling B3).
-        ("pending", 0),
+        ("pending", pending(account)),
         ("frames", account.frames),
     ];
     for (name, count) in counts {

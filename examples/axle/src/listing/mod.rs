@@ -42,6 +42,11 @@ pub(crate) struct SkippedBytes {
 pub(crate) const REASONS: [Reason; 5] =
     [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
 
+/// Number of bytes that are in no other count: they may still become a frame (ruling B2).
+const fn pending(counters: &Counters) -> u64 {
+    counters.received - counters.framed - counters.skipped()
+}
+
 /// The form of the lines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Style {

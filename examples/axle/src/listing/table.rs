@@ -11,7 +11,7 @@ use axlewire::{
 };
 use serde::Serialize;
 
-use super::{Modes, Out, REASONS, Shown, print_summary};
+use super::{Modes, Out, REASONS, Shown, pending, print_summary};
 use crate::args::Protocol;
 
 /// The time over which a rate is measured.
@@ -46,6 +46,7 @@ struct Record<'a> {
     received: u64,
     framed: u64,
     skipped: u64,
+    pending: u64,
     frames: u64,
     skipped_by: BTreeMap<&'static str, u64>,
     messages: Vec<Message<'a>>,
@@ -169,6 +170,7 @@ impl Table {
             received: counters.received,
             framed: counters.framed,
             skipped: counters.skipped(),
+            pending: pending(counters),
             frames: counters.frames,
             skipped_by: skipped
                 .filter(|(_, bytes)| *bytes > 0)
@@ -205,7 +207,6 @@ impl Table {
         &mut self,
         out: &mut impl Write,
         counters: &Counters,
-        pending: usize,
         now: Instant,
     ) -> io::Result<()> {
         self.measure_all(now);
@@ -217,7 +218,7 @@ impl Table {
         if counters.received == 0 {
             writeln!(out, "Nothing was heard in {:.0} s.", self.micros(now) as f64 / 1e6)?;
         } else {
-            print_summary(out, counters, pending, !self.rows.is_empty())?;
+            print_summary(out, counters, !self.rows.is_empty())?;
         }
         out.flush()
     }

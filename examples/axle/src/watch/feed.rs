@@ -122,11 +122,6 @@ where
         counters
     }
 
-    /// Number of bytes that may still become a frame.
-    pub(crate) const fn pending(&self) -> usize {
-        self.received.decoder.pending() + self.sent.decoder.pending()
-    }
-
     /// The counts, if there are any.
     pub(crate) fn into_table(self) -> Option<Table> {
         self.table

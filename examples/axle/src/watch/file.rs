@@ -53,10 +53,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         table.measure_all(end);
         table.print_json(&mut out, "summary", &counters, end)
     } else if is_empty {
-        listing::print_summary(&mut out, &counters, 0, false)
+        listing::print_summary(&mut out, &counters, false)
     } else {
-        let pending = counters.received - counters.framed - counters.skipped();
-        table.finish(&mut out, &counters, pending as usize, end)
+        table.finish(&mut out, &counters, end)
     };
     told.map_err(Failure::Write)?;
     walked.broken.map_or(Ok(()), Err)

@@ -71,7 +71,7 @@ where
         table.measure_all(now);
         table.print_json(&mut out, "summary", &counters, now)
     } else {
-        table.finish(&mut out, &counters, decoder.pending(), now)
+        table.finish(&mut out, &counters, now)
     };
     told.map_err(Failure::Write)?;
     broken?;
