@@ -39,8 +39,9 @@ const MOST_JOBS: usize = 16;
 ///
 /// Reads raw bytes, or pcapng as `axle record` writes it; standard input too. Every byte appears in
 /// exactly one line: a frame, or a gap with the reason why no frame starts there. The end of the
-/// input counts as a quiet line: a truncated frame becomes a gap. Memory use does not grow with the
-/// input.
+/// input, or of a section of pcapng, counts as a quiet line: a truncated frame becomes a gap. Times
+/// do not: how long a line was quiet cannot be told from the moments at which its bytes were read.
+/// Memory use does not grow with the input.
 ///
 /// The time of a frame is that of its last byte: of the moment when the recording program got it
 /// from the system, with all bytes of the same chunk. Behind a USB adapter, that can be 16 ms after
