@@ -23,8 +23,8 @@ pub(super) const SAMPLE_LEN: usize = 64 * 1024;
 /// Frames that make a guess sure enough to begin with.
 const SURE_FRAMES: u64 = 3;
 
-/// The share of each protocol in `sample`, the largest first. Its end counts as a quiet line, as the
-/// end of the input does: a false header in a short input hides no frame (ruling B3).
+/// The share of each protocol in `sample`, the largest first. Its end counts as a quiet line, as
+/// the end of the input does: a false header in a short input hides no frame (ruling B3).
 pub(super) fn shares(sample: &[u8]) -> [Share; 3] {
     let mut shares = [
         share::<ucp::Ucp>(Protocol::Ucp, sample),
