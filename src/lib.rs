@@ -78,6 +78,8 @@ mod inbox;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
 mod machine;
+#[cfg(all(feature = "serde", any(feature = "ikeya", feature = "ucp")))]
+mod map;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
 // Pages, not code. The examples of two of them use one more feature than their links.

@@ -9,7 +9,7 @@ use super::{
     three::{Packet as PacketOfThree, Request as RequestOfThree, Response as ResponseOfThree},
     units::{NodeId, Position},
 };
-use crate::text::Hex;
+use crate::{map::Fields, text::Hex};
 
 /// What the packets of both kinds of boards have in common.
 struct Parts<'a> {
@@ -33,7 +33,7 @@ macro_rules! serialized {
                     values: self.values(),
                     bytes: self.as_bytes(),
                 }
-                .serialize(serializer)
+                .as_map(serializer)
             }
         }
     )+)+};
@@ -44,64 +44,53 @@ serialized! {
     "ikeya-3": RequestOfThree, ResponseOfThree, PacketOfThree;
 }
 
-impl Serialize for Parts<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        // The number of fields depends on the packet.
-        let mut map = serializer.serialize_map(None)?;
+impl Fields for Parts<'_> {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
         map.serialize_entry("length", &self.bytes.len())?;
         map.serialize_entry("protocol", self.protocol)?;
         map.serialize_entry("message", self.message)?;
         map.serialize_entry("node", &self.node)?;
-        fields(&self.values, &mut map)?;
+        self.values.put(map)?;
         if let (Values::Command(..), [_, _, payload @ .., _, _]) = (&self.values, self.bytes) {
             map.serialize_entry("payload", &Hex(payload))?;
         }
-        map.serialize_entry("bytes", &Hex(self.bytes))?;
-        map.end()
+        map.serialize_entry("bytes", &Hex(self.bytes))
     }
 }
 
 /// A map: `rps`, or `count` and `rotation`, as in the JSON of a response.
 impl Serialize for Status<OneMotor> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        status(
-            match *self {
-                Self::Velocity(speed) => Values::Speeds(speed.into()),
-                Self::Position(position) => Values::Positions(position.into()),
-            },
-            serializer,
-        )
+        let values = match *self {
+            Self::Velocity(speed) => Values::Speeds(speed.into()),
+            Self::Position(position) => Values::Positions(position.into()),
+        };
+        values.as_map(serializer)
     }
 }
 
 /// The same with three values each.
 impl Serialize for Status<ThreeMotors> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        status(
-            match *self {
-                Self::Velocity(speeds) => Values::Speeds(speeds.into()),
-                Self::Position(positions) => Values::Positions(positions.into()),
-            },
-            serializer,
-        )
+        let values = match *self {
+            Self::Velocity(speeds) => Values::Speeds(speeds.into()),
+            Self::Position(positions) => Values::Positions(positions.into()),
+        };
+        values.as_map(serializer)
     }
 }
 
-fn status<S: Serializer>(values: Values, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut map = serializer.serialize_map(None)?;
-    fields(&values, &mut map)?;
-    map.end()
-}
-
-fn fields<M: SerializeMap>(values: &Values, map: &mut M) -> Result<(), M::Error> {
-    match values {
-        Values::None => Ok(()),
-        Values::Command(speed, position) => {
-            map.serialize_entry("rps", &Speeds(speed))?;
-            positions(position, map)
+impl Fields for Values {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        match self {
+            Self::None => Ok(()),
+            Self::Command(speed, position) => {
+                map.serialize_entry("rps", &Speeds(speed))?;
+                positions(position, map)
+            }
+            Self::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed)),
+            Self::Positions(position) => positions(position, map),
         }
-        Values::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed)),
-        Values::Positions(position) => positions(position, map),
     }
 }
 

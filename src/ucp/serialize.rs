@@ -10,34 +10,41 @@ use super::{
     motor::RawMotorControl,
     report::Report,
 };
-use crate::text::Hex;
+use crate::{map::Fields, text::Hex};
 
 /// A map: `length`, `protocol`, `message`, `id`, `index`, the fields of the message, and `bytes`:
 /// the whole frame in lower-case hex digits. The page `fields` describes each.
 impl Serialize for Frame {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.as_map(serializer)
+    }
+}
+
+impl Fields for Frame {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
         let (bytes, message) = (self.as_bytes(), self.message());
-        // The number of fields depends on the message.
-        let mut map = serializer.serialize_map(None)?;
         map.serialize_entry("length", &bytes.len())?;
         map.serialize_entry("protocol", "ucp")?;
         map.serialize_entry("message", message.name())?;
         map.serialize_entry("id", &self.id())?;
         map.serialize_entry("index", &self.index())?;
-        fields(&message, &mut map)?;
-        map.serialize_entry("bytes", &Hex(bytes))?;
-        map.end()
+        fields(&message, map)?;
+        map.serialize_entry("bytes", &Hex(bytes))
     }
 }
 
 /// A map: `message`, `id` and the fields of the message. The page `fields` describes each.
 impl Serialize for Message<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
+        self.as_map(serializer)
+    }
+}
+
+impl Fields for Message<'_> {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
         map.serialize_entry("message", self.name())?;
         map.serialize_entry("id", &self.id())?;
-        fields(self, &mut map)?;
-        map.end()
+        fields(self, map)
     }
 }
 

@@ -26,10 +26,10 @@ use crate::{
 
 /// Record the traffic of a line, with times, without sending anything
 ///
-/// Writes pcapng, which `axle decode` and Wireshark read: one packet per frame, and per run of
-/// bytes between frames, each with the time of its last byte in microseconds. The times are those
-/// at which this program got the bytes from the system; behind a USB adapter, that can be 16 ms
-/// after they were on the line. Name of the port, protocol and speed are in the file.
+/// Writes pcapng, which `axle decode` and Wireshark read: one packet per frame, and one or more per
+/// run of bytes between frames, each with the time of its last byte in microseconds. The times are
+/// those at which this program got the bytes from the system; behind a USB adapter, that can be
+/// 16 ms after they were on the line. Name of the port, protocol and speed are in the file.
 ///
 /// Ends after --for, on Ctrl-C, and when the port fails; what was recorded by then is complete. If
 /// the disk is full, the file ends with the last whole packet.
@@ -97,7 +97,7 @@ where
     let account = frames.finish()?;
     if args.output != Path::new("-") {
         let mut out = io::stdout().lock();
-        let told = listing::print_summary(&mut out, &account, 0, false);
+        let told = listing::print_summary(&mut out, &account, false);
         told.and_then(|()| out.flush()).map_err(Failure::Write)?;
     }
     broken

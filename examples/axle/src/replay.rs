@@ -8,6 +8,7 @@ use crate::{
     bus,
     decode::{self, Taken},
     failure::Failure,
+    pcapng::Direction,
     play::{self, Due, Limits, Plan, Side},
 };
 
@@ -78,9 +79,10 @@ const LINGER_US: u64 = 200_000;
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
-    let (mut frames, mut moving) = (Vec::new(), 0_u64);
+    let mut frames = Vec::new();
     let (mut first, mut last_us) = (None, 0);
-    for Taken { micros, bytes, commands } in taken {
+    let mut has_sent = false;
+    for Taken { micros, direction, bytes, commands } in taken {
         let (side, effect) = match play::effect_of(protocol, &bytes) {
             Ok(found) => found,
             // Only a commander's frames can be refused.
@@ -92,7 +94,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         if side != args.side {
             continue;
         }
-        moving += u64::from(effect.moves());
         let after_us = match micros {
             Some(micros) => {
                 let begin = *first.get_or_insert(micros);
@@ -104,12 +105,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         last_us = after_us.max(last_us);
         // The answers in the capture say how its commands were meant.
         let meant = commands.and_then(|node| modes.of(node));
-        frames.push(Due { after_us: last_us, bytes, meant, effect });
+        has_sent |= direction == Some(Direction::Out);
+        frames.push((direction, Due { after_us: last_us, bytes, meant, effect }));
     }
+    // What the recording program has sent and heard again is an echo.
+    frames.retain(|(direction, _)| !has_sent || *direction == Some(Direction::Out));
     if frames.is_empty() {
         let line = format!("no frame of a {} in the capture", args.side);
         return Err(Failure::Failed(line));
     }
+    let moving = frames.iter().filter(|(_, due)| due.effect.moves()).count();
     if moving > 0 && !args.moves {
         return Err(Failure::Failed(format!(
             "{moving} of {} frames move something: use --move if you mean it; nothing is sent",
@@ -120,7 +125,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         bus: &args.bus,
         protocol,
         side: args.side,
-        frames: frames.into(),
+        frames: frames.into_iter().map(|(_, due)| due).collect(),
         linger_us: LINGER_US,
         limits: args.limits,
         is_json: args.json,

@@ -293,6 +293,25 @@ fn a_frame_behind_a_false_header_at_the_end_is_not_lost() {
 }
 
 #[test]
+fn the_protocol_of_a_short_input_is_found_behind_a_false_header() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let input = [&[0xFD, 0xFF, 60, 0][..], &ping].concat();
+    let (events, summary) = decode(&[], &input);
+    assert_eq!((&events[0]["event"], &events[0]["protocol"]), (&json!("protocol"), &json!("ucp")));
+    assert_eq!(summary["frames"], 1);
+}
+
+#[test]
+fn where_the_beginning_tells_no_protocol_the_option_is_named() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let late = [&[0; 70_000][..], &ping].concat();
+    let stderr = String::from_utf8(run(&["decode"], &late).stderr).unwrap();
+    assert!(stderr.starts_with("axle: no frame of any protocol in the first "), "{stderr}");
+    assert!(stderr.ends_with(" bytes: use --protocol to decode them all\n"), "{stderr}");
+    assert_eq!(decode(&["-P", "ucp"], &late).1["frames"], 1);
+}
+
+#[test]
 fn chunk_boundaries_change_nothing() {
     const CHUNK_LEN: u64 = 64 * 1024;
     let capture = Capture::noisy(6 * CHUNK_LEN as usize, 0x9E37_79B9_7F4A_7C15);

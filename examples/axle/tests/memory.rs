@@ -5,13 +5,16 @@ mod support;
 
 use std::{
     fs,
-    io::{BufRead, BufReader, Write},
-    process::Stdio,
+    io::{BufRead, BufReader, Read, Write},
+    process::{Child, Stdio},
     thread,
 };
 
-use axlewire::ucp::{Body, message::Ping};
-use support::axle;
+use axlewire::{
+    ikeya::{NodeId, ReadRequest},
+    ucp::{Body, message::Ping},
+};
+use support::{axle, file, pcapng::PcapNg};
 
 /// Total number of bytes fed in.
 const FED: usize = 200 * 1024 * 1024;
@@ -19,13 +22,15 @@ const FED: usize = 200 * 1024 * 1024;
 /// Limit of the tool's peak memory, KiB.
 const PEAK_LIMIT_KIB: usize = 16 * 1024;
 
+/// The same while several threads list a file.
+const THREADS_LIMIT_KIB: usize = 20 * 1024;
+
+const UCP: u16 = 150;
+const IKEYA: u16 = 147;
+
 #[test]
 fn memory_does_not_grow_with_the_input() {
-    let mut child = axle(&["decode", "--protocol", "ucp", "--json"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = start(&["decode", "--protocol", "ucp", "--json"]);
     let output = BufReader::new(child.stdout.take().unwrap());
     let frames = thread::spawn(move || {
         output.lines().map_while(Result::ok).filter(|line| line.contains("ping")).count()
@@ -42,12 +47,92 @@ fn memory_does_not_grow_with_the_input() {
         stdin.write_all(&block).unwrap();
     }
     // Standard input is still open, so the tool is still running.
-    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let peak = peak(&child).unwrap();
     drop(stdin);
     assert!(child.wait().unwrap().success());
     assert_eq!(frames.join().unwrap(), blocks / 2);
-
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
-    let peak: usize = peak.trim().trim_end_matches(" kB").parse().unwrap();
     assert!(peak < PEAK_LIMIT_KIB, "the tool held {peak} KiB");
+}
+
+#[test]
+fn memory_does_not_grow_with_the_packets_of_a_capture() {
+    let packets = |kind: u16, bytes: &[u8]| {
+        let mut capture = PcapNg::new(kind, &[]);
+        let header = capture.0.len();
+        for at in 0..1000 {
+            capture.packet(0, (at, 1, bytes));
+        }
+        (capture.0[..header].to_vec(), capture.0[header..].to_vec())
+    };
+    let noise = packets(UCP, &[1, 2, 3, 4]);
+    let empty = packets(UCP, &[]);
+    let section = (Vec::new(), PcapNg::new(UCP, &[(0, 1, Ping {}.frame(0).as_bytes())]).0);
+    let mut long = packets(IKEYA, &ReadRequest::new(NodeId::N1).as_bytes().repeat(200_000));
+    long.1.truncate(long.1.len() / 1000);
+    for (what, (header, block), times) in [
+        ("noise", noise, 1000),
+        ("empty", empty, 1000),
+        ("sections", section, 50_000),
+        ("long", long, 3),
+    ] {
+        for args in [["decode", "--json"], ["watch", "-"]] {
+            let mut child = start(&args);
+            let mut output = child.stdout.take().unwrap();
+            let reader = thread::spawn(move || std::io::copy(&mut output, &mut std::io::sink()));
+            let mut stdin = child.stdin.take().unwrap();
+            stdin.write_all(&header).unwrap();
+            for _ in 0..times {
+                stdin.write_all(&block).unwrap();
+            }
+            let peak = peak(&child).unwrap();
+            drop(stdin);
+            child.wait().unwrap();
+            reader.join().unwrap().unwrap();
+            assert!(peak < PEAK_LIMIT_KIB, "{what}, {args:?}: the tool held {peak} KiB");
+        }
+    }
+}
+
+/// Where two candidates overlap all the time, there is no place to split.
+#[test]
+fn memory_does_not_grow_where_a_file_cannot_be_split() {
+    let read = *ReadRequest::new(NodeId::N1).as_bytes();
+    let solid = [&[0xBB][..], &read].concat().repeat(20_000);
+    let split = [&solid[..95_000], &[0; 64]].concat().repeat(15);
+    let (never, rarely) = (solid.repeat(20), split);
+    for (name, bytes) in
+        [("never.bin", never), ("rarely.bin", rarely), ("reads.bin", read.repeat(250_000))]
+    {
+        let path = file(name, &bytes);
+        for jobs in ["2", "16", "256"] {
+            for style in ["--json", "--summary"] {
+                let path = path.to_str().unwrap();
+                let mut child = start(&["decode", "-P", "ikeya", style, "--jobs", jobs, path]);
+                let (mut buffer, mut highest) = (vec![0; 1 << 20], 0);
+                let mut output = child.stdout.take().unwrap();
+                while output.read(&mut buffer).unwrap() > 0 {
+                    // It has none any more when it has ended.
+                    highest = highest.max(peak(&child).unwrap_or(0));
+                }
+                assert!(child.wait().unwrap().success());
+                assert!(
+                    highest < THREADS_LIMIT_KIB,
+                    "{name} {style} --jobs {jobs}: the tool held {highest} KiB"
+                );
+            }
+        }
+        fs::remove_file(path).unwrap();
+    }
+}
+
+fn start(args: &[&str]) -> Child {
+    let piped = Stdio::piped;
+    axle(args).stdin(piped()).stdout(piped()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// The most memory so far, KiB.
+fn peak(child: &Child) -> Option<usize> {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(peak.trim().trim_end_matches(" kB").parse().unwrap())
 }

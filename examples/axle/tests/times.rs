@@ -132,11 +132,22 @@ fn a_capture_that_ends_inside_a_block_gives_all_that_is_there_and_one_line() {
 }
 
 #[test]
+fn the_summary_of_a_capture_that_is_cut_off_counts_what_is_there() {
+    let capture = bus().0;
+    let cut = &capture[..capture.len() - 20];
+    for (style, expected) in [("-tnone", "16 bytes received"), ("--json", "\"received\":16,")] {
+        let (listing, code, error) = outcome(run(&["decode", style, "-s"], cut));
+        assert!(listing.contains(expected), "{listing}");
+        assert!(error.contains("ends inside the pcapng block") && code == Some(1), "{error}");
+    }
+}
+
+#[test]
 fn another_link_type_is_named_and_can_be_overruled() {
     let ethernet = PcapNg::new(1, &[(T, 0, Ping {}.frame(0).as_bytes())]).0;
     let (listing, code, error) = outcome(run(&["decode"], &ethernet));
     assert_eq!((&*listing, code), ("", Some(1)));
-    let says = "axle: interface 0 (\"tty0\") has link type 1, not one of axle's 147 to 149";
+    let says = "axle: interface 0 (\"tty0\") has link type 1, not one of axle's 147 to 150";
     assert!(error.starts_with(says) && error.lines().count() == 1, "{error}");
     assert_eq!(decode(&["--protocol", "ucp"], &ethernet).0[0]["message"], "ping");
 }
@@ -194,4 +205,106 @@ fn a_date_that_no_calendar_has_is_printed_in_seconds() {
     let ping = Ping {}.frame(0).as_bytes().to_vec();
     let capture = PcapNg::new(UCP, &[(u64::MAX, 1, &ping)]).0;
     assert_eq!(times(&["-t", "absolute"], &capture), ["18446744073709 s"]);
+}
+
+/// A capture of these interfaces and packets: interface and bytes.
+fn of_lines(link_types: &[u16], packets: &[(u32, &[u8])]) -> Vec<u8> {
+    let (first, others) = link_types.split_first().unwrap();
+    let mut capture = PcapNg::new(*first, &[]);
+    for link_type in others {
+        capture.interface(*link_type);
+    }
+    for (at, (interface, bytes)) in packets.iter().enumerate() {
+        capture.packet(*interface, (T + at as u64, 0, bytes));
+    }
+    capture.0
+}
+
+#[test]
+fn the_nodes_of_each_line_have_modes_of_their_own() {
+    let node = NodeId::N1;
+    let write = *WriteRequest::velocity(node, Rps::new(1.0).unwrap()).as_bytes();
+    let speed = *VelocityResponse::new(node, Rps::ZERO).as_bytes();
+    let place = *PositionResponse::new(node, Position::new(0, 0)).as_bytes();
+    let packets: [(u32, &[u8]); 5] =
+        [(0, &speed), (0, &write), (1, &place), (0, &write), (1, &write)];
+    let (events, _) = decode(&[], &of_lines(&[IKEYA, IKEYA], &packets));
+    let modes: Vec<_> = events.iter().map(|event| event["mode"].as_str()).collect();
+    assert_eq!(modes, [None, Some("velocity"), None, Some("velocity"), Some("position")]);
+    // The two directions of a line have the same nodes, those of another recording do not.
+    let mut capture = PcapNg::new(IKEYA, &[(T, 1, &speed), (T, 2, &write)]).0;
+    capture.extend(PcapNg::new(IKEYA, &[(T, 2, &write)]).0);
+    let (events, _) = decode(&[], &capture);
+    let modes: Vec<_> = events.iter().map(|event| event["mode"].as_str()).collect();
+    assert_eq!(modes, [None, Some("velocity"), None]);
+}
+
+#[test]
+fn one_direction_of_a_bus_can_be_chosen_in_a_capture_too() {
+    let answer = *VelocityResponse::new(NodeId::N2, Rps::ZERO).as_bytes();
+    let line = [ReadRequest::new(NodeId::N2).as_bytes(), &answer[..]].concat();
+    let capture = of_lines(&[IKEYA], &[(0, &line)]);
+    for (direction, expected) in [("to-slave", "read_request"), ("to-master", "velocity_response")]
+    {
+        let (events, summary) = decode(&["--direction", direction], &capture);
+        let frames = events.iter().filter(|event| event["event"] == "frame");
+        let names: Vec<_> = frames.map(|frame| frame["message"].clone()).collect();
+        assert_eq!(names, [expected]);
+        assert_eq!(summary["received"], 12);
+    }
+}
+
+#[test]
+fn a_direction_is_refused_where_the_protocol_turns_out_to_be_ucp() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let read = *ReadRequest::new(NodeId::N2).as_bytes();
+    let says = "axle: --direction is for ikeya and ikeya-3: UCP frames show their own direction\n";
+    for input in [&ping, &of_lines(&[UCP], &[(0, &ping)])] {
+        let found = outcome(run(&["decode", "-d", "to-slave"], input));
+        assert_eq!(found, (String::new(), Some(2), says.to_owned()));
+    }
+    // What was decoded before is not lost.
+    let mixed = of_lines(&[IKEYA, UCP], &[(0, &read), (1, &ping)]);
+    let (listing, code, error) = outcome(run(&["decode", "-d", "to-slave"], &mixed));
+    assert!(listing.contains("read_request"), "{listing}");
+    assert_eq!((code, &*error), (Some(2), says));
+}
+
+#[test]
+fn what_precedes_an_interface_of_another_link_type_is_printed() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let capture = of_lines(&[UCP, 1], &[(0, &ping), (0, &ping[..3]), (1, &[1, 2, 3])]);
+    for style in ["--json", "--time=none"] {
+        let (listing, code, error) = outcome(run(&["decode", style], &capture));
+        assert!(listing.contains("ping") && listing.contains("skipped"), "{listing}");
+        assert!(!listing.contains("summary") && !listing.contains("received"), "{listing}");
+        let says = "axle: interface 1 (\"tty0\") has link type 1, ";
+        assert!(error.starts_with(says) && error.lines().count() == 1, "{error}");
+        assert_eq!(code, Some(1));
+    }
+}
+
+#[test]
+fn packets_in_obsolete_blocks_are_decoded() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let mut capture = PcapNg::new(UCP, &[]);
+    let times = [((T >> 32) as u32).to_le_bytes(), (T as u32).to_le_bytes()].concat();
+    capture.block(2, &[&[0; 4][..], &times, &[8, 0, 0, 0, 8, 0, 0, 0], &ping].concat());
+    let (events, summary) = decode(&[], &capture.0);
+    assert_eq!((&events[0]["message"], &events[0]["t"]), (&json!("ping"), &json!(T as f64 / 1e6)));
+    assert_eq!(summary["frames"], 1);
+}
+
+#[test]
+fn a_pause_ends_no_frame_but_the_end_of_a_section_does() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let whole = PcapNg::new(UCP, &[(T, 1, &ping[..3]), (T + 60_000_000, 1, &ping[3..])]).0;
+    assert_eq!(decode(&[], &whole).1["frames"], 1);
+    let halves = [&ping[..3], &ping[3..]].map(|half| PcapNg::new(UCP, &[(T, 1, half)]).0);
+    let (events, summary) = decode(&["-P", "ucp"], &[&halves[0][..], &halves[1], &whole].concat());
+    let lines: Vec<_> =
+        events.iter().map(|event| (&event["interface"], &event["length"])).collect();
+    let expected = [(0, 3), (1, 5), (2, 8)].map(|(interface, len)| (json!(interface), json!(len)));
+    assert_eq!(lines, expected.each_ref().map(|(interface, len)| (interface, len)));
+    assert_eq!((&summary["frames"], &summary["received"]), (&json!(1), &json!(16)));
 }

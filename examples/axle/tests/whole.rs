@@ -124,7 +124,7 @@ fn the_protocol_is_found_out_and_the_tool_says_how_sure_it_is() {
     let line: serde_json::Value = serde_json::from_str(ikeya.0.lines().next().unwrap()).unwrap();
     let expected = serde_json::json!({
         "event": "protocol", "protocol": "ikeya", "received": 90,
-        "framed": {"ikeya": 68, "ikeya-3": 20, "ucp": 0},
+        "framed": {"ikeya": 68, "ikeya-3": 24, "ucp": 0},
     });
     assert_eq!(line, expected);
     // The rest is as with the protocol given.

@@ -78,14 +78,19 @@ fn account<F: Framing>(
         Some(end) => place(end)?,
         None => buffer.len(),
     };
-    let mut frames = Frames::<F>::new(buffer.get(first..last)?);
+    // Only the end of the file cuts a candidate off.
+    Some(of_bytes::<F>(buffer.get(first..last)?))
+}
+
+/// The account of these bytes, behind which nothing follows (ruling B3).
+pub(super) fn of_bytes<F: Framing>(bytes: &[u8]) -> Counters {
+    let mut frames = Frames::<F>::new(bytes);
     frames.each(|_| {});
     while !frames.rest().is_empty() {
-        // Only at the end of the file: a candidate that it cuts off.
         frames.idle();
         frames.each(|_| {});
     }
-    Some(frames.counters())
+    frames.counters()
 }
 
 /// Fills `bytes` from this offset.

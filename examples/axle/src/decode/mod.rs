@@ -3,8 +3,11 @@
 mod account;
 mod capture;
 mod detect;
+mod framing;
 mod parallel;
+mod printer;
 mod stream;
+mod walk;
 
 use std::{
     io::{self, Write},
@@ -12,31 +15,35 @@ use std::{
     thread,
 };
 
-use axlewire::{
-    ikeya::{self, three},
-    stream::{Counters, Framing},
-    ucp,
-};
-use clap::ValueEnum;
+use axlewire::stream::{Counters, Framing};
+use clap::{ValueEnum, builder::PossibleValue};
 
 use crate::{
     EXIT_CODES,
     args::Protocol,
     failure::Failure,
     input::{self, Input},
-    listing::{self, Modes, Shown, Style, TimeColumn},
+    listing::{Modes, Shown, Style, TimeColumn},
     pcapng,
 };
 use detect::Share;
+pub(crate) use framing::Choice;
+use framing::for_framing;
+use printer::Printer;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
+pub(crate) use walk::walk;
+
+/// The most threads that are used: each has its own buffers.
+const MOST_JOBS: usize = 16;
 
 /// List the frames of a capture, and the gaps between them
 ///
 /// Reads raw bytes, or pcapng as `axle record` writes it; standard input too. Every byte appears in
 /// exactly one line: a frame, or a gap with the reason why no frame starts there. The end of the
-/// input counts as a quiet line: a truncated frame becomes a gap. Memory use does not grow with the
-/// input.
+/// input, or of a section of pcapng, counts as a quiet line: a truncated frame becomes a gap. Times
+/// do not: how long a line was quiet cannot be told from the moments at which its bytes were read.
+/// Memory use does not grow with the input.
 ///
 /// The time of a frame is that of its last byte: of the moment when the recording program got it
 /// from the system, with all bytes of the same chunk. Behind a USB adapter, that can be 16 ms after
@@ -44,10 +51,10 @@ pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    /// Protocol of the line; auto takes that of a pcapng file, or the one with the most frames at
-    /// the beginning of raw bytes
+    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
+    /// most bytes at the beginning of raw bytes
     #[arg(short = 'P', long, value_enum, default_value = "auto")]
-    protocol: Choice,
+    protocol: Named,
 
     /// Ikeya: decode packets of one direction only; by default, of both
     #[arg(short, long, value_enum)]
@@ -65,7 +72,8 @@ pub(crate) struct Args {
     #[arg(short, long, value_enum, default_value = "relative")]
     time: TimeColumn,
 
-    /// Threads for a file of raw bytes; by default, as many as there are cores
+    /// Threads for a file of raw bytes, at most 16 of which are used; by default, as many as there
+    /// are cores
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     jobs: Option<u16>,
 
@@ -74,65 +82,51 @@ pub(crate) struct Args {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Direction {
+pub(crate) enum Direction {
     /// Sent by the master
     ToSlave,
     /// Sent by the slaves
     ToMaster,
 }
 
-/// What `--protocol` accepts.
-#[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
-enum Choice {
-    /// Find it out
-    Auto,
-    /// Link between the Linux board and the robot of a rover
-    Ucp,
-    /// Motor bus, one motor per board
-    Ikeya,
-    /// Motor bus, three motors per board
-    #[value(name = "ikeya-3")]
-    Ikeya3,
-}
+/// What `--protocol` accepts: a protocol, or `None` for auto.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+struct Named(Option<Protocol>);
 
-impl Choice {
-    const fn protocol(self) -> Option<Protocol> {
-        match self {
-            Self::Auto => None,
-            Self::Ucp => Some(Protocol::Ucp),
-            Self::Ikeya => Some(Protocol::Ikeya),
-            Self::Ikeya3 => Some(Protocol::Ikeya3),
-        }
+impl ValueEnum for Named {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [Named; 4] = [
+            Named(None),
+            Named(Some(Protocol::Ucp)),
+            Named(Some(Protocol::Ikeya)),
+            Named(Some(Protocol::Ikeya3)),
+        ];
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let auto = || Some(PossibleValue::new("auto").help("Find it out"));
+        self.0.as_ref().map_or_else(auto, Protocol::to_possible_value)
     }
 }
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let chosen = args.protocol.protocol();
-    if args.direction.is_some() && chosen == Some(Protocol::Ucp) {
-        let line = "--direction is for ikeya and ikeya-3: UCP frames show their own direction";
-        return Err(Failure::Usage(line.to_owned()));
+    let choice = Choice { protocol: args.protocol.0, direction: args.direction };
+    if let Some(protocol) = choice.protocol {
+        choice.permits(protocol)?;
     }
     let mut input = Input::open(args.file.as_deref())?;
     if input.is_pcapng()? {
-        return capture::run(args, input, chosen);
+        return capture::run(args, input, choice);
     }
-    let protocol = match chosen {
+    let protocol = match choice.protocol {
         Some(protocol) => protocol,
-        None => detected(args, &mut input)?,
-    };
-    let direction = if protocol == Protocol::Ucp { None } else { args.direction };
-    let run = match (protocol, direction) {
-        (Protocol::Ucp, _) => decode::<ucp::Ucp>,
-        (Protocol::Ikeya, None) => decode::<ikeya::BothDirections>,
-        (Protocol::Ikeya, Some(Direction::ToSlave)) => decode::<ikeya::ToSlave>,
-        (Protocol::Ikeya, Some(Direction::ToMaster)) => decode::<ikeya::ToMaster>,
-        (Protocol::Ikeya3, None) => decode::<three::BothDirections>,
-        (Protocol::Ikeya3, Some(Direction::ToSlave)) => decode::<three::ToSlave>,
-        (Protocol::Ikeya3, Some(Direction::ToMaster)) => decode::<three::ToMaster>,
+        None => detected(args, choice, &mut input)?,
     };
     // For a hint at the end, if there are no frames.
     input.keep_first(detect::SAMPLE_LEN);
+    let run = for_framing!(decode, protocol, choice.direction);
     let account = run(args, protocol, &mut input)?;
     if account.frames == 0 && account.received > 0 {
         return Err(Failure::Failed(no_frame(protocol, &account, &detect::shares(input.first()))));
@@ -142,45 +136,42 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 /// A stream of this protocol, in one direction of a line.
 pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box<dyn Stream> {
-    capture::stream(protocol, None, Some(direction))
+    Choice::default().stream(protocol, None, Some(direction))
 }
 
-/// All frames of a capture, and the modes of the nodes at its end. `chosen` is needed for raw
+/// All frames of a capture of one line, and the modes of its nodes. `chosen` is needed for raw
 /// bytes.
+///
+/// The frames are for one line again. So there may be no other in the capture, and no doubt about
+/// how a command was meant: its node must not have changed its mode (ruling I3).
 pub(crate) fn frames_of(
     path: &Path,
     chosen: Option<Protocol>,
 ) -> Result<(Protocol, Vec<Taken>, Modes), Failure> {
     let mut input = Input::open(Some(path))?;
-    let (mut sheet, mut found) = (Sheet::new(None), chosen);
-    sheet.taken = Some(Vec::new());
-    if input.is_pcapng()? {
-        let mut mixed = false;
-        let walked = capture::walk(&mut input, chosen, &mut sheet, |protocol, _| {
-            mixed |= *found.get_or_insert(protocol) != protocol;
-            Ok(())
-        })?;
-        if let Some(problem) = walked.problem {
-            return Err(problem.failure(Some(path.to_owned())));
+    let mut sheet = Sheet::new(None);
+    sheet.taken = Some(Default::default());
+    let choice = Choice { protocol: chosen, direction: None };
+    let mut found = None;
+    let walked = walk(&mut input, choice, &mut sheet, |next, _| {
+        let (_, interface) = *found.get_or_insert((next.protocol, next.interface));
+        if interface != next.interface {
+            return Err(Failure::Failed(format!("{path:?} has more than one line")));
         }
-        if mixed {
-            return Err(Failure::Failed(format!("{path:?} has lines of several protocols")));
-        }
-    } else if let Some(protocol) = chosen {
-        let mut stream = capture::stream(protocol, None, None);
-        loop {
-            let bytes = input.read()?;
-            if bytes.is_empty() {
-                break;
-            }
-            stream.feed(bytes, None, &mut sheet);
-        }
-        stream.finish(&mut sheet);
+        Ok(true)
+    });
+    if let Some(failure) = walked.broken {
+        return Err(failure);
     }
-    let protocol = found.ok_or_else(|| {
-        Failure::Usage("--protocol is needed for a capture of raw bytes".to_owned())
-    })?;
-    Ok((protocol, sheet.taken.take().unwrap_or_default(), sheet.modes))
+    let protocol = found.map(|(protocol, _)| protocol).or(chosen);
+    let protocol = protocol.ok_or_else(|| Failure::Failed(format!("{path:?} has no bytes")))?;
+    let (taken, turned) = sheet.taken.unwrap_or_default();
+    let mut commanded = taken.iter().filter_map(|taken| taken.commands);
+    if let Some(node) = commanded.find(|node| turned.contains(node)) {
+        let line = format!("node {node} changes its mode in {path:?}: its commands are ambiguous");
+        return Err(Failure::Failed(line));
+    }
+    Ok((protocol, taken, walked.modes))
 }
 
 /// What to say if there was no frame of `protocol`.
@@ -197,7 +188,7 @@ fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> Stri
 }
 
 /// Finds out the protocol of raw bytes, and says how sure it is.
-fn detected(args: &Args, input: &mut Input) -> Result<Protocol, Failure> {
+fn detected(args: &Args, choice: Choice, input: &mut Input) -> Result<Protocol, Failure> {
     let sample = input.peek(detect::SAMPLE_LEN, |sample| {
         detect::is_sure(&detect::shares(sample), sample.len())
     })?;
@@ -205,8 +196,11 @@ fn detected(args: &Args, input: &mut Input) -> Result<Protocol, Failure> {
     let [best, others @ ..] = &shares;
     if best.framed == 0 && len > 0 {
         let line = format!("no frame of any protocol in the first {len} bytes");
-        return Err(Failure::Failed(line));
+        let hint =
+            if len < detect::SAMPLE_LEN { "" } else { ": use --protocol to decode them all" };
+        return Err(Failure::Failed(line + hint));
     }
+    choice.permits(best.protocol)?;
     let mut out = io::stdout().lock();
     let told = match (args.json, len) {
         (_, 0) => Ok(()),
@@ -256,22 +250,28 @@ where
     let style = style(args, protocol, false);
     let mut printer = Printer::new(args.json, style);
     let cores = || thread::available_parallelism().map_or(1, |cores| cores.get());
-    let jobs = args.jobs.map_or_else(cores, usize::from);
+    let jobs = args.jobs.map_or_else(cores, usize::from).min(MOST_JOBS);
     let (mut sheet, mut account, mut stream) =
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
-    if let (Some((file, len)), None, 2..) = (input.file(), style, jobs)
-        && let Some(account) = account::of_file::<F>(file, len, jobs)
-    {
-        printer.finish(&account, 0)?;
-        return Ok(account);
-    }
     // A stream may be slow, and its lines are wanted as they come.
-    if input.file().is_some() && jobs > 1 {
-        let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
-        stream = StreamOf::new(rest.offset);
-        (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
-        stream.feed(&rest.bytes, None, &mut sheet);
+    match (input.file(), style) {
+        (Some((file, len)), None) if jobs > 1 => {
+            if let Some(account) = account::of_file::<F>(file, len, jobs) {
+                printer.finish(&account, 0)?;
+                return Ok(account);
+            }
+        }
+        (Some(_), Some(style)) if jobs > 1 => {
+            let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
+            stream = StreamOf::new(rest.offset);
+            (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
+            for piece in rest.bytes.chunks(walk::PIECE) {
+                stream.feed(piece, None, &mut sheet);
+                printer.print_sheet(&mut sheet)?;
+            }
+        }
+        _ => {}
     }
     while broken.is_none() {
         match input.read() {
@@ -289,9 +289,9 @@ where
         }
     }
     if let Some(failure) = broken {
-        // What was decoded is still valid; the missing summary shows that it is incomplete.
         printer.print_sheet(&mut sheet)?;
-        printer.flush()?;
+        account += stream.counters();
+        printer.break_off(&account, 0)?;
         return Err(failure);
     }
     stream.finish(&mut sheet);
@@ -299,63 +299,4 @@ where
     account += stream.counters();
     printer.finish(&account, 0)?;
     Ok(account)
-}
-
-/// Writes lines to standard output, with the titles in front of the first and the summary behind
-/// the last.
-struct Printer {
-    out: io::BufWriter<io::StdoutLock<'static>>,
-    is_json: bool,
-    style: Option<Style>,
-    has_lines: bool,
-}
-
-impl Printer {
-    fn new(is_json: bool, style: Option<Style>) -> Self {
-        let out = io::BufWriter::with_capacity(64 * 1024, io::stdout().lock());
-        Self { out, is_json, style, has_lines: false }
-    }
-
-    fn print(&mut self, lines: &[u8]) -> Result<(), Failure> {
-        if lines.is_empty() {
-            return Ok(());
-        }
-        if !self.has_lines {
-            self.has_lines = true;
-            let mut titles = listing::Out::default();
-            if let Some(style) = &self.style {
-                style.titles(&mut titles);
-            }
-            self.out.write_all(&titles.0).map_err(Failure::Write)?;
-        }
-        self.out.write_all(lines).map_err(Failure::Write)
-    }
-
-    /// Prints the lines of a sheet, and empties it.
-    fn print_sheet(&mut self, sheet: &mut Sheet) -> Result<(), Failure> {
-        self.print(&sheet.out.0)?;
-        sheet.out.0.clear();
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<(), Failure> {
-        self.out.flush().map_err(Failure::Write)
-    }
-
-    fn finish(mut self, account: &Counters, times_back: u64) -> Result<(), Failure> {
-        let printed = if self.is_json {
-            let mut line = listing::Out::default();
-            listing::json_summary(&mut line, account, 0, times_back);
-            self.out.write_all(&line.0)
-        } else {
-            listing::print_summary(&mut self.out, account, 0, self.has_lines).and_then(|()| {
-                match times_back {
-                    0 => Ok(()),
-                    times => writeln!(self.out, "{times:>10} times the clock went backwards"),
-                }
-            })
-        };
-        printed.map_err(Failure::Write)?;
-        self.flush()
-    }
 }

@@ -23,15 +23,15 @@ use crate::{
     listing::{Modes, Shown, Style},
 };
 
-/// Bytes of all parts of which only the account is needed.
-const ACCOUNTED: usize = 2 * 1024 * 1024;
+/// Bytes of one part per thread.
+const LISTED: usize = 192 * 1024;
 
-/// Bytes of all parts of which lines are written: the lines are up to 25 times as long.
-const LISTED: usize = 256 * 1024;
+/// The lines are up to this many times as long as the bytes.
+const GROWTH: usize = 40;
 
 /// A stretch without a place to split becomes a part of at most this length; then the rest of the
 /// file is decoded by one thread.
-const LONGEST_PART: usize = 4 * 1024 * 1024;
+const LONGEST_PART: usize = 96 * 1024;
 
 /// How far in front of the end of what was read a place to split is looked for first.
 const NEAR_END: usize = 1024;
@@ -72,7 +72,7 @@ pub(super) struct Rest {
 /// is left for one thread: at least the bytes behind the last place to split.
 pub(super) fn list<F>(
     input: &mut Input,
-    style: Option<Style>,
+    style: Style,
     jobs: usize,
     mut write: impl FnMut(&[u8]) -> Result<(), Failure>,
 ) -> Result<Rest, Failure>
@@ -80,8 +80,7 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    let all = if style.is_none() { ACCOUNTED } else { LISTED };
-    let part_len = (all / jobs).clamp(16 * 1024, 512 * 1024);
+    let part_len = LISTED / jobs;
     let (parts, queue) = mpsc::channel::<Part>();
     let (done, results) = mpsc::channel();
     let queue = Mutex::new(queue);
@@ -97,14 +96,16 @@ where
         let mut reading =
             Reading { input, rest: Vec::new(), offset: 0, is_over: false, failure: None, modes };
         let mut writing = Writing::default();
-        let (mut sent, mut written) = (0, 0);
+        let (mut sent, mut written, mut under_way) = (0, 0, 0);
         loop {
-            // One part more than there are threads, so that none waits for the reading.
-            while sent <= written + jobs && !reading.is_over {
+            // One part more than there are threads, so that none waits for the reading; fewer if
+            // they are long, because their lines are held in memory.
+            while sent <= written + jobs && under_way <= LISTED && !reading.is_over {
                 let room = writing.spare.pop().unwrap_or_default();
                 match reading.next_part::<F>(part_len, room, sent) {
                     Ok(Some(part)) => {
                         sent += 1;
+                        under_way += part.bytes.len();
                         // The workers live as long as this end of the queue.
                         let _ = parts.send(part);
                     }
@@ -123,13 +124,20 @@ where
             writing.waiting.insert(listed.number, listed);
             while let Some(listed) = writing.waiting.remove(&written) {
                 written += 1;
+                under_way -= listed.buffer.len();
                 writing.account += listed.account;
                 if let Err(failure) = write(&listed.lines) {
                     // The reader of the output has gone: nothing else matters.
                     drop(parts);
                     return Err(failure);
                 }
-                writing.spare.push((listed.buffer, listed.lines));
+                let (mut buffer, mut lines) = (listed.buffer, listed.lines);
+                buffer.clear();
+                lines.clear();
+                // Room for a long part is not kept.
+                buffer.shrink_to(2 * part_len);
+                lines.shrink_to(2 * GROWTH * part_len);
+                writing.spare.push((buffer, lines));
             }
         }
         drop(parts);
@@ -172,7 +180,7 @@ impl Reading<'_> {
     fn next_part<F: Framing>(
         &mut self,
         part_len: usize,
-        (mut bytes, mut lines): (Vec<u8>, Vec<u8>),
+        (mut bytes, lines): (Vec<u8>, Vec<u8>),
         number: usize,
     ) -> Result<Option<Part>, Failure> {
         let mut len = part_len;
@@ -194,8 +202,6 @@ impl Reading<'_> {
                 None => len = self.rest.len() + part_len / 2,
             }
         };
-        bytes.clear();
-        lines.clear();
         bytes.extend_from_slice(self.rest.get(end..).unwrap_or_default());
         self.rest.truncate(end);
         core::mem::swap(&mut bytes, &mut self.rest);
@@ -208,7 +214,7 @@ impl Reading<'_> {
 }
 
 /// Lists parts until there are no more.
-fn work<F>(queue: &Mutex<Receiver<Part>>, done: &Sender<Listed>, style: Option<Style>)
+fn work<F>(queue: &Mutex<Receiver<Part>>, done: &Sender<Listed>, style: Style)
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
@@ -219,33 +225,20 @@ where
             Err(_) => return,
         };
         let Ok(part) = next else { return };
-        let listed = match style {
-            None => account::<F>(part),
-            Some(_) => lines::<F>(part, style),
-        };
-        if done.send(listed).is_err() {
+        if done.send(lines::<F>(part, style)).is_err() {
             return;
         }
     }
 }
 
-fn account<F: Framing>(part: Part) -> Listed {
-    let mut frames = Frames::<F>::new(&part.bytes);
-    frames.each(|_| {});
-    let account = frames.counters();
-    // Nobody asks for the modes, but the next part waits for them.
-    let _ = part.next.send(Modes::default());
-    Listed { number: part.number, lines: part.lines, account, buffer: part.bytes }
-}
-
-fn lines<F>(part: Part, style: Option<Style>) -> Listed
+fn lines<F>(part: Part, style: Style) -> Listed
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
     let mut learned = Modes::default();
     Frames::<F>::new(&part.bytes).each(|frame| frame.teach(&mut learned));
-    let mut sheet = Sheet::new(style);
+    let mut sheet = Sheet::new(Some(style));
     sheet.out.0 = part.lines;
     sheet.modes = part.modes.recv().unwrap_or_default();
     let mut after = sheet.modes;

@@ -1,6 +1,6 @@
 //! The events of one stream of bytes, as lines.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use axlewire::{
     ikeya::NodeId,
@@ -8,29 +8,36 @@ use axlewire::{
 };
 
 use crate::{
-    listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style},
+    listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style, Table},
     pcapng::Direction,
 };
 
 /// Length of the longest frame of any protocol.
 pub(crate) const BUFFER_LEN: usize = axlewire::ucp::MAX_LEN;
 
-/// The lines of a listing, and what they need to know of the lines before.
-#[derive(Debug)]
+/// What becomes of the frames: the lines of a listing, and what they need to know of the lines
+/// before; their counts; the frames themselves.
 pub(crate) struct Sheet {
     /// `None` if no lines are wanted.
     pub(crate) style: Option<Style>,
     pub(crate) out: Out,
     clock: LineClock,
+    /// Modes of the nodes on the line whose bytes are fed.
     pub(crate) modes: Modes,
-    /// The frames themselves, if they are wanted.
-    pub(crate) taken: Option<Vec<Taken>>,
+    /// The frames themselves, if they are wanted, and the nodes that changed their modes meanwhile.
+    pub(crate) taken: Option<(Vec<Taken>, BTreeSet<NodeId>)>,
+    /// Their counts, if they are wanted.
+    pub(crate) table: Option<Table>,
+    /// How many more frames are wanted, if not all.
+    pub(crate) wanted: Option<u64>,
 }
 
 /// A frame of a capture.
 #[derive(Clone, Debug)]
 pub(crate) struct Taken {
     pub(crate) micros: Option<u64>,
+    /// As seen by the program that has recorded it.
+    pub(crate) direction: Option<Direction>,
     pub(crate) bytes: Box<[u8]>,
     /// The node whose mode says how to read it, if there is one.
     pub(crate) commands: Option<NodeId>,
@@ -44,6 +51,41 @@ impl Sheet {
             clock: LineClock::default(),
             modes: Modes::default(),
             taken: None,
+            table: None,
+            wanted: None,
+        }
+    }
+
+    /// Whether no more frames are wanted.
+    pub(crate) fn is_full(&self) -> bool {
+        self.wanted == Some(0)
+    }
+
+    /// Whether only the account of the bytes is wanted.
+    const fn is_blank(&self) -> bool {
+        self.style.is_none()
+            && self.taken.is_none()
+            && self.table.is_none()
+            && self.wanted.is_none()
+    }
+
+    fn take(&mut self, at: Place, frame: &impl Shown) {
+        if let Some(style) = self.style {
+            style.frame(&mut self.out, &mut self.clock, at, frame, &self.modes);
+        }
+        if let Some(table) = &mut self.table {
+            table.count_in(frame, &self.modes);
+        }
+        let before = self.modes;
+        frame.teach(&mut self.modes);
+        if let Some((taken, turned)) = &mut self.taken {
+            let (micros, bytes) = (at.micros, frame.bytes().into());
+            let (direction, commands) = (at.direction, frame.commands());
+            taken.push(Taken { micros, direction, bytes, commands });
+            turned.extend(before.conflict(&self.modes));
+        }
+        if let Some(wanted) = &mut self.wanted {
+            *wanted -= 1;
         }
     }
 }
@@ -94,7 +136,8 @@ where
     }
 
     fn drain(&mut self, bytes: &mut &[u8], sheet: &mut Sheet) {
-        while let Some(event) = self.decoder.decode(bytes) {
+        while !sheet.is_full() {
+            let Some(event) = self.decoder.decode(bytes) else { break };
             match event {
                 Event::Skipped(gap) => {
                     let at = place_of(&mut self.place, &mut self.chunks, gap.len);
@@ -120,18 +163,9 @@ where
                     }
                     let length = frame.bytes().len() as u64;
                     let at = place_of(&mut self.place, &mut self.chunks, length);
-                    if sheet.style.is_none() && sheet.taken.is_none() {
-                        continue;
+                    if !sheet.is_blank() {
+                        sheet.take(at, &frame);
                     }
-                    if let Some(style) = sheet.style {
-                        style.frame(&mut sheet.out, &mut sheet.clock, at, &frame, &sheet.modes);
-                    }
-                    if let Some(taken) = &mut sheet.taken {
-                        let (micros, bytes) = (at.micros, frame.bytes().into());
-                        let commands = frame.commands();
-                        taken.push(Taken { micros, bytes, commands });
-                    }
-                    frame.teach(&mut sheet.modes);
                 }
             }
         }
@@ -144,14 +178,22 @@ where
     for<'a> F::Frame<'a>: Shown,
 {
     fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet) {
-        if let Some(micros) = micros {
+        if let (Some(micros), false) = (micros, bytes.is_empty()) {
             let end = self.decoder.received() + bytes.len() as u64;
             self.chunks.push_back((end, micros));
         }
         self.drain(&mut &*bytes, sheet);
+        // The next event ends with the last decided byte at the earliest. A gap may be endless, so
+        // what is before is not kept.
+        let decided = self.decoder.received() - self.decoder.pending() as u64;
+        forget_before(&mut self.chunks, decided);
     }
 
     fn finish(&mut self, sheet: &mut Sheet) {
+        if sheet.is_full() {
+            // What is pending might be one frame more.
+            return;
+        }
         // Each call rejects a truncated frame and continues the search inside it, so that a frame
         // behind a false header is still found (ruling B3).
         loop {
@@ -181,14 +223,16 @@ fn list_gap(sheet: &mut Sheet, at: Place, gap: &SkippedBytes) {
 fn place_of(next: &mut Place, chunks: &mut VecDeque<(u64, u64)>, length: u64) -> Place {
     let mut place = *next;
     next.offset += length;
-    while let Some(&(end, micros)) = chunks.front() {
-        if next.offset <= end {
-            place.micros = Some(micros);
-            break;
-        }
+    forget_before(chunks, next.offset);
+    place.micros = chunks.front().map(|&(_, micros)| micros);
+    place
+}
+
+/// Drops the chunks in which no event ends any more: the next ends at this offset or behind it.
+fn forget_before(chunks: &mut VecDeque<(u64, u64)>, offset: u64) {
+    while chunks.front().is_some_and(|&(end, _)| end < offset) {
         chunks.pop_front();
     }
-    place
 }
 
 /// The account of the bytes skipped in between.

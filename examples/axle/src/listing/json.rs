@@ -2,7 +2,7 @@
 
 use axlewire::ikeya::Mode;
 
-use super::{Modes, Out, Place, REASONS, Shown, SkippedBytes};
+use super::{Modes, Out, Place, REASONS, Shown, SkippedBytes, pending};
 use axlewire::stream::Counters;
 
 pub(super) fn frame(out: &mut Out, at: Place, frame: &impl Shown, modes: &Modes) {
@@ -83,13 +83,13 @@ fn seconds(out: &mut Out, micros: u64) {
 }
 
 /// The last object of a listing.
-pub(crate) fn summary(out: &mut Out, account: &Counters, pending: usize, times_back: u64) {
+pub(crate) fn summary(out: &mut Out, account: &Counters, times_back: u64) {
     out.text(r#"{"event":"summary""#);
     let counts = [
         ("received", account.received),
         ("framed", account.framed),
         ("skipped", account.skipped()),
-        ("pending", pending as u64),
+        ("pending", pending(account)),
         ("frames", account.frames),
     ];
     for (name, count) in counts {

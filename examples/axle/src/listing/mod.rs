@@ -3,6 +3,7 @@
 mod json;
 mod row;
 mod shown;
+mod table;
 
 use std::fmt;
 
@@ -12,6 +13,7 @@ use crate::pcapng::Direction;
 pub(crate) use json::summary as json_summary;
 pub(crate) use row::{TimeColumn, print_summary};
 pub(crate) use shown::{Modes, Shown};
+pub(crate) use table::Table;
 
 /// Where and when an event was on the line.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,6 +41,11 @@ pub(crate) struct SkippedBytes {
 /// All reasons, in the order in which they are printed.
 pub(crate) const REASONS: [Reason; 5] =
     [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
+
+/// Number of bytes that are in no other count: they may still become a frame (ruling B2).
+const fn pending(counters: &Counters) -> u64 {
+    counters.received - counters.framed - counters.skipped()
+}
 
 /// The form of the lines.
 #[derive(Clone, Copy, Debug)]

@@ -7,13 +7,13 @@ use std::{
 
 use clap::ValueEnum;
 
-use super::{LineClock, Modes, Out, Place, REASONS, Shown, SkippedBytes};
+use super::{LineClock, Modes, Out, Place, REASONS, Shown, SkippedBytes, pending};
 use axlewire::stream::Counters;
 
 /// What the time column shows.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub(crate) enum TimeColumn {
-    /// No time column
+    /// No columns of time and direction
     None,
     /// Seconds since the first line
     Relative,
@@ -153,7 +153,6 @@ pub(super) fn six_digits(out: &mut Out, number: u64) {
 pub(crate) fn print_summary(
     out: &mut impl Write,
     counters: &Counters,
-    pending: usize,
     has_lines: bool,
 ) -> io::Result<()> {
     let Counters { received, framed, frames, .. } = *counters;
@@ -175,6 +174,7 @@ pub(crate) fn print_summary(
         }
     }
     writeln!(out)?;
+    let pending = pending(counters);
     if pending > 0 {
         writeln!(out, "{pending:>10} pending")?;
     }

@@ -26,6 +26,14 @@ impl Modes {
         }
     }
 
+    /// A node that has another mode in `others`.
+    pub(crate) fn conflict(&self, others: &Self) -> Option<NodeId> {
+        NodeId::ALL.into_iter().find(|&node| {
+            let modes = self.of(node).zip(others.of(node));
+            modes.is_some_and(|(mode, other)| mode != other)
+        })
+    }
+
     /// Takes over what is known later.
     pub(crate) fn update(&mut self, later: &Self) {
         for (known, later) in self.0.iter_mut().zip(later.0) {

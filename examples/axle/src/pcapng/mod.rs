@@ -3,7 +3,7 @@
 //! A file is a sequence of blocks: a section header, then one description per interface, then the
 //! packets. What `axle record` writes: one section, one interface with the name of the port, the
 //! protocol as its description, the baud rate as its speed and microseconds as its unit of time;
-//! one packet per frame, or per run of bytes between frames.
+//! one packet per frame, and one or more per run of bytes between frames.
 //!
 //! Written by hand: of two crates for pcapng, one takes every unit of time for nanoseconds, the
 //! other reads no binary units and no big-endian offsets, and to write files one pulls in a second
@@ -15,7 +15,7 @@ mod recording;
 mod write;
 
 pub(crate) use background::Background;
-pub(crate) use read::{Problem, Reader};
+pub(crate) use read::{Packet, Reader};
 pub(crate) use recording::Recording;
 pub(crate) use write::Writer;
 
@@ -27,6 +27,8 @@ pub(crate) const MAGIC: [u8; 4] = [0x0A, 0x0D, 0x0D, 0x0A];
 /// Types of blocks.
 mod block {
     pub(super) const INTERFACE: u32 = 1;
+    /// What old programs wrote instead of [`PACKET`]; its flags are the same.
+    pub(super) const OBSOLETE_PACKET: u32 = 2;
     pub(super) const SIMPLE_PACKET: u32 = 3;
     pub(super) const PACKET: u32 = 6;
 }
@@ -79,17 +81,23 @@ impl Direction {
     }
 }
 
-/// Link types for private use: USER0 to USER2.
+/// Link types for private use: USER0, USER1 and USER3. Wireshark takes USER2 for PKTAP.
 pub(crate) const fn link_type(protocol: Protocol) -> u16 {
     match protocol {
         Protocol::Ikeya => 147,
         Protocol::Ikeya3 => 148,
-        Protocol::Ucp => 149,
+        Protocol::Ucp => 150,
     }
 }
 
+/// UCP in captures of the first versions: USER2.
+const OLD_UCP: u16 = 149;
+
 /// The protocol of a link type; `None` for those of others.
 pub(crate) fn protocol_of(link_type_found: u16) -> Option<Protocol> {
+    if link_type_found == OLD_UCP {
+        return Some(Protocol::Ucp);
+    }
     [Protocol::Ikeya, Protocol::Ikeya3, Protocol::Ucp]
         .into_iter()
         .find(|&protocol| link_type(protocol) == link_type_found)

@@ -14,12 +14,20 @@ use crate::failure::Failure;
 /// interfaces in up to a few kilobytes and cut packets at 256 KiB.
 const LONGEST_BLOCK: usize = 1 << 20;
 
+/// Most accepted interfaces of one section: each is held in memory, and has streams of its own.
+const MOST_INTERFACES: usize = 1024;
+
+/// What is kept of the name of an interface, bytes.
+const LONGEST_NAME: usize = 256;
+
 /// An interface of the current section.
 #[derive(Clone, Debug)]
 pub(crate) struct Interface {
     pub(crate) link_type: u16,
-    /// As text, however it was written.
+    /// As text, however it was written; the beginning of a very long one.
     pub(crate) name: Option<String>,
+    /// Packets are cut at this length; 0 is none.
+    longest_packet: u32,
     unit: Unit,
     offset_s: i64,
 }
@@ -45,12 +53,25 @@ impl Unit {
 /// Bytes that a line carried, and when.
 #[derive(Debug)]
 pub(crate) struct Packet<'a> {
+    /// Number of the section. The lines of a section end with it.
+    pub(crate) section: u64,
     /// Number of the interface, counted through all sections.
     pub(crate) interface: usize,
+    pub(crate) described: &'a Interface,
     /// Microseconds since 1970; `None` if the block has no time.
     pub(crate) micros: Option<u64>,
     pub(crate) direction: Option<Direction>,
     pub(crate) bytes: &'a [u8],
+}
+
+/// A packet in the body of its block.
+struct Found {
+    /// Number of the interface in its section.
+    interface: usize,
+    micros: Option<u64>,
+    direction: Option<Direction>,
+    /// Where its bytes are.
+    bytes: Range<usize>,
 }
 
 /// Why reading ends before the end of the file.
@@ -101,9 +122,11 @@ pub(crate) struct Reader<R> {
     /// Offset of `start` in the file.
     offset: u64,
     is_big_endian: bool,
+    /// The interfaces of the current section.
     interfaces: Vec<Interface>,
-    /// First interface of the current section.
-    section: usize,
+    /// Number of interfaces in the sections before.
+    interfaces_before: usize,
+    section: u64,
     is_cut_off: bool,
 }
 
@@ -118,14 +141,10 @@ impl<R: Read> Reader<R> {
             offset: 0,
             is_big_endian: false,
             interfaces: Vec::new(),
+            interfaces_before: 0,
             section: 0,
             is_cut_off: false,
         }
-    }
-
-    /// The interfaces so far.
-    pub(crate) fn interfaces(&self) -> &[Interface] {
-        &self.interfaces
     }
 
     /// The next packet; `None` at the end. After a problem there is nothing more to read.
@@ -167,21 +186,31 @@ impl<R: Read> Reader<R> {
             let body = from + 8..from + if is_whole { held - 4 } else { held };
             match kind {
                 block::INTERFACE if is_whole => {
+                    if self.interfaces.len() == MOST_INTERFACES {
+                        let why = "its section has more than 1024 interfaces";
+                        return Err(Problem::Invalid { offset, why });
+                    }
                     let Some(interface) = self.interface(body) else {
                         let why = "it is too short for an interface";
                         return Err(Problem::Invalid { offset, why });
                     };
                     self.interfaces.push(interface);
                 }
-                block::PACKET | block::SIMPLE_PACKET if body.len() >= 20 || is_whole => {
-                    let begin = body.start;
-                    let found = self.buffer.get(body).unwrap_or_default();
-                    let (found, bytes) = self
-                        .packet(kind, found, is_whole)
+                block::PACKET | block::OBSOLETE_PACKET | block::SIMPLE_PACKET
+                    if is_whole || body.len() >= header_len(kind) =>
+                {
+                    let body = self.buffer.get(body).unwrap_or_default();
+                    let (found, described) = self
+                        .packet(kind, body, is_whole)
                         .map_err(|why| Problem::Invalid { offset, why })?;
-                    let bytes = begin + bytes.start..begin + bytes.end;
-                    let bytes = self.buffer.get(bytes).unwrap_or_default();
-                    return Ok(Some(Packet { bytes, ..found }));
+                    return Ok(Some(Packet {
+                        section: self.section,
+                        interface: self.interfaces_before + found.interface,
+                        described,
+                        micros: found.micros,
+                        direction: found.direction,
+                        bytes: body.get(found.bytes).unwrap_or_default(),
+                    }));
                 }
                 _ => {}
             }
@@ -200,17 +229,23 @@ impl<R: Read> Reader<R> {
         if self.peek(8) != Some(BYTE_ORDER) {
             return Err(self.invalid("it has no byte-order mark"));
         }
-        self.section = self.interfaces.len();
+        // Their numbers begin anew, and nothing refers to those before.
+        self.interfaces_before += self.interfaces.len();
+        self.interfaces.clear();
+        self.section += 1;
         Ok(())
     }
 
     fn interface(&self, body: Range<usize>) -> Option<Interface> {
         let body = self.buffer.get(body)?;
         let (link_type, options) = (self.u16(body.get(..2)?)?, body.get(8..)?);
-        let mut interface = Interface { link_type, name: None, unit: Unit(6), offset_s: 0 };
+        let longest_packet = self.u32(body.get(4..8)?)?;
+        let mut interface =
+            Interface { link_type, name: None, longest_packet, unit: Unit(6), offset_s: 0 };
         for (code, value) in self.options(options) {
             match (code, value) {
                 (option::INTERFACE_NAME, name) => {
+                    let name = name.get(..LONGEST_NAME).unwrap_or(name);
                     interface.name = Some(String::from_utf8_lossy(name).into_owned());
                 }
                 (option::TIME_UNIT, &[unit]) => interface.unit = Unit(unit),
@@ -228,36 +263,45 @@ impl<R: Read> Reader<R> {
         Some(interface)
     }
 
-    /// A packet without its bytes, and where they are in the body of its block.
+    /// The packet in the body of a block, and its interface.
     fn packet(
         &self,
         kind: u32,
         body: &[u8],
         is_whole: bool,
-    ) -> Result<(Packet<'static>, Range<usize>), &'static str> {
+    ) -> Result<(Found, &Interface), &'static str> {
         const SHORT: &str = "it is too short for a packet";
         let word = |at| self.u32(body.get(at..at + 4).ok_or(SHORT)?).ok_or(SHORT);
-        let (interface, len, begin) = match kind {
-            block::SIMPLE_PACKET => (self.section, word(0)?.min(body.len() as u32 - 4), 4),
-            _ => (self.section + word(0)? as usize, word(12)?, 20),
+        let interface = match kind {
+            block::SIMPLE_PACKET => 0,
+            // In half a word; the other half counts packets lost.
+            block::OBSOLETE_PACKET => self.u16(body.get(..2).ok_or(SHORT)?).ok_or(SHORT)?.into(),
+            _ => word(0)? as usize,
         };
         let described = self.interfaces.get(interface).ok_or("it names no interface")?;
+        let (begin, has_time) = (header_len(kind), kind != block::SIMPLE_PACKET);
+        let len = match (kind, described.longest_packet) {
+            // These name the length on the line only; padding may follow.
+            (block::SIMPLE_PACKET, longest @ 1..) => word(0)?.min(longest),
+            (block::SIMPLE_PACKET, 0) => word(0)?,
+            _ => word(12)?,
+        };
         let (len, held) = (len as usize, body.len().saturating_sub(begin));
         if is_whole && held < len {
             return Err("its packet is longer than the block");
         }
         let bytes = begin..begin + held.min(len);
-        let mut packet = Packet { interface, micros: None, direction: None, bytes: &[] };
-        if kind == block::PACKET {
+        let mut found = Found { interface, micros: None, direction: None, bytes };
+        if has_time {
             let time = u64::from(word(4)?) << 32 | u64::from(word(8)?);
             let offset_us = described.offset_s.saturating_mul(1_000_000);
-            packet.micros = Some(described.unit.micros(time).saturating_add_signed(offset_us));
+            found.micros = Some(described.unit.micros(time).saturating_add_signed(offset_us));
             let options = body.get(begin + len.next_multiple_of(4)..).unwrap_or_default();
             let flags = self.options(options).find(|(code, _)| *code == option::FLAGS);
             let flags = flags.and_then(|(_, flags)| self.u32(flags));
-            packet.direction = flags.and_then(Direction::from_flags);
+            found.direction = flags.and_then(Direction::from_flags);
         }
-        Ok((packet, bytes))
+        Ok((found, described))
     }
 
     /// Code and value of each option, up to the first that is cut off.
@@ -311,4 +355,9 @@ impl<R: Read> Reader<R> {
     fn invalid(&self, why: &'static str) -> Problem {
         Problem::Invalid { offset: self.offset, why }
     }
+}
+
+/// Number of bytes in front of those of a packet.
+const fn header_len(kind: u32) -> usize {
+    if kind == block::SIMPLE_PACKET { 4 } else { 20 }
 }

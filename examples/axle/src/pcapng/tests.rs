@@ -1,6 +1,6 @@
 //! What is written is read back; whatever else is read ends in a packet or a problem.
 
-use super::{Direction, Problem, Reader, Writer, protocol_of};
+use super::{Direction, Reader, Writer, link_type, protocol_of, read::Problem};
 use crate::args::Protocol;
 
 /// Time, direction and bytes of each packet, and the problem at the end.
@@ -64,8 +64,7 @@ fn what_is_written_is_read_back() {
     assert_eq!(seen, packets);
     assert!(problem.is_none());
     let mut reader = Reader::new(&bytes[..]);
-    reader.next().unwrap();
-    let interface = &reader.interfaces()[0];
+    let interface = reader.next().unwrap().unwrap().described;
     assert_eq!(interface.name.as_deref(), Some("/dev/ttyUSB0"));
     assert_eq!(protocol_of(interface.link_type), Some(Protocol::Ikeya3));
 }
@@ -129,9 +128,9 @@ fn packets_of_later_sections_have_interfaces_of_their_own() {
     let bytes = [one, two].concat();
     let mut reader = Reader::new(&bytes[..]);
     let first = reader.next().unwrap().unwrap();
-    assert_eq!((first.interface, first.micros), (0, Some(1)));
+    assert_eq!((first.interface, first.section, first.micros), (0, 1, Some(1)));
     let second = reader.next().unwrap().unwrap();
-    assert_eq!((second.interface, second.micros), (1, Some(2)));
+    assert_eq!((second.interface, second.section, second.micros), (1, 2, Some(2)));
     assert!(reader.next().unwrap().is_none());
 }
 
@@ -143,6 +142,72 @@ fn simple_packets_have_no_time_and_unknown_blocks_are_passed_over() {
     let (seen, problem) = read(&bytes);
     assert!(problem.is_none());
     assert_eq!(seen[1], (None, None, vec![7, 8]));
+}
+
+#[test]
+fn the_padding_of_a_simple_packet_is_no_part_of_it() {
+    // An interface that cuts packets at 5 bytes, and a packet that had 8 on the line.
+    let section =
+        block(false, 0x0A0D_0D0A, &[&0x1A2B_3C4D_u32.to_le_bytes()[..], &[0; 12]].concat());
+    let interface = block(false, 1, &[149, 0, 0, 0, 5, 0, 0, 0]);
+    let start = [section, interface].concat();
+    for (len_on_line, expected) in
+        [(8, &[1, 2, 3, 4, 5][..]), (5, &[1, 2, 3, 4, 5]), (3, &[1, 2, 3])]
+    {
+        let packet = block(false, 3, &[len_on_line, 0, 0, 0, 1, 2, 3, 4, 5, 0, 0, 0]);
+        let (seen, problem) = read(&[&start[..], &packet].concat());
+        assert!(problem.is_none());
+        assert_eq!(seen, [(None, None, expected.to_vec())], "{len_on_line}");
+    }
+    // Cut off by the end of the file.
+    let packet = block(false, 3, &[4, 0, 0, 0, 1, 2, 3, 4]);
+    let (seen, problem) = read(&[&start[..], &packet[..14]].concat());
+    assert_eq!(seen, [(None, None, vec![1, 2])]);
+    assert!(matches!(problem, Some(Problem::CutOff { .. })), "{problem:?}");
+}
+
+#[test]
+fn the_packets_of_old_programs_are_read() {
+    for is_big in [false, true] {
+        let word = |number: u32| if is_big { number.to_be_bytes() } else { number.to_le_bytes() };
+        let half = |number: u16| if is_big { number.to_be_bytes() } else { number.to_le_bytes() };
+        let mut bytes = with_option(is_big, 9, &[6], 1);
+        // Interface 0; 7 packets were lost before.
+        let flags = [&half(2)[..], &half(4), &word(1)].concat();
+        let words = [word(0), word(9), word(3), word(3)].concat();
+        let packet = [&half(0)[..], &half(7), &words, &[4, 5, 6, 0], &flags].concat();
+        bytes.extend(block(is_big, 2, &packet));
+        let (seen, problem) = read(&bytes);
+        assert!(problem.is_none(), "{problem:?}");
+        assert_eq!(seen[1], (Some(9), Some(Direction::In), vec![4, 5, 6]), "{is_big}");
+    }
+}
+
+#[test]
+fn a_section_has_a_limited_number_of_interfaces_and_names() {
+    let interface = block(false, 1, &[149, 0, 0, 0, 0, 0, 0, 0]);
+    let start = with_option(false, 2, &[b'x'; 60_000], 1);
+    let mut reader = Reader::new(&start[..]);
+    let name = reader.next().unwrap().unwrap().described.name.clone();
+    assert_eq!(name.unwrap().len(), 256);
+    let most = [&start[..], &interface.repeat(1023)].concat();
+    assert!(read(&most).1.is_none());
+    // Those of other sections do not count.
+    assert!(read(&most.repeat(2)).1.is_none());
+    let (seen, problem) = read(&[&most[..], &interface].concat());
+    assert_eq!(seen.len(), 1);
+    let expected = "its section has more than 1024 interfaces";
+    assert!(matches!(problem, Some(Problem::Invalid { why, .. }) if why == expected));
+}
+
+#[test]
+fn rovers_have_a_link_type_that_other_programs_give_no_meaning() {
+    assert_eq!(link_type(Protocol::Ucp), 150);
+    // Of captures before that.
+    assert_eq!(protocol_of(149), Some(Protocol::Ucp));
+    for protocol in [Protocol::Ucp, Protocol::Ikeya, Protocol::Ikeya3] {
+        assert_eq!(protocol_of(link_type(protocol)), Some(protocol));
+    }
 }
 
 #[test]
@@ -159,6 +224,7 @@ fn an_invalid_block_is_named_with_its_offset() {
         (block(false, 6, &packet(1, 4)), "it names no interface"),
         (block(false, 6, &packet(0, 5)), "its packet is longer than the block"),
         (block(false, 6, &[0; 8]), "it is too short for a packet"),
+        (block(false, 3, &[5, 0, 0, 0, 9, 9, 9, 9]), "its packet is longer than the block"),
         (block(false, 1, &[0; 4]), "it is too short for an interface"),
         (block(false, 0x0A0D_0D0A, &[0; 16]), "it has no byte-order mark"),
         (odd, "its length is not a multiple of 4 above 8"),

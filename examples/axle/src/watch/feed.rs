@@ -5,11 +5,12 @@ use axlewire::{
     stream::{Counters, Decoder, Event, Framing},
 };
 
-use super::{
-    model::{Heard, Model},
-    table::Table,
+use super::model::{Heard, Model};
+use crate::{
+    decode::BUFFER_LEN,
+    line::QUIET,
+    listing::{Shown, Table},
 };
-use crate::{decode::BUFFER_LEN, line::QUIET, listing::Shown};
 
 /// Where bytes come from.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -119,11 +120,6 @@ where
         let mut counters = self.received.decoder.counters();
         counters += self.sent.decoder.counters();
         counters
-    }
-
-    /// Number of bytes that may still become a frame.
-    pub(crate) const fn pending(&self) -> usize {
-        self.received.decoder.pending() + self.sent.decoder.pending()
     }
 
     /// The counts, if there are any.

@@ -8,12 +8,12 @@ use axlewire::{
     time::Duration,
 };
 
-use super::{Watched, recorder::Recorder, table::Table};
+use super::{Watched, recorder::Recorder};
 use crate::{
     decode::BUFFER_LEN,
     failure::Failure,
     line::{Line, PATIENCE, QUIET},
-    listing::Shown,
+    listing::{Shown, Table},
     signals::Signals,
 };
 
@@ -71,7 +71,7 @@ where
         table.measure_all(now);
         table.print_json(&mut out, "summary", &counters, now)
     } else {
-        table.finish(&mut out, &counters, decoder.pending(), now)
+        table.finish(&mut out, &counters, now)
     };
     told.map_err(Failure::Write)?;
     broken?;

@@ -18,7 +18,6 @@ mod page;
 mod recorder;
 #[cfg(all(unix, feature = "dashboard"))]
 mod screen;
-mod table;
 
 use std::path::PathBuf;
 

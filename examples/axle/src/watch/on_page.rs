@@ -12,11 +12,11 @@ use super::{
     page::View,
     recorder::Recorder,
     screen::{self, Sink},
-    table::Table,
 };
 use crate::{
     failure::Failure,
     line::{Line, PATIENCE},
+    listing::Table,
     signals::{self, Signals},
 };
 
@@ -49,10 +49,10 @@ where
 
     let recorded = watch.recorder.finish();
     let feed = watch.dashboard.leave();
-    let (counters, pending) = (feed.counters(), feed.pending());
+    let counters = feed.counters();
     let mut out = io::stdout().lock();
     if let Some(mut table) = feed.into_table() {
-        table.finish(&mut out, &counters, pending, clock.now()).map_err(Failure::Write)?;
+        table.finish(&mut out, &counters, clock.now()).map_err(Failure::Write)?;
     }
     broken?;
     watch.failed.map_or(recorded, Err)

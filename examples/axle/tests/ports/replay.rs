@@ -112,6 +112,21 @@ fn a_node_that_changes_its_mode_ends_the_replay_and_is_stopped_in_its_new_mode()
 }
 
 #[test]
+fn an_echo_in_the_recording_is_not_sent() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
+        let answer = *VelocityResponse::new(NodeId::N1, Rps::ZERO).as_bytes();
+        let packets: [Packet<'_>; 3] = [(0, 2, &write), (10, 1, &write), (20, 1, &answer)];
+        let path = file("echo.pcapng", &PcapNg::new(147, &packets).0);
+        let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
+        Process::start(&replay).success();
+        let said = speeds(&line.said());
+        assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 1, "{said:?}");
+    });
+}
+
+#[test]
 fn a_speed_above_the_limit_is_found_before_anything_is_sent() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});

@@ -43,7 +43,7 @@ impl PcapNg {
         self.block(6, &body);
     }
 
-    fn block(&mut self, kind: u32, body: &[u8]) {
+    pub(crate) fn block(&mut self, kind: u32, body: &[u8]) {
         let len = body.len() as u32 + 12;
         self.0.extend([kind.to_le_bytes(), len.to_le_bytes()].concat());
         self.0.extend(body);

@@ -11,11 +11,8 @@ use axlewire::{
 };
 use serde::Serialize;
 
-use crate::{
-    args::Protocol,
-    decode::BUFFER_LEN,
-    listing::{self, Modes, Out, REASONS, Shown},
-};
+use super::{Modes, Out, REASONS, Shown, pending, print_summary};
+use crate::args::Protocol;
 
 /// The time over which a rate is measured.
 const RATE_PERIOD: Duration = Duration::from_millis(1000);
@@ -26,6 +23,7 @@ pub(crate) struct Table {
     rows: BTreeMap<(u8, &'static str), Row>,
     start: Instant,
     measured_at: Instant,
+    /// Modes on the only line.
     modes: Modes,
 }
 
@@ -48,6 +46,7 @@ struct Record<'a> {
     received: u64,
     framed: u64,
     skipped: u64,
+    pending: u64,
     frames: u64,
     skipped_by: BTreeMap<&'static str, u64>,
     messages: Vec<Message<'a>>,
@@ -66,7 +65,7 @@ struct Message<'a> {
 }
 
 impl Table {
-    pub(super) fn new(protocol: Protocol, now: Instant) -> Self {
+    pub(crate) fn new(protocol: Protocol, now: Instant) -> Self {
         Self {
             protocol,
             rows: BTreeMap::new(),
@@ -77,7 +76,7 @@ impl Table {
     }
 
     /// Counts the frames in `bytes`.
-    pub(super) fn take<F>(&mut self, decoder: &mut Decoder<F, BUFFER_LEN>, mut bytes: &[u8])
+    pub(crate) fn take<F, const N: usize>(&mut self, decoder: &mut Decoder<F, N>, mut bytes: &[u8])
     where
         F: Framing,
         for<'a> F::Frame<'a>: Shown,
@@ -90,20 +89,26 @@ impl Table {
         }
     }
 
-    /// Counts a frame.
-    pub(super) fn count(&mut self, frame: &impl Shown) {
+    /// Counts a frame of the only line.
+    pub(crate) fn count(&mut self, frame: &impl Shown) {
         frame.teach(&mut self.modes);
+        let modes = self.modes;
+        self.count_in(frame, &modes);
+    }
+
+    /// Counts a frame of a line whose nodes have these modes.
+    pub(crate) fn count_in(&mut self, frame: &impl Shown, modes: &Modes) {
         let row = self.rows.entry((frame.key(), frame.name())).or_default();
         row.count += 1;
         // The same memory again: a full bus has thousands of frames a second.
         let mut contents = Out(core::mem::take(&mut row.last).into_bytes());
         contents.0.clear();
-        frame.contents(&mut contents, &self.modes);
+        frame.contents(&mut contents, modes);
         row.last = String::from_utf8(contents.0).unwrap_or_default();
     }
 
     /// Measures the rates, once per period.
-    pub(super) fn measure(&mut self, now: Instant) {
+    pub(crate) fn measure(&mut self, now: Instant) {
         if now < self.measured_at + RATE_PERIOD {
             return;
         }
@@ -135,7 +140,7 @@ impl Table {
     }
 
     /// The rates on one line.
-    pub(super) fn print_line(
+    pub(crate) fn print_line(
         &self,
         out: &mut impl Write,
         counters: &Counters,
@@ -150,7 +155,7 @@ impl Table {
     }
 
     /// The same as a JSON object.
-    pub(super) fn print_json(
+    pub(crate) fn print_json(
         &self,
         out: &mut impl Write,
         event: &'static str,
@@ -165,6 +170,7 @@ impl Table {
             received: counters.received,
             framed: counters.framed,
             skipped: counters.skipped(),
+            pending: pending(counters),
             frames: counters.frames,
             skipped_by: skipped
                 .filter(|(_, bytes)| *bytes > 0)
@@ -189,7 +195,7 @@ impl Table {
     }
 
     /// The rates of the whole run.
-    pub(super) fn measure_all(&mut self, now: Instant) {
+    pub(crate) fn measure_all(&mut self, now: Instant) {
         let seconds = self.micros(now) as f64 / 1e6;
         for row in self.rows.values_mut() {
             row.per_second = if seconds > 0.0 { row.count as f64 / seconds } else { 0.0 };
@@ -197,11 +203,10 @@ impl Table {
     }
 
     /// The table with the rates of the whole run, and the byte counts.
-    pub(super) fn finish(
+    pub(crate) fn finish(
         &mut self,
         out: &mut impl Write,
         counters: &Counters,
-        pending: usize,
         now: Instant,
     ) -> io::Result<()> {
         self.measure_all(now);
@@ -213,7 +218,7 @@ impl Table {
         if counters.received == 0 {
             writeln!(out, "Nothing was heard in {:.0} s.", self.micros(now) as f64 / 1e6)?;
         } else {
-            listing::print_summary(out, counters, pending, !self.rows.is_empty())?;
+            print_summary(out, counters, !self.rows.is_empty())?;
         }
         out.flush()
     }

@@ -1,0 +1,196 @@
+//! All packets of a capture, with times or without, each fed to the stream it belongs to.
+
+use std::collections::{BTreeMap, btree_map::Entry};
+
+use axlewire::stream::Counters;
+
+use super::{Choice, Sheet, Stream};
+use crate::{
+    args::Protocol,
+    failure::Failure,
+    input::Input,
+    listing::Modes,
+    pcapng::{self, Direction, Packet, Reader},
+};
+
+/// The most bytes that are fed at once: their lines are up to 40 times as long, and are held in
+/// memory.
+pub(super) const PIECE: usize = 16 * 1024;
+
+/// Bytes that come next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Next {
+    pub(crate) protocol: Protocol,
+    /// Number of the interface, if the capture has such.
+    pub(crate) interface: Option<usize>,
+    /// Microseconds since 1970, if the capture has times.
+    pub(crate) micros: Option<u64>,
+}
+
+/// What was found in a capture.
+#[derive(Debug, Default)]
+pub(crate) struct Walked {
+    pub(crate) account: Counters,
+    /// Number of packets with a time before that of the packet in front of them.
+    pub(crate) times_back: u64,
+    /// The modes of the nodes at the end of the last line.
+    pub(crate) modes: Modes,
+    /// Why not all was read. What was is on the sheet all the same.
+    pub(crate) broken: Option<Failure>,
+}
+
+/// Feeds a capture to a sheet; each interface and each direction is a stream of its own. `go_on` is
+/// called in front of every piece, may empty the sheet, and says whether to go on.
+pub(crate) fn walk(
+    input: &mut Input,
+    choice: Choice,
+    sheet: &mut Sheet,
+    go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
+) -> Walked {
+    let mut walk = Walk { choice, lines: BTreeMap::new(), walked: Walked::default(), go_on };
+    let result = match input.is_pcapng() {
+        Ok(true) => walk.packets(input, sheet),
+        Ok(false) => walk.raw(input, sheet),
+        Err(failure) => Err(failure),
+    };
+    // Nothing more will come, even if the file was cut off.
+    walk.end_lines(sheet);
+    walk.walked.broken = result.err();
+    walk.walked
+}
+
+struct Walk<G> {
+    choice: Choice,
+    /// Those of a section, by the number of the interface.
+    lines: BTreeMap<usize, Line>,
+    walked: Walked,
+    go_on: G,
+}
+
+/// What an interface was connected to.
+struct Line {
+    protocol: Protocol,
+    interface: Option<usize>,
+    /// Both directions have the same nodes.
+    modes: Modes,
+    streams: BTreeMap<Option<Direction>, Box<dyn Stream>>,
+}
+
+impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
+    fn packets(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<(), Failure> {
+        let path = input.path().map(ToOwned::to_owned);
+        let mut reader = Reader::new(input);
+        let (mut latest, mut section) = (0, 0);
+        while let Some(packet) = reader.next().map_err(|problem| problem.failure(path.clone()))? {
+            if packet.section != section {
+                section = packet.section;
+                self.end_lines(sheet);
+            }
+            let line = match self.lines.entry(packet.interface) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    let protocol = match self.choice.protocol {
+                        Some(protocol) => protocol,
+                        None => protocol_of(&packet)?,
+                    };
+                    self.choice.permits(protocol)?;
+                    new.insert(Line::new(protocol, Some(packet.interface)))
+                }
+            };
+            if let Some(micros) = packet.micros {
+                self.walked.times_back += u64::from(micros < latest);
+                latest = micros;
+            }
+            let next = Next {
+                protocol: line.protocol,
+                interface: Some(packet.interface),
+                micros: packet.micros,
+            };
+            for piece in packet.bytes.chunks(PIECE) {
+                if !(self.go_on)(next, sheet)? {
+                    return Ok(());
+                }
+                line.feed(self.choice, packet.direction, piece, packet.micros, sheet);
+            }
+        }
+        Ok(())
+    }
+
+    fn raw(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<(), Failure> {
+        let Some(protocol) = self.choice.protocol else {
+            let line = "--protocol is needed for a capture of raw bytes";
+            return Err(Failure::Usage(line.to_owned()));
+        };
+        self.choice.permits(protocol)?;
+        let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None));
+        loop {
+            let bytes = input.read()?;
+            if bytes.is_empty() {
+                return Ok(());
+            }
+            for piece in bytes.chunks(PIECE) {
+                if !(self.go_on)(Next { protocol, interface: None, micros: None }, sheet)? {
+                    return Ok(());
+                }
+                line.feed(self.choice, None, piece, None, sheet);
+            }
+        }
+    }
+
+    /// Lists what is left of all lines: nothing more will come on them.
+    fn end_lines(&mut self, sheet: &mut Sheet) {
+        let walked = &mut self.walked;
+        for mut line in core::mem::take(&mut self.lines).into_values() {
+            walked.account += line.finish(sheet);
+            walked.modes = line.modes;
+        }
+    }
+}
+
+impl Line {
+    fn new(protocol: Protocol, interface: Option<usize>) -> Self {
+        Self { protocol, interface, modes: Modes::default(), streams: BTreeMap::new() }
+    }
+
+    fn feed(
+        &mut self,
+        choice: Choice,
+        direction: Option<Direction>,
+        bytes: &[u8],
+        micros: Option<u64>,
+        sheet: &mut Sheet,
+    ) {
+        let stream = self
+            .streams
+            .entry(direction)
+            .or_insert_with(|| choice.stream(self.protocol, self.interface, direction));
+        core::mem::swap(&mut self.modes, &mut sheet.modes);
+        stream.feed(bytes, micros, sheet);
+        core::mem::swap(&mut self.modes, &mut sheet.modes);
+    }
+
+    /// Lists what is left, and returns the account.
+    fn finish(&mut self, sheet: &mut Sheet) -> Counters {
+        let mut account = Counters::default();
+        core::mem::swap(&mut self.modes, &mut sheet.modes);
+        for stream in self.streams.values_mut() {
+            stream.finish(sheet);
+            account += stream.counters();
+        }
+        core::mem::swap(&mut self.modes, &mut sheet.modes);
+        account
+    }
+}
+
+/// The protocol of a packet, by the link type of its interface.
+fn protocol_of(packet: &Packet<'_>) -> Result<Protocol, Failure> {
+    let Packet { interface, described, .. } = packet;
+    let link_type = described.link_type;
+    pcapng::protocol_of(link_type).ok_or_else(|| {
+        let name = described.name.as_deref().map(|name| format!(" ({name:?})")).unwrap_or_default();
+        Failure::Failed(format!(
+            "interface {interface}{name} has link type {link_type}, not one of axle's 147 to 150: \
+             if it is a serial line all the same, use --protocol"
+        ))
+    })
+}
