@@ -37,7 +37,7 @@ pub(crate) enum Effect {
     /// Moves nothing.
     Nothing,
     /// Commands the motors of a node.
-    Write(Write),
+    Write(Box<Write>),
     /// Drives a rover.
     Drive,
     /// Tells a rover to stand still.
@@ -83,7 +83,10 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             ikeya::Packet::Request(ikeya::Request::Read(_)) => (Side::Commander, Effect::Nothing),
             ikeya::Packet::Request(ikeya::Request::Write(write)) => {
                 let (speeds, positions) = (vec![write.as_velocity()], vec![write.as_position()]);
-                (Side::Commander, Effect::Write(Write { node: write.id(), speeds, positions }))
+                (
+                    Side::Commander,
+                    Effect::Write(Write { node: write.id(), speeds, positions }.into()),
+                )
             }
             ikeya::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
@@ -92,7 +95,10 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             three::Packet::Request(three::Request::Write(write)) => {
                 let (speeds, positions) =
                     (write.as_velocity().to_vec(), write.as_position().to_vec());
-                (Side::Commander, Effect::Write(Write { node: write.id(), speeds, positions }))
+                (
+                    Side::Commander,
+                    Effect::Write(Write { node: write.id(), speeds, positions }.into()),
+                )
             }
             three::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
@@ -215,7 +221,7 @@ mod tests {
 
     fn write(packet: &WriteRequest) -> Write {
         match of(Protocol::Ikeya, packet.as_bytes()) {
-            Ok((Side::Commander, Effect::Write(write))) => write,
+            Ok((Side::Commander, Effect::Write(write))) => *write,
             other => panic!("{other:?}"),
         }
     }
