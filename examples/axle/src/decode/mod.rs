@@ -34,7 +34,8 @@ use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 pub(crate) use walk::walk;
 
-/// The most threads that are used: each has its own buffers.
+/// The most threads that are used: each has its own buffers, and the more there are, the shorter
+/// are the parts of the file.
 const MOST_JOBS: usize = 16;
 
 /// List the frames of a capture, and the gaps between them
@@ -266,10 +267,7 @@ where
             let rest = parallel::list::<F>(input, style, jobs, |lines| printer.print(lines))?;
             stream = StreamOf::new(rest.offset);
             (sheet.modes, account, broken) = (rest.modes, rest.account, rest.failure);
-            for piece in rest.bytes.chunks(walk::PIECE) {
-                stream.feed(piece, None, &mut sheet);
-                printer.print_sheet(&mut sheet)?;
-            }
+            stream.feed(&rest.bytes, None, &mut sheet);
         }
         _ => {}
     }

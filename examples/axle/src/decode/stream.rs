@@ -178,7 +178,7 @@ where
     for<'a> F::Frame<'a>: Shown,
 {
     fn feed(&mut self, bytes: &[u8], micros: Option<u64>, sheet: &mut Sheet) {
-        if let (Some(micros), false) = (micros, bytes.is_empty()) {
+        if let Some(micros) = micros {
             let end = self.decoder.received() + bytes.len() as u64;
             self.chunks.push_back((end, micros));
         }

@@ -15,7 +15,7 @@ use crate::{
 
 /// The most bytes that are fed at once: their lines are up to 40 times as long, and are held in
 /// memory.
-pub(super) const PIECE: usize = 16 * 1024;
+const PIECE: usize = 16 * 1024;
 
 /// Bytes that come next.
 #[derive(Clone, Copy, Debug)]
