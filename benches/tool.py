@@ -4,8 +4,9 @@
     python3 benches/tool.py [--quick] [--mb 100]
 
 Builds the tool, writes captures of clean frames to a temporary folder, and runs each contender in
-turns; a figure is the ratio of medians of one run. Every output is checked: its number of lines
-and its summary. It fails if an output is wrong, never because a figure is low.
+turns; a figure is the ratio of medians of one run. What two threads can gain is limited by what
+the machine gives to two processes at once, which is measured too. Every output is checked: its
+number of lines and its summary. It fails if an output is wrong, never because a figure is low.
 """
 
 import argparse
@@ -80,6 +81,16 @@ def run(args, path):
     return seconds, peak / 1024
 
 
+def at_once(args, path):
+    """Seconds of two runs at the same time."""
+    begin = time.perf_counter()
+    command = [AXLE, "decode", *args, path]
+    children = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for _ in range(2)]
+    if any([child.wait() for child in children]):
+        sys.exit(f"axle decode {args} failed")
+    return time.perf_counter() - begin
+
+
 def check(args, frames, path, protocol):
     """Every frame has a line, and the summary counts them all."""
     output = subprocess.run([AXLE, "decode", *args, path], capture_output=True, check=True).stdout
@@ -132,10 +143,11 @@ def main():
                     args = [*styles[style], "--protocol", protocol, "--jobs", jobs]
                     contenders[style, jobs] = args
                     check(args, len(unit), small, protocol)
-            seconds = {name: [] for name in [*contenders, "read"]}
+            seconds = {name: [] for name in [*contenders, "read", "at once"]}
             memory = 0
             for _ in range(rounds):
                 seconds["read"].append(read(path))
+                seconds["at once"].append(at_once(contenders["json", "1"], path))
                 for name, args in contenders.items():
                     took, megabytes = run(args, path)
                     seconds[name].append(took)
@@ -146,6 +158,9 @@ def main():
             for style in styles:
                 ratio = median[style, "1"] / median[style, "2"]
                 figure(f"tool_jobs2_over_jobs1_{style}", ratio, 1.7)
+            # What this machine gives to two processes that have nothing to do with each other.
+            lent = 2 * median["json", "1"] / median["at once"]
+            figure("tool_two_processes_over_one_json", lent, "-")
             best = min(median["summary", "1"], median["summary", "2"])
             half_read = size / median["read"] / 2 / 1e9
             figure("tool_summary_gb_per_s", size / best / 1e9, f"{min(1.5, half_read):.3f}")
