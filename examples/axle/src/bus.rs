@@ -38,6 +38,9 @@ const RUN_OUT: Duration = Duration::from_millis(3000);
 /// Time for which an id must be asked without ever answering before it counts as silent.
 const SILENCE: Duration = Duration::from_millis(1000);
 
+/// Time allowed for nodes to answer before they are stopped by what was known of them.
+const REFRESH: Duration = Duration::from_millis(200);
+
 /// Pause after a port failure during a stop, before the stop continues.
 const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 
@@ -146,6 +149,25 @@ impl<B: Boards> Bus<B> {
             }
         }
         Ok(None)
+    }
+
+    /// Reads these nodes now, so that no decision uses an old mode or position, and waits for their
+    /// answers, but not for long.
+    pub(crate) fn refresh(&mut self, nodes: NodeSet) {
+        let start = self.now();
+        for node in nodes.iter() {
+            // One that is refused is not known either.
+            let _ = self.master_mut().read(node, start);
+        }
+        let is_fresh = |master: &Master<B>, node| {
+            master.status(node).is_some_and(|(_, at)| at > start) && !master.is_mode_in_doubt(node)
+        };
+        let end = start + REFRESH;
+        while self.now() < end && !nodes.iter().all(|node| is_fresh(self.master(), node)) {
+            if self.round(end).is_err() {
+                return;
+            }
+        }
     }
 
     pub(crate) fn new(line: Line, config: MasterConfig) -> Self {

@@ -31,14 +31,15 @@ const ENDS: &[i32] = &[SIGINT, SIGTERM, SIGHUP, SIGQUIT];
 const SUSPENSIONS: &[i32] =
     &[signal_hook::consts::SIGTSTP, signal_hook::consts::SIGTTIN, signal_hook::consts::SIGTTOU];
 
-/// Signals that neither end nor suspend a process by default; those that cannot be caught; and
-/// faults of the program itself, after which it cannot continue.
+/// Signals that neither end nor suspend a process by default; SIGXFSZ, for which every subcommand
+/// has its own use; those that cannot be caught; and faults of the program itself, after which it
+/// cannot continue.
 #[cfg(unix)]
 const LEFT_ALONE: &[i32] = {
     use signal_hook::consts::*;
     &[
-        SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE, SIGKILL, SIGSTOP, SIGILL, SIGFPE, SIGSEGV,
-        SIGBUS,
+        SIGCHLD, SIGCONT, SIGURG, SIGWINCH, SIGPIPE, SIGXFSZ, SIGKILL, SIGSTOP, SIGILL, SIGFPE,
+        SIGSEGV, SIGBUS,
     ]
 };
 

@@ -3,24 +3,21 @@
 //! Before: the mode of each node that is commanded is read, and each command is checked against it.
 //! After, on every error and on every signal that can be caught: what was commanded is stopped.
 
+mod commanded;
 mod effect;
 mod player;
 
 use std::collections::VecDeque;
 
 use axlewire::{
-    ikeya::{
-        Mode, NodeId,
-        board::{OneMotor, ThreeMotors},
-        master::{MasterConfig, NodeSet},
-    },
+    ikeya::board::{OneMotor, ThreeMotors},
     time::Duration,
     ucp::host::HostConfig,
 };
 
 use crate::{
     args::Protocol,
-    bus::{self, Boards, Bus},
+    bus::MasterArgs,
     failure::{Failure, guarded},
     line::Line,
     listing::{Modes, Style, TimeColumn},
@@ -35,7 +32,7 @@ use player::{Part, Player};
 
 /// What to send, and how.
 pub(crate) struct Plan<'a> {
-    pub(crate) bus: &'a bus::MasterArgs,
+    pub(crate) bus: &'a MasterArgs,
     pub(crate) protocol: Protocol,
     pub(crate) side: Side,
     pub(crate) frames: VecDeque<Due>,
@@ -52,84 +49,12 @@ const CALL_PERIOD: Duration = Duration::from_millis(50);
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
     let signals = Signals::listen_to_all()?;
     let result = match plan.protocol {
-        Protocol::Ikeya => on_bus::<OneMotor>(plan, &signals),
-        Protocol::Ikeya3 => on_bus::<ThreeMotors>(plan, &signals),
+        Protocol::Ikeya => commanded::run::<OneMotor>(plan, &signals),
+        Protocol::Ikeya3 => commanded::run::<ThreeMotors>(plan, &signals),
         Protocol::Ucp => on_rover(plan, &signals),
     };
     // The port is closed here.
     signals.suspend_if_wanted(result)
-}
-
-fn on_bus<B: Boards>(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
-    let write = |due: &Due| match &due.effect {
-        Effect::Write(write) => Some((write.clone(), due.meant)),
-        _ => None,
-    };
-    let writes: Vec<_> = plan.frames.iter().filter_map(write).collect();
-    let commanded: NodeSet = writes.iter().map(|(write, _)| write.node).collect();
-    let line = Line::open(plan.bus.line(), plan.protocol)?;
-    let mut modes = Modes::default();
-    // The same master stops them in the end: it knows their modes, so it can even stop a node whose
-    // answers are lost meanwhile.
-    let mut bus = Bus::<B>::new(line.clone(), config(&plan, commanded, &line));
-    if !commanded.is_empty() {
-        if !bus.discover(signals)? {
-            return signals.interrupted();
-        }
-        for node in commanded.iter() {
-            let Some(status) = bus.read(node, signals)? else {
-                if signals.is_raised() {
-                    return signals.interrupted();
-                }
-                let line =
-                    format!("node {node} does not answer: without its mode, nothing is sent to it");
-                return Err(Failure::Failed(line));
-            };
-            modes.learn(node, status.mode());
-            for (write, meant) in writes.iter().filter(|(write, _)| write.node == node) {
-                write.check(status, *meant, &plan.limits).map_err(Failure::Failed)?;
-            }
-        }
-    }
-    let is_json = plan.is_json;
-    play(plan, &line, modes, signals, !commanded.is_empty(), || {
-        if commanded.is_empty() {
-            return Ok(Vec::new());
-        }
-        let failure = bus.stop(commanded).err();
-        let complaints: Vec<_> = commanded.iter().filter_map(|node| bus.complaint(node)).collect();
-        if !complaints.is_empty() {
-            let complaint = complaints.join("; ");
-            return Err(match failure {
-                Some(failure) => failure.while_moving(&complaint),
-                None => Failure::Failed(complaint),
-            });
-        }
-        for node in commanded.iter() {
-            let (meant, now) = (modes.of(node), bus.master().mode(node));
-            if let (Some(meant), Some(now)) = (meant, now.filter(|&now| Some(now) != meant)) {
-                return Err(Failure::Failed(turned(node, now, meant)));
-            }
-        }
-        let told = commanded.iter().map(|node| match is_json {
-            true => format!("{{\"event\":\"stopped\",\"node\":{node}}}"),
-            false => {
-                let status = bus.status(node).map(B::describe).unwrap_or_default();
-                format!("node {node}: {status}, stopped and confirmed")
-            }
-        });
-        Ok(told.collect())
-    })
-}
-
-fn turned(node: NodeId, now: Mode, meant: Mode) -> String {
-    format!("node {node} has changed to {now} mode: it may have taken commands for {meant} mode")
-}
-
-fn config(plan: &Plan<'_>, nodes: NodeSet, line: &Line) -> MasterConfig {
-    let mut config = plan.bus.config();
-    config.nodes = nodes;
-    bus::complete(config, plan.bus.line(), line)
 }
 
 fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
@@ -144,7 +69,7 @@ fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
         }
     }
     let is_json = plan.is_json;
-    play(plan, &line, Modes::default(), signals, drives, || {
+    play(plan, &line, Modes::default(), signals, drives, |_| {
         if !drives {
             return Ok(Vec::new());
         }
@@ -158,14 +83,15 @@ fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
     })
 }
 
-/// Sends the frames, then stops what they have moved, whatever happened.
+/// Sends the frames, then stops what they have moved, whatever happened: `stop` gets the modes in
+/// which the nodes have answered last.
 fn play(
     plan: Plan<'_>,
     line: &Line,
     modes: Modes,
     signals: &Signals,
     moves: bool,
-    stop: impl FnOnce() -> Result<Vec<String>, Failure>,
+    stop: impl FnOnce(Modes) -> Result<Vec<String>, Failure>,
 ) -> Result<(), Failure> {
     let style = match plan.is_json {
         true => Style::Json,
@@ -184,9 +110,10 @@ fn play(
     if let Ok(Some(lines)) = last {
         let _ = teller.say(lines);
     }
+    let seen = session.role().seen();
     drop(session);
     // In any case, stop first and report errors afterwards.
-    let stopped = stop();
+    let stopped = stop(seen);
     let told = teller.finish().and(line.check_recording());
     for line in stopped? {
         // If the output fails, what moved has stopped all the same.
@@ -217,7 +144,7 @@ fn until_over(
             teller.say(lines)?;
         }
         if let Some((node, now, meant)) = session.role().turncoat() {
-            return Err(Failure::Failed(turned(node, now, meant)));
+            return Err(commanded::turned(node, now, meant));
         }
     }
     Ok(())

@@ -133,6 +133,11 @@ impl Player {
         self.due.is_empty() && now.as_micros() >= self.last_at.as_micros() + self.linger_us
     }
 
+    /// The modes in which the nodes have answered last.
+    pub(crate) const fn seen(&self) -> Modes {
+        self.sheet.modes
+    }
+
     /// A node that has answered in another mode than its commands are meant for, and both modes.
     pub(crate) fn turncoat(&self) -> Option<(NodeId, Mode, Mode)> {
         NodeId::ALL.into_iter().find_map(|node| {

@@ -27,7 +27,8 @@ use motion::{Event, Spin, data};
 ///
 /// Finds the node, reads it again, commands it and prints its measurements. At the end, on every
 /// error and on every signal that can be caught (Ctrl-C, Ctrl-Z, Ctrl-\, a kill without -9; not
-/// those of a crash, nor 32 and 33, which belong to the C library), the motor is stopped: a
+/// those of a crash, nor 32 and 33, which belong to the C library, nor SIGXFSZ, which only ends a
+/// recording), the motor is stopped: a
 /// velocity node gets 0 rps, a position node holds the position read at that moment. The tool
 /// continues until the node has confirmed the stop twice and the motor is at rest, or else reports
 /// what is known; a second Ctrl-C does not cut this short. After Ctrl-Z and fg nothing moves again,

@@ -134,6 +134,6 @@ fn watch_refuses_a_command_line_without_a_source_or_a_protocol() {
     assert!(complaint(&["watch"]).contains("--port"));
     assert!(complaint(&["watch", "--port", "x"]).contains("--protocol"));
     assert!(complaint(&["watch", "--port", "x", "-P", "ucp", "file"]).contains("cannot be used"));
-    assert!(complaint(&["watch", "-"]).contains("use --protocol"));
+    assert!(complaint(&["watch", "-"]).contains("--protocol is needed"));
     assert!(complaint(&["watch", "-", "-P", "ucp", "--record", "x"]).contains("--record"));
 }
