@@ -22,7 +22,7 @@ use crate::{
     rover::{CALL_PERIOD, Rover},
     send::Kind,
     signals::Signals,
-    teller,
+    teller::Teller,
 };
 
 /// Calibrate sensors of a rover
@@ -84,7 +84,8 @@ impl fmt::Display for Event {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let signals = Signals::listen()?;
+    // The end of the calibration is bounded.
+    let signals = Signals::listen_gently()?;
     let mut rover = Rover::open(&args.line)?;
     if !rover.find(|| signals.is_raised())? {
         return Err(Failure::Failed("interrupted before the calibration began".to_owned()));
@@ -92,30 +93,19 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let start = rover.now();
     let form = Form::of(args.json);
     let kind = args.kind.kind();
+    let teller = Teller::new();
     let mut calibration =
-        Calibration { rover, start, form, kind, result: None, earlier: 0, taken: 0 };
-    let started = calibration.request(CalibrationStep::Start);
-    let told = started.and_then(|()| calibration.say_started(args));
-    let listened = told.and_then(|()| calibration.listen(args, &signals));
-    // In any case, the robot is told that the calibration is over: it may have begun even if its
-    // answer was lost.
-    calibration.earlier = calibration.results();
-    let ended = calibration.request(CalibrationStep::End);
-    listened?;
-    ended?;
-    if signals.is_raised() {
-        return Err(Failure::Failed("interrupted: the calibration was ended".to_owned()));
-    }
-    calibration.say(&Event::Ended { kind: kind.to_string() })?;
-    let result = calibration.result()?;
-    calibration.say(&result)?;
-    calibration.rover.check_recording()
+        Calibration { rover, start, form, teller, kind, result: None, earlier: 0, taken: 0 };
+    let calibrated = calibration.run(args, &signals);
+    let recorded = calibration.rover.check_recording();
+    calibrated.and(calibration.teller.finish()).and(recorded)
 }
 
 struct Calibration {
     rover: Rover,
     start: Instant,
     form: Form,
+    teller: Teller,
     kind: CalibrationKind,
     /// The latest result.
     result: Option<Event>,
@@ -131,9 +121,28 @@ struct Calibration {
 const SHORTEST_US: u64 = 1_200_000;
 
 impl Calibration {
+    fn run(&mut self, args: &Args, signals: &Signals) -> Result<(), Failure> {
+        let started = self.request(CalibrationStep::Start);
+        let told = started.and_then(|()| self.say_started(args));
+        let listened = told.and_then(|()| self.listen(args, signals));
+        // In any case, the robot is told that the calibration is over: it may have begun even if
+        // its answer was lost.
+        self.earlier = self.results();
+        let ended = self.request(CalibrationStep::End);
+        listened?;
+        ended?;
+        if !signals.is_raised() {
+            self.say(&Event::Ended { kind: self.kind.to_string() })?;
+            if let Some(result) = self.result(signals)? {
+                return self.say(&result);
+            }
+        }
+        Err(Failure::Failed("interrupted: the calibration was ended".to_owned()))
+    }
+
     fn say(&mut self, event: &Event) -> Result<(), Failure> {
         let micros = self.rover.now().as_micros().saturating_sub(self.start.as_micros());
-        teller::print(&self.form.line(micros, event)).map_err(Failure::Write)
+        self.teller.say(self.form.line(micros, event))
     }
 
     fn say_started(&mut self, args: &Args) -> Result<(), Failure> {
@@ -208,13 +217,16 @@ impl Calibration {
         Ok(())
     }
 
-    /// Waits for the result.
-    fn result(&mut self) -> Result<Event, Failure> {
+    /// Waits for the result; `None` if a signal comes first.
+    fn result(&mut self, signals: &Signals) -> Result<Option<Event>, Failure> {
         let end = self.rover.now() + RESULT_PATIENCE;
         while self.rover.now() < end {
+            if signals.is_raised() {
+                return Ok(None);
+            }
             // The same numbers once more are a result too.
             match self.result.take() {
-                Some(result) if self.results() > self.earlier => return Ok(result),
+                Some(result) if self.results() > self.earlier => return Ok(Some(result)),
                 result => self.result = result,
             }
             self.round()?;

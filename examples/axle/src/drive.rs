@@ -25,10 +25,10 @@ use crate::{
 /// Sends stops until the robot is heard. Then repeats the command every 100 ms and prints the
 /// robot's reports. At the end, on every error and on every signal that can be caught (Ctrl-C,
 /// Ctrl-Z, Ctrl-\, a kill without -9; not those of a crash, nor 32 and 33, which belong to the C
-/// library, nor SIGXFSZ, which only ends a recording), the tool repeats the stop until the reports show that all wheels have stopped; a
-/// second Ctrl-C does not cut this short. If the robot is no longer heard, it may be moving: the
-/// tool says so, and the exit code is 1. After Ctrl-Z and fg nothing moves again, and the exit code
-/// is 1.
+/// library, nor SIGXFSZ, which only ends a recording), the tool repeats the stop until the reports
+/// show that all wheels have stopped; a second Ctrl-C does not cut this short. If the robot is no
+/// longer heard, it may be moving: the tool says so, and the exit code is 1. After Ctrl-Z and fg
+/// nothing moves again, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {

@@ -11,6 +11,8 @@ use std::{
 use anstyle::{AnsiColor, Effects, Style};
 use clap::error::{ContextKind, ContextValue};
 
+use crate::signals;
+
 const ERROR: Style = AnsiColor::Red.on_default().effects(Effects::BOLD);
 
 /// Reason why the tool exits early.
@@ -91,7 +93,9 @@ impl Failure {
                 return ExitCode::SUCCESS;
             }
             // If standard error is closed, there is nowhere left to report.
-            _ => drop(writeln!(anstream::stderr(), "{ERROR}axle:{ERROR:#} {self}")),
+            _ => drop(signals::freely(|| {
+                writeln!(anstream::stderr(), "{ERROR}axle:{ERROR:#} {self}")
+            })),
         }
         match self {
             Self::Usage(_) => ExitCode::from(2),

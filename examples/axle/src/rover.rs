@@ -54,8 +54,8 @@ pub(crate) struct Rover {
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
-    /// When a ping was found to be lost. It may only be late, and then its pong is taken for that
-    /// of the next one.
+    /// When a ping was found to be lost, or others had sent pings. A pong of such a one is taken
+    /// for that of the next ping.
     lost_at: Option<Instant>,
 }
 
@@ -80,6 +80,11 @@ impl Rover {
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {
         let session = Session::new(line, |now| Host::new(config, now));
         Self { session, has_dead_man_fired: false, still_reports: 0, lost_at: None }
+    }
+
+    /// Tells that others have sent pings on this line until now.
+    pub(crate) fn others_have_pinged(&mut self) {
+        self.lost_at = Some(self.now());
     }
 
     pub(crate) fn now(&mut self) -> Instant {
@@ -167,7 +172,8 @@ impl Rover {
     /// came after the robot had heard of it: after its answer to a ping behind it. Failures of the
     /// port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
-        let (begin, sent) = (self.now(), self.host().statistics().commands);
+        let (begin, before) = (self.now(), *self.host().statistics());
+        let (sent, reports) = (before.commands, before.reports);
         let mut awake = Awake::new(begin);
         // When enough stops had been sent, and how many pings by then.
         let (mut told, mut has_heard) = (None, false);
@@ -199,8 +205,13 @@ impl Rover {
         if let Some(failure) = failure {
             return Err(failure.while_moving(OUT_OF_REACH));
         }
-        let sent = self.host().statistics().commands.saturating_sub(sent);
+        let seen = self.host().statistics();
+        let sent = seen.commands.saturating_sub(sent);
+        let reports = seen.reports.saturating_sub(reports);
         Err(Failure::Failed(match self.host().link() {
+            Link::Up if reports == 0 => {
+                format!("the robot was told {sent} times to stop, but reports nothing any more")
+            }
             Link::Up => {
                 format!("the robot was told {sent} times to stop, but its wheels are still turning")
             }

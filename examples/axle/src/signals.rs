@@ -60,13 +60,15 @@ impl Signals {
     /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. A second one
     /// ends the tool at once, such as while it waits for a reader of its output.
     pub(crate) fn listen() -> Result<Self, Failure> {
-        let signals = Self::new()?;
+        let signals = Self::listen_gently()?;
         #[cfg(unix)]
         listen_to(ENDS, free())?;
         Ok(signals)
     }
 
-    fn new() -> Result<Self, Failure> {
+    /// For a subcommand that has something to bring to its end: a second signal does not cut that
+    /// short.
+    pub(crate) fn listen_gently() -> Result<Self, Failure> {
         let signals = Self {
             end: Arc::default(),
             suspend: Arc::default(),
@@ -88,7 +90,7 @@ impl Signals {
     /// For a subcommand that moves something: no signal that can be caught ends or suspends the
     /// tool before the motors are stopped.
     pub(crate) fn listen_to_all() -> Result<Self, Failure> {
-        let signals = Self::new()?;
+        let signals = Self::listen_gently()?;
         #[cfg(unix)]
         {
             listen_to(SUSPENSIONS, &signals.suspend)?;

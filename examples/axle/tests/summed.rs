@@ -2,12 +2,15 @@
 
 mod support;
 
+use std::{io::Write, process::Stdio};
+
 use axlewire::{
     ikeya::{NodeId, Position, PositionResponse, Rps, VelocityResponse, WriteRequest},
     ucp::{Body, message::Ping},
 };
 use serde_json::{Value, json};
 use support::{
+    axle,
     pcapng::{PcapNg, outcome},
     run, stdout,
 };
@@ -121,4 +124,20 @@ fn the_counts_add_up() {
     let count = |field: &str| found[field].as_u64().unwrap();
     assert_eq!(count("received"), 15);
     assert_eq!(count("received"), count("framed") + count("skipped") + count("pending"));
+}
+
+#[test]
+fn on_a_pipe_the_last_frame_that_is_wanted_is_the_end() {
+    let mut child = axle(&["watch", "--json", "--count", "3", "-P", "ucp", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(&Ping {}.frame(0).as_bytes().repeat(3)).unwrap();
+    // More may come: the pipe stays open.
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(summary["frames"], 3);
 }

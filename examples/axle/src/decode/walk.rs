@@ -111,6 +111,9 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                     return Ok(());
                 }
                 line.feed(self.choice, packet.direction, piece, packet.micros, sheet);
+                if sheet.is_full() {
+                    return Ok(());
+                }
             }
         }
         Ok(())
@@ -133,6 +136,10 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                     return Ok(());
                 }
                 line.feed(self.choice, None, piece, None, sheet);
+                // At once: on a pipe, the next piece may be long in coming.
+                if sheet.is_full() {
+                    return Ok(());
+                }
             }
         }
     }

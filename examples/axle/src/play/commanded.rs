@@ -1,4 +1,4 @@
-//! The nodes of a bus that are commanded: before, their modes are read; in the end they are stopped.
+//! The nodes of a bus that are commanded: their modes are read before, and they are stopped.
 
 use axlewire::ikeya::{
     Mode, NodeId,

@@ -36,6 +36,8 @@ impl fmt::Display for Side {
 pub(crate) enum Effect {
     /// Moves nothing.
     Nothing,
+    /// Asks a node for its status.
+    Ask(NodeId),
     /// Commands the motors of a node.
     Write(Box<Write>),
     /// Drives a rover.
@@ -80,7 +82,9 @@ pub(crate) struct Limits {
 pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), String> {
     match protocol {
         Protocol::Ikeya => Ok(match whole::<ikeya::BothDirections>(bytes)? {
-            ikeya::Packet::Request(ikeya::Request::Read(_)) => (Side::Commander, Effect::Nothing),
+            ikeya::Packet::Request(ikeya::Request::Read(read)) => {
+                (Side::Commander, Effect::Ask(read.id()))
+            }
             ikeya::Packet::Request(ikeya::Request::Write(write)) => {
                 let (speeds, positions) = (vec![write.as_velocity()], vec![write.as_position()]);
                 (
@@ -91,7 +95,9 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             ikeya::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
         Protocol::Ikeya3 => Ok(match whole::<three::BothDirections>(bytes)? {
-            three::Packet::Request(three::Request::Read(_)) => (Side::Commander, Effect::Nothing),
+            three::Packet::Request(three::Request::Read(read)) => {
+                (Side::Commander, Effect::Ask(read.id()))
+            }
             three::Packet::Request(three::Request::Write(write)) => {
                 let (speeds, positions) =
                     (write.as_velocity().to_vec(), write.as_position().to_vec());

@@ -24,7 +24,7 @@ use crate::{
     rover::Rover,
     session::Session,
     signals::Signals,
-    teller::{self, Teller},
+    teller::Teller,
 };
 pub(crate) use effect::{Effect, Limits, Side, of as effect_of};
 pub(crate) use player::Due;
@@ -74,6 +74,7 @@ fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
             return Ok(Vec::new());
         }
         let mut rover = Rover::new(line.clone(), config);
+        rover.others_have_pinged();
         rover.stop()?;
         let report = rover.describe().unwrap_or_default();
         Ok(vec![match is_json {
@@ -114,11 +115,12 @@ fn play(
     drop(session);
     // In any case, stop first and report errors afterwards.
     let stopped = stop(seen);
-    let told = teller.finish().and(line.check_recording());
-    for line in stopped? {
+    for line in stopped.iter().flatten() {
         // If the output fails, what moved has stopped all the same.
-        drop(teller::print(&line));
+        let _ = teller.say(line.clone());
     }
+    let told = teller.finish().and(line.check_recording());
+    stopped?;
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
     for (count, what) in [(lost, "did not leave whole"), (left, "were not sent: interrupted")] {

@@ -7,7 +7,7 @@ use std::{
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{Mode, NodeId},
+    ikeya::{Mode, NodeId, master::NodeSet},
     time::{Duration, Instant, wire_time},
     ucp::{Body, MotorControl},
 };
@@ -36,6 +36,11 @@ pub(crate) struct Due {
 /// Interval between the stops on a rover's line before its first motor command (ruling U16).
 const STOP_PERIOD: Duration = Duration::from_millis(100);
 
+/// Number of READs in a row without an answer, and the time since the first of them, after which no
+/// more commands are sent: a USB adapter may delay an answer by 16 ms.
+const QUESTIONS: u32 = 3;
+const SILENCE: Duration = Duration::from_millis(100);
+
 /// A role that says what it is told to.
 pub(crate) struct Player {
     due: VecDeque<Due>,
@@ -55,7 +60,12 @@ pub(crate) struct Player {
     sending: Box<[u8]>,
     attendance: Attendance,
     /// Why nothing more is handed out.
-    absence: Option<Failure>,
+    failure: Option<Failure>,
+    /// The nodes that are commanded.
+    commanded: NodeSet,
+    /// Number of questions to them since the last answer on the line, and when the first of them
+    /// left.
+    unanswered: (u32, Instant),
     sheet: Sheet,
     sent: Box<dyn Stream>,
     received: Box<dyn Stream>,
@@ -85,6 +95,11 @@ pub(crate) struct Part {
 impl Player {
     pub(crate) fn new(part: Part, style: Style, now: Instant) -> Self {
         let Part { protocol, baud, due, linger_us, holds_rover, has_echo, modes } = part;
+        let written = |due: &Due| match &due.effect {
+            Effect::Write(write) => Some(write.node),
+            _ => None,
+        };
+        let commanded = due.iter().filter_map(written).collect();
         let mut sheet = Sheet::new(Some(style));
         style.titles(&mut sheet.out);
         sheet.modes = modes;
@@ -100,7 +115,9 @@ impl Player {
             stop_at: holds_rover.then_some(now),
             sending: Box::default(),
             attendance: Attendance::new(now),
-            absence: None,
+            failure: None,
+            commanded,
+            unanswered: (0, now),
             sheet,
             sent: decode::stream_of(protocol, Direction::Out),
             received: decode::stream_of(protocol, Direction::In),
@@ -115,16 +132,22 @@ impl Player {
         self.due.len()
     }
 
-    /// Fails if the tool did not run for a while: what was due meanwhile is out of date, and
-    /// nothing more is sent. Call it in every round.
+    /// Fails if the tool did not run for a while, so that what was due meanwhile is out of date, or
+    /// if the nodes that are commanded do not answer any more. Nothing more is sent then. Call it
+    /// in every round.
     pub(crate) fn check(&mut self, now: Instant) -> Result<(), Failure> {
         self.attend(now);
-        self.absence.take().map_or(Ok(()), Err)
+        self.failure.take().map_or(Ok(()), Err)
     }
 
     fn attend(&mut self, now: Instant) {
         if let Err(failure) = self.attendance.check(now) {
-            self.absence.get_or_insert(failure);
+            self.failure.get_or_insert(failure);
+        }
+        let (asked, since) = self.unanswered;
+        if asked >= QUESTIONS && now - since >= SILENCE {
+            let line = format!("no answer to {QUESTIONS} READs: no more commands are sent");
+            self.failure.get_or_insert(Failure::Failed(line));
         }
     }
 
@@ -178,8 +201,11 @@ impl Endpoint for Player {
             }
         }
         if !bytes.is_empty() {
-            let micros = self.micros(now);
+            let (micros, before) = (self.micros(now), self.received.counters().frames);
             self.received.feed(bytes, micros, &mut self.sheet);
+            if self.received.counters().frames > before {
+                self.unanswered = (0, now);
+            }
         }
     }
 
@@ -191,7 +217,7 @@ impl Endpoint for Player {
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
         self.attend(now);
-        if self.absence.is_some() || now < self.poll_timeout()? {
+        if self.failure.is_some() || now < self.poll_timeout()? {
             return None;
         }
         let due = self.due.front().filter(|due| now >= self.time_of(due));
@@ -203,6 +229,12 @@ impl Endpoint for Player {
             let due = self.due.pop_front()?;
             if is_motor {
                 self.stop_at = None;
+            }
+            if let Effect::Ask(node) = due.effect
+                && self.commanded.contains(node)
+            {
+                let (asked, since) = self.unanswered;
+                self.unanswered = (asked + 1, if asked == 0 { now } else { since });
             }
             (self.sending, self.last_at) = (due.bytes, now);
         }

@@ -45,7 +45,7 @@ pub(crate) struct Args {
 #[derive(Debug, clap::Args)]
 struct Times {
     /// How often to send the message
-    #[arg(short, long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(short, long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     count: u32,
 
     /// Interval between two of them, seconds
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             // A node may start anew in the other mode, and only its answers tell.
             let bytes = ikeya::ReadRequest::new(write.node).as_bytes()[..].into();
             let after_us = after_us + READ_AFTER_US.min(times.every / 2);
-            frames.push_back(Due { after_us, bytes, meant: None, effect: Effect::Nothing });
+            frames.push_back(Due { after_us, bytes, meant: None, effect: Effect::Ask(write.node) });
         }
     }
     play::run(Plan {

@@ -21,9 +21,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let (mut first, mut last) = (None, 0);
     let choice = Choice { protocol: args.protocol, direction: None };
     let walked = decode::walk(&mut input, choice, &mut sheet, |next, sheet| {
-        if sheet.is_full() {
-            return Ok(false);
-        }
         if *found.get_or_insert(next.protocol) != next.protocol {
             let line = "the capture has lines of several protocols: axle decode lists them all";
             return Err(Failure::Failed(line.to_owned()));

@@ -38,7 +38,8 @@ use crate::{
 /// On a terminal, shows a page: one row per node of a motor bus, or the values of a rover, with
 /// rates, errors, and a log of gaps and events. Keys: q quit, p pause the picture (counting goes
 /// on), f filter the log, r start and stop recording, ? help. Elsewhere, and with --plain, one line
-/// is printed per second. Ctrl-C ends with a summary of all messages.
+/// is printed per second. Ctrl-C ends with a summary of all messages. A capture is summed up when
+/// it has been read to its end.
 ///
 /// Latencies are those from a READ to its answer as this machine heard them: behind a USB adapter,
 /// that adds up to 16 ms.
@@ -67,11 +68,11 @@ pub(crate) struct Args {
     #[arg(short, long)]
     json: bool,
 
-    /// End after this time, seconds
+    /// End after this time, seconds; raw bytes of a capture have no times
     #[arg(short = 'f', long = "for", value_name = "SECONDS", value_parser = args::seconds)]
     micros: Option<u64>,
 
-    /// End after this number of frames
+    /// End after this number of frames; a line may have brought some more by then
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     count: Option<u64>,
 

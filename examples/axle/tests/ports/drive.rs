@@ -4,12 +4,15 @@ use std::{io::Write, thread, time::Duration};
 
 use axlewire::{
     stream::Event,
-    ucp::{self, Body, Message, message::Ping},
+    ucp::{
+        self, Body, Message, Telemetry,
+        message::{ErrorCode, FirmwareReport, Ping, Pong},
+    },
 };
 
 use super::{
     Process,
-    played::{self, parrot},
+    played::{self, PlayedLine, parrot},
     sim, undisturbed, wait_until,
 };
 
@@ -45,6 +48,33 @@ fn reports_from_before_the_robot_heard_of_the_stop_do_not_count() {
             assert!(lines.iter().any(|line| line.ends_with(moving)), "{delay}: {lines:?}");
             assert!(lines.iter().any(|line| line.contains(rest)), "{delay}: {lines:?}");
         }
+    });
+}
+
+#[test]
+fn a_rover_that_reports_nothing_any_more_is_not_said_to_turn() {
+    undisturbed(|| {
+        let (mut decoder, mut is_told) = (ucp::Decoder::new(), false);
+        let line = PlayedLine::new((), move |_, mut bytes| {
+            let mut said = Vec::new();
+            while let Some(event) = decoder.decode(&mut bytes) {
+                let Event::Frame(frame) = event else { continue };
+                match frame.message() {
+                    Message::Ping(_) => {
+                        said.extend(Pong::new(ErrorCode::Fine).frame(0).as_bytes());
+                    }
+                    Message::MotorControl(command) => is_told |= command.speed() != 0,
+                    _ => {}
+                }
+            }
+            if !is_told {
+                said.extend(FirmwareReport::new(&Telemetry::default(), 50).frame(0).as_bytes());
+            }
+            said
+        });
+        let drive = format!("drive -p {} --speed 30 --turn 0 -f 0.3", line.path);
+        let error = Process::start(&drive).complaint(1);
+        assert!(error.ends_with("times to stop, but reports nothing any more"), "{error}");
     });
 }
 

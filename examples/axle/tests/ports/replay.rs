@@ -1,6 +1,9 @@
 //! `axle replay`: a capture is sent again; what it moves is stopped.
 
-use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse, WriteRequest};
+use axlewire::{
+    ikeya::{NodeId, ReadRequest, Rps, VelocityResponse, WriteRequest},
+    ucp::{Body, MotorControl, message::Ping},
+};
 
 use super::{
     Process, TWO_NODES,
@@ -108,6 +111,25 @@ fn a_node_that_changes_its_mode_ends_the_replay_and_is_stopped_in_its_new_mode()
         // It is held where it is.
         assert!(later.iter().any(|said| matches!(said, Said::Write(1, _, 4096))), "{later:?}");
         assert!(!later.contains(&said[first]), "{later:?}");
+    });
+}
+
+#[test]
+fn pongs_of_the_capture_do_not_tell_that_the_stop_was_heard() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp --delay 0.4");
+        let ping = Ping {}.frame(0);
+        let drive = MotorControl::new(60, 0).unwrap().frame(0);
+        let mut packets: Vec<Packet<'_>> =
+            (0..100).map(|at| (at * 20_000, 2, ping.as_bytes())).collect();
+        packets.push((2_000_000, 2, drive.as_bytes()));
+        let path = file("pings.pcapng", &PcapNg::new(150, &packets).0);
+        let replay = format!("replay {} --move -p {port}", path.to_str().unwrap());
+        Process::start(&replay).success();
+        // No wait: the rover is at rest already.
+        let lines = sim.lines();
+        assert!(lines.iter().any(|line| line.ends_with("  moving")), "{lines:?}");
+        assert!(lines.iter().any(|line| line.contains("at rest after")), "{lines:?}");
     });
 }
 

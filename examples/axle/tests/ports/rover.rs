@@ -1,6 +1,6 @@
 //! `axle ping`, `calibrate`, `lamp` and `network`: a rover that does not move because of them.
 
-use std::{io::Write, process::Stdio};
+use std::{io::Write, process::Stdio, thread, time::Duration};
 
 use axlewire::{crc16, stream::Event, ucp};
 use serde_json::Value;
@@ -178,6 +178,29 @@ fn a_calibration_whose_start_is_not_acknowledged_is_ended_all_the_same() {
 }
 
 #[test]
+fn a_second_signal_does_not_keep_a_calibration_from_being_ended() {
+    undisturbed(|| {
+        let mut ends = 0;
+        let line = rover_that_calibrates(move |sent, body| match sent {
+            3 => vec![frame(3, &[body[0], 0])],
+            // The first two are lost.
+            4 => {
+                ends += 1;
+                if ends == 3 { vec![frame(4, &[body[0], 0])] } else { Vec::new() }
+            }
+            _ => Vec::new(),
+        });
+        let calibrate = Process::start(&format!("calibrate -p {} -k imu -f 600", line.path));
+        calibrate.line("has begun");
+        calibrate.signal("INT");
+        thread::sleep(Duration::from_millis(30));
+        calibrate.signal("INT");
+        assert_eq!(calibrate.complaint(1), "interrupted: the calibration was ended");
+        assert_eq!(line.lock().iter().filter(|id| **id == 4).count(), 3);
+    });
+}
+
+#[test]
 fn a_state_that_is_not_followed_by_an_answer_is_not_said_to_be_sent() {
     undisturbed(|| {
         let line = rover_that_calibrates(|_, _| Vec::new());
@@ -190,7 +213,7 @@ fn a_state_that_is_not_followed_by_an_answer_is_not_said_to_be_sent() {
 /// A rover that reports, answers no ping, and answers calibration requests as told: it gets id and
 /// body. Holds the ids of all that it has heard.
 fn rover_that_calibrates(
-    answers: impl Fn(u8, &[u8]) -> Vec<Vec<u8>> + Send + 'static,
+    mut answers: impl FnMut(u8, &[u8]) -> Vec<Vec<u8>> + Send + 'static,
 ) -> PlayedLine<Vec<u8>> {
     let mut decoder = ucp::Decoder::new();
     PlayedLine::new(Vec::new(), move |heard, mut bytes| {

@@ -2,7 +2,7 @@
 
 use std::{thread, time::Duration};
 
-use axlewire::ikeya::Position;
+use axlewire::ikeya::{Mode, Position};
 
 use super::{
     Process, TWO_NODES,
@@ -269,6 +269,54 @@ fn a_node_that_starts_anew_in_the_other_mode_gets_no_more_commands() {
         assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
         let said = speeds(&line.said());
         assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 3, "{said:?}");
+    });
+}
+
+#[test]
+fn a_node_that_turns_to_position_mode_is_held_where_it_is_even_if_its_answers_are_lost() {
+    undisturbed(|| {
+        for lost in [0, 20] {
+            let (mut writes, mut mute) = (0, 0);
+            let line = played::bus(&[Node::velocity(1)], move |said, bus| match said {
+                Said::Write(..) => {
+                    writes += 1;
+                    if writes == 2 {
+                        bus.nodes[0] = Node { follows: false, ..Node::position(1, 4096) };
+                    }
+                }
+                // Its first answer in the new mode is heard, the next are not.
+                Said::Read(_) if bus.nodes[0].mode == Mode::Position => {
+                    bus.nodes[0].is_dumb = (1..=lost).contains(&mute);
+                    mute += 1;
+                }
+                Said::Read(_) => {}
+            });
+            let args = format!("send -p {} -c 20 --every 0.05 ikeya velocity 1 1", line.path);
+            let error = Process::start(&args).complaint(1);
+            assert!(error.contains("node 1 "), "{error}");
+            let said = line.said();
+            let turned = speeds(&said).iter().position(|&rps| rps == 1.0).unwrap() + 2;
+            let holds = said.iter().filter(|said| matches!(said, Said::Write(_, _, 4096)));
+            assert!(lost > 0 || holds.count() > 0, "{said:?}");
+            for said in said.iter().filter(|said| matches!(said, Said::Write(..))).skip(turned) {
+                assert!(matches!(said, Said::Write(_, _, 4096)), "{lost}: {said:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_node_that_does_not_answer_any_more_gets_no_more_commands() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |said, bus| {
+            bus.nodes[0].is_dumb |= matches!(said, Said::Write(..));
+        });
+        let args = format!("send -p {} -c 100 --every 0.05 ikeya velocity 1 5", line.path);
+        let error = Process::start(&args).complaint(1);
+        assert!(error.ends_with("it may be moving"), "{error}");
+        let said = speeds(&line.said());
+        assert!(said.iter().filter(|&&rps| rps == 5.0).count() <= 5, "{said:?}");
+        assert_eq!(line.lock().nodes[0].rps, 0.0);
     });
 }
 

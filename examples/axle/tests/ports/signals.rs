@@ -3,7 +3,7 @@
 use std::{
     cell::RefCell,
     io::Write,
-    process::{Command, Stdio},
+    process::Command,
     sync::{Arc, Mutex},
     thread,
     time::Duration,
@@ -42,12 +42,15 @@ fn a_reader_that_does_not_read_keeps_nobody_from_ending_the_tool_while_nothing_m
             (format!("spin -p {port} -n 1 --rps 2 -f 600"), 1),
             (format!("stop -p {port} -P ikeya"), 1),
             (format!("ping -p {robot} --every 0.01"), 2),
+            // Its error.
+            (format!("send -p {port} ikeya velocity 2 1"), 1),
         ] {
             let (_reader, mut writer) = std::io::pipe().unwrap();
             let args: Vec<_> = args.split(' ').collect();
             // The pipe is full from the beginning.
             writer.write_all(&[b' '; 65536]).unwrap();
-            let tool = axle(&args).stdout(writer).stderr(Stdio::null()).spawn().unwrap();
+            let errors = writer.try_clone().unwrap();
+            let tool = axle(&args).stdout(writer).stderr(errors).spawn().unwrap();
             // Long enough to stop what moves.
             thread::sleep(Duration::from_millis(1500));
             for _ in 0..signals {
