@@ -97,8 +97,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut calibration =
         Calibration { rover, start, form, teller, kind, result: None, earlier: 0, taken: 0 };
     let calibrated = calibration.run(args, &signals);
-    let recorded = calibration.rover.check_recording();
-    calibrated.and(calibration.teller.finish()).and(recorded)
+    calibrated.and(calibration.teller.finish()).and_then(|()| calibration.rover.check_recording())
 }
 
 struct Calibration {

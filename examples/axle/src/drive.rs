@@ -91,13 +91,13 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     // In any case, stop the wheels first and report errors afterwards. That the wheels may still
     // turn is the most serious one.
     let stopped = drive.stop();
-    let recorded = drive.rover.check_recording();
     let is_at_rest = stopped.is_ok();
     let besides = |failure: Failure| failure.and("it was stopped and is at rest");
     let result = stopped.and(driven.map_err(besides));
+    let result = result.and_then(|()| drive.rover.check_recording());
     Outcome::of(&result, is_at_rest).say(form, &mut drive.teller);
     let told = drive.teller.finish();
-    result.and(drive.left).and(told).and(recorded)
+    result.and(drive.left).and(told)
 }
 
 /// What happens to the rover.

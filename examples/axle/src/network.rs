@@ -43,8 +43,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     shown.map_err(|error| Failure::Failed(error.to_string()))?;
     // It leaves in this round, in front of the pings to come.
     rover.round(begin + CALL_PERIOD)?;
-    let pings = rover.host().statistics().pings;
-    while !rover.has_answered_since(pings) {
+    let mark = rover.mark();
+    while !rover.has_heard(&mark) {
         let now = rover.now();
         if now >= begin + PATIENCE || signals.is_raised() {
             let line = format!("network {state}: sent, but the robot does not answer any more");

@@ -77,6 +77,9 @@ fn factor(text: &str) -> Result<f64, String> {
 /// How long to listen behind the last frame, microseconds.
 const LINGER_US: u64 = 200_000;
 
+/// Longest time of a replay, microseconds.
+const LONGEST_US: u64 = 365 * 86_400_000_000;
+
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
@@ -102,6 +105,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             }
             None => frames.len() as u64 * args.every,
         };
+        if after_us > LONGEST_US {
+            let line = format!("frame {} is due after more than a year", frames.len() + 1);
+            return Err(Failure::Failed(line));
+        }
         // Time may run backwards in a capture, but not here.
         last_us = after_us.max(last_us);
         // The answers in the capture say how its commands were meant.

@@ -1,13 +1,13 @@
 //! A rover on a port, with its host; shared by `drive` and `stop`.
 
-use std::{thread, time};
+use std::{collections::VecDeque, thread, time};
 
 use axlewire::{
     error::EncodeError,
     time::{Duration, Instant},
     ucp::{
         Host, MotorControl,
-        host::{HostConfig, HostEvent, Link},
+        host::{HostConfig, HostEvent, HostStatistics, Link},
     },
 };
 
@@ -54,9 +54,10 @@ pub(crate) struct Rover {
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
-    /// When a ping was found to be lost, or others had sent pings. A pong of such a one is taken
-    /// for that of the next ping.
-    lost_at: Option<Instant>,
+    /// The number of pings sent, at moments up to the longest round trip ago.
+    sent: VecDeque<(Instant, u32)>,
+    /// Others have sent pings on this line.
+    has_others: bool,
 }
 
 impl Rover {
@@ -79,12 +80,18 @@ impl Rover {
 
     pub(crate) fn new(line: Line, config: HostConfig) -> Self {
         let session = Session::new(line, |now| Host::new(config, now));
-        Self { session, has_dead_man_fired: false, still_reports: 0, lost_at: None }
+        Self {
+            session,
+            has_dead_man_fired: false,
+            still_reports: 0,
+            sent: VecDeque::new(),
+            has_others: false,
+        }
     }
 
-    /// Tells that others have sent pings on this line until now.
-    pub(crate) fn others_have_pinged(&mut self) {
-        self.lost_at = Some(self.now());
+    /// Tells that others have sent pings on this line.
+    pub(crate) const fn others_have_pinged(&mut self) {
+        self.has_others = true;
     }
 
     pub(crate) fn now(&mut self) -> Instant {
@@ -134,7 +141,6 @@ impl Rover {
         until: Instant,
         mut react: impl FnMut(&HostEvent),
     ) -> Result<(), Failure> {
-        let lost = self.host().statistics().pings_lost;
         let (mut next, result) = match self.session.round(until) {
             Ok(event) => (event, Ok(())),
             Err(failure) => (self.session.poll_event(), Err(failure)),
@@ -152,20 +158,29 @@ impl Rover {
             }
             next = self.session.poll_event();
         }
-        if self.host().statistics().pings_lost > lost {
-            self.lost_at = Some(self.now());
+        let now = self.now();
+        self.sent.push_back((now, self.host().statistics().pings));
+        // One from before the longest round trip is kept.
+        while self.sent.get(1).is_some_and(|(at, _)| now - *at >= LONGEST_TRIP) {
+            self.sent.pop_front();
         }
         result
     }
 
-    /// Whether the robot has answered a ping that was sent behind the first `pings`: then it has
-    /// heard all that was sent before.
-    pub(crate) fn has_answered_since(&mut self, pings: u32) -> bool {
+    /// This moment, to ask later whether the robot has heard what was sent by then.
+    pub(crate) fn mark(&mut self) -> Mark {
         let (now, seen) = (self.now(), self.host().statistics());
-        let is_recent = |at: Instant| now - at < LONGEST_TRIP;
-        // Pings are settled one after the other.
-        let settled = seen.round_trip.count().saturating_add(seen.pings_lost);
-        settled > pings && !self.lost_at.is_some_and(is_recent)
+        // Those before are answered by now, or lost.
+        let before = self.sent.front().map_or(0, |(_, pings)| *pings);
+        let open = seen.pings.saturating_sub(pongs(seen)).min(seen.pings.saturating_sub(before));
+        Mark { at: now, pongs: pongs(seen), open: (!self.has_others).then_some(open) }
+    }
+
+    /// Whether the robot has heard what was sent up to this mark: it has answered more pings since
+    /// than were open then. A pong does not say which ping it answers.
+    pub(crate) fn has_heard(&self, mark: &Mark) -> bool {
+        let since = pongs(self.host().statistics()).saturating_sub(mark.pongs);
+        mark.open.is_some_and(|open| since > open)
     }
 
     /// Repeats the stop until the robot's reports show all wheels at rest. Only those count that
@@ -175,19 +190,19 @@ impl Rover {
         let (begin, before) = (self.now(), *self.host().statistics());
         let (sent, reports) = (before.commands, before.reports);
         let mut awake = Awake::new(begin);
-        // When enough stops had been sent, and how many pings by then.
+        // When enough stops had been sent.
         let (mut told, mut has_heard) = (None, false);
         self.host_mut().stop(begin);
         let failure = loop {
             let until = self.now() + CALL_PERIOD;
             let result = self.round(until);
-            let (now, seen) = (self.now(), *self.host().statistics());
-            if told.is_none() && seen.commands.saturating_sub(sent) >= STOPS {
-                told = Some((now, seen.pings));
+            let now = self.now();
+            if told.is_none() && self.host().statistics().commands.saturating_sub(sent) >= STOPS {
+                told = Some(self.mark());
             }
             let must_have_heard =
-                |(at, pings)| self.has_answered_since(pings) || now - at >= LONGEST_TRIP;
-            if !has_heard && told.is_some_and(must_have_heard) {
+                |mark: &Mark| self.has_heard(mark) || now - mark.at >= LONGEST_TRIP;
+            if !has_heard && told.as_ref().is_some_and(must_have_heard) {
                 // Earlier reports do not count.
                 (has_heard, self.still_reports) = (true, 0);
             }
@@ -236,6 +251,20 @@ impl Rover {
             now.battery_pct,
         ))
     }
+}
+
+/// A moment in the talk with a robot.
+pub(crate) struct Mark {
+    at: Instant,
+    /// Number of pongs by then.
+    pongs: u32,
+    /// The most pings whose pongs may still come; not known if others have sent some.
+    open: Option<u32>,
+}
+
+/// All pongs, expected or not.
+fn pongs(seen: &HostStatistics) -> u32 {
+    seen.round_trip.count().saturating_add(seen.pongs_unasked)
 }
 
 /// A motor command; a positive `turn` is to the right. Named by its direction, so that the sign is

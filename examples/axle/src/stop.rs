@@ -111,8 +111,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         Some(Protocol::Ucp) => stop_rover(args, &mut lines),
         None => stop_whatever(args, &mut lines),
     };
-    let result = stopped.and(lines.finish());
-    Outcome::of(&result, result.is_ok()).print(Form::of(args.json));
+    let at_rest = stopped.is_ok();
+    let kept = lines.finish();
+    if let (Err(_), Err(failure)) = (&stopped, &kept) {
+        let _ = failure.report();
+    }
+    let result = stopped.and(kept);
+    Outcome::of(&result, at_rest).print(Form::of(args.json));
     result
 }
 

@@ -96,8 +96,10 @@ impl Background {
 
 impl Drop for Background {
     fn drop(&mut self) {
-        // There is another failure to report.
-        drop(self.check());
+        // There is another failure, which is reported too.
+        if let Err(failure) = self.check() {
+            let _ = failure.report();
+        }
     }
 }
 

@@ -119,7 +119,7 @@ fn play(
         // If the output fails, what moved has stopped all the same.
         let _ = teller.say(line.clone());
     }
-    let told = teller.finish().and(line.check_recording());
+    let told = teller.finish();
     stopped?;
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
@@ -128,7 +128,7 @@ fn play(
             return Err(Failure::Failed(format!("{count} frames {what}; {besides}")));
         }
     }
-    told
+    told.and_then(|()| line.check_recording())
 }
 
 fn until_over(

@@ -7,7 +7,7 @@ use std::{
 
 use axlewire::{
     endpoint::{Endpoint, Unsent},
-    ikeya::{Mode, NodeId, master::NodeSet},
+    ikeya::{Mode, NodeId, VelocityResponse, master::NodeSet, three},
     time::{Duration, Instant, wire_time},
     ucp::{Body, MotorControl},
 };
@@ -36,6 +36,9 @@ pub(crate) struct Due {
 /// Interval between the stops on a rover's line before its first motor command (ruling U16).
 const STOP_PERIOD: Duration = Duration::from_millis(100);
 
+/// Pause between a frame and its answer (ruling I9 asks for 50 us at least).
+const TURNAROUND: Duration = Duration::from_micros(200);
+
 /// Number of READs in a row without an answer, and the time since the first of them, after which no
 /// more commands are sent: a USB adapter may delay an answer by 16 ms.
 const QUESTIONS: u32 = 3;
@@ -43,6 +46,7 @@ const SILENCE: Duration = Duration::from_millis(100);
 
 /// A role that says what it is told to.
 pub(crate) struct Player {
+    protocol: Protocol,
     due: VecDeque<Due>,
     start: Instant,
     /// Line speed, bit/s.
@@ -52,7 +56,7 @@ pub(crate) struct Player {
     /// How long to listen behind the last frame, microseconds.
     linger_us: u64,
     last_at: Instant,
-    /// When the line has carried all that was handed out.
+    /// When the line has carried all that was handed out, and the answers to it.
     is_free_at: Instant,
     /// When the next stop is due, until a frame commands the motors of a rover.
     stop_at: Option<Instant>,
@@ -105,6 +109,7 @@ impl Player {
         sheet.modes = modes;
         let epoch = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
+            protocol,
             due,
             start: now,
             baud,
@@ -176,6 +181,18 @@ impl Player {
         self.poll_event()
     }
 
+    /// Length of the answer to a frame with this effect, bytes; boards with three motors answer
+    /// commands too (ruling I10).
+    const fn answer_len(&self, effect: &Effect) -> usize {
+        match (self.protocol, effect) {
+            (Protocol::Ikeya, Effect::Ask(_)) => size_of::<VelocityResponse>(),
+            (Protocol::Ikeya3, Effect::Ask(_) | Effect::Write(_)) => {
+                size_of::<three::VelocityResponse>()
+            }
+            _ => 0,
+        }
+    }
+
     fn time_of(&self, due: &Due) -> Instant {
         Instant::from_micros(self.start.as_micros() + due.after_us)
     }
@@ -222,6 +239,7 @@ impl Endpoint for Player {
         }
         let due = self.due.front().filter(|due| now >= self.time_of(due));
         let is_motor = due.is_some_and(|due| due.effect.is_for_wheels());
+        let mut answer = 0;
         if !is_motor && self.stop_at.is_some_and(|at| now >= at) {
             self.stop_at = Some(now + STOP_PERIOD);
             self.sending = MotorControl::STOP.frame(0).as_bytes().into();
@@ -230,6 +248,7 @@ impl Endpoint for Player {
             if is_motor {
                 self.stop_at = None;
             }
+            answer = self.answer_len(&due.effect);
             if let Effect::Ask(node) = due.effect
                 && self.commanded.contains(node)
             {
@@ -241,7 +260,8 @@ impl Endpoint for Player {
         if let Some(echo) = &mut self.echo {
             echo.extend(&self.sending);
         }
-        self.is_free_at = now + self.wire_time(self.sending.len());
+        let turnaround = if answer > 0 { TURNAROUND } else { Duration::ZERO };
+        self.is_free_at = now + self.wire_time(self.sending.len() + answer) + turnaround;
         let micros = self.micros(now);
         self.sent.feed(&self.sending, micros, &mut self.sheet);
         Some(&self.sending)

@@ -84,13 +84,13 @@ impl<B: Boards> Spin<B> {
         // In any case, stop the motor first and report errors afterwards. That it may still turn is
         // the most serious one.
         let stopped = self.stop();
-        let recorded = self.bus.check_recording();
         let is_at_rest = stopped.is_ok();
         let besides = |failure: Failure| failure.and("it was stopped and is at rest");
         let result = stopped.and(spun.map_err(besides));
+        let result = result.and_then(|()| self.bus.check_recording());
         Outcome::of(&result, is_at_rest).say(self.form, &mut self.teller);
         let told = self.teller.finish();
-        result.and(self.left).and(told).and(recorded)
+        result.and(self.left).and(told)
     }
 
     /// Commands the motor and watches it until the time is up or a signal comes.

@@ -131,6 +131,29 @@ fn what_was_recorded_before_the_disk_is_full_stays_readable() {
 }
 
 #[test]
+fn a_recording_that_fails_is_told_with_the_outcome_and_beside_another_failure() {
+    undisturbed(|| {
+        let (_sim, port) = sim(TWO_NODES);
+        let path = fresh("outcome.pcapng");
+        let spin = format!("spin -p {port} -n 1 --rps 2 -f 1 -j --record {path}");
+        let ended = Process::spawn(&mut with_little_disk(&spin)).unwrap().end();
+        let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!(outcome["at_rest"], true);
+        assert!(outcome["failure"].as_str().unwrap().starts_with("cannot write "), "{outcome}");
+        let stop = format!("stop -p {port} -P ikeya -j --record /dev/full");
+        let ended = Process::start(&stop).end();
+        let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!((ended.code, &outcome["at_rest"]), (Some(1), &Value::Bool(true)));
+        // The target is not reached in this time.
+        let path = fresh("beside.pcapng");
+        let spin = format!("spin -p {port} -n 3 --revolutions 1000 -f 1 --record {path}");
+        let ended = Process::spawn(&mut with_little_disk(&spin)).unwrap().end();
+        assert!(ended.stderr.iter().any(|line| line.contains("cannot write")), "{ended:?}");
+        assert!(ended.stderr.iter().any(|line| line.contains("when the time was up")), "{ended:?}");
+    });
+}
+
+#[test]
 fn a_file_that_is_there_is_not_overwritten_without_being_told() {
     undisturbed(|| {
         let (_sim, port) = sim("ucp");

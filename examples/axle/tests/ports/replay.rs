@@ -134,6 +134,20 @@ fn pongs_of_the_capture_do_not_tell_that_the_stop_was_heard() {
 }
 
 #[test]
+fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
+        let packets: [Packet<'_>; 2] = [(0, 2, &write), (u64::MAX, 2, &write)];
+        let path = file("ages.pcapng", &PcapNg::new(147, &packets).0);
+        let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
+        let error = Process::start(&replay).complaint(1);
+        assert_eq!(error, "frame 2 is due after more than a year");
+        assert!(line.said().is_empty());
+    });
+}
+
+#[test]
 fn an_echo_in_the_recording_is_not_sent() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});

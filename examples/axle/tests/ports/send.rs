@@ -200,6 +200,19 @@ fn frames_are_sent_no_faster_than_the_line_carries_them() {
 }
 
 #[test]
+fn what_follows_a_question_waits_for_the_answer() {
+    undisturbed(|| {
+        let line = played::bus(&[], |_, _| {});
+        // 4 bytes, and 8 of the answer, of 10 bits at 9600 bit/s.
+        let send = format!("send -p {} -b 9600 -c 5 --every 0 -f 0 ikeya read 1", line.path);
+        Process::start(&send).success();
+        let at: Vec<_> = line.lock().said.iter().map(|(_, at)| *at).collect();
+        let span = *at.last().unwrap() - at[0];
+        assert!(at.len() == 5 && span >= Duration::from_millis(48), "{span:?}");
+    });
+}
+
+#[test]
 fn what_was_due_while_the_tool_was_suspended_is_not_sent() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
