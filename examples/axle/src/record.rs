@@ -83,24 +83,28 @@ where
     let start = Instant::now();
     let end = args.micros.map(|micros| start + Duration::from_micros(micros));
     let mut buffer = [0; 4096];
+    let mut recorded = Ok(());
     let broken = loop {
         let now = Instant::now();
-        if signals.is_raised() || end.is_some_and(|end| now >= end) {
+        if recorded.is_err() || signals.is_raised() || end.is_some_and(|end| now >= end) {
             break Ok(());
         }
         let patience = end.map_or(PATIENCE, |end| PATIENCE.min(end - now));
         match line.receive(&mut buffer, patience) {
-            Ok(bytes) => frames.take(bytes)?,
+            Ok(bytes) => recorded = frames.take(bytes),
             Err(failure) => break Err(failure),
         }
     };
-    let account = frames.finish()?;
+    let (account, recorded) = match recorded {
+        Ok(()) => frames.finish(),
+        failed => (frames.account(), failed),
+    };
     if args.output != Path::new("-") {
         let mut out = io::stdout().lock();
         let told = listing::print_summary(&mut out, &account, false);
         told.and_then(|()| out.flush()).map_err(Failure::Write)?;
     }
-    broken
+    recorded.and(broken)
 }
 
 /// Cuts what is received into frames and the bytes between them, a packet each.
@@ -189,13 +193,18 @@ where
         self.file.packet(micros, Some(Direction::In), &bytes);
     }
 
+    /// The account of what was received.
+    fn account(&self) -> Counters {
+        self.decoder.counters()
+    }
+
     /// Writes what is left; returns the account.
-    pub(crate) fn finish(mut self) -> Result<Counters, Failure> {
+    pub(crate) fn finish(mut self) -> (Counters, Result<(), Failure>) {
         loop {
             self.decoder.idle();
-            self.write(&[])?;
-            if self.decoder.pending() == 0 {
-                return Ok(self.decoder.counters());
+            let written = self.write(&[]);
+            if written.is_err() || self.decoder.pending() == 0 {
+                return (self.account(), written);
             }
         }
     }

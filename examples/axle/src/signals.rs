@@ -3,8 +3,6 @@
 #[cfg(windows)]
 mod console;
 
-#[cfg(unix)]
-use std::sync::LazyLock;
 use std::{
     io,
     sync::{
@@ -12,12 +10,15 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
 };
+#[cfg(unix)]
+use std::{io::Read, os::unix::net::UnixStream, sync::LazyLock, thread};
 
 use axlewire::time::{Duration, Instant};
 #[cfg(unix)]
 use signal_hook::{
     consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ},
     flag,
+    low_level::pipe,
 };
 
 use crate::failure::Failure;
@@ -57,12 +58,13 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. A second one
-    /// ends the tool at once, such as while it waits for a reader of its output.
+    /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. If the tool has
+    /// not ended a second later, because it waits for a reader of its output, the next one ends it
+    /// at once.
     pub(crate) fn listen() -> Result<Self, Failure> {
         let signals = Self::listen_gently()?;
         #[cfg(unix)]
-        listen_to(ENDS, free())?;
+        free_later().map_err(deaf)?;
         Ok(signals)
     }
 
@@ -182,6 +184,27 @@ pub(crate) fn freely<T>(run: impl FnOnce() -> T) -> T {
     #[cfg(unix)]
     free().store(before, Ordering::SeqCst);
     done
+}
+
+/// Time for an orderly end. Some programs send a signal twice, such as `timeout`, to a process and
+/// to its group.
+#[cfg(unix)]
+const GRACE: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// Lets signals end the tool at once, some time after the first.
+#[cfg(unix)]
+fn free_later() -> io::Result<()> {
+    let (mut first, signalled) = UnixStream::pair()?;
+    for &signal in ENDS {
+        pipe::register(signal, signalled.try_clone()?)?;
+    }
+    thread::spawn(move || {
+        if first.read_exact(&mut [0]).is_ok() {
+            thread::sleep(GRACE);
+            free().store(true, Ordering::SeqCst);
+        }
+    });
+    Ok(())
 }
 
 /// Whether a signal of [`ENDS`] ends the tool at once.

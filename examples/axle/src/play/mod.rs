@@ -123,9 +123,10 @@ fn play(
     stopped?;
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
-    for (count, what) in [(lost, "did not leave whole"), (left, "were not sent: interrupted")] {
+    for (count, what) in [(lost, "did not leave whole"), (left, "not sent: interrupted")] {
         if count > 0 {
-            return Err(Failure::Failed(format!("{count} frames {what}; {besides}")));
+            let frames = if count == 1 { "frame" } else { "frames" };
+            return Err(Failure::Failed(format!("{count} {frames} {what}; {besides}")));
         }
     }
     told.and_then(|()| line.check_recording())

@@ -36,6 +36,7 @@ where
     let mut table = Table::new(watched.protocol, start);
     let (mut print_at, mut heard_at) = (start + PRINT_PERIOD, start);
 
+    let mut lost = Ok(());
     let broken = loop {
         let frames = decoder.counters().frames;
         if signals.is_raised() || watched.is_over(start, clock.now(), frames) {
@@ -52,7 +53,11 @@ where
         } else if now >= heard_at + QUIET && decoder.pending() > 0 {
             decoder.idle();
         }
-        recorder.take(received)?;
+        // A recording that fails does not end the watch; it decides the exit code.
+        if let Err(failure) = recorder.take(received) {
+            recorder.drop_it();
+            lost = Err(failure);
+        }
         table.take(&mut decoder, received);
         if now >= print_at {
             print_at = now + PRINT_PERIOD;
@@ -75,5 +80,5 @@ where
     };
     told.map_err(Failure::Write)?;
     broken?;
-    recorded
+    lost.and(recorded)
 }

@@ -78,11 +78,10 @@ where
 
     /// Ends the recording, if there is one.
     pub(super) fn finish(&mut self) -> Result<(), Failure> {
-        self.running.take().map_or(Ok(()), |(_, frames)| frames.finish().map(drop))
+        self.running.take().map_or(Ok(()), |(_, frames)| frames.finish().1)
     }
 
     /// Gives up a recording that has failed.
-    #[cfg(all(unix, feature = "dashboard"))]
     pub(super) fn drop_it(&mut self) {
         self.running = None;
     }

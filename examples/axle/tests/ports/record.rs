@@ -117,7 +117,10 @@ fn what_was_recorded_before_the_disk_is_full_stays_readable() {
         let path = fresh("full.pcapng");
         let record = format!("record -p {port} -P ucp -o {path}");
         let mut limited = with_little_disk(&record);
-        let error = Process::spawn(&mut limited).unwrap().complaint(1);
+        let ended = Process::spawn(&mut limited).unwrap().end();
+        assert!(ended.stdout.iter().any(|line| line.contains(" bytes received")), "{ended:?}");
+        let [error] = &ended.stderr[..] else { panic!("{ended:?}") };
+        let error = error.strip_prefix("axle: ").unwrap();
         let says = format!("cannot write {path:?}: File too large (os error 27); the ");
         assert!(
             error.starts_with(&says) && error.ends_with("packets in it are complete"),
@@ -150,6 +153,37 @@ fn a_recording_that_fails_is_told_with_the_outcome_and_beside_another_failure() 
         let ended = Process::spawn(&mut with_little_disk(&spin)).unwrap().end();
         assert!(ended.stderr.iter().any(|line| line.contains("cannot write")), "{ended:?}");
         assert!(ended.stderr.iter().any(|line| line.contains("when the time was up")), "{ended:?}");
+    });
+}
+
+#[test]
+fn a_recording_that_fails_does_not_end_a_watch() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("watch.pcapng");
+        let watch = format!("watch -p {port} -P ucp --plain -f 1.5 --record {path}");
+        let ended = Process::spawn(&mut with_little_disk(&watch)).unwrap().end();
+        assert_eq!((ended.code, ended.stderr.len()), (Some(1), 1), "{ended:?}");
+        assert!(ended.stdout.iter().any(|line| line.contains("  5  report")), "{ended:?}");
+    });
+}
+
+#[test]
+fn a_signal_that_comes_twice_ends_a_recording_in_order() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        for _ in 0..5 {
+            let path = fresh("twice.pcapng");
+            let record = Process::start(&format!("record -p {port} -P ucp -o {path}"));
+            super::wait_until("a kilobyte", || {
+                fs::metadata(&path).is_ok_and(|file| file.len() > 1000)
+            });
+            record.signal("TERM");
+            record.signal("TERM");
+            let ended = record.end();
+            // It may have ended before the second one.
+            assert_eq!((ended.code, ended.stdout.is_empty()), (Some(0), false), "{ended:?}");
+        }
     });
 }
 

@@ -246,7 +246,7 @@ fn frames_that_a_signal_keeps_from_being_sent_are_counted() {
         });
         send.signal("INT");
         let error = send.complaint(1);
-        let expected = "1998 frames were not sent: interrupted; what was commanded is stopped and \
+        let expected = "1998 frames not sent: interrupted; what was commanded is stopped and \
                         at rest";
         assert_eq!(error, expected);
     });

@@ -56,7 +56,7 @@ fn a_reader_that_does_not_read_keeps_nobody_from_ending_the_tool_while_nothing_m
             for _ in 0..signals {
                 let kill = format!("kill -TERM {}", tool.id());
                 assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
-                thread::sleep(Duration::from_millis(200));
+                thread::sleep(Duration::from_millis(1200));
             }
             let tool = RefCell::new(tool);
             wait_until("the end", || tool.borrow_mut().try_wait().unwrap().is_some());
