@@ -141,14 +141,17 @@ impl<B: Boards> Bus<B> {
         }
         while !signals.is_raised() && self.is_online(node) && self.now() < end {
             self.look()?;
-            match self.master().status(node) {
-                Some((status, at)) if at > start && !self.master().is_mode_in_doubt(node) => {
-                    return Ok(Some(status));
-                }
-                _ => {}
+            if let Some(status) = self.fresh(node, start) {
+                return Ok(Some(status));
             }
         }
         Ok(None)
+    }
+
+    /// The status of a node, if it was measured after `since` and its mode is certain.
+    fn fresh(&self, node: NodeId, since: Instant) -> Option<Status<B>> {
+        let (status, at) = self.master().status(node)?;
+        (at > since && !self.master().is_mode_in_doubt(node)).then_some(status)
     }
 
     /// Reads these nodes now, so that no decision uses an old mode or position, and waits for their
@@ -159,11 +162,8 @@ impl<B: Boards> Bus<B> {
             // One that is refused is not known either.
             let _ = self.master_mut().read(node, start);
         }
-        let is_fresh = |master: &Master<B>, node| {
-            master.status(node).is_some_and(|(_, at)| at > start) && !master.is_mode_in_doubt(node)
-        };
         let end = start + REFRESH;
-        while self.now() < end && !nodes.iter().all(|node| is_fresh(self.master(), node)) {
+        while self.now() < end && !nodes.iter().all(|node| self.fresh(node, start).is_some()) {
             if self.round(end).is_err() {
                 return;
             }

@@ -87,10 +87,7 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             }
             ikeya::Packet::Request(ikeya::Request::Write(write)) => {
                 let (speeds, positions) = (vec![write.as_velocity()], vec![write.as_position()]);
-                (
-                    Side::Commander,
-                    Effect::Write(Write { node: write.id(), speeds, positions }.into()),
-                )
+                (Side::Commander, Write { node: write.id(), speeds, positions }.into())
             }
             ikeya::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
@@ -101,25 +98,11 @@ pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), Str
             three::Packet::Request(three::Request::Write(write)) => {
                 let (speeds, positions) =
                     (write.as_velocity().to_vec(), write.as_position().to_vec());
-                (
-                    Side::Commander,
-                    Effect::Write(Write { node: write.id(), speeds, positions }.into()),
-                )
+                (Side::Commander, Write { node: write.id(), speeds, positions }.into())
             }
             three::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
-        Protocol::Ucp => {
-            let frame = whole::<ucp::Ucp>(bytes)?;
-            let (side, effect) = of_message(&frame.message())?;
-            if let Message::MotorControl(command) = frame.message() {
-                let clean = MotorControl::try_from(*command).map(|it| it.frame(frame.index()));
-                if clean.is_ok_and(|clean| clean.as_bytes() != bytes) {
-                    let line = "a motor command with values that no host sends (ruling U7)";
-                    return Err(line.to_owned());
-                }
-            }
-            Ok((side, effect))
-        }
+        Protocol::Ucp => of_frame(whole::<ucp::Ucp>(bytes)?),
     }
 }
 
@@ -133,10 +116,14 @@ fn whole<F: Framing>(bytes: &[u8]) -> Result<F::Frame<'_>, String> {
     }
 }
 
-fn of_message(message: &Message<'_>) -> Result<(Side, Effect), String> {
+fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
+    let message = frame.message();
     let commander = |effect| Ok((Side::Commander, effect));
-    match message {
+    match &message {
         Message::MotorControl(command) => match MotorControl::try_from(**command) {
+            Ok(command) if command.frame(frame.index()).as_bytes() != frame.as_bytes() => {
+                Err("a motor command with values that no host sends (ruling U7)".to_owned())
+            }
             Ok(command) if command.stands_still() => commander(Effect::Stand),
             Ok(_) => commander(Effect::Drive),
             Err(_) if command.starts_update() => {
@@ -164,6 +151,12 @@ fn of_message(message: &Message<'_>) -> Result<(Side, Effect), String> {
         )),
         Message::Unknown(_) => commander(Effect::Nothing),
         _ => Err("a message that this version does not know".to_owned()),
+    }
+}
+
+impl From<Write> for Effect {
+    fn from(write: Write) -> Self {
+        Self::Write(write.into())
     }
 }
 
