@@ -5,6 +5,8 @@
     .ci/api.py --check     compare it with api.txt; exit code 1 and a diff if they differ
     .ci/api.py --record    write it to api.txt
     .ci/api.py --counts    print the number of items on each module page
+    .ci/api.py --semver    compare api.txt with that of the release named in .ci/api-released; exit
+                           code 1 if the version does not allow what has changed
     .ci/api.py --defmt     check that each public struct and enum implements defmt::Format
 
 The listing is read from the pages that `cargo doc --all-features` writes, one line for each item,
@@ -265,6 +267,45 @@ def check(lines):
     return bool(diff)
 
 
+def semver():
+    """Whether the version in Cargo.toml allows what has changed since the release on record."""
+    released, commit = (ROOT / ".ci" / "api-released").read_text().split()
+    old = subprocess.run(["git", "show", f"{commit}:{LISTING.name}"], cwd=ROOT, text=True,
+                         stdout=subprocess.PIPE)
+    if old.returncode:
+        print(f"the commit of {released}, {commit}, is not in this clone: git fetch --unshallow")
+        return 1
+    version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)[1]
+    old, new = old.stdout.splitlines()[2:], LISTING.read_text().splitlines()[2:]
+    broken = breaks(old, new)
+    # Below 1.0 the second number counts for breaks.
+    allowed, given = ([int(part) for part in it.split(".")[:2]] for it in (released, version))
+    allowed = given > allowed
+    print(f"{released} had {len(old)} lines, {version} has {len(new)}; {len(broken)} break its users")
+    if broken and not allowed:
+        print(*broken, sep="\n")
+        print(f"after {released} this needs a version of which the second number is higher;"
+              " if that release never left this tree, put the present commit into .ci/api-released")
+    return bool(broken) and not allowed
+
+
+def breaks(old, new):
+    """Lines that users of `old` may depend on, and new ones that they would have to handle."""
+    broken = [f"gone: {line}" for line in sorted(set(old) - set(new))]
+    heads = {line.split(": ", 1)[0]: line.split(": ", 1)[1] for line in reversed(old)
+             if re.search(r": (#\[.*\] )?pub (struct|enum|trait) ", line)}
+    for line in sorted(set(new) - set(old)):
+        path, text = line.split(": ", 1)
+        head = heads.get(path.rpartition("::")[0], "")
+        is_open = "non_exhaustive" in head or "private fields" in head or not head
+        if "pub trait" in head:
+            if "{ provided }" not in text:
+                broken.append(f"has to be implemented: {line}")
+        elif not is_open and not re.match(r"(pub )?(const |unsafe |async )*(fn|impl|const|type)\b", text):
+            broken.append(f"has to be given or matched: {line}")
+    return broken
+
+
 def counts(pages):
     rows = []
     for path, (kind, page) in pages.items():
@@ -303,9 +344,11 @@ def is_in(path, top):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     option = parser.add_mutually_exclusive_group()
-    for name in ("--check", "--record", "--counts", "--defmt"):
+    for name in ("--check", "--record", "--counts", "--defmt", "--semver"):
         option.add_argument(name, action="store_true")
     args = parser.parse_args()
+    if args.semver:
+        return semver()
     pages = read_pages(document())
     if args.counts:
         return counts(pages)

@@ -4,10 +4,13 @@
     chrt -f 10 cargo bench -q -p axlewire-benches --bench ratios > benches/ratios.txt
     python3 benches/chart.py
 
+With `--check` it draws nothing, and fails if the picture is not the one that it would draw.
+
 Left: throughput of each decoder over that of the C reference. Right: the intact frames that C
 loses at each bit-error rate; axlewire loses none, or the bench would have failed.
 """
 
+import sys
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -44,7 +47,10 @@ def main():
         *body,
         "</svg>",
     ]
-    (HERE / "ratios.svg").write_text("\n".join(svg) + "\n")
+    picture, text = HERE / "ratios.svg", "\n".join(svg) + "\n"
+    if sys.argv[1:] == ["--check"]:
+        return None if picture.read_text() == text else f"{picture} is out of date"
+    picture.write_text(text)
 
 
 def throughput(values):
@@ -144,4 +150,4 @@ def text(x, y, words, anchor="start", weight="normal"):
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -57,6 +57,8 @@ pub struct Protocol {
     pub oracle: fn(&[u8]) -> Tally,
     /// End offsets of the frames that axlewire finds.
     pub frame_ends: fn(&[u8]) -> Vec<usize>,
+    /// A frame to end a stream with.
+    pub last_frame: fn() -> Vec<u8>,
 }
 
 /// Ikeya MD, both directions on one line.
@@ -71,6 +73,7 @@ pub const IKEYA: Protocol = Protocol {
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
     frame_ends: ours::frame_ends::<Portable<ikeya::BothDirections>>,
+    last_frame: streams::last_ikeya_frame,
 };
 
 /// UCP with the default cap of 64-byte frames.
@@ -85,4 +88,5 @@ pub const UCP: Protocol = Protocol {
     c_bitwise: reference::ucp_bitwise,
     oracle: oracle::ucp,
     frame_ends: ours::frame_ends::<Portable<ucp::Ucp>>,
+    last_frame: streams::last_ucp_frame,
 };

@@ -14,22 +14,99 @@ use ublox::{Parser, UbxPacket, proto23::PacketRef};
 
 use crate::{Tally, streams::Rng};
 
+/// A crate with frames for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Peer {
+    /// Its name.
+    pub name: &'static str,
+    /// Length of each frame, bytes.
+    pub frame_len: usize,
+    /// Makes this many frames.
+    pub frames: fn(usize) -> Vec<u8>,
+    /// What the crate finds in them.
+    pub read: fn(&[u8]) -> Tally,
+    /// Where a frame has its id and its first four payload bytes as the crate gives them.
+    sample: fn(&[u8]) -> (u8, [u8; 4]),
+}
+
+impl Peer {
+    /// What is in these frames, known without the crate.
+    #[must_use]
+    pub fn contents(&self, frames: &[u8]) -> Tally {
+        let mut tally = Tally::default();
+        for frame in frames.chunks_exact(self.frame_len) {
+            let (id, payload) = (self.sample)(frame);
+            tally.add(id, Some(payload));
+        }
+        tally
+    }
+}
+
+/// `mavlink` on attitudes: sequence number, and time since boot.
+pub const MAVLINK: Peer = Peer {
+    name: "mavlink",
+    frame_len: MAVLINK_LEN,
+    frames: mavlink_frames,
+    read: mavlink_read,
+    sample: |frame| (frame[4], four(&frame[10..])),
+};
+
+/// `ublox` on velocities: message id, and time of week.
+pub const UBLOX: Peer = Peer {
+    name: "ublox",
+    frame_len: UBLOX_LEN,
+    frames: ublox_frames,
+    read: ublox_read,
+    sample: |frame| (frame[3], four(&frame[6..])),
+};
+
+/// `modbus-core` on responses: address, and the rest from the function code on.
+pub const MODBUS_CORE_RESPONSES: Peer = Peer {
+    name: "modbus-core, responses",
+    frame_len: MODBUS_RESPONSE_LEN,
+    frames: modbus_responses,
+    read: modbus_read_responses,
+    sample: |frame| (frame[0], four(&frame[1..])),
+};
+
+/// The same on requests.
+pub const MODBUS_CORE_REQUESTS: Peer = Peer {
+    name: "modbus-core, requests",
+    frame_len: MODBUS_REQUEST_LEN,
+    frames: modbus_requests,
+    read: modbus_read_requests,
+    sample: |frame| (frame[0], four(&frame[1..])),
+};
+
+/// `rmodbus` on requests: address, and number of the register, big-endian in the frame.
+pub const RMODBUS_REQUESTS: Peer = Peer {
+    name: "rmodbus",
+    frame_len: MODBUS_REQUEST_LEN,
+    frames: modbus_requests,
+    read: rmodbus_read_requests,
+    sample: |frame| (frame[0], [frame[3], frame[2], 0, 0]),
+};
+
+/// The first four of these bytes.
+fn four(bytes: &[u8]) -> [u8; 4] {
+    bytes.first_chunk().copied().unwrap_or_default()
+}
+
 /// Length of a MAVLink frame here, bytes: that of a UCP report.
-pub const MAVLINK_LEN: usize = 44;
+const MAVLINK_LEN: usize = 44;
 
 /// Length of a UBX frame here, bytes: that of a UCP report.
-pub const UBLOX_LEN: usize = 44;
+const UBLOX_LEN: usize = 44;
 
 /// Length of a Modbus response here, bytes: registers have two bytes each, so one less than a
 /// report.
-pub const MODBUS_RESPONSE_LEN: usize = 43;
+const MODBUS_RESPONSE_LEN: usize = 43;
 
 /// Length of a Modbus request here, bytes: that of an Ikeya response.
-pub const MODBUS_REQUEST_LEN: usize = 8;
+const MODBUS_REQUEST_LEN: usize = 8;
 
 /// MAVLink 2 frames with an attitude each.
-#[must_use]
-pub fn mavlink_frames(count: usize) -> Vec<u8> {
+fn mavlink_frames(count: usize) -> Vec<u8> {
     let mut rng = Rng::new(5);
     let mut bytes = Vec::with_capacity(count * MAVLINK_LEN);
     let mut unit = || rng.below(1 << 20) as f32 / (1 << 20) as f32 + 0.5;
@@ -52,8 +129,7 @@ pub fn mavlink_frames(count: usize) -> Vec<u8> {
 }
 
 /// `mavlink`, reading from memory into its own message type.
-#[must_use]
-pub fn mavlink_read(bytes: &[u8]) -> Tally {
+fn mavlink_read(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();
     let mut reader = MavlinkReader::new(Cursor::new(bytes));
     // The end of the bytes gives an error.
@@ -66,8 +142,7 @@ pub fn mavlink_read(bytes: &[u8]) -> Tally {
 }
 
 /// UBX frames with a velocity (NAV-VELNED) each.
-#[must_use]
-pub fn ublox_frames(count: usize) -> Vec<u8> {
+fn ublox_frames(count: usize) -> Vec<u8> {
     let mut rng = Rng::new(7);
     let mut bytes = Vec::with_capacity(count * UBLOX_LEN);
     for _ in 0..count {
@@ -88,8 +163,7 @@ pub fn ublox_frames(count: usize) -> Vec<u8> {
 }
 
 /// `ublox`, given everything at once, so that it borrows all frames and copies none.
-#[must_use]
-pub fn ublox_read(bytes: &[u8]) -> Tally {
+fn ublox_read(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();
     let mut parser = Parser::default_proto();
     let mut packets = parser.consume_ubx(bytes);
@@ -102,14 +176,12 @@ pub fn ublox_read(bytes: &[u8]) -> Tally {
 }
 
 /// Modbus RTU responses with 19 registers each.
-#[must_use]
-pub fn modbus_responses(count: usize) -> Vec<u8> {
+fn modbus_responses(count: usize) -> Vec<u8> {
     modbus_frames::<{ MODBUS_RESPONSE_LEN - 2 }>(count, [1, 3, 38])
 }
 
 /// Modbus RTU requests that write one register each.
-#[must_use]
-pub fn modbus_requests(count: usize) -> Vec<u8> {
+fn modbus_requests(count: usize) -> Vec<u8> {
     modbus_frames::<{ MODBUS_REQUEST_LEN - 2 }>(count, [1, 6, 0])
 }
 
@@ -127,14 +199,12 @@ fn modbus_frames<const LEN: usize>(count: usize, header: [u8; 3]) -> Vec<u8> {
 }
 
 /// `modbus-core` on responses, each borrowed and not unpacked.
-#[must_use]
-pub fn modbus_read_responses(bytes: &[u8]) -> Tally {
+fn modbus_read_responses(bytes: &[u8]) -> Tally {
     modbus_read(modbus_core::DecoderType::Response, bytes)
 }
 
 /// `modbus-core` on requests, each borrowed and not unpacked.
-#[must_use]
-pub fn modbus_read_requests(bytes: &[u8]) -> Tally {
+fn modbus_read_requests(bytes: &[u8]) -> Tally {
     modbus_read(modbus_core::DecoderType::Request, bytes)
 }
 
@@ -149,8 +219,7 @@ fn modbus_read(kind: modbus_core::DecoderType, mut bytes: &[u8]) -> Tally {
 
 /// `rmodbus` as the server addressed by the requests. It does not search for frames: it gets each
 /// one as a separate slice.
-#[must_use]
-pub fn rmodbus_read_requests(bytes: &[u8]) -> Tally {
+fn rmodbus_read_requests(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();
     let mut response = Vec::new();
     for request in bytes.chunks_exact(MODBUS_REQUEST_LEN) {
@@ -167,19 +236,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_frames_are_as_long_as_they_say() {
-        assert_eq!(mavlink_frames(100).len(), 100 * MAVLINK_LEN);
-        assert_eq!(ublox_frames(100).len(), 100 * UBLOX_LEN);
-        assert_eq!(modbus_responses(100).len(), 100 * MODBUS_RESPONSE_LEN);
-        assert_eq!(modbus_requests(100).len(), 100 * MODBUS_REQUEST_LEN);
-    }
-
-    #[test]
-    fn every_peer_finds_all_its_frames() {
-        assert_eq!(mavlink_read(&mavlink_frames(1000)).frames, 1000);
-        assert_eq!(ublox_read(&ublox_frames(1000)).frames, 1000);
-        assert_eq!(modbus_read_responses(&modbus_responses(1000)).frames, 1000);
-        assert_eq!(modbus_read_requests(&modbus_requests(1000)).frames, 1000);
-        assert_eq!(rmodbus_read_requests(&modbus_requests(1000)).frames, 1000);
+    fn every_peer_finds_all_its_frames_with_their_contents() {
+        for peer in [MAVLINK, UBLOX, MODBUS_CORE_RESPONSES, MODBUS_CORE_REQUESTS, RMODBUS_REQUESTS]
+        {
+            let frames = (peer.frames)(1000);
+            assert_eq!(frames.len(), 1000 * peer.frame_len, "{}", peer.name);
+            let all = peer.contents(&frames);
+            assert!(all.frames == 1000 && all.sum > 100_000, "{}: {all:?}", peer.name);
+            assert_eq!((peer.read)(&frames), all, "{}", peer.name);
+            // A damaged frame is none.
+            let mut damaged = frames;
+            damaged[peer.frame_len + 7] ^= 1;
+            assert_ne!((peer.read)(&damaged), all, "{}", peer.name);
+        }
     }
 }

@@ -10,7 +10,10 @@ use axlewire::{
     },
     time::{Duration, Instant},
 };
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput};
+
+mod measure;
+use measure::measure;
 
 const EXCHANGES: u32 = 1000;
 
@@ -62,27 +65,35 @@ impl Bus {
         told
     }
 
-    /// Runs a thousand exchanges, each with WRITE, READ and answer.
-    fn exchanges(&mut self) {
-        let before = (self.slave.statistics().writes, self.slave.statistics().replies);
+    /// Runs a thousand exchanges, each with WRITE, READ and answer; returns how many WRITEs and
+    /// answers the slave counted.
+    fn exchanges(&mut self) -> [u32; 2] {
+        let before = self.counted();
         let mut told = 0;
         while told < EXCHANGES {
             told += self.step();
         }
-        let after = (self.slave.statistics().writes, self.slave.statistics().replies);
-        assert_eq!((after.0 - before.0, after.1 - before.1), (EXCHANGES, EXCHANGES));
+        let after = self.counted();
+        [after[0] - before[0], after[1] - before[1]]
+    }
+
+    /// WRITEs and answers of the slave.
+    fn counted(&self) -> [u32; 2] {
+        [self.slave.statistics().writes, self.slave.statistics().replies]
     }
 }
 
-fn roles(criterion: &mut Criterion) {
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
     let mut group = criterion.benchmark_group("Ikeya roles");
     group.throughput(Throughput::Elements(EXCHANGES.into()));
     let mut bus = Bus::new();
-    group.bench_function("WRITE, READ and answer, both ends", |bencher| {
-        bencher.iter(|| bus.exchanges());
-    });
+    let before = bus.counted();
+    let name = "WRITE, READ and answer, both ends";
+    let runs = measure(&mut group, name, [EXCHANGES; 2], || bus.exchanges());
+    let after = bus.counted();
+    let counted = [after[0].wrapping_sub(before[0]), after[1].wrapping_sub(before[1])];
+    assert_eq!(counted, [runs.wrapping_mul(EXCHANGES); 2], "exchanges that were not made");
     group.finish();
+    criterion.final_summary();
 }
-
-criterion_group!(benches, roles);
-criterion_main!(benches);

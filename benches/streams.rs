@@ -105,7 +105,8 @@ pub fn reports(len: usize) -> Stream {
     })
 }
 
-/// Streams of exactly `len` bytes without sent frames: noise, and worst-case patterns.
+/// Streams of exactly `len` bytes: noise, and worst-case patterns. Their only frames are a few at
+/// their end, so that a decoder that finds nothing gives a wrong answer: more than C loses.
 ///
 /// The patterns contain as many headers of maximum-length frames as possible, or make the next byte
 /// as unpredictable as possible.
@@ -132,11 +133,28 @@ pub fn hostile(len: usize) -> Vec<Stream> {
         ("FD FF 28 00 repeated", UCP, repeated(&[0xFD, 0xFF, 40, 0])),
         ("FD FF 3C 00 repeated", UCP, repeated(&[0xFD, 0xFF, 60, 0])),
     ]
-    .map(|(name, protocol, bytes)| {
+    .map(|(name, protocol, mut bytes)| {
         let name = format!("{} {name}", protocol.name);
-        Stream { name, protocol, bytes, sent: 0, intact: Vec::new() }
+        let last = (protocol.last_frame)();
+        bytes.truncate(len - LAST_FRAMES * last.len());
+        let intact = (1..=LAST_FRAMES).map(|count| bytes.len() + count * last.len()).collect();
+        bytes.extend(last.repeat(LAST_FRAMES));
+        Stream { name, protocol, bytes, sent: LAST_FRAMES, intact }
     })
     .into()
+}
+
+/// Frames at the end of a hostile stream.
+const LAST_FRAMES: usize = 16;
+
+/// An answer of node 8.
+pub(crate) fn last_ikeya_frame() -> Vec<u8> {
+    VelocityResponse::new(NodeId::N8, Rps::ZERO).as_bytes().to_vec()
+}
+
+/// A request for biases.
+pub(crate) fn last_ucp_frame() -> Vec<u8> {
+    BiasRequest {}.frame(0).as_bytes().to_vec()
 }
 
 /// SplitMix64: small, reproducible, and random enough to fill frames.
@@ -301,6 +319,17 @@ mod tests {
     }
 
     #[test]
+    fn a_hostile_stream_ends_with_frames_that_all_find_and_c_in_part() {
+        for Stream { name, protocol, bytes, sent, intact } in hostile(LEN) {
+            assert_eq!((bytes.len(), intact.len(), intact.last()), (LEN, sent, Some(&LEN)));
+            assert!((protocol.frame_ends)(&bytes).ends_with(&intact), "{name}");
+            for c in [protocol.c_table, protocol.c_bitwise] {
+                assert!(c(&bytes).frames > 5, "{name}: {:?}", c(&bytes));
+            }
+        }
+    }
+
+    #[test]
     fn axlewire_and_the_oracle_agree_on_every_stream() {
         let clean = clean(LEN);
         let noisy = clean.each_ref().map(|stream| stream.with_bit_errors(1000));
@@ -310,6 +339,8 @@ mod tests {
             assert_eq!((protocol.frames)(bytes), expected, "{name}, frames");
             assert_eq!((protocol.each)(bytes), expected, "{name}, each");
             assert_eq!((protocol.each_simd)(bytes), expected, "{name}, each by SIMD");
+            assert_eq!((protocol.pushed)(bytes), expected, "{name}, pushed");
+            assert_ne!(expected, crate::Tally::default(), "{name}");
             for chunk in [1, 7, 64, 512, 4096] {
                 assert_eq!((protocol.decoder)(bytes, chunk), expected, "{name}, by {chunk}");
             }

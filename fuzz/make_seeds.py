@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
-"""Builds seeds/ from the frames in ../tests/vectors, with identical files every time.
+"""Puts starting points for a campaign into corpus/, from the frames in ../tests/vectors.
 
-Run it from anywhere; it replaces existing files. src/bodies.rs describes the format of a stream
-seed: framing, repair and number of ops, ops, stream.
+The files are the same every time; `fuzz/campaign --minimise` makes seeds of what counts in them.
+src/targets/streams.rs describes the format: framing, repair and number of ops, ops, stream.
 """
 
 import json
 import random
-import shutil
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 VECTORS = HERE.parent / "tests" / "vectors"
-SEEDS = HERE / "seeds"
+CORPUS = HERE / "corpus"
 
-# Ops as src/bodies.rs reads them: the upper three bits are the kind, the lower five the amount.
+# Ops as src/targets/streams.rs reads them: the upper three bits are the kind, the lower five the
+# amount.
 SLICE, SLICE8, COMMIT, COMMIT8, STOP1, STOP2, DRAIN, IDLE = (kind << 5 for kind in range(8))
 PLANS = {
     "whole": [SLICE8 | 31],
@@ -38,7 +38,7 @@ def stream(choice, repair, ops, data):
 
 
 def write(target, name, data):
-    folder = SEEDS / target
+    folder = CORPUS / target
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_bytes(data)
 
@@ -80,7 +80,6 @@ def roundtrips():
 
 
 if __name__ == "__main__":
-    shutil.rmtree(SEEDS, ignore_errors=True)
     streams("ikeya_stream", "ikeya", 12, [0xAA, 0xBB, 0x55, 0x56, 0x01, 0x09])
     streams("ucp_stream", "ucp", 6, [0xFD, 0xFF, 0x04, 0x3C, 0x00, 0x05])
     roundtrips()

@@ -21,8 +21,9 @@ use crate::time::{Duration, Instant};
 /// it is given, and it never blocks, allocates or panics. Spurious calls are harmless: empty input,
 /// a timeout that has not been reached, a poll with nothing to return.
 ///
-/// Hand in received bytes *before* the next `poll_transmit`: a master uses this order to tell
-/// answers from stale bytes (ruling I7).
+/// Hand in *all* received bytes before the next `poll_transmit`: a master uses this order to tell
+/// answers from stale bytes (ruling I7). If you cannot, because the port fails or is full, hand in
+/// the bytes behind it with [`handle_old_input`](Self::handle_old_input).
 ///
 /// # When a port fails
 ///
@@ -37,11 +38,13 @@ pub trait Endpoint {
     /// Takes in all received bytes. All of them have arrived by `now`.
     fn handle_input(&mut self, bytes: &[u8], now: Instant);
 
-    /// Takes in received bytes that may have arrived at any time from `since` to `now`, because the
-    /// caller was held up. `since` may be before the time of earlier calls.
+    /// Takes in received bytes that may have arrived at any time from `since` to `now`: the caller
+    /// was held up, or handed out a frame before it had read all of them. `since` may be before the
+    /// time of earlier calls.
     ///
     /// By default the bytes count as received at `now`. A role that acts on commands dates them
-    /// `since`, so that a stale command is not treated as new.
+    /// `since`, so that a stale command is not treated as new; a master does not take them for the
+    /// answer to a request that was handed out after `since` (ruling I7).
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
         let _ = since;
         self.handle_input(bytes, now);

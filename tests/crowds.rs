@@ -1,5 +1,5 @@
 //! Dense headers, where candidates are rejected in batches, against the slow oracle.
-#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
 #[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]

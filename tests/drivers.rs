@@ -25,9 +25,29 @@ mod driver_enable_rig;
 /// The messages and sources of errors.
 #[path = "drivers/errors.rs"]
 mod errors;
+/// Every call: a failing port, a refusal, a timeout.
+#[macro_use]
+#[path = "drivers/every_call.rs"]
+mod every_call;
+/// Every call of a host and of a robot.
+#[cfg(feature = "ucp")]
+#[path = "drivers/every_rover_call.rs"]
+mod every_rover_call;
+/// Waits, to the microsecond.
+#[path = "drivers/exact_waits.rs"]
+mod exact_waits;
 /// Calls that fail or are dropped, and the call after them.
 #[path = "drivers/failed_and_dropped_calls.rs"]
 mod failed_and_dropped_calls;
+/// Ports of which one half fails.
+#[path = "drivers/half_ports.rs"]
+mod half_ports;
+/// Drivers that are held up.
+#[path = "drivers/held_up.rs"]
+mod held_up;
+/// Parts, and the defaults of traits.
+#[path = "drivers/parts.rs"]
+mod parts;
 #[path = "support/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
@@ -52,3 +72,6 @@ mod virtual_time;
 /// Waiting for events.
 #[path = "drivers/waiting.rs"]
 mod waiting;
+/// Tasks that wait are woken.
+#[path = "drivers/waking.rs"]
+mod waking;

@@ -7,10 +7,14 @@
 //! again.
 //!
 //! Needs QEMU and a compiler for thumbv7em; see `examples/firmware/README.md`. Without them the
-//! tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set.
+//! tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set. An image that cannot be built
+//! fails them.
 
 #![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
 
+/// What the firmware counts.
+#[path = "firmware/counts.rs"]
+mod counts;
 /// The driver-enable pin, from the log of QEMU.
 #[path = "firmware/driver_enable_pin.rs"]
 mod driver_enable_pin;
@@ -28,6 +32,9 @@ mod quiet;
 /// The firmware robot.
 #[path = "firmware/robot.rs"]
 mod robot;
+/// The registers that the firmware sets up.
+#[path = "firmware/setup.rs"]
+mod setup;
 /// The firmware slave.
 #[path = "firmware/slave.rs"]
 mod slave;

@@ -11,9 +11,18 @@ mod dead_man;
 /// Finding the nodes of a bus.
 #[path = "ikeya_roles/discovery.rs"]
 mod discovery;
+/// Echoes of packets that did not fit or did not leave.
+#[path = "ikeya_roles/echo.rs"]
+mod echo;
 /// Strikes, and the search for abnormal nodes.
 #[path = "ikeya_roles/health.rs"]
 mod health;
+/// Stops that are interrupted.
+#[path = "ikeya_roles/interrupted_stops.rs"]
+mod interrupted_stops;
+/// Failures that come late, and set-points that keep changing.
+#[path = "ikeya_roles/late_failures.rs"]
+mod late_failures;
 /// Modes in doubt and modes that change.
 #[path = "ikeya_roles/modes.rs"]
 mod modes;
@@ -38,6 +47,9 @@ mod settings;
 /// The slave.
 #[path = "ikeya_roles/slave.rs"]
 mod slave;
+/// Times of a slave.
+#[path = "ikeya_roles/slave_times.rs"]
+mod slave_times;
 /// Measured standstill.
 #[path = "ikeya_roles/standstill.rs"]
 mod standstill;
@@ -47,6 +59,9 @@ mod stops;
 /// Stops of nodes that do not answer.
 #[path = "ikeya_roles/stops_of_lost_nodes.rs"]
 mod stops_of_lost_nodes;
+/// Slaves with three motors.
+#[path = "ikeya_roles/three_motor_slaves.rs"]
+mod three_motor_slaves;
 /// Boards with three motors.
 #[path = "ikeya_roles/three_motors.rs"]
 mod three_motors;

@@ -282,5 +282,46 @@ fn a_write_error_keeps_the_ports_own_as_its_source() {
     let error = WriteError::Port(Unplugged);
     assert_eq!(error.source().unwrap().to_string(), "unplugged");
     assert_eq!(error.to_string(), "port failed while sending: unplugged");
-    assert!(WriteError::<Unplugged>::Zero.source().is_none());
+    let zero = WriteError::<Unplugged>::Zero;
+    assert_eq!((zero.to_string().as_str(), zero.source().is_none()), ("port took no bytes", true));
+    let refused = EncodeError::KnownId { id: 5 };
+    let error = WriteError::<Unplugged>::from(refused);
+    assert_eq!(error.to_string(), format!("frame cannot be encoded: {refused}"));
+    assert_eq!(error.source().unwrap().to_string(), refused.to_string());
+}
+
+#[test]
+fn a_reader_and_its_copy_go_on_with_the_bytes_that_it_holds() {
+    let bytes = ping(1);
+    let mut reader = FrameReader::<&[u8], Ucp, 64>::new(&bytes[..5]);
+    assert_eq!(reader.read_event(), Ok(None));
+    assert_eq!((reader.pending(), reader.decoder().pending()), (5, 5));
+    let mut copy = reader.clone();
+    for reader in [&mut reader, &mut copy] {
+        *reader.port_mut() = &bytes[5..];
+        let Ok(Some(Event::Frame(frame))) = reader.read_event() else { panic!("no frame") };
+        assert_eq!(frame.as_bytes(), bytes);
+        assert_eq!((reader.pending(), reader.decoder().counters().frames), (0, 1));
+    }
+    // The decoder that is handed out holds what was not framed yet.
+    *reader.port_mut() = &bytes[..3];
+    assert_eq!(reader.read_event(), Ok(None));
+    let (rest, decoder) = reader.into_parts();
+    assert_eq!((rest, decoder.pending()), (&[][..], 3));
+}
+
+#[test]
+fn a_failed_flush_is_an_error_of_the_port_and_the_next_one_goes_on() {
+    let port = || Script { flushes: [Step::Error].into(), ..Script::default() };
+    let (mut one, mut other) = (Writer::new(port()), Writer::new(port()));
+    for (is_first, expected) in [(true, Err(WriteError::Port(Unplugged))), (false, Ok(()))] {
+        if is_first {
+            one.queue(&Ping {}.frame(1)).unwrap();
+            other.queue(&Ping {}.frame(1)).unwrap();
+        }
+        assert_eq!(one.flush(), expected);
+        assert_eq!(poll_once(other.flush_async()), Some(expected));
+        assert!(one.unsent().is_empty() && other.unsent().is_empty());
+    }
+    assert_eq!((one.into_port().written, other.into_port().written), (ping(1), ping(1)));
 }

@@ -110,6 +110,11 @@ MENDS = [
      "const BOTH: Self = Self::Due(2);", "const BOTH: Self = Self::Due(1);", []),
     ("I12", "a stop is paid by one answer", "src/ikeya/master/stop.rs",
      "const PAYMENTS: u8 = 2;", "const PAYMENTS: u8 = 1;", []),
+    ("23", "an answer behind a failing receiver is taken for a later one", "src/drive/driver.rs",
+     "self.has_overtaken |= !self.is_empty;", "self.has_overtaken |= false;", ["motion"]),
+    ("23b", "a master takes bytes from before its request for the answer", "src/ikeya/master/role.rs",
+     "self.window.take_if(|window| since < window.request_end);",
+     "self.window.take_if(|window| since > window.deadline);", ["motion"]),
 ]
 
 

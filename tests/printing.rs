@@ -5,6 +5,8 @@
 mod data;
 #[path = "printing/debug.rs"]
 mod debug;
+#[path = "printing/errors.rs"]
+mod errors;
 #[path = "printing/ikeya.rs"]
 mod ikeya;
 #[path = "printing/ucp.rs"]

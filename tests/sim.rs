@@ -18,6 +18,10 @@ mod motor;
 #[cfg(feature = "ikeya")]
 #[path = "sim/motor_bus.rs"]
 mod motor_bus;
+/// Roles with what they move.
+#[cfg(all(feature = "ikeya", feature = "ucp"))]
+#[path = "sim/nodes.rs"]
+mod nodes;
 /// A simulated rover.
 #[cfg(feature = "ucp")]
 #[path = "sim/rover.rs"]

@@ -1,6 +1,6 @@
 //! Frames judged together, and bytes rejected together, with and without SIMD, against the slow
 //! oracle: streams long enough for lanes, damaged everywhere.
-#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
 #[path = "support/checked_line.rs"]
 #[allow(dead_code, reason = "stream.rs uses more of it")]

@@ -1,5 +1,5 @@
 //! The stream layer: against the slow oracle on hostile streams, and as single scenarios.
-#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
 /// The buffer of a decoder.
 #[path = "stream/buffer.rs"]
@@ -14,6 +14,8 @@ mod false_starts;
 mod foreign_framings;
 #[path = "support/hostile_streams.rs"]
 mod hostile_streams;
+#[path = "support/judged_work.rs"]
+mod judged_work;
 #[path = "support/known_framings.rs"]
 mod known_framings;
 #[path = "support/oracle.rs"]

@@ -11,9 +11,18 @@ mod acknowledgement_properties;
 /// What is acknowledged, and when.
 #[path = "ucp_roles/acknowledgements.rs"]
 mod acknowledgements;
+/// The end of an update, and indices.
+#[path = "ucp_roles/after_an_update.rs"]
+mod after_an_update;
 /// Calibrations and biases.
 #[path = "ucp_roles/calibration.rs"]
 mod calibration;
+/// What is counted, and how often.
+#[path = "ucp_roles/counts.rs"]
+mod counts;
+/// Both kinds, each time, to the microsecond.
+#[path = "ucp_roles/edges.rs"]
+mod edges;
 /// Ids on which some firmware hangs.
 #[path = "ucp_roles/firmware_hangs.rs"]
 mod firmware_hangs;
@@ -29,6 +38,9 @@ mod link;
 /// Motor commands and the dead-man.
 #[path = "ucp_roles/motor_commands.rs"]
 mod motor_commands;
+/// Frames that have become wrong, and kinds that do not fit.
+#[path = "ucp_roles/outdated_frames.rs"]
+mod outdated_frames;
 /// Helpers: roles alone, and two roles on one line.
 #[path = "ucp_roles/rig.rs"]
 mod rig;
@@ -38,6 +50,9 @@ mod robot;
 /// Properties: any calls, bytes and times.
 #[path = "ucp_roles/robustness.rs"]
 mod robustness;
+/// Presets and shortest times.
+#[path = "ucp_roles/settings.rs"]
+mod settings;
 /// Properties: everything that should be stopped is.
 #[path = "ucp_roles/standstill_properties.rs"]
 mod standstill_properties;

@@ -1,7 +1,7 @@
 # Builds for thumbv7em; sourced by the other scripts in this folder.
 #
 # Uses the rustup target if it is installed, otherwise Debian's compiler. QEMU and lld come from
-# Debian if they are missing; with INSTALL=no that is an error.
+# Debian if they are missing; with INSTALL=no that is an error, with status 77.
 #
 # Sets `out` to the target folder, `target` to the target's name, `cargo` to the build command, and
 # `compiler` to its name and version.
@@ -10,7 +10,14 @@ target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}
 export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
 
-need() { bash ../../.ci/need "$@" || exit; }
+need() { bash ../../.ci/need "$@" || exit 77; }
+
+# What the caller's build has set is not meant for this one: its flags, its compiler and the path of
+# that compiler's libraries, or a wrapper that measures coverage.
+for name in $(compgen -e | grep -E '^(RUSTC|RUSTFLAGS|RUSTDOC|CARGO_(BUILD|ENCODED|LLVM|PROFILE)_|LLVM_PROFILE|__CARGO)'); do
+    unset "$name"
+done
+unset LD_LIBRARY_PATH
 
 command -v qemu-system-arm >/dev/null || need qemu-system-arm
 if [ -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then

@@ -1,5 +1,3 @@
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-
-fuzz_target!(|data: &[u8]| axlewire_fuzz::roles::ikeya_master(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| axlewire_fuzz::run("ikeya_master", data));

@@ -1,5 +1,3 @@
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-
-fuzz_target!(|data: &[u8]| axlewire_fuzz::bodies::roundtrip(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| axlewire_fuzz::run("roundtrip", data));

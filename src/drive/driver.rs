@@ -40,6 +40,11 @@ pub struct Driver<R, P, C> {
     pub(super) looked_at: Instant,
     /// When it was last seen empty: all received bytes have arrived since.
     pub(super) empty_at: Instant,
+    /// Whether the last look ended there. It may have ended in an error, or at its limit.
+    is_empty: bool,
+    /// A frame was handed out although bytes may have waited: up to the next empty port, what is
+    /// received may be from before that frame.
+    has_overtaken: bool,
     pub(super) sending: Sending,
 }
 
@@ -60,6 +65,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             ahead_us: 0,
             looked_at: latest,
             empty_at: latest,
+            is_empty: false,
+            has_overtaken: false,
             sending: Sending::new(),
         }
     }
@@ -170,7 +177,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Hands in the bytes of a read. If the port was not seen empty recently, the driver was held
     /// up, in a call of the port, by its caller or by another task, and the bytes may have arrived
-    /// at any time since it was.
+    /// at any time since it was. So they may if a frame has been sent past them.
     pub(super) fn receive_chunk<E>(
         &mut self,
         chunk: &[u8],
@@ -181,11 +188,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
         let now = self.now();
         let bytes = chunk.get(..count).unwrap_or(chunk);
-        match self.role.held_up_after() {
-            Some(limit) if now - self.empty_at > limit => {
-                self.role.handle_old_input(bytes, self.empty_at, now);
-            }
-            _ => self.role.handle_input(bytes, now),
+        let is_old = match self.role.held_up_after() {
+            Some(limit) => now - self.empty_at > limit,
+            None => self.has_overtaken,
+        };
+        if is_old {
+            self.role.handle_old_input(bytes, self.empty_at, now);
+        } else {
+            self.role.handle_input(bytes, now);
         }
         Ok(())
     }
@@ -193,12 +203,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Notes that the port is checked for received bytes now, or a little later.
     pub(super) fn look(&mut self) {
         self.looked_at = self.latest;
+        self.is_empty = false;
     }
 
     /// Notes that the port was empty at `latest` or a little later. A short read does not show
     /// that: a ring buffer returns only the bytes up to its end.
     pub(super) fn saw_empty(&mut self) {
         self.empty_at = self.latest;
+        (self.is_empty, self.has_overtaken) = (true, false);
     }
 
     /// Lets time pass.
@@ -220,6 +232,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         if self.sending.rest().is_empty() {
             let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
             self.sending.load(frame)?;
+            self.has_overtaken |= !self.is_empty;
         }
         Ok(true)
     }

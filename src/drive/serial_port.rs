@@ -120,8 +120,8 @@ impl SerialPort {
         self.tty
     }
 
-    /// Waits for received bytes, at most for `patience` after the latest signal; returns whether
-    /// there are some. A [`Clock`](super::Clock) of your own can idle with it.
+    /// Waits for received bytes, at most for `patience`, however many signals interrupt it; returns
+    /// whether there are some. A [`Clock`](super::Clock) of your own can idle with it.
     ///
     /// # Errors
     ///
@@ -134,34 +134,41 @@ impl SerialPort {
     }
 
     fn receive(&mut self, patience: Duration) -> io::Result<bool> {
-        self.tty.set_timeout(patience.max(SHORTEST_WAIT)).map_err(lost)?;
+        let deadline = Instant::now() + patience;
         // Not every Windows driver returns a read at its first byte, so ask for one byte there.
         let asked = if cfg!(windows) { 1 } else { HELD_LEN };
-        let count = self.read_at(0, asked)?;
+        let count = self.read_at(0, asked, deadline)?;
         self.unread = 0..count;
         if cfg!(windows) && count > 0 {
             let more = self.tty.bytes_to_read().map_err(lost)?;
             // What is there already comes at once.
-            self.unread.end += self.read_at(count, more as usize)?;
+            self.unread.end += self.read_at(count, more as usize, deadline)?;
         }
         Ok(count > 0)
     }
 
-    /// Reads up to `len` bytes into the buffer, from `at`; 0 if none has come in time.
-    fn read_at(&mut self, at: usize, len: usize) -> io::Result<usize> {
+    /// Reads up to `len` bytes into the buffer, from `at`; 0 if none has come by `deadline`.
+    fn read_at(&mut self, at: usize, len: usize, deadline: Instant) -> io::Result<usize> {
         let free = self.held.get_mut(at..).unwrap_or_default();
         let len = len.min(free.len());
         let free = free.get_mut(..len).unwrap_or_default();
         if free.is_empty() {
             return Ok(0);
         }
+        let mut is_last = false;
         loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            self.tty.set_timeout(left.max(SHORTEST_WAIT)).map_err(lost)?;
             match self.tty.read(free) {
                 Ok(0) => return Err(lost(io::ErrorKind::UnexpectedEof)),
                 Ok(count) => return Ok(count.min(len)),
                 Err(error) => match error.kind() {
-                    io::ErrorKind::Interrupted => {}
-                    io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => return Ok(0),
+                    // Signals that never end must not make it wait for ever. One of them may come
+                    // in the last look.
+                    io::ErrorKind::Interrupted if !is_last => is_last = left.is_zero(),
+                    io::ErrorKind::Interrupted
+                    | io::ErrorKind::TimedOut
+                    | io::ErrorKind::WouldBlock => return Ok(0),
                     _ => return Err(lost(error)),
                 },
             }

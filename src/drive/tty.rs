@@ -118,6 +118,19 @@ mod tests {
     }
 
     #[test]
+    fn a_port_that_cannot_be_opened_has_its_reason_in_plain_words() {
+        let of = |kind, words: &str| explain(&serialport::Error::new(kind, words), "/dev/ttyUSB0");
+        let (kind, text) = of(ErrorKind::Io(io::ErrorKind::PermissionDenied), "13");
+        assert_eq!(kind, io::ErrorKind::PermissionDenied);
+        assert!(text.contains("permission denied") && text.contains("dialout"), "{text}");
+        let (kind, text) = of(ErrorKind::Io(io::ErrorKind::NotFound), "2");
+        assert_eq!((kind, &*text), (io::ErrorKind::NotFound, "no such path"));
+        // What is not known is told as it is.
+        let (kind, text) = of(ErrorKind::InvalidInput, "odd");
+        assert_eq!((kind, &*text), (io::ErrorKind::InvalidInput, "odd"));
+    }
+
+    #[test]
     fn only_pseudo_terminals_have_no_line_speed() {
         assert!(is_pseudo_terminal_path("/dev/pts/0"));
         for path in ["/dev/ttyUSB0", "/dev/ttyS0", "/dev/ttyAMA0", "/dev/serial/by-id/usb-1", "x"] {

@@ -220,6 +220,24 @@ impl<B: MotorBoard> Endpoint for MotorNode<B> {
         self.obey(now);
     }
 
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        self.run(now);
+        self.slave.handle_old_input(bytes, since, now);
+        self.obey(now);
+    }
+
+    fn held_up_after(&self) -> Option<Duration> {
+        self.slave.held_up_after()
+    }
+
+    fn frame_pause(&self) -> Duration {
+        self.slave.frame_pause()
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        self.slave.wire_time(bytes)
+    }
+
     fn handle_timeout(&mut self, now: Instant) {
         self.run(now);
         self.slave.handle_timeout(now);

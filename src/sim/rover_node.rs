@@ -82,6 +82,24 @@ impl Endpoint for RoverNode {
         self.rover.command(&self.robot.command(now));
     }
 
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        self.run(now);
+        self.robot.handle_old_input(bytes, since, now);
+        self.rover.command(&self.robot.command(now));
+    }
+
+    fn held_up_after(&self) -> Option<Duration> {
+        self.robot.held_up_after()
+    }
+
+    fn frame_pause(&self) -> Duration {
+        self.robot.frame_pause()
+    }
+
+    fn wire_time(&self, bytes: usize) -> Duration {
+        self.robot.wire_time(bytes)
+    }
+
     fn handle_timeout(&mut self, now: Instant) {
         self.run(now);
         self.robot.handle_timeout(now);

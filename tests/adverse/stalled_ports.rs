@@ -10,15 +10,24 @@ use axlewire::{
     ikeya::{Mode, NodeId, Rps},
 };
 
-use crate::{motor::Motor, wire::Wire};
+use crate::{
+    motor::Motor,
+    wire::{Bus, Wire},
+};
+
+/// A bus whose only motor turns at 5 rps.
+fn turning() -> (Wire, Bus) {
+    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
+    let mut bus = wire.master(|_| ());
+    bus.discover().unwrap();
+    bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+    (wire, bus)
+}
 
 #[test]
 fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
-        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-        let mut bus = wire.master(|_| ());
-        bus.discover().unwrap();
-        bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+        let (wire, mut bus) = turning();
         (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
         let begin_us = wire.world().now_us;
         let stopped = wire.block_on(bus.stop_async(NodeId::N1));
@@ -37,10 +46,7 @@ fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
 #[test]
 fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
     for flushes_hang in [false, true] {
-        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-        let mut bus = wire.master(|_| ());
-        bus.discover().unwrap();
-        bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+        let (wire, mut bus) = turning();
         (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
         let begin_us = wire.world().now_us;
         loop {
@@ -66,10 +72,7 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
 
 #[test]
 fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|_| ());
-    bus.discover().unwrap();
-    bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+    let (wire, mut bus) = turning();
     wire.pass(10_000);
     wire.world().flushes_hang = true;
     let mut context = Context::from_waker(Waker::noop());
@@ -81,4 +84,31 @@ fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
     wire.pass(2000);
     wire.world().flushes_hang = false;
     assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+}
+
+#[test]
+fn a_port_that_has_stalled_is_given_a_second_again() {
+    for flushes_hang in [false, true] {
+        let (wire, mut bus) = turning();
+        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        while wire.block_on(bus.service_async()) != Err(DriveError::Stalled) {
+            wire.pass(100);
+        }
+        // It needs half a second for the next frame.
+        let mut context = Context::from_waker(Waker::noop());
+        for _ in 0..10 {
+            let mut call = pin!(bus.service_async());
+            if call.as_mut().poll(&mut context).is_ready() {
+                wire.pass(100);
+                continue;
+            }
+            wire.pass(500_000);
+            assert!(call.as_mut().poll(&mut context).is_pending(), "flushes hang: {flushes_hang}");
+            (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
+            assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+            break;
+        }
+        let world = wire.world();
+        assert!(!world.writes_hang && !world.flushes_hang, "no frame was due");
+    }
 }

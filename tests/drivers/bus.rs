@@ -362,6 +362,34 @@ fn a_repeated_read_or_command_has_the_same_result_after_a_drop() {
 }
 
 #[test]
+fn a_read_that_fails_takes_no_failure_of_another_node() {
+    for is_async in [false, true] {
+        let mut story = Story::new(manual()).discovered();
+        while story.bus.poll_event().is_some() {}
+        for node in [&story.two, &story.five] {
+            node.borrow().port().unplugged.set(true);
+        }
+        story.ask(NodeId::N5);
+        for _ in 0..100 {
+            story.bus.service().unwrap();
+            story.pass(20);
+        }
+        let failed = match is_async {
+            true => story.world.block_on(story.bus.read_async(NodeId::N2)),
+            false => story.bus.read(NodeId::N2),
+        };
+        assert!(matches!(failed, Err(DriveError::ReadFailed { node: NodeId::N2, .. })));
+        let failures: Vec<_> = std::iter::from_fn(|| story.bus.poll_event())
+            .filter_map(|event| match event {
+                MasterEvent::ReadFailed { node, .. } => Some(node),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(failures, [NodeId::N5]);
+    }
+}
+
+#[test]
 fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
     for is_async in [false, true] {
         let world = World::default();

@@ -104,6 +104,18 @@ fn bytes_taken_before_a_failed_write_leave_before_the_pin_goes_off_or_are_report
 }
 
 #[test]
+fn the_pin_stays_on_for_its_time_behind_a_write_that_failed() {
+    for is_async in [false, true] {
+        let steps = [Step::Bytes(vec![0]), Step::Error];
+        let (mut port, log) = delayed(Script::writing(steps), 0);
+        drain(&log);
+        assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
+        assert_eq!(write(&mut port, is_async, b"2"), Err(Rs485Error::Port(Unplugged)));
+        assert_eq!(drain(&log), "on 5000 ns write write flush 7000 ns off");
+    }
+}
+
+#[test]
 fn a_failing_pin_sends_nothing_and_is_retried() {
     for is_async in [false, true] {
         let (mut port, log, pin) = undelayed(Script::default());
@@ -188,4 +200,8 @@ fn the_error_distinguishes_port_and_pin() {
     assert_eq!(pin.to_string(), "driver-enable pin failed: Stuck");
     assert!(pin.source().is_none());
     assert_eq!(pin.kind(), embedded_io::ErrorKind::Other);
+    let lost = Rs485Error::<Unplugged, Stuck>::Lost;
+    let text = "bytes may have been lost: the port failed while sending them";
+    assert_eq!((lost.to_string().as_str(), lost.source().is_none()), (text, true));
+    assert_eq!(lost.kind(), embedded_io::ErrorKind::Other);
 }

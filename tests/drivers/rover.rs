@@ -8,7 +8,7 @@ use axlewire::{
     ucp::{
         Host, MotorControl, Robot, Telemetry,
         host::{CalibrationStep, CommandError, FailureCause, HostConfig, HostEvent, Link},
-        message::CalibrationKind,
+        message::{CalibrationKind, NetworkState},
         robot::{RobotConfig, RobotEvent},
     },
 };
@@ -101,7 +101,7 @@ fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
             rover.service().unwrap();
             world.step(20);
         }
-        rover.port_mut().fails_read = true;
+        rover.port_mut().failing_reads = 1;
         let deadline = after(&world, 700);
         let pong = if is_async {
             world.block_on(rover.ping_async(deadline))
@@ -170,6 +170,24 @@ fn driving_does_not_change_the_lamp() {
         rover.role().command(),
         Some(MotorControl::new(20, 0).unwrap().with_front_led(true))
     );
+    // Nor does a stop in between.
+    rover.stop().unwrap();
+    rover.drive(30, 0).unwrap();
+    let lit = MotorControl::new(30, 0).unwrap().with_front_led(true);
+    assert_eq!(rover.role().command(), Some(lit));
+}
+
+#[test]
+fn a_command_taken_leaves_the_other_events_of_a_robot() {
+    let (world, mut rover, robot) = story();
+    let state = NetworkState::from(2);
+    rover.role_mut().set_network_state(state, world.now()).unwrap();
+    rover.drive(10, 0).unwrap();
+    assert_eq!(rover.run_until(after(&world, 100), |_, _, _| ()), Ok(()));
+    let mut robot = robot.borrow_mut();
+    assert_eq!(robot.next_command(world.now()), Ok(MotorControl::new(10, 0).ok()));
+    let events: Vec<_> = std::iter::from_fn(|| robot.poll_event()).collect();
+    assert!(events.contains(&RobotEvent::NetworkState(state)), "{events:?}");
 }
 
 #[test]

@@ -344,7 +344,7 @@ fn a_set_point_that_has_left_is_withdrawn_as_well_where_its_call_fails() {
     for (is_async, is_deaf) in [(false, false), (false, true), (true, false), (true, true)] {
         let mut story = Story::new(only_two_and_five()).discovered();
         if is_deaf {
-            story.bus.port_mut().fails_read = true;
+            story.bus.port_mut().failing_reads = 1;
         } else {
             // The WRITE and the beginning of the next READ.
             story.bus.port_mut().fails_after = Some(8 + 2);

@@ -9,10 +9,12 @@ use std::{
 use axlewire::{
     drive::{DriveError, Driver},
     endpoint::Unsent,
+    ikeya::{NodeId, WriteRequest},
     time::Instant,
 };
 
 use crate::{
+    bus_rig::{Story, manual, rps},
     port::{Script, Step, Unplugged},
     recorder::{ASYNC, Call, ROUNDS, Recorder, Scripted, scripted},
     virtual_time::{VirtualClock, Wakes, World},
@@ -225,4 +227,21 @@ fn a_read_that_fails_while_the_driver_waits_also_yields() {
     assert_eq!(call.as_mut().poll(&mut context), Poll::Pending);
     assert_eq!(wakes.count(), 1);
     assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Err(GONE)));
+}
+
+#[test]
+fn the_rest_of_a_set_point_is_not_sent_behind_a_stop_also_after_a_failed_flush() {
+    let mut story = Story::new(manual()).discovered();
+    let packet = WriteRequest::velocity(NodeId::N2, rps(5.0));
+    let (now, before) = (story.bus.now(), story.bus.port().written.len());
+    story.bus.role_mut().set_velocity(NodeId::N2, rps(5.0), now).unwrap();
+    let port = story.bus.port_mut();
+    (port.most, port.fails_after, port.fails_flush) = (3, Some(3), true);
+    assert!(story.bus.service().is_err());
+    assert_eq!(story.bus.port().written[before..], packet.as_bytes()[..3]);
+    story.bus.role_mut().stop(NodeId::N2, now);
+    story.bus.port_mut().most = usize::MAX;
+    story.bus.service().unwrap();
+    let behind = &story.bus.port().written[before + 3..];
+    assert!(!behind.starts_with(&packet.as_bytes()[3..]), "{behind:02x?}");
 }

@@ -62,6 +62,31 @@ fn every_event_is_handed_out_until_the_deadline() {
     assert_eq!(driver.port().outboxes[0].borrow().len(), 3);
 }
 
+#[test]
+fn a_run_ends_at_its_deadline_although_more_events_wait() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let (near, mut far) = End::pair(&world, 20);
+        embedded_io::Write::write(&mut far, b"abc").unwrap();
+        world.step(1000);
+        let mut driver = Driver::new(Recorder::default(), near, VirtualClock(world.clone()));
+        let (mut events, mut times) = (vec![], vec![]);
+        // The application takes 4 ms for each event.
+        let slow = |_: &mut Recorder, event, now| {
+            events.push(event);
+            times.push(now);
+            world.step(4000);
+        };
+        if is_async {
+            world.block_on(driver.run_until_async(at_ms(5), slow)).unwrap();
+        } else {
+            driver.run_until(at_ms(5), slow).unwrap();
+        }
+        assert_eq!((&events[..], &times[..]), (&b"ab"[..], &[at_ms(1), at_ms(5)][..]));
+        assert_eq!(driver.poll_event(), Some(b'c'), "it waits");
+    }
+}
+
 /// A role with only the required methods.
 #[derive(Default)]
 struct Plain {

@@ -4,7 +4,7 @@ use axlewire::{
     endpoint::Endpoint,
     ikeya::{
         NodeId, Position, Status,
-        master::{Health, MasterEvent},
+        master::{Cause, Health, MasterEvent},
     },
 };
 
@@ -186,4 +186,50 @@ fn a_late_answer_to_the_third_strike_does_not_answer_the_search_for_the_node() {
     desk.turn();
     desk.hear(290, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(1.0));
+}
+
+#[test]
+fn bytes_that_may_be_older_than_the_request_are_no_answer_and_are_told_as_unexpected() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    let mut told = vec![];
+    for _ in 0..3 {
+        let asked = desk.now;
+        assert_eq!(desk.turn(), read(NodeId::N1));
+        desk.now += US(290);
+        desk.master.handle_old_input(&velocity(NodeId::N1, 1.0), asked, desk.now);
+        assert!(desk.told().is_empty(), "it is no answer");
+        desk.silence();
+        told.append(&mut desk.told());
+    }
+    let failed = MasterEvent::ReadFailed { node: NodeId::N1, cause: Cause::Unexpected };
+    assert!(told.contains(&failed), "{told:?}");
+    let statistics = desk.master.node_statistics(NodeId::N1);
+    assert_eq!((statistics.late, statistics.timeouts), (3, 3));
+    // Those that came behind it are.
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    let now = desk.now + US(290);
+    desk.master.handle_old_input(&velocity(NodeId::N1, 1.0), now, now);
+    desk.now = now;
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
+}
+
+#[test]
+fn an_own_answer_that_is_too_early_or_too_late_is_told_as_unexpected_and_is_no_damage() {
+    for (after_us, is_early) in [(100, true), (900, false)] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        let mut told = vec![];
+        for _ in 0..3 {
+            desk.turn();
+            desk.hear(after_us, &velocity(NodeId::N1, 1.0));
+            let end = desk.master.poll_timeout().unwrap();
+            desk.now = desk.now.max(end);
+            desk.master.handle_timeout(desk.now);
+            told.append(&mut desk.told());
+        }
+        let failed = MasterEvent::ReadFailed { node: NodeId::N1, cause: Cause::Unexpected };
+        assert!(told.contains(&failed), "{told:?}");
+        let seen = desk.master.node_statistics(NodeId::N1);
+        assert_eq!((seen.early, seen.late), if is_early { (3, 0) } else { (0, 3) });
+        assert_eq!((seen.timeouts, seen.crc_errors), (3, 0));
+    }
 }

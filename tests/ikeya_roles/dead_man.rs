@@ -3,7 +3,7 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        NodeId,
+        Mode, NodeId, Position,
         master::{CommandError, MasterConfig, MasterEvent, NodeSet, Polling},
     },
     time::Instant,
@@ -64,6 +64,7 @@ fn a_silent_application_stops_every_node_whose_latest_order_is_no_stop() {
     assert!(!has_died(&mut desk));
     desk.run(MS(20));
     assert!(has_died(&mut desk));
+    assert_eq!(desk.master.statistics().dead_man, 2, "each time");
 }
 
 #[test]
@@ -157,4 +158,44 @@ fn a_node_that_has_been_stopped_needs_no_sign_of_life() {
     desk.run(MS(500));
     assert!(!has_died(&mut desk));
     assert_eq!(desk.master.statistics().dead_man, 0);
+}
+
+#[test]
+fn the_deadline_of_the_dead_man_is_reported_however_late_the_next_request_is_due() {
+    let mut config = armed();
+    config.polling = Polling::Every(MS(1000));
+    let (mut desk, told) = turning(config);
+    assert_eq!(desk.packets(1), [write(NodeId::N1, 5.0)]);
+    assert_eq!(desk.master.poll_timeout(), Some(told + MS(100)), "and not in a second");
+    config.polling = Polling::Every(MS(20));
+    let (mut desk, told) = turning(config);
+    assert_eq!(desk.packets(1), [write(NodeId::N1, 5.0)]);
+    assert!(desk.master.poll_timeout().unwrap() < told + MS(100), "a request goes before it");
+}
+
+#[test]
+fn each_node_under_an_order_is_stopped_whatever_its_id_and_its_mode() {
+    for node in NodeId::ALL {
+        for mode in [Mode::Velocity, Mode::Position] {
+            let mut config = armed();
+            config.polling = Polling::Manual;
+            let mut desk = Desk::with_nodes(config, &[(node, mode)]);
+            assert_eq!(desk.master.poll_timeout(), None, "nobody has an order");
+            let told = desk.now;
+            match mode {
+                Mode::Velocity => desk.master.set_velocity(node, rps(1.0), told).unwrap(),
+                Mode::Position => desk.master.set_position(node, turns(9), told).unwrap(),
+            }
+            desk.packets(1);
+            assert_eq!(desk.master.poll_timeout(), Some(told + MS(100)));
+            desk.now = told + MS(100);
+            desk.master.handle_timeout(desk.now);
+            assert_eq!(desk.master.stops_owed(), node.into());
+            let stop = match mode {
+                Mode::Velocity => write(node, 0.0),
+                Mode::Position => hold(node, Position::new(7, 3)),
+            };
+            assert_eq!(writes(&desk.packets(9)), [stop.clone(), stop], "{node}, {mode}");
+        }
+    }
 }

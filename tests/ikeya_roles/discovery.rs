@@ -172,3 +172,19 @@ fn a_driver_that_sleeps_between_a_discovery_and_the_turns_that_go_first_is_never
         assert!(reads > 100, "{reads} of {period:?}");
     }
 }
+
+#[test]
+fn a_discovery_counts_the_nodes_that_are_online_at_its_end() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    desk.lose(NodeId::N3);
+    desk.told();
+    for (answer, online) in [(Answer::Silence, 1), (Answer::Position(Position::new(7, 3)), 2)] {
+        desk.answer(NodeId::N3, answer);
+        desk.master.discover(desk.now);
+        while desk.master.is_discovering() {
+            desk.exchange().unwrap();
+        }
+        let done = MasterEvent::DiscoveryDone { online };
+        assert!(desk.told().contains(&done), "{answer:?}");
+    }
+}

@@ -2,7 +2,7 @@
 
 use axlewire::ikeya::{
     NodeId,
-    master::{Cause, Health, MasterEvent},
+    master::{Cause, Health, MasterEvent, Polling},
 };
 
 use crate::rig::*;
@@ -27,6 +27,28 @@ fn three_strikes_make_a_node_abnormal_and_one_answer_brings_it_back() {
     assert_eq!(desk.turn(), read(NodeId::N1));
     desk.hear(290, &velocity(NodeId::N1, 0.0));
     assert_eq!(desk.told()[0], health(Health::Online));
+}
+
+#[test]
+fn a_read_that_is_asked_again_is_a_retry_also_while_a_stop_is_owed_and_none_after_an_answer() {
+    for is_stopping in [false, true] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        if is_stopping {
+            desk.master.stop(NodeId::N1, desk.now);
+        }
+        for retries in [1, 2] {
+            desk.turn();
+            desk.silence();
+            desk.turn();
+            assert_eq!(desk.master.node_statistics(NodeId::N1).retries, retries);
+            desk.hear(600, &velocity(NodeId::N1, 0.0));
+            for _ in 0..5 {
+                desk.turn();
+                desk.hear(600, &velocity(NodeId::N1, 0.0));
+            }
+            assert_eq!(desk.master.node_statistics(NodeId::N1).retries, retries);
+        }
+    }
 }
 
 #[test]
@@ -138,4 +160,94 @@ fn a_read_that_was_answered_is_not_undone_by_a_later_failure() {
     }
     assert_eq!(desk.master.last_failure(NodeId::N1), Some(Cause::Silent));
     assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Ok(())));
+}
+
+#[test]
+fn the_outcome_of_a_read_is_unknown_until_it_has_one_of_its_own() {
+    let mut desk = Desk::with_nodes(manual(), &[N1]);
+    let outcome = |desk: &Desk| desk.master.read_outcome(NodeId::N1);
+    desk.answer(NodeId::N1, Answer::Silence);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.packets(2);
+    assert_eq!(outcome(&desk), None, "two of three attempts");
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    desk.packets(1);
+    assert_eq!(outcome(&desk), Some(Ok(())));
+    let mut config = manual();
+    config.attempts = 1;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    for answer in [Answer::Silence, Answer::Velocity(0.0), Answer::Silence, Answer::Silence] {
+        desk.answer(NodeId::N1, answer);
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        assert_eq!(outcome(&desk), None, "not that of the one before");
+        desk.packets(1);
+        let expected = if answer == Answer::Silence { Err(Cause::Silent) } else { Ok(()) };
+        assert_eq!(outcome(&desk), Some(expected));
+    }
+}
+
+#[test]
+fn the_guard_is_kept_after_every_missed_answer_the_last_attempt_included() {
+    for (attempts, polling) in [
+        (1, Polling::Fastest),
+        (1, Polling::Every(MS(1))),
+        (2, Polling::Fastest),
+        (2, Polling::Every(MS(1))),
+        (3, Polling::Every(MS(1))),
+    ] {
+        let mut config = direct();
+        (config.attempts, config.late_guard, config.polling) = (attempts, MS(7), polling);
+        let mut desk = Desk::with_nodes(config, &[N1]);
+        for missed in 0..2 {
+            desk.turn();
+            desk.silence();
+            let closed = desk.now;
+            assert_eq!(desk.turn(), read(NodeId::N1));
+            assert_eq!(desk.now, closed + MS(7), "{attempts}, {polling:?}, {missed}");
+            desk.hear(290, &velocity(NodeId::N1, 0.0));
+        }
+    }
+}
+
+#[test]
+fn noise_behind_the_packet_of_another_node_does_not_change_the_cause() {
+    let other = velocity(NodeId::N7, 1.0);
+    let noise = vec![0x55, 1, 2, 3, 4, 5, 6, 7, 8];
+    for heard in [[&other, &noise], [&noise, &other]] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        for _ in 0..3 {
+            desk.turn();
+            heard.into_iter().for_each(|bytes| desk.hear(200, bytes));
+            desk.silence();
+        }
+        let cause = Cause::Unexpected;
+        assert_eq!(desk.told().last(), Some(&MasterEvent::ReadFailed { node: NodeId::N1, cause }));
+        assert_eq!(desk.master.node_statistics(NodeId::N1).crc_errors, 0);
+    }
+}
+
+#[test]
+fn the_last_failure_is_the_latest_one_with_its_own_cause() {
+    let mut config = manual();
+    config.attempts = 1;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    assert_eq!(desk.master.last_failure(NodeId::N1), None);
+    let noise = vec![0x55, 1, 2, 3, 4, 5, 6, 7, 8];
+    for (heard, cause) in [
+        (vec![], Cause::Silent),
+        (noise, Cause::Damaged),
+        (velocity(NodeId::N7, 1.0), Cause::Unexpected),
+    ] {
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        desk.turn();
+        desk.hear(300, &heard);
+        desk.silence();
+        assert_eq!(desk.master.last_failure(NodeId::N1), Some(cause));
+        assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Err(cause)));
+        // An answer in between does not make it forget the failure.
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        desk.turn();
+        desk.hear(290, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.master.last_failure(NodeId::N1), Some(cause));
+    }
 }

@@ -1,8 +1,11 @@
 //! Set-points: the latest one is repeated, and a confirmation always ends in one event.
 
-use axlewire::ikeya::{
-    Mode, NodeId, Position, Rps,
-    master::{Cause, CommandError, MasterEvent},
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Mode, NodeId, Position, Rps,
+        master::{Cause, CommandError, MasterEvent},
+    },
 };
 
 use crate::rig::*;
@@ -154,4 +157,19 @@ fn there_is_nothing_to_confirm_without_a_set_point() {
     let error = CommandError::NoSetPoint { node: NodeId::N1 };
     assert_eq!(desk.master.confirm(NodeId::N1, desk.now), Err(error));
     assert_eq!(error.to_string(), "node 1 has no set-point");
+}
+
+#[test]
+fn after_a_failed_flush_an_answer_does_not_confirm_the_write_in_front_of_its_read() {
+    let mut desk = confirming();
+    desk.turn();
+    assert_eq!(desk.sent, [write(NodeId::N1, 1.0)]);
+    desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+    desk.hear(450, &velocity(NodeId::N1, 0.0));
+    assert_eq!(desk.news(), [], "the WRITE may not have left");
+    desk.sent.clear();
+    desk.turn();
+    assert_eq!(desk.sent, [write(NodeId::N1, 1.0)]);
+    desk.hear(450, &velocity(NodeId::N1, 0.0));
+    assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }]);
 }

@@ -39,6 +39,23 @@ fn a_read_that_did_not_leave_opens_no_window_and_is_sent_again() {
 }
 
 #[test]
+fn a_repeated_read_that_did_not_leave_is_no_repetition() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        desk.turn();
+        desk.silence();
+        for _ in 0..3 {
+            assert_eq!(desk.turn(), read(NodeId::N1));
+            fail(&mut desk, unsent);
+            desk.now += MS(1);
+            assert_eq!(desk.master.node_statistics(NodeId::N1).retries, 0);
+        }
+        assert_eq!(desk.turn(), read(NodeId::N1));
+        assert_eq!(desk.master.node_statistics(NodeId::N1).retries, 1);
+    }
+}
+
+#[test]
 fn a_set_point_that_did_not_leave_is_new_again_unless_another_has_come() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut desk = Desk::with_nodes(manual(), &[N1]);

@@ -132,6 +132,50 @@ fn a_stop_after_a_pause_of_the_driver_leaves_a_position_node_where_it_is() {
     assert!(way.abs() < 1.0, "the shaft returned to an old position: {way} turns");
 }
 
+/// Turns by which a position node is wrong after a stop that was reported as done. Before it, the
+/// driver paused with an answer on its way, and then this happened to its port.
+fn turns_off(config: MasterConfig, is_async: bool, spoil: &dyn Fn(&mut End)) -> f64 {
+    let mut story = Story::new(config, Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
+    let written = story.bus.port().written.len();
+    while story.bus.port().written.len() < written + ReadRequest::LEN {
+        story.bus.service().unwrap();
+        story.world.step(10);
+    }
+    story.pass(2000);
+    spoil(story.bus.port_mut());
+    let before = story.revolutions();
+    assert!(before > 9.0, "it is not moving");
+    stop(&mut story, is_async).unwrap();
+    story.run(3000);
+    (story.revolutions() - before).abs()
+}
+
+#[test]
+fn an_answer_behind_a_failing_receiver_is_not_taken_for_a_later_one() {
+    for config in [MasterConfig::direct(), MasterConfig::usb_adapter()] {
+        for (reads, is_async) in (0..9).flat_map(|reads| [(reads, false), (reads, true)]) {
+            let turns = turns_off(config, is_async, &|port| port.failing_reads = reads);
+            assert!(turns < 1.0, "{reads} failing reads, async {is_async}: {turns} turns");
+        }
+    }
+}
+
+#[test]
+fn an_answer_behind_more_bytes_than_a_round_reads_is_not_taken_for_a_later_one() {
+    for config in [MasterConfig::direct(), MasterConfig::usb_adapter()] {
+        for (count, is_async) in
+            [0, 4000, 50_000, 60_000].map(|n| [(n, false), (n, true)]).as_flattened()
+        {
+            let turns = turns_off(config, *is_async, &|port| {
+                (0..*count).for_each(|_| port.inbox.borrow_mut().push_front((0, 0x55)));
+            });
+            assert!(turns < 1.0, "{count} bytes of noise, async {is_async}: {turns} turns");
+        }
+    }
+}
+
 #[test]
 fn a_stop_of_an_abnormal_node_is_no_success() {
     for is_async in [false, true] {

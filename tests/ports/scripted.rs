@@ -23,11 +23,16 @@ struct Script {
     /// Bytes that are still to be sent, as told call by call; the last one stays.
     queued: Vec<u32>,
     flushes: Arc<Mutex<u32>>,
-    /// Whether every other write is interrupted.
+    /// Whether every other call is interrupted.
     signals_forever: bool,
 }
 
 impl Script {
+    /// How calls end that have no result of their own.
+    fn end(&self) -> ErrorKind {
+        if self.signals_forever { ErrorKind::Interrupted } else { ErrorKind::TimedOut }
+    }
+
     fn port(self) -> SerialPort {
         SerialPort::from(Box::new(Scripted(Mutex::new(self))) as Box<dyn serialport::SerialPort>)
     }
@@ -37,8 +42,9 @@ struct Scripted(Mutex<Script>);
 
 impl Read for Scripted {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let next = self.0.lock().unwrap().reads.pop_front();
-        let bytes = next.unwrap_or_else(|| Err(ErrorKind::TimedOut.into()))?;
+        let mut script = self.0.lock().unwrap();
+        let end = script.end();
+        let bytes = script.reads.pop_front().unwrap_or_else(|| Err(end.into()))?;
         buffer[..bytes.len()].copy_from_slice(&bytes);
         Ok(bytes.len())
     }
@@ -47,8 +53,7 @@ impl Read for Scripted {
 impl Write for Scripted {
     fn write(&mut self, _: &[u8]) -> io::Result<usize> {
         let mut script = self.0.lock().unwrap();
-        let is_signal = script.signals_forever;
-        let end = if is_signal { ErrorKind::Interrupted } else { ErrorKind::TimedOut };
+        let end = script.end();
         script.writes.pop_front().unwrap_or_else(|| Err(end.into()))
     }
 
@@ -169,12 +174,24 @@ fn signals_that_never_end_do_not_keep_a_write_from_returning() {
 }
 
 #[test]
+fn signals_that_never_end_do_not_keep_a_wait_or_a_look_from_returning() {
+    let port = || Script { signals_forever: true, ..Script::default() }.port();
+    let start = Instant::now();
+    assert!(!in_time(move || port().wait(Duration::from_millis(20))).unwrap());
+    assert!(start.elapsed() >= Duration::from_millis(20));
+    assert!(!in_time(move || port().read_ready()).unwrap());
+}
+
+#[test]
 fn a_port_that_takes_no_byte_has_timed_out_and_may_take_the_next() {
     let writes = [fails(ErrorKind::TimedOut), fails(ErrorKind::WouldBlock), Ok(1)].into();
     let mut port = Script { writes, ..Script::default() }.port();
     assert_eq!(port.write(b"1").unwrap_err().kind(), ErrorKind::TimedOut);
     assert_eq!(port.write(b"1").unwrap_err().kind(), ErrorKind::TimedOut);
     assert_eq!(port.write(b"1").unwrap(), 1);
+    // So Windows says it.
+    let mut windows = Script { writes: [Ok(0)].into(), ..Script::default() }.port();
+    assert_eq!(windows.write(b"1").unwrap_err().kind(), ErrorKind::TimedOut);
     // A write of nothing reaches no port.
     assert_eq!(port.write(b"").unwrap(), 0);
 }
@@ -240,5 +257,35 @@ fn what_was_received_is_handed_out_in_pieces_and_in_order() {
     }
     assert_eq!(bytes, (0..=200).collect::<Vec<u8>>());
     assert!(!port.is_pseudo_terminal());
+    let text = r#"SerialPort { name: Some("/dev/ttyUSB0"), unread: 0 }"#;
+    assert_eq!(format!("{port:?}"), text);
+    assert_eq!(port.get_mut().name(), port.get_ref().name());
     assert_eq!(port.into_inner().name().as_deref(), Some("/dev/ttyUSB0"));
+}
+
+#[test]
+fn bytes_not_handed_out_yet_are_told_at_once() {
+    let reads = VecDeque::from([Ok(vec![1, 2, 3])]);
+    let mut port = Script { reads, ..Script::default() }.port();
+    let mut one = [0];
+    assert_eq!(port.read(&mut one).unwrap(), 1);
+    let begin = Instant::now();
+    assert!(port.read_ready().unwrap());
+    assert!(port.wait(Duration::from_secs(60)).unwrap());
+    assert!(begin.elapsed() < Duration::from_secs(30));
+    let mut rest = [0; 8];
+    assert_eq!((port.read(&mut rest).unwrap(), &rest[..2]), (2, &[2, 3][..]));
+    assert!(!port.read_ready().unwrap());
+}
+
+#[test]
+fn a_read_or_write_of_nothing_does_not_touch_the_port() {
+    let reads = VecDeque::from([Err(ErrorKind::NotConnected.into())]);
+    let writes = VecDeque::from([Err(ErrorKind::NotConnected.into())]);
+    let mut port = Script { reads, writes, ..Script::default() }.port();
+    assert_eq!(port.read(&mut []).unwrap(), 0);
+    assert_eq!(port.write(&[]).unwrap(), 0);
+    // Both still fail when they are asked.
+    assert!(port.read(&mut [0]).is_err());
+    assert!(port.write(&[0]).is_err());
 }

@@ -189,6 +189,18 @@ fn a_path_without_a_port_is_named_with_the_reason() {
 }
 
 #[test]
+fn the_port_of_tokio_serial_is_lent_and_given_back() {
+    run(|| async {
+        let (mut port, _far, held) = line();
+        let name = held.name();
+        assert!(name.is_some());
+        assert_eq!(port.get_ref().name(), name);
+        assert_eq!(port.get_mut().name(), name);
+        assert_eq!(port.into_inner().name(), name);
+    });
+}
+
+#[test]
 fn outside_a_runtime_there_is_no_port() {
     let (_far, held) = TTYPort::pair().unwrap();
     let error = TokioSerialPort::open(&held.name().unwrap(), BAUD).unwrap_err();
@@ -198,7 +210,7 @@ fn outside_a_runtime_there_is_no_port() {
 #[test]
 fn the_clock_passes_at_least_the_time_of_its_delay() {
     run(|| async {
-        let mut clock = TokioClock::new();
+        let mut clock = TokioClock::default();
         let before = clock.now();
         clock.delay_us(30_000).await;
         assert!(clock.now() - before >= time::Duration::from_millis(30));

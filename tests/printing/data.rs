@@ -168,6 +168,7 @@ fn three_motors_have_three_values() {
         (&json!([4096, 4096, 4096]), &json!([1, 1, 1]))
     );
     assert_eq!(data["payload"], "001000100010010001000100");
+    assert_eq!(write.payload(), [[0, 16, 0, 16], [0, 16, 1, 0], [1, 0, 1, 0]]);
     assert_eq!(data["rps"].as_array().map(Vec::len), Some(3));
     let velocity = three::VelocityResponse::new(NodeId::N5, [rps; 3]);
     let data = to_value(three::Packet::Response(three::Response::Velocity(&velocity))).unwrap();
@@ -195,6 +196,10 @@ fn a_speed_that_is_no_number_is_a_string() {
 fn a_status_has_the_values_of_its_response() {
     let status: Status = Status::Velocity(1.5);
     assert_eq!(to_value(status).unwrap(), json!({"rps": 1.5}));
+    let status: Status = Status::Position(Position::new(1, 2));
+    assert_eq!(to_value(status).unwrap(), json!({"count": 1, "rotation": 2}));
+    let status: Status<ThreeMotors> = Status::Velocity([1.5, 2.5, -3.5]);
+    assert_eq!(to_value(status).unwrap(), json!({"rps": [1.5, 2.5, -3.5]}));
     let status: Status<ThreeMotors> = Status::Position([Position::new(1, 2); 3]);
     assert_eq!(to_value(status).unwrap(), json!({"count": [1, 1, 1], "rotation": [2, 2, 2]}));
 }

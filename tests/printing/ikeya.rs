@@ -1,10 +1,24 @@
 //! The text of Ikeya packets, against core's formatting of the same values.
 
+use axlewire::ikeya::master::NodeSet;
 use axlewire::ikeya::{
     Mode, NodeId, Packet, Position, PositionResponse, ReadRequest, Request, Response, Rps,
     VelocityResponse, WriteRequest, three,
 };
 use proptest::prelude::*;
+
+#[test]
+fn a_set_of_nodes_is_printed_as_a_list() {
+    for (nodes, text) in [
+        (&[][..], "none"),
+        (&[NodeId::N3], "3"),
+        (&[NodeId::N8, NodeId::N3], "3 and 8"),
+        (&[NodeId::N1, NodeId::N8, NodeId::N3], "1, 3 and 8"),
+    ] {
+        let set: NodeSet = nodes.iter().copied().collect();
+        assert_eq!(set.to_string(), text);
+    }
+}
 
 fn spaced<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
     values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(" ")

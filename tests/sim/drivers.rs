@@ -76,4 +76,9 @@ fn an_endpoint_that_would_make_a_driver_spin_is_an_error() {
     assert_eq!(run(Bad::Insatiable), Err(Stuck::Endless { who, at: at(0) }));
     let said = Stuck::BusyLoop { who, at: at(100) }.to_string();
     assert_eq!(said, "tail 0 makes its driver spin at 100 µs: its poll_timeout stays in the past");
+    let said = Stuck::Endless { who: Who::Head, at: at(7) }.to_string();
+    assert_eq!(
+        said,
+        "the head makes its driver spin at 7 µs: it sends or tells events without end"
+    );
 }

@@ -70,6 +70,8 @@ fn commands_move_the_motors_and_the_master_reads_how_they_move() {
     line.run_for(Duration::from_millis(2000)).unwrap();
     assert!((line.tail(0).motor().velocity().get() - 3.0).abs() < 1e-3);
     assert_eq!(line.tail(1).motor().position(), target);
+    assert_eq!(line.tails().len(), 2);
+    assert_eq!(line.tails()[1].motor().position(), target);
     assert_eq!(line.head().health(NodeId::N2), Some(Health::Online));
     let (status, _) = line.head().status(NodeId::N2).unwrap();
     assert_eq!(status, axlewire::ikeya::Status::Position(target));

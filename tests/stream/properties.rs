@@ -11,9 +11,9 @@ use proptest::{collection::vec, prelude::*};
 use crate::{
     checked_line::{self, CheckedLine, Op},
     hostile_streams,
+    judged_work::check_work,
     known_framings::Known,
     oracle, split,
-    work::check_work,
 };
 
 macro_rules! properties {

@@ -82,6 +82,18 @@ fn room_for_a_port_hides_no_silence() {
     assert_eq!(decoder.spare().len(), 13);
     let gap = Gap { len: 3, reason: Reason::Idle };
     assert_eq!(decoder.poll(), Some(Event::Skipped(gap)));
+    // Only its first byte is cut off by the silence; the others start no frame.
+    let counters = decoder.counters();
+    let of = [Reason::Idle, Reason::Header, Reason::Length, Reason::Id, Reason::Crc];
+    assert_eq!(of.map(|reason| counters.skipped_for(reason)), [1, 2, 0, 0, 0]);
+    assert_eq!(counters.skipped(), 3);
+}
+
+#[test]
+fn a_default_decoder_is_a_new_one() {
+    let (mut default, mut new) = (Decoder::<Ucp, 64>::default(), Decoder::<Ucp, 64>::new());
+    assert_eq!(default.counters(), new.counters());
+    assert_eq!((default.pending(), default.spare().len()), (0, new.spare().len()));
 }
 
 #[test]

@@ -30,7 +30,11 @@ pub(crate) fn check_split_points<F: Known>(bytes: &[u8]) {
 
 /// The parts are the whole, have the asked length, and give its frames and its account.
 pub(crate) fn check_parts<F: Known>(bytes: &[u8], len: usize) {
-    let parts: Vec<_> = stream::parts::<F>(bytes, len).collect();
+    let mut rest = stream::parts::<F>(bytes, len);
+    let parts: Vec<_> = rest.clone().collect();
+    // A copy goes on where the first one is.
+    rest.next();
+    assert!(rest.clone().eq(parts.iter().skip(1).copied()));
     assert_eq!(parts.concat(), bytes);
     let last = parts.len().saturating_sub(1);
     assert!(parts.iter().take(last).all(|part| part.len() >= len.max(1)));

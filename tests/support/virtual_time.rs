@@ -143,8 +143,8 @@ pub(crate) struct End {
     pub(crate) fails_after: Option<usize>,
     /// The next flush fails, although the bytes leave.
     pub(crate) fails_flush: bool,
-    /// The receiver fails once, at the next check for bytes.
-    pub(crate) fails_read: bool,
+    /// The receiver fails this many times, at the next checks for bytes.
+    pub(crate) failing_reads: u32,
     /// A byte always seems available, and every read fails.
     pub(crate) is_deaf: bool,
     /// The receiver fails when something is written.
@@ -168,7 +168,7 @@ impl End {
             most: usize::MAX,
             fails_after: None,
             fails_flush: false,
-            fails_read: false,
+            failing_reads: 0,
             is_deaf: false,
             is_deafened: false,
             is_mute: false,
@@ -188,6 +188,12 @@ impl End {
 
     fn is_plugged(&self) -> Result<(), Unplugged> {
         if self.unplugged.get() { Err(Unplugged) } else { Ok(()) }
+    }
+
+    fn fail_read(&mut self) -> Result<(), Unplugged> {
+        let is_good = self.failing_reads == 0;
+        self.failing_reads = self.failing_reads.saturating_sub(1);
+        if is_good { Ok(()) } else { Err(Unplugged) }
     }
 
     fn has_arrived(&self) -> bool {
@@ -258,9 +264,7 @@ impl embedded_io::ErrorType for End {
 impl embedded_io::ReadReady for End {
     fn read_ready(&mut self) -> Result<bool, Unplugged> {
         self.is_plugged()?;
-        if core::mem::take(&mut self.fails_read) {
-            return Err(Unplugged);
-        }
+        self.fail_read()?;
         Ok(self.is_deaf || self.has_arrived())
     }
 }
@@ -283,9 +287,7 @@ impl embedded_io::Write for End {
 
 impl embedded_io_async::Read for End {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
-        if core::mem::take(&mut self.fails_read) {
-            return Err(Unplugged);
-        }
+        self.fail_read()?;
         poll_fn(|context| match self.is_plugged() {
             Ok(()) if !self.is_deaf && !self.has_arrived() => self.world.sleep(context),
             _ => Poll::Ready(self.give(buffer)),

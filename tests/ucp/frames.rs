@@ -150,3 +150,14 @@ fn frames_carry_the_index_of_their_sender() {
     }
     assert_eq!(Header::LEN, 6);
 }
+
+#[test]
+fn no_frame_has_an_empty_length_field_even_without_a_body() {
+    let ping = Ping {}.frame(7);
+    let frame = Frame::parse(ping.as_bytes()).unwrap();
+    assert_eq!(
+        (frame.header().len(), frame.header().is_empty(), frame.body()),
+        (4, false, &[][..])
+    );
+    assert_eq!((frame.header().id(), frame.header().index()), (1, 7));
+}

@@ -168,3 +168,15 @@ fn the_wheels_turn_like_the_vendors_and_not_at_all_in_the_dead_bands() {
         }
     }
 }
+
+#[test]
+fn only_no_speed_and_no_turn_at_all_stand_still() {
+    for speed in -6..=6 {
+        for angular in -11..=11 {
+            let command = MotorControl::new(speed, angular).unwrap();
+            for command in [command, command.with_front_led(true)] {
+                assert_eq!(command.stands_still(), (speed, angular) == (0, 0));
+            }
+        }
+    }
+}

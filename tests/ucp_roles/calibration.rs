@@ -252,6 +252,21 @@ fn a_repeated_result_is_acknowledged_again_and_stored_once() {
 }
 
 #[test]
+fn neither_a_refused_start_nor_one_of_the_other_kind_makes_a_result_new() {
+    for (kind, other, result) in [(IMU, MAG, bytes(imu_bias())), (MAG, IMU, bytes(mag_bias()))] {
+        let mut host = quiet_host();
+        host.handle_input(&result, ms(0));
+        assert_eq!(events(&mut host).len(), 2, "the link, and the result");
+        host.start_calibration(other, ms(10)).unwrap();
+        host.handle_input(&result, ms(20));
+        assert_eq!(host.start_calibration(kind, ms(30)), Err(CommandError::Calibrating));
+        host.handle_input(&result, ms(40));
+        assert_eq!(events(&mut host), []);
+        assert_eq!(host.statistics().results_repeated, 2);
+    }
+}
+
+#[test]
 fn a_result_is_reported_once_even_if_the_end_is_requested_before_it_is_repeated() {
     for (kind, result) in [(IMU, bytes(imu_bias())), (MAG, bytes(mag_bias()))] {
         let mut host = quiet_host();

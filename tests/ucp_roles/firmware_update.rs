@@ -12,6 +12,7 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     host.drive(go(10), ms(50)).unwrap();
     sent(&mut host, ms(50));
     assert_eq!(host.start_firmware_update(40, ms(100)), Err(CommandError::Moving));
+    assert_eq!(sent(&mut host, ms(100)), [] as [Vec<u8>; 0], "a refused call sends nothing");
     host.stop(ms(110));
     assert_eq!(speeds(&wait(&mut host, ms(110))), [(110_000, 0)]);
     host.start_firmware_update(40, ms(110)).unwrap();

@@ -28,8 +28,11 @@ fn the_link_is_lost_after_500_ms_without_a_valid_frame_and_not_earlier() {
     assert_eq!((host.link(), events(&mut host)), (Link::Down, vec![HostEvent::LinkDown]));
     wait(&mut host, ms(5000));
     assert_eq!(events(&mut host), [], "reported once");
+    assert_eq!(host.statistics().links_lost, 1);
     host.handle_input(&bytes(BiasRequest {}), ms(6000));
     assert_eq!(events(&mut host)[0], HostEvent::LinkUp);
+    wait(&mut host, ms(7000));
+    assert_eq!(host.statistics().links_lost, 2, "each time");
 }
 
 #[test]

@@ -101,6 +101,8 @@ fn the_host_sends_zero_when_the_application_has_been_silent_for_500_ms() {
     host.drive(go(30), ms(1010)).unwrap();
     assert_eq!(wait(&mut host, ms(1030)).len(), 1, "and the next call drives again");
     assert_eq!(host.command().unwrap().speed(), 30);
+    wait(&mut host, ms(2000));
+    assert_eq!(host.statistics().dead_man, 2, "each time");
 }
 
 #[test]

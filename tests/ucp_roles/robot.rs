@@ -89,6 +89,11 @@ fn out_of_range_values_are_clamped_like_in_the_vendor_firmware() {
     assert_eq!(robot.command(ms(1)), MotorControl::new(1, 2).unwrap());
     robot.handle_input(&careless(100, -100, 0, 0), ms(2));
     assert_eq!((robot.statistics().commands, robot.statistics().commands_clamped), (3, 1));
+    // Each of them, also if it repeats the last one.
+    for at in [3, 4] {
+        robot.handle_input(&careless(0, 360, 0, 0), ms(at));
+    }
+    assert_eq!((robot.statistics().commands, robot.statistics().commands_clamped), (5, 3));
 }
 
 #[test]
@@ -188,4 +193,61 @@ fn an_update_by_a_motor_command_that_has_no_room_is_counted_and_one_that_has_is_
     let before = robot.statistics().without_room;
     robot.handle_input(&careless(0, 0, 0, 40), ms(2));
     assert_eq!(robot.statistics().without_room, before + 1);
+}
+
+#[test]
+fn the_command_of_a_robot_whose_driver_is_late_has_ended_when_it_is_taken() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(go(50).with_front_led(true)), ms(0));
+    assert_eq!(robot.take_command(us(499_999)), Some(go(50).with_front_led(true)));
+    assert_eq!(robot.take_command(us(499_999)), None, "taken");
+    // Nobody has called `handle_timeout`.
+    assert_eq!(robot.take_command(ms(500)), Some(MotorControl::STOP.with_front_led(true)));
+    assert_eq!(robot.take_command(ms(500)), None);
+    assert_eq!((robot.statistics().watchdog, robot.command(ms(0)).speed()), (1, 0));
+    // Also of a robot that stands still: its stop by the watchdog is a change.
+    robot.handle_input(&bytes(go(0)), ms(600));
+    assert_eq!(robot.take_command(ms(600)), Some(go(0)));
+    assert_eq!(robot.take_command(ms(1100)), Some(MotorControl::STOP));
+    assert_eq!(robot.statistics().watchdog, 2, "each time");
+}
+
+#[test]
+fn a_command_that_comes_at_the_end_of_the_last_one_does_not_hide_the_watchdog() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(go(50)), ms(0));
+    assert_eq!(robot.poll_event(), Some(RobotEvent::Motor(go(50))));
+    robot.handle_input(&bytes(go(40)), ms(500));
+    assert_eq!(robot.poll_event(), Some(RobotEvent::Watchdog));
+    assert_eq!(robot.poll_event(), Some(RobotEvent::Motor(go(40))));
+    // One that came in time has no watchdog before it, also if it is taken in late.
+    robot.handle_old_input(&bytes(go(30)), ms(990), ms(1010));
+    assert_eq!(robot.poll_event(), Some(RobotEvent::Motor(go(30))));
+    assert_eq!(robot.statistics().watchdog, 1);
+}
+
+#[test]
+fn answers_are_due_since_the_oldest_request() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(Ping {}), ms(3));
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(5));
+    assert_eq!(robot.poll_timeout(), Some(ms(3)));
+    assert_eq!(sent(&mut robot, ms(5)).len(), 2);
+    assert_eq!(robot.poll_timeout(), None);
+}
+
+#[test]
+fn an_answer_to_an_update_request_that_did_not_leave_does_not_replace_a_newer_one() {
+    let asks = bytes(OtaRequest::start_firmware_update(50));
+    for unsent in EVERY {
+        let mut robot = quiet_robot();
+        robot.handle_input(&asks, ms(0));
+        assert!(robot.answer_update(OtaStatus::Failed, ms(0)));
+        assert!(!robot.answer_update(OtaStatus::Failed, ms(0)), "answered");
+        robot.poll_transmit(ms(0)).unwrap();
+        robot.handle_input(&asks, ms(1));
+        assert!(robot.answer_update(OtaStatus::Forbidden, ms(1)));
+        robot.handle_unsent(unsent, ms(1));
+        assert_eq!(sent(&mut robot, ms(1)), [bytes(OtaAck::new(OtaStatus::Forbidden))]);
+    }
 }

@@ -210,3 +210,25 @@ fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     let ids: Vec<_> = sent(&mut robot, ms(5)).iter().map(|frame| frame[4]).collect();
     assert_eq!(ids, [6, 7, 8], "the host pings again");
 }
+
+#[test]
+fn a_robot_whose_flush_failed_answers_an_update_again_and_takes_the_acknowledgement_of_its_results()
+{
+    let mut robot = quiet_robot();
+    robot.calibration_result_imu(imu_bias(), ms(0));
+    robot.calibration_result_mag(mag_bias(), ms(0));
+    assert_eq!(sent(&mut robot, ms(0)).len(), 2);
+    robot.handle_unsent(Unsent::Unflushed, ms(1));
+    // They may have left all the same.
+    robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(2));
+    robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(2));
+    assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken, RobotEvent::MagBiasTaken]);
+    assert_eq!(sent(&mut robot, ms(3)), [] as [Vec<u8>; 0]);
+
+    robot.handle_input(&bytes(OtaRequest::start_firmware_update(50)), ms(10));
+    assert!(robot.answer_update(OtaStatus::Forbidden, ms(10)));
+    let answer = sent(&mut robot, ms(10));
+    assert_eq!(answer.len(), 1);
+    robot.handle_unsent(Unsent::Unflushed, ms(11));
+    assert_eq!(sent(&mut robot, ms(11)), answer);
+}

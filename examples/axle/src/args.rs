@@ -34,6 +34,12 @@ pub(crate) struct PortArgs {
 }
 
 impl PortArgs {
+    /// A port with this speed.
+    #[cfg(test)]
+    pub(crate) fn new(baud: Option<u32>) -> Self {
+        Self { port: "played".to_owned(), baud, instant: false, record: None }
+    }
+
     /// The line speed for this protocol, bit/s.
     pub(crate) fn baud_for(&self, protocol: Protocol) -> u32 {
         self.baud.unwrap_or(protocol.default_baud())
@@ -163,3 +169,6 @@ pub(crate) fn hex_byte(text: &str) -> Result<u8, String> {
     let byte = is_hex.then(|| u8::from_str_radix(digits, 16).ok()).flatten();
     byte.ok_or("expected two hex digits, such as ff".to_owned())
 }
+
+#[cfg(test)]
+mod tests;

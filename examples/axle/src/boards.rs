@@ -208,6 +208,31 @@ mod tests {
     }
 
     #[test]
+    fn a_board_takes_one_value_for_each_motor_in_their_order() {
+        let speeds = [1.0, -2.0, 3.5].map(|it| Rps::new(it).unwrap());
+        let places = [7, -8, 9000].map(|it| Position::from_counts(it).unwrap());
+        assert_eq!(ThreeMotors::velocity(&speeds), Some(speeds));
+        assert_eq!(ThreeMotors::position(&places), Some(places));
+        assert_eq!(OneMotor::velocity(&speeds[..1]), Some(speeds[0]));
+        assert_eq!(OneMotor::position(&places[1..2]), Some(places[1]));
+        for count in [0, 1, 2] {
+            assert!(ThreeMotors::velocity(&speeds[..count]).is_none());
+            assert!(ThreeMotors::position(&places[..count]).is_none());
+        }
+        assert!(OneMotor::velocity(&speeds).is_none() && OneMotor::position(&places).is_none());
+        let reached = ThreeMotors::reached(Target::Velocity(speeds));
+        assert_eq!(ThreeMotors::describe(reached), "1.00 -2.00 3.50 rps");
+        let reached = ThreeMotors::reached(Target::Position(places));
+        assert_eq!(ThreeMotors::positions(reached), Some(places.to_vec()));
+        assert_eq!(ThreeMotors::describe(reached), "0.0009 -0.0010 1.0986 turns");
+        for motor in 0..3 {
+            let mut now = places;
+            now[motor] = Position::from_counts(now[motor].counts() + 9).unwrap();
+            assert!(!ThreeMotors::is_reached(Target::Position(places), Status::Position(now)));
+        }
+    }
+
+    #[test]
     fn each_of_three_motors_has_to_reach_its_target() {
         let target =
             Target::<ThreeMotors>::Velocity([1.0, 0.0, -2.0].map(|it| Rps::new(it).unwrap()));

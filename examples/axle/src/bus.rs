@@ -87,6 +87,11 @@ pub(crate) enum Halt {
 }
 
 impl MasterArgs {
+    #[cfg(test)]
+    pub(crate) const fn new(line: args::PortArgs, direct: bool, echo: bool) -> Self {
+        Self { line, direct, echo }
+    }
+
     pub(crate) const fn line(&self) -> &args::PortArgs {
         &self.line
     }
@@ -244,7 +249,7 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
         let begin = self.now();
         nodes.iter().for_each(|node| self.master_mut().stop(node, begin));
-        let bound = self.master().stop_bound().max(STOP_PATIENCE);
+        let bound = self.stop_bound();
         let (mut awake, mut confirmed_at) = (Awake::new(begin), None);
         loop {
             let result = self.look();
@@ -267,6 +272,11 @@ impl<B: Boards> Bus<B> {
                 thread::sleep(FAILURE_PAUSE);
             }
         }
+    }
+
+    /// Longest wait for the nodes to confirm a stop.
+    fn stop_bound(&self) -> Duration {
+        self.master().stop_bound().max(STOP_PATIENCE)
     }
 
     /// Whether an id has never answered, but was not asked often enough to count as silent.
@@ -299,12 +309,7 @@ impl<B: Boards> Bus<B> {
                 )
             }
             Halt::Owed => {
-                let heard = match self.master().last_failure(node) {
-                    _ if self.is_online(node) => "",
-                    Some(Cause::Damaged) => " (damaged bytes received)",
-                    Some(Cause::Unexpected) => " (other answers received)",
-                    _ => " (nothing received)",
-                };
+                let heard = heard(self.is_online(node), self.master().last_failure(node));
                 format!(
                     "node {node} was told to stop and has not confirmed it{heard}: it may be moving"
                 )
@@ -319,3 +324,16 @@ impl<B: Boards> Bus<B> {
         })
     }
 }
+
+/// What was heard of a node that has not confirmed its stop.
+const fn heard(is_online: bool, failure: Option<Cause>) -> &'static str {
+    match failure {
+        _ if is_online => "",
+        Some(Cause::Damaged) => " (damaged bytes received)",
+        Some(Cause::Unexpected) => " (other answers received)",
+        _ => " (nothing received)",
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests;

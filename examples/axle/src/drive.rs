@@ -85,19 +85,8 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
         teller::print(&line).map_err(Failure::Write)?;
     }
     let start = rover.now();
-    let mut drive = Drive { rover, start, form, teller: Teller::new(), page, left: Ok(()) };
-
-    let driven = guarded(|| drive.drive(command, args.micros, signals));
-    // In any case, stop the wheels first and report errors afterwards. That the wheels may still
-    // turn is the most serious one.
-    let stopped = drive.stop();
-    let is_at_rest = stopped.is_ok();
-    let besides = |failure: Failure| failure.and("it was stopped and is at rest");
-    let result = stopped.and(driven.map_err(besides));
-    let result = result.and_then(|()| drive.rover.check_recording());
-    Outcome::of(&result, is_at_rest).say(form, &mut drive.teller);
-    let told = drive.teller.finish();
-    result.and(drive.left).and(told)
+    let drive = Drive { rover, start, form, teller: Teller::new(), page, left: Ok(()) };
+    drive.run(command, args.micros, signals)
 }
 
 /// What happens to the rover.
@@ -152,6 +141,21 @@ struct Drive {
 }
 
 impl Drive {
+    /// Drives; then stops, whatever happened.
+    fn run(mut self, command: MotorControl, micros: u64, signals: &Signals) -> Result<(), Failure> {
+        let driven = guarded(|| self.drive(command, micros, signals));
+        // In any case, stop the wheels first and report errors afterwards. That the wheels may
+        // still turn is the most serious one.
+        let stopped = self.stop();
+        let is_at_rest = stopped.is_ok();
+        let besides = |failure: Failure| failure.and("it was stopped and is at rest");
+        let result = stopped.and(driven.map_err(besides));
+        let result = result.and_then(|()| self.rover.check_recording());
+        Outcome::of(&result, is_at_rest).say(self.form, &mut self.teller);
+        let told = self.teller.finish();
+        result.and(self.left).and(told)
+    }
+
     /// Drives until the time is up or a signal comes.
     fn drive(
         &mut self,
@@ -211,3 +215,6 @@ impl Drive {
         line.map_or(Ok(()), |line| self.teller.say(line))
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests;

@@ -131,9 +131,34 @@ impl fmt::Display for Failure {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::{Failure, guarded};
+    use crate::report::{Form, Outcome};
+
+    #[test]
+    fn a_failure_is_told_with_what_is_known_besides() {
+        let lost = || Failure::lost("port", "unplugged");
+        let failed = || Failure::Failed("too slow".to_owned());
+        assert_eq!(failed().and("at rest").to_string(), "too slow; at rest");
+        assert_eq!(lost().and("at rest").to_string(), "port \"port\" failed: unplugged; at rest");
+        let moving = lost().while_moving("it turns");
+        let says = "port \"port\" failed: unplugged; it turns";
+        assert_eq!(moving.to_string(), says);
+        assert_eq!(moving.and("at rest").to_string(), says, "the worse one stays");
+        assert_eq!(failed().while_moving("it turns").to_string(), "too slow");
+        let outcome = |result| {
+            let (teller, lines) = crate::teller::Teller::to_memory();
+            let mut teller = teller;
+            Outcome::of(&result, result.is_ok()).say(Form::Json, &mut teller);
+            Outcome::of(&result, false).say(Form::Text, &mut teller);
+            teller.finish().unwrap();
+            lines.lock().unwrap().concat()
+        };
+        let says = r#"{"event":"outcome","at_rest":false,"failure":"too slow"}"#;
+        assert_eq!(outcome(Err(failed())), says);
+        assert_eq!(outcome(Ok(())), r#"{"event":"outcome","at_rest":true}"#);
+    }
 
     #[test]
     fn a_panic_is_a_failure_so_that_what_moves_is_stopped() {

@@ -20,9 +20,12 @@ mod manual;
 mod network;
 #[cfg(not(unix))]
 mod no_sim;
+mod noise;
 mod pcapng;
 mod ping;
 mod play;
+#[cfg(all(test, unix))]
+mod played;
 mod ports;
 mod record;
 mod replay;
@@ -103,6 +106,7 @@ enum Command {
     Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
+    Noise(noise::Args),
     Ports(ports::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
@@ -161,6 +165,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
+        Command::Noise(args) => noise::run(args),
         Command::Ports(args) => ports::run(args),
         Command::Completions(args) => manual::print_completions(args),
         Command::Man(args) => manual::write_pages(args),

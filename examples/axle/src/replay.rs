@@ -82,6 +82,11 @@ const LONGEST_US: u64 = 365 * 86_400_000_000;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    play::run(plan(args)?)
+}
+
+/// The frames of one side of the capture, each with its time.
+fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
     let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
     let mut frames = Vec::new();
     let (mut first, mut last_us) = (None, 0);
@@ -129,7 +134,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             frames.len()
         )));
     }
-    play::run(Plan {
+    Ok(Plan {
         bus: &args.bus,
         protocol,
         side: args.side,
@@ -139,3 +144,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         is_json: args.json,
     })
 }
+
+#[cfg(test)]
+mod tests;

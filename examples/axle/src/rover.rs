@@ -170,8 +170,9 @@ impl Rover {
     /// This moment, to ask later whether the robot has heard what was sent by then.
     pub(crate) fn mark(&mut self) -> Mark {
         let (now, seen) = (self.now(), self.host().statistics());
-        // Those before are answered by now, or lost.
-        let before = self.sent.front().map_or(0, |(_, pings)| *pings);
+        // Those sent before that are answered by now, or lost.
+        let is_old = |(at, _): &&(Instant, u32)| now - *at >= LONGEST_TRIP;
+        let before = self.sent.front().filter(is_old).map_or(0, |(_, pings)| *pings);
         let open = seen.pings.saturating_sub(pongs(seen)).min(seen.pings.saturating_sub(before));
         Mark { at: now, pongs: pongs(seen), open: (!self.has_others).then_some(open) }
     }
@@ -290,3 +291,6 @@ pub(crate) fn describe(command: &MotorControl) -> String {
     };
     format!("speed {speed} %, turn {} %{side}{nose}", turn.abs())
 }
+
+#[cfg(all(test, unix))]
+mod tests;

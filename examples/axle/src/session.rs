@@ -103,8 +103,12 @@ mod tests {
     use super::*;
     use crate::line::Wire;
 
-    /// A port whose system takes no byte, as behind a stuck adapter.
-    struct Stuck;
+    /// A port whose system takes no byte, as behind a stuck adapter, except at the times of `open`,
+    /// milliseconds.
+    struct Stuck {
+        start: Clock,
+        open: core::ops::Range<u128>,
+    }
 
     impl ErrorType for Stuck {
         type Error = io::Error;
@@ -129,8 +133,11 @@ mod tests {
     }
 
     impl Write for Stuck {
-        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
-            Err(io::ErrorKind::TimedOut.into())
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            match self.open.contains(&self.start.elapsed().as_millis()) {
+                true => Ok(bytes.len()),
+                false => Err(io::ErrorKind::TimedOut.into()),
+            }
         }
 
         fn flush(&mut self) -> io::Result<()> {
@@ -138,14 +145,27 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_port_that_takes_nothing_for_a_second_has_failed_and_not_before() {
-        let line = Line::new("stuck", Stuck, true);
-        let mut session =
-            Session::<Master>::new(line, |now| Master::new(MasterConfig::usb_adapter(), now));
+    fn stuck(open: core::ops::Range<u128>) -> (Session<Master>, Clock) {
+        let start = Clock::now();
+        let line = Line::new("stuck", Stuck { start, open }, true);
+        let mut session = Session::new(line, |now| Master::new(MasterConfig::usb_adapter(), now));
         let now = session.now();
         session.role_mut().discover(now);
-        let start = Clock::now();
+        (session, start)
+    }
+
+    #[test]
+    fn a_port_that_takes_something_in_between_has_a_second_again() {
+        let (mut session, start) = stuck(700..800);
+        while start.elapsed() < 3 * STUCK / 2 {
+            let until = session.now() + PATIENCE;
+            session.round(until).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_port_that_takes_nothing_for_a_second_has_failed_and_not_before() {
+        let (mut session, start) = stuck(0..0);
         let failure = loop {
             let until = session.now() + PATIENCE;
             if let Err(failure) = session.round(until) {

@@ -168,6 +168,24 @@ impl Signals {
     }
 }
 
+#[cfg(all(test, unix))]
+impl Signals {
+    /// Signals that only [`raise`](Self::raise) raises.
+    pub(crate) fn none() -> Self {
+        Self { end: Arc::default(), suspend: Arc::default() }
+    }
+
+    /// Does what Ctrl-C does.
+    pub(crate) fn raise(&self) {
+        self.end.store(true, Ordering::SeqCst);
+    }
+
+    /// Does what Ctrl-Z does.
+    pub(crate) fn raise_suspension(&self) {
+        self.suspend.store(true, Ordering::SeqCst);
+    }
+}
+
 /// Suspends the process so that the shell notices; returns when it goes on.
 #[cfg(all(unix, feature = "dashboard"))]
 pub(crate) fn suspend() {
@@ -273,5 +291,39 @@ impl Attendance {
         }
         let seconds = f64::from(away.as_micros()) / 1e6;
         Err(Failure::Failed(format!("the tool did not run for {seconds:.1} s (suspended?)")))
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ctrl_c_and_ctrl_z_are_both_noticed_and_only_ctrl_c_is_a_failure_at_once() {
+        let signals = Signals::none();
+        assert!(!signals.is_raised());
+        signals.raise();
+        assert!(signals.is_raised());
+        let failure = signals.interrupted().unwrap_err();
+        assert_eq!(failure.to_string(), "interrupted before anything moved");
+        let signals = Signals::none();
+        signals.raise_suspension();
+        assert!(signals.is_raised());
+        signals.interrupted().unwrap();
+    }
+
+    #[test]
+    fn an_absence_of_half_a_second_is_noticed_once() {
+        let at = |millis: u64| Instant::from_micros(millis * 1000);
+        let mut attendance = Attendance::new(at(1000));
+        attendance.check(at(1499)).unwrap();
+        attendance.check(at(1998)).unwrap();
+        let failure = attendance.check(at(2498)).unwrap_err();
+        assert_eq!(failure.to_string(), "the tool did not run for 0.5 s (suspended?)");
+        attendance.check(at(2600)).unwrap();
+        let mut awake = Awake::new(at(0));
+        assert_eq!(awake.time(at(400)), Duration::from_millis(400));
+        assert_eq!(awake.time(at(60_000)), Duration::from_millis(900), "suspended");
+        assert_eq!(awake.time(at(60_100)), Duration::from_millis(1000));
     }
 }

@@ -240,3 +240,6 @@ fn stop_rover(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
     }
     Ok(())
 }
+
+#[cfg(all(test, unix))]
+mod tests;

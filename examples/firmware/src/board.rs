@@ -17,6 +17,7 @@ use stm32f4::stm32f405::{GPIOA, Interrupt, Peripherals, USART1, USART2};
 use crate::{
     clock::{self, Clock},
     stack::Stack,
+    text_line::TextLine,
     uart::{Channel, Port, Queue},
 };
 
@@ -98,6 +99,13 @@ impl Board {
     /// The timeout `on_board`; longer in an emulator, whose host is not real-time.
     pub fn patience(&self, on_board: Duration) -> Duration {
         if self.is_emulated { on_board.max(EMULATOR_PATIENCE) } else { on_board }
+    }
+}
+
+impl TextLine {
+    /// Adds the counts of lost and damaged bytes of the line: the same for all programs.
+    pub fn bus_losses(&mut self) -> &mut Self {
+        self.losses(&BUS)
     }
 }
 

@@ -5,7 +5,7 @@ use axlewire::{
     time::{Instant, Wrapping32},
 };
 use cortex_m::peripheral::{SCB, SYST, syst::SystClkSource};
-use stm32f4::stm32f405::{FLASH, RCC, TIM2};
+use stm32f4::stm32f405::{TIM2, flash, rcc};
 
 use crate::uart;
 
@@ -39,7 +39,7 @@ const CRYSTAL_PATIENCE: u32 = 50_000;
 ///
 /// After every reset a processor runs from its internal oscillator, so HSIRDY is 1 wherever it is
 /// modelled.
-pub fn is_emulated(rcc: &RCC) -> bool {
+pub fn is_emulated(rcc: &rcc::RegisterBlock) -> bool {
     rcc.cr().read().hsirdy().bit_is_clear()
 }
 
@@ -47,7 +47,7 @@ pub fn is_emulated(rcc: &RCC) -> bool {
 ///
 /// Does nothing in an emulator, which runs at its own speed and would never report a clock as
 /// ready.
-pub fn speed_up(rcc: &RCC, flash: &FLASH) {
+pub fn speed_up(rcc: &rcc::RegisterBlock, flash: &flash::RegisterBlock) {
     if is_emulated(rcc) {
         return;
     }
@@ -71,6 +71,11 @@ pub fn speed_up(rcc: &RCC, flash: &FLASH) {
     while !rcc.cfgr().read().sws().is_pll() {}
 }
 
+/// Prescaler of TIM2 for microseconds.
+pub const fn prescaler(is_emulated: bool) -> u16 {
+    (if is_emulated { EMULATED_TIMER_MHZ } else { TIMER_MHZ }) - 1
+}
+
 /// The time since the start. TIM2 counts microseconds; SysTick is the alarm.
 pub struct Clock {
     timer: TIM2,
@@ -81,8 +86,7 @@ pub struct Clock {
 impl Clock {
     /// Starts at 0. The timer's clock must already be enabled.
     pub fn new(timer: TIM2, mut alarm: SYST, is_emulated: bool) -> Self {
-        let mhz = if is_emulated { EMULATED_TIMER_MHZ } else { TIMER_MHZ };
-        timer.psc().write(|w| w.psc().set(mhz - 1));
+        timer.psc().write(|w| w.psc().set(prescaler(is_emulated)));
         // The update event loads the prescaler.
         timer.egr().write(|w| w.ug().set_bit());
         timer.cr1().write(|w| w.cen().enabled());

@@ -96,6 +96,9 @@ where
     /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs
     /// have each been followed by an answer (ruling I12). Continues through errors of the port.
     ///
+    /// No WRITE is acknowledged. On a bad line both may be damaged although both READs are
+    /// answered: keep calling the driver, which repeats the stop with each reading.
+    ///
     /// # Errors
     ///
     /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running.** The

@@ -105,7 +105,8 @@ pub enum Cause {
     Silent,
     /// Bytes were heard, but no valid packet: damage or noise.
     Damaged,
-    /// Only other nodes were heard, or the node in another mode.
+    /// Only other nodes were heard, or the node in another mode, too early or too late, or bytes
+    /// that may be older than the request.
     Unexpected,
     /// The set-point to be confirmed was dropped: released, stopped, or meant for another mode.
     Dropped,

@@ -307,6 +307,9 @@ impl<B: Board> Node<B> {
 
     fn take_back_request(&mut self, is_scan: bool) {
         uncount(&mut self.statistics.requests);
+        if self.attempt > 0 {
+            uncount(&mut self.statistics.retries);
+        }
         self.scans = self.scans.saturating_sub(is_scan.into());
         self.is_asked = self.is_online();
         let is_lost = !self.is_asked;

@@ -9,7 +9,7 @@ use super::{
     statistics::MasterStatistics,
     stop::{Standstill, Stop},
     turns::{Discovery, Search, Sent, Turns},
-    window::Window,
+    window::{Heard, Window},
 };
 use crate::{
     endpoint::{Endpoint, Unsent},
@@ -331,6 +331,16 @@ impl<B: Board> Endpoint for Master<B> {
         while let Some((node, status)) = self.next_response(&mut bytes) {
             self.hear(node, status, now);
         }
+    }
+
+    /// Bytes that may be from before the request are no answer to it: its window opens behind them.
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        let mut asked = self.window.take_if(|window| since < window.request_end);
+        self.handle_input(bytes, now);
+        if let Some(window) = asked.as_mut().filter(|_| !bytes.is_empty()) {
+            window.heard = Heard::Others;
+        }
+        self.window = asked.or(self.window);
     }
 
     fn handle_timeout(&mut self, now: Instant) {

@@ -85,6 +85,7 @@ impl Line {
     }
 
     /// The same line, whose bytes go through `tap`.
+    #[cfg(all(unix, feature = "dashboard"))]
     pub(crate) fn through<W: Wire + 'static>(
         self,
         tap: impl FnOnce(Rc<RefCell<dyn Wire>>) -> W,
@@ -209,5 +210,24 @@ impl drive::Clock for LineClock {
         let patience = (until - self.now()).as_micros();
         // A failure is found again, and handled, when the driver reads.
         let _ = self.wire.borrow_mut().wait(Duration::from_micros(patience.into()));
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use serialport::{SerialPort as _, TTYPort};
+
+    use super::*;
+
+    #[test]
+    fn a_port_has_the_speed_that_was_asked_for() {
+        for (baud, expected) in [(None, 115_200), (Some(57_600), 57_600)] {
+            let (_ours, theirs) = TTYPort::pair().unwrap();
+            let path = theirs.name().unwrap();
+            let args = PortArgs { port: path.clone(), ..PortArgs::new(baud) };
+            let line = Line::open(&args, Protocol::Ucp).unwrap();
+            assert_eq!(theirs.baud_rate().unwrap(), expected);
+            assert!(line.is_instant() && line.path() == path);
+        }
     }
 }

@@ -46,20 +46,18 @@ impl TcpPort {
         self.stream.peer_addr().is_ok_and(|peer| peer.ip().is_loopback())
     }
 
+    /// A signal ends the wait, so that signals that never end do not prolong it for ever.
     fn receive(&mut self) -> io::Result<bool> {
-        loop {
-            match self.stream.read(&mut self.held) {
-                Ok(0) => return Err(lost("the server has closed the connection")),
-                Ok(count) => {
-                    self.unread = 0..count;
-                    return Ok(true);
-                }
-                Err(error) => match error.kind() {
-                    ErrorKind::Interrupted => {}
-                    ErrorKind::TimedOut | ErrorKind::WouldBlock => return Ok(false),
-                    _ => return Err(lost(&error.to_string())),
-                },
+        match self.stream.read(&mut self.held) {
+            Ok(0) => Err(lost("the server has closed the connection")),
+            Ok(count) => {
+                self.unread = 0..count;
+                Ok(true)
             }
+            Err(error) => match error.kind() {
+                ErrorKind::Interrupted | ErrorKind::TimedOut | ErrorKind::WouldBlock => Ok(false),
+                _ => Err(lost(&error.to_string())),
+            },
         }
     }
 }
@@ -110,9 +108,14 @@ impl Read for TcpPort {
 impl Write for TcpPort {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self.stream.write(bytes) {
-            Err(error) if error.kind() == ErrorKind::WouldBlock => Err(ErrorKind::TimedOut.into()),
-            Err(error) if error.kind() != ErrorKind::TimedOut => Err(lost(&error.to_string())),
-            result => result,
+            Ok(count) => Ok(count),
+            Err(error) => match error.kind() {
+                // A signal came, or the time is over, before a byte was taken.
+                ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {
+                    Err(ErrorKind::TimedOut.into())
+                }
+                _ => Err(lost(&error.to_string())),
+            },
         }
     }
 

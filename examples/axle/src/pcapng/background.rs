@@ -125,6 +125,23 @@ mod tests {
     }
 
     #[test]
+    fn packets_for_which_the_disk_was_too_slow_are_told_at_the_end() {
+        let (mut reader, writer) = std::io::pipe().unwrap();
+        let mut recording = Background::new(Recording::to_file(File::from(OwnedFd::from(writer))));
+        while recording.lost < 3 {
+            recording.add(Direction::Out, &[0; 8]);
+        }
+        let read = thread::spawn(move || {
+            let mut file = Vec::new();
+            reader.read_to_end(&mut file).map(|_| file)
+        });
+        let error = recording.check().unwrap_err().to_string();
+        assert_eq!(error, "\"file\" is incomplete: too slow for 3 packets");
+        drop(recording);
+        assert!(read.join().unwrap().is_ok());
+    }
+
+    #[test]
     fn all_packets_are_written_in_their_order_before_the_end() {
         let (mut reader, writer) = std::io::pipe().unwrap();
         let mut recording = Background::new(Recording::to_file(File::from(OwnedFd::from(writer))));

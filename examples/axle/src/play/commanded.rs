@@ -135,3 +135,6 @@ pub(super) fn turned(node: NodeId, now: Mode, meant: Mode) -> Failure {
         "node {node} has changed to {now} mode: it may have taken commands for {meant} mode"
     ))
 }
+
+#[cfg(all(test, unix))]
+mod tests;

@@ -209,7 +209,10 @@ impl Write {
 mod tests {
     use axlewire::{
         crc16,
-        ikeya::{Rps, WriteRequest, board::OneMotor},
+        ikeya::{
+            Rps, WriteRequest,
+            board::{OneMotor, ThreeMotors},
+        },
     };
 
     use super::*;
@@ -264,6 +267,45 @@ mod tests {
         velocity(-20.1).check(still, None, &limits()).unwrap_err();
         let nan = write(&WriteRequest::position(NodeId::N1, Position::new(0, 0x7FC0)));
         nan.check(still, None, &limits()).unwrap_err();
+    }
+
+    #[test]
+    fn the_limits_hold_for_each_of_three_motors() {
+        let check =
+            |packet: &three::WriteRequest, status| match of(Protocol::Ikeya3, packet.as_bytes()) {
+                Ok((Side::Commander, Effect::Write(write))) => {
+                    write.check::<ThreeMotors>(status, None, &limits())
+                }
+                other => panic!("{other:?}"),
+            };
+        let (still, place) = (Status::Velocity([0.0; 3]), Position::new(0, 50));
+        let there = Status::Position([place; 3]);
+        for motor in 0..3 {
+            for (rps, is_fine) in [(20.0, true), (-20.0, true), (20.5, false), (-20.5, false)] {
+                let mut speeds = [Rps::ZERO; 3];
+                speeds[motor] = Rps::new(rps).unwrap();
+                let write = three::WriteRequest::velocity(NodeId::N2, speeds);
+                assert_eq!(check(&write, still).is_ok(), is_fine, "{motor} {rps}");
+            }
+            for (turns, is_fine) in [(150, true), (-50, true), (151, false), (-51, false)] {
+                let mut places = [place; 3];
+                places[motor] = Position::new(0, turns);
+                let write = three::WriteRequest::position(NodeId::N2, places);
+                assert_eq!(check(&write, there).is_ok(), is_fine, "{motor} {turns}");
+            }
+        }
+        let answer = three::VelocityResponse::new(NodeId::N1, [Rps::ZERO; 3]);
+        let found = of(Protocol::Ikeya3, answer.as_bytes());
+        assert_eq!(found, Ok((Side::Device, Effect::Nothing)));
+    }
+
+    #[test]
+    fn what_moves_is_a_write_or_a_drive_and_what_is_for_wheels_a_drive_or_a_stop() {
+        let write = Effect::from(velocity(0.0));
+        let all =
+            [&write, &Effect::Drive, &Effect::Stand, &Effect::Ask(NodeId::N1), &Effect::Nothing];
+        assert_eq!(all.map(Effect::moves), [true, true, false, false, false]);
+        assert_eq!(all.map(Effect::is_for_wheels), [false, true, true, false, false]);
     }
 
     #[test]

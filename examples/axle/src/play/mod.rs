@@ -58,8 +58,12 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
 }
 
 fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
-    let drives = plan.frames.iter().any(|due| due.effect.moves());
     let line = Line::open(plan.bus.line(), plan.protocol)?;
+    play_on_rover(plan, line, signals)
+}
+
+fn play_on_rover(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
+    let drives = plan.frames.iter().any(|due| due.effect.moves());
     let mut config = HostConfig::default();
     config.baud = plan.bus.line().baud_for(Protocol::Ucp);
     if drives {
@@ -152,3 +156,6 @@ fn until_over(
     }
     Ok(())
 }
+
+#[cfg(all(test, unix))]
+mod tests;

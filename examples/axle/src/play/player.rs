@@ -288,3 +288,6 @@ impl Endpoint for Player {
         Some(next.max(self.is_free_at))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -73,6 +73,11 @@ const READ_AFTER_US: u64 = 2000;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    play::run(plan(args)?)
+}
+
+/// The message as often as it is wanted, and a READ behind each WRITE.
+fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
     let (protocol, meant) = (args.message.protocol(), args.message.mode());
     let (first, times) = (args.message.bytes(0).map_err(Failure::Usage)?, &args.times);
     let (side, effect) = play::effect_of(protocol, &first)
@@ -93,7 +98,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             frames.push_back(Due { after_us, bytes, meant: None, effect: Effect::Ask(write.node) });
         }
     }
-    play::run(Plan {
+    Ok(Plan {
         bus: &args.bus,
         protocol,
         side,
@@ -103,3 +108,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         is_json: times.json,
     })
 }
+
+#[cfg(test)]
+mod tests;

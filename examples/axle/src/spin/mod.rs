@@ -123,17 +123,32 @@ fn prepare<B: Boards>(
     let (page, wire) = args.page.open(wire, &about, signals)?;
     let config = bus::complete(args.bus.config(), port, &wire);
     let mut bus = Bus::new(wire, config);
+    let node = args.node;
+    // Print before anything moves: a terminal may suspend a background process that prints.
+    let tell = |found| {
+        let event = Event::Target { node, target: data(found) };
+        let line = page.note(form.line(0, &event));
+        line.map_or(Ok(()), |line| teller::print(&line).map_err(Failure::Write))
+    };
+    let Some(target) = aim(&mut bus, node, goal, tell, signals)? else { return Ok(None) };
+    let start = bus.now();
+    let (teller, left) = (Teller::new(), Ok(()));
+    Ok(Some((Spin { bus, node, start, form, teller, page, left }, target)))
+}
+
+/// The target of a node that was found and then read again, and told in between; `None` if a signal
+/// came first.
+fn aim<B: Boards>(
+    bus: &mut Bus<B>,
+    node: NodeId,
+    goal: &Goal<B>,
+    tell: impl FnOnce(Target<B>) -> Result<(), Failure>,
+    signals: &Signals,
+) -> Result<Option<Target<B>>, Failure> {
     if !bus.discover(signals)? {
         return Ok(None);
     }
-    let node = args.node;
-    let found = goal.target(node, &bus, bus.status(node))?;
-    // Print before anything moves: a terminal may suspend a background process that prints.
-    let event = Event::Target { node, target: data(found) };
-    if let Some(line) = page.note(form.line(0, &event)) {
-        teller::print(&line).map_err(Failure::Write)?;
-    }
-
+    tell(goal.target(node, bus, bus.status(node))?)?;
     // Discovery took a while, and so may the reader of that line: the mode may have changed.
     let status = bus.read(node, signals)?;
     if signals.is_raised() {
@@ -142,8 +157,8 @@ fn prepare<B: Boards>(
     if bus.master().is_mode_in_doubt(node) {
         return Err(Failure::Failed(format!("the mode of node {node} is in doubt")));
     }
-    let target = goal.target(node, &bus, status)?;
-    let start = bus.now();
-    let (teller, left) = (Teller::new(), Ok(()));
-    Ok(Some((Spin { bus, node, start, form, teller, page, left }, target)))
+    goal.target(node, bus, status).map(Some)
 }
+
+#[cfg(all(test, unix))]
+mod tests;

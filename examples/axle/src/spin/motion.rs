@@ -199,3 +199,6 @@ impl<B: Boards> Spin<B> {
 pub(super) fn data<B: Boards>(target: Target<B>) -> Data {
     B::data(B::reached(target))
 }
+
+#[cfg(all(test, unix))]
+mod tests;

@@ -1,6 +1,10 @@
 //! `axle drive`: drives a rover, and stops it before the tool exits.
 
-use std::{io::Write, thread, time::Duration};
+use std::{
+    io::Write,
+    thread,
+    time::{Duration, Instant},
+};
 
 use axlewire::{
     stream::Event,
@@ -106,9 +110,10 @@ fn a_rover_that_vanishes_is_reported_with_what_it_means() {
 #[test]
 fn a_robot_that_never_answers_is_never_told_to_move() {
     undisturbed(|| {
-        let line = parrot(&[]);
+        let (line, begin) = (parrot(&[]), Instant::now());
         let drive = Process::start(&format!("drive --port {} --speed 60 --turn 0", line.path));
         let complaint = drive.complaint(1);
+        assert!(begin.elapsed() >= Duration::from_secs(2), "{:?}", begin.elapsed());
         assert!(complaint.starts_with("no robot answers on"), "{complaint}");
         assert!(complaint.ends_with("nothing received in 2 s"), "{complaint}");
 
@@ -181,12 +186,17 @@ fn the_time_that_was_asked_for_is_kept() {
 fn turning_on_the_spot_counts_as_moving() {
     undisturbed(|| {
         let line = played::rover(None);
-        let args = format!("drive --port {} --speed 0 --turn 40 --for 0.3", line.path);
+        let args = format!("drive --port {} --speed 0 --turn 40 --for 0.3 --json", line.path);
         let drive = Process::start(&args);
         wait_until("the drive", || line.lock().commands.contains(&(0, 40)));
         // The mean of its wheel speeds is 0.
         line.lock().wheels = Some([28, -28, 28, -28]);
-        let complaint = drive.complaint(1);
+        let ended = drive.end();
+        let outcome: serde_json::Value =
+            serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!((ended.code, &outcome["at_rest"]), (Some(1), &false.into()));
+        let complaint = outcome["failure"].as_str().unwrap();
+        assert_eq!(ended.stderr, [format!("axle: {complaint}")]);
         assert!(complaint.starts_with("the robot was told "), "{complaint}");
         assert!(
             complaint.ends_with(" times to stop, but its wheels are still turning"),

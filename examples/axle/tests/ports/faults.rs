@@ -138,7 +138,7 @@ fn with_echo_the_other_program_hears_itself_and_needs_the_option_for_it() {
 #[test]
 fn an_unplugged_line_lets_nothing_through_until_it_is_plugged_in_again() {
     undisturbed(|| {
-        let (sim, mut port) = bus("--unplug 0.5:1.5");
+        let (sim, mut port) = bus("--unplug 1.4:1.2");
         sim.line("the line is unplugged");
         assert_eq!(heard(&mut port, &read(), 1), [0_u8; 0]);
         sim.line("the line is plugged in again");

@@ -24,6 +24,7 @@ mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod stress;
 mod tcp;
 mod three;
 mod watch;

@@ -7,9 +7,10 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
+use axlewire::ikeya::{NodeId, Rps, three};
 use serde_json::Value;
 
-use super::{Process, TWO_NODES, sim, support::axle, undisturbed};
+use super::{Process, TWO_NODES, played::PlayedLine, sim, support::axle, undisturbed};
 
 /// A file that does not exist yet, in the build directory.
 pub(crate) fn fresh(name: &str) -> String {
@@ -102,10 +103,14 @@ fn a_recording_of_an_unplugged_port_is_complete() {
 
 /// The tool, for which the system refuses to let a file grow beyond 4 kB.
 pub(super) fn with_little_disk(args: &str) -> Command {
+    with_disk(4, args)
+}
+
+fn with_disk(kilobytes: u32, args: &str) -> Command {
     let args: Vec<_> = args.split(' ').collect();
     let axle = axle(&args);
     let mut limited = Command::new("bash");
-    limited.args(["-c", "ulimit -f 4; exec \"$0\" \"$@\""]);
+    limited.args(["-c", &format!("ulimit -f {kilobytes}; exec \"$0\" \"$@\"")]);
     limited.arg(axle.get_program()).args(axle.get_args());
     limited
 }
@@ -157,6 +162,33 @@ fn a_recording_that_fails_is_told_with_the_outcome_and_beside_another_failure() 
 }
 
 #[test]
+fn a_recording_that_fails_decides_the_exit_code_of_each_subcommand() {
+    undisturbed(|| {
+        let (_bus, bus) = sim("ikeya --node 1:velocity");
+        let (_rover, rover) = sim("ucp");
+        for args in [
+            format!("scan -p {bus}"),
+            format!("send -p {bus} -f 0.3 ikeya velocity 1 1"),
+            format!("ping -p {rover} -c 3"),
+            format!("lamp -p {rover} on"),
+            format!("network -p {rover} connected"),
+            format!("calibrate -p {rover} -k imu -f 0.1"),
+            format!("drive -p {rover} --speed 10 --turn 0 -f 0.3"),
+            format!("stop -p {rover} -P ucp"),
+        ] {
+            let path = fresh("little.pcapng");
+            let mut limited =
+                with_disk(1, &args.replacen(" -p", &format!(" --record {path} -p"), 1));
+            let ended = Process::spawn(&mut limited).unwrap().end();
+            assert_eq!((ended.code, ended.stderr.len()), (Some(1), 1), "{args}: {ended:?}");
+            let says = format!("axle: cannot write {path:?}: File too large");
+            assert!(ended.stderr[0].starts_with(&says), "{args}: {ended:?}");
+            assert!(!ended.stdout.is_empty(), "{args}: what was done is told all the same");
+        }
+    });
+}
+
+#[test]
 fn a_recording_that_fails_does_not_end_a_watch() {
     undisturbed(|| {
         let (_sim, port) = sim("ucp");
@@ -192,13 +224,42 @@ fn a_file_that_is_there_is_not_overwritten_without_being_told() {
     undisturbed(|| {
         let (_sim, port) = sim("ucp");
         let path = fresh("there.pcapng");
-        fs::write(&path, "dear to somebody").unwrap();
+        // Longer than what is recorded over it.
+        let before = "of use to somebody".repeat(5000);
+        fs::write(&path, &before).unwrap();
         let record = format!("record -p {port} -P ucp --for 0.1 -o {path}");
-        let error = Process::start(&record).complaint(1);
-        assert!(error.starts_with(&format!("cannot create {path:?}: File exists")), "{error}");
-        assert_eq!(fs::read(&path).unwrap(), b"dear to somebody");
+        for tool in [
+            record.clone(),
+            format!("watch -p {port} -P ucp --plain --record {path}"),
+            format!("drive -p {port} --speed 20 --turn 0 --record {path}"),
+        ] {
+            let error = Process::start(&tool).complaint(1);
+            assert!(error.starts_with(&format!("cannot create {path:?}: File exists")), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), before);
+        }
         Process::start(&format!("{record} --force")).success();
         decoded(&path);
+    });
+}
+
+#[test]
+fn boards_with_three_motors_are_recorded_and_watched_as_such() {
+    undisturbed(|| {
+        let answer = three::VelocityResponse::new(NodeId::N2, [Rps::ZERO; 3]);
+        let line = PlayedLine::new((), move |_, _| answer.as_bytes().to_vec());
+        let path = fresh("three.pcapng");
+        let record = format!("record -p {} -P ikeya-3 -f 0.2 -o {path}", line.path);
+        let told = Process::start(&record).success();
+        assert_eq!(told.last().unwrap().trim(), "0 skipped", "{told:?}");
+        let (events, summary) = decoded(&path);
+        assert!(events.len() > 3 && summary["skipped"] == 0, "{summary}");
+        assert!(events.iter().all(|event| event["rps"] == serde_json::json!([0.0, 0.0, 0.0])));
+        let watch = format!("watch -p {} -P ikeya-3 -f 0.2 --json", line.path);
+        let lines = Process::start(&watch).success();
+        let summary: Value = serde_json::from_str(lines.last().unwrap()).unwrap();
+        let message = &summary["messages"][0];
+        assert_eq!((&message["node"], &message["last"]), (&2.into(), &"0.0 0.0 0.0 rps".into()));
+        assert_eq!(summary["skipped"], 0);
     });
 }
 

@@ -1,13 +1,18 @@
 //! `axle ping`, `calibrate`, `lamp` and `network`: a rover that does not move because of them.
 
-use std::{io::Write, process::Stdio, thread, time::Duration};
+use std::{
+    io::Write,
+    process::Stdio,
+    thread,
+    time::{Duration, Instant},
+};
 
 use axlewire::{crc16, stream::Event, ucp};
 use serde_json::Value;
 
 use super::{
     Process,
-    played::{PlayedLine, parrot},
+    played::{self, PlayedLine, parrot},
     sim,
     support::axle,
     undisturbed,
@@ -125,13 +130,94 @@ fn a_calibration_says_what_to_do_and_prints_the_biases() {
         sim.line("calibration begins: IMU");
         sim.line("calibration ends: IMU");
 
-        let args = format!("calibrate -p {port} -k magnetometer -f 0.3 -j");
+        let args = format!("calibrate -p {port} -k magnetometer -f 1.7 -j");
         let lines = Process::start(&args).success();
         let records = objects(&lines);
         let names: Vec<_> = records.iter().map(|it| it["event"].as_str().unwrap()).collect();
         assert_eq!(names, ["started", "ended", "mag_bias"]);
         assert_eq!(records[2]["mag"], serde_json::json!([105, -48, 260]));
+        let seconds = |at: usize| records[at]["seconds"].as_f64().unwrap();
+        assert!((1.7..2.2).contains(&(seconds(1) - seconds(0))), "{records:?}");
         assert_nothing_moved(sim);
+    });
+}
+
+#[test]
+fn pings_are_as_far_apart_as_asked_for_and_their_times_are_told() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        for (every, least) in [("0.5", 1.0), ("0.05", 0.1)] {
+            let args = format!("ping -p {} -c 3 --every {every} -j", line.path);
+            let records = objects(&Process::start(&args).success());
+            let at = |of: usize| records[of]["seconds"].as_f64().unwrap();
+            let span = at(2) - at(0);
+            assert!((least - 0.02..least + 0.3).contains(&span), "{every}: {records:?}");
+        }
+    });
+}
+
+#[test]
+fn a_lamp_is_told_three_times() {
+    undisturbed(|| {
+        let line = played::rover(None);
+        for (state, shines) in [("on", 100), ("off", 0)] {
+            let before = line.lock().lamps.len();
+            Process::start(&format!("lamp -p {} {state}", line.path)).success();
+            let lamps = line.lock().lamps[before..].to_vec();
+            // In front of them is a stop.
+            assert_eq!((lamps[0], lamps.len() >= 4), (0, true), "{lamps:?}");
+            assert!(lamps.iter().rev().take(3).all(|lamp| *lamp == shines), "{lamps:?}");
+            assert!(line.lock().commands.iter().all(|command| *command == (0, 0)));
+        }
+    });
+}
+
+#[test]
+fn a_result_that_comes_late_is_waited_for() {
+    undisturbed(|| {
+        let mut ended = None;
+        let line = rover_that_calibrates(move |sent, body| match (sent, ended) {
+            // It has an old result.
+            (3, _) => vec![frame(6, &[9; 12]), frame(3, &[body[0], 0])],
+            (4, _) => {
+                ended = Some(Instant::now());
+                vec![frame(4, &[body[0], 0])]
+            }
+            (_, Some(at)) if at.elapsed() >= Duration::from_millis(2500) => {
+                vec![frame(6, &[1; 12])]
+            }
+            _ => Vec::new(),
+        });
+        let args = format!("calibrate -p {} -k imu -f 0.1 -j", line.path);
+        let records = objects(&Process::start(&args).success());
+        assert_eq!(records[2]["acc"], serde_json::json!([257, 257, 257]), "{records:?}");
+        // In this time an old result comes and is acknowledged.
+        let seconds = |at: usize| records[at]["seconds"].as_f64().unwrap();
+        assert!((1.2..2.0).contains(&(seconds(1) - seconds(0))), "{records:?}");
+    });
+}
+
+#[test]
+fn a_result_of_the_other_kind_is_not_taken_for_this_one() {
+    undisturbed(|| {
+        for (kind, says) in [
+            ("imu", "accelerometer 514 514 514, gyroscope 514 514 514"),
+            ("magnetometer", "magnetometer 2313 2313 2313"),
+        ] {
+            let is_imu = kind == "imu";
+            let line = rover_that_calibrates(move |sent, body| match sent {
+                3 => vec![frame(3, &[body[0], 0])],
+                4 => {
+                    let (imu, mag) = (frame(6, &[2; 12]), frame(7, &[9; 6]));
+                    let ack = frame(4, &[body[0], 0]);
+                    if is_imu { vec![ack, imu, mag] } else { vec![ack, mag, imu] }
+                }
+                _ => Vec::new(),
+            });
+            let args = format!("calibrate -p {} -k {kind} -f 0.1", line.path);
+            let lines = Process::start(&args).success();
+            assert!(lines.last().unwrap().ends_with(says), "{lines:?}");
+        }
     });
 }
 
@@ -251,6 +337,9 @@ fn a_calibration_ends_on_enter_and_on_a_signal() {
         let calibrate = Process::start(&format!("calibrate --port {port} --kind imu"));
         sim.line("calibration begins: IMU");
         calibrate.line("then press Enter");
+        // The end of the input is no Enter.
+        thread::sleep(Duration::from_millis(1500));
+        assert_eq!(calibrate.lines().len(), 1, "{:?}", calibrate.lines());
         calibrate.signal("INT");
         assert_eq!(calibrate.complaint(1), "interrupted: the calibration was ended");
         sim.line("calibration ends: IMU");

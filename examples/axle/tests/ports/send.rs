@@ -114,6 +114,36 @@ fn a_rover_that_is_commanded_is_stopped_at_the_end() {
 }
 
 #[test]
+fn a_rover_that_turns_on_is_not_said_to_be_stopped_and_one_that_is_not_heard_gets_no_command() {
+    undisturbed(|| {
+        let line = played::rover(Some([0, 0, 5, 0]));
+        let send = format!("send -p {} -f 0.1 ucp motor 40 0", line.path);
+        let error = Process::start(&send).complaint(1);
+        assert!(error.ends_with("to stop, but its wheels are still turning"), "{error}");
+        let silent = played::parrot(&[]);
+        let error = Process::start(&send.replace(&line.path, &silent.path)).complaint(1);
+        assert!(error.starts_with("no robot answers on "), "{error}");
+        let is_zero = |frame: &[u8]| frame[..5] != [0xFD, 0xFF, 20, 0, 2] || frame[6..10] == [0; 4];
+        assert!(silent.lock().windows(24).all(is_zero), "{:02x?}", silent.lock());
+    });
+}
+
+#[test]
+fn a_board_with_three_motors_is_commanded_and_stopped() {
+    undisturbed(|| {
+        let (sim, port) = sim("ikeya-3 --node 1:velocity --node 3:position");
+        let send = format!("send -p {port} -f 0.3 ikeya-3 velocity 1 1 -2 3");
+        let lines = Process::start(&send).success();
+        assert!(lines.last().unwrap().ends_with("rps, stopped and confirmed"), "{lines:?}");
+        sim.line("node 1: command 1.00 -2.00 3.00 rps");
+        sim.line("node 1: command 0.00 0.00 0.00 rps");
+        let send = format!("send -p {port} ikeya-3 position 3 0 101 0");
+        let error = Process::start(&send).complaint(1);
+        assert!(error.starts_with("101.0000 turns for node 3, which is at 0.0000"), "{error}");
+    });
+}
+
+#[test]
 fn messages_of_a_host_are_answered_by_a_robot() {
     undisturbed(|| {
         let (sim, port) = sim("ucp");

@@ -6,7 +6,7 @@ use std::{
     process::Command,
     sync::{Arc, Mutex},
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use super::{
@@ -41,7 +41,7 @@ fn a_reader_that_does_not_read_keeps_nobody_from_ending_the_tool_while_nothing_m
             // The first line comes before anything moves.
             (format!("spin -p {port} -n 1 --rps 2 -f 600"), 1),
             (format!("stop -p {port} -P ikeya"), 1),
-            (format!("ping -p {robot} --every 0.01"), 2),
+            (format!("watch -p {robot} -P ucp --json"), 2),
             // Its error.
             (format!("send -p {port} ikeya velocity 2 1"), 1),
         ] {
@@ -95,6 +95,33 @@ fn every_signal_that_can_be_caught_stops_the_motor_first() {
             let commands: Vec<_> =
                 sim.lines().into_iter().filter(|line| line.contains("command")).collect();
             assert!(commands.last().unwrap().contains("0.00 rps"), "{signal}: {commands:?}");
+        }
+    });
+}
+
+/// A process group without a terminal ignores the signals of one, so what they do is not seen in
+/// every place where tests run; that they are caught is.
+#[test]
+fn what_moves_something_catches_every_signal_that_can_be_caught() {
+    undisturbed(|| {
+        let (bus, rover) = (played::bus(&[Node::velocity(1)], |_, _| {}), played::rover(None));
+        for args in [
+            format!("spin -p {} -n 1 --rps 1 -f 600", bus.path),
+            format!("send -p {} -f 600 ikeya velocity 1 1", bus.path),
+            format!("drive -p {} --speed 10 --turn 0 -f 600", rover.path),
+            format!("stop -p {} -P ikeya -n 8", bus.path),
+        ] {
+            let before = bus.said().len() + rover.lock().bytes;
+            let tool = Process::start(&args);
+            wait_until("the first byte", || bus.said().len() + rover.lock().bytes > before);
+            let caught = tool.caught_signals();
+            // Hangup, interrupt, quit, abort, user 1 and 2, alarm, terminated, stop, background
+            // input and output, and the first and the last of the real-time signals.
+            for signal in [1, 2, 3, 6, 10, 12, 14, 15, 20, 21, 22, 34, 64] {
+                assert!(caught & 1 << (signal - 1) != 0, "{args}: {signal} of {caught:x}");
+            }
+            tool.signal("INT");
+            tool.end();
         }
     });
 }
@@ -296,6 +323,7 @@ fn after_a_stop_signal_that_cannot_be_caught_the_rover_is_stopped_and_not_driven
         drive.signal("CONT");
         let complaint = drive.complaint(1);
         assert!(says_for_how_long(&complaint), "{complaint}");
+        assert!(complaint.ends_with("(suspended?); it was stopped and is at rest"), "{complaint}");
         let commands = line.lock().commands[before..].to_vec();
         assert!(commands.len() >= 3, "{commands:?}");
         assert!(commands.iter().all(|command| *command == (0, 0)), "kept driving: {commands:?}");
@@ -363,5 +391,60 @@ fn a_stop_that_is_itself_suspended_has_all_of_its_time_afterwards() {
         rover.lock().wheels = None;
         assert!(spin.success().last().unwrap().ends_with("stopped and confirmed"));
         assert!(drive.success().last().unwrap().ends_with("stopped"));
+    });
+}
+
+#[test]
+fn a_signal_ends_a_search_at_once_and_says_what_was_not_done() {
+    undisturbed(|| {
+        let moved = "interrupted before anything moved";
+        for (args, says) in [
+            ("drive --speed 20 --turn 0", moved),
+            ("send ucp motor 20 0", moved),
+            ("lamp on", "interrupted"),
+            ("network connected", "interrupted before the state was sent"),
+            ("calibrate -k imu", "interrupted before the calibration began"),
+            ("scan", "interrupted before all ids were asked"),
+            ("spin -n 1 --rps 1", moved),
+        ] {
+            let line = played::parrot(&[]);
+            let (name, rest) = args.split_once(' ').unwrap_or((args, ""));
+            let tool = Process::start(&format!("{name} -p {} {rest}", line.path));
+            wait_until("the first byte", || !line.lock().is_empty());
+            let begin = Instant::now();
+            tool.signal("INT");
+            assert_eq!(tool.complaint(1), says, "{args}");
+            assert!(begin.elapsed() < Duration::from_secs(1), "{args}: {:?}", begin.elapsed());
+        }
+    });
+}
+
+#[test]
+fn what_send_has_moved_is_stopped_before_ctrl_z_suspends_it_and_a_second_ctrl_c_ends_nothing() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        for signal in ["TSTP", "INT"] {
+            let args = format!("send -p {} -f 600 ikeya velocity 1 2", line.path);
+            let send = Process::start(&args);
+            wait_until("2 rps", || line.lock().nodes[0].rps == 2.0);
+            // It coasts for a while.
+            line.change(|node| node.follows = false);
+            send.signal(signal);
+            thread::sleep(Duration::from_millis(1300));
+            if signal == "INT" {
+                send.signal(signal);
+                thread::sleep(Duration::from_millis(200));
+            }
+            assert_eq!(send.lines().iter().filter(|line| line.contains("stopped")).count(), 0);
+            assert!(!['T', 'Z'].contains(&send.state()), "with the motor turning");
+            line.change(|node| (node.follows, node.rps) = (true, 0.0));
+            if signal == "TSTP" {
+                wait_until("suspended", || send.state() == 'T');
+                send.signal("CONT");
+                assert_eq!(send.complaint(1), SUSPENDED);
+            } else {
+                assert!(send.success().last().unwrap().ends_with("stopped and confirmed"));
+            }
+        }
     });
 }

@@ -107,6 +107,28 @@ fn a_reader_that_goes_away_stops_the_motor_too() {
 }
 
 #[test]
+fn an_output_that_takes_nothing_moves_nothing() {
+    undisturbed(|| {
+        let bus = played::bus(&[Node::velocity(1)], |_, _| {});
+        let rover = played::rover(None);
+        for args in [
+            format!("spin -p {} -n 1 --rps 2 -f 0.5", bus.path),
+            format!("drive -p {} --speed 20 --turn 0 -f 0.5", rover.path),
+            format!("send -p {} -f 0 ikeya read 1", bus.path),
+        ] {
+            let args: Vec<_> = args.split(' ').collect();
+            let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+            let output = axle(&args).stdout(full).output().unwrap();
+            let error = String::from_utf8(output.stderr).unwrap();
+            assert!(error.starts_with("axle: cannot write the output: "), "{error}");
+            assert_eq!(output.status.code(), Some(1));
+        }
+        assert!(speeds(&bus.said()).is_empty());
+        assert!(rover.lock().commands.iter().all(|command| *command == (0, 0)));
+    });
+}
+
+#[test]
 fn a_port_that_vanishes_is_reported_with_what_it_means() {
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
@@ -192,11 +214,16 @@ fn a_motor_that_turns_on_after_its_stop_is_not_called_stopped() {
     undisturbed(|| {
         let line = played::bus(&[Node { follows: false, ..Node::velocity(1) }], |_, _| {});
         line.change(|node| node.rps = 2.0);
-        let args = format!("spin --port {} --node 1 --rps 2 --for 0.2", line.path);
+        let args = format!("spin --port {} --node 1 --rps 2 --for 0.2 --json", line.path);
         let ended = Process::start(&args).end();
-        let expected = "axle: node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
-        assert_eq!((ended.code, &*ended.stderr), (Some(1), &[expected.to_owned()][..]));
-        assert!(!ended.stdout.iter().any(|line| line.contains("stopped")), "{ended:?}");
+        let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+        assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
+        assert!(!ended.stdout.iter().any(|line| line.contains("\"stopped\"")), "{ended:?}");
+        let outcome = serde_json::json!(
+            {"event": "outcome", "at_rest": false, "failure": expected}
+        );
+        let last: serde_json::Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!(last, outcome);
     });
 }
 

@@ -144,9 +144,33 @@ fn stop_fails_when_a_motor_turns_on() {
     undisturbed(|| {
         let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
         let line = played::bus(&[node], |_, _| {});
-        let stop = Process::start(&format!("stop --port {} --protocol ikeya --node 1", line.path));
+        let stop = format!("stop --port {} --protocol ikeya --node 1 --json", line.path);
+        let ended = Process::start(&stop).end();
         let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
-        assert_eq!(stop.complaint(1), expected);
+        assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
+        let said: Vec<Value> =
+            ended.stdout.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let outcome =
+            serde_json::json!({"event": "outcome", "at_rest": false, "failure": expected});
+        assert_eq!(said, [outcome]);
+    });
+}
+
+#[test]
+fn a_motor_that_confirms_late_has_its_time_to_coast_from_then_on() {
+    undisturbed(|| {
+        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+        let line = played::bus(&[node], |said, bus| {
+            bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)) && speeds_said(bus) == 1;
+        });
+        let begin = Instant::now();
+        let stop = Process::start(&format!("stop -p {} -P ikeya", line.path));
+        wait_until("a stop", || !speeds(&line.said()).is_empty());
+        thread::sleep(Duration::from_millis(1200));
+        line.change(|node| node.is_dumb = false);
+        thread::sleep(Duration::from_millis(3600).saturating_sub(begin.elapsed()));
+        line.change(|node| node.rps = 0.0);
+        assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
     });
 }
 
@@ -174,8 +198,9 @@ fn a_line_on_which_nothing_answers_is_no_stop() {
             ("--protocol ikeya-3", "no node answers on "),
             ("--protocol ucp", "no robot answers on "),
         ] {
-            let stop = Process::start(&format!("stop --port {} {protocol}", line.path));
-            let complaint = stop.complaint(1);
+            let stop = Process::start(&format!("stop --port {} {protocol}", line.path)).end();
+            assert_eq!((stop.code, &*stop.stdout, stop.stderr.len()), (Some(1), &[][..], 1));
+            let complaint = stop.stderr[0].strip_prefix("axle: ").unwrap();
             assert!(complaint.starts_with(expected), "{protocol}: {complaint}");
             assert_eq!(complaint.contains("no robot answers"), !protocol.contains("ikeya"));
         }
@@ -199,10 +224,14 @@ fn a_stop_is_not_interrupted() {
         let line = played::bus(&[node], |_, _| {});
         let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
         line.wait_for(Said::Write(1, 0.0, 0));
-        for signal in ["INT", "TSTP", "QUIT", "INT", "TERM"] {
+        for signal in ["INT", "TSTP", "QUIT", "TERM"] {
             stop.signal(signal);
             thread::sleep(Duration::from_millis(100));
         }
+        // While nothing moves, a second one, a second later, ends a tool.
+        thread::sleep(Duration::from_millis(1000));
+        stop.signal("INT");
+        thread::sleep(Duration::from_millis(100));
         line.change(|node| node.rps = 0.0);
         assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
     });

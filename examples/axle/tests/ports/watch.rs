@@ -1,10 +1,12 @@
 //! `axle watch`: shows the traffic on a line, without sending anything.
 
+use std::time::{Duration, Instant};
+
 use serde_json::Value;
 
 use super::{
     Process,
-    played::parrot,
+    played::{PlayedLine, parrot},
     sim,
     support::{Capture, axle, decode, file, run, stdout},
     undisturbed,
@@ -74,6 +76,25 @@ fn watch_prints_one_json_object_per_second_and_one_at_the_end() {
         assert!(report["last"].as_str().unwrap().contains("battery"), "{report}");
         let rate = report["per_second"].as_f64().unwrap();
         assert!((30.0..70.0).contains(&rate), "{rate}");
+    });
+}
+
+#[test]
+fn the_beginning_of_a_frame_is_skipped_once_the_line_is_quiet() {
+    undisturbed(|| {
+        // Once, when the tool listens.
+        let (mut said, begin) = (false, Instant::now());
+        let line = PlayedLine::new((), move |_, _| {
+            let is_time = !said && begin.elapsed() >= Duration::from_millis(500);
+            said |= is_time;
+            // Of a packet of 8 bytes.
+            if is_time { vec![0x55, 0x01, 0x00] } else { Vec::new() }
+        });
+        let watch = format!("watch -p {} -P ikeya --json -f 1", line.path);
+        let lines = Process::start(&watch).success();
+        let summary: Value = serde_json::from_str(lines.last().unwrap()).unwrap();
+        let counts = ["received", "skipped", "pending"].map(|count| summary[count].as_u64());
+        assert_eq!(counts, [Some(3), Some(3), Some(0)], "{summary}");
     });
 }
 

@@ -1,6 +1,7 @@
 //! Runs the real binary, and builds captures with known events.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub(crate) mod devices;
 pub(crate) mod pcapng;
 pub(crate) mod process;
 pub(crate) mod schema;

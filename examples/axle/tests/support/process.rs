@@ -70,6 +70,18 @@ impl Process {
         stat.rsplit(") ").next().unwrap().chars().next().unwrap()
     }
 
+    /// The signals that it catches, a bit each; the first is bit 0.
+    pub(crate) fn caught_signals(&self) -> u64 {
+        let path = format!("/proc/{}/status", self.child.id());
+        let status = std::fs::read_to_string(path).unwrap();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
+        u64::from_str_radix(mask.trim(), 16).unwrap()
+    }
+
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// The error lines so far.
     pub(crate) fn complaints(&self) -> Vec<String> {
         self.stderr.all()

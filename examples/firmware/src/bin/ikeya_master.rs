@@ -16,10 +16,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 use axlewire_firmware::{
-    board::{BUS, Board},
-    clock::milliseconds,
-    on_panic, serve_usarts,
-    text_line::TextLine,
+    board::Board, clock::milliseconds, on_panic, serve_usarts, text_line::TextLine,
 };
 
 on_panic!();
@@ -179,7 +176,7 @@ fn report(line: &mut TextLine, master: &Master, exchanges: u32) {
         .count("writes", statistics.writes)
         .count("exchanges", exchanges)
         .count("lost_events", master.lost_events())
-        .losses(&BUS);
+        .bus_losses();
     for node in NodeId::ALL {
         if let Some((status, _)) = master.status(node) {
             line.count("node", node.get().into());

@@ -15,11 +15,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 use axlewire_firmware::{
-    board::{BUS, Board},
-    clock::milliseconds,
-    motor::Motor,
-    on_panic, serve_usarts,
-    text_line::TextLine,
+    board::Board, clock::milliseconds, motor::Motor, on_panic, serve_usarts, text_line::TextLine,
 };
 
 on_panic!();
@@ -118,5 +114,5 @@ fn report(line: &mut TextLine, slave: &Slave, motor: &Motor, stops: u32, now: In
     .count("expired", expired)
     .count("stops", stops)
     .count("skipped", slave.counters().skipped() as u32)
-    .losses(&BUS);
+    .bus_losses();
 }

@@ -1,8 +1,10 @@
 //! Checks cases that QEMU's USART never produces: overruns, framing errors, noise, a full queue,
-//! and a slow last byte. Exits with status 0, or prints the failed check.
+//! and a slow last byte; and the clock, which it does not model. Exits with status 0, or prints the
+//! failed check.
 //!
-//! The driver of [`uart`](axlewire_firmware::uart) here works on a register block in RAM, with
-//! SysTick playing the hardware. The stack measurement is checked as well.
+//! The drivers of [`uart`](axlewire_firmware::uart) and [`clock`](axlewire_firmware::clock) here
+//! work on register blocks in RAM, with SysTick playing the hardware. The stack measurement is
+//! checked as well.
 
 #![no_std]
 #![no_main]
@@ -12,11 +14,12 @@ use core::{
     hint::black_box,
     ops::Deref,
     ptr,
-    sync::atomic::{AtomicU32, Ordering::Relaxed},
+    sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed},
 };
 
 use axlewire::drive::Rs485;
 use axlewire_firmware::{
+    clock,
     stack::Stack,
     text_line::TextLine,
     uart::{Channel, Port, Queue},
@@ -86,7 +89,16 @@ fn check_all() -> Option<()> {
     received_bytes_and_what_went_wrong(registers, &mut port);
     a_full_queue_loses_the_newest(registers, &mut port);
     the_counts_are_told();
-    the_pin_stays_on_until_the_last_stop_bit(registers, port)?;
+    a_frame_is_queued_as_a_whole_or_not_at_all(registers, &mut port);
+    let mut core = cortex_m::Peripherals::take()?;
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(1680);
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+    the_pin_stays_on_until_the_last_stop_bit(registers, port);
+    the_clock_runs_at_168_mhz_with_a_crystal_and_without()?;
+    core.SYST.disable_counter();
     Some(())
 }
 
@@ -128,6 +140,21 @@ fn a_full_queue_loses_the_newest(registers: Registers, port: &mut Port<Registers
     expect("the oldest are kept", is_kept && port.poll_byte().is_none());
 }
 
+/// While the data register is full.
+fn a_frame_is_queued_as_a_whole_or_not_at_all(registers: Registers, port: &mut Port<Registers>) {
+    // SAFETY: RAM.
+    unsafe { registers.sr().write(|w| w.bits(0)) };
+    expect("room for 500 bytes", port.try_send(&[7; 500]));
+    expect("no room for 12 more", !port.try_send(&[8; 12]));
+    expect("room for 11 more", port.try_send(&[9; 11]));
+    expect("no room at all", !port.try_send(&[8]) && port.try_send(&[]));
+    // SAFETY: RAM.
+    unsafe { registers.sr().write(|w| w.bits(TXE)) };
+    CHANNEL.serve();
+    expect("the last byte is sent last", registers.dr().read().bits() & 0xFF == 9);
+    expect("all are sent", registers.cr1().read().txeie().bit_is_clear());
+}
+
 fn the_counts_are_told() {
     let mut line = TextLine::new("check");
     expect("the line", line.losses(&CHANNEL).end() == b"check overruns 2 lost 4 damaged 2\r\n");
@@ -163,41 +190,121 @@ impl OutputPin for Pin {
     }
 }
 
-fn the_pin_stays_on_until_the_last_stop_bit(
-    registers: Registers,
-    port: Port<Registers>,
-) -> Option<()> {
-    let mut core = cortex_m::Peripherals::take()?;
-    core.SYST.set_clock_source(SystClkSource::Core);
-    core.SYST.set_reload(1680);
-    core.SYST.clear_current();
-    core.SYST.enable_interrupt();
-    core.SYST.enable_counter();
+fn the_pin_stays_on_until_the_last_stop_bit(registers: Registers, port: Port<Registers>) {
     // SAFETY: there is no critical section based on priority that this could break.
     unsafe { NVIC::unmask(Interrupt::USART6) };
     let Ok(mut port) = Rs485::new(port, Pin);
-    for frame in [&[1u8; 4][..], &[2; 8], &[3; 44]] {
+    // The data register is full, and remains so for half of the ticks; the shift register is full
+    // or, though the queue is not, still empty.
+    for (frame, status) in [(&[1u8; 4][..], 0), (&[2; 8], TC), (&[3; 44], 0), (&[4; 4], TC)] {
         let before = SWITCHES.load(Relaxed);
-        // The data register is full, and remains so until the first tick.
         // SAFETY: RAM.
-        unsafe { registers.sr().write(|w| w.bits(0)) };
+        unsafe { registers.sr().write(|w| w.bits(status)) };
         SHIFTING.store(SHIFT_TICKS, Relaxed);
         expect("a frame is queued", port.write(frame) == Ok(frame.len()));
         expect("nothing has been sent", SHIFTING.load(Relaxed) > 0);
+        expect("it is to be sent", registers.cr1().read().txeie().bit_is_set());
         // A master talks over the answer: its bytes are damaged and overrun each other.
-        arrive(registers, b'x', RXNE | ORE | FE);
+        arrive(registers, b'x', RXNE | ORE | FE | status);
         expect("flushed", port.flush() == Ok(()));
         expect("flush waits for the stop bit", SHIFTING.load(Relaxed) == 0);
+        expect("nothing is left to send", registers.cr1().read().txeie().bit_is_clear());
         expect("the pin went on and off", SWITCHES.load(Relaxed) - before == 2);
     }
-    core.SYST.disable_counter();
     expect("the pin went off too early", EARLY.load(Relaxed) == 0);
+}
+
+/// Addresses of the registers of the clocks and of the flash; 0 until they are used.
+static RCC: AtomicU32 = AtomicU32::new(0);
+static FLASH: AtomicU32 = AtomicU32::new(0);
+static HAS_CRYSTAL: AtomicBool = AtomicBool::new(false);
+
+/// 5 wait states, prefetch and both caches.
+const FIVE_WAIT_STATES: u32 = 0x705;
+
+/// Bits of the clock control register.
+const HSIRDY: u32 = 1 << 1;
+const HSEON: u32 = 1 << 16;
+const HSERDY: u32 = 1 << 17;
+const PLLON: u32 = 1 << 24;
+const PLLRDY: u32 = 1 << 25;
+
+fn the_clock_runs_at_168_mhz_with_a_crystal_and_without() -> Option<()> {
+    let rcc = ptr::from_mut(cortex_m::singleton!(: [u32; 40] = [0; 40])?);
+    let flash = ptr::from_mut(cortex_m::singleton!(: [u32; 8] = [0; 8])?);
+    let rcc_word = |index| register(rcc.expose_provenance() as u32, index);
+    FLASH.store(flash.expose_provenance() as u32, Relaxed);
+    // SAFETY: the blocks are 35 and 6 registers long, have the alignment of one, and any bit
+    // pattern is valid.
+    let blocks = unsafe { (&*rcc.cast(), &*flash.cast()) };
+    clock::speed_up(blocks.0, blocks.1);
+    let is_untouched = (0..3).all(|index| rcc_word(index).read() == 0);
+    expect("an emulator's clock is left alone", is_untouched && clock::is_emulated(blocks.0));
+    for (has_crystal, mhz) in [(true, 8), (false, 16)] {
+        (0..3).for_each(|index| rcc_word(index).write(0));
+        register(FLASH.load(Relaxed), 0).write(0);
+        rcc_word(0).write(HSIRDY);
+        HAS_CRYSTAL.store(has_crystal, Relaxed);
+        RCC.store(rcc.expose_provenance() as u32, Relaxed);
+        clock::speed_up(blocks.0, blocks.1);
+        RCC.store(0, Relaxed);
+        // 1 MHz times 336, halved; the crystal as the source; 336 by 7 for USB; a reserved bit.
+        let pll = mhz | 336 << 6 | u32::from(has_crystal) << 22 | 7 << 24 | 1 << 29;
+        expect("168 MHz from the PLL", rcc_word(1).read() == pll);
+        // APB1 at a quarter, APB2 at half, the PLL as the source, and in use.
+        expect("the buses", rcc_word(2).read() == 0b101 << 10 | 0b100 << 13 | 0b10_10);
+    }
+    expect("a microsecond at 84 MHz", clock::prescaler(false) == 83);
     Some(())
+}
+
+/// A register in RAM.
+struct Word(*mut u32);
+
+/// The register at this index of the block at this address.
+fn register(block: u32, index: usize) -> Word {
+    Word(ptr::with_exposed_provenance_mut::<u32>(block as usize + 4 * index))
+}
+
+impl Word {
+    fn read(&self) -> u32 {
+        // SAFETY: a register of a block in static RAM.
+        unsafe { self.0.read_volatile() }
+    }
+
+    fn write(&self, value: u32) {
+        // SAFETY: a register of a block in static RAM.
+        unsafe { self.0.write_volatile(value) }
+    }
+}
+
+/// Plays the clocks: a crystal starts if there is one, the PLL starts, and a source that is chosen
+/// is used, which needs the PLL and a flash that is slow enough.
+fn play_clocks(rcc: u32) {
+    let (control, configuration) = (register(rcc, 0), register(rcc, 2));
+    let mut state = control.read();
+    if state & HSEON != 0 && HAS_CRYSTAL.load(Relaxed) {
+        state |= HSERDY;
+    }
+    if state & PLLON != 0 {
+        state |= PLLRDY;
+    }
+    control.write(state);
+    let source = configuration.read() & 0b11;
+    let is_slow = register(FLASH.load(Relaxed), 0).read() == FIVE_WAIT_STATES;
+    if source == 0b10 && state & PLLRDY != 0 {
+        expect("the flash is slow enough before the clock is fast", is_slow);
+        configuration.write(configuration.read() | source << 2);
+    }
 }
 
 /// Plays the hardware: empties the data register halfway, and the shift register at the end.
 #[cortex_m_rt::exception]
 fn SysTick() {
+    let rcc = RCC.load(Relaxed);
+    if rcc != 0 {
+        play_clocks(rcc);
+    }
     let left = SHIFTING.load(Relaxed);
     if left == 0 {
         return;
@@ -206,7 +313,7 @@ fn SysTick() {
     let status = match left - 1 {
         0 => TXE | TC,
         ticks if ticks < SHIFT_TICKS / 2 => TXE,
-        _ => 0,
+        _ => return,
     };
     let register = ptr::with_exposed_provenance_mut::<u16>(REGISTERS.load(Relaxed) as usize);
     // SAFETY: the first register, in static RAM.

@@ -17,12 +17,7 @@ use axlewire::{
     },
 };
 use axlewire_firmware::{
-    board::{BUS, Board},
-    clock::milliseconds,
-    on_panic,
-    rover::Rover,
-    serve_usarts,
-    text_line::TextLine,
+    board::Board, clock::milliseconds, on_panic, rover::Rover, serve_usarts, text_line::TextLine,
 };
 use embedded_hal::digital::OutputPin;
 
@@ -151,5 +146,5 @@ fn report(line: &mut TextLine, robot: &Robot, rover: &Rover, shown: &Shown, now:
         .count("biases", shown.biases)
         .count("updates_refused", shown.updates_refused)
         .count("skipped", robot.counters().skipped() as u32)
-        .losses(&BUS);
+        .bus_losses();
 }

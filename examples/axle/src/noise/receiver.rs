@@ -1,0 +1,249 @@
+//! The receivers that are compared: the ways to decode with the library, and a plain one.
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::{Decoder, Event, Frames, Framing, Portable},
+    ucp::{self, Ucp},
+};
+
+use super::{
+    noisy_line::Place,
+    oracle::{self, Rules},
+    traffic::Traffic,
+};
+use crate::listing::Shown;
+
+/// A way to find the frames of a stream.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Receiver {
+    /// The iterator over a slice.
+    Frames,
+    /// Its method for all frames at once; with AVX2 where the processor has it.
+    EachSimd,
+    /// The same without.
+    EachPortable,
+    /// The decoder of streams, given so many bytes at a time.
+    Decoder(usize),
+    /// The same, given byte by byte as from an interrupt.
+    Pushed,
+    /// Not of the library: the usual receiver of firmware.
+    Plain,
+    /// A decoder with a fault, for tests: it loses one frame.
+    #[cfg(test)]
+    Forgetful,
+    /// The same: it delivers one twice.
+    #[cfg(test)]
+    Stuttering,
+}
+
+impl Receiver {
+    pub(super) const ALL: [Self; 9] = [
+        Self::Frames,
+        Self::EachSimd,
+        Self::EachPortable,
+        Self::Decoder(1),
+        Self::Decoder(7),
+        Self::Decoder(64),
+        Self::Decoder(4096),
+        Self::Pushed,
+        Self::Plain,
+    ];
+
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::Frames => "frames".to_owned(),
+            Self::EachSimd => "each-simd".to_owned(),
+            Self::EachPortable => "each-portable".to_owned(),
+            Self::Decoder(chunk) => format!("decoder-{chunk}"),
+            Self::Pushed => "decoder-pushed".to_owned(),
+            Self::Plain => "plain".to_owned(),
+            #[cfg(test)]
+            Self::Forgetful => "forgetful".to_owned(),
+            #[cfg(test)]
+            Self::Stuttering => "stuttering".to_owned(),
+        }
+    }
+
+    /// Whether it is a decoder of the library.
+    pub(super) fn is_ours(self) -> bool {
+        self != Self::Plain
+    }
+
+    /// The frames of a stream, in the order in which they are delivered. The line is quiet behind
+    /// the last byte.
+    pub(super) fn receive(self, traffic: Traffic, bytes: &[u8]) -> Vec<Place> {
+        match traffic {
+            Traffic::Ucp | Traffic::UcpToRobot => {
+                self.decode::<Ucp, { ucp::MAX_LEN }>(traffic, bytes)
+            }
+            Traffic::Ikeya => self.decode::<ikeya::ToMaster, { ikeya::MAX_LEN }>(traffic, bytes),
+            Traffic::IkeyaRequests => {
+                self.decode::<ikeya::ToSlave, { ikeya::MAX_LEN }>(traffic, bytes)
+            }
+            Traffic::Ikeya3 => self.decode::<three::ToMaster, { three::MAX_LEN }>(traffic, bytes),
+        }
+    }
+
+    fn decode<F, const N: usize>(self, traffic: Traffic, bytes: &[u8]) -> Vec<Place>
+    where
+        F: Framing,
+        for<'a> F::Frame<'a>: Shown,
+    {
+        let mut found = Found { bytes, at: 0, places: Vec::new() };
+        match self {
+            Self::Frames => iterate::<F>(&mut found),
+            Self::EachSimd => take_each::<F>(&mut found),
+            Self::EachPortable => take_each::<Portable<F>>(&mut found),
+            Self::Decoder(chunk) => decode_chunks::<F, N>(chunk, &mut found),
+            Self::Pushed => push::<F, N>(&mut found),
+            Self::Plain => receive_plainly(traffic.rules(), &mut found),
+            #[cfg(test)]
+            Self::Forgetful | Self::Stuttering => {
+                iterate::<F>(&mut found);
+                let middle = found.places.len() / 2;
+                let frame = found.places.remove(middle);
+                if self == Self::Stuttering {
+                    found.places.extend([frame; 2]);
+                }
+            }
+        }
+        found.places
+    }
+}
+
+/// What was delivered.
+struct Found<'i> {
+    bytes: &'i [u8],
+    /// End of what a decoder has told about: frames and gaps.
+    at: usize,
+    places: Vec<Place>,
+}
+
+/// The place of a frame whose bytes are not those of the stream.
+const NOWHERE: usize = usize::MAX;
+
+impl Found<'_> {
+    /// A frame borrowed from the stream: its address tells where.
+    fn borrowed(&mut self, frame: &[u8]) {
+        let at = frame.as_ptr().addr().wrapping_sub(self.bytes.as_ptr().addr());
+        self.add(at, frame);
+    }
+
+    /// A frame or gap of a decoder: by its account, the next bytes.
+    fn next(&mut self, event: Event<impl Shown>) {
+        match event {
+            Event::Skipped(gap) => self.at += gap.len as usize,
+            Event::Frame(frame) => {
+                self.add(self.at, frame.bytes());
+                self.at += frame.bytes().len();
+            }
+        }
+    }
+
+    fn add(&mut self, at: usize, frame: &[u8]) {
+        let is_there = self.bytes.get(at..).is_some_and(|bytes| bytes.starts_with(frame));
+        self.places.push((if is_there { at } else { NOWHERE }, frame.len()));
+    }
+}
+
+fn iterate<F>(found: &mut Found)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let mut frames = Frames::<F>::new(found.bytes);
+    loop {
+        for frame in frames.by_ref() {
+            found.borrowed(frame.bytes());
+        }
+        if frames.rest().is_empty() {
+            return;
+        }
+        frames.idle();
+    }
+}
+
+fn take_each<F>(found: &mut Found)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let mut frames = Frames::<F>::new(found.bytes);
+    loop {
+        frames.each(|frame| found.borrowed(frame.bytes()));
+        if frames.rest().is_empty() {
+            return;
+        }
+        frames.idle();
+    }
+}
+
+fn decode_chunks<F, const N: usize>(chunk: usize, found: &mut Found)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let mut decoder = Decoder::<F, N>::new();
+    for mut input in found.bytes.chunks(chunk) {
+        while let Some(event) = decoder.decode(&mut input) {
+            found.next(event);
+        }
+    }
+    quiet(&mut decoder, found);
+}
+
+fn push<F, const N: usize>(found: &mut Found)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let mut decoder = Decoder::<F, N>::new();
+    for &byte in found.bytes {
+        if decoder.push(byte) {
+            while let Some(event) = decoder.poll() {
+                found.next(event);
+            }
+        }
+    }
+    quiet(&mut decoder, found);
+}
+
+/// The line goes quiet, and remains so.
+fn quiet<F, const N: usize>(decoder: &mut Decoder<F, N>, found: &mut Found)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    while decoder.pending() > 0 {
+        decoder.idle();
+        while let Some(event) = decoder.poll() {
+            found.next(event);
+        }
+    }
+}
+
+/// A state machine fed one byte at a time, as firmware often has it: it waits for a header,
+/// collects as many bytes as the header announces and checks them. A frame that is bad is dropped
+/// whole, and the wait for a header begins anew; so is the start of one that cannot be.
+fn receive_plainly(rules: Rules, found: &mut Found) {
+    let (mut frame, mut announced, bytes) = (Vec::new(), None, found.bytes);
+    for (at, &byte) in bytes.iter().enumerate() {
+        frame.push(byte);
+        if announced.is_none() {
+            match oracle::promised_len(rules, &frame) {
+                Ok(len) => announced = len,
+                Err(_) => frame.clear(),
+            }
+        }
+        if announced != Some(frame.len()) {
+            continue;
+        }
+        let (body, crc) = frame.split_at(frame.len() - 2);
+        let is_node = matches!(rules, Rules::Ucp { .. }) || (1..=8).contains(&body[1]);
+        if oracle::crc(body).to_le_bytes() == crc && is_node {
+            found.add(at + 1 - frame.len(), &frame);
+        }
+        frame.clear();
+        announced = None;
+    }
+}

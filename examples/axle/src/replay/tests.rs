@@ -1,0 +1,163 @@
+//! Captures and the frames that they become.
+
+use std::fs;
+
+use axlewire::ikeya::{NodeId, ReadRequest, Rps, VelocityResponse, WriteRequest};
+use clap::Parser;
+
+use super::*;
+use crate::pcapng::Writer;
+
+#[derive(Debug, Parser)]
+struct Only {
+    #[command(flatten)]
+    args: Args,
+}
+
+/// A file that is removed with it.
+struct Capture(PathBuf);
+
+impl Drop for Capture {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.0);
+    }
+}
+
+fn file(name: &str, bytes: &[u8]) -> Capture {
+    let path = std::env::temp_dir().join(format!("axle-replay-{}-{name}", std::process::id()));
+    fs::write(&path, bytes).unwrap();
+    Capture(path)
+}
+
+/// A capture of a bus: times in milliseconds.
+fn capture(name: &str, packets: &[(u64, Option<Direction>, &[u8])]) -> Capture {
+    let mut bytes = Vec::new();
+    let mut writer = Writer::new(&mut bytes, Protocol::Ikeya, "port", 500_000).unwrap();
+    for (millis, direction, packet) in packets {
+        writer.packet(1_000_000_000 + millis * 1000, *direction, packet).unwrap();
+    }
+    file(name, &bytes)
+}
+
+fn parsed(capture: &Capture, words: &str) -> Args {
+    let words = ["replay", "-p", "x"].into_iter().chain(words.split_whitespace());
+    let words = words.map(str::to_owned).chain([capture.0.to_str().unwrap().to_owned()]);
+    Only::try_parse_from(words).unwrap().args
+}
+
+/// Times in microseconds, and the first four bytes.
+fn frames(capture: &Capture, words: &str) -> Result<Vec<(u64, [u8; 4])>, String> {
+    let args = parsed(capture, words);
+    let plan = plan(&args).map_err(|failure| failure.to_string())?;
+    let start = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
+    Ok(plan.frames.iter().map(|due| (due.after_us, start(&due.bytes))).collect())
+}
+
+fn read() -> [u8; 4] {
+    *ReadRequest::new(NodeId::N1).as_bytes()
+}
+
+fn write() -> [u8; 8] {
+    *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes()
+}
+
+fn answer() -> [u8; 8] {
+    *VelocityResponse::new(NodeId::N1, Rps::ZERO).as_bytes()
+}
+
+#[test]
+fn times_are_those_of_the_capture_from_the_first_frame_on_at_the_speed_that_was_asked_for() {
+    let read = read();
+    let packets: [(u64, Option<Direction>, &[u8]); 3] =
+        [(0, None, &read), (100, None, &read), (350, None, &read)];
+    let capture = capture("times", &packets);
+    for (speed, expected) in [
+        ("", [0, 100_000, 350_000]),
+        ("--speed 4", [0, 25_000, 87_500]),
+        ("--speed 0.5", [0, 200_000, 700_000]),
+    ] {
+        let at: Vec<_> = frames(&capture, speed).unwrap().iter().map(|(at, _)| *at).collect();
+        assert_eq!(at, expected, "{speed}");
+    }
+    for speed in ["0", "0.0009", "1001", "-1", "nan", "x"] {
+        assert!(factor(speed).is_err(), "{speed}");
+    }
+}
+
+#[test]
+fn what_is_due_in_ages_or_may_not_be_sent_is_refused_with_the_rest() {
+    let read = read();
+    let far: [(u64, Option<Direction>, &[u8]); 2] =
+        [(0, None, &read), (366 * 86_400_000, None, &read)];
+    let says = "frame 2 is due after more than a year";
+    assert_eq!(frames(&capture("far", &far), "").unwrap_err(), says);
+    assert!(frames(&capture("faster", &far), "--speed 2").is_ok());
+    let mut update = vec![0xFD, 0xFF, 20, 0, 2, 0];
+    update.extend([0; 16]);
+    update[14] = 39;
+    update.extend(axlewire::crc16::compute(&update).to_le_bytes());
+    let raw = file("update", &update);
+    let says = "the capture has a motor command that starts a firmware update (ruling U7): nothing \
+                is sent";
+    assert_eq!(frames(&raw, "-P ucp --move").unwrap_err(), says);
+    let says = "no frame of a device in the capture";
+    assert_eq!(frames(&raw, "-P ucp --move --as device").unwrap_err(), says);
+}
+
+#[test]
+fn time_does_not_run_backwards() {
+    let read = read();
+    let packets: [(u64, Option<Direction>, &[u8]); 3] =
+        [(100, None, &read), (300, None, &read), (200, None, &read)];
+    let found = frames(&capture("back", &packets), "").unwrap();
+    assert_eq!(found.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [0, 200_000, 200_000]);
+}
+
+#[test]
+fn raw_bytes_follow_each_other_at_the_interval_that_was_asked_for() {
+    let raw = file("raw", &read().repeat(3));
+    for (every, expected) in [("", [0, 20_000, 40_000]), ("--every 0.5", [0, 500_000, 1_000_000])] {
+        let found = frames(&raw, &format!("-P ikeya {every}")).unwrap();
+        assert_eq!(found.iter().map(|(at, _)| *at).collect::<Vec<_>>(), expected, "{every}");
+    }
+    assert!(frames(&raw, "").unwrap_err().contains("--protocol is needed"));
+}
+
+#[test]
+fn one_side_is_sent_and_a_command_only_with_move() {
+    let (read, write, answer) = (read(), write(), answer());
+    let packets: [(u64, Option<Direction>, &[u8]); 3] =
+        [(0, None, &read), (1, None, &answer), (2, None, &write)];
+    let capture = capture("sides", &packets);
+    let says = "1 of 2 frames move something: use --move if you mean it; nothing is sent";
+    assert_eq!(frames(&capture, "").unwrap_err(), says);
+    let found = frames(&capture, "--move").unwrap();
+    assert_eq!(found, [(0, read), (2000, [write[0], write[1], write[2], write[3]])]);
+    let found = frames(&capture, "--as device").unwrap();
+    assert_eq!(found, [(0, [answer[0], answer[1], answer[2], answer[3]])]);
+}
+
+#[test]
+fn the_options_reach_the_plan_and_the_answers_say_how_a_command_was_meant() {
+    let (write, answer) = (write(), answer());
+    let packets: [(u64, Option<Direction>, &[u8]); 2] = [(0, None, &write), (1, None, &answer)];
+    let capture = capture("options", &packets);
+    let args = parsed(&capture, "--move --max-rps 5 --max-turns 7 -j");
+    let found = plan(&args).unwrap();
+    assert_eq!((found.limits.max_rps.get(), found.limits.max_turns), (5.0, 7.0));
+    assert!(found.is_json && found.side == Side::Commander && found.linger_us == 200_000);
+    assert_eq!(found.frames[0].meant, Some(axlewire::ikeya::Mode::Velocity));
+    let args = parsed(&capture, "--as device");
+    let found = plan(&args).unwrap();
+    assert!(!found.is_json && found.side == Side::Device);
+}
+
+#[test]
+fn where_the_recording_program_has_sent_something_what_it_heard_of_it_is_left_out() {
+    let read = read();
+    let (sent, heard) = (Some(Direction::Out), Some(Direction::In));
+    let both: [(u64, Option<Direction>, &[u8]); 2] = [(0, sent, &read), (1, heard, &read)];
+    assert_eq!(frames(&capture("echo", &both), "").unwrap().len(), 1);
+    let only: [(u64, Option<Direction>, &[u8]); 2] = [(0, heard, &read), (1, heard, &read)];
+    assert_eq!(frames(&capture("heard", &only), "").unwrap().len(), 2);
+}

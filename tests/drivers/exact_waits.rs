@@ -1,0 +1,319 @@
+//! Waits of a driver, to the microsecond: between attempts, inside a frame, and on a clock that has
+//! gone backwards.
+
+use std::{cell::RefCell, rc::Rc};
+
+use axlewire::{
+    drive::{Clock, DriveError, Driver},
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Master, NodeId,
+        master::{MasterConfig, StopProgress},
+    },
+    time::{Duration, Instant},
+    ucp::{Host, host::HostConfig},
+};
+use embedded_hal_async::delay::DelayNs;
+
+use crate::{
+    bus_rig::{Story, only_two_and_five},
+    port::{Script, Step, Unplugged},
+    recorder::Recorder,
+    virtual_time::{End, VirtualClock, World},
+};
+
+/// Plugs the port in again at this time.
+fn replug(world: &World, port: &End, at_us: u64) {
+    port.unplugged.set(true);
+    let (unplugged, clock) = (port.unplugged.clone(), world.clone());
+    world.add(move || unplugged.set(clock.now() < Instant::from_micros(at_us)));
+}
+
+#[test]
+fn a_stop_is_tried_again_a_millisecond_after_the_port_has_failed() {
+    for is_async in [false, true] {
+        let mut story = Story::new(only_two_and_five()).discovered();
+        let world = story.world.clone();
+        let begin = world.now().as_micros();
+        replug(&world, story.bus.port(), begin + 5500);
+        match is_async {
+            true => world.block_on(story.bus.stop_async(NodeId::N2)).unwrap(),
+            false => story.bus.stop(NodeId::N2).unwrap(),
+        }
+        // Two exchanges follow.
+        let took = world.now().as_micros() - begin;
+        assert!((5500..8500).contains(&took), "{took} us, async {is_async}");
+        assert_ne!(story.bus.role().stop_progress(NodeId::N2), StopProgress::Owed);
+    }
+}
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_stop_of_a_rover_is_tried_again_a_millisecond_after_the_port_has_failed() {
+    use axlewire::ucp::{Host, host::HostConfig};
+    for is_async in [false, true] {
+        let world = World::default();
+        let host = Host::new(HostConfig::default(), world.now());
+        let mut rover = Driver::new(host, End::new(&world, 87), VirtualClock(world.clone()));
+        replug(&world, rover.port(), 5500);
+        match is_async {
+            true => world.block_on(rover.stop_async()).unwrap(),
+            false => rover.stop().unwrap(),
+        }
+        let took = world.now().as_micros();
+        assert!((5500..7500).contains(&took), "{took} us, async {is_async}");
+    }
+}
+
+/// A role that sends one frame, in which it permits pauses of a millisecond. A byte takes 20 us.
+#[derive(Default)]
+struct Pausing {
+    is_sent: bool,
+    unsent: Vec<Unsent>,
+}
+
+impl Endpoint for Pausing {
+    type Event = ();
+    fn handle_input(&mut self, _: &[u8], _: Instant) {}
+    fn handle_timeout(&mut self, _: Instant) {}
+    fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
+        (!core::mem::replace(&mut self.is_sent, true)).then_some(&b"0123456789"[..])
+    }
+    fn frame_pause(&self) -> Duration {
+        Duration::from_millis(1)
+    }
+    fn wire_time(&self, bytes: usize) -> Duration {
+        Duration::from_micros(bytes as u32 * 20)
+    }
+    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
+        self.unsent.push(unsent);
+    }
+    fn poll_event(&mut self) -> Option<()> {
+        None
+    }
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
+
+#[test]
+fn the_pause_inside_a_frame_is_from_the_end_of_a_byte_to_the_end_of_the_next() {
+    // Three bytes leave at once, and take 60 us. The next takes 20 us of the pause.
+    for (late_us, is_cut_off) in [(60 + 979, false), (60 + 980, false), (60 + 981, true)] {
+        let world = World::default();
+        let mut driver =
+            Driver::new(Pausing::default(), End::new(&world, 20), VirtualClock(world.clone()));
+        driver.port_mut().fails_after = Some(3);
+        assert!(driver.service().is_err());
+        assert_eq!(driver.unsent().len(), 7);
+        world.step(late_us);
+        driver.service().unwrap();
+        let expected = if is_cut_off { vec![Unsent::CutOff] } else { vec![] };
+        assert_eq!(driver.role().unsent, expected, "{late_us} us");
+        assert_eq!(driver.port().written.len(), if is_cut_off { 3 } else { 10 });
+    }
+}
+
+/// A port that takes three bytes at once and the rest after a while, and is flushed 300 us later.
+struct InTwo {
+    world: World,
+    rest_after_us: u64,
+    has_begun: bool,
+}
+
+impl embedded_io::ErrorType for InTwo {
+    type Error = Unplugged;
+}
+
+impl embedded_io::ReadReady for InTwo {
+    fn read_ready(&mut self) -> Result<bool, Unplugged> {
+        Ok(false)
+    }
+}
+
+impl embedded_io::Read for InTwo {
+    fn read(&mut self, _: &mut [u8]) -> Result<usize, Unplugged> {
+        Err(Unplugged)
+    }
+}
+
+impl embedded_io::Write for InTwo {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Unplugged> {
+        if !core::mem::replace(&mut self.has_begun, true) {
+            return Ok(3);
+        }
+        self.world.step(self.rest_after_us);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Unplugged> {
+        self.world.step(300);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long() {
+    // As above; behind a longer one only a flush within the time of the frame and a pause counts.
+    for (rest_after_us, is_cut_off) in [(60 + 979, false), (60 + 980, false), (60 + 981, true)] {
+        let world = World::default();
+        let port = InTwo { world: world.clone(), rest_after_us, has_begun: false };
+        let mut driver = Driver::new(Pausing::default(), port, VirtualClock(world));
+        driver.service().unwrap();
+        let expected = if is_cut_off { vec![Unsent::CutOff] } else { vec![] };
+        assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
+    }
+}
+
+/// A clock that is set back by 500 us once, and notes until when it is asked to idle.
+#[derive(Clone, Default)]
+struct SetBack(Rc<RefCell<(Vec<u64>, Vec<u64>)>>);
+
+impl Clock for SetBack {
+    fn now(&mut self) -> Instant {
+        let mut parts = self.0.borrow_mut();
+        let reading = if parts.0.len() > 1 { parts.0.remove(0) } else { parts.0[0] };
+        Instant::from_micros(reading)
+    }
+    fn idle_until(&mut self, until: Instant) {
+        let mut parts = self.0.borrow_mut();
+        parts.1.push(until.as_micros());
+        parts.0 = vec![until.as_micros()];
+    }
+}
+
+#[test]
+fn a_driver_whose_clock_was_set_back_idles_until_the_deadline_on_that_clock() {
+    let clock = SetBack::default();
+    clock.0.borrow_mut().0 = vec![1000, 500];
+    let mut driver = Driver::new(Recorder::default(), Script::default(), clock.clone());
+    let now = driver.now();
+    assert_eq!(now, Instant::from_micros(1000), "the role's time goes on");
+    let deadline = now + Duration::from_micros(2000);
+    assert_eq!(driver.next_event(deadline), Ok(None));
+    assert_eq!(clock.0.borrow().1, [2500]);
+    assert_eq!(driver.now(), deadline);
+}
+
+#[test]
+fn a_stop_behind_a_failing_port_naps_for_a_millisecond_on_a_clock_that_was_set_back() {
+    let clock = || {
+        let clock = SetBack::default();
+        clock.0.borrow_mut().0 = vec![1000, 500];
+        clock
+    };
+    let fails = || Script::writing([Step::Error]);
+    let (bus_clock, rover_clock) = (clock(), clock());
+    let (config, at) = (MasterConfig::direct(), Instant::from_micros(0));
+    let mut bus = Driver::new(<Master>::new(config, at), fails(), bus_clock.clone());
+    let _ = bus.stop(NodeId::N1);
+    let mut rover = Driver::new(Host::new(HostConfig::default(), at), fails(), rover_clock.clone());
+    rover.stop().unwrap();
+    for clock in [bus_clock, rover_clock] {
+        // The clock stays at 500; the time of the role goes on from 1000.
+        assert_eq!(clock.0.borrow().1.first(), Some(&1500));
+    }
+}
+
+#[test]
+fn a_driver_idles_until_its_role_wants_something_and_then_until_the_deadline() {
+    let clock = SetBack::default();
+    clock.0.borrow_mut().0 = vec![1000];
+    let mut role = Recorder::default();
+    role.timeout = Some(Instant::from_micros(4000));
+    let mut driver = Driver::new(role, Script::default(), clock.clone());
+    assert_eq!(driver.next_event(Instant::from_micros(9000)), Ok(None));
+    assert_eq!(clock.0.borrow().1, [4000, 9000]);
+}
+
+/// A port that takes its time for each call.
+struct Slow {
+    clock: VirtualClock,
+    write_ms: u32,
+    flush_ms: u32,
+    written: Vec<u8>,
+}
+
+impl embedded_io::ErrorType for Slow {
+    type Error = Unplugged;
+}
+
+impl embedded_io_async::Read for Slow {
+    async fn read(&mut self, _: &mut [u8]) -> Result<usize, Unplugged> {
+        core::future::pending().await
+    }
+}
+
+impl embedded_io_async::Write for Slow {
+    async fn write(&mut self, bytes: &[u8]) -> Result<usize, Unplugged> {
+        if !bytes.is_empty() {
+            self.clock.delay_ms(self.write_ms).await;
+        }
+        self.written.extend(bytes);
+        Ok(bytes.len())
+    }
+
+    async fn flush(&mut self) -> Result<(), Unplugged> {
+        self.clock.delay_ms(self.flush_ms).await;
+        Ok(())
+    }
+}
+
+fn slow(world: &World, write_ms: u32, flush_ms: u32) -> Driver<Recorder, Slow, VirtualClock> {
+    let clock = VirtualClock(world.clone());
+    let port = Slow { clock: clock.clone(), write_ms, flush_ms, written: vec![] };
+    Driver::new(Recorder::sending(&[b"123"]), port, clock)
+}
+
+#[test]
+fn a_port_has_stalled_after_a_second_in_a_write_or_in_a_flush() {
+    for (write_ms, flush_ms, expected) in
+        [(999, 0, Ok(())), (1001, 0, Err(())), (0, 999, Ok(())), (0, 1001, Err(()))]
+    {
+        let world = World::default();
+        let mut driver = slow(&world, write_ms, flush_ms);
+        let sent = world.block_on(driver.service_async());
+        assert_eq!(sent, expected.map_err(|()| DriveError::Stalled), "{write_ms}, {flush_ms}");
+        let took = world.now().as_micros();
+        assert!((999_000..=1_000_040).contains(&took), "{took} us: {write_ms}, {flush_ms}");
+        // A frame that the port has not taken is back at its role.
+        assert_eq!(driver.unsent(), b"");
+        let told = match (expected, write_ms) {
+            (Ok(()), _) => vec![],
+            (_, 0) => vec![Unsent::Unflushed],
+            _ => vec![Unsent::Untouched, Unsent::Unflushed],
+        };
+        assert_eq!(driver.role().unsent(), told);
+    }
+}
+
+#[test]
+fn each_frame_has_a_second_of_its_own() {
+    for (write_ms, flush_ms) in [(600, 0), (0, 600), (600, 600)] {
+        let world = World::default();
+        let mut driver = slow(&world, write_ms, flush_ms);
+        for frame in 1..4 {
+            assert_eq!(world.block_on(driver.service_async()), Ok(()), "{write_ms}, {flush_ms}");
+            assert_eq!(driver.port().written, b"123".repeat(frame));
+            driver.role_mut().frames.push_back(b"123".into());
+            world.step(5_000_000);
+        }
+    }
+}
+
+#[test]
+fn a_port_that_was_not_asked_for_seconds_has_the_time_of_a_frame_to_take_it() {
+    for is_flush in [false, true] {
+        let world = World::default();
+        let mut role = Recorder::sending(&[b"123"]);
+        role.repeats = true;
+        let mut driver = Driver::new(role, End::new(&world, 20), VirtualClock(world.clone()));
+        driver.port_mut().stutters = true;
+        // A call that is dropped while it waits for the write, or for the flush.
+        assert_eq!(world.poll_times(if is_flush { 2 } else { 1 }, driver.service_async()), None);
+        world.step(5_000_000);
+        // The port needs a moment, as before.
+        assert_eq!(world.block_on(driver.service_async()), Ok(()), "flush {is_flush}");
+        assert_eq!(driver.port().written, b"123");
+    }
+}

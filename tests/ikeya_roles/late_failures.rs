@@ -1,0 +1,227 @@
+//! A master whose packets fail late, whose attempts outlast its patience, or whose set-points keep
+//! changing.
+
+use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Mode, NodeId, Position, Status, Target,
+        master::{Cause, Health, MasterEvent, NodeSet, Polling, StopProgress},
+    },
+};
+
+use crate::rig::*;
+
+#[test]
+fn a_read_has_failed_when_its_node_is_abnormal_however_many_attempts_are_left() {
+    let mut config = direct();
+    config.attempts = 9;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    desk.master.confirm(NodeId::N1, desk.now).unwrap();
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.lose(NodeId::N1);
+    let (node, cause) = (NodeId::N1, Cause::Silent);
+    assert_eq!(desk.master.read_outcome(node), Some(Err(cause)));
+    let news = desk.news();
+    assert_eq!(
+        news[..2],
+        [MasterEvent::ReadFailed { node, cause }, MasterEvent::NotConfirmed { node, cause },]
+    );
+    assert_eq!(desk.master.node_statistics(node).failures, 1);
+    assert_eq!(desk.master.health(node), Some(Health::Abnormal));
+}
+
+#[test]
+fn the_silence_after_a_cut_off_packet_begins_when_the_failure_was_noticed() {
+    for noticed_us in [0, 50, 5000] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        assert_eq!(desk.packet(), read(NodeId::N1));
+        desk.now += US(noticed_us);
+        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        let noticed = desk.now;
+        assert_eq!(desk.packet(), read(NodeId::N1));
+        // The packet may still be leaving: 80 us, and twice the five byte times of a pause.
+        assert_eq!(desk.now, noticed + US(80 + 2 * 100), "{noticed_us} us");
+    }
+}
+
+#[test]
+fn set_points_of_several_nodes_take_turns_however_often_all_of_them_change() {
+    let nodes = [NodeId::N2, NodeId::N3, NodeId::N7];
+    let mut desk = Desk::with_nodes(manual(), &nodes.map(|node| (node, Mode::Velocity)));
+    let mut served = [0; 3];
+    for step in 0..30_u8 {
+        for node in nodes {
+            desk.master.set_velocity(node, rps(f32::from(step) + 1.0), desk.now).unwrap();
+        }
+        let (header, id) = kind(&desk.packet());
+        assert_eq!(header, WRITE);
+        served[nodes.iter().position(|node| node.get() == id).unwrap()] += 1;
+    }
+    assert_eq!(served, [10; 3]);
+}
+
+#[test]
+fn a_flush_that_fails_behind_a_paid_half_does_not_move_the_held_position() {
+    let mut desk = Desk::with_nodes(manual(), &[N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(30)));
+    desk.master.stop(NodeId::N3, desk.now);
+    assert_eq!(desk.packets(2), [read(NodeId::N3), hold(NodeId::N3, turns(30))]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    assert_eq!(desk.packets(1), [read(NodeId::N3)]);
+    for _ in 0..3 {
+        desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+        desk.now += MS(100);
+    }
+    assert_eq!(desk.packet(), hold(NodeId::N3, turns(30)));
+}
+
+#[test]
+fn a_standstill_from_before_a_change_of_mode_is_forgotten() {
+    for is_released in [false, true] {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.master.stop(NodeId::N1, desk.now);
+        desk.packets(9);
+        assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+        if is_released {
+            desk.master.release(NodeId::N1);
+        }
+        desk.answer(NodeId::N1, Answer::Position(turns(3)));
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        // A set-point that is left goes in front of the first READ.
+        desk.packets(if is_released { 2 } else { 3 });
+        assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
+        // What it was told last may have been read in the new mode.
+        let expected = if is_released { StopProgress::NotAsked } else { StopProgress::Owed };
+        assert_eq!(desk.master.stop_progress(NodeId::N1), expected);
+    }
+}
+
+#[test]
+fn a_node_that_has_missed_its_only_attempt_keeps_its_set_point() {
+    let mut config = direct();
+    config.attempts = 1;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    for missed in 1..3 {
+        desk.turn();
+        desk.silence();
+        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Suspect(missed)));
+        assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(1.0))));
+        assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+    }
+    desk.turn();
+    desk.silence();
+    assert_eq!(desk.master.set_point(NodeId::N1), None);
+    assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
+}
+
+#[test]
+fn a_position_of_the_permitted_age_is_held_for_20_ms_from_the_call() {
+    for (late_us, is_held) in [(0, true), (20_000, true), (20_001, false)] {
+        let mut config = manual();
+        config.hold_age = MS(1000);
+        let mut desk = Desk::with_nodes(config, &[N3]);
+        desk.now += MS(900);
+        desk.master.stop(NodeId::N3, desk.now);
+        desk.now += US(late_us);
+        let held = hold(NodeId::N3, Position::new(7, 3));
+        assert_eq!(desk.packet(), if is_held { held } else { read(NodeId::N3) }, "{late_us} us");
+    }
+}
+
+#[test]
+fn a_line_without_an_echo_has_no_echo_to_remove_and_none_that_is_wrong() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    assert!(writes(&desk.run(MS(10))).len() > 2);
+    let statistics = desk.master.statistics();
+    assert_eq!((statistics.echo_bytes, statistics.echo_errors), (0, 0));
+    assert_eq!(statistics.stale_bytes, 0);
+}
+
+#[test]
+fn nothing_follows_a_cut_off_write_before_the_silence_is_over() {
+    for (is_stop, noticed_us) in [(false, 0), (false, 700), (true, 0), (true, 700)] {
+        let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+        desk.master.read(NodeId::N3, desk.now).unwrap();
+        if is_stop {
+            desk.master.stop(NodeId::N1, desk.now);
+        } else {
+            desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        }
+        assert_eq!(kind(&desk.packet()), (WRITE, 1));
+        desk.now += US(noticed_us);
+        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        let noticed = desk.now;
+        // The same again, or the READ of the other node.
+        assert!([(WRITE, 1), (READ, 3)].contains(&kind(&desk.packet())));
+        assert_eq!(desk.now, noticed + US(160 + 2 * 100), "stop {is_stop}, {noticed_us} us");
+    }
+}
+
+#[test]
+fn a_read_that_is_under_way_confirms_no_set_point_that_came_after_it() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    for speed in [1.0, 2.0] {
+        // Its window is open.
+        desk.master.set_velocity(NodeId::N1, rps(speed), desk.now).unwrap();
+        desk.master.confirm(NodeId::N1, desk.now).unwrap();
+        desk.hear(300, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.news(), []);
+        desk.sent.clear();
+        desk.turn();
+        assert_eq!(desk.sent, [write(NodeId::N1, speed)]);
+        // Asked again, it needs another WRITE.
+        desk.master.confirm(NodeId::N1, desk.now).unwrap();
+        desk.hear(460, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.news(), []);
+        desk.turn();
+        desk.hear(460, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }]);
+        desk.turn();
+    }
+}
+
+#[test]
+fn a_stop_of_all_reaches_a_lost_node_although_the_settings_do_not_name_it() {
+    let mut config = only(&[NodeId::N1]);
+    config.polling = Polling::Manual;
+    let mut desk = Desk::with_nodes(config, &[N1]);
+    desk.answer(NodeId::N3, Answer::Position(turns(3)));
+    desk.master.stop(NodeId::N3, desk.now);
+    desk.packets(9);
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+    desk.lose_by_hand(NodeId::N3);
+    // Since it was lost it is owed a stop; so it is after another one of all.
+    desk.answer(NodeId::N3, Answer::Position(turns(3)));
+    desk.run(MS(500));
+    desk.master.release(NodeId::N3);
+    desk.lose_by_hand(NodeId::N3);
+    assert_eq!(desk.master.stops_owed(), NodeSet::NONE, "it had no command to keep");
+    desk.master.stop_all(desk.now);
+    assert_eq!(desk.master.stops_owed(), [NodeId::N1, NodeId::N3].into_iter().collect());
+}
+
+#[test]
+fn a_measurement_has_the_time_at_which_its_answer_was_complete() {
+    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
+    for (node, answer) in
+        [(NodeId::N1, velocity(NodeId::N1, 2.5)), (NodeId::N3, position(NodeId::N3, turns(8)))]
+    {
+        while desk.turn() != read(node) {
+            desk.silence();
+        }
+        let asked = desk.now;
+        desk.hear(333, &answer);
+        let (status, at) = desk.master.status(node).unwrap();
+        assert_eq!(at, asked + US(333));
+        let expected = match node {
+            NodeId::N1 => Status::Velocity(2.5),
+            _ => Status::Position(turns(8)),
+        };
+        assert_eq!(status, expected);
+    }
+}

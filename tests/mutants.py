@@ -1,0 +1,385 @@
+#!/usr/bin/env python3
+"""Changes one expression at a time, and shows that a test fails for each.
+
+    tests/mutants.py                      goes on where the last run ended, until all are tried
+    tests/mutants.py --minutes 60         for an hour; --workers 2 tries two at a time
+    tests/mutants.py --file 'src/ucp/**'  only these files; --again tries what has been tried, too
+    tests/mutants.py --sample             a sample of the mutants of the last commit, for the gate
+    tests/mutants.py --table              prints the score of each module
+    tests/mutants.py --check              each survivor on record has a reason that is not stale
+
+`cargo mutants` lists the changes. Each is made in a copy of the tree; first the tests that concern
+its file run, then, if they pass, all of its package. `tests/mutants.txt` has the outcome of each
+file, and the reason of each survivor that has no effect.
+
+Exit status 1 if a change survives without a reason.
+"""
+
+import argparse
+import collections
+import concurrent.futures
+import datetime
+import fnmatch
+import hashlib
+import json
+import os
+import pathlib
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RECORD = ROOT / "tests" / "mutants.txt"
+WORK = ROOT / "target" / "mutants"
+# Tests that take so many times as long as without a change wait for something that it prevents.
+PATIENCE = 4
+LEAST_PATIENCE_S = 120
+
+# Files, and the tests that concern them most; the first match counts.
+CONCERNED = [
+    ("src/crc16/*", "--lib --test crc16 --test vectors"),
+    ("src/ikeya/master/*", "--lib --test ikeya_roles --test drivers --test motion"),
+    ("src/ikeya/slave/*", "--lib --test ikeya_roles --test adverse"),
+    ("src/ikeya/board.rs", "--lib --test ikeya_roles --test vectors"),
+    ("src/ikeya/batch/*", "--test simd --test stream --test crowds"),
+    ("src/ikeya/framing.rs", "--lib --test stream --test crowds"),
+    ("src/ikeya/judge.rs", "--lib --test stream --test ikeya"),
+    ("src/ikeya/*", "--lib --test ikeya --test layout --test vectors"),
+    ("src/ucp/host/*", "--lib --test ucp_roles --test drivers --test motion"),
+    ("src/ucp/robot/*", "--lib --test ucp_roles --test adverse"),
+    ("src/ucp/batch.rs", "--test simd --test stream --test crowds"),
+    ("src/ucp/framing.rs", "--lib --test stream --test crowds"),
+    ("src/ucp/*", "--lib --test ucp --test layout --test vectors --test ucp_roles"),
+    ("src/stream/*", "--lib --test stream --test captures --test simd --test io"),
+    ("src/sim/*", "--lib --test sim --test roles"),
+    ("src/drive/tokio.rs", "--features tokio --test ports"),
+    ("src/drive/serial_port.rs", "--features tokio --test ports"),
+    ("src/drive/tty.rs", "--features tokio --test ports"),
+    ("src/drive/*", "--lib --test drivers --test ports"),
+    ("src/io/*", "--test io"),
+    ("src/text/*", "--lib --test printing"),
+    ("src/*", "--lib --test drivers --test ikeya_roles --test ucp_roles --test printing"),
+    ("examples/axle/src/*", "--bins"),
+]
+# What runs if those pass: everything of the package that does not take minutes.
+ALL = {
+    "axlewire": "--lib --tests --features tokio",
+    "axle": "--bins --tests",
+}
+
+
+class Mutant:
+    """A change of one expression, as `cargo mutants` lists it."""
+
+    def __init__(self, listed, source):
+        self.file, self.package = listed["file"], listed["package"]
+        self.span, self.replacement = listed["span"], listed["replacement"]
+        change = listed["name"].split(": ", 1)[1]
+        self.line = self.span["start"]["line"]
+        # Without its place, so that it is the same after lines were added above.
+        self.key = f"{change} | {source.split(chr(10))[self.line - 1].strip()}"
+        self.name = f"{self.file}:{self.line}: {self.key}"
+
+    def applied(self, source):
+        lines = source.split("\n")
+        start, end = self.span["start"], self.span["end"]
+        head = lines[: start["line"] - 1] + [lines[start["line"] - 1][: start["column"] - 1]]
+        tail = [lines[end["line"] - 1][end["column"] - 1 :]] + lines[end["line"] :]
+        return "\n".join(head) + self.replacement + "\n".join(tail)
+
+
+def listed(*options):
+    """All mutants of library and tool, in the order of the files; one key is listed once."""
+    out = subprocess.run(
+        ["cargo", "mutants", "--list", "--json", "-p", "axlewire", "-p", "axle", *options],
+        cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    sources = {}
+    mutants, seen = [], collections.Counter()
+    for item in json.loads(out or "[]"):
+        file = item["file"]
+        if file not in sources:
+            sources[file] = (ROOT / file).read_text()
+        mutant = Mutant(item, sources[file])
+        seen[file, mutant.key] += 1
+        if (count := seen[file, mutant.key]) > 1:
+            mutant.key += f" ({count})"
+        mutants.append(mutant)
+    return mutants
+
+
+class Tree:
+    """A copy of the files known to git, with a build directory of its own."""
+
+    def __init__(self, number):
+        self.path, self.target = WORK / f"tree{number}", WORK / f"target{number}"
+        self.path.mkdir(parents=True, exist_ok=True)
+        self.took_s = {}  # tests: how long they take without a change
+        files = subprocess.run(["git", "ls-files", "-z", "-co", "--exclude-standard"], cwd=ROOT,
+                               check=True, stdout=subprocess.PIPE, text=True).stdout
+        known = {file for file in files.split("\0") if file and (ROOT / file).is_file()}
+        for old in [path for path in self.path.rglob("*") if path.is_file()]:
+            if str(old.relative_to(self.path)) not in known:
+                old.unlink()
+        for file in known:
+            copy = self.path / file
+            if not copy.is_file() or copy.read_bytes() != (ROOT / file).read_bytes():
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / file, copy)
+
+    def outcome(self, mutant):
+        """`caught`, `unviable`, or `survived`."""
+        file = self.path / mutant.file
+        source = file.read_text()
+        file.write_text(mutant.applied(source))
+        try:
+            if (outcome := self.test(mutant.package, concerned(mutant.file))) != "survived":
+                return outcome
+        finally:
+            file.write_text(source)
+        self.check_unchanged(mutant.package, ALL[mutant.package])
+        file.write_text(mutant.applied(source))
+        try:
+            return self.test(mutant.package, ALL[mutant.package])
+        finally:
+            file.write_text(source)
+
+    def test(self, package, tests):
+        """Whether a test fails, or never ends; `unviable` if the tree does not compile."""
+        patience_s = max(LEAST_PATIENCE_S, PATIENCE * self.took_s.get(tests, 1000))
+        quick = {"CARGO_PROFILE_DEV_DEBUG": "none", "CARGO_INCREMENTAL": "1", "CARGO_TERM_COLOR": "never",
+                 "CARGO_TARGET_DIR": str(self.target), "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1",
+                 "RUSTFLAGS": "--cap-lints allow" + " -Clink-arg=-fuse-ld=lld" * bool(shutil.which("ld.lld"))}
+        command = ["cargo", "test", "--quiet", "-p", package, *tests.split()]
+        with subprocess.Popen(command, cwd=self.path, env=os.environ | quick, text=True,
+                              start_new_session=True, stdin=subprocess.DEVNULL,
+                              stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
+            try:
+                _, err = run.communicate(timeout=patience_s)
+            except subprocess.TimeoutExpired:
+                return "caught"
+            finally:
+                # Also what a test has started and left.
+                try:
+                    os.killpg(run.pid, signal.SIGKILL)
+                except ProcessLookupError:
+                    pass
+        if run.returncode == 0:
+            return "survived"
+        return "unviable" if "could not compile" in err else "caught"
+
+    def check_unchanged(self, package, tests):
+        """Without a change these tests pass; builds what later runs need, and takes the time."""
+        if tests in self.took_s:
+            return
+        begin = time.monotonic()
+        if self.test(package, tests) != "survived":
+            sys.exit(f"without a change, `cargo test -p {package} {tests}` fails in {self.path}")
+        self.took_s[tests] = time.monotonic() - begin
+
+
+def concerned(file):
+    return next(tests for pattern, tests in CONCERNED if fnmatch.fnmatch(file, pattern))
+
+
+def digest(file):
+    return hashlib.sha256((ROOT / file).read_bytes()).hexdigest()[:12]
+
+
+class Record:
+    """The outcome of each file: in full in the build directory, for readers in `mutants.txt`."""
+
+    def __init__(self):
+        self.reasons = {}  # (file, key): why the change has no effect
+        self.lines = {}  # file: (digest, counts, date)
+        self.state_file = WORK / "outcomes.json"
+        self.state = json.loads(self.state_file.read_text()) if self.state_file.exists() else {}
+        file = key = None
+        for line in RECORD.read_text().splitlines() if RECORD.exists() else []:
+            if match := re.fullmatch(r"(\S+\.rs) (\w+): (\d+) caught, (\d+) unviable, (\d+) survived, (\S+)", line):
+                file = match[1]
+                self.lines[file] = (match[2], [int(match[i]) for i in (3, 4, 5)], match[6])
+            elif line.startswith("        "):
+                self.reasons[file, key] = line.strip()
+            elif line.startswith("    "):
+                key = line.strip()
+                self.reasons[file, key] = ""
+
+    def outcomes(self, file):
+        """By key; empty if the file has changed since."""
+        entry = self.state.get(file, {})
+        return entry.get("outcomes", {}) if entry.get("digest") == digest(file) else {}
+
+    def is_done(self, file):
+        """Whether the file has a line, of this or another machine, and has not changed since."""
+        return file in self.lines and (ROOT / file).exists() and self.lines[file][0] == digest(file)
+
+    def keep(self, mutant, outcome):
+        known = self.outcomes(mutant.file) | {mutant.key: outcome}
+        self.state[mutant.file] = {"digest": digest(mutant.file), "outcomes": known}
+        self.state_file.parent.mkdir(parents=True, exist_ok=True)
+        part = self.state_file.with_suffix(".part")
+        part.write_text(json.dumps(self.state, indent=0))
+        part.rename(self.state_file)
+
+    def write(self, mutants):
+        """Files of which all mutants have been tried get a line."""
+        of_file = collections.defaultdict(list)
+        for mutant in mutants:
+            of_file[mutant.file].append(mutant.key)
+        today = datetime.date.today().isoformat()
+        for file, keys in of_file.items():
+            outcomes = self.outcomes(file)
+            if not all(key in outcomes for key in keys):
+                continue
+            counts = [sum(outcomes[key] == kind for key in keys) for kind in ("caught", "unviable", "survived")]
+            if self.lines.get(file, ())[:2] != (digest(file), counts):
+                self.lines[file] = (digest(file), counts, today)
+            survived = {key for key in keys if outcomes[key] == "survived"}
+            self.reasons = {at: why for at, why in self.reasons.items() if at[0] != file or at[1] in survived}
+            for key in survived:
+                self.reasons.setdefault((file, key), "")
+        self.lines = {file: line for file, line in self.lines.items() if (ROOT / file).exists()}
+        text = ["# Written by tests/mutants.py: of each file its SHA-256, what became of its changes, and the date.",
+                "# Below it each change that survived, and why it has no effect.", ""]
+        for file, (sha, counts, date) in sorted(self.lines.items()):
+            text.append(f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}")
+            for (of, key), why in sorted(self.reasons.items()):
+                if of == file:
+                    text += [f"    {key}"] + [f"        {why}"] * bool(why)
+        RECORD.write_text("\n".join(text) + "\n")
+
+    def has_reason(self, mutant):
+        return bool(self.reasons.get((mutant.file, mutant.key)))
+
+
+def run(mutants, workers, until, record):
+    """Tries these until the time is up; returns the survivors without a reason, and the counts."""
+    counts, survivors, trees = collections.Counter(), [], {}
+    queue = collections.deque(mutants)
+
+    def work(number):
+        tree = trees[number] = Tree(number)
+        while queue and time.monotonic() < until:
+            try:
+                mutant = queue.popleft()
+            except IndexError:
+                return
+            tree.check_unchanged(mutant.package, concerned(mutant.file))
+            if time.monotonic() >= until:
+                return
+            outcome = tree.outcome(mutant)
+            counts[outcome] += 1
+            record.keep(mutant, outcome)
+            if outcome == "survived" and not record.has_reason(mutant):
+                survivors.append(mutant)
+                print(f"survived: {mutant.name}", flush=True)
+
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        for done in [pool.submit(work, number) for number in range(workers)]:
+            done.result()
+    return survivors, counts
+
+
+def of_change():
+    """The mutants of the change that is under way, else of the last commit."""
+    def git(*words):
+        return subprocess.run(["git", *words], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    base = os.environ.get("MUTANTS_BASE") or ("HEAD" if git("status", "--porcelain", "-uno") else "HEAD~1")
+    WORK.mkdir(parents=True, exist_ok=True)
+    diff = WORK / "change.diff"
+    diff.write_text(git("diff", base, "--", "src", "examples/axle/src"))
+    return listed("--in-diff", str(diff)) if diff.read_text() else [], git("rev-parse", "HEAD").strip()
+
+
+def sample(record, minutes):
+    """A seeded sample of a change; from files on record, if the change has few mutants."""
+    until = time.monotonic() + 60 * minutes
+    mutants, seed = of_change()
+    dice = random.Random(seed)
+    dice.shuffle(mutants)
+    of_others = [m for m in listed() if record.is_done(m.file) and m.package == "axlewire" and not record.has_reason(m)]
+    others = dice.sample(of_others, min(len(of_others), 12)) if len(mutants) < 12 else []
+    print(f"seed {seed[:12]}: {len(mutants)} mutants of the change, {len(others)} of other files")
+    # Of one kind together: each has to be built once.
+    chosen = sorted(mutants[:60], key=lambda m: concerned(m.file)) + sorted(others, key=lambda m: concerned(m.file))
+    survivors, counts = run(chosen, 1, until, record)
+    tried = sum(counts.values())
+    print(f"tried {tried} of {len(mutants) + len(others)}: "
+          + ", ".join(f"{counts[kind]} {kind}" for kind in ("caught", "unviable", "survived")))
+    return bool(survivors) or (tried == 0 and bool(mutants or others))
+
+
+def table(record):
+    rows = collections.defaultdict(lambda: [0, 0, 0, 0])
+    for file, (_, counts, _) in record.lines.items():
+        parts = file.split("/")
+        row = rows["axle" if parts[0] == "examples" else parts[1] if len(parts) > 2 else "others"]
+        for i in range(3):
+            row[i] += counts[i]
+        row[3] += 1
+    rows = dict(sorted(rows.items()))
+    rows["all"] = [sum(row[i] for row in rows.values()) for i in range(4)]
+    print("module     files  caught  unviable  survived  caught of viable")
+    for name, (caught, unviable, survived, files) in rows.items():
+        viable = caught + survived
+        share = f"{100 * caught / viable:.1f} %" if viable else "-"
+        print(f"{name:9} {files:6} {caught:7} {unviable:9} {survived:9} {share:>17}")
+
+
+def check(record):
+    """Every survivor on record has a reason, and its line is still in its file."""
+    faults = []
+    for (file, key), why in record.reasons.items():
+        line = re.sub(r" \(\d+\)$", "", key.split(" | ", 1)[1])
+        if not why:
+            faults.append(f"{file}: no reason: {key}")
+        elif (ROOT / file).exists() and line not in (ROOT / file).read_text():
+            faults.append(f"{file}: the line is gone: {key}")
+    faults += [f"{file}: the file is gone" for file in record.lines if not (ROOT / file).exists()]
+    for file, (_, (_, _, survived), _) in record.lines.items():
+        listed_ = sum(of == file for of, _ in record.reasons)
+        if survived != listed_:
+            faults.append(f"{file}: {survived} survived, {listed_} of them are listed")
+    stale = [file for file in record.lines if not record.is_done(file)]
+    print(f"{len(record.lines)} files on record, {len(stale)} of them changed since; "
+          f"{len(record.reasons)} survivors with a reason")
+    for fault in faults:
+        print(fault)
+    return bool(faults) or not record.lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--minutes", type=float, default=10_000)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--file", action="append", default=[])
+    for flag in ("again", "survivors", "sample", "table", "check"):
+        parser.add_argument(f"--{flag}", action="store_true")
+    args = parser.parse_args()
+    record = Record()
+    if args.table:
+        return table(record)
+    if args.check:
+        return check(record)
+    if args.sample:
+        return sample(record, min(args.minutes, 4))
+    mutants = listed()
+    wanted = [m for m in mutants if any(fnmatch.fnmatch(m.file, f) for f in args.file or ["*"])]
+    known = {m.name: record.outcomes(m.file).get(m.key) for m in wanted}
+    if args.survivors:
+        wanted = [m for m in wanted if known[m.name] == "survived"]
+    elif not args.again:
+        wanted = [m for m in wanted if known[m.name] is None and not record.is_done(m.file)]
+    print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)
+    survivors, counts = run(wanted, args.workers, time.monotonic() + 60 * args.minutes, record)
+    record.write(mutants)
+    print(", ".join(f"{count} {kind}" for kind, count in counts.items()))
+    return bool(survivors)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,176 @@
+//! Settings: the two presets of each role, and the shortest times.
+
+use crate::rig::*;
+
+#[test]
+fn the_presets_of_a_role_differ_in_the_pause_that_cuts_off_a_frame_and_in_nothing_else() {
+    let margin = Duration::from_millis;
+    let (direct, adapter) = (HostConfig::direct(), HostConfig::usb_adapter());
+    assert_eq!(HostConfig::default(), adapter);
+    assert_eq!((direct.idle_margin, adapter.idle_margin), (margin(1), margin(20)));
+    let mut other = direct;
+    other.idle_margin = adapter.idle_margin;
+    assert_eq!(other, adapter);
+
+    let (direct, adapter) = (RobotConfig::direct(), RobotConfig::usb_adapter());
+    assert_eq!(RobotConfig::default(), direct);
+    assert_eq!((direct.idle_margin, adapter.idle_margin), (margin(5), margin(20)));
+    let mut other = adapter;
+    other.idle_margin = direct.idle_margin;
+    assert_eq!(other, direct);
+}
+
+/// The settings that a role really uses.
+#[test]
+fn every_period_and_timeout_below_a_millisecond_counts_as_one() {
+    let (least, below) = (Duration::from_millis(1), Duration::from_micros(999));
+    for short in [Duration::ZERO, below] {
+        let mut config = HostConfig::default();
+        (config.command_period, config.command_gap) = (short, short);
+        (config.dead_man, config.ping_period, config.ping_timeout) = (short, Some(short), short);
+        (config.link_timeout, config.ack_timeout) = (short, short);
+        let host = Host::new(config, ms(0));
+        let used = host.config();
+        assert_eq!((used.command_period, used.command_gap), (least, least));
+        assert_eq!((used.dead_man, used.link_timeout, used.ack_timeout), (least, least, least));
+        assert_eq!((used.ping_period, used.ping_timeout), (Some(least), least));
+
+        let mut config = RobotConfig::default();
+        (config.watchdog, config.report_period) = (short, short);
+        (config.result_period, config.bias_request_period) = (short, Some(short));
+        let robot = Robot::new(config, ms(0));
+        let used = robot.config();
+        assert_eq!((used.watchdog, used.report_period), (least, least));
+        assert_eq!((used.result_period, used.bias_request_period), (least, Some(least)));
+    }
+    let mut config = HostConfig::default();
+    (config.ping_period, config.idle_margin) = (None, below);
+    assert_eq!(*Host::new(config, ms(0)).config(), config, "and nothing else is changed");
+    let mut config = RobotConfig::default();
+    (config.bias_request_period, config.idle_margin) = (None, below);
+    assert_eq!(*Robot::new(config, ms(0)).config(), config);
+}
+
+#[test]
+fn a_pause_of_two_bytes_and_the_margin_but_at_least_a_millisecond_cuts_off_a_frame() {
+    // Two bytes at 115,200 bit/s take 174 us.
+    for (margin_us, pause) in [(0, 1000), (825, 1000), (827, 1001), (1000, 1174), (20_000, 20_174)]
+    {
+        let (mut host, mut robot) = (quiet_config(), RobotConfig::default());
+        host.idle_margin = Duration::from_micros(margin_us);
+        (robot.idle_margin, robot.bias_request_period) = (host.idle_margin, None);
+        let (mut host, mut robot) = (Host::new(host, ms(0)), Robot::new(robot, ms(0)));
+        host.handle_input(&[0xFD, 0xFF], ms(5));
+        robot.handle_input(&[0xFD, 0xFF], ms(5));
+        let cut_off = us(5000 + pause);
+        assert_eq!((host.poll_timeout(), robot.poll_timeout()), (Some(cut_off), Some(cut_off)));
+        for at in [us(cut_off.as_micros() - 1), cut_off] {
+            host.handle_timeout(at);
+            robot.handle_timeout(at);
+            let idle = u64::from(at == cut_off);
+            assert_eq!((host.counters().idle, robot.counters().idle), (idle, idle));
+        }
+    }
+}
+
+#[test]
+fn a_robot_is_held_up_after_20_ms_and_a_host_never() {
+    assert_eq!(quiet_robot().held_up_after(), Some(Duration::from_millis(20)));
+    assert_eq!(quiet_host().held_up_after(), None);
+}
+
+#[test]
+fn reports_of_both_layouts_are_counted_by_their_index() {
+    for layout in [ReportLayout::Document, ReportLayout::Firmware { version: 40 }] {
+        let mut config = RobotConfig::default();
+        (config.layout, config.bias_request_period) = (layout, None);
+        let mut robot = Robot::new(config, ms(0));
+        robot.set_telemetry(&Telemetry { power_w: 9, ..Telemetry::default() }, ms(0));
+        for index in 0..=256 {
+            let frames = sent(&mut robot, ms(20 * index));
+            let frame = Frame::parse(&frames[0]).unwrap();
+            let Message::Report(report) = frame.message() else { panic!("{frames:?}") };
+            assert_eq!((frame.index(), report.telemetry().power_w), (index as u8, 9));
+            let version = if layout == ReportLayout::Document { None } else { Some(40) };
+            assert_eq!(report.version(), version);
+        }
+    }
+}
+
+#[test]
+fn each_time_of_a_host_has_a_setting_of_its_own() {
+    let after = Duration::from_millis;
+    let mut config = HostConfig::default();
+    (config.command_period, config.command_gap) = (after(110), after(30));
+    (config.dead_man, config.link_timeout) = (after(400), after(700));
+    (config.ping_period, config.ping_timeout) = (Some(after(170)), after(300));
+    (config.ack_timeout, config.attempts) = (after(150), 2);
+    let mut host = Host::new(config, ms(0));
+    host.handle_input(&bytes(BiasRequest {}), ms(0));
+    host.drive(go(5), ms(0)).unwrap();
+    host.start_calibration(IMU, ms(0)).unwrap();
+    let mut told = vec![];
+    let mut frames = vec![];
+    for at in 0..1000 {
+        frames.extend(wait(&mut host, ms(at)));
+        told.extend(events(&mut host).into_iter().map(|event| (at, event)));
+    }
+    let times = |is_it: fn(&[u8]) -> bool| {
+        let found = frames.iter().filter(|(_, frame)| is_it(frame));
+        found.map(|(at, _)| at.as_micros() / 1000).collect::<Vec<_>>()
+    };
+    // The stop of the dead-man begins a new series.
+    assert_eq!(times(|it| it[4] == 2), [0, 0, 110, 220, 330, 400, 510, 620, 730, 840, 950]);
+    assert_eq!(times(is_ping), [0, 300, 600, 900], "no pong: the timeout is longer");
+    assert_eq!(times(|it| it[4] == 3), [0, 150]);
+    let at = |wanted: fn(&HostEvent) -> bool| {
+        told.iter().filter(|(_, event)| wanted(event)).map(|(at, _)| *at).collect::<Vec<_>>()
+    };
+    assert_eq!(at(|it| *it == HostEvent::DeadMan), [400]);
+    assert_eq!(at(|it| *it == HostEvent::LinkDown), [700]);
+    // Twice the 9 bytes of the request and 150 ms.
+    assert_eq!(at(|it| matches!(it, HostEvent::CalibrationFailed(_))), [302]);
+
+    // Pongs are answered at once: the period counts. Different commands keep the gap.
+    let mut host = Host::new(config, ms(0));
+    let mut pings = vec![];
+    for at in 0..400 {
+        for (at, _) in wait(&mut host, ms(at)).iter().filter(|(_, frame)| is_ping(frame)) {
+            pings.push(at.as_micros() / 1000);
+            host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), *at);
+        }
+    }
+    assert_eq!(pings, [0, 170, 340]);
+    host.drive(go(1), ms(1000)).unwrap();
+    sent(&mut host, ms(1000));
+    host.drive(go(2), ms(1001)).unwrap();
+    assert_eq!(speeds(&wait(&mut host, ms(1100))), [(1_030_000, 2)]);
+}
+
+#[test]
+fn each_time_of_a_robot_has_a_setting_of_its_own() {
+    let after = Duration::from_millis;
+    let mut config = RobotConfig::default();
+    (config.watchdog, config.report_period) = (after(450), after(250));
+    (config.result_period, config.bias_request_period) = (after(300), Some(after(350)));
+    let mut robot = Robot::new(config, ms(0));
+    robot.set_telemetry(&Telemetry::default(), ms(0));
+    robot.calibration_result_imu(imu_bias(), ms(0));
+    robot.calibration_result_mag(mag_bias(), ms(0));
+    robot.handle_input(&bytes(go(5)), ms(0));
+    let frames = wait(&mut robot, ms(1000));
+    for (id, expected) in [
+        (5, &[0, 250, 500, 750, 1000][..]),
+        (6, &[0, 300, 600, 900]),
+        (7, &[0, 300, 600, 900]),
+        (8, &[0, 350, 700]),
+    ] {
+        let found = frames.iter().filter(|(_, frame)| frame[4] == id);
+        assert_eq!(found.map(|(at, _)| at.as_micros() / 1000).collect::<Vec<_>>(), expected);
+    }
+    assert_eq!((robot.command(us(449_999)).speed(), robot.statistics().watchdog), (0, 1));
+    let mut robot = Robot::new(config, ms(0));
+    robot.handle_input(&bytes(go(5)), ms(0));
+    assert_eq!(robot.command(us(449_999)).speed(), 5);
+    assert_eq!(robot.command(ms(450)).speed(), 0);
+}
