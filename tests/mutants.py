@@ -77,7 +77,7 @@ class Mutant:
 
     def __init__(self, listed, source):
         self.file, self.package = listed["file"], listed["package"]
-        self.span, self.replacement = listed["span"], listed["replacement"]
+        self.span, self.replacement, self.genre = listed["span"], listed["replacement"], listed["genre"]
         change = listed["name"].split(": ", 1)[1]
         self.line = self.span["start"]["line"]
         # Without its place, so that it is the same after lines were added above.
@@ -101,9 +101,16 @@ def listed(*options):
     mutants, seen = [], collections.Counter()
     for item in json.loads(out or "[]"):
         file = item["file"]
+        # The tool borrows modules of the tests.
+        if "tests" in file:
+            continue
         if file not in sources:
             sources[file] = (ROOT / file).read_text()
         mutant = Mutant(item, sources[file])
+        # A module of tests under a longer `cfg` than `cargo mutants` knows.
+        if (tests := re.search(r"^(pub\(crate\) )?mod tests \{", sources[file], re.M)):
+            if mutant.line > sources[file].count("\n", 0, tests.start()):
+                continue
         seen[file, mutant.key] += 1
         if (count := seen[file, mutant.key]) > 1:
             mutant.key += f" ({count})"
@@ -217,9 +224,13 @@ class Record:
         """Whether the file has a line, of this or another machine, and has not changed since."""
         return file in self.lines and (ROOT / file).exists() and self.lines[file][0] == digest(file)
 
-    def keep(self, mutant, outcome):
+    def keep(self, mutant, outcome, save=True):
         known = self.outcomes(mutant.file) | {mutant.key: outcome}
         self.state[mutant.file] = {"digest": digest(mutant.file), "outcomes": known}
+        if save:
+            self.save()
+
+    def save(self):
         self.state_file.parent.mkdir(parents=True, exist_ok=True)
         part = self.state_file.with_suffix(".part")
         part.write_text(json.dumps(self.state, indent=0))
@@ -281,6 +292,46 @@ def run(mutants, workers, until, record):
     with concurrent.futures.ThreadPoolExecutor(workers) as pool:
         for done in [pool.submit(work, number) for number in range(workers)]:
             done.result()
+    return survivors, counts
+
+
+def run_woven(mutants, wanted, workers, until, record):
+    """As `run`, with all mutants in one build. Some are left to it: these have no outcome."""
+    try:
+        import woven
+    except ImportError:
+        sys.exit("--woven needs: pip install tree-sitter tree-sitter-rust")
+    packages = {mutant.package for mutant in wanted}
+    tree = Tree("woven")
+    build = woven.Build(tree.path, tree.target, mutants, packages)
+    commands = [["test", "--no-run", "-p", package, *ALL[package].split()] for package in sorted(packages, reverse=True)]
+    tests = woven.tests_of(build.settle(commands), tree.path)
+    print(f"{len(build.unviable)} do not compile, {len(build.apart)} apart; {len(tests)} tests", flush=True)
+    reached = WORK / "reached"
+    reached.mkdir(parents=True, exist_ok=True)
+    with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+        for done in [pool.submit(test.learn, reached, number) for number, test in enumerate(tests)]:
+            done.result()
+    for test in tests:
+        if not test.passes:
+            print(f"left out, since it does not pass in the woven tree: {test.name}")
+    print(f"they take {sum(test.took_s for test in tests):.0f} s one after the other", flush=True)
+    numbers = {id(mutant): number for number, mutant in enumerate(mutants, 1)}
+    chosen = [numbers[id(mutant)] for mutant in wanted]
+    for number in chosen:
+        if number in build.unviable:
+            record.keep(mutants[number - 1], "unviable", save=False)
+    counts, survivors = collections.Counter(unviable=len(build.unviable & set(chosen))), []
+
+    def keep(number, outcome, why):
+        mutant = mutants[number - 1]
+        counts[outcome] += 1
+        record.keep(mutant, outcome, save=sum(counts.values()) % 50 == 0)
+        if outcome == "survived" and not record.has_reason(mutant):
+            survivors.append(mutant)
+            print(f"survived ({why}): {mutant.name}", flush=True)
+    woven.run(build, tests, [n for n in chosen if n not in build.unviable | build.apart], until, workers, keep)
+    record.save()
     return survivors, counts
 
 
@@ -357,6 +408,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=10_000)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--file", action="append", default=[])
+    parser.add_argument("--woven", action="store_true")
     for flag in ("again", "survivors", "sample", "table", "check"):
         parser.add_argument(f"--{flag}", action="store_true")
     args = parser.parse_args()
@@ -375,7 +427,11 @@ def main():
     elif not args.again:
         wanted = [m for m in wanted if known[m.name] is None and not record.is_done(m.file)]
     print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)
-    survivors, counts = run(wanted, args.workers, time.monotonic() + 60 * args.minutes, record)
+    until = time.monotonic() + 60 * args.minutes
+    if args.woven:
+        survivors, counts = run_woven(mutants, wanted, args.workers, until, record)
+    else:
+        survivors, counts = run(wanted, args.workers, until, record)
     record.write(mutants)
     print(", ".join(f"{count} {kind}" for kind, count in counts.items()))
     return bool(survivors)
