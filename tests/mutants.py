@@ -304,7 +304,7 @@ def run_woven(mutants, wanted, workers, until, record):
     packages = {mutant.package for mutant in wanted}
     tree = Tree("woven")
     build = woven.Build(tree.path, tree.target, mutants, packages)
-    commands = [["test", "--no-run", "-p", package, *ALL[package].split()] for package in sorted(packages, reverse=True)]
+    commands = [["build", "-p", package, *ALL[package].split()] for package in sorted(packages, reverse=True)]
     tests = woven.tests_of(build.settle(commands), tree.path)
     print(f"{len(build.unviable)} do not compile, {len(build.apart)} apart; {len(tests)} tests", flush=True)
     reached = WORK / "reached"

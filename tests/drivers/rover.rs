@@ -247,6 +247,34 @@ fn a_calibration_is_begun_and_ended_when_the_calls_return() {
 }
 
 #[test]
+fn an_outcome_that_came_after_its_call_is_not_an_event_during_the_next() {
+    for is_async in [false, true] {
+        let (world, mut rover, robot) = story();
+        let kind = CalibrationKind::Imu;
+        let start = |rover: &mut Rover, millis| {
+            let deadline = after(&world, millis);
+            if is_async {
+                world.block_on(rover.start_calibration_async(kind, deadline))
+            } else {
+                rover.start_calibration(kind, deadline)
+            }
+        };
+        let timeout = Err(DriveError::Timeout(Operation::Calibration));
+        assert_eq!(start(&mut rover, 1), timeout);
+        for _ in 0..100 {
+            rover.service().unwrap();
+            world.step(200);
+        }
+        assert_eq!(rover.role().calibration_outcome(), Some(Ok(())));
+        robot.borrow().port().unplugged.set(true);
+        assert_eq!(start(&mut rover, 1), timeout);
+        let told: Vec<_> = std::iter::from_fn(|| rover.poll_event()).collect();
+        let is_outcome = |event: &HostEvent| matches!(event, HostEvent::CalibrationStarted(_));
+        assert!(!told.iter().any(is_outcome), "{told:?}");
+    }
+}
+
+#[test]
 fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
     for is_async in [false, true] {
         let (world, mut rover, robot) = story();
