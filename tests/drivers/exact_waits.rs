@@ -119,7 +119,7 @@ struct InTwo {
     world: World,
     rest_after_us: u64,
     has_begun: bool,
-    flush_fails: bool,
+    failing_flushes: u32,
 }
 
 impl embedded_io::ErrorType for InTwo {
@@ -149,13 +149,19 @@ impl embedded_io::Write for InTwo {
 
     fn flush(&mut self) -> Result<(), Unplugged> {
         self.world.step(300);
-        if self.flush_fails { Err(Unplugged) } else { Ok(()) }
+        match self.failing_flushes.checked_sub(1) {
+            Some(left) => {
+                self.failing_flushes = left;
+                Err(Unplugged)
+            }
+            None => Ok(()),
+        }
     }
 }
 
-fn in_two(rest_after_us: u64, flush_fails: bool) -> Driver<Pausing, InTwo, VirtualClock> {
+fn in_two(rest_after_us: u64, failing_flushes: u32) -> Driver<Pausing, InTwo, VirtualClock> {
     let world = World::default();
-    let port = InTwo { world: world.clone(), rest_after_us, has_begun: false, flush_fails };
+    let port = InTwo { world: world.clone(), rest_after_us, has_begun: false, failing_flushes };
     Driver::new(Pausing::default(), port, VirtualClock(world))
 }
 
@@ -163,7 +169,7 @@ fn in_two(rest_after_us: u64, flush_fails: bool) -> Driver<Pausing, InTwo, Virtu
 fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long() {
     // As above; behind a longer one only a flush within the time of the frame and a pause counts.
     for (rest_after_us, is_cut_off) in [(60 + 979, false), (60 + 980, false), (60 + 981, true)] {
-        let mut driver = in_two(rest_after_us, false);
+        let mut driver = in_two(rest_after_us, 0);
         driver.service().unwrap();
         let expected = if is_cut_off { vec![Unsent::CutOff] } else { vec![] };
         assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
@@ -175,7 +181,7 @@ fn a_failed_flush_behind_a_frame_in_doubt_counts_for_it_and_for_the_frames_befor
     for (rest_after_us, expected) in
         [(60 + 980, vec![Unsent::Unflushed]), (60 + 981, vec![Unsent::CutOff, Unsent::Unflushed])]
     {
-        let mut driver = in_two(rest_after_us, true);
+        let mut driver = in_two(rest_after_us, 1);
         assert_eq!(driver.service(), Err(DriveError::Port(Unplugged)));
         assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
     }
