@@ -4,6 +4,7 @@
     tests/mutants.py                      goes on where the last run ended, until all are tried
     tests/mutants.py --minutes 60         for an hour; --workers 2 tries two at a time
     tests/mutants.py --file 'src/ucp/**'  only these files; --again tries what has been tried, too
+    tests/mutants.py --woven              all in one build, many times quicker; see tests/woven.py
     tests/mutants.py --sample             a sample of the mutants of the last commit, for the gate
     tests/mutants.py --table              prints the score of each module
     tests/mutants.py --check              each survivor on record has a reason that is not stale
@@ -304,7 +305,8 @@ def run_woven(mutants, wanted, workers, until, record):
     packages = {mutant.package for mutant in wanted}
     tree = Tree("woven")
     build = woven.Build(tree.path, tree.target, mutants, packages)
-    commands = [["build", "-p", package, *ALL[package].split()] for package in sorted(packages, reverse=True)]
+    commands = [[word, "-p", package, *ALL[package].split()] for word in ("check", "build")
+                for package in sorted(packages, reverse=True)]
     tests = woven.tests_of(build.settle(commands), tree.path)
     print(f"{len(build.unviable)} do not compile, {len(build.apart)} apart; {len(tests)} tests", flush=True)
     reached = WORK / "reached"

@@ -62,10 +62,11 @@ fn ask(n: u32) -> bool {
     false
 }
 """
-# Crates, and where they find the module. The proofs borrow files of the library.
+# Crates, and where they find the module. Proofs and fuzz targets borrow files of the library.
 ROOTS = {
     "src/lib.rs": ("axlewire", "mod woven;"),
     "tests/exhaustive.rs": ("axlewire", '#[path = "../src/woven.rs"] mod woven;'),
+    "tests/fuzz_seeds.rs": ("axlewire", '#[path = "../src/woven.rs"] mod woven;'),
     "examples/axle/src/main.rs": ("axle", "mod woven;"),
 }
 ATTRIBUTES = "#![feature(core_intrinsics, const_eval_select)] #![allow(internal_features)] "
@@ -228,8 +229,8 @@ class Build:
     def environment(self):
         flags = "--cap-lints allow" + " -Clink-arg=-fuse-ld=lld" * bool(shutil.which("ld.lld"))
         return os.environ | {
-            "RUSTC_BOOTSTRAP": "axlewire,axle,exhaustive", "CARGO_TARGET_DIR": str(self.target), "RUSTFLAGS": flags,
-            "CARGO_PROFILE_DEV_DEBUG": "none", "CARGO_PROFILE_DEV_OPT_LEVEL": "1", "CARGO_INCREMENTAL": "0",
+            "RUSTC_BOOTSTRAP": "axlewire,axle,exhaustive,fuzz_seeds", "CARGO_TARGET_DIR": str(self.target), "RUSTFLAGS": flags,
+            "CARGO_PROFILE_DEV_DEBUG": "none", "CARGO_INCREMENTAL": "1",
             "CARGO_TERM_COLOR": "never"}
 
     def write(self):
@@ -255,7 +256,8 @@ class Build:
         return run.returncode, [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
 
     def settle(self, commands):
-        """Builds until no mutant stops the compiler; returns the test programs of each package."""
+        """Builds until no mutant stops the compiler; returns the test programs of all packages."""
+        programs = []
         for words in commands:
             while True:
                 regions = self.write()
@@ -263,8 +265,9 @@ class Build:
                 if code == 0:
                     break
                 self.drop(regions, messages)
-        return [(m["package_id"], m["target"]["name"], m["executable"]) for m in messages
-                if m["reason"] == "compiler-artifact" and m["profile"]["test"] and m["executable"]]
+            programs += [(m["package_id"], m["target"]["name"], m["executable"]) for m in messages
+                         if m["reason"] == "compiler-artifact" and m["profile"]["test"] and m["executable"]]
+        return programs
 
     def drop(self, regions, messages):
         """Takes out what the compiler complains about."""
@@ -284,7 +287,8 @@ class Build:
             print(f"{len(self.unviable)} do not compile, {len(self.apart)} apart", flush=True)
             return
         # The weaving itself is the fault: what is on these lines is tried the plain way.
-        for span, _ in unexplained:
+        for span, rendered in unexplained:
+            print(rendered, flush=True)
             file = self.files[span["file_name"]]
             self.apart |= {number for number, mutant in file.mutants if number not in self.unviable
                            and mutant.span["start"]["line"] <= span["line_end"]

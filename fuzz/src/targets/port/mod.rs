@@ -139,6 +139,12 @@ impl Port {
         world.inbox.extend(bytes.iter().zip(1..).map(|(&byte, n)| (begin + n * byte_us, byte)));
     }
 
+    /// How long it takes until all bytes under way have arrived, microseconds.
+    pub(super) fn under_way_us(&self) -> u64 {
+        let world = self.world();
+        world.inbox.back().map_or(0, |last| last.0.saturating_sub(world.now_us))
+    }
+
     pub(super) fn fault(&self, call: Call, fault: Fault) {
         self.world().faults[call as usize].push_back(fault);
     }

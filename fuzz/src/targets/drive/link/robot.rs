@@ -50,7 +50,8 @@ where
                 rig.port.receive(&frame(2, &body));
                 let motion =
                     (i16::from(speed).clamp(-100, 100), i16::from(angular).clamp(-100, 100));
-                told.push((rig.driver.now() + Duration::from_micros(87 * 24), motion));
+                let takes = Duration::from_micros(rig.port.under_way_us() as u32);
+                told.push((rig.driver.now() + takes, motion));
             }
             Do::Service => {
                 let done = call!(rig, how, service, service_async());
