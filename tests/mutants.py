@@ -328,6 +328,8 @@ def run_woven(mutants, wanted, workers, until, record):
     def keep(number, outcome, why):
         mutant = mutants[number - 1]
         counts[outcome] += 1
+        if outcome == "apart":
+            return
         record.keep(mutant, outcome, save=sum(counts.values()) % 50 == 0)
         if outcome == "survived" and not record.has_reason(mutant):
             survivors.append(mutant)

@@ -98,6 +98,18 @@ class File:
             self.starts.append(self.starts[-1] + len(line.encode()) + 1)
         self.lines = text.split("\n")
         self.mutants, self.apart = mutants, set()
+        self.constant = {number for number, mutant in mutants if self.is_constant(mutant)}
+
+    def is_constant(self, mutant):
+        """Whether it may be evaluated while compiling."""
+        place = self.at(mutant.span["start"])
+        node = self.tree.root_node.descendant_for_byte_range(place, place)
+        while node is not None:
+            modifiers = [child for child in node.children if child.type == "function_modifiers"]
+            if node.type in ("const_item", "static_item", "const_block") or any(b"const" in self.part(it) for it in modifiers):
+                return True
+            node = node.parent
+        return False
 
     def at(self, place):
         line = self.lines[place["line"] - 1]
@@ -357,7 +369,7 @@ def tests_of(programs, tree):
 
 
 def run(build, tests, numbers, until, workers, keep):
-    """Tries these mutants; `keep(mutant, outcome, why)` hears of each."""
+    """Tries these mutants; `keep(number, outcome, why)` hears of each."""
     reaching = collections.defaultdict(list)
     for test in sorted(tests, key=lambda test: test.took_s):
         for number in test.reaches if test.passes else ():
@@ -365,9 +377,13 @@ def run(build, tests, numbers, until, workers, keep):
     killers = collections.defaultdict(collections.deque)  # file: tests that caught the latest ones
     queue, lock = collections.deque(numbers), threading.Lock()
 
+    constant = {number for file in build.files.values() for number in file.constant}
+
     def outcome(number):
         mutant = build.mutants[number - 1]
         own = reaching[number]
+        if not own and number in constant:
+            return "apart", "only evaluated while compiling"
         first = [test for test in list(killers[mutant.file]) if number in test.reaches][:4]
         for test in first + [test for test in own if test not in first]:
             patience_s = LEAST_PATIENCE_S + PATIENCE * test.took_s
