@@ -109,6 +109,22 @@ fn stop_sends_to_a_bus_nothing_but_reads_and_stops() {
 }
 
 #[test]
+fn stop_of_one_node_leaves_the_others_alone_and_fails_if_that_node_is_silent() {
+    undisturbed(|| {
+        let turning = |id| Node { rps: 2.0, ..Node::velocity(id) };
+        let line = played::bus(&[turning(2), turning(7)], |_, _| {});
+        let stop = |node| Process::start(&format!("stop -p {} -P ikeya -n {node}", line.path));
+        let lines = stop(2).success();
+        assert_eq!(lines, ["node 2: 0.00 rps, stopped and confirmed"]);
+        let is_two = |said: &Said| matches!(said, Said::Read(2) | Said::Write(2, 0.0, _));
+        assert!(line.said().iter().all(is_two), "{:?}", line.said());
+        assert_eq!(line.lock().nodes[1].rps, 2.0);
+        stop(3).complaint(1);
+        assert_eq!(line.lock().nodes[1].rps, 2.0);
+    });
+}
+
+#[test]
 fn stop_waits_until_the_motor_stands_still() {
     undisturbed(|| {
         let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
