@@ -296,7 +296,7 @@ def run(mutants, workers, until, record):
     return survivors, counts
 
 
-def run_woven(mutants, wanted, workers, until, record):
+def run_woven(mutants, wanted, workers, until, record, is_patient):
     """As `run`, with all mutants in one build. Some are left to it: these have no outcome."""
     try:
         import woven
@@ -318,6 +318,8 @@ def run_woven(mutants, wanted, workers, until, record):
         if not test.passes:
             print(f"left out, since it does not pass in the woven tree: {test.name}")
     print(f"they take {sum(test.took_s for test in tests):.0f} s one after the other", flush=True)
+    for took_s, name in sorted(((test.took_s, test.name) for test in tests), reverse=True)[:10]:
+        print(f"    {took_s:5.1f} s  {name}")
     numbers = {id(mutant): number for number, mutant in enumerate(mutants, 1)}
     chosen = [numbers[id(mutant)] for mutant in wanted]
     for number in chosen:
@@ -330,11 +332,12 @@ def run_woven(mutants, wanted, workers, until, record):
         counts[outcome] += 1
         if outcome == "apart":
             return
-        record.keep(mutant, outcome, save=sum(counts.values()) % 50 == 0)
+        record.keep(mutant, outcome, save=sum(counts.values()) % 20 == 0)
         if outcome == "survived" and not record.has_reason(mutant):
             survivors.append(mutant)
             print(f"survived ({why}): {mutant.name}", flush=True)
-    woven.run(build, tests, [n for n in chosen if n not in build.unviable | build.apart], until, workers, keep)
+    woven.run(build, tests, [n for n in chosen if n not in build.unviable | build.apart], until, workers, keep,
+              is_patient)
     record.save()
     return survivors, counts
 
@@ -433,7 +436,7 @@ def main():
     print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)
     until = time.monotonic() + 60 * args.minutes
     if args.woven:
-        survivors, counts = run_woven(mutants, wanted, args.workers, until, record)
+        survivors, counts = run_woven(mutants, wanted, args.workers, until, record, args.survivors)
     else:
         survivors, counts = run(wanted, args.workers, until, record)
     record.write(mutants)

@@ -10,8 +10,10 @@ What cannot be woven stays for the plain way: deleted fields of a struct, change
 compiler's inference, and what is only evaluated while compiling.
 """
 
+import bisect
 import collections
 import concurrent.futures
+import itertools
 import json
 import os
 import pathlib
@@ -72,10 +74,13 @@ ROOTS = {
 ATTRIBUTES = "#![feature(core_intrinsics, const_eval_select)] #![allow(internal_features)] "
 
 # A test that takes so much longer than without a change waits for something that it prevents.
-PATIENCE, LEAST_PATIENCE_S = 8, 5
+PATIENCE, LEAST_PATIENCE_S = 8, 2
 MEMORY_BYTES = 8 << 30
 # Tests that took longer have to fail twice: they use the real clock.
 REAL_TIME_S = 1.0
+# So much of the tests that reach a mutant, the quickest ones, is tried at first; all of them with
+# `--survivors`.
+FIRST_S = 15
 
 
 class Edit:
@@ -342,15 +347,20 @@ class Test:
 
     def learn(self, directory, number):
         """What it reaches, how long it takes, and whether it passes in the woven tree."""
-        file = directory / f"{number}.reached"
-        file.unlink(missing_ok=True)
-        self.run({"WOVEN_REACHED": str(file)}, 600)
-        if file.exists():
-            data = file.read_bytes()
-            self.reaches = {int.from_bytes(data[i : i + 4], "little") for i in range(0, len(data), 4)}
-        begin = time.monotonic()
-        self.passes = self.run({"WOVEN": "0"}, 600) == "passed"
-        self.took_s = time.monotonic() - begin
+        file, known = directory / f"{number}.reached", directory / f"{number}.json"
+        key = [self.program, os.stat(self.program).st_mtime_ns, self.name]
+        if known.exists() and (entry := json.loads(known.read_text()))["key"] == key:
+            self.took_s, self.passes = entry["took_s"], entry["passes"]
+        else:
+            file.unlink(missing_ok=True)
+            begin = time.monotonic()
+            self.passes = self.run({"WOVEN_REACHED": str(file)}, 600) == "passed"
+            self.took_s = time.monotonic() - begin
+            # The record itself takes memory, which a few tests count.
+            self.passes = self.passes or self.run({"WOVEN": "0"}, 600) == "passed"
+            known.write_text(json.dumps({"key": key, "took_s": self.took_s, "passes": self.passes}))
+        data = file.read_bytes() if file.exists() else b""
+        self.reaches = {int.from_bytes(data[i : i + 4], "little") for i in range(0, len(data), 4)}
 
 
 def tests_of(programs, tree):
@@ -368,12 +378,17 @@ def tests_of(programs, tree):
     return tests
 
 
-def run(build, tests, numbers, until, workers, keep):
+def run(build, tests, numbers, until, workers, keep, is_patient):
     """Tries these mutants; `keep(number, outcome, why)` hears of each."""
     reaching = collections.defaultdict(list)
     for test in sorted(tests, key=lambda test: test.took_s):
         for number in test.reaches if test.passes else ():
             reaching[number].append(test)
+    for number, own in reaching.items():
+        # At least the quickest one of those that reach it.
+        spent_s = list(itertools.accumulate(test.took_s for test in own))
+        if not is_patient:
+            reaching[number] = own[: max(1, bisect.bisect(spent_s, FIRST_S))]
     killers = collections.defaultdict(collections.deque)  # file: tests that caught the latest ones
     queue, lock = collections.deque(numbers), threading.Lock()
 
@@ -384,7 +399,7 @@ def run(build, tests, numbers, until, workers, keep):
         own = reaching[number]
         if not own and number in constant:
             return "apart", "only evaluated while compiling"
-        first = [test for test in list(killers[mutant.file]) if number in test.reaches][:4]
+        first = [test for test in list(killers[mutant.file]) if number in test.reaches][:6]
         for test in first + [test for test in own if test not in first]:
             patience_s = LEAST_PATIENCE_S + PATIENCE * test.took_s
             result = test.run({"WOVEN": str(number)}, patience_s)

@@ -66,9 +66,11 @@ fn a_stop_of_a_rover_is_tried_again_a_millisecond_after_the_port_has_failed() {
 }
 
 /// A role that sends one frame, in which it permits pauses of a millisecond. A byte takes 20 us.
+/// It may send the frame again if it did not leave.
 #[derive(Default)]
 struct Pausing {
     is_sent: bool,
+    repeats: bool,
     unsent: Vec<Unsent>,
 }
 
@@ -87,6 +89,7 @@ impl Endpoint for Pausing {
     }
     fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
         self.unsent.push(unsent);
+        self.is_sent &= !self.repeats;
     }
     fn poll_event(&mut self) -> Option<()> {
         None
@@ -253,8 +256,8 @@ fn a_driver_idles_until_its_role_wants_something_and_then_until_the_deadline() {
 /// A port that takes its time for each call.
 struct Slow {
     clock: VirtualClock,
-    write_ms: u32,
-    flush_ms: u32,
+    write_us: u32,
+    flush_us: u32,
     written: Vec<u8>,
 }
 
@@ -271,21 +274,22 @@ impl embedded_io_async::Read for Slow {
 impl embedded_io_async::Write for Slow {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Unplugged> {
         if !bytes.is_empty() {
-            self.clock.delay_ms(self.write_ms).await;
+            self.clock.delay_us(self.write_us).await;
         }
         self.written.extend(bytes);
         Ok(bytes.len())
     }
 
     async fn flush(&mut self) -> Result<(), Unplugged> {
-        self.clock.delay_ms(self.flush_ms).await;
+        self.clock.delay_us(self.flush_us).await;
         Ok(())
     }
 }
 
 fn slow(world: &World, write_ms: u32, flush_ms: u32) -> Driver<Recorder, Slow, VirtualClock> {
     let clock = VirtualClock(world.clone());
-    let port = Slow { clock: clock.clone(), write_ms, flush_ms, written: vec![] };
+    let (write_us, flush_us) = (write_ms * 1000, flush_ms * 1000);
+    let port = Slow { clock: clock.clone(), write_us, flush_us, written: vec![] };
     Driver::new(Recorder::sending(&[b"123"]), port, clock)
 }
 
@@ -339,5 +343,20 @@ fn a_port_that_was_not_asked_for_seconds_has_the_time_of_a_frame_to_take_it() {
         // The port needs a moment, as before.
         assert_eq!(world.block_on(driver.service_async()), Ok(()), "flush {is_flush}");
         assert_eq!(driver.port().written, b"123");
+    }
+}
+
+#[test]
+fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
+    // 64 bytes take 1280 us.
+    for (write_us, expected) in [(3559, Ok(())), (3561, Err(DriveError::Stalled))] {
+        let world = World::default();
+        let clock = VirtualClock(world.clone());
+        let port = Slow { clock: clock.clone(), write_us, flush_us: 0, written: vec![] };
+        let role = Pausing { repeats: true, ..Pausing::default() };
+        let mut driver = Driver::new(role, port, clock);
+        assert_eq!(world.poll_times(1, driver.service_async()), None);
+        world.step(5_000_000);
+        assert_eq!(world.block_on(driver.service_async()), expected, "{write_us} us");
     }
 }
