@@ -260,3 +260,16 @@ fn one_rps_read_as_a_position_is_16256_turns() {
     let write = WriteRequest::position(NodeId::N1, Position::new(0, -1));
     assert!(write.as_velocity().is_nan());
 }
+
+#[test]
+fn a_speed_becomes_an_f32_as_it_is() {
+    assert_eq!(f32::from(Rps::new(-2.5).unwrap()), -2.5);
+}
+
+#[cfg(feature = "arbitrary")]
+#[test]
+fn an_arbitrary_speed_is_any_finite_one() {
+    let speed = |rps: f32| arbitrary::Unstructured::new(&rps.to_le_bytes()).arbitrary::<Rps>();
+    assert_eq!(speed(-2.5).unwrap().get(), -2.5);
+    assert!(speed(f32::NAN).is_err());
+}

@@ -4,6 +4,9 @@
 /// How a station is driven, and endpoints that break the contract.
 #[path = "sim/drivers.rs"]
 mod drivers;
+/// Limits, to the microsecond and to the byte.
+#[path = "sim/exact.rs"]
+mod exact;
 /// Faults of a line and of its stubs.
 #[path = "sim/faults.rs"]
 mod faults;

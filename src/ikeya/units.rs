@@ -276,19 +276,12 @@ impl Position {
         let counts = revolutions * f64::from(Self::COUNTS_PER_REVOLUTION);
         // `as` truncates and saturates, so adding half a count away from zero makes it round.
         let counts = (counts + if counts < 0.0 { -0.5 } else { 0.5 }) as i64;
-        match i32::try_from(counts) {
-            Ok(counts) => Self::from_counts(counts),
-            Err(_) => {
-                Self::from_counts(if counts < 0 { i32::MIN } else { i32::MAX }).map_err(|error| {
-                    match error {
-                        EncodeError::Position { min, max, .. } => {
-                            EncodeError::Position { counts, min, max }
-                        }
-                        other => other,
-                    }
-                })
-            }
-        }
+        // What no i32 holds is out of range in any case.
+        let near = i32::try_from(counts).unwrap_or(i32::MAX);
+        Self::from_counts(near).map_err(|error| match error {
+            EncodeError::Position { min, max, .. } => EncodeError::Position { counts, min, max },
+            other => other,
+        })
     }
 
     /// Converts from radians, rounded to the nearest count.

@@ -189,3 +189,57 @@ fn the_robot_that_a_rover_node_lends_is_its_own() {
     let lent: *const _ = node.robot_mut();
     assert!(core::ptr::eq(lent, node.robot()));
 }
+
+#[test]
+fn the_answer_of_a_motor_node_is_how_its_motor_moves() {
+    let (read, turn) =
+        (ReadRequest::new(NodeId::N1), WriteRequest::velocity(NodeId::N1, Rps::new(2.0).unwrap()));
+    let mut node = MotorNode::new(NodeId::N1, Mode::Velocity);
+    node.handle_input(turn.as_bytes(), at_ms(1));
+    node.handle_timeout(at_ms(51));
+    node.handle_input(read.as_bytes(), at_ms(51));
+    let answer = node.poll_transmit(at_ms(51)).unwrap().to_vec();
+    let rps = node.motor().velocity().get();
+    assert!((1.2..1.3).contains(&rps), "{rps}: 63 % after 50 ms");
+    assert_eq!(answer[2..6], rps.to_le_bytes());
+}
+
+#[test]
+fn a_motor_node_wants_to_be_called_when_its_watchdog_is_due() {
+    let mut config = SlaveConfig::default();
+    config.watchdog = Some(MS(100));
+    let slave = <Slave>::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
+    let mut node = MotorNode::from_parts(slave, Motor::new());
+    let turn = WriteRequest::velocity(NodeId::N1, Rps::new(2.0).unwrap());
+    node.handle_input(turn.as_bytes(), at_ms(1));
+    assert_eq!(node.poll_timeout(), Some(at_ms(101)));
+}
+
+#[test]
+fn the_answer_of_three_motors_is_how_they_move() {
+    let read = ReadRequest::new(NodeId::N1);
+    for mode in [Mode::Velocity, Mode::Position] {
+        let mut node = MotorNode::three_motors(NodeId::N1, mode);
+        for (motor, counts) in node.motor_mut().iter_mut().zip([5, -6, 7]) {
+            *motor = Motor::new().at(Position::new(counts, 0));
+            motor.turn(Rps::new(f32::from(counts)).unwrap());
+            motor.step(Duration::from_micros(1));
+        }
+        let motors = node.motor().clone();
+        node.handle_input(read.as_bytes(), at_ms(0));
+        let answer = node.poll_transmit(at_ms(0)).unwrap();
+        let expected: Vec<u8> = match mode {
+            Mode::Velocity => {
+                motors.iter().flat_map(|motor| motor.velocity().get().to_le_bytes()).collect()
+            }
+            // All counts, then all rotations.
+            Mode::Position => {
+                let counts = motors.iter().map(|motor| motor.position().count());
+                let rotations = motors.iter().map(|motor| motor.position().rotation());
+                counts.chain(rotations).flat_map(i16::to_le_bytes).collect()
+            }
+        };
+        assert_eq!(answer[2..14], expected, "{mode:?}");
+        assert!(motors.iter().all(|motor| motor.velocity() != Rps::ZERO));
+    }
+}

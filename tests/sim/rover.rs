@@ -106,3 +106,54 @@ fn the_battery_drains_and_an_empty_one_stops_the_wheels() {
     }
     assert_eq!((rover.telemetry().battery(), rover.telemetry().rpm), (Some(0), [0; 4]));
 }
+
+/// Speed at 100 %, m/s.
+const FULL_SPEED: f64 = 0.8;
+
+#[test]
+fn a_rover_measures_its_mean_acceleration_of_the_last_step() {
+    let mut rover = Rover::new();
+    rover.command(&MotorControl::new(50, 0).unwrap());
+    // In each 150 ms a wheel makes up for 63 % of what is missing to 50 %.
+    let lag = (-1.0_f64).exp();
+    let speeds = [0.0, 0.5 * (1.0 - lag), 0.5 * (1.0 - lag * lag)];
+    for (before, after) in [(speeds[0], speeds[1]), (speeds[1], speeds[2])] {
+        rover.step(Duration::from_millis(150));
+        let g = (after - before) * FULL_SPEED / 0.15 / 9.81;
+        let [ahead, left, up] = rover.telemetry().acc;
+        assert!((f64::from(ahead) - g * 16384.0).abs() <= 1.0, "{ahead}, {g} g");
+        assert_eq!((left, up), (0, 16384));
+    }
+}
+
+#[test]
+fn a_rover_measures_its_turn_rate_of_the_last_step() {
+    let mut rover = Rover::new();
+    rover.command(&MotorControl::turn_right(0, 20).unwrap());
+    rover.step(Duration::from_millis(3000));
+    rover.step(Duration::from_millis(500));
+    let [left, right, ..] = rover.telemetry().rpm;
+    assert_eq!((left, right), (17, -17));
+    // 14 % of full speed, each in its direction, on wheels 0.3 m apart.
+    let degrees_per_s = (2.0 * 0.14 * FULL_SPEED / 0.3).to_degrees();
+    let expected = -degrees_per_s * 16.4;
+    let turn = f64::from(rover.telemetry().gyro[2]);
+    assert!((turn - expected).abs() < 2.0, "{turn}, not {expected}");
+    assert_eq!(rover.telemetry().acc[0], 0, "it does not go ahead");
+}
+
+#[test]
+fn a_battery_of_40_wh_loses_what_the_rover_takes() {
+    let mut rover = Rover::new();
+    for _ in 0..60 {
+        rover.step(Duration::from_millis(30_000));
+    }
+    // 4 W for half an hour.
+    assert!((rover.battery() - 95.0).abs() < 1e-6, "{}", rover.battery());
+    rover.command(&MotorControl::new(100, 0).unwrap());
+    rover.step(Duration::from_millis(10_000));
+    let at_speed = rover.battery();
+    rover.step(Duration::from_millis(900_000));
+    // 24 W for a quarter of an hour.
+    assert!((at_speed - rover.battery() - 15.0).abs() < 1e-6, "{}", rover.battery());
+}

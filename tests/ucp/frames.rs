@@ -161,3 +161,13 @@ fn no_frame_has_an_empty_length_field_even_without_a_body() {
     );
     assert_eq!((frame.header().id(), frame.header().index()), (1, 7));
 }
+
+#[test]
+fn a_header_is_empty_if_its_length_is_0() {
+    use zerocopy::TryFromBytes;
+    for (len, expected) in [([0, 0], true), ([4, 0], false), ([0, 1], false)] {
+        let bytes = [0xFD, 0xFF, len[0], len[1], 1, 0];
+        let header = Header::try_ref_from_bytes(&bytes).unwrap();
+        assert_eq!(header.is_empty(), expected, "{len:?}");
+    }
+}
