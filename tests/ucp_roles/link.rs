@@ -36,6 +36,26 @@ fn the_link_is_lost_after_500_ms_without_a_valid_frame_and_not_earlier() {
 }
 
 #[test]
+fn the_last_link_event_is_the_latest_however_many_were_not_taken() {
+    let mut host = quiet_host();
+    for second in 1..100 {
+        host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(second * 1000));
+        if second > 90 {
+            let last = events(&mut host.clone()).into_iter().rfind(is_link_event);
+            assert_eq!(last, Some(HostEvent::LinkUp));
+        }
+        host.handle_timeout(ms(second * 1000 + 500));
+    }
+    let links: Vec<_> = events(&mut host).into_iter().filter(is_link_event).collect();
+    assert_eq!(links.last(), Some(&HostEvent::LinkDown));
+    assert!(links.len() < 20, "{}", links.len());
+}
+
+fn is_link_event(event: &HostEvent) -> bool {
+    matches!(event, HostEvent::LinkUp | HostEvent::LinkDown)
+}
+
+#[test]
 fn a_robot_that_never_answers_is_reported_after_500_ms() {
     let mut host = Host::new(HostConfig::default(), ms(0));
     sent(&mut host, ms(0));
