@@ -5,6 +5,7 @@
     tests/mutants.py --minutes 60         for an hour; --workers 2 tries two at a time
     tests/mutants.py --file 'src/ucp/**'  only these files; --again tries what has been tried, too
     tests/mutants.py --woven              all in one build, many times quicker; see tests/woven.py
+    tests/mutants.py --survivors          tries again what survived without a reason
     tests/mutants.py --sample             a sample of the mutants of the last commit, for the gate
     tests/mutants.py --table              prints the score of each module
     tests/mutants.py --check              each survivor on record has a reason that is not stale
@@ -231,6 +232,9 @@ class Record:
         if save:
             self.save()
 
+    def forget(self, mutant):
+        self.state.get(mutant.file, {}).get("outcomes", {}).pop(mutant.key, None)
+
     def save(self):
         self.state_file.parent.mkdir(parents=True, exist_ok=True)
         part = self.state_file.with_suffix(".part")
@@ -238,7 +242,7 @@ class Record:
         part.rename(self.state_file)
 
     def write(self, mutants):
-        """Files of which all mutants have been tried get a line."""
+        """Files of which all mutants have been tried, and all survivors explained, get a line."""
         of_file = collections.defaultdict(list)
         for mutant in mutants:
             of_file[mutant.file].append(mutant.key)
@@ -252,15 +256,17 @@ class Record:
                 self.lines[file] = (digest(file), counts, today)
             survived = {key for key in keys if outcomes[key] == "survived"}
             self.reasons = {at: why for at, why in self.reasons.items() if at[0] != file or at[1] in survived}
-            for key in survived:
-                self.reasons.setdefault((file, key), "")
+            # A file is done when each survivor has a reason.
+            if missing := [key for key in survived if not self.reasons.get((file, key))]:
+                self.lines.pop(file, None)
+                print(f"{file}: {len(missing)} survivors without a reason")
         self.lines = {file: line for file, line in self.lines.items() if (ROOT / file).exists()}
         text = ["# Written by tests/mutants.py: of each file its SHA-256, what became of its changes, and the date.",
                 "# Below it each change that survived, and why it has no effect.", ""]
         for file, (sha, counts, date) in sorted(self.lines.items()):
             text.append(f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}")
             for (of, key), why in sorted(self.reasons.items()):
-                if of == file:
+                if of == file and why:
                     text += [f"    {key}"] + [f"        {why}"] * bool(why)
         RECORD.write_text("\n".join(text) + "\n")
 
@@ -331,6 +337,7 @@ def run_woven(mutants, wanted, workers, until, record, is_patient):
         mutant = mutants[number - 1]
         counts[outcome] += 1
         if outcome == "apart":
+            record.forget(mutant)
             return
         record.keep(mutant, outcome, save=sum(counts.values()) % 20 == 0)
         if outcome == "survived" and not record.has_reason(mutant):
@@ -430,7 +437,7 @@ def main():
     wanted = [m for m in mutants if any(fnmatch.fnmatch(m.file, f) for f in args.file or ["*"])]
     known = {m.name: record.outcomes(m.file).get(m.key) for m in wanted}
     if args.survivors:
-        wanted = [m for m in wanted if known[m.name] == "survived"]
+        wanted = [m for m in wanted if known[m.name] == "survived" and not record.has_reason(m)]
     elif not args.again:
         wanted = [m for m in wanted if known[m.name] is None and not record.is_done(m.file)]
     print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)

@@ -52,7 +52,8 @@ fn running(n: u32) -> bool {
 fn ask(n: u32) -> bool {
     if CHOSEN.load(Relaxed) == UNKNOWN {
         let chosen = std::env::var("WOVEN").ok().and_then(|it| it.parse().ok()).unwrap_or(0);
-        CHOSEN.store(if std::env::var_os("WOVEN_REACHED").is_some() { RECORDING } else { chosen }, Relaxed);
+        let is_recording = std::env::var_os("WOVEN_REACHED").is_some();
+        CHOSEN.store(if is_recording { RECORDING } else { chosen }, Relaxed);
         return running(n);
     }
     if !SEEN[n as usize].swap(true, Relaxed) {
@@ -137,7 +138,8 @@ class File:
         for (start, end), options in guards.items():
             edits.append(Edit(start, end, 2, lambda inner, options=options: guarded(inner, options)))
         for place, pieces in inserts.items():
-            edits.append(Edit(place, place, 0, lambda inner, pieces=pieces: inner + [it for piece in pieces for it in piece]))
+            text = [it for piece in pieces for it in piece]
+            edits.append(Edit(place, place, 0, lambda inner, text=text: inner + text))
         edits.sort(key=lambda edit: (edit.start, edit.end > edit.start, -edit.end, -edit.order))
         pieces, rest = self.rendered(0, len(self.source), edits)
         assert not rest, f"{len(rest)} edits cross another"
