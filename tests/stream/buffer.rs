@@ -2,7 +2,7 @@
 
 use axlewire::{
     ikeya,
-    stream::{Decoder, Event, Frames, Gap, Reason},
+    stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
     ucp::{self, Ucp},
 };
 
@@ -75,4 +75,40 @@ fn a_commit_cannot_exceed_the_available_room() {
     assert!(decoder.spare().is_empty());
     while decoder.decode(&mut &[][..]).is_some() {}
     assert_eq!((decoder.counters().header, decoder.spare().len()), (8, 8));
+    // Nor what is left of it.
+    decoder.commit(3);
+    decoder.commit(6);
+    assert_eq!((decoder.counters().received, decoder.pending()), (16, 8));
+}
+
+#[test]
+fn a_decoder_prints_what_it_holds() {
+    let mut decoder = ucp::Decoder::new();
+    assert_eq!(decoder.decode(&mut &[0xFD, 0xFF, 5][..]), None);
+    let said = format!("{decoder:?}");
+    assert!(said.starts_with("Decoder { held: [253, 255, 5], line: "), "{said}");
+}
+
+#[test]
+fn an_idle_line_takes_no_whole_frame_that_was_not_asked_for_yet() {
+    for bytes in [motor(), [motor(), motor()].concat()] {
+        let mut frames = Frames::<Ucp>::new(&bytes);
+        frames.idle();
+        assert_eq!(frames.by_ref().count(), bytes.len() / motor().len());
+    }
+}
+
+#[test]
+fn a_beginning_needs_more_than_it_has_and_no_more_than_its_frame() {
+    fn check<F: Framing>(frame: &[u8]) {
+        for len in 0..frame.len() {
+            match F::judge(&frame[..len]) {
+                Verdict::Partial { need } => assert!((len + 1..=frame.len()).contains(&need)),
+                verdict => panic!("{verdict:?} of the first {len} bytes"),
+            }
+        }
+        assert_eq!(F::judge(frame), Verdict::Frame { len: frame.len() });
+    }
+    check::<Ucp>(&motor());
+    check::<ikeya::ToMaster>(&response());
 }
