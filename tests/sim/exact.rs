@@ -11,8 +11,9 @@ use axlewire::{
 
 use crate::talker::{Talker, at, one_way, us};
 
-fn pieces(line: &Line<Talker, Talker>) -> Vec<(u64, usize)> {
-    line.tail(0).heard.iter().map(|(at, it)| (*at, it.len())).collect()
+/// When each piece was there, and its length. The loop has seen it `late` microseconds later.
+fn pieces(line: &Line<Talker, Talker>, late: u32) -> Vec<(u64, usize)> {
+    line.tail(0).heard.iter().map(|(at, it)| (*at - u64::from(late), it.len())).collect()
 }
 
 /// Three bytes that end at 20, 120 and 240 us.
@@ -30,10 +31,14 @@ fn a_longer_pause_ends_a_piece_of_dma_and_an_equal_one_does_not() {
         (100, vec![(220, 2), (340, 1)]),
         (120, vec![(360, 3)]),
     ] {
-        let mut line = three_bytes_with_pauses();
-        line.timing_mut(Who::Tail(0)).input = Input::AfterPause { pause: us(pause), at_most: 8 };
-        line.run_for(us(2000)).unwrap();
-        assert_eq!(pieces(&line), expected, "{pause} us");
+        for late in [0, 5] {
+            let mut line = three_bytes_with_pauses();
+            let input = Input::AfterPause { pause: us(pause), at_most: 8 };
+            line.timing_mut(Who::Tail(0)).input = input;
+            line.timing_mut(Who::Tail(0)).latency = us(late);
+            line.run_for(us(2000)).unwrap();
+            assert_eq!(pieces(&line, late), expected, "{pause} us, {late} us late");
+        }
     }
 }
 
@@ -42,10 +47,13 @@ fn a_piece_of_an_adapter_is_full_or_ends_with_its_timer() {
     for (wait, expected) in
         [(219, vec![(239, 2), (459, 1)]), (220, vec![(240, 3)]), (1000, vec![(240, 3)])]
     {
-        let mut line = three_bytes_with_pauses();
-        line.timing_mut(Who::Tail(0)).input = Input::AfterFirst { wait: us(wait), at_most: 3 };
-        line.run_for(us(2000)).unwrap();
-        assert_eq!(pieces(&line), expected, "{wait} us");
+        for late in [0, 5] {
+            let mut line = three_bytes_with_pauses();
+            line.timing_mut(Who::Tail(0)).input = Input::AfterFirst { wait: us(wait), at_most: 3 };
+            line.timing_mut(Who::Tail(0)).latency = us(late);
+            line.run_for(us(2000)).unwrap();
+            assert_eq!(pieces(&line, late), expected, "{wait} us, {late} us late");
+        }
     }
 }
 
@@ -88,6 +96,12 @@ fn bytes_that_touch_do_not_collide() {
     line.run_for(us(1000)).unwrap();
     assert_eq!(line.statistics(Direction::ToHead).collided, 0);
     assert_eq!(line.head().bytes(), [[0x33; 4], [0x11; 4], [0x22; 4]].concat());
+    // One byte meets the second of four, and touches the third.
+    let mut line = Line::new(500_000, 5, Talker::default());
+    line.add(Talker::saying(at(0), &[0x11; 4]));
+    line.add(Talker::saying(at(20), &[0x22]));
+    line.run_for(us(1000)).unwrap();
+    assert_eq!(line.statistics(Direction::ToHead).collided, 2);
 }
 
 #[test]
