@@ -211,6 +211,8 @@ class Record:
             if match := re.fullmatch(r"(\S+\.rs) (\w+): (\d+) caught, (\d+) unviable, (\d+) survived, (\S+)", line):
                 file = match[1]
                 self.lines[file] = (match[2], [int(match[i]) for i in (3, 4, 5)], match[6])
+            elif match := re.fullmatch(r"(\S+\.rs): not done", line):
+                file = match[1]
             elif line.startswith("        "):
                 self.reasons[file, key] = line.strip()
             elif line.startswith("    "):
@@ -262,13 +264,20 @@ class Record:
                 print(f"{file}: {len(missing)} survivors without a reason")
         self.lines = {file: line for file, line in self.lines.items() if (ROOT / file).exists()}
         text = ["# Written by tests/mutants.py: of each file its SHA-256, what became of its changes, and the date.",
-                "# Below it each change that survived, and why it has no effect.", ""]
-        for file, (sha, counts, date) in sorted(self.lines.items()):
-            text.append(f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}")
+                "# Below it each change that survived, and why it has no effect.", self.sum(), ""]
+        heads = {file: f"{file}: not done" for (file, _), why in self.reasons.items() if why}
+        for file, (sha, counts, date) in self.lines.items():
+            heads[file] = f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}"
+        for file, head in sorted(heads.items()):
+            text.append(head)
             for (of, key), why in sorted(self.reasons.items()):
                 if of == file and why:
                     text += [f"    {key}"] + [f"        {why}"] * bool(why)
         RECORD.write_text("\n".join(text) + "\n")
+
+    def sum(self):
+        caught, _, survived = (sum(counts[i] for _, counts, _ in self.lines.values()) for i in range(3))
+        return f"# {len(self.lines)} files: {caught} caught of {caught + survived} that compile."
 
     def has_reason(self, mutant):
         return bool(self.reasons.get((mutant.file, mutant.key)))
@@ -399,10 +408,12 @@ def check(record):
     """Every survivor on record has a reason, and its line is still in its file."""
     faults = []
     for (file, key), why in record.reasons.items():
-        line = re.sub(r" \(\d+\)$", "", key.split(" | ", 1)[1])
+        # Behind the first bar, or behind the second if the change itself is one of `|`.
+        parts = re.sub(r" \(\d+\)$", "", key).split(" | ")
+        lines = [" | ".join(parts[at:]) for at in range(1, len(parts))]
         if not why:
             faults.append(f"{file}: no reason: {key}")
-        elif (ROOT / file).exists() and line not in (ROOT / file).read_text():
+        elif (ROOT / file).exists() and not any(line in (ROOT / file).read_text() for line in lines):
             faults.append(f"{file}: the line is gone: {key}")
     faults += [f"{file}: the file is gone" for file in record.lines if not (ROOT / file).exists()]
     for file, (_, (_, _, survived), _) in record.lines.items():
