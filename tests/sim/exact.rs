@@ -96,12 +96,14 @@ fn bytes_that_touch_do_not_collide() {
     line.run_for(us(1000)).unwrap();
     assert_eq!(line.statistics(Direction::ToHead).collided, 0);
     assert_eq!(line.head().bytes(), [[0x33; 4], [0x11; 4], [0x22; 4]].concat());
-    // One byte meets the second of four, and touches the third.
-    let mut line = Line::new(500_000, 5, Talker::default());
-    line.add(Talker::saying(at(0), &[0x11; 4]));
-    line.add(Talker::saying(at(20), &[0x22]));
-    line.run_for(us(1000)).unwrap();
-    assert_eq!(line.statistics(Direction::ToHead).collided, 2);
+    // The second byte of one meets the first of the other. What is behind them only touches.
+    for (first, second) in [(4, 1), (2, 2)] {
+        let mut line = Line::new(500_000, 5, Talker::default());
+        line.add(Talker::saying(at(0), &vec![0x11; first]));
+        line.add(Talker::saying(at(20), &vec![0x22; second]));
+        line.run_for(us(1000)).unwrap();
+        assert_eq!(line.statistics(Direction::ToHead).collided, 2, "{first}, {second}");
+    }
 }
 
 #[test]
