@@ -29,10 +29,11 @@ import pathlib
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
+
+import quick
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RECORD = ROOT / "tests" / "mutants.txt"
@@ -159,26 +160,12 @@ class Tree:
     def test(self, package, tests):
         """Whether a test fails, or never ends; `unviable` if the tree does not compile."""
         patience_s = max(LEAST_PATIENCE_S, PATIENCE * self.took_s.get(tests, 1000))
-        quick = {"CARGO_PROFILE_DEV_DEBUG": "none", "CARGO_INCREMENTAL": "1", "CARGO_TERM_COLOR": "never",
-                 "CARGO_TARGET_DIR": str(self.target), "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1",
-                 "RUSTFLAGS": "--cap-lints allow" + " -Clink-arg=-fuse-ld=lld" * bool(shutil.which("ld.lld"))}
         command = ["cargo", "test", "--quiet", "-p", package, *tests.split()]
-        with subprocess.Popen(command, cwd=self.path, env=os.environ | quick, text=True,
-                              start_new_session=True, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as run:
-            try:
-                _, err = run.communicate(timeout=patience_s)
-            except subprocess.TimeoutExpired:
-                return "caught"
-            finally:
-                # Also what a test has started and left.
-                try:
-                    os.killpg(run.pid, signal.SIGKILL)
-                except ProcessLookupError:
-                    pass
-        if run.returncode == 0:
+        status, errors = quick.finish(command, patience_s, cwd=self.path,
+                                      env=quick.build_environment(self.target))
+        if status == 0:
             return "survived"
-        return "unviable" if "could not compile" in err else "caught"
+        return "unviable" if "could not compile" in errors else "caught"
 
     def check_unchanged(self, package, tests):
         """Without a change these tests pass; builds what later runs need, and takes the time."""

@@ -18,13 +18,12 @@ import json
 import os
 import pathlib
 import resource
-import shutil
-import signal
 import subprocess
 import sys
 import threading
 import time
 
+import quick
 import tree_sitter
 import tree_sitter_rust
 
@@ -246,11 +245,8 @@ class Build:
             self.files[file] = File((tree / file).read_text(), its)
 
     def environment(self):
-        flags = "--cap-lints allow" + " -Clink-arg=-fuse-ld=lld" * bool(shutil.which("ld.lld"))
-        return os.environ | {
-            "RUSTC_BOOTSTRAP": "axlewire,axle,exhaustive,fuzz_seeds", "CARGO_TARGET_DIR": str(self.target), "RUSTFLAGS": flags,
-            "CARGO_PROFILE_DEV_DEBUG": "none", "CARGO_INCREMENTAL": "1",
-            "CARGO_TERM_COLOR": "never"}
+        crates = "axlewire,axle,exhaustive,fuzz_seeds"
+        return quick.build_environment(self.target) | {"RUSTC_BOOTSTRAP": crates}
 
     def write(self):
         """Writes all files; returns their regions."""
@@ -333,18 +329,8 @@ class Test:
         def limit():
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with subprocess.Popen([self.program, "--exact", self.name, "--test-threads=1"], cwd=self.at, env=environment,
-                              start_new_session=True, preexec_fn=limit, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
-            try:
-                code = run.wait(patience_s)
-            except subprocess.TimeoutExpired:
-                code = None
-            finally:
-                try:
-                    os.killpg(run.pid, signal.SIGKILL)
-                except ProcessLookupError:
-                    pass
+        code, _ = quick.finish([self.program, "--exact", self.name, "--test-threads=1"], patience_s,
+                               cwd=self.at, env=environment, preexec_fn=limit)
         return "late" if code is None else "passed" if code == 0 else "failed"
 
     def learn(self, directory, number):

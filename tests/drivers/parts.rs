@@ -1,9 +1,8 @@
-//! What a driver and a port are made of comes back out, and what a clock, an endpoint or a store
-//! leaves to its trait does what the trait says.
+//! What a driver and a port are made of comes back out, and what a clock or a store leaves to
+//! its trait does what the trait says.
 
 use axlewire::{
     drive::{Clock, Driver},
-    endpoint::{Endpoint, Unsent},
     time::Instant,
 };
 
@@ -45,44 +44,6 @@ fn a_closure_as_a_clock_does_not_idle() {
     };
     clock.idle_until(Instant::from_micros(u64::MAX));
     assert_eq!(clock.now(), Instant::from_micros(1));
-}
-
-/// An endpoint that leaves to the trait what it can.
-#[derive(Default)]
-struct Plain(Vec<(Vec<u8>, Instant)>);
-
-impl Endpoint for Plain {
-    type Event = ();
-
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.0.push((bytes.to_vec(), now));
-    }
-
-    fn handle_timeout(&mut self, _: Instant) {}
-
-    fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
-        None
-    }
-
-    fn poll_event(&mut self) -> Option<()> {
-        None
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        None
-    }
-}
-
-#[test]
-fn an_endpoint_without_commands_takes_old_bytes_as_new_and_loses_what_did_not_leave() {
-    let mut plain = Plain::default();
-    let (since, now) = (Instant::from_micros(1), Instant::from_micros(2));
-    plain.handle_old_input(&[5], since, now);
-    plain.handle_unsent(Unsent::CutOff, now);
-    assert_eq!(plain.0, [(vec![5], now)]);
-    assert!(plain.poll_transmit(now).is_none() && !plain.is_outdated());
-    assert_eq!(plain.held_up_after(), None);
-    assert_eq!((plain.frame_pause().as_micros(), plain.wire_time(8).as_micros()), (20_000, 0));
 }
 
 #[cfg(feature = "ucp")]

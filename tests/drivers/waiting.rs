@@ -2,7 +2,7 @@
 
 use axlewire::{
     drive::Driver,
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
 };
 
@@ -121,10 +121,17 @@ fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
 }
 
 #[test]
-fn by_default_a_role_treats_old_bytes_as_new_and_frames_may_pause_for_20_ms() {
+fn by_default_a_role_treats_old_bytes_as_new_and_loses_what_did_not_leave() {
     let mut role = Plain::default();
     role.handle_old_input(b"12", at_ms(1), at_ms(9));
+    role.handle_unsent(Unsent::CutOff, at_ms(9));
     assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);
+    assert!(role.poll_transmit(at_ms(9)).is_none() && !role.is_outdated());
+}
+
+#[test]
+fn by_default_frames_may_pause_for_20_ms_and_take_no_time() {
+    let role = Plain::default();
     assert_eq!(role.held_up_after(), None);
     assert_eq!(role.frame_pause(), Duration::from_millis(20));
     assert_eq!(role.wire_time(64), Duration::ZERO);

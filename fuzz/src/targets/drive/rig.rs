@@ -95,6 +95,11 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         self.port.fault(call, fault);
     }
 
+    /// When the last of the bytes under way arrives.
+    pub(super) fn last_arrival(&mut self) -> Instant {
+        self.driver.now() + Duration::from_micros(self.port.under_way_us() as u32)
+    }
+
     pub(super) fn begin(&self) -> Before {
         let world = self.port.world();
         Before {

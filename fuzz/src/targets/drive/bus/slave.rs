@@ -28,6 +28,7 @@ where
     let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
     let role = |now| -> Slave { Slave::new(NodeId::N1, mode, config, now) };
     let mut rig = Rig::<Slave, P>::new(begin_us, 20, Nobody, role);
+    // When each WRITE arrived.
     let mut written: Vec<(Instant, WriteRequest)> = Vec::new();
     for _ in 0..40 {
         if u.is_empty() || rig.port.world().calls > ENOUGH {
@@ -40,7 +41,7 @@ where
             Do::Request { node, rps: Some(to) } => {
                 let write = WriteRequest::velocity(node, rps(to));
                 rig.port.receive(write.as_bytes());
-                let at = rig.driver.now();
+                let at = rig.last_arrival();
                 written.extend((node == NodeId::N1).then_some((at, write)));
             }
             Do::Service => {

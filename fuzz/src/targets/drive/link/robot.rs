@@ -2,7 +2,7 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
-    time::{Duration, Instant},
+    time::Instant,
     ucp::{
         Robot, Telemetry,
         robot::{ReportLayout, RobotConfig},
@@ -50,8 +50,7 @@ where
                 rig.port.receive(&frame(2, &body));
                 let motion =
                     (i16::from(speed).clamp(-100, 100), i16::from(angular).clamp(-100, 100));
-                let takes = Duration::from_micros(rig.port.under_way_us() as u32);
-                told.push((rig.driver.now() + takes, motion));
+                told.push((rig.last_arrival(), motion));
             }
             Do::Service => {
                 let done = call!(rig, how, service, service_async());

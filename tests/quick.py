@@ -1,0 +1,36 @@
+"""Builds that are made often and thrown away, and programs that must not outlive their time."""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+
+
+def build_environment(target):
+    """Of a cargo that builds quickly into this folder: no debug info, lld if there is one."""
+    flags = "--cap-lints allow" + " -Clink-arg=-fuse-ld=lld" * bool(shutil.which("ld.lld"))
+    return os.environ | {
+        "CARGO_TARGET_DIR": str(target), "RUSTFLAGS": flags, "CARGO_PROFILE_DEV_DEBUG": "none",
+        "CARGO_INCREMENTAL": "1", "CARGO_TERM_COLOR": "never",
+        "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1"}
+
+
+def finish(command, patience_s, **options):
+    """Runs it, and ends it with all that it started: its status, `None` if it was late; its errors."""
+    # Not a pipe: what it has started and left would keep that open.
+    with tempfile.TemporaryFile() as errors:
+        run = subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL,
+                               stdout=subprocess.DEVNULL, stderr=errors, **options)
+        try:
+            status = run.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            status = None
+        finally:
+            try:
+                os.killpg(run.pid, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+            run.wait()
+        errors.seek(0)
+        return status, errors.read().decode(errors="replace")
