@@ -61,6 +61,9 @@ mod rounds;
 #[cfg(feature = "ucp")]
 #[path = "drivers/rover.rs"]
 mod rover;
+/// A port that takes its time.
+#[path = "drivers/slow_port.rs"]
+mod slow_port;
 /// Stops, and drives that end with one.
 #[path = "drivers/stops.rs"]
 mod stops;

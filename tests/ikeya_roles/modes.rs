@@ -115,6 +115,7 @@ fn a_late_answer_in_another_mode_puts_the_mode_in_doubt_and_decides_nothing() {
         Status::Velocity(0.0),
         "the late answer is not taken"
     );
+    assert_eq!(desk.master.node_statistics(NodeId::N1).other_mode, 3, "each one is counted");
     assert_eq!(desk.packets(1), [read(NodeId::N1)]);
     assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
 }
