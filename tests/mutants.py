@@ -40,7 +40,9 @@ RECORD = ROOT / "tests" / "mutants.txt"
 WORK = ROOT / "target" / "mutants"
 # Tests that take so many times as long as without a change wait for something that it prevents.
 PATIENCE = 4
-LEAST_PATIENCE_S = 120
+LEAST_PATIENCE_S = 60
+# The compiler has no reason to take longer.
+BUILD_S = 1200
 
 # Files, and the tests that concern them most; the first match counts.
 CONCERNED = [
@@ -127,7 +129,8 @@ class Tree:
     def __init__(self, number):
         self.path, self.target = WORK / f"tree{number}", WORK / f"target{number}"
         self.path.mkdir(parents=True, exist_ok=True)
-        self.took_s = {}  # tests: how long they take without a change
+        self.took_s = {}  # tests: how long they run without a change
+        self.latest_s = 0.0
         files = subprocess.run(["git", "ls-files", "-z", "-co", "--exclude-standard"], cwd=ROOT,
                                check=True, stdout=subprocess.PIPE, text=True).stdout
         known = {file for file in files.split("\0") if file and (ROOT / file).is_file()}
@@ -159,22 +162,26 @@ class Tree:
 
     def test(self, package, tests):
         """Whether a test fails, or never ends; `unviable` if the tree does not compile."""
-        patience_s = max(LEAST_PATIENCE_S, PATIENCE * self.took_s.get(tests, 1000))
         command = ["cargo", "test", "--quiet", "-p", package, *tests.split()]
-        status, errors = quick.finish(command, patience_s, cwd=self.path,
-                                      env=quick.build_environment(self.target))
-        if status == 0:
-            return "survived"
-        return "unviable" if "could not compile" in errors else "caught"
+        options = {"cwd": self.path, "env": quick.build_environment(self.target)}
+        status, errors = quick.finish([*command, "--no-run"], BUILD_S, **options)
+        if status != 0:
+            if "could not compile" not in errors:
+                sys.exit(f"`{' '.join(command)} --no-run` fails in {self.path}: {errors}")
+            return "unviable"
+        patience_s = max(LEAST_PATIENCE_S, PATIENCE * self.took_s.get(tests, 1000))
+        begin = time.monotonic()
+        status, _ = quick.finish(command, patience_s, preexec_fn=quick.limit_memory, **options)
+        self.latest_s = time.monotonic() - begin
+        return "survived" if status == 0 else "caught"
 
     def check_unchanged(self, package, tests):
-        """Without a change these tests pass; builds what later runs need, and takes the time."""
+        """Without a change these tests pass. Notes how long they run."""
         if tests in self.took_s:
             return
-        begin = time.monotonic()
         if self.test(package, tests) != "survived":
             sys.exit(f"without a change, `cargo test -p {package} {tests}` fails in {self.path}")
-        self.took_s[tests] = time.monotonic() - begin
+        self.took_s[tests] = self.latest_s
 
 
 def concerned(file):

@@ -1,10 +1,13 @@
 """Builds that are made often and thrown away, and programs that must not outlive their time."""
 
 import os
+import resource
 import shutil
 import signal
 import subprocess
 import tempfile
+
+MEMORY_BYTES = 8 << 30
 
 
 def build_environment(target):
@@ -34,3 +37,9 @@ def finish(command, patience_s, **options):
             run.wait()
         errors.seek(0)
         return status, errors.read().decode(errors="replace")
+
+
+def limit_memory():
+    """For a `preexec_fn`: a program that takes ever more memory fails, and leaves no core."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

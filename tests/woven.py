@@ -17,7 +17,6 @@ import itertools
 import json
 import os
 import pathlib
-import resource
 import subprocess
 import sys
 import threading
@@ -75,7 +74,6 @@ ATTRIBUTES = "#![feature(core_intrinsics, const_eval_select)] #![allow(internal_
 
 # A test that takes so much longer than without a change waits for something that it prevents.
 PATIENCE, LEAST_PATIENCE_S = 8, 2
-MEMORY_BYTES = 8 << 30
 # Tests that took longer have to fail twice: they use the real clock.
 REAL_TIME_S = 1.0
 # So much of the tests that reach a mutant, the quickest ones, is tried at first; all of them with
@@ -325,12 +323,8 @@ class Test:
     def run(self, extra, patience_s):
         """`passed`, `failed` or `late`."""
         environment = os.environ | {"CARGO_MANIFEST_DIR": str(self.at), "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1"} | extra
-
-        def limit():
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         code, _ = quick.finish([self.program, "--exact", self.name, "--test-threads=1"], patience_s,
-                               cwd=self.at, env=environment, preexec_fn=limit)
+                               cwd=self.at, env=environment, preexec_fn=quick.limit_memory)
         return "late" if code is None else "passed" if code == 0 else "failed"
 
     def learn(self, directory, number):
