@@ -21,6 +21,9 @@ use crate::{
 
 pub(crate) use crate::boards::Boards;
 
+mod wait;
+use wait::{RUN_OUT, Wait};
+
 /// Period at which each node is read and its set-point repeated: short enough for every motor, and
 /// a USB adapter keeps up with three nodes.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -31,12 +34,6 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 /// Minimum time allowed for nodes that answer to confirm a stop. A slow line gets more:
 /// [`Master::stop_bound`].
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
-
-/// Time allowed for a motor to coast down after its node has confirmed the stop.
-const RUN_OUT: Duration = Duration::from_millis(3000);
-
-/// Time for which an id must be asked without ever answering before it counts as silent.
-const SILENCE: Duration = Duration::from_millis(1000);
 
 /// Time allowed for nodes to answer before they are stopped by what was known of them.
 const REFRESH: Duration = Duration::from_millis(200);
@@ -249,22 +246,14 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
         let begin = self.now();
         nodes.iter().for_each(|node| self.master_mut().stop(node, begin));
-        let bound = self.stop_bound();
-        let (mut awake, mut confirmed_at) = (Awake::new(begin), None);
+        let mut wait = Wait::new(self.stop_bound());
+        let mut awake = Awake::new(begin);
         loop {
             let result = self.look();
             let time = awake.time(self.now());
             let is_any = |halt| nodes.iter().any(|node| self.halt(node) == halt);
-            let is_asking = time < SILENCE || nodes.iter().any(|node| self.is_unasked(node));
-            let deadline = if is_any(Halt::Owed) || is_any(Halt::Doubtful) {
-                bound
-            } else if is_any(Halt::Moving) {
-                *confirmed_at.get_or_insert(time) + RUN_OUT
-            } else if (is_any(Halt::Silent) || is_any(Halt::Damaged)) && is_asking {
-                bound
-            } else {
-                return result;
-            };
+            let is_unasked = nodes.iter().any(|node| self.is_unasked(node));
+            let Some(deadline) = wait.deadline(time, is_any, is_unasked) else { return result };
             if time >= deadline {
                 return result;
             }
