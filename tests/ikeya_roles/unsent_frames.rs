@@ -53,7 +53,8 @@ fn a_repeated_read_that_did_not_leave_is_no_repetition() {
         assert_eq!(desk.turn(), read(NodeId::N1));
         assert_eq!(desk.master.node_statistics(NodeId::N1).retries, 1);
         // Answered. A new READ is no repetition, whether it leaves or not.
-        desk.hear(100, &velocity(NodeId::N1, 0.0));
+        desk.hear(300, &velocity(NodeId::N1, 0.0));
+        assert_eq!(desk.master.node_statistics(NodeId::N1).replies, 2);
         assert_eq!(desk.turn(), read(NodeId::N1));
         fail(&mut desk, unsent);
         assert_eq!(desk.master.node_statistics(NodeId::N1).retries, 1);

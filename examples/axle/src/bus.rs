@@ -16,7 +16,7 @@ use crate::{
     failure::Failure,
     line::Line,
     session::Session,
-    signals::{ABSENCE, Awake, Signals},
+    signals::{ABSENCE, Signals},
 };
 
 pub(crate) use crate::boards::Boards;
@@ -246,15 +246,13 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
         let begin = self.now();
         nodes.iter().for_each(|node| self.master_mut().stop(node, begin));
-        let mut wait = Wait::new(self.stop_bound());
-        let mut awake = Awake::new(begin);
+        let mut wait = Wait::new(self.stop_bound(), begin);
         loop {
             let result = self.look();
-            let time = awake.time(self.now());
+            let now = self.now();
             let is_any = |halt| nodes.iter().any(|node| self.halt(node) == halt);
             let is_unasked = nodes.iter().any(|node| self.is_unasked(node));
-            let Some(deadline) = wait.deadline(time, is_any, is_unasked) else { return result };
-            if time >= deadline {
+            if !wait.goes_on(now, is_any, is_unasked) {
                 return result;
             }
             if result.is_err() {

@@ -1,8 +1,9 @@
 //! How long a stop is waited for.
 
-use axlewire::time::Duration;
+use axlewire::time::{Duration, Instant};
 
 use super::Halt;
+use crate::signals::Awake;
 
 /// Time for which an id must be asked without ever answering before it counts as silent.
 const SILENCE: Duration = Duration::from_millis(1000);
@@ -10,36 +11,38 @@ const SILENCE: Duration = Duration::from_millis(1000);
 /// Time allowed for a motor to coast down after its node has confirmed the stop.
 pub(super) const RUN_OUT: Duration = Duration::from_millis(3000);
 
-/// How long to wait for the outcome of a stop.
+/// The wait for the outcome of a stop. A suspension of the tool takes no time of it.
 pub(super) struct Wait {
-    /// For the confirmations.
+    /// Time for the confirmations.
     bound: Duration,
-    /// When the last node has confirmed its stop.
+    /// Time since the beginning.
+    awake: Awake,
+    /// When the last node has confirmed its stop, on the same clock.
     confirmed_at: Option<Duration>,
 }
 
 impl Wait {
-    pub(super) const fn new(bound: Duration) -> Self {
-        Self { bound, confirmed_at: None }
+    pub(super) const fn new(bound: Duration, now: Instant) -> Self {
+        Self { bound, awake: Awake::new(now), confirmed_at: None }
     }
 
-    /// The deadline, with these outcomes so far, some of them of nodes that were not asked often
-    /// enough; `None` if there is nothing to wait for.
-    pub(super) fn deadline(
+    /// Whether to go on, with these outcomes so far; `is_unasked` if one of the ids that have never
+    /// answered was not asked often enough. Call it in every round.
+    pub(super) fn goes_on(
         &mut self,
-        time: Duration,
+        now: Instant,
         is_any: impl Fn(Halt) -> bool,
         is_unasked: bool,
-    ) -> Option<Duration> {
-        let is_asking = is_unasked || time < SILENCE;
+    ) -> bool {
+        let time = self.awake.time(now);
         if is_any(Halt::Owed) || is_any(Halt::Doubtful) {
-            Some(self.bound)
+            time < self.bound
         } else if is_any(Halt::Moving) {
-            Some(*self.confirmed_at.get_or_insert(time) + RUN_OUT)
-        } else if is_asking && (is_any(Halt::Silent) || is_any(Halt::Damaged)) {
-            Some(self.bound)
+            time < *self.confirmed_at.get_or_insert(time) + RUN_OUT
+        } else if is_any(Halt::Silent) || is_any(Halt::Damaged) {
+            time < self.bound && (is_unasked || time < SILENCE)
         } else {
-            None
+            false
         }
     }
 }
@@ -48,27 +51,66 @@ impl Wait {
 mod tests {
     use super::*;
 
+    /// A wait with a bound of 5 s, asked every 100 ms.
+    struct Asked(Wait, u64);
+
+    impl Asked {
+        fn new() -> Self {
+            Self(Wait::new(Duration::from_millis(5000), Instant::from_micros(0)), 0)
+        }
+
+        /// Goes on until this time with these outcomes; whether it still goes on then.
+        fn until(&mut self, millis: u64, halts: &[Halt], is_unasked: bool) -> bool {
+            while self.1 < millis {
+                self.1 += 100;
+                let now = Instant::from_micros(1000 * self.1);
+                if !self.0.goes_on(now, |halt| halts.contains(&halt), is_unasked) {
+                    return false;
+                }
+            }
+            true
+        }
+    }
+
     #[test]
     fn a_motor_has_three_seconds_to_run_out_once_all_have_confirmed_their_stops() {
-        let ms = Duration::from_millis;
-        let mut wait = Wait::new(ms(5000));
-        let mut deadline = |millis, halts: &[Halt], is_unasked| {
-            wait.deadline(ms(millis), |halt| halts.contains(&halt), is_unasked)
-        };
-        assert_eq!(deadline(500, &[Halt::Moving, Halt::Owed], true), Some(ms(5000)));
-        assert_eq!(deadline(700, &[Halt::Moving, Halt::Doubtful], true), Some(ms(5000)));
-        assert_eq!(deadline(1500, &[Halt::Moving, Halt::Silent], true), Some(ms(4500)));
-        assert_eq!(
-            deadline(2500, &[Halt::Moving, Halt::Still], false),
-            Some(ms(4500)),
-            "not again"
-        );
-        for silent in [Halt::Silent, Halt::Damaged] {
-            assert_eq!(deadline(2600, &[silent, Halt::Still], true), Some(ms(5000)));
-            assert_eq!(deadline(2600, &[silent, Halt::Still], false), None);
+        let mut wait = Asked::new();
+        assert!(wait.until(1000, &[Halt::Moving, Halt::Owed], false));
+        assert!(wait.until(2000, &[Halt::Moving, Halt::Doubtful], false));
+        assert!(wait.until(3000, &[Halt::Moving, Halt::Silent], false));
+        assert!(wait.until(5000, &[Halt::Moving, Halt::Still], false));
+        assert!(!wait.until(5100, &[Halt::Moving], false), "confirmed at 2.1 s");
+    }
+
+    #[test]
+    fn a_stop_that_is_not_confirmed_is_waited_for_until_its_bound() {
+        for halt in [Halt::Owed, Halt::Doubtful] {
+            let mut wait = Asked::new();
+            assert!(wait.until(4900, &[halt, Halt::Still, Halt::Moving], false));
+            assert!(!wait.until(5000, &[halt, Halt::Still], true));
         }
-        assert_eq!(deadline(999, &[Halt::Silent], false), Some(ms(5000)));
-        assert_eq!(deadline(1000, &[Halt::Silent], false), None);
-        assert_eq!(deadline(2700, &[Halt::Still], true), None);
+    }
+
+    #[test]
+    fn an_id_that_never_answers_is_waited_for_for_a_second_and_until_it_was_asked_enough() {
+        for halt in [Halt::Silent, Halt::Damaged] {
+            let mut wait = Asked::new();
+            assert!(wait.until(900, &[halt, Halt::Still], false));
+            assert!(wait.until(4000, &[halt], true));
+            assert!(!wait.until(4100, &[halt], false));
+            let mut wait = Asked::new();
+            assert!(wait.until(4900, &[halt], true));
+            assert!(!wait.until(5000, &[halt], true));
+        }
+        assert!(!Asked::new().until(100, &[Halt::Still], true), "nothing to wait for");
+    }
+
+    #[test]
+    fn a_suspended_stop_has_all_of_its_time_afterwards() {
+        let mut wait = Asked::new();
+        assert!(wait.until(1000, &[Halt::Owed], false));
+        wait.1 += 60_000;
+        assert!(wait.until(64_000, &[Halt::Owed], false));
+        assert!(!wait.until(65_000, &[Halt::Owed], false));
     }
 }
