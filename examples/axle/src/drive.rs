@@ -169,21 +169,20 @@ impl Drive {
         while !signals.is_raised() {
             let now = self.rover.now();
             // An absence ends the drive: the host stops the robot after one, but the next command
-            // would drive it again.
+            // would drive it again. First, because it has other effects, too.
             attendance.check(now)?;
-            if now >= end {
-                break;
-            }
-            let driven = self.rover.host_mut().drive(command, now);
-            driven.map_err(|error| Failure::Failed(error.to_string()))?;
-            self.rover.round((now + CALL_PERIOD).min(end).min(print_at))?;
-            attendance.check(self.rover.now())?;
             if self.rover.has_dead_man_fired {
                 return Err(Failure::Failed(DEAD_MAN.to_owned()));
             }
             if self.rover.host().link() == Link::Down {
                 return Err(Failure::Failed("the robot is no longer heard".to_owned()));
             }
+            if now >= end {
+                break;
+            }
+            let driven = self.rover.host_mut().drive(command, now);
+            driven.map_err(|error| Failure::Failed(error.to_string()))?;
+            self.rover.round((now + CALL_PERIOD).min(end).min(print_at))?;
             if self.rover.now() >= print_at {
                 print_at = self.rover.now() + PRINT_PERIOD;
                 self.say_report(Event::Report)?;

@@ -114,3 +114,21 @@ fn lost_reports_are_told() {
     let last: Value = serde_json::from_str(lines.last().unwrap()).unwrap();
     assert!(last["reports_lost"].as_u64().unwrap() > 3, "{last}");
 }
+
+#[test]
+fn an_absence_ends_the_drive_and_nothing_is_commanded_after_it() {
+    let mut absences = 0;
+    let line = played::rover(move |rover| {
+        if rover.commands.last() == Some(&(30, -10)) && absences == 0 {
+            absences += 1;
+            std::thread::sleep(std::time::Duration::from_millis(600));
+            rover.commands.clear();
+        }
+    });
+    let (mut drive, _) = ready(&line);
+    let error = drive.drive(command(), 10_000_000, &Signals::none()).unwrap_err().to_string();
+    assert!(error.starts_with("the tool did not run for 0."), "{error}");
+    drive.stop().unwrap();
+    let commands = &line.state.borrow().commands;
+    assert!(commands.iter().all(|command| *command == (0, 0)), "{commands:?}");
+}

@@ -101,14 +101,14 @@ impl<B: Boards> Spin<B> {
         let mut attendance = Attendance::new(self.start);
         while !signals.is_raised() {
             let now = self.bus.now();
+            // First, because an absence has other effects, too.
             attendance.check(now)?;
+            self.check_follows(target)?;
             if now >= end {
                 return self.check_reached(target);
             }
             self.bus.master_mut().keep_alive(now);
             self.bus.round(end.min(print_at).min(now + CALL_PERIOD))?;
-            attendance.check(self.bus.now())?;
-            self.check_follows(target)?;
             if self.bus.now() >= print_at {
                 print_at = self.bus.now() + PRINT_PERIOD;
                 self.say_status(false)?;

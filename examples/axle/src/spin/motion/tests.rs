@@ -100,6 +100,22 @@ fn an_output_that_fails_is_told_behind_the_stop() {
 }
 
 #[test]
+fn an_absence_ends_the_spin_and_nothing_is_commanded_after_it() {
+    let mut absences = 0;
+    let line = played::bus(&[Node::velocity(1)], move |_, bus| {
+        if bus.nodes[0].rps == 2.0 && absences == 0 {
+            absences += 1;
+            std::thread::sleep(std::time::Duration::from_millis(600));
+            bus.said.clear();
+        }
+    });
+    let (spin, _) = ready(&line);
+    let error = spin.run(speed(2.0), 10_000_000, &Signals::none()).unwrap_err().to_string();
+    assert!(error.starts_with("the tool did not run for 0."), "{error}");
+    assert!(line.speeds().iter().all(|rps| *rps == 0.0), "{:?}", line.speeds());
+}
+
+#[test]
 fn a_single_lost_answer_ends_no_spin() {
     let line = played::bus(&[Node::velocity(1)], |_, bus| {
         let reads = bus.said.iter().filter(|(said, _)| *said == Said::Read(1)).count();
