@@ -40,6 +40,15 @@ fn stops_of_velocity_nodes_go_first_then_positions_in_turn() {
 }
 
 #[test]
+fn a_measured_position_is_written_before_a_stop_given_behind_its_read() {
+    let mut desk = Desk::with_nodes(mixed(), &MIXED);
+    desk.master.stop(NodeId::N1, desk.now);
+    while desk.exchange() != Some(read(NodeId::N1)) {}
+    desk.master.stop(NodeId::N2, desk.now);
+    assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (WRITE, 2)]);
+}
+
+#[test]
 fn between_two_exchanges_for_one_stop_the_cycle_reads_the_next_node() {
     let nodes = [(NodeId::N1, Mode::Velocity), (NodeId::N2, Mode::Velocity)];
     let mut desk = Desk::with_nodes(only(&nodes.map(|it| it.0)), &nodes);

@@ -112,14 +112,16 @@ impl Turns {
         }
     }
 
-    /// Whether it is this node's turn. A stop WRITE is followed by a READ before it is repeated, so
-    /// it needs no turn of its own unless it is answered.
+    /// Whether it is this node's turn; a regular request is always for the next round. A stop WRITE
+    /// is followed by a READ before it is repeated, so it needs no turn of its own unless it is
+    /// answered.
     pub(super) fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
         let had = match reason {
             _ if round == Round::Next => 0,
             Reason::SpeedStop | Reason::Stop if !B::ANSWERS_WRITE => 0,
             Reason::SetPoint => self.had_set_point,
-            Reason::Hold | Reason::Discovery | Reason::Search | Reason::Cycle => 0,
+            // Directly behind its READ.
+            Reason::Hold => 0,
             _ => self.had_stop,
         };
         had >> index & 1 == 0
