@@ -312,6 +312,7 @@ def run_woven(mutants, wanted, workers, until, record, is_patient):
     except ImportError:
         sys.exit("--woven needs: pip install tree-sitter tree-sitter-rust")
     packages = {mutant.package for mutant in wanted}
+    mutants = [mutant for mutant in mutants if mutant.package in packages]
     tree = Tree("woven")
     build = woven.Build(tree.path, tree.target, mutants, packages)
     commands = [[word, "-p", package, *ALL[package].split()] for word in ("check", "build")

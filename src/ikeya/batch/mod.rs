@@ -129,5 +129,12 @@ mod tests {
         let exchange = [0xAA, 0x01, 0xBE, 0xD0, 0xBB, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x43, 0x40];
         let batch = <ToSlave as Framing>::Batch::accept_batch(&exchange.repeat(20), true);
         assert!(batch.frames >= 14, "{batch:?}");
+        let answer = |header| {
+            let body = [header, 0x02, 0, 0, 0, 0];
+            [&body[..], &crc16::compute(&body).to_le_bytes()].concat()
+        };
+        let poll = [&exchange[..4], &answer(0x55), &exchange[..4], &answer(0x56)].concat();
+        let batch = <BothDirections as Framing>::Batch::accept_batch(&poll.repeat(20), true);
+        assert!(batch.frames >= 14, "{batch:?}");
     }
 }
