@@ -73,7 +73,7 @@ CONCERNED = [
 # What runs if those pass: everything of the package that does not take minutes.
 ALL = {
     "axlewire": "--lib --tests --features tokio",
-    "axle": "--bins --tests",
+    "axle": "--bins --tests --test ports",
 }
 
 

@@ -111,9 +111,9 @@ class File:
             modifiers = [child for child in node.children if child.type == "function_modifiers"]
             if node.type in ("const_item", "static_item", "const_block") or any(b"const" in self.part(it) for it in modifiers):
                 return True
-            # The length in `[b' '; 2 * LEN]`.
+            # The lengths in `[b' '; 2 * LEN]` and `first_chunk::<{ 2 * LEN }>()`.
             length = node.child_by_field_name("length")
-            if length is not None and length.start_byte <= place < length.end_byte:
+            if node.type == "type_arguments" or length is not None and length.start_byte <= place < length.end_byte:
                 return True
             node = node.parent
         return False
