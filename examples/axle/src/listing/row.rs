@@ -180,3 +180,6 @@ pub(crate) fn print_summary(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -238,3 +238,6 @@ fn account(counters: &Counters) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests;
