@@ -20,7 +20,7 @@ def build_environment(target):
 
 
 def finish(command, patience_s, **options):
-    """Runs it, and ends it with all that it started: its status, `None` if it was late; its errors."""
+    """Runs it, and ends all that it started: its status (`None` if it was late) and its errors."""
     # Not a pipe: what it has started and left would keep that open.
     with tempfile.TemporaryFile() as errors:
         run = subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL,
