@@ -152,3 +152,6 @@ fn share(tally: &Tally) -> String {
     let hundredths = tally.delivered * 10_000 / tally.intact;
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
 }
+
+#[cfg(test)]
+mod tests;
