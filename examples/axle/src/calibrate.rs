@@ -192,7 +192,10 @@ impl Calibration {
         loop {
             match self.rover.host().calibration_outcome() {
                 Some(Ok(())) => return Ok(()),
-                Some(Err(failure)) => return Err(Failure::Failed(describe(&failure))),
+                Some(Err(failure)) => {
+                    let CalibrationFailure { kind, step, cause, attempts, .. } = failure;
+                    return Err(Failure::Failed(describe(kind, step, cause, attempts)));
+                }
                 None => self.round()?,
             }
         }
@@ -258,15 +261,38 @@ fn enter() -> Receiver<()> {
     enter
 }
 
-fn describe(failure: &CalibrationFailure) -> String {
-    let step = match failure.step {
+fn describe(
+    kind: CalibrationKind,
+    step: CalibrationStep,
+    cause: FailureCause,
+    attempts: u8,
+) -> String {
+    let step = match step {
         CalibrationStep::Start => "begin",
         CalibrationStep::End => "end",
     };
-    let cause = match failure.cause {
+    let cause = match cause {
         FailureCause::Refused(code) => format!("the robot refuses ({code})"),
         _ => "the robot does not answer".to_owned(),
     };
-    let (kind, attempts) = (failure.kind, failure.attempts);
     format!("the calibration of the {kind} does not {step}: {cause}, asked {attempts} times")
+}
+
+#[cfg(test)]
+mod tests {
+    use axlewire::ucp::message::ErrorCode;
+
+    use super::*;
+
+    #[test]
+    fn a_failure_is_told_with_the_step_the_cause_and_the_attempts() {
+        let (imu, mag) = (CalibrationKind::Imu, CalibrationKind::Magnetometer);
+        let refused = FailureCause::Refused(ErrorCode::Damaged);
+        let told = describe(imu, CalibrationStep::Start, refused, 3);
+        let calibration = "the calibration of the IMU does not begin";
+        assert_eq!(told, format!("{calibration}: the robot refuses (damaged), asked 3 times"));
+        let told = describe(mag, CalibrationStep::End, FailureCause::NoAnswer, 5);
+        let calibration = "the calibration of the magnetometer does not end";
+        assert_eq!(told, format!("{calibration}: the robot does not answer, asked 5 times"));
+    }
 }

@@ -162,3 +162,22 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_told_in_milliseconds() {
+        let pong = |damaged| Event::Pong { round_trip_us: 12_345, damaged }.to_string();
+        assert_eq!(pong(false), "pong after 12.35 ms");
+        assert_eq!(pong(true), "pong after 12.35 ms; the ping arrived damaged");
+        let summary = |min_us, mean_us, max_us| {
+            Event::Summary { pings: 5, pongs: 3, lost: 2, min_us, mean_us, max_us }.to_string()
+        };
+        let counts = "5 pings, 3 pongs, 2 lost";
+        assert_eq!(summary(None, None, None), counts);
+        let times = "; round trip: min 0.50, mean 2.00, max 10.25 ms";
+        assert_eq!(summary(Some(500), Some(2000), Some(10_250)), format!("{counts}{times}"));
+    }
+}
