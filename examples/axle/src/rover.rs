@@ -1,6 +1,6 @@
 //! A rover on a port, with its host; shared by `drive` and `stop`.
 
-use std::{collections::VecDeque, thread, time};
+use std::{thread, time};
 
 use axlewire::{
     error::EncodeError,
@@ -19,6 +19,9 @@ use crate::{
     signals::Awake,
 };
 
+mod pings;
+use pings::{LONGEST_TRIP, Pings};
+
 /// Time allowed for a robot to be heard for the first time.
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
 
@@ -28,10 +31,6 @@ const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 /// Number of stops sent before a report counts: motor frames are not acknowledged (ruling U16), so
 /// any may be lost.
 const STOPS: u32 = 3;
-
-/// Longest round trip of a line: an adapter, or a network in between. What was measured before the
-/// robot heard of a stop says nothing about it.
-const LONGEST_TRIP: Duration = Duration::from_millis(1500);
 
 /// Number of consecutive reports with all wheels at rest. A single one may show a wheel that is
 /// changing direction.
@@ -54,8 +53,7 @@ pub(crate) struct Rover {
     pub(crate) has_dead_man_fired: bool,
     /// Number of consecutive reports with all wheels at rest.
     still_reports: u32,
-    /// The number of pings sent, at moments up to the longest round trip ago.
-    sent: VecDeque<(Instant, u32)>,
+    pings: Pings,
     /// Others have sent pings on this line.
     has_others: bool,
 }
@@ -84,7 +82,7 @@ impl Rover {
             session,
             has_dead_man_fired: false,
             still_reports: 0,
-            sent: VecDeque::new(),
+            pings: Pings::default(),
             has_others: false,
         }
     }
@@ -159,21 +157,14 @@ impl Rover {
             next = self.session.poll_event();
         }
         let now = self.now();
-        self.sent.push_back((now, self.host().statistics().pings));
-        // One from before the longest round trip is kept.
-        while self.sent.get(1).is_some_and(|(at, _)| now - *at >= LONGEST_TRIP) {
-            self.sent.pop_front();
-        }
+        self.pings.note(now, self.session.role().statistics().pings);
         result
     }
 
     /// This moment, to ask later whether the robot has heard what was sent by then.
     pub(crate) fn mark(&mut self) -> Mark {
         let (now, seen) = (self.now(), self.host().statistics());
-        // Those sent before that are answered by now, or lost.
-        let is_old = |(at, _): &&(Instant, u32)| now - *at >= LONGEST_TRIP;
-        let before = self.sent.front().filter(is_old).map_or(0, |(_, pings)| *pings);
-        let open = seen.pings.saturating_sub(pongs(seen)).min(seen.pings.saturating_sub(before));
+        let open = self.pings.open(now, seen.pings, pongs(seen));
         Mark { at: now, pongs: pongs(seen), open: (!self.has_others).then_some(open) }
     }
 

@@ -1,6 +1,6 @@
 //! A rover on a line within the process.
 
-use std::time::Instant as Clock;
+use std::{collections::VecDeque, time::Instant as Clock};
 
 use super::*;
 use crate::played;
