@@ -169,7 +169,7 @@ impl Drive {
         while !signals.is_raised() {
             let now = self.rover.now();
             // An absence ends the drive: the host stops the robot after one, but the next command
-            // would drive it again. First, because it has other effects, too.
+            // would drive it again. First: it also makes the other checks fail.
             attendance.check(now)?;
             if self.rover.has_dead_man_fired {
                 return Err(Failure::Failed(DEAD_MAN.to_owned()));

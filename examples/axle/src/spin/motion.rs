@@ -101,7 +101,7 @@ impl<B: Boards> Spin<B> {
         let mut attendance = Attendance::new(self.start);
         while !signals.is_raised() {
             let now = self.bus.now();
-            // First, because an absence has other effects, too.
+            // First: an absence also makes the other checks fail.
             attendance.check(now)?;
             self.check_follows(target)?;
             if now >= end {
