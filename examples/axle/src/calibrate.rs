@@ -278,11 +278,32 @@ fn describe(
     format!("the calibration of the {kind} does not {step}: {cause}, asked {attempts} times")
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use axlewire::ucp::message::ErrorCode;
 
     use super::*;
+    use crate::played;
+
+    /// A calibration of the IMU, on a rover that answers.
+    fn calibration() -> Calibration {
+        let mut rover = Rover::on(played::rover(|_| {}).line, 115_200);
+        assert!(rover.find(|| false).unwrap());
+        let start = rover.now();
+        let (form, teller, kind) = (Form::of(false), Teller::new(), CalibrationKind::Imu);
+        Calibration { rover, start, form, teller, kind, result: None, earlier: 0, taken: 0 }
+    }
+
+    #[test]
+    fn a_result_that_does_not_come_is_told_after_five_seconds() {
+        let (mut calibration, signals) = (calibration(), Signals::none());
+        let begin = calibration.rover.now();
+        let Err(Failure::Failed(told)) = calibration.result(&signals) else { panic!("a result") };
+        assert_eq!(told, "the robot has sent no result for 5 s");
+        assert!(calibration.rover.now() - begin >= RESULT_PATIENCE);
+        signals.raise();
+        assert!(calibration.result(&signals).unwrap().is_none());
+    }
 
     #[test]
     fn a_failure_is_told_with_the_step_the_cause_and_the_attempts() {

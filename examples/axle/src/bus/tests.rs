@@ -157,6 +157,20 @@ fn all_nodes_are_stopped_each_in_its_mode_and_confirm_it_twice() {
 }
 
 #[test]
+fn an_id_counts_as_silent_only_after_as_many_requests_as_the_master_attempts() {
+    let line = turning(|_, bus| bus.nodes[0].is_dumb = true);
+    let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
+    config.nodes = NodeId::N1.into();
+    // The second one is open after the second that an unanswered id is allowed.
+    (config.attempts, config.reply_timeout) = (3, Duration::from_millis(600));
+    let mut bus = Bus::<OneMotor>::new(line.line.clone(), config);
+    let begin = Clock::now();
+    bus.stop(NodeId::N1.into()).unwrap();
+    let asked = line.said().iter().filter(|said| **said == Said::Read(1)).count();
+    assert_eq!((asked, bus.halt(NodeId::N1)), (3, Halt::Silent), "{:?}", begin.elapsed());
+}
+
+#[test]
 fn a_stop_on_a_slow_line_has_the_time_that_it_needs() {
     let line = turning(|_, _| {}).line;
     let bound = |baud| {

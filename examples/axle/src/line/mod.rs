@@ -217,7 +217,10 @@ impl drive::Clock for LineClock {
 mod tests {
     use serialport::{SerialPort as _, TTYPort};
 
+    use axlewire::drive::Clock as _;
+
     use super::*;
+    use crate::played;
 
     #[test]
     fn a_port_has_the_speed_that_was_asked_for() {
@@ -229,5 +232,38 @@ mod tests {
             assert_eq!(theirs.baud_rate().unwrap(), expected);
             assert!(line.is_instant() && line.path() == path);
         }
+    }
+
+    #[test]
+    fn a_clock_idles_until_the_time_or_until_bytes_are_there() {
+        let idles = |line: Line, micros| {
+            let mut clock = line.clock();
+            let (begin, until) = (Clock::now(), clock.now() + time::Duration::from_micros(micros));
+            clock.idle_until(until);
+            begin.elapsed()
+        };
+        let silence = played::silence(true);
+        assert!(idles(silence.clone(), 30_000) >= Duration::from_millis(29));
+        assert!(idles(silence, 0) < Duration::from_millis(500));
+        let talk = played::played((), |(), _| vec![0]).line;
+        assert!(idles(talk, 60_000_000) < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn a_clock_does_not_idle_for_a_time_that_is_past() {
+        let mut clock = played::silence(true).clock();
+        let until = clock.now() + time::Duration::from_millis(5);
+        clock.idle_until(until);
+        let begin = Clock::now();
+        clock.idle_until(Instant::from_micros(1));
+        assert!(begin.elapsed() < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn a_flush_is_one_of_the_port() {
+        let mut played = played::played((), |(), _| Vec::new());
+        assert!(played.line.flush().is_ok());
+        played.is_gone.set(true);
+        assert!(played.line.flush().is_err());
     }
 }

@@ -117,6 +117,24 @@ fn a_search_that_is_over_finds_nothing() {
 }
 
 #[test]
+fn a_search_that_finds_no_robot_tells_what_was_received_and_how_long_it_took() {
+    let strays = |count: u32| {
+        played::played(count, |left, _| {
+            let is_more = *left > 0;
+            *left = left.saturating_sub(1);
+            vec![0; usize::from(is_more)]
+        })
+    };
+    for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
+        let mut rover = Rover::on(strays(count).line, 115_200);
+        let begin = Clock::now();
+        let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
+        assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
+        assert!(begin.elapsed().as_millis() >= 1999, "{:?}", begin.elapsed());
+    }
+}
+
+#[test]
 fn a_search_is_over_soon_after_it_is_told_so_however_silent_the_line_is() {
     let line = played::rover(|rover| rover.is_dumb = true);
     let mut rover = Rover::on(line.line.clone(), 115_200);
