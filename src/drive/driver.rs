@@ -255,6 +255,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
                 let (time, silence) = (self.role.wire_time(count), self.silence());
                 let unsent = self.sending.sent(count, time, now, silence);
                 self.tell_unsent(unsent);
+                if self.sending.rest().is_empty() {
+                    self.role.handle_sent(now);
+                }
                 return Ok(());
             }
             Err(error) => DriveError::Port(error),
@@ -271,6 +274,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let now = self.now();
         let unsent = self.sending.flushed(now, self.silence());
         self.tell_unsent(unsent);
+        if self.sending.rest().is_empty() {
+            self.role.handle_sent(now);
+        }
         Ok(())
     }
 

@@ -420,3 +420,27 @@ fn a_timeout_names_the_node() {
     let error = DriveError::<Unplugged>::Timeout(Operation::Read { node: NodeId::N3 });
     assert_eq!(error.to_string(), "node 3 was not read in time");
 }
+
+#[test]
+fn an_answer_to_a_request_that_left_after_its_window_is_not_taken_for_the_next_one() {
+    for is_async in [false, true] {
+        let mut config = manual();
+        // Only the window itself can tell the answers apart.
+        (config.attempts, config.accepts_early) = (3, true);
+        let mut story = Story::new(config).discovered();
+        let asked = story.bus.port().written.len();
+        story.bus.port_mut().stalls_us = [3_000_000, 0];
+        let first = match is_async {
+            true => story.world.block_on(story.bus.read_async(NodeId::N5)),
+            false => story.bus.read(NodeId::N5),
+        };
+        assert_eq!(first, Err(DriveError::Timeout(Operation::Read { node: NodeId::N5 })));
+        assert_eq!(story.bus.port().written.len(), asked + 4, "one READ");
+        // The node has answered, and turns.
+        story.pass(100);
+        let turned = Position::new(9, 2);
+        story.five.borrow_mut().role_mut().set_position(turned);
+        assert_eq!(story.bus.read(NodeId::N5), Ok(Status::Position(turned)), "async {is_async}");
+        assert_eq!(story.bus.role().node_statistics(NodeId::N5).late, 1);
+    }
+}

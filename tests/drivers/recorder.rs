@@ -39,6 +39,8 @@ pub(crate) struct Recorder {
     /// A frame of which no byte has left is sent again.
     pub(crate) repeats: bool,
     pub(crate) calls: Vec<Call>,
+    /// When a frame had been taken or flushed.
+    pub(crate) sent_at: Vec<Instant>,
     pub(crate) received: Vec<u8>,
     pub(crate) events: VecDeque<u8>,
     last: Instant,
@@ -85,6 +87,11 @@ impl Endpoint for Recorder {
         self.calls.push(Call::Transmit(frame.clone()));
         self.packet = frame?;
         Some(&self.packet)
+    }
+
+    fn handle_sent(&mut self, now: Instant) {
+        self.at(now);
+        self.sent_at.push(now);
     }
 
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {

@@ -34,6 +34,21 @@ fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {
 }
 
 #[test]
+fn a_role_is_told_when_its_frame_was_taken_and_when_it_was_flushed() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let mut port = End::new(&world, 20);
+        // Only the write of the last part takes the frame.
+        (port.stalls_us, port.most) = ([3000, 4000], 2);
+        let role = Recorder::sending(&[b"123", b"45"]);
+        let mut driver = Driver::new(role, port, VirtualClock(world.clone()));
+        let sent = if is_async { world.block_on(driver.service_async()) } else { driver.service() };
+        assert_eq!(sent, Ok(()));
+        assert_eq!(driver.role().sent_at, [3, 3, 7].map(at_ms), "async {is_async}");
+    }
+}
+
+#[test]
 fn timeouts_are_handled_only_when_the_role_has_requested_them() {
     for round in ROUNDS {
         let mut role = Recorder::default();

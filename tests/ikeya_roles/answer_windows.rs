@@ -31,6 +31,49 @@ fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
 }
 
 #[test]
+fn a_request_that_left_within_its_window_has_the_window_that_it_had() {
+    for left_us in [0, 80, 740] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        desk.turn();
+        let begin = desk.now;
+        desk.master.handle_sent(begin + US(left_us));
+        assert_eq!(desk.master.poll_timeout(), Some(begin + US(740)));
+        desk.hear(740, &velocity(NodeId::N1, 1.0));
+        assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]), "{left_us} us");
+    }
+}
+
+#[test]
+fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_is_not_taken() {
+    for flushed_us in [741, 9000] {
+        let mut desk = Desk::with_nodes(direct(), &[N1]);
+        desk.turn();
+        let begin = desk.now;
+        desk.master.handle_sent(begin + US(741));
+        // The flush says it better than the write.
+        desk.master.handle_sent(begin + US(flushed_us));
+        desk.now = begin + US(flushed_us);
+        let end = desk.now + US(500 + 160);
+        assert_eq!(desk.master.poll_timeout(), Some(end));
+        desk.master.handle_timeout(desk.now);
+        assert_eq!(desk.master.poll_transmit(desk.now), None);
+        desk.hear(210, &velocity(NodeId::N1, 1.0));
+        assert_eq!(desk.told(), []);
+        assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
+        desk.now = end;
+        desk.master.handle_timeout(end);
+        let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
+        assert_eq!(desk.told(), [suspect]);
+        // A later answer meets a closed window, too.
+        assert_eq!(desk.master.poll_timeout(), Some(end + US(500)));
+        assert_eq!(desk.turn(), read(NodeId::N1));
+        desk.hear(290, &velocity(NodeId::N1, 2.0));
+        let status = Status::Velocity(2.0);
+        assert!(desk.told().contains(&MasterEvent::Status { node: NodeId::N1, status }));
+    }
+}
+
+#[test]
 fn behind_a_write_the_window_begins_when_both_requests_have_left() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();

@@ -151,6 +151,9 @@ pub(crate) struct End {
     pub(crate) is_deafened: bool,
     /// Every write fails.
     pub(crate) is_mute: bool,
+    /// The next write takes this long before its bytes leave, and the next flush this long, in one
+    /// call.
+    pub(crate) stalls_us: [u64; 2],
     /// Async writes and flushes are ready only on the second poll.
     pub(crate) stutters: bool,
     /// All bytes taken.
@@ -172,6 +175,7 @@ impl End {
             is_deaf: false,
             is_deafened: false,
             is_mute: false,
+            stalls_us: [0; 2],
             stutters: false,
             written: vec![],
             unplugged: Rc::default(),
@@ -230,6 +234,7 @@ impl End {
                 return Err(Unplugged);
             }
         }
+        self.stall(0);
         self.written.extend(&buffer[..count]);
         self.is_deaf |= self.is_deafened;
         for outbox in &self.outboxes {
@@ -242,8 +247,16 @@ impl End {
         Ok(count)
     }
 
+    fn stall(&mut self, call: usize) {
+        match core::mem::take(&mut self.stalls_us[call]) {
+            0 => {}
+            micros => self.world.step(micros),
+        }
+    }
+
     fn finish(&mut self) -> Result<(), Unplugged> {
         self.is_plugged()?;
+        self.stall(1);
         if core::mem::take(&mut self.fails_flush) { Err(Unplugged) } else { Ok(()) }
     }
 

@@ -44,7 +44,19 @@ impl<B: Board> Master<B> {
         asked.sent_request(&self.config, self.now);
         asked.scans = asked.scans.saturating_add(is_scan.into());
         let deadline = request_end + self.answer_time();
-        self.window = Some(Window { node, request_end, deadline, heard: Heard::Nothing });
+        let heard = Heard::Nothing;
+        self.window = Some(Window { node, request_end, deadline, heard, is_missed: false });
+    }
+
+    /// Reopens a window that has passed before its request has left.
+    pub(super) fn miss_window(&mut self, left_by: Instant) {
+        let answer_time = self.answer_time();
+        if let Some(window) = &mut self.window {
+            window.is_missed |= left_by > window.deadline;
+            if window.is_missed {
+                window.deadline = left_by + answer_time;
+            }
+        }
     }
 
     /// The next complete response in the input.
@@ -63,7 +75,7 @@ impl<B: Board> Master<B> {
         let accepts_early = self.config.accepts_early;
         let statistics = &mut self.nodes[index_of(id)].statistics;
         match &mut self.window {
-            Some(window) if window.node == id && now <= window.deadline => {
+            Some(window) if window.node == id && now <= window.deadline && !window.is_missed => {
                 // No line is that fast, even allowing for a slightly coarse clock.
                 if now < window.request_end + half_answer && !accepts_early {
                     window.heard = Heard::Others;

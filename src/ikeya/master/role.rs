@@ -58,7 +58,8 @@ const EVENTS: usize = 16;
 /// after the request has left the line (I7). Packets outside the window or from another node are
 /// counted and dropped. A node that did not answer is not polled again for
 /// [`MasterConfig::late_guard`], so that a late answer meets a closed window. An answer later than
-/// that cannot be told from the next one: the protocol has no sequence numbers.
+/// that cannot be told from the next one: the protocol has no sequence numbers. If the port lets a
+/// request out only after its window, the answer is not taken, and the line is kept free for it.
 ///
 /// # Modes
 ///
@@ -366,6 +367,11 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn wire_time(&self, bytes: usize) -> Duration {
         wire_time(bytes, self.config.baud)
+    }
+
+    fn handle_sent(&mut self, now: Instant) {
+        self.now = now;
+        self.miss_window(now);
     }
 
     /// Whether it is a WRITE of a set-point that has been dropped or replaced.

@@ -11,6 +11,9 @@ pub(super) struct Window {
     pub(super) request_end: Instant,
     pub(super) deadline: Instant,
     pub(super) heard: Heard,
+    /// Whether the request left only after the deadline. Its answer is too old when it comes; the
+    /// window is open again until then, so that the answer does not meet the next request.
+    pub(super) is_missed: bool,
 }
 
 /// What has been heard in the window.
