@@ -83,6 +83,7 @@ ALL = {
     # Those that `--tests` leaves out, too.
     "axle": "--bins --test *",
 }
+UNIT_TESTS = {"axlewire": ALL["axlewire"], "axle": "--tests"}
 
 
 class Mutant:
@@ -331,8 +332,10 @@ def run_woven(mutants, wanted, workers, until, record, is_patient):
     mutants = [mutant for mutant in mutants if mutant.package in packages]
     tree = Tree("woven", until)
     build = woven.Build(tree.path, tree.target, mutants, packages)
-    commands = [[word, "-p", package, *ALL[package].split()] for word in ("check", "build")
-                for package in sorted(packages, reverse=True)]
+    # `--bins` builds no unit tests, and `--tests` leaves out what is no test by default.
+    commands = [[word, "-p", package, *targets.split()]
+                for word, of in (("check", ALL), ("build", ALL), ("build", UNIT_TESTS))
+                for package in sorted(packages, reverse=True) for targets in [of[package]]]
     tests = woven.tests_of(build.settle(commands), tree.path)
     print(f"{len(build.unviable)} do not compile, {len(build.apart)} apart; {len(tests)} tests", flush=True)
     reached = WORK / "reached"

@@ -274,7 +274,7 @@ class Build:
 
     def settle(self, commands):
         """Builds until no mutant stops the compiler; returns the test programs of all packages."""
-        programs = []
+        programs = {}
         for words in commands:
             while True:
                 regions = self.write()
@@ -282,9 +282,9 @@ class Build:
                 if code == 0:
                     break
                 self.drop(regions, messages)
-            programs += [(m["package_id"], m["target"]["name"], m["executable"]) for m in messages
-                         if m["reason"] == "compiler-artifact" and m["profile"]["test"] and m["executable"]]
-        return programs
+            programs |= {m["executable"]: (m["package_id"], m["target"]["name"], m["executable"]) for m in messages
+                         if m["reason"] == "compiler-artifact" and m["profile"]["test"] and m["executable"]}
+        return list(programs.values())
 
     def drop(self, regions, messages):
         """Takes out what the compiler complains about."""
