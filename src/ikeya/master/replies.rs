@@ -43,19 +43,17 @@ impl<B: Board> Master<B> {
         let asked = &mut self.nodes[index_of(node)];
         asked.sent_request(&self.config, self.now);
         asked.scans = asked.scans.saturating_add(is_scan.into());
-        let deadline = request_end + self.answer_time();
-        let heard = Heard::Nothing;
-        self.window = Some(Window { node, request_end, deadline, heard, is_missed: false });
+        let answer_by = request_end + self.answer_time();
+        let (closes_at, heard) = (answer_by, Heard::Nothing);
+        self.window = Some(Window { node, request_end, answer_by, closes_at, heard });
     }
 
-    /// Reopens a window that has passed before its request has left.
-    pub(super) fn miss_window(&mut self, left_by: Instant) {
-        let answer_time = self.answer_time();
-        if let Some(window) = &mut self.window {
-            window.is_missed |= left_by > window.deadline;
-            if window.is_missed {
-                window.deadline = left_by + answer_time;
-            }
+    /// Prolongs a window that had passed before its request left: its answer is too late, but must
+    /// not meet the next request.
+    pub(super) fn prolong_window(&mut self, left_by: Instant) {
+        let closes_at = left_by + self.answer_time();
+        if let Some(window) = self.window.as_mut().filter(|window| left_by > window.answer_by) {
+            window.closes_at = closes_at;
         }
     }
 
@@ -75,7 +73,7 @@ impl<B: Board> Master<B> {
         let accepts_early = self.config.accepts_early;
         let statistics = &mut self.nodes[index_of(id)].statistics;
         match &mut self.window {
-            Some(window) if window.node == id && now <= window.deadline && !window.is_missed => {
+            Some(window) if window.node == id && now <= window.answer_by => {
                 // No line is that fast, even allowing for a slightly coarse clock.
                 if now < window.request_end + half_answer && !accepts_early {
                     window.heard = Heard::Others;
@@ -155,9 +153,9 @@ impl<B: Board> Master<B> {
 
     /// Closes a window that has passed without its answer.
     pub(super) fn expire_window(&mut self, now: Instant) {
-        if let Some(window) = self.window.filter(|window| now >= window.deadline) {
+        if let Some(window) = self.window.filter(|window| now >= window.closes_at) {
             self.window = None;
-            self.strike(window.node, window.cause(), window.deadline);
+            self.strike(window.node, window.cause(), window.closes_at);
             self.settle_discovery();
         }
     }

@@ -371,7 +371,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_sent(&mut self, now: Instant) {
         self.now = now;
-        self.miss_window(now);
+        self.prolong_window(now);
     }
 
     /// Whether it is a WRITE of a set-point that has been dropped or replaced.
@@ -390,7 +390,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let work = match &self.window {
-            Some(window) => Some(window.deadline),
+            Some(window) => Some(window.closes_at),
             // Not before the line is free.
             None => self.due().map(|due| self.line_free.unwrap_or(due).max(due)),
         };

@@ -9,11 +9,11 @@ use crate::{ikeya::units::NodeId, time::Instant};
 pub(super) struct Window {
     pub(super) node: NodeId,
     pub(super) request_end: Instant,
-    pub(super) deadline: Instant,
+    /// Until when an answer counts.
+    pub(super) answer_by: Instant,
+    /// The same, or later if the request left only after that.
+    pub(super) closes_at: Instant,
     pub(super) heard: Heard,
-    /// Whether the request left only after the deadline. Its answer is too old when it comes; the
-    /// window is open again until then, so that the answer does not meet the next request.
-    pub(super) is_missed: bool,
 }
 
 /// What has been heard in the window.
