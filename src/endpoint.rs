@@ -84,12 +84,13 @@ pub trait Endpoint {
     /// The next bytes to send, if any: one frame, handed out once, to be sent from `now` on.
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]>;
 
-    /// The port has taken, or flushed, all of the last frame from `poll_transmit` by `now`. Does
-    /// nothing by default.
+    /// The last frame from `poll_transmit` may have left as late as `now`: until then the port has
+    /// not taken or not flushed all of it. Does nothing by default.
     ///
-    /// A driver calls this after each write that ends a frame and after each flush. It matters only
-    /// when a port takes long: a request that left late is answered late, and a master must not
-    /// take that answer for the one to its next request (ruling I7).
+    /// A driver calls this after each write that ends a frame and after each flush, and after a
+    /// pause in an unfinished flush. It matters only when a port takes long: a request that left
+    /// late is answered late, and a master must not take that answer for the one to its next
+    /// request (ruling I7).
     fn handle_sent(&mut self, now: Instant) {
         let _ = now;
     }

@@ -255,9 +255,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
                 let (time, silence) = (self.role.wire_time(count), self.silence());
                 let unsent = self.sending.sent(count, time, now, silence);
                 self.tell_unsent(unsent);
-                if self.sending.rest().is_empty() {
-                    self.role.handle_sent(now);
-                }
+                self.tell_sent();
                 return Ok(());
             }
             Err(error) => DriveError::Port(error),
@@ -274,10 +272,16 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let now = self.now();
         let unsent = self.sending.flushed(now, self.silence());
         self.tell_unsent(unsent);
+        self.tell_sent();
+        Ok(())
+    }
+
+    /// Tells the role that its frame may have left as late as now.
+    pub(super) fn tell_sent(&mut self) {
         if self.sending.rest().is_empty() {
+            let now = self.now();
             self.role.handle_sent(now);
         }
-        Ok(())
     }
 
     /// Notes that bytes sent since the last flush may not have left.

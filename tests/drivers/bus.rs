@@ -444,3 +444,45 @@ fn an_answer_to_a_request_that_left_after_its_window_is_not_taken_for_the_next_o
         assert_eq!(story.bus.role().node_statistics(NodeId::N5).late, 1);
     }
 }
+
+#[test]
+fn an_answer_to_a_request_whose_flush_was_dropped_and_came_late_is_not_taken_for_the_next_one() {
+    let mut config = manual();
+    (config.attempts, config.accepts_early) = (3, true);
+    let mut story = Story::new(config).discovered();
+    let asked = story.bus.port().written.len();
+    let held_us = story.world.now().as_micros() + 300_000;
+    story.bus.port_mut().holds_until_us = held_us;
+    story.ask(NodeId::N5);
+    // Every call is dropped while the port flushes.
+    while story.world.now().as_micros() < held_us + 300 {
+        story.world.poll_times(2, story.bus.service_async());
+        story.pass(20);
+    }
+    assert_eq!(story.bus.port().written.len(), asked + 4, "one READ");
+    let turned = Position::new(9, 2);
+    story.five.borrow_mut().role_mut().set_position(turned);
+    assert_eq!(
+        story.world.block_on(story.bus.read_async(NodeId::N5)),
+        Ok(Status::Position(turned))
+    );
+    assert_eq!(story.bus.role().node_statistics(NodeId::N5).late, 1);
+}
+
+#[test]
+fn a_port_that_never_flushes_delays_the_next_request_by_a_second() {
+    let mut story = Story::new(manual()).discovered();
+    let (asked, begin) = (story.bus.port().written.len(), story.world.now());
+    story.bus.port_mut().holds_until_us = 60_000_000;
+    story.ask(NodeId::N5);
+    story.world.poll_times(2, story.bus.service_async());
+    story.ask(NodeId::N2);
+    let mut next_at = None;
+    while next_at.is_none() && story.world.now() - begin < Duration::from_millis(3000) {
+        story.world.poll_times(2, story.bus.service_async());
+        story.pass(200);
+        next_at = (story.bus.port().written.len() > asked + 4).then(|| story.world.now() - begin);
+    }
+    let next_us = next_at.expect("a request").as_micros();
+    assert!((1_000_000..1_002_000).contains(&next_us), "{next_us} us");
+}

@@ -154,6 +154,8 @@ pub(crate) struct End {
     /// The next write takes this long before its bytes leave, and the next flush this long, in one
     /// call.
     pub(crate) stalls_us: [u64; 2],
+    /// Bytes leave from this time on, and async flushes wait for it, microseconds.
+    pub(crate) holds_until_us: u64,
     /// Async writes and flushes are ready only on the second poll.
     pub(crate) stutters: bool,
     /// All bytes taken.
@@ -176,6 +178,7 @@ impl End {
             is_deafened: false,
             is_mute: false,
             stalls_us: [0; 2],
+            holds_until_us: 0,
             stutters: false,
             written: vec![],
             unplugged: Rc::default(),
@@ -240,7 +243,8 @@ impl End {
         for outbox in &self.outboxes {
             let mut outbox = outbox.borrow_mut();
             for &byte in &buffer[..count] {
-                let free = outbox.back().map_or(0, |&(at, _)| at).max(self.world.micros.get());
+                let begin = self.world.micros.get().max(self.holds_until_us);
+                let free = outbox.back().map_or(0, |&(at, _)| at).max(begin);
                 outbox.push_back((free + self.byte_us, byte));
             }
         }
@@ -317,6 +321,11 @@ impl embedded_io_async::Write for End {
 
     async fn flush(&mut self) -> Result<(), Unplugged> {
         self.stutter().await;
+        poll_fn(|context| match self.world.micros.get() >= self.holds_until_us {
+            true => Poll::Ready(()),
+            false => self.world.sleep(context),
+        })
+        .await;
         self.finish()
     }
 }

@@ -48,8 +48,8 @@ impl<B: Board> Master<B> {
         self.window = Some(Window { node, request_end, answer_by, closes_at, heard });
     }
 
-    /// Prolongs a window that had passed before its request left: its answer is too late, but must
-    /// not meet the next request.
+    /// Prolongs a window that had passed before its request left: the answer is too late, but must
+    /// not meet the next request, nor be taken for the answer to that.
     pub(super) fn prolong_window(&mut self, left_by: Instant) {
         let closes_at = left_by + self.answer_time();
         if let Some(window) = self.window.as_mut().filter(|window| left_by > window.answer_by) {
