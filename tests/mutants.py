@@ -4,6 +4,7 @@
     tests/mutants.py                      goes on where the last run ended, until all are tried
     tests/mutants.py --minutes 60         for an hour; --workers 2 tries two at a time
     tests/mutants.py --file 'src/ucp/**'  only these files; --again tries what has been tried, too
+    tests/mutants.py --shuffled           in another order each time: a sample, with --minutes
     tests/mutants.py --woven              all in one build, many times quicker; see tests/woven.py
     tests/mutants.py --survivors          tries again what survived without a reason
     tests/mutants.py --sample             a sample of the mutants of the last commit, for the gate
@@ -76,12 +77,18 @@ CONCERNED = [
     ("examples/axle/src/spin/*", "--bins --test ports spin"),
     ("examples/axle/src/stop*", "--bins --test ports stop"),
     ("examples/axle/src/*", "--bins"),
+    ("examples/firmware/src/*", "--test firmware"),
 ]
+# The images for QEMU. What they run is tried; what `bench.sh` and `no_panic.sh` build is not.
+FIRMWARE = "axlewire-firmware"
+IMAGES = ("ikeya_slave", "ikeya_master", "ucp_robot", "uart_check")
+IN_QEMU = re.compile("examples/firmware/src/(?!bin/(bench|size_|no_panic|soak_)|work)")
 # What runs at the end if those pass: everything of the package.
 ALL = {
     "axlewire": "--lib --tests --features tokio",
     # Those that `--tests` leaves out, too.
     "axle": "--bins --test *",
+    FIRMWARE: "--test firmware",
 }
 UNIT_TESTS = {"axlewire": ALL["axlewire"], "axle": "--tests"}
 
@@ -107,16 +114,21 @@ class Mutant:
 
 
 def listed(*options):
-    """All mutants of library and tool, in the order of the files; one key is listed once."""
-    out = subprocess.run(
-        ["cargo", "mutants", "--list", "--json", "-p", "axlewire", "-p", "axle", *options],
-        cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+    """All mutants of library, tool and firmware by file; one key is listed once."""
+    def items(*words):
+        out = subprocess.run(["cargo", "mutants", "--list", "--json", *words, *options],
+                             cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+        return json.loads(out or "[]")
+    # A sample of a change has no time for QEMU.
+    firmware = [] if options else items("--manifest-path", "examples/firmware/Cargo.toml")
+    for item in firmware:
+        item["file"] = "examples/firmware/" + item["file"]
     sources = {}
     mutants, seen = [], collections.Counter()
-    for item in json.loads(out or "[]"):
+    for item in items("-p", "axlewire", "-p", "axle") + firmware:
         file = item["file"]
         # The tool borrows modules of the tests.
-        if "tests" in file:
+        if "tests" in file or item["package"] == FIRMWARE and not IN_QEMU.match(file):
             continue
         if file not in sources:
             sources[file] = (ROOT / file).read_text()
@@ -166,13 +178,20 @@ class Tree:
         """Whether a test fails, or never ends; `unviable` if the tree does not compile."""
         command = ["cargo", "test", "--quiet", "-p", package, *tests.split()]
         options = {"cwd": self.path, "env": quick.build_environment(self.target)}
-        status, errors = quick.finish([*command, "--no-run"], min(BUILD_S, self.left_s()), **options)
-        if status is None and self.left_s() == 0:
-            return "undecided"
-        if status != 0:
-            if "could not compile" not in errors:
-                sys.exit(f"`{' '.join(command)} --no-run` fails in {self.path}: {errors}")
-            return "unviable"
+        builds = [[*command, "--no-run"]]
+        if package == FIRMWARE:
+            # The tests of the library build and run the images.
+            command[4] = "axlewire"
+            options["env"] |= {"AXLEWIRE_FIRMWARE": "required"}
+            builds = [["bash", "examples/firmware/run.sh", "--build", *IMAGES], [*command, "--no-run"]]
+        for build in builds:
+            status, errors = quick.finish(build, min(BUILD_S, self.left_s()), **options)
+            if status is None and self.left_s() == 0:
+                return "undecided"
+            if status != 0:
+                if "could not compile" not in errors:
+                    sys.exit(f"`{' '.join(build)}` fails in {self.path}: {errors}")
+                return "unviable"
         patience_s = max(LEAST_PATIENCE_S, PATIENCE * self.took_s.get(tests, 1000))
         begin = time.monotonic()
         status, _ = quick.finish(command, min(patience_s, self.left_s()), preexec_fn=quick.limit_memory, **options)
@@ -405,7 +424,7 @@ def table(record):
     rows = collections.defaultdict(lambda: [0, 0, 0, 0])
     for file, (_, counts, _) in record.lines.items():
         parts = file.split("/")
-        row = rows["axle" if parts[0] == "examples" else parts[1] if len(parts) > 2 else "others"]
+        row = rows[parts[1] if len(parts) > 2 else "others"]
         for i in range(3):
             row[i] += counts[i]
         row[3] += 1
@@ -448,7 +467,7 @@ def main():
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--file", action="append", default=[])
     parser.add_argument("--woven", action="store_true")
-    for flag in ("again", "survivors", "sample", "table", "check"):
+    for flag in ("again", "shuffled", "survivors", "sample", "table", "check"):
         parser.add_argument(f"--{flag}", action="store_true")
     args = parser.parse_args()
     record = Record()
@@ -465,6 +484,8 @@ def main():
         wanted = [m for m in wanted if known[m.name] == "survived" and not record.has_reason(m)]
     elif not args.again:
         wanted = [m for m in wanted if known[m.name] is None and not record.is_done(m.file)]
+    if args.shuffled:
+        random.shuffle(wanted)
     print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)
     until = time.monotonic() + 60 * args.minutes
     if args.woven:
