@@ -15,7 +15,7 @@ import gate
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORDS = ["tests/exhaustive.txt", "tests/campaign.txt", "tests/soak.txt", "tests/coverage.txt",
-           "tests/mutants.txt", "fuzz/campaign.txt"]
+           "tests/mutants.txt", "fuzz/campaign.txt", "fuzz/coverage.txt"]
 STEPS = gate.steps()
 # A row of the table of motors that stop.
 MOTOR = re.compile(r"^\| (?:bus|rover)\b.*\| [\d.]+ \|$", re.MULTILINE)
