@@ -84,14 +84,19 @@ pub trait Endpoint {
     /// The next bytes to send, if any: one frame, handed out once, to be sent from `now` on.
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]>;
 
-    /// The last frame from `poll_transmit` may have left as late as `now`: until then the port has
-    /// not taken or not flushed all of it. Does nothing by default.
+    /// The port has taken all of the last frame from [`poll_transmit`](Self::poll_transmit), but
+    /// may still hold it. Does nothing by default.
     ///
-    /// A driver calls this after each write that ends a frame and after each flush, and after a
-    /// pause in an unfinished flush. It matters only when a port takes long: a request that left
-    /// late is answered late, and a master must not take that answer for the one to its next
-    /// request (ruling I7).
-    fn handle_sent(&mut self, now: Instant) {
+    /// A driver whose port can hold bytes back calls this after the write that ended the frame,
+    /// also of one that it then gives up, and [`handle_flushed`](Self::handle_flushed) once they
+    /// have left: both or neither. A request that leaves late is answered late, and a master must
+    /// not take that answer for the one to its next request (ruling I7).
+    fn handle_taken(&mut self, now: Instant) {
+        let _ = now;
+    }
+
+    /// All bytes that the port has taken have left by `now`. Does nothing by default.
+    fn handle_flushed(&mut self, now: Instant) {
         let _ = now;
     }
 

@@ -13,6 +13,9 @@ mod bus_rig;
 /// Clocks and delays.
 #[path = "drivers/clocks.rs"]
 mod clocks;
+#[path = "support/dice.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod dice;
 /// The driver-enable pin of a port alone.
 #[path = "drivers/driver_enable.rs"]
 mod driver_enable;
@@ -42,6 +45,9 @@ mod failed_and_dropped_calls;
 /// Ports of which one half fails.
 #[path = "drivers/half_ports.rs"]
 mod half_ports;
+/// Requests that a port holds back.
+#[path = "drivers/held_requests.rs"]
+mod held_requests;
 /// Drivers that are held up.
 #[path = "drivers/held_up.rs"]
 mod held_up;

@@ -115,6 +115,14 @@ MENDS = [
     ("23b", "a master takes bytes from before its request for the answer", "src/ikeya/master/role.rs",
      "self.window.take_if(|window| since < window.request_end);",
      "self.window.take_if(|window| since > window.deadline);", ["motion"]),
+    ("24", "an answer counts although it may be that of an earlier request in the port", "src/ikeya/master/replies.rs",
+     "now <= window.deadline && self.held != Held::Several", "now <= window.deadline", ["ikeya_roles"]),
+    ("24b", "the next request is sent while the port holds one", "src/ikeya/master/replies.rs",
+     "self.line_free = Some(now + HELD);", "", ["ikeya_roles"]),
+    ("24c", "the next request is sent before the answer to one that left late", "src/ikeya/master/replies.rs",
+     "                self.line_free = Some(answer_by);\n", "", ["ikeya_roles"]),
+    ("24d", "a driver does not say that the port holds a request", "src/drive/driver.rs",
+     "                    self.role.handle_taken(now);\n", "", ["drivers"]),
 ]
 
 

@@ -49,11 +49,6 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
-        let now = self.now();
-        if self.sending.flush_wait.is_on(now, STALL) {
-            // A call was dropped in the flush, so the frame may not have left yet.
-            self.tell_sent();
-        }
         let mut result = Ok(());
         for _ in 0..FRAMES {
             result = result.and(self.receive_async().await);

@@ -253,9 +253,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             Ok(0) => DriveError::WriteZero,
             Ok(count) => {
                 let (time, silence) = (self.role.wire_time(count), self.silence());
+                let is_whole = count >= self.sending.rest().len();
                 let unsent = self.sending.sent(count, time, now, silence);
+                if is_whole {
+                    self.role.handle_taken(now);
+                }
                 self.tell_unsent(unsent);
-                self.tell_sent();
                 return Ok(());
             }
             Err(error) => DriveError::Port(error),
@@ -272,16 +275,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let now = self.now();
         let unsent = self.sending.flushed(now, self.silence());
         self.tell_unsent(unsent);
-        self.tell_sent();
+        self.role.handle_flushed(now);
         Ok(())
-    }
-
-    /// Tells the role that its frame may have left as late as now.
-    pub(super) fn tell_sent(&mut self) {
-        if self.sending.rest().is_empty() {
-            let now = self.now();
-            self.role.handle_sent(now);
-        }
     }
 
     /// Notes that bytes sent since the last flush may not have left.

@@ -54,11 +54,6 @@ impl Wait {
         now - *self.0.get_or_insert(now)
     }
 
-    /// Whether the port was asked within this time, and neither has done it nor failed yet.
-    pub(super) fn is_on(&self, now: Instant, limit: Duration) -> bool {
-        self.0.is_some_and(|begin| now - begin < limit)
-    }
-
     /// Notes that the port has done it, or has failed.
     pub(super) fn end(&mut self) {
         self.0 = None;

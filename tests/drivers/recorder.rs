@@ -39,8 +39,9 @@ pub(crate) struct Recorder {
     /// A frame of which no byte has left is sent again.
     pub(crate) repeats: bool,
     pub(crate) calls: Vec<Call>,
-    /// When a frame had been taken or flushed.
-    pub(crate) sent_at: Vec<Instant>,
+    /// When a frame had been taken, and when all had left.
+    pub(crate) taken_at: Vec<Instant>,
+    pub(crate) flushed_at: Vec<Instant>,
     pub(crate) received: Vec<u8>,
     pub(crate) events: VecDeque<u8>,
     last: Instant,
@@ -89,9 +90,14 @@ impl Endpoint for Recorder {
         Some(&self.packet)
     }
 
-    fn handle_sent(&mut self, now: Instant) {
+    fn handle_taken(&mut self, now: Instant) {
         self.at(now);
-        self.sent_at.push(now);
+        self.taken_at.push(now);
+    }
+
+    fn handle_flushed(&mut self, now: Instant) {
+        self.at(now);
+        self.flushed_at.push(now);
     }
 
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {

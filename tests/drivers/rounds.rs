@@ -44,7 +44,8 @@ fn a_role_is_told_when_its_frame_was_taken_and_when_it_was_flushed() {
         let mut driver = Driver::new(role, port, VirtualClock(world.clone()));
         let sent = if is_async { world.block_on(driver.service_async()) } else { driver.service() };
         assert_eq!(sent, Ok(()));
-        assert_eq!(driver.role().sent_at, [3, 3, 7].map(at_ms), "async {is_async}");
+        assert_eq!(driver.role().taken_at, [3, 3].map(at_ms), "async {is_async}");
+        assert_eq!(driver.role().flushed_at, [7].map(at_ms), "async {is_async}");
     }
 }
 

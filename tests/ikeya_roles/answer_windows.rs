@@ -1,7 +1,7 @@
 //! Answer windows: which packet counts as the answer to a request, and which is late (I7).
 
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     ikeya::{
         NodeId, Position, Status,
         master::{Cause, Health, MasterEvent},
@@ -31,46 +31,147 @@ fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
 }
 
 #[test]
-fn a_request_that_left_within_its_window_has_the_window_that_it_had() {
-    for left_us in [0, 80, 740] {
+fn a_request_that_the_port_held_back_within_its_window_has_a_window_from_there() {
+    for (flushed_us, deadline_us) in [(0, 740), (80, 740), (81, 741), (400, 1060), (740, 1400)] {
         let mut desk = Desk::with_nodes(direct(), &[N1]);
         desk.turn();
         let begin = desk.now;
-        desk.master.handle_sent(begin + US(left_us));
-        assert_eq!(desk.master.poll_timeout(), Some(begin + US(740)));
-        desk.hear(740, &velocity(NodeId::N1, 1.0));
-        assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]), "{left_us} us");
+        desk.master.handle_taken(begin);
+        desk.master.handle_flushed(begin + US(flushed_us));
+        assert_eq!(desk.master.poll_timeout(), Some(begin + US(deadline_us)), "{flushed_us} us");
+        let mut late = desk.clone();
+        desk.hear(deadline_us, &velocity(NodeId::N1, 1.0));
+        assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]), "{flushed_us} us");
+        assert_eq!(desk.turn(), read(NodeId::N1), "the line is free");
+        assert_eq!(desk.now, begin + US(deadline_us));
+
+        late.hear(deadline_us + 1, &velocity(NodeId::N1, 1.0));
+        assert_eq!(late.told(), [], "{flushed_us} us");
+        assert_eq!(late.master.node_statistics(NodeId::N1).late, 1);
     }
 }
 
 #[test]
 fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_is_not_taken() {
-    for flushed_us in [741, 9000] {
-        let mut desk = Desk::with_nodes(direct(), &[N1]);
+    // The write takes long, or the flush.
+    for (taken_us, flushed_us) in [(741, 741), (741, 9000), (0, 741), (0, 9000)] {
+        let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
         desk.turn();
         let begin = desk.now;
-        desk.master.handle_sent(begin + US(741));
-        // The flush says it better than the write.
-        desk.master.handle_sent(begin + US(flushed_us));
-        desk.now = begin + US(flushed_us);
-        let end = desk.now + US(500 + 160);
-        assert_eq!(desk.master.poll_timeout(), Some(end));
+        desk.master.handle_taken(begin + US(taken_us));
+        desk.now = begin + US(740.max(taken_us));
         desk.master.handle_timeout(desk.now);
+        let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
+        assert_eq!(desk.told(), [suspect]);
         assert_eq!(desk.master.poll_transmit(desk.now), None);
+        desk.master.handle_flushed(begin + US(flushed_us));
+        desk.now = begin + US(flushed_us);
         desk.hear(210, &velocity(NodeId::N1, 1.0));
         assert_eq!(desk.told(), []);
         assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
-        desk.now = end;
-        desk.master.handle_timeout(end);
-        let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
-        assert_eq!(desk.told(), [suspect]);
-        // A later answer meets a closed window, too.
-        assert_eq!(desk.master.poll_timeout(), Some(end + US(500)));
-        assert_eq!(desk.turn(), read(NodeId::N1));
-        desk.hear(290, &velocity(NodeId::N1, 2.0));
-        let status = Status::Velocity(2.0);
-        assert!(desk.told().contains(&MasterEvent::Status { node: NodeId::N1, status }));
+        // 500 us of patience and 160 us of answer behind the flush.
+        let end = begin + US(flushed_us + 660);
+        assert_eq!(desk.master.poll_timeout(), Some(end));
+        assert_eq!(desk.turn(), read(NodeId::N3));
+        assert_eq!(desk.now, end);
+        desk.hear(290, &position(NodeId::N3, turns(2)));
+        let status = Status::Position(turns(2));
+        assert_eq!(desk.told(), [MasterEvent::Status { node: NodeId::N3, status }]);
+        // The node may be late by its guard, as always.
+        while desk.turn() != read(NodeId::N1) {
+            desk.hear(290, &position(NodeId::N3, turns(2)));
+        }
+        assert!(desk.now >= end + US(500));
     }
+}
+
+#[test]
+fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answer() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    let begin = desk.now;
+    desk.master.handle_taken(begin);
+    // Nobody has let time pass meanwhile.
+    desk.now = begin + US(741);
+    desk.master.handle_flushed(desk.now);
+    let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
+    assert_eq!(desk.told(), [suspect]);
+    desk.hear(1, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.told(), []);
+    // The line is free then, but the node may be late by its guard.
+    assert_eq!(desk.master.poll_timeout(), Some(begin + US(741 + 660 + 500)));
+}
+
+#[test]
+fn an_answer_shows_that_its_request_has_left() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    desk.master.handle_taken(desk.now);
+    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.turn(), read(NodeId::N1), "the line is free");
+    let begin = desk.now;
+    desk.master.handle_taken(begin);
+    desk.hear(290, &velocity(NodeId::N1, 2.0));
+    assert_eq!(desk.told().len(), 2, "and the next answer counts");
+}
+
+#[test]
+fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_counts() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    let held_at = desk.now;
+    desk.master.handle_taken(held_at);
+    for _ in 0..2 {
+        assert_eq!(desk.turn(), read(NodeId::N1));
+        assert!(desk.now >= held_at + MS(1000));
+        desk.master.handle_taken(desk.now);
+        // Whose answer is it?
+        desk.hear(290, &velocity(NodeId::N1, 1.0));
+        desk.silence();
+    }
+    assert_eq!(desk.now, held_at + MS(1000) + US(740 + 500 + 740), "no second is lost again");
+    assert_eq!(desk.master.node_statistics(NodeId::N1).late, 2);
+    let statuses = desk.told();
+    assert!(!statuses.iter().any(|event| matches!(event, MasterEvent::Status { .. })));
+
+    // Everything has left: an answer to one of those may come, and then they count again.
+    let flushed_at = desk.now + US(100);
+    desk.master.handle_flushed(flushed_at);
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert!(desk.now >= flushed_at + US(660));
+    desk.hear(290, &velocity(NodeId::N1, 3.0));
+    let status = Status::Velocity(3.0);
+    assert!(desk.told().contains(&MasterEvent::Status { node: NodeId::N1, status }));
+}
+
+#[test]
+fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    desk.master.handle_taken(desk.now);
+    desk.turn();
+    desk.master.handle_taken(desk.now);
+    desk.master.handle_flushed(desk.now + US(10));
+    desk.told();
+    // In the window that it had.
+    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.told(), []);
+    assert_eq!(desk.master.poll_transmit(desk.now), None);
+}
+
+#[test]
+fn a_request_given_up_in_doubt_keeps_the_line_free_for_its_answer() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.turn();
+    let begin = desk.now;
+    desk.master.handle_taken(begin + US(400));
+    desk.master.handle_unsent(Unsent::CutOff, begin + US(400));
+    desk.master.handle_flushed(begin + US(400));
+    desk.now = begin + US(400);
+    desk.hear(300, &velocity(NodeId::N1, 1.0));
+    assert_eq!(desk.told(), []);
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert_eq!(desk.now, begin + US(400 + 660));
 }
 
 #[test]

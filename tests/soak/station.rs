@@ -108,6 +108,16 @@ impl<E: Endpoint> Endpoint for Station<E> {
         Some(frame)
     }
 
+    fn handle_taken(&mut self, now: Instant) {
+        let now = self.at(now);
+        self.role.handle_taken(now);
+    }
+
+    fn handle_flushed(&mut self, now: Instant) {
+        let now = self.at(now);
+        self.role.handle_flushed(now);
+    }
+
     fn is_outdated(&self) -> bool {
         self.role.is_outdated()
     }

@@ -154,12 +154,15 @@ pub(crate) struct End {
     /// The next write takes this long before its bytes leave, and the next flush this long, in one
     /// call.
     pub(crate) stalls_us: [u64; 2],
-    /// Bytes leave from this time on, and async flushes wait for it, microseconds.
+    /// Bytes leave from this time on, microseconds; async flushes wait for it, others fail.
     pub(crate) holds_until_us: u64,
+    /// Bytes arrive this much later, microseconds, as behind an adapter.
+    pub(crate) delay_us: u64,
     /// Async writes and flushes are ready only on the second poll.
     pub(crate) stutters: bool,
-    /// All bytes taken.
+    /// All bytes taken, and when each write took some.
     pub(crate) written: Vec<u8>,
+    pub(crate) taken_at_us: Vec<(usize, u64)>,
     pub(crate) unplugged: Rc<Cell<bool>>,
 }
 
@@ -179,8 +182,10 @@ impl End {
             is_mute: false,
             stalls_us: [0; 2],
             holds_until_us: 0,
+            delay_us: 0,
             stutters: false,
             written: vec![],
+            taken_at_us: vec![],
             unplugged: Rc::default(),
         }
     }
@@ -203,7 +208,7 @@ impl End {
         if is_good { Ok(()) } else { Err(Unplugged) }
     }
 
-    fn has_arrived(&self) -> bool {
+    pub(crate) fn has_arrived(&self) -> bool {
         self.inbox.borrow().front().is_some_and(|&(at, _)| at <= self.world.micros.get())
     }
 
@@ -239,11 +244,12 @@ impl End {
         }
         self.stall(0);
         self.written.extend(&buffer[..count]);
+        self.taken_at_us.push((count, self.world.micros.get()));
         self.is_deaf |= self.is_deafened;
         for outbox in &self.outboxes {
             let mut outbox = outbox.borrow_mut();
             for &byte in &buffer[..count] {
-                let begin = self.world.micros.get().max(self.holds_until_us);
+                let begin = self.world.micros.get().max(self.holds_until_us) + self.delay_us;
                 let free = outbox.back().map_or(0, |&(at, _)| at).max(begin);
                 outbox.push_back((free + self.byte_us, byte));
             }
@@ -298,6 +304,9 @@ impl embedded_io::Write for End {
     }
 
     fn flush(&mut self) -> Result<(), Unplugged> {
+        if self.world.micros.get() < self.holds_until_us {
+            return Err(Unplugged);
+        }
         self.finish()
     }
 }

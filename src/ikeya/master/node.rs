@@ -63,6 +63,8 @@ pub(super) struct Node<B: Board> {
 }
 
 impl<B: Board> Node<B> {
+    // In line it would take 90 more bytes of flash.
+    #[inline(never)]
     pub(super) const fn new() -> Self {
         Self {
             health: None,

@@ -7,7 +7,7 @@ use super::{
     role::{Master, index_of},
     set_point::{Confirm, SetPoint},
     stop::Standstill,
-    window::{Heard, Window},
+    window::{Heard, Held, Window},
 };
 use crate::{
     ikeya::{
@@ -19,6 +19,9 @@ use crate::{
     stream::Event,
     time::{Duration, Instant, wire_time},
 };
+
+/// Longest time for which the line is kept free for a request that the port holds.
+const HELD: Duration = Duration::from_millis(1000);
 
 impl<B: Board> Master<B> {
     /// Time from handing out a READ to the end of its window.
@@ -43,17 +46,45 @@ impl<B: Board> Master<B> {
         let asked = &mut self.nodes[index_of(node)];
         asked.sent_request(&self.config, self.now);
         asked.scans = asked.scans.saturating_add(is_scan.into());
-        let answer_by = request_end + self.answer_time();
-        let (closes_at, heard) = (answer_by, Heard::Nothing);
-        self.window = Some(Window { node, request_end, answer_by, closes_at, heard });
+        let deadline = request_end + self.answer_time();
+        self.window = Some(Window { node, request_end, deadline, heard: Heard::Nothing });
+        if self.held == Held::Last {
+            self.held = Held::Several;
+        }
     }
 
-    /// Prolongs a window that had passed before its request left: the answer is too late, but must
-    /// not meet the next request, nor be taken for the answer to that.
-    pub(super) fn prolong_window(&mut self, left_by: Instant) {
-        let closes_at = left_by + self.answer_time();
-        if let Some(window) = self.window.as_mut().filter(|window| left_by > window.answer_by) {
-            window.closes_at = closes_at;
+    /// The port has taken a request, and may hold it: the next one waits for its flush.
+    pub(super) fn hold_line(&mut self, now: Instant) {
+        if self.window.is_some() && self.held == Held::Nothing {
+            self.held = Held::Last;
+            self.line_free = Some(now + HELD);
+        }
+    }
+
+    /// What the port has held has left, at the latest by now.
+    pub(super) fn expect_answer(&mut self, left_by: Instant) {
+        let held = core::mem::replace(&mut self.held, Held::Nothing);
+        if held == Held::Nothing {
+            return;
+        }
+        let answer_by = left_by + self.answer_time();
+        let is_open = self.window.as_ref().is_some_and(|window| left_by <= window.deadline);
+        match &mut self.window {
+            Some(window) if is_open && held == Held::Last => {
+                window.deadline = window.deadline.max(answer_by);
+                let gap = self.config.turnaround_gap;
+                self.line_free = Some(window.request_end.max(left_by) + gap);
+            }
+            _ => {
+                // The answer comes too late, or may be that of an earlier request.
+                self.close_window();
+                let guarded_until = Some(answer_by + self.config.late_guard);
+                if let Some(sent) = self.sent {
+                    self.nodes[sent.choice.index & 7].guarded_until = guarded_until;
+                }
+                self.line_free = Some(answer_by);
+                self.is_behind_write = false;
+            }
         }
     }
 
@@ -73,7 +104,9 @@ impl<B: Board> Master<B> {
         let accepts_early = self.config.accepts_early;
         let statistics = &mut self.nodes[index_of(id)].statistics;
         match &mut self.window {
-            Some(window) if window.node == id && now <= window.answer_by => {
+            Some(window)
+                if window.node == id && now <= window.deadline && self.held != Held::Several =>
+            {
                 // No line is that fast, even allowing for a slightly coarse clock.
                 if now < window.request_end + half_answer && !accepts_early {
                     window.heard = Heard::Others;
@@ -81,7 +114,7 @@ impl<B: Board> Master<B> {
                     return self.hear_mode_outside_window(id, status.mode());
                 }
                 let request_end = window.request_end;
-                self.window = None;
+                (self.window, self.held) = (None, Held::Nothing);
                 self.line_free = Some(now + self.config.turnaround_gap);
                 self.hear_answer(id, status, request_end, now);
                 self.settle_discovery();
@@ -153,9 +186,15 @@ impl<B: Board> Master<B> {
 
     /// Closes a window that has passed without its answer.
     pub(super) fn expire_window(&mut self, now: Instant) {
-        if let Some(window) = self.window.filter(|window| now >= window.closes_at) {
-            self.window = None;
-            self.strike(window.node, window.cause(), window.closes_at);
+        if self.window.as_ref().is_some_and(|window| now >= window.deadline) {
+            self.close_window();
+        }
+    }
+
+    /// Closes the window without its answer.
+    fn close_window(&mut self) {
+        if let Some(window) = self.window.take() {
+            self.strike(window.node, window.cause(), window.deadline);
             self.settle_discovery();
         }
     }

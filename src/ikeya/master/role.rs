@@ -9,7 +9,7 @@ use super::{
     statistics::MasterStatistics,
     stop::{Standstill, Stop},
     turns::{Discovery, Search, Sent, Turns},
-    window::{Heard, Window},
+    window::{Heard, Held, Window},
 };
 use crate::{
     endpoint::{Endpoint, Unsent},
@@ -58,8 +58,12 @@ const EVENTS: usize = 16;
 /// after the request has left the line (I7). Packets outside the window or from another node are
 /// counted and dropped. A node that did not answer is not polled again for
 /// [`MasterConfig::late_guard`], so that a late answer meets a closed window. An answer later than
-/// that cannot be told from the next one: the protocol has no sequence numbers. If the port lets a
-/// request out only after its window, the answer is not taken, and the line is kept free for it.
+/// that cannot be told from the next one: the protocol has no sequence numbers.
+///
+/// A port may hold a request back. If its flush ends within the window, the window begins there. If
+/// it ends later, the answer is not taken, and the line is kept free for it. If it has not ended a
+/// second after the port took the request, the master continues, but takes no answer until a flush
+/// has ended.
 ///
 /// # Modes
 ///
@@ -94,6 +98,7 @@ pub struct Master<B: Board = OneMotor> {
     pub(super) answer_wire_time: Duration,
     /// Whether the last packet was an unanswered WRITE: a READ may follow without a pause.
     pub(super) is_behind_write: bool,
+    pub(super) held: Held,
     pub(super) discovery: Option<Discovery>,
     pub(super) turns: Turns,
     /// Time of the last call.
@@ -128,6 +133,7 @@ impl<B: Board> Master<B> {
             now,
             line_free: None,
             is_behind_write: false,
+            held: Held::Nothing,
             turns: Turns::default(),
             discovery: None,
             search: Search::default(),
@@ -203,6 +209,7 @@ impl<B: Board> Master<B> {
     }
 
     /// Shows that the application is alive, for [`MasterConfig::dead_man`].
+    #[inline(never)]
     pub fn keep_alive(&mut self, now: Instant) {
         self.sign_of_life(now);
     }
@@ -369,9 +376,14 @@ impl<B: Board> Endpoint for Master<B> {
         wire_time(bytes, self.config.baud)
     }
 
-    fn handle_sent(&mut self, now: Instant) {
+    fn handle_taken(&mut self, now: Instant) {
         self.now = now;
-        self.prolong_window(now);
+        self.hold_line(now);
+    }
+
+    fn handle_flushed(&mut self, now: Instant) {
+        self.now = now;
+        self.expect_answer(now);
     }
 
     /// Whether it is a WRITE of a set-point that has been dropped or replaced.
@@ -390,7 +402,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let work = match &self.window {
-            Some(window) => Some(window.closes_at),
+            Some(window) => Some(window.deadline),
             // Not before the line is free.
             None => self.due().map(|due| self.line_free.unwrap_or(due).max(due)),
         };

@@ -9,11 +9,18 @@ use crate::{ikeya::units::NodeId, time::Instant};
 pub(super) struct Window {
     pub(super) node: NodeId,
     pub(super) request_end: Instant,
-    /// Until when an answer counts.
-    pub(super) answer_by: Instant,
-    /// The same, or later if the request left only after that.
-    pub(super) closes_at: Instant,
+    pub(super) deadline: Instant,
     pub(super) heard: Heard,
+}
+
+/// What the port has taken and may still hold, so that its answer is still to come.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Held {
+    Nothing,
+    /// The last exchange.
+    Last,
+    /// Others before it: it is unknown whose answer comes.
+    Several,
 }
 
 /// What has been heard in the window.

@@ -1,0 +1,123 @@
+//! Requests that a port holds back, so that their answers come when they are no longer expected.
+
+use axlewire::{
+    ikeya::{NodeId, Position, ReadRequest, Status, master::MasterConfig},
+    time::Instant,
+};
+
+use crate::{
+    bus_rig::{Story, only_two_and_five},
+    dice::Dice,
+};
+
+/// One step of virtual time, microseconds.
+const STEP_US: u64 = 20;
+
+/// A master with node 2, which turns, and node 5, which answers with the time.
+struct Clocked {
+    story: Story,
+    dice: Dice,
+    is_async: bool,
+    window_us: usize,
+    /// The measurement that was taken last.
+    seen: Option<Instant>,
+    taken: usize,
+}
+
+impl Clocked {
+    fn new(seed: u64, is_async: bool) -> Self {
+        let mut dice = Dice(seed);
+        let mut config = only_two_and_five();
+        let is_adapter = dice.one_in(2);
+        if is_adapter {
+            let nodes = config.nodes;
+            (config, config.nodes) = (MasterConfig::usb_adapter(), nodes);
+        }
+        let story = Story::new(config);
+        let (world, five) = (story.world.clone(), story.five.clone());
+        for node in [&story.two, &story.five] {
+            node.borrow_mut().port_mut().delay_us = if is_adapter { 15_000 } else { 0 };
+        }
+        story.world.add(move || {
+            let steps = (world.now().as_micros() / STEP_US) as i32;
+            let at = Position::from_counts(steps).unwrap();
+            five.borrow_mut().role_mut().set_position(at);
+        });
+        let window_us = if is_adapter { 20_240 } else { 740 };
+        Self { story: story.discovered(), dice, is_async, window_us, seen: None, taken: 0 }
+    }
+
+    /// One call, on a port that may stall, hold back, and fail.
+    fn call(&mut self) {
+        let mut some_us = || match self.dice.one_in(3) {
+            true => self.dice.below(self.window_us * 4) as u64,
+            false => 0,
+        };
+        let (stall_us, flush_us, hold_us, pause_us) = (some_us(), some_us(), some_us(), some_us());
+        let (fails, drops) = (self.dice.one_in(3), self.dice.one_in(3));
+        let polls = 1 + self.dice.below(40);
+        let now_us = self.story.world.now().as_micros();
+        let port = self.story.bus.port_mut();
+        if self.dice.one_in(8) {
+            port.stalls_us = [stall_us, flush_us];
+            port.fails_flush = fails;
+            port.holds_until_us = now_us + hold_us;
+        }
+        let _ = match (self.is_async, drops) {
+            (false, _) => Some(self.story.bus.service()),
+            (true, true) => self.story.world.poll_times(polls, self.story.bus.service_async()),
+            (true, false) => Some(self.story.world.block_on(self.story.bus.service_async())),
+        };
+        let wake_at = self.story.bus.poll_timeout().unwrap_or_default();
+        while self.story.world.now() < wake_at && !self.story.bus.port().has_arrived() {
+            self.story.pass(STEP_US);
+        }
+        if self.dice.one_in(6) {
+            self.story.pass(pause_us);
+        }
+    }
+
+    /// No answer counts that was measured before its request was given to the port.
+    fn check(&mut self) {
+        while self.story.bus.poll_event().is_some() {}
+        let Some((Status::Position(at), heard_at)) = self.story.bus.role().status(NodeId::N5)
+        else {
+            return;
+        };
+        if self.seen.replace(heard_at) == Some(heard_at) {
+            return;
+        }
+        self.taken += 1;
+        let port = self.story.bus.port();
+        let read = ReadRequest::new(NodeId::N5);
+        let (mut end, mut asked_us) = (0, 0);
+        for &(count, at_us) in &port.taken_at_us {
+            end += count;
+            if port.written[..end].ends_with(read.as_bytes()) && at_us < heard_at.as_micros() {
+                asked_us = at_us;
+            }
+        }
+        let measured_us = at.counts() as u64 * STEP_US;
+        // It is set once in each step.
+        assert!(
+            measured_us + 2 * STEP_US >= asked_us,
+            "measured at {measured_us} us, asked at {asked_us} us, heard at {heard_at:?}"
+        );
+    }
+}
+
+#[test]
+fn no_answer_counts_that_was_measured_before_its_request_was_given_to_the_port() {
+    for is_async in [false, true] {
+        let mut taken = 0;
+        for seed in 0..10 {
+            let mut clocked = Clocked::new(seed, is_async);
+            for _ in 0..300 {
+                clocked.call();
+                clocked.check();
+            }
+            taken += clocked.taken;
+        }
+        assert!(taken > 80, "{taken} answers, async {is_async}");
+    }
+}
