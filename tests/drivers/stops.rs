@@ -6,15 +6,15 @@ use axlewire::{
     drive::DriveError,
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, Position, Rps, Target, WriteRequest,
+        Mode, NodeId, Position, ReadRequest, Rps, Target, WriteRequest,
         board::OneMotor,
-        master::{CommandError, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
     },
     time::{Duration, Instant},
 };
 
 use crate::{
-    bus_rig::{Story, manual, only_two_and_five, rps},
+    bus_rig::{Bus, Story, manual, only_two_and_five, rps},
     port::Unplugged,
 };
 
@@ -356,4 +356,26 @@ fn a_set_point_that_has_left_is_withdrawn_as_well_where_its_call_fails() {
         story.bus.run_until(end, |_, _, _| ()).unwrap();
         assert_eq!((story.bus.role().stops_owed(), command(&story)), (NodeSet::NONE, STOPPED));
     }
+}
+
+#[test]
+fn a_node_lost_while_its_set_point_waits_is_owed_a_stop_even_where_lost_nodes_are_not() {
+    let mut config = only_two_and_five();
+    config.stops_abnormal = false;
+    let mut story = Story::new(config).discovered();
+    let last = Some(Health::Suspect(2));
+    story.two.borrow().port().unplugged.set(true);
+    // Its third READ without an answer is under way.
+    let read = ReadRequest::new(NodeId::N2);
+    let is_under_way = |bus: &Bus| {
+        bus.role().health(NodeId::N2) == last && bus.port().written.ends_with(read.as_bytes())
+    };
+    while !is_under_way(&story.bus) {
+        story.bus.service().unwrap();
+        story.pass(20);
+    }
+    let refused = story.bus.set_velocity(NodeId::N2, rps(1.0));
+    let not_online = CommandError::NotOnline { node: NodeId::N2 };
+    assert_eq!(refused, Err(DriveError::Bus(not_online)));
+    assert_eq!(story.bus.role().stops_owed(), NodeId::N2.into());
 }

@@ -92,9 +92,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     pub(super) fn withdraw(&mut self, node: NodeId) {
         let cut_off = self.sending.give_up();
         self.tell_unsent(cut_off);
-        if self.role.set_point(node).is_some() {
-            self.begin_stop(node);
-        }
+        self.begin_stop(node);
     }
 
     /// Whether a node still has this set-point, and if not, why.
