@@ -86,6 +86,10 @@
 //!   ([`Endpoint::wire_time`]). Otherwise it is given up as well. So `flush` must wait until the
 //!   bytes are out, and after a partial `write` the driver must be called again in time.
 //! * *After a failed `flush`* the role counts its latest commands as not sent.
+//! * *A request that the port still holds*, because its `flush` has failed or its call was dropped,
+//!   will be answered late. A master keeps the line free for that answer, for a second at most. As
+//!   long as no `flush` succeeds it sends on after that, stops included, but takes no answer: it
+//!   could be that of an earlier request ([`Endpoint::handle_taken`]).
 //!
 //! # What is kept
 //!
@@ -153,6 +157,7 @@
 //! [`Endpoint`]: crate::endpoint::Endpoint
 //! [`Endpoint::frame_pause`]: crate::endpoint::Endpoint::frame_pause
 //! [`Endpoint::handle_old_input`]: crate::endpoint::Endpoint::handle_old_input
+//! [`Endpoint::handle_taken`]: crate::endpoint::Endpoint::handle_taken
 //! [`Endpoint::held_up_after`]: crate::endpoint::Endpoint::held_up_after
 //! [`Endpoint::is_outdated`]: crate::endpoint::Endpoint::is_outdated
 //! [`Endpoint::wire_time`]: crate::endpoint::Endpoint::wire_time
