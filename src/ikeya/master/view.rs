@@ -134,7 +134,8 @@ impl<B: Board> Master<B> {
 
     /// Longest time from the first request of a READ to its answer or its
     /// [failure](crate::ikeya::master::MasterEvent::ReadFailed), on any line. It assumes that the
-    /// driver is called in time, and that no discovery or stop, which go first, is in progress.
+    /// driver is called in time, that the port holds no request back, and that no discovery or
+    /// stop, which go first, is in progress.
     ///
     /// Between two attempts come the guard, one exchange with each other node and as many of the
     /// search for abnormal ones, and before each of these a new set-point for every node.
