@@ -119,9 +119,9 @@ impl Clocked {
 fn no_answer_counts_that_was_measured_before_its_request_was_given_to_the_port() {
     for is_async in [false, true] {
         let mut taken = 0;
-        for seed in 0..10 {
+        for seed in 0..6 {
             let mut clocked = Clocked::new(seed, is_async);
-            for _ in 0..300 {
+            for _ in 0..200 {
                 clocked.call(true);
                 clocked.check();
             }
@@ -134,6 +134,6 @@ fn no_answer_counts_that_was_measured_before_its_request_was_given_to_the_port()
                 assert!(took < Duration::from_millis(5000), "seed {seed}, async {is_async}");
             }
         }
-        assert!(taken > 80, "{taken} answers, async {is_async}");
+        assert!(taken > 30, "{taken} answers, async {is_async}");
     }
 }
