@@ -57,6 +57,8 @@ fn a_signal_or_a_lost_port_stops_what_was_commanded() {
             let send = format!("send -p {port} --for 600 ikeya velocity 1 {rps}");
             let send = Process::start(&send);
             sim.line(&format!("node 1: command {rps} rps"));
+            // The node can have heard the command before the tool knows that it has left.
+            send.line("write");
             send.signal(signal);
             let lines = send.success();
             assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
