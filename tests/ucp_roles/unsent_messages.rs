@@ -232,3 +232,14 @@ fn a_robot_whose_flush_failed_answers_an_update_again_and_takes_the_acknowledgem
     robot.handle_unsent(Unsent::Unflushed, ms(11));
     assert_eq!(sent(&mut robot, ms(11)), answer);
 }
+
+#[test]
+fn an_answer_of_a_robot_that_is_cut_off_after_a_failed_flush_is_due_again() {
+    let mut robot = Robot::new(RobotConfig::default(), ms(0));
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(0));
+    let lost = robot.poll_transmit(ms(0)).map(<[u8]>::to_vec).unwrap();
+    assert_eq!(lost[4], 3);
+    robot.handle_unsent(Unsent::Unflushed, ms(0));
+    robot.handle_unsent(Unsent::CutOff, ms(1));
+    assert_eq!(robot.poll_transmit(ms(1)), Some(&lost[..]));
+}

@@ -238,3 +238,20 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     host.handle_unsent(Unsent::Unflushed, ms(50));
     assert_eq!(copies(&mut host, ms(51)), 1);
 }
+
+#[test]
+fn the_rest_of_a_command_is_outdated_by_a_stop_although_a_flush_has_failed_meanwhile() {
+    let mut host = begun();
+    host.drive(go(60), ms(30)).unwrap();
+    assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(60));
+    // Of its bytes the port has taken some, and has not flushed them.
+    host.handle_unsent(Unsent::Unflushed, ms(31));
+    assert!(!host.is_outdated());
+    host.stop(ms(32));
+    assert!(host.is_outdated(), "so a driver gives it up");
+    host.handle_unsent(Unsent::CutOff, ms(32));
+    let frames = sent(&mut host, ms(32));
+    assert_eq!(frames.iter().map(|frame| speed(frame)).collect::<Vec<_>>(), [Some(0); 2]);
+    let indices: Vec<_> = frames.iter().map(|frame| frame[5]).collect();
+    assert_eq!(indices, [1, 2], "the index of the command is used again");
+}

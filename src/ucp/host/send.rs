@@ -128,7 +128,11 @@ impl<S: BiasStore> State<S> {
     /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        let last = self.last.take();
+        // After a failed flush its rest may still be sent.
+        let last = self.last;
+        if unsent != Unsent::Unflushed {
+            self.last = None;
+        }
         let was_motor = matches!(last, Some(Outgoing::Motor(_)));
         if unsent == Unsent::Unflushed {
             self.network_due = self.network.map(|_| now);

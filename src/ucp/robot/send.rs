@@ -79,7 +79,11 @@ impl State {
     /// anyway is not repeated. Results and requests are due at once: a host recognises a
     /// repetition.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        let last = self.last.take();
+        // After a failed flush its rest may still be sent.
+        let last = self.last;
+        if unsent != Unsent::Unflushed {
+            self.last = None;
+        }
         if unsent == Unsent::Unflushed {
             self.imu_result.again(now);
             self.mag_result.again(now);
