@@ -99,9 +99,8 @@
 //!   the answer's own wire time is added. Bytes received before the request are dropped. Answers
 //!   from another node, of another kind or after the deadline are counted, and never accepted.
 //!   While a port may hold a request back, the next one waits for it, and answers that may belong
-//!   to either are not accepted.
-//!   Three windows in a row without the answer make a node abnormal, one answer brings it back, and
-//!   a WRITE changes nothing. [`Master`] follows this.
+//!   to either are not accepted. Three windows in a row without the answer make a node abnormal,
+//!   one answer brings it back, and a WRITE changes nothing. [`Master`] follows this.
 //! * **I8** A READ is repeated, with three attempts by default. A WRITE is silent, so the latest
 //!   set-point is repeated in every cycle and, on request, confirmed by a READ.
 //! * **I9** A slave follows foreign traffic to stay in step, answers only a READ for its own id,

@@ -19,7 +19,7 @@ pub(super) enum Held {
     Nothing,
     /// The last exchange.
     Last,
-    /// Others before it: it is unknown whose answer comes.
+    /// Earlier ones as well: it is unknown whose answer comes.
     Several,
 }
 

@@ -128,15 +128,12 @@ impl<S: BiasStore> State<S> {
     /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        // After a failed flush its rest may still be sent.
+        // It stays on record after a failed flush: its rest may still be sent.
         let last = self.last;
-        if unsent != Unsent::Unflushed {
-            self.last = None;
-        }
         let was_motor = matches!(last, Some(Outgoing::Motor(_)));
         if unsent == Unsent::Unflushed {
             self.network_due = self.network.map(|_| now);
-        } else if let Some(outgoing) = last {
+        } else if let Some(outgoing) = self.last.take() {
             self.index = self.index.wrapping_sub(1);
             self.take_back(outgoing, now);
         }

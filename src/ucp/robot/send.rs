@@ -79,16 +79,13 @@ impl State {
     /// anyway is not repeated. Results and requests are due at once: a host recognises a
     /// repetition.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        // After a failed flush its rest may still be sent.
+        // It stays on record after a failed flush: its rest may still be sent.
         let last = self.last;
-        if unsent != Unsent::Unflushed {
-            self.last = None;
-        }
         if unsent == Unsent::Unflushed {
             self.imu_result.again(now);
             self.mag_result.again(now);
             self.bias_request.again(now);
-        } else if let Some(outgoing) = last {
+        } else if let Some(outgoing) = self.last.take() {
             self.take_back(outgoing, now);
         }
         if let (Some(Outgoing::UpdateAnswer(status)), false) = (last, self.update_asked) {
