@@ -326,7 +326,9 @@ class Test:
 
     def run(self, extra, patience_s):
         """`passed`, `failed` or `late`."""
-        environment = os.environ | {"CARGO_MANIFEST_DIR": str(self.at), "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1"} | extra
+        # A test that a mutant fails is not to be run eight times because the machine is busy.
+        environment = os.environ | {"CARGO_MANIFEST_DIR": str(self.at), "AXLEWIRE_ATTEMPTS": "2",
+                                    "PROPTEST_DISABLE_FAILURE_PERSISTENCE": "1"} | extra
         code, _ = quick.finish([self.program, "--exact", self.name, "--test-threads=1"], patience_s,
                                cwd=self.at, env=environment, preexec_fn=quick.limit_memory)
         return "late" if code is None else "passed" if code == 0 else "failed"

@@ -22,7 +22,7 @@ const CROWD_PCT: u32 = 20;
 /// it, is halted meanwhile; our threads may not notice.
 const STOLEN_PCT: u64 = 1;
 
-/// Number of attempts for a test that fails on a busy machine.
+/// Number of attempts for a test that fails on a busy machine, unless `AXLEWIRE_ATTEMPTS` has one.
 const ATTEMPTS: u32 = 8;
 
 /// Runs one test at a time. A failure counts unless the machine was busy meanwhile; then the test
@@ -30,7 +30,8 @@ const ATTEMPTS: u32 = 8;
 pub(crate) fn undisturbed(test: impl Fn()) {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    repeat(|| {
+    let attempts = std::env::var("AXLEWIRE_ATTEMPTS").ok().and_then(|number| number.parse().ok());
+    repeat(attempts.unwrap_or(ATTEMPTS), || {
         let watch = Watch::start();
         let outcome = catch_unwind(AssertUnwindSafe(&test));
         (outcome, watch.end())
@@ -38,11 +39,11 @@ pub(crate) fn undisturbed(test: impl Fn()) {
 }
 
 /// Runs the attempts: each returns its outcome, and how busy the machine was.
-fn repeat(mut attempt: impl FnMut() -> (thread::Result<()>, Busy)) {
+fn repeat(attempts: u32, mut attempt: impl FnMut() -> (thread::Result<()>, Busy)) {
     for number in 1.. {
         match attempt() {
             (Ok(()), _) => return,
-            (Err(_), busy) if busy.is_too_much() && number < ATTEMPTS => {
+            (Err(_), busy) if busy.is_too_much() && number < attempts => {
                 eprintln!("attempt {number} failed on a busy machine, {busy:?}: retrying");
             }
             (Err(panic), _) => resume_unwind(panic),
@@ -134,7 +135,7 @@ fn a_failure_counts_at_once_unless_the_machine_was_busy_and_then_on_the_last_att
     {
         let mut attempts = 0;
         let failed = catch_unwind(AssertUnwindSafe(|| {
-            repeat(|| {
+            repeat(ATTEMPTS, || {
                 attempts += 1;
                 (Err(Box::new("a defect")), busy)
             });
@@ -146,7 +147,7 @@ fn a_failure_counts_at_once_unless_the_machine_was_busy_and_then_on_the_last_att
 #[test]
 fn a_success_ends_the_attempts() {
     let mut attempts = 0;
-    repeat(|| {
+    repeat(ATTEMPTS, || {
         attempts += 1;
         let busy = Busy { stall: STALL, ..Busy::default() };
         (if attempts < 3 { Err(Box::new("the machine's")) } else { Ok(()) }, busy)
