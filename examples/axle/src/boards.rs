@@ -193,6 +193,11 @@ mod tests {
     }
 
     #[test]
+    fn half_of_a_slow_speed_has_to_be_reached() {
+        assert!(velocity(0.15, 0.076) && !velocity(0.15, 0.074));
+    }
+
+    #[test]
     fn a_motor_that_stands_still_has_not_reached_a_slow_speed() {
         assert!(!velocity(0.12, 0.0) && !velocity(-0.12, 0.0) && velocity(0.12, 0.08));
         assert!(velocity(0.0, 0.04) && !velocity(0.0, 0.06) && !velocity(1.0, f32::NAN));

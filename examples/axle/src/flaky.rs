@@ -25,6 +25,7 @@ use serialport::{
 use crate::{
     bus::{Bus, Halt},
     line::Line,
+    quiet::undisturbed,
     rover::Rover,
 };
 
@@ -132,22 +133,26 @@ fn broken_for_a_while<E: Endpoint + Send + 'static>(
 
 #[test]
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
-    let node = |_| MotorNode::new(NodeId::N1, Mode::Velocity);
-    let line = broken_for_a_while(node, |_, _| {});
-    let mut config = MasterConfig::usb_adapter();
-    config.accepts_early = true;
-    let mut bus: Bus = Bus::new(line, config);
-    bus.stop(NodeId::N1.into()).unwrap();
-    assert_eq!(bus.halt(NodeId::N1), Halt::Still);
+    undisturbed(|| {
+        let node = |_| MotorNode::new(NodeId::N1, Mode::Velocity);
+        let line = broken_for_a_while(node, |_, _| {});
+        let mut config = MasterConfig::usb_adapter();
+        config.accepts_early = true;
+        let mut bus: Bus = Bus::new(line, config);
+        bus.stop(NodeId::N1.into()).unwrap();
+        assert_eq!(bus.halt(NodeId::N1), Halt::Still);
+    });
 }
 
 #[test]
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
-    let robot = |now| Robot::new(RobotConfig::default(), now);
-    let line = broken_for_a_while(robot, |robot, now| {
-        robot.set_telemetry(&Telemetry::default(), now);
+    undisturbed(|| {
+        let robot = |now| Robot::new(RobotConfig::default(), now);
+        let line = broken_for_a_while(robot, |robot, now| {
+            robot.set_telemetry(&Telemetry::default(), now);
+        });
+        let mut rover = Rover::new(line, HostConfig::default());
+        rover.stop().unwrap();
+        assert!(rover.host().is_stop_sent());
     });
-    let mut rover = Rover::new(line, HostConfig::default());
-    rover.stop().unwrap();
-    assert!(rover.host().is_stop_sent());
 }

@@ -198,3 +198,67 @@ fn progress(len: u64) -> Option<ProgressBar> {
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     Some(ProgressBar::new(len).with_style(style).with_finish(ProgressFinish::AndClear))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gives one byte at a time, each after an interruption as by a signal, and fails at the end.
+    struct Rough {
+        rest: &'static [u8],
+        is_interrupted: bool,
+    }
+
+    impl Read for Rough {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            self.is_interrupted = !self.is_interrupted;
+            if self.is_interrupted {
+                return Err(ErrorKind::Interrupted.into());
+            }
+            let (&byte, rest) = self.rest.split_first().ok_or(ErrorKind::BrokenPipe)?;
+            (buffer[0], self.rest) = (byte, rest);
+            Ok(1)
+        }
+    }
+
+    fn rough(rest: &'static [u8], progress: Option<ProgressBar>) -> Input {
+        let reader = Rough { rest, is_interrupted: false };
+        Input::new(None, Box::new(reader), None, progress)
+    }
+
+    #[test]
+    fn an_interrupted_read_is_tried_again_and_a_failed_one_is_told() {
+        let mut input = rough(&[1, 2], None);
+        assert_eq!(input.read().unwrap(), [1]);
+        assert_eq!(input.read().unwrap(), [2]);
+        assert!(matches!(input.read(), Err(Failure::Read { .. })));
+
+        let (mut input, mut bytes) = (rough(&[1, 2, 3], None), Vec::new());
+        assert!(!input.fill(&mut bytes, 2).unwrap());
+        assert_eq!(bytes, [1, 2]);
+        assert!(matches!(input.fill(&mut bytes, 4), Err(Failure::Read { .. })));
+        assert_eq!(bytes, [1, 2, 3], "what came before the failure");
+    }
+
+    #[test]
+    fn the_progress_is_the_number_of_bytes_read() {
+        let bar = ProgressBar::hidden();
+        let (mut input, mut bytes) = (rough(&[1, 2, 3, 4, 5], Some(bar.clone())), Vec::new());
+        for (len, expected) in [(2, 2), (4, 4), (3, 4)] {
+            input.fill(&mut bytes, len).unwrap();
+            assert_eq!(bar.position(), expected);
+        }
+        input.read().unwrap();
+        assert_eq!(bar.position(), 5);
+    }
+
+    #[test]
+    fn the_chunk_after_what_was_read_ahead_is_a_long_one() {
+        let reader = io::Cursor::new(vec![7; 2 * CHUNK_LEN + 3]);
+        let mut input =
+            Input::new(None, Box::new(io::Cursor::new(vec![1; 3]).chain(reader)), None, None);
+        assert_eq!(input.peek(3, |_| false).unwrap(), [1; 3]);
+        let lens = [(); 4].map(|()| input.read().unwrap().len());
+        assert_eq!(lens, [3, CHUNK_LEN, CHUNK_LEN, 3]);
+    }
+}

@@ -27,6 +27,9 @@ mod play;
 #[cfg(all(test, unix))]
 mod played;
 mod ports;
+#[cfg(test)]
+#[path = "../../../tests/support/quiet.rs"]
+mod quiet;
 mod record;
 mod replay;
 mod report;

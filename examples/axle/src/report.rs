@@ -85,3 +85,28 @@ struct Timed<'a, E> {
 fn object(event: &impl Serialize) -> String {
     serde_json::to_string(event).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Serialize)]
+    struct Wave {
+        height: u8,
+    }
+
+    impl Display for Wave {
+        fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            write!(f, "a wave of {}", self.height)
+        }
+    }
+
+    #[test]
+    fn a_line_has_the_time_in_seconds_and_the_event() {
+        let wave = Wave { height: 3 };
+        assert_eq!(Form::of(false).line(1_500_000, &wave), "   1.50 s  a wave of 3");
+        assert_eq!(Form::of(true).line(1_500_000, &wave), r#"{"height":3,"seconds":1.5}"#);
+        assert_eq!(Form::Text.plain(&wave), "a wave of 3");
+        assert_eq!(Form::Json.plain(&wave), r#"{"height":3}"#);
+    }
+}

@@ -309,6 +309,23 @@ fn where_the_beginning_tells_no_protocol_the_option_is_named() {
     assert!(stderr.starts_with("axle: no frame of any protocol in the first "), "{stderr}");
     assert!(stderr.ends_with(" bytes: use --protocol to decode them all\n"), "{stderr}");
     assert_eq!(decode(&["-P", "ucp"], &late).1["frames"], 1);
+    // All of a short input has been looked at.
+    let stderr = String::from_utf8(run(&["decode"], &[0; 70]).stderr).unwrap();
+    assert_eq!(stderr, "axle: no frame of any protocol in the first 70 bytes\n");
+}
+
+#[test]
+fn without_a_frame_the_protocol_that_has_some_is_named() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    let complaint = |protocol: &str, input: &[u8]| {
+        String::from_utf8(run(&["decode", "--protocol", protocol], input).stderr).unwrap()
+    };
+    assert_eq!(
+        complaint("ikeya", &ping),
+        format!("axle: no ikeya frame in {} bytes, but 1 of ucp: use --protocol ucp\n", ping.len())
+    );
+    let plain = "no ucp frame in 9 bytes: the wrong protocol, the wrong baud rate, or noise";
+    assert_eq!(complaint("ucp", &[0; 9]), format!("axle: {plain}\n"));
 }
 
 #[test]

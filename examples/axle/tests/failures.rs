@@ -70,6 +70,14 @@ fn help_and_version_are_no_failures() {
 }
 
 #[test]
+fn the_list_of_ports_ends_with_their_number() {
+    let lines = stdout(run(&["ports", "--json"], &[]));
+    let lines: Vec<_> = lines.lines().collect();
+    let expected = format!(r#"{{"event":"summary","ports":{}}}"#, lines.len() - 1);
+    assert_eq!(lines.last(), Some(&&*expected));
+}
+
+#[test]
 fn a_file_that_does_not_exist_is_named() {
     let line = complaint(run(&["decode", "--protocol", "ucp", "no such\nfile"], &[]), 1);
     assert!(line.starts_with(r#"cannot open "no such\nfile": "#), "{line}");

@@ -162,6 +162,23 @@ fn a_clock_that_goes_backwards_is_told_and_is_no_failure() {
     assert_eq!(lines(&[], &capture).last().unwrap(), "         1 times the clock went backwards");
     assert_eq!(decode(&[], &capture).1["times_back"], 1);
     assert_eq!(decode(&[], &bus().0).1.get("times_back"), None);
+    let at_once: [Packet<'_>; 2] = [(T, 1, &ping), (T, 1, &ping)];
+    assert_eq!(decode(&[], &PcapNg::new(UCP, &at_once).0).1.get("times_back"), None);
+}
+
+#[test]
+fn a_capture_without_a_frame_is_a_failure_unless_it_has_no_bytes() {
+    for (packets, expected) in [
+        (
+            &[(T, 1, &[0; 9][..])][..],
+            "axle: no frame in 9 bytes: use --protocol if it is another one\n",
+        ),
+        (&[(T, 1, &[][..])][..], ""),
+        (&[][..], ""),
+    ] {
+        let (_, code, error) = outcome(run(&["decode"], &PcapNg::new(UCP, packets).0));
+        assert_eq!((&*error, code), (expected, Some(i32::from(!expected.is_empty()))));
+    }
 }
 
 #[test]

@@ -98,6 +98,7 @@ mod tests {
             assert!(wait.until(900, &[halt, Halt::Still], false));
             assert!(wait.until(4000, &[halt], true));
             assert!(!wait.until(4100, &[halt], false));
+            assert!(!Asked::new().until(1000, &[halt, Halt::Still], false));
             let mut wait = Asked::new();
             assert!(wait.until(4900, &[halt], true));
             assert!(!wait.until(5000, &[halt], true));

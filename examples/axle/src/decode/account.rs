@@ -111,3 +111,51 @@ fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<()> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use axlewire::ucp::{Body, Ucp, message::Ping};
+
+    use super::*;
+
+    /// A file of pings with a damaged one in 13, and its bytes.
+    fn pings(name: &str, len: usize) -> (File, Vec<u8>) {
+        let mut bytes: Vec<u8> = Vec::new();
+        for number in 0.. {
+            if bytes.len() >= len {
+                break;
+            }
+            bytes.extend(Ping {}.frame(number as u8).as_bytes());
+            if number % 13 == 0 {
+                *bytes.last_mut().unwrap() ^= 1;
+            }
+        }
+        let path = std::env::temp_dir().join(format!("axle-{}-{name}", std::process::id()));
+        let mut options = File::options();
+        let mut file =
+            options.read(true).write(true).create(true).truncate(true).open(&path).unwrap();
+        std::fs::remove_file(path).unwrap();
+        file.write_all(&bytes).unwrap();
+        (file, bytes)
+    }
+
+    #[test]
+    fn several_threads_give_the_account_of_the_whole_file() {
+        let (file, bytes) = pings("whole", 5 * PART + 77);
+        for jobs in [1, 2, 5] {
+            let found = of_file::<Ucp>(&file, bytes.len() as u64, jobs);
+            assert_eq!(found, Some(of_bytes::<Ucp>(&bytes)), "{jobs} threads");
+        }
+    }
+
+    #[test]
+    fn a_short_file_and_one_that_is_shorter_than_it_was_are_left_to_one_thread() {
+        let (file, bytes) = pings("short", 2 * PART - 1000);
+        assert_eq!(of_file::<Ucp>(&file, bytes.len() as u64, 2), None);
+        let (file, bytes) = pings("cut", 2 * PART);
+        assert!(of_file::<Ucp>(&file, bytes.len() as u64, 2).is_some());
+        assert_eq!(of_file::<Ucp>(&file, bytes.len() as u64 + 1, 2), None);
+    }
+}

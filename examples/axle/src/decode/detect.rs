@@ -83,6 +83,19 @@ mod tests {
     }
 
     #[test]
+    fn it_takes_some_frames_in_half_of_the_bytes_and_twice_those_of_any_other() {
+        let is_sure = |frames, framed, others| {
+            let share = |protocol, framed, frames| Share { protocol, framed, frames };
+            let others = share(Protocol::Ikeya, others, 9);
+            is_sure(&[share(Protocol::Ucp, framed, frames), others, others], 200)
+        };
+        assert!(is_sure(SURE_FRAMES, 100, 49));
+        assert!(!is_sure(SURE_FRAMES - 1, 100, 49));
+        assert!(!is_sure(SURE_FRAMES, 99, 49));
+        assert!(!is_sure(SURE_FRAMES, 100, 50));
+    }
+
+    #[test]
     fn noise_is_no_protocol() {
         let noise: Vec<u8> = (0..2000_u32).map(|at| (at * at % 251) as u8).collect();
         let shares = shares(&noise);

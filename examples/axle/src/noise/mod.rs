@@ -173,6 +173,11 @@ mod tests {
             let clean = transmit(traffic, Noise::None, 300, 1);
             let found = Receiver::Plain.receive(traffic, &clean.bytes);
             assert_eq!(found, clean.valid, "{traffic:?}");
+            let (mut damaged, [most @ .., _]) = (clean.bytes.clone(), &clean.valid[..]) else {
+                panic!("no frames");
+            };
+            *damaged.last_mut().unwrap() ^= 1;
+            assert_eq!(Receiver::Plain.receive(traffic, &damaged), most, "{traffic:?}");
             let noisy = transmit(traffic, Noise::HeaderBursts(2), 300, 1);
             let tally = noisy.tally(&Receiver::Plain.receive(traffic, &noisy.bytes));
             assert!(tally.delivered < 290 && tally.delivered > 100, "{traffic:?}: {tally:?}");

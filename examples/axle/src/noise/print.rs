@@ -95,7 +95,6 @@ impl Table {
             total.delivered += tally.delivered;
             total.phantoms += tally.phantoms;
             total.unavoidable += tally.unavoidable;
-            total.invented += tally.invented;
         }
         if self.is_json {
             return rows.iter().try_for_each(|row| row.json(out));

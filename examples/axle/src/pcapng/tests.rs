@@ -1,5 +1,7 @@
 //! What is written is read back; whatever else is read ends in a packet or a problem.
 
+use std::{fs::File, io};
+
 use super::{Direction, Reader, Writer, link_type, protocol_of, read::Problem};
 use crate::args::Protocol;
 
@@ -103,15 +105,19 @@ fn a_file_cut_off_anywhere_gives_every_byte_that_is_there() {
 #[test]
 fn times_of_any_unit_and_byte_order_are_microseconds() {
     for is_big in [false, true] {
-        let offset = if is_big { 5_i64.to_be_bytes() } else { 5_i64.to_le_bytes() };
-        let cases: [(u16, &[u8], u64, u64); 7] = [
+        let offset =
+            |seconds: i64| if is_big { seconds.to_be_bytes() } else { seconds.to_le_bytes() };
+        let (forth, back, far) = (offset(5), offset(-5), offset(3 << 32));
+        let cases: [(u16, &[u8], u64, u64); 9] = [
             (1, b"a comment", 7_000_001, 7_000_001), // microseconds unless it says otherwise
             (9, &[6], 7_000_001, 7_000_001),
             (9, &[9], 7_000_001_999, 7_000_001),
             (9, &[0], 7, 7_000_000),
             (9, &[0x80 + 20], 7 << 20, 7_000_000),
             (9, &[0x7F], u64::MAX, 0), // a unit too small to matter
-            (14, &offset, 2_000_000, 7_000_000),
+            (14, &forth, 2_000_000, 7_000_000),
+            (14, &back, 12_000_000, 7_000_000),
+            (14, &far, 1, (3 << 32) * 1_000_000 + 1),
         ];
         for (code, value, time, micros) in cases {
             let (seen, problem) = read(&with_option(is_big, code, value, time));
@@ -258,4 +264,42 @@ fn damage_never_panics_nor_loops() {
         let found: usize = seen.iter().map(|(.., bytes)| bytes.len()).sum();
         assert!(found <= bytes.len());
     }
+}
+
+/// Gives up to 1000 bytes at a time, each time after an interruption as by a signal.
+struct Interrupted<'a>(&'a [u8], bool);
+
+impl io::Read for Interrupted<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.1 = !self.1;
+        if self.1 {
+            return Err(io::ErrorKind::Interrupted.into());
+        }
+        let len = buffer.len().min(1000);
+        self.0.read(&mut buffer[..len])
+    }
+}
+
+#[test]
+fn blocks_up_to_1_mib_are_read_whole_through_all_interruptions() {
+    const HEADER: usize = 20;
+    let start = with_option(false, 9, &[6], 1);
+    let packet = |len: usize| {
+        let lens = (len as u32).to_le_bytes().repeat(2);
+        block(false, 6, &[&[0; 12][..], &lens, &vec![7; len]].concat())
+    };
+    let longest = (1 << 20) - 12 - HEADER;
+    let bytes = [&start[..], &packet(70_000), &packet(longest), &packet(longest + 4)].concat();
+    let mut reader = Reader::new(Interrupted(&bytes, false));
+    for len in [3, 70_000, longest] {
+        assert_eq!(reader.next().unwrap().unwrap().bytes.len(), len);
+    }
+    let why = "it is longer than 1 MiB";
+    assert!(matches!(reader.next(), Err(Problem::Invalid { why: is, .. }) if is == why));
+}
+
+#[test]
+fn a_read_error_is_a_problem() {
+    let mut reader = Reader::new(File::open(std::env::temp_dir()).unwrap());
+    assert!(matches!(reader.next(), Err(Problem::Io(_))));
 }

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, time::Instant as Clock};
 
 use super::*;
-use crate::played;
+use crate::{played, quiet::undisturbed};
 
 #[test]
 fn a_positive_turn_is_to_the_right_and_the_text_says_so() {
@@ -24,184 +24,206 @@ fn a_positive_turn_is_to_the_right_and_the_text_says_so() {
 
 #[test]
 fn a_rover_is_at_rest_once_every_wheel_has_been_still_for_three_reports() {
-    let begin = Clock::now();
-    let line = played::rover(move |rover| {
-        let millis = begin.elapsed().as_millis();
-        rover.wheels = match millis / 110 {
-            0 | 1 => Some([9, 0, 0, 0]),
-            2 => Some([0, -9, 0, 0]),
-            3 => Some([0, 0, 9, 0]),
-            4 => Some([0, 0, 0, -9]),
-            5 => Some([9, -9, 9, -9]),
-            // Still for one report in three.
-            6 | 7 => Some([if millis % 60 < 15 { 0 } else { 9 }; 4]),
-            _ => None,
-        };
+    undisturbed(|| {
+        let begin = Clock::now();
+        let line = played::rover(move |rover| {
+            let millis = begin.elapsed().as_millis();
+            rover.wheels = match millis / 110 {
+                0 | 1 => Some([9, 0, 0, 0]),
+                2 => Some([0, -9, 0, 0]),
+                3 => Some([0, 0, 9, 0]),
+                4 => Some([0, 0, 0, -9]),
+                5 => Some([9, -9, 9, -9]),
+                // Still for one report in three.
+                6 | 7 => Some([if millis % 60 < 15 { 0 } else { 9 }; 4]),
+                _ => None,
+            };
+        });
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        rover.stop().unwrap();
+        assert!(begin.elapsed().as_millis() >= 880, "{:?}", begin.elapsed());
+        let commands = &line.state.borrow().commands;
+        assert!(commands.len() >= 5 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
     });
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    rover.stop().unwrap();
-    assert!(begin.elapsed().as_millis() >= 880, "{:?}", begin.elapsed());
-    let commands = &line.state.borrow().commands;
-    assert!(commands.len() >= 5 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
 }
 
 #[test]
 fn a_stop_is_sent_three_times_and_heard_before_a_report_counts() {
-    let line = played::rover(|_| {});
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    let before = line.state.borrow().commands.len();
-    rover.stop().unwrap();
-    assert!(line.state.borrow().commands.len() >= before + 3);
-    assert!(rover.host().is_stop_sent());
-    let text = rover.describe().unwrap();
-    assert!(text.starts_with("rpm    0    0    0    0  heading  90 deg  "), "{text}");
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        let before = line.state.borrow().commands.len();
+        rover.stop().unwrap();
+        assert!(line.state.borrow().commands.len() >= before + 3);
+        assert!(rover.host().is_stop_sent());
+        let text = rover.describe().unwrap();
+        assert!(text.starts_with("rpm    0    0    0    0  heading  90 deg  "), "{text}");
+    });
 }
 
 #[test]
 fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
-    // It stands still until it has heard of the stop, and then turns.
-    let mut pings = None;
-    let line = played::rover(move |rover| {
-        if rover.commands.len() >= STOPS as usize {
-            let before = *pings.get_or_insert(rover.pings);
-            rover.wheels = (rover.pings > before).then_some([9; 4]);
-        }
+    undisturbed(|| {
+        // It stands still until it has heard of the stop, and then turns.
+        let mut pings = None;
+        let line = played::rover(move |rover| {
+            if rover.commands.len() >= STOPS as usize {
+                let before = *pings.get_or_insert(rover.pings);
+                rover.wheels = (rover.pings > before).then_some([9; 4]);
+            }
+        });
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        assert!(rover.stop().is_err());
+        assert_eq!(line.state.borrow().wheels, Some([9; 4]));
     });
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    assert!(rover.stop().is_err());
-    assert_eq!(line.state.borrow().wheels, Some([9; 4]));
 }
 
 #[test]
 fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
-    let line = played::rover(|_| {});
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    let now = rover.now();
-    rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
-    while !line.state.borrow().commands.contains(&(30, 0)) {
-        let end = rover.now() + CALL_PERIOD;
-        rover.round(end).unwrap();
-    }
-    let (before, begin) = (line.state.borrow().commands.len(), Clock::now());
-    rover.stop().unwrap();
-    let commands = line.state.borrow().commands[before..].to_vec();
-    assert!(commands.len() >= 3 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
-    assert!(begin.elapsed().as_millis() < 1400, "{:?}", begin.elapsed());
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        let now = rover.now();
+        rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
+        while !line.state.borrow().commands.contains(&(30, 0)) {
+            let end = rover.now() + CALL_PERIOD;
+            rover.round(end).unwrap();
+        }
+        let (before, begin) = (line.state.borrow().commands.len(), Clock::now());
+        rover.stop().unwrap();
+        let commands = line.state.borrow().commands[before..].to_vec();
+        assert!(commands.len() >= 3 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
+        assert!(begin.elapsed().as_millis() < 1400, "{:?}", begin.elapsed());
+    });
 }
 
 #[test]
 fn the_wheels_of_a_report_are_told_in_their_order() {
-    let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    let end = rover.now() + Duration::from_millis(5000);
-    while rover.describe().is_none() && rover.now() < end {
-        rover.round(end).unwrap();
-    }
-    let text = rover.describe().unwrap();
-    let expected = "rpm    1   -2    3   -4  heading  90 deg  24.3 V  1.56 A  battery 87 %  lost \
+    undisturbed(|| {
+        let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let end = rover.now() + Duration::from_millis(5000);
+        while rover.describe().is_none() && rover.now() < end {
+            rover.round(end).unwrap();
+        }
+        let text = rover.describe().unwrap();
+        let expected = "rpm    1   -2    3   -4  heading  90 deg  24.3 V  1.56 A  battery 87 %  lost \
                     reports 0";
-    assert_eq!(text, expected);
+        assert_eq!(text, expected);
+    });
 }
 
 #[test]
 fn a_search_that_is_over_finds_nothing() {
-    let line = played::rover(|_| {});
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(!rover.find(|| true).unwrap());
-    assert!(rover.find(|| false).unwrap());
-    assert!(!rover.find(|| true).unwrap(), "even if it is heard");
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(!rover.find(|| true).unwrap());
+        assert!(rover.find(|| false).unwrap());
+        assert!(!rover.find(|| true).unwrap(), "even if it is heard");
+    });
 }
 
 #[test]
 fn a_search_that_finds_no_robot_tells_what_was_received_and_how_long_it_took() {
-    let strays = |count: u32| {
-        played::played(count, |left, _| {
-            let is_more = *left > 0;
-            *left = left.saturating_sub(1);
-            vec![0; usize::from(is_more)]
-        })
-    };
-    for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
-        let mut rover = Rover::on(strays(count).line, 115_200);
-        let begin = Clock::now();
-        let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
-        assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
-        assert!(begin.elapsed().as_millis() >= 1999, "{:?}", begin.elapsed());
-    }
+    undisturbed(|| {
+        let strays = |count: u32| {
+            played::played(count, |left, _| {
+                let is_more = *left > 0;
+                *left = left.saturating_sub(1);
+                vec![0; usize::from(is_more)]
+            })
+        };
+        for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
+            let mut rover = Rover::on(strays(count).line, 115_200);
+            let begin = Clock::now();
+            let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
+            assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
+            assert!(begin.elapsed().as_millis() >= 1999, "{:?}", begin.elapsed());
+        }
+    });
 }
 
 #[test]
 fn a_search_is_over_soon_after_it_is_told_so_however_silent_the_line_is() {
-    let line = played::rover(|rover| rover.is_dumb = true);
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    let begin = Clock::now();
-    assert!(!rover.find(|| begin.elapsed().as_millis() >= 300).unwrap());
-    assert!(begin.elapsed().as_millis() < 700, "{:?}", begin.elapsed());
+    undisturbed(|| {
+        let line = played::rover(|rover| rover.is_dumb = true);
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let begin = Clock::now();
+        assert!(!rover.find(|| begin.elapsed().as_millis() >= 300).unwrap());
+        assert!(begin.elapsed().as_millis() < 700, "{:?}", begin.elapsed());
+    });
 }
 
 #[test]
 fn the_dead_man_of_the_host_is_noticed() {
-    let line = played::rover(|_| {});
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    let now = rover.now();
-    rover.host_mut().drive(motor_control(20, 0).unwrap(), now).unwrap();
-    let end = rover.now() + Duration::from_millis(700);
-    while rover.now() < end {
-        rover.round(end).unwrap();
-    }
-    assert!(rover.has_dead_man_fired);
-    assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        let now = rover.now();
+        rover.host_mut().drive(motor_control(20, 0).unwrap(), now).unwrap();
+        let end = rover.now() + Duration::from_millis(700);
+        while rover.now() < end {
+            rover.round(end).unwrap();
+        }
+        assert!(rover.has_dead_man_fired);
+        assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
+    });
 }
 
 #[test]
 fn a_late_pong_does_not_tell_that_a_later_ping_was_heard() {
-    let late = time::Duration::from_millis(700);
-    let (mut played, mut waiting) = (played::PlayedRover::default(), VecDeque::new());
-    let line = played::played(played::RoverState::default(), move |state, bytes| {
-        let said = played.hear(state, bytes);
-        if !said.is_empty() {
-            waiting.push_back((Clock::now() + late, said));
+    undisturbed(|| {
+        let late = time::Duration::from_millis(700);
+        let (mut played, mut waiting) = (played::PlayedRover::default(), VecDeque::new());
+        let line = played::played(played::RoverState::default(), move |state, bytes| {
+            let said = played.hear(state, bytes);
+            if !said.is_empty() {
+                waiting.push_back((Clock::now() + late, said));
+            }
+            let mut due = Vec::new();
+            while waiting.front().is_some_and(|(at, _)| *at <= Clock::now()) {
+                due.extend(waiting.pop_front().map(|(_, said)| said).unwrap_or_default());
+            }
+            due
+        });
+        let mut rover = Rover::on(line.line.clone(), 115_200);
+        assert!(rover.find(|| false).unwrap());
+        let (mark, begin) = (rover.mark(), Clock::now());
+        // All pings are young: each may be answered yet, also those of the first round.
+        let seen = rover.host().statistics();
+        assert_eq!(mark.open, Some(seen.pings - pongs(seen)));
+        assert_ne!(mark.open, Some(0));
+        while !rover.has_heard(&mark) && begin.elapsed() < 5 * late {
+            let end = rover.now() + CALL_PERIOD;
+            rover.round(end).unwrap();
         }
-        let mut due = Vec::new();
-        while waiting.front().is_some_and(|(at, _)| *at <= Clock::now()) {
-            due.extend(waiting.pop_front().map(|(_, said)| said).unwrap_or_default());
-        }
-        due
+        assert!((late..3 * late).contains(&begin.elapsed()), "{:?}", begin.elapsed());
     });
-    let mut rover = Rover::on(line.line.clone(), 115_200);
-    assert!(rover.find(|| false).unwrap());
-    let (mark, begin) = (rover.mark(), Clock::now());
-    // All pings are young: each may be answered yet, also those of the first round.
-    let seen = rover.host().statistics();
-    assert_eq!(mark.open, Some(seen.pings - pongs(seen)));
-    assert_ne!(mark.open, Some(0));
-    while !rover.has_heard(&mark) && begin.elapsed() < 5 * late {
-        let end = rover.now() + CALL_PERIOD;
-        rover.round(end).unwrap();
-    }
-    assert!((late..3 * late).contains(&begin.elapsed()), "{:?}", begin.elapsed());
 }
 
 #[test]
 fn pings_of_others_make_every_pong_doubtful() {
-    let line = played::rover(|_| {});
-    for has_others in [false, true] {
-        let mut rover = Rover::on(line.line.clone(), 115_200);
-        assert!(rover.find(|| false).unwrap());
-        if has_others {
-            rover.others_have_pinged();
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        for has_others in [false, true] {
+            let mut rover = Rover::on(line.line.clone(), 115_200);
+            assert!(rover.find(|| false).unwrap());
+            if has_others {
+                rover.others_have_pinged();
+            }
+            let mark = rover.mark();
+            assert!(!rover.has_heard(&mark));
+            let end = rover.now() + Duration::from_millis(700);
+            while rover.now() < end && !rover.has_heard(&mark) {
+                rover.round(end).unwrap();
+            }
+            assert_eq!(rover.has_heard(&mark), !has_others);
         }
-        let mark = rover.mark();
-        assert!(!rover.has_heard(&mark));
-        let end = rover.now() + Duration::from_millis(700);
-        while rover.now() < end && !rover.has_heard(&mark) {
-            rover.round(end).unwrap();
-        }
-        assert_eq!(rover.has_heard(&mark), !has_others);
-    }
+    });
 }

@@ -386,6 +386,9 @@ fn a_reader_that_does_not_read_keeps_no_stop_from_being_sent() {
 
 #[test]
 fn a_speed_beyond_the_limit_is_a_typing_error() {
+    // The limit itself is allowed: what fails is the port.
+    let spin = Process::start("spin --port /none --node 1 --rps -2 --max-rps 2");
+    assert!(spin.complaint(1).contains("/none"));
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
         let cases = [

@@ -93,3 +93,24 @@ fn an_absolute_time_is_a_date_up_to_the_year_9999() {
         ]
     );
 }
+
+#[test]
+fn what_is_pending_has_a_line_of_its_own_if_there_is_any() {
+    let mut account = Counters::default();
+    (account.received, account.framed, account.frames, account.crc) = (17, 8, 1, 4);
+    let printed = |account: &Counters| {
+        let mut out = Vec::new();
+        print_summary(&mut out, account, false).unwrap();
+        String::from_utf8(out).unwrap()
+    };
+    let lines = [
+        "        17 bytes received",
+        "         8 in 1 frame",
+        "         4 skipped: 4 crc",
+        "         5 pending",
+        "",
+    ];
+    assert_eq!(printed(&account), lines.join("\n"));
+    account.received = 12;
+    assert!(!printed(&account).contains("pending"));
+}

@@ -128,6 +128,13 @@ fn three_questions_to_a_commanded_node_without_an_answer_are_the_end_after_a_ten
     answering.handle_input(answer.as_bytes(), at(70));
     let later: Vec<_> = [105, 115].map(|time| sent(&mut answering, time).len()).into();
     assert_eq!(later, [1; 2]);
+    // Noise is no answer.
+    let mut noisy = frames(ONE);
+    for time in [0, 10, 30, 60] {
+        sent(&mut noisy, time);
+        noisy.handle_input(&[0], at(time + 1));
+    }
+    assert_eq!([105, 115].map(|time| sent(&mut noisy, time).len()), [1, 0]);
     // Those to others do not count.
     let mut others = frames(NodeId::N2);
     let left: Vec<_> = [0, 10, 30, 60, 105, 115].map(|time| sent(&mut others, time).len()).into();
@@ -184,4 +191,30 @@ fn an_echo_is_taken_out_once_and_an_answer_behind_it_is_shown() {
         let reads = if has_echo { 1 } else { 2 };
         assert_eq!((count("read_request"), count("position_response")), (reads, 1), "{text}");
     }
+}
+
+#[test]
+fn an_echo_may_come_in_pieces() {
+    let mut part = part(Protocol::Ikeya, &[(0, &read(ONE))]);
+    part.has_echo = true;
+    let mut player = player(part);
+    sent(&mut player, 0);
+    player.handle_input(&read(ONE)[..2], at(5));
+    player.handle_input(&read(ONE)[2..], at(6));
+    let lines = player.finish().unwrap();
+    assert_eq!(lines.lines().count(), 2, "the titles and what was sent: {lines}");
+}
+
+#[test]
+fn each_line_has_its_time_and_the_last_one_comes_at_the_end() {
+    let style = Style::text("node", TimeColumn::Relative);
+    let mut player = Player::new(part(Protocol::Ikeya, &[]), style, at(0));
+    let answer = PositionResponse::new(ONE, Position::new(0, 0));
+    player.handle_input(answer.as_bytes(), at(10));
+    player.handle_input(answer.as_bytes(), at(35));
+    player.handle_input(&[0x55, 1, 2], at(40));
+    let lines = [player.poll_event().unwrap(), player.finish().unwrap()].join("\n");
+    let times: Vec<_> = lines.lines().map(|line| line.split_whitespace().next()).collect();
+    let expected = ["time", "0.000000", "0.025000", "0.030000"];
+    assert_eq!(times, expected.map(Some), "{lines}");
 }
