@@ -321,3 +321,6 @@ impl<B: Simulated> Endpoint for Nodes<B> {
         self.all.iter().filter_map(|node| node.motor.poll_timeout()).min()
     }
 }
+
+#[cfg(test)]
+mod tests;

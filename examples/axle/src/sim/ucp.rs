@@ -156,3 +156,6 @@ impl From<&MotorControl> for Event {
         Self::Command { speed, angular, front_led: command.front_led() }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -16,6 +16,24 @@ fn a_simulation_ends_well_when_it_is_asked_to() {
 }
 
 #[test]
+fn a_simulation_goes_on_for_the_time_that_was_asked_for() {
+    undisturbed(|| {
+        for what in ["sim ikeya --node 1:velocity", "sim ucp"] {
+            let lines = Process::start(&format!("{what} --for 0.4")).success();
+            let seconds = lines.last().unwrap().trim().split(' ').next().unwrap();
+            assert!((0.4..5.0).contains(&seconds.parse::<f64>().unwrap()), "{lines:?}");
+        }
+    });
+}
+
+#[test]
+fn a_link_in_a_folder_that_does_not_exist_is_told() {
+    let line = Process::start("sim ucp --link /no/such/folder/rover").complaint(1);
+    let expected = "cannot create the link \"/no/such/folder/rover\": no such directory";
+    assert_eq!(line, expected);
+}
+
+#[test]
 fn help_tells_of_units_signs_and_exit_codes() {
     undisturbed(|| {
         let cases = [
