@@ -108,6 +108,12 @@ pub enum EncodeError {
         /// The id.
         id: u8,
     },
+    /// A raw frame with FD FF behind its header. Shipped robots give up a frame at an id that they do
+    /// not know, and would take what follows there for a frame (ruling U13).
+    NestedHeader {
+        /// Offset of the FD in the frame, bytes.
+        at: usize,
+    },
     /// A motor command whose version field starts a firmware update in shipped robots (rulings U7,
     /// U13).
     StartsUpdate {
@@ -144,6 +150,9 @@ impl fmt::Display for EncodeError {
             }
             Self::KnownId { id } => {
                 write!(f, "id {id:#04x} has its own message type and cannot be sent raw")
+            }
+            Self::NestedHeader { at } => {
+                write!(f, "FD FF at byte {at}: shipped robots would take it for another frame")
             }
             Self::StartsUpdate { version } => {
                 write!(f, "motor command with version {version} would start a firmware update")

@@ -10,6 +10,7 @@ use axlewire::{
         BothDirections, Mode, NodeId, Packet, Position, PositionResponse, ReadRequest, Request,
         Response, Rps, VelocityResponse, WriteRequest,
         slave::{DipSwitch, IdReading},
+        three,
     },
     stream::Frames,
 };
@@ -18,6 +19,27 @@ fn with_crc(body: &[u8]) -> Vec<u8> {
     let mut frame = body.to_vec();
     frame.extend(crc16::compute(body).to_le_bytes());
     frame
+}
+
+#[test]
+fn a_velocity_response_received_with_nan_or_infinity_is_not_encoded_again() {
+    let mut buffer = [0xEE; 20];
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let bytes = with_crc(&[&[0x55, 3][..], &bad.to_le_bytes()].concat());
+        let received = VelocityResponse::parse(bytes[..].try_into().unwrap()).unwrap();
+        let error = received.encode(&mut buffer).unwrap_err();
+        assert!(matches!(error, EncodeError::NotFinite { .. }), "{error}");
+        for motor in 0..3 {
+            let mut speeds = [1.0; 3];
+            speeds[motor] = bad;
+            let speeds = speeds.map(f32::to_le_bytes).concat();
+            let bytes = with_crc(&[&[0x55, 3][..], &speeds].concat());
+            let received = three::VelocityResponse::parse(bytes[..].try_into().unwrap()).unwrap();
+            let error = received.encode(&mut buffer).unwrap_err();
+            assert!(matches!(error, EncodeError::NotFinite { .. }), "{error}");
+        }
+    }
+    assert_eq!(buffer, [0xEE; 20], "an error writes nothing");
 }
 
 #[test]

@@ -210,7 +210,7 @@ impl PositionResponse {
 
 packet! {
     WriteRequest { id: id, velocity: as_velocity, position: as_position }
-    VelocityResponse { id: id, rps: rps }
+    VelocityResponse { id: id, rps: rps } [finite it => it.rps()]
     PositionResponse { id: id, positions: positions }
 }
 

@@ -248,9 +248,10 @@ impl PositionResponse {
     }
 }
 
-/// Common to all packets of both variants: parsing, encoding, and `{:?}` with these values.
+/// Common to all packets of both variants: parsing, encoding, and `{:?}` with these values. Encoding
+/// refuses NaN and infinity in speeds that are `finite`: a packet that was received may hold them.
 macro_rules! packet {
-    ($($packet:ident { $($name:ident: $getter:ident),+ })+) => {$(
+    ($($packet:ident { $($name:ident: $getter:ident),+ } $([finite $it:ident => $speeds:expr])?)+) => {$(
         impl core::fmt::Debug for $packet {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
                 f.debug_struct(stringify!($packet))
@@ -291,6 +292,12 @@ macro_rules! packet {
                 &self,
                 buffer: &'b mut [u8],
             ) -> Result<&'b [u8], $crate::error::EncodeError> {
+                $(
+                    let $it = self;
+                    for rps in $speeds {
+                        $crate::ikeya::Rps::new(rps)?;
+                    }
+                )?
                 $crate::encode::encode_bytes(self.as_bytes(), buffer)
             }
         }
@@ -301,7 +308,7 @@ pub(super) use packet;
 packet! {
     ReadRequest { id: id }
     WriteRequest { id: id, velocity: as_velocity, position: as_position }
-    VelocityResponse { id: id, rps: rps }
+    VelocityResponse { id: id, rps: rps } [finite it => [it.rps()]]
     PositionResponse { id: id, position: position }
 }
 

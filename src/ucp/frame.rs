@@ -4,7 +4,7 @@ use core::fmt;
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
-use super::header::{Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, MessageId, OUTSIDE_LEN};
+use super::header::{Header, LEN_WITHOUT_BODY, MAX_BODY_LEN, MessageId, OUTSIDE_LEN, SYNC};
 use crate::{
     crc16,
     encode::{Encode, encode_bytes},
@@ -259,12 +259,14 @@ pub struct RawFrame<'a> {
     pub id: u8,
     /// The sender's counter.
     pub index: u8,
-    /// The body; to be sent, it must be at most 56 bytes.
+    /// The body; to be sent, it must be at most 56 bytes, and the frame must have no second FD FF.
     pub body: &'a [u8],
 }
 
-/// Encodes in place. Refuses with [`EncodeError::KnownId`] and [`EncodeError::BodyTooLong`] what
-/// hangs or corrupts shipped robots (ruling U13).
+/// Refuses with [`EncodeError::KnownId`], [`EncodeError::BodyTooLong`] and
+/// [`EncodeError::NestedHeader`] what hangs, corrupts or misleads shipped robots (ruling U13): they
+/// give up a frame with an id that they do not know, and search the rest of it for another one, such
+/// as a motor command. A frame whose CRC is at fault can be sent with another index.
 impl Encode for RawFrame<'_> {
     fn encoded_len(&self) -> usize {
         self.body.len() + LEN_WITHOUT_BODY + OUTSIDE_LEN
@@ -275,20 +277,25 @@ impl Encode for RawFrame<'_> {
             return Err(EncodeError::KnownId { id: self.id });
         }
         let length = self.body.len();
-        if length > MAX_BODY_LEN {
-            return Err(EncodeError::BodyTooLong { length, limit: MAX_BODY_LEN });
-        }
-        let (needed, available) = (self.encoded_len(), buffer.len());
-        let too_small = EncodeError::BufferTooSmall { needed, available };
-        let frame = buffer.get_mut(..needed).ok_or(too_small)?;
-        let (header, tail) = frame.split_first_chunk_mut::<{ Header::LEN }>().ok_or(too_small)?;
-        let (body, _) = tail.split_last_chunk_mut::<2>().ok_or(too_small)?;
+        let too_long = EncodeError::BodyTooLong { length, limit: MAX_BODY_LEN };
+        let mut longest = [0; MAX_BODY_LEN + LEN_WITHOUT_BODY + OUTSIDE_LEN];
+        let frame = longest.get_mut(..self.encoded_len()).ok_or(too_long)?;
+        let (header, tail) = frame.split_first_chunk_mut::<{ Header::LEN }>().ok_or(too_long)?;
+        let (body, _) = tail.split_last_chunk_mut::<2>().ok_or(too_long)?;
         *header = zerocopy::transmute!(Header::new(self.id, self.index, length as u8));
         body.copy_from_slice(self.body);
         let crc = crc16::seal(frame);
         if let Some(field) = frame.last_chunk_mut::<2>() {
             *field = crc;
         }
-        Ok(frame)
+        match nested_header(frame) {
+            Some(at) => Err(EncodeError::NestedHeader { at }),
+            None => encode_bytes(frame, buffer),
+        }
     }
+}
+
+/// Where FD FF occurs in a frame behind its own.
+fn nested_header(frame: &[u8]) -> Option<usize> {
+    frame.windows(2).skip(1).position(|pair| pair == SYNC).map(|at| at + 1)
 }

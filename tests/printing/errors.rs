@@ -46,6 +46,10 @@ fn an_error_of_a_value_names_the_value_and_its_limits() {
         (&small, "frame needs 8 bytes, buffer has 7"),
         (&long, "body of 57 bytes is longer than 56"),
         (
+            &EncodeError::NestedHeader { at: 9 },
+            "FD FF at byte 9: shipped robots would take it for another frame",
+        ),
+        (
             &EncodeError::KnownId { id: 5 },
             "id 0x05 has its own message type and cannot be sent raw",
         ),
@@ -97,6 +101,8 @@ fn a_refused_value_is_an_error_with_that_value() {
     let too_long = Err(EncodeError::BodyTooLong { length: 57, limit: 56 });
     assert_eq!(raw(0x20, &[1; 57]).encode(&mut buffer), too_long);
     assert_eq!(raw(10, &[]).encode(&mut buffer), Err(EncodeError::KnownId { id: 10 }));
+    let nested = Err(EncodeError::NestedHeader { at: 7 });
+    assert_eq!(raw(0x20, &[0, 0xFD, 0xFF]).encode(&mut buffer), nested);
     assert_eq!(buffer, [0xEE; 11], "an error writes nothing");
 }
 

@@ -130,6 +130,68 @@ fn a_body_above_56_bytes_is_refused_and_56_is_sent() {
     }
 }
 
+/// The frames that the receiver of shipped robots (v6.38) takes: it reads 7 bytes, looks for FD FF
+/// in them, reads on as `len` says, and gives a frame up at an id other than 1 to 10 without a search
+/// in what it has not read yet.
+fn taken_by_a_shipped_robot(stream: &[u8]) -> Vec<&[u8]> {
+    let (mut taken, mut at) = (Vec::new(), 0);
+    while at < stream.len() {
+        let read = &stream[at..stream.len().min(at + 7)];
+        let Some(sync) = read.windows(2).position(|pair| pair == [0xFD, 0xFF]) else {
+            at += read.len();
+            continue;
+        };
+        let frame = &stream[at + sync..];
+        let (Some(&len), Some(id)) = (frame.get(2), frame.get(4)) else { break };
+        at += read.len().max(sync + 5);
+        if (1..=10).contains(id) {
+            let end = (usize::from(len) + 4).min(frame.len());
+            at = stream.len() - frame.len() + end;
+            taken.extend(Frame::parse(&frame[..end]).is_ok().then_some(&frame[..end]));
+        }
+    }
+    taken
+}
+
+#[test]
+fn a_raw_frame_hides_no_other_frame_from_shipped_robots() {
+    let mut update = [0; 16];
+    update[8] = 39; // the version
+    for inner in [frame(2, &[60; 16]), frame(2, &update), frame(9, &[40, 0]), frame(1, &[])] {
+        assert_eq!(taken_by_a_shipped_robot(&inner), [&inner[..]], "the model takes it alone");
+        let mut is_dangerous = false;
+        for pad in 0..=20 {
+            let body = [&[0; 20][..pad], &inner].concat();
+            let raw = RawFrame { id: 0x2B, index: 3, body: &body };
+            is_dangerous |= !taken_by_a_shipped_robot(&frame(0x2B, &body)).is_empty();
+            let mut buffer = [0xEE; 64];
+            assert_eq!(raw.encode(&mut buffer), Err(EncodeError::NestedHeader { at: 6 + pad }));
+            assert_eq!(buffer, [0xEE; 64]);
+        }
+        assert!(is_dangerous, "without the refusal it would take {inner:?}");
+    }
+}
+
+#[test]
+fn fd_ff_anywhere_behind_the_header_of_a_raw_frame_is_refused() {
+    let mut buffer = [0; 64];
+    let mut encoded = |id, index, body: &[u8]| {
+        RawFrame { id, index, body }.encode(&mut buffer).map(<[u8]>::to_vec)
+    };
+    assert_eq!(encoded(0xFD, 0xFF, &[]), Err(EncodeError::NestedHeader { at: 4 }));
+    assert_eq!(encoded(0x20, 0xFD, &[0xFF]), Err(EncodeError::NestedHeader { at: 5 }));
+    let last = [&[0; 54][..], &[0xFD, 0xFF]].concat();
+    assert_eq!(encoded(0x20, 0, &last), Err(EncodeError::NestedHeader { at: 60 }));
+    for harmless in [&[0xFD, 0xFE][..], &[0xFF, 0xFD], &[0xFD, 0, 0xFF]] {
+        encoded(0x20, 0, harmless).unwrap();
+    }
+    // In the CRC: another index makes another one.
+    let has_it_in_crc = |body: &[u8; 2]| frame(0x20, body)[8..] == [0xFD, 0xFF];
+    let body = (0..=u16::MAX).map(u16::to_le_bytes).find(has_it_in_crc).unwrap();
+    assert_eq!(encoded(0x20, 0, &body), Err(EncodeError::NestedHeader { at: 8 }));
+    encoded(0x20, 1, &body).unwrap();
+}
+
 #[test]
 fn a_buffer_too_small_is_refused_with_both_lengths_and_left_alone() {
     for available in 0..9 {

@@ -9,7 +9,7 @@ use axlewire::{
     ucp::{self, Body, Message, RawFrame, Telemetry, message::Report},
 };
 
-use super::Tally;
+use super::{Tally, oracle};
 
 /// Values of one kind.
 pub(super) fn roundtrip(data: &[u8], tally: &mut Tally) {
@@ -230,18 +230,32 @@ fn ucp_report(u: &mut Unstructured<'_>) -> Result<()> {
     Ok(())
 }
 
-/// U3: frames without a known message are relayed unchanged.
+/// U3: frames without a known message are relayed unchanged; U13: unless a shipped robot would find
+/// another frame in them.
 fn ucp_raw(u: &mut Unstructured<'_>) -> Result<()> {
     let (id, index) = (u.arbitrary()?, u.arbitrary()?);
     let raw = RawFrame { id, index, body: u.bytes(u.len().min(70))? };
     let mut buffer = [0; 100];
     match raw.encode(&mut buffer) {
-        Ok(_) => found::<ucp::Ucp>(&raw, |frame| frame.message() == Message::Unknown(raw)),
+        Ok(sent) => {
+            assert_eq!(nested(sent), None);
+            found::<ucp::Ucp>(&raw, |frame| frame.message() == Message::Unknown(raw));
+        }
+        Err(EncodeError::NestedHeader { at }) => {
+            let len = raw.body.len() as u8 + 4;
+            let mut frame = [&[0xFD, 0xFF, len, 0, id, index], raw.body, &[0; 2]].concat();
+            oracle::seal(&mut frame);
+            assert_eq!(nested(&frame), Some(at));
+        }
         Err(EncodeError::KnownId { id }) => assert!((1..=0x0A).contains(&id)),
         Err(EncodeError::BodyTooLong { length, .. }) => assert!(length > 56),
         Err(other) => panic!("{other}"),
     }
     Ok(())
+}
+
+fn nested(frame: &[u8]) -> Option<usize> {
+    (2..frame.len() - 1).find(|&at| frame[at] == 0xFD && frame[at + 1] == 0xFF)
 }
 
 /// A body makes a frame that parses as the same body with the same values.

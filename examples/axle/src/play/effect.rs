@@ -3,6 +3,7 @@
 use core::fmt;
 
 use axlewire::{
+    encode::Encode,
     ikeya::{self, Mode, NodeId, Position, Rps, Status, three},
     stream::{Frames, Framing},
     ucp::{self, Body, Message, MotorControl},
@@ -149,7 +150,10 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
             frame.id,
             frame.body.len()
         )),
-        Message::Unknown(_) => commander(Effect::Nothing),
+        Message::Unknown(frame) => match frame.encode(&mut [0; 64]) {
+            Ok(_) => commander(Effect::Nothing),
+            Err(error) => Err(format!("a frame that harms shipped robots (ruling U13): {error}")),
+        },
         _ => Err("a message that this version does not know".to_owned()),
     }
 }
@@ -328,6 +332,10 @@ mod tests {
         for (id, len) in [(1, 2), (2, 15), (3, 0), (5, 1), (8, 5), (10, 2)] {
             assert!(frame(id, &vec![0; len]).unwrap_err().contains("U13"), "{id} {len}");
         }
+        // A frame in a frame: shipped robots give the outer one up, and take the inner one.
+        let ping = [0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42];
+        let nested = frame(0x40, &ping).unwrap_err();
+        assert!(nested.contains("(ruling U13): FD FF at byte 6"), "{nested}");
     }
 
     #[test]

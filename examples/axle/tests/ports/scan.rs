@@ -80,8 +80,8 @@ fn a_node_that_answers_with_garbage_for_ever_is_named_and_does_not_hold_anybody_
 #[test]
 fn a_direct_line_has_to_answer_at_once_and_an_adapter_has_20_ms() {
     undisturbed(|| {
-        // Only a stall that `undisturbed` notices can change a result: at 8 ms, 12 are left until the
-        // adapter's time is up; at 15 ms, a direct line is that much too late.
+        // Only a stall that `undisturbed` notices can change a result: at 8 ms, 12 are left until
+        // the adapter's time is up; at 15 ms, a direct line is that much too late.
         for (delay_ms, option, expected) in
             [(8, "", "1 node answers."), (15, "--direct", "No node answers on")]
         {
