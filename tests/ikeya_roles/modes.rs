@@ -27,6 +27,19 @@ fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point(
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
 }
 
+#[test]
+fn a_read_is_not_answered_by_an_answer_that_leaves_the_mode_in_doubt() {
+    let mut desk = Desk::with_nodes(direct(), &[N1]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.turn();
+    desk.hear(450, &position(NodeId::N1, turns(3)));
+    assert!(desk.master.is_mode_in_doubt(NodeId::N1));
+    assert_eq!(desk.master.read_outcome(NodeId::N1), None, "the status is still the old one");
+    desk.turn();
+    desk.hear(450, &position(NodeId::N1, turns(3)));
+    assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Ok(())));
+}
+
 /// A velocity node with a set-point that has just answered as a position node.
 fn in_doubt_at(at: Position) -> Desk {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
