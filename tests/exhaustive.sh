@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Runs the proofs of tests/exhaustive.rs one after another and prints how long each took.
 #
-#   bash tests/exhaustive.sh              all
-#   bash tests/exhaustive.sh reads        those with `reads` in their name
+#   bash tests/exhaustive.sh                    all
+#   bash tests/exhaustive.sh reads checksum     those with one of these words in their names
 #
 # Uses all cores.
 set -euo pipefail
@@ -10,7 +10,13 @@ cd "$(dirname "$0")/.."
 proofs=(cargo test --release --quiet -p axlewire --test exhaustive --)
 TIMEFORMAT='%R s, %U s of processor time'
 
-names=$("${proofs[@]}" --list --ignored | sed -n 's/: test$//p' | grep -F -- "${1:-}")
+all=$("${proofs[@]}" --list --ignored | sed -n 's/: test$//p')
+names=
+for word in "${@:-::}"; do
+    found=$(grep -F -- "$word" <<<"$all") || { echo "no proof has $word in its name; there are"; echo "$all"; exit 1; }
+    names+=$found$'\n'
+done
+names=$(sort -u <<<"$names")
 said=$(mktemp)
 trap 'rm "$said"' EXIT
 for name in $names; do

@@ -174,6 +174,8 @@ def failing(tree, target):
 
 def main(wanted):
     mends = [(mend, without(mend)) for mend in MENDS]
+    if unknown := set(wanted) - {mend[0] for mend in MENDS} - {"--check"}:
+        sys.exit(f"no fix has this number: {', '.join(sorted(unknown))}")
     if wanted == ["--check"]:
         return print(f"{len(mends)} fixes are in place")
     tree = copy_tree()

@@ -457,6 +457,12 @@ def check(record):
         listed_ = sum(of == file for of, _ in record.reasons)
         if survived != listed_:
             faults.append(f"{file}: {survived} survived, {listed_} of them are listed")
+    if record.sum() not in RECORD.read_text().splitlines():
+        faults.append(f"the sum is not: {record.sum()}")
+    made = collections.Counter(mutant.file for mutant in listed())
+    for file, (_, counts, _) in record.lines.items():
+        if record.is_done(file) and sum(counts) != made[file]:
+            faults.append(f"{file}: {sum(counts)} mutants on record, but it has {made[file]}")
     stale = [file for file in record.lines if not record.is_done(file)]
     print(f"{len(record.lines)} files on record, {len(stale)} of them changed since; "
           f"{len(record.reasons)} survivors with a reason")
@@ -482,6 +488,9 @@ def main():
     if args.sample:
         return sample(record, min(args.minutes, 4))
     mutants = listed()
+    for pattern in args.file:
+        if not fnmatch.filter((m.file for m in mutants), pattern):
+            sys.exit(f"no mutant is in {pattern}")
     wanted = [m for m in mutants if any(fnmatch.fnmatch(m.file, f) for f in args.file or ["*"])]
     known = {m.name: record.outcomes(m.file).get(m.key) for m in wanted}
     if args.survivors:
@@ -497,8 +506,8 @@ def main():
     else:
         survivors, counts = run(wanted, args.workers, until, record)
     record.write(mutants)
-    print(", ".join(f"{count} {kind}" for kind, count in counts.items()))
-    return bool(survivors)
+    print(", ".join(f"{count} {kind}" for kind, count in counts.items()) or "none was tried")
+    return bool(survivors) or bool(wanted and not counts)
 
 
 if __name__ == "__main__":

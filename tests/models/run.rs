@@ -22,7 +22,8 @@ pub(crate) struct Run {
 
 impl Run {
     pub(crate) fn new(group: &'static str, is_deep: bool) -> Self {
-        let all_depths = env::var("MODELS_DEPTH").ok().and_then(|depth| depth.parse().ok());
+        let all_depths = env::var("MODELS_DEPTH").ok();
+        let all_depths = all_depths.map(|depth| depth.parse().expect("MODELS_DEPTH: a number"));
         Self { group, is_deep, all_depths, violations: Vec::new() }
     }
 
