@@ -19,6 +19,7 @@ not tell yet, or a measurement of nothing.
 
 import argparse
 import re
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -158,6 +159,14 @@ def planted(options):
                 missed += 1
                 print(f"{lines} with{'' if words else 'out'} a fault gives {faults}")
         options.record = False
+        # The same by the command itself: a fault is its exit status, and is not recorded.
+        before = options.path.read_text()
+        for words in [], ["--record"]:
+            run = subprocess.run([sys.executable, __file__, options.path, *words], input="size 0 120\n",
+                                 stdout=subprocess.DEVNULL, text=True)
+            if run.returncode != 1 or options.path.read_text() != before:
+                missed += 1
+                print(f"figures with a fault were written, or are no failure: {words}")
         for empty in ["", "# rustc\n"]:
             options.path.write_text(empty)
             if "nothing is recorded" not in judge(options, good):

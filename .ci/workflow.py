@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that the hosted workflow runs every step of the gate exactly once.
+"""Checks that the hosted workflow runs every step of the gate exactly once, and that neither it nor
+a step ignores a check that fails.
 
     .ci/workflow.py --check
 """
@@ -31,6 +32,10 @@ def main():
     text = WORKFLOW.read_text()
     faults += ["the steps are not run as they should be"] * (COMMAND not in text)
     faults += [f"it hides failures: {word}" for word in ("|| true", "continue-on-error", "set +e") if word in text]
+    # Of a check; what was started in the background may have ended.
+    checks = re.findall(r"^ +(?:python3|bash|cargo|\.ci/).*$", (ROOT / ".ci" / "run").read_text(), re.MULTILINE)
+    faults += [f".ci/run hides a failure: {line.strip()}" for line in checks if re.search(r"\|\| (true|:)", line)]
+    faults += ["hardly any check is run"] * (len(checks) < 40)
     print(f"{len(steps)} steps, {len(faults)} faults", *faults, sep="\n")
     return bool(faults) or len(steps) < 20
 

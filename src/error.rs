@@ -108,8 +108,8 @@ pub enum EncodeError {
         /// The id.
         id: u8,
     },
-    /// A raw frame with FD FF behind its header. Shipped robots give up a frame at an id that they do
-    /// not know, and would take what follows there for a frame (ruling U13).
+    /// A raw frame with FD FF behind its header. Shipped robots give up a frame at an id that they
+    /// do not know, and would take what follows there for a frame (ruling U13).
     NestedHeader {
         /// Offset of the FD in the frame, bytes.
         at: usize,

@@ -79,7 +79,8 @@ CONCERNED = [
     ("examples/axle/src/*", "--bins"),
     ("examples/firmware/src/*", "--test firmware"),
 ]
-# Modules of the tool that are built for its tests alone, under a longer `cfg` than `cargo mutants` knows.
+# Modules of the tool that are built for its tests alone, under a longer `cfg` than `cargo mutants`
+# knows.
 OF_TESTS = ("examples/axle/src/flaky.rs", "examples/axle/src/played.rs")
 # The images for QEMU. What they run is tried; what `bench.sh` and `no_panic.sh` build is not.
 FIRMWARE = "axlewire-firmware"

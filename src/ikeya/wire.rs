@@ -248,8 +248,9 @@ impl PositionResponse {
     }
 }
 
-/// Common to all packets of both variants: parsing, encoding, and `{:?}` with these values. Encoding
-/// refuses NaN and infinity in speeds that are `finite`: a packet that was received may hold them.
+/// Common to all packets of both variants: parsing, encoding, and `{:?}` with these values.
+/// Encoding refuses NaN and infinity in speeds that are `finite`: a packet that was received may
+/// hold them.
 macro_rules! packet {
     ($($packet:ident { $($name:ident: $getter:ident),+ } $([finite $it:ident => $speeds:expr])?)+) => {$(
         impl core::fmt::Debug for $packet {

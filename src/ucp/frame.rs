@@ -265,8 +265,8 @@ pub struct RawFrame<'a> {
 
 /// Refuses with [`EncodeError::KnownId`], [`EncodeError::BodyTooLong`] and
 /// [`EncodeError::NestedHeader`] what hangs, corrupts or misleads shipped robots (ruling U13): they
-/// give up a frame with an id that they do not know, and search the rest of it for another one, such
-/// as a motor command. A frame whose CRC is at fault can be sent with another index.
+/// give up a frame with an id that they do not know, and search the rest of it for another one,
+/// such as a motor command. A frame whose CRC is at fault can be sent with another index.
 impl Encode for RawFrame<'_> {
     fn encoded_len(&self) -> usize {
         self.body.len() + LEN_WITHOUT_BODY + OUTSIDE_LEN

@@ -47,8 +47,8 @@ pub struct MasterConfig {
     pub accepts_early: bool,
     /// Maximum age of a measured position that a stop may hold without reading a new one; zero by
     /// default: always read (I6). If it cannot be written within 20 ms, a new one is read anyway.
-    /// The age counts from when the driver took the answer: add the longest time between two of your
-    /// calls, for which an answer may wait in the port.
+    /// The age counts from when the driver took the answer: add the longest time between two of
+    /// your calls, for which an answer may wait in the port.
     pub hold_age: Duration,
     /// Dead-man: after this much time without an accepted set-point, a stop or
     /// [`keep_alive`](super::Master::keep_alive), every node under a set-point is owed a stop
