@@ -37,7 +37,7 @@ CELLS = [
      "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)){rest}"),
     ("`.ci/coverage`", COVERAGE, r"(?s)^axle, all +([\d.]+) +([\d.]+)$.*^library, all +([\d.]+) +([\d.]+)$",
      "library {2} % of lines, {3} % of branches; tool {0} and {1} ([tests/coverage.txt](tests/coverage.txt))"),
-    (".ci/prove", ".ci/prove", r'^    "(\w+)": \("', "all {count} seen to fail"),
+    ("`.ci/prove`", ".ci/prove", r'^    "(\w+)": \("', "all {count} seen to fail"),
     ("--test soak", HOURS, r"In all ([\d,]+) READ and ([\d,]+) reports",
      "{0} READ, {1} reports; no invariant broken ([tests/soak.txt](tests/soak.txt))"),
     ("--test hour", HOURS, r"500 kbit/s: ([\d,]+) answers", "{0} answers; no leak, the beat of 20 ms moved by less than 1 us"),
