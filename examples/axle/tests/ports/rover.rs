@@ -107,6 +107,21 @@ fn the_lamp_goes_on_and_off_and_the_wheels_stand_still() {
 }
 
 #[test]
+fn the_lamp_is_told_as_often_as_it_says() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = std::env::temp_dir().join(format!("axle-lamp-{}.pcapng", std::process::id()));
+        let path = path.to_str().unwrap();
+        let lamp = format!("lamp -p {port} --record {path} on");
+        assert_eq!(Process::start(&lamp).success(), ["lamp on: told 3 times"]);
+        let lines = Process::start(&format!("decode --json {path}")).success();
+        std::fs::remove_file(path).unwrap();
+        let lit = objects(&lines).into_iter().filter(|frame| frame["front_led"] == 100);
+        assert_eq!(lit.count(), 3, "{lines:?}");
+    });
+}
+
+#[test]
 fn a_state_of_the_network_reaches_the_rover() {
     undisturbed(|| {
         let (sim, port) = sim("ucp");

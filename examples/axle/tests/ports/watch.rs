@@ -8,7 +8,7 @@ use super::{
     Process,
     played::{PlayedLine, parrot},
     sim,
-    support::{Capture, axle, decode, file, run, stdout},
+    support::{Capture, axle, decode, file, run, stdout, terminal::Terminal},
     undisturbed,
 };
 
@@ -157,4 +157,18 @@ fn watch_refuses_a_command_line_without_a_source_or_a_protocol() {
     assert!(complaint(&["watch", "--port", "x", "-P", "ucp", "file"]).contains("cannot be used"));
     assert!(complaint(&["watch", "-"]).contains("--protocol is needed"));
     assert!(complaint(&["watch", "-", "-P", "ucp", "--record", "x"]).contains("--record"));
+}
+
+#[test]
+fn plain_lines_and_json_are_lines_on_a_terminal_too() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        for (option, expected) in [("--plain", "5  report"), ("--json", r#""event":"summary""#)] {
+            let args = format!("watch --port {port} --protocol ucp {option} --for 0.3");
+            let mut watch = Terminal::start(&args, (200, 40));
+            assert_eq!(watch.code(), Some(0), "{option}");
+            watch.row(expected);
+            assert!(!watch.has_had_page(), "{option} shows the page");
+        }
+    });
 }

@@ -122,6 +122,12 @@ impl Terminal {
         self.shown().parser.screen().alternate_screen()
     }
 
+    /// Whether there was a page at any time.
+    pub(crate) fn has_had_page(&self) -> bool {
+        const ENTER: &[u8] = b"\x1b[?1049h";
+        self.shown().bytes.windows(ENTER.len()).any(|part| part == ENTER)
+    }
+
     /// The first row with this text, as soon as there is one.
     pub(crate) fn row(&self, what: &str) -> String {
         let found = || self.text().lines().find(|row| row.contains(what)).map(ToOwned::to_owned);
