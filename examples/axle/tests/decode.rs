@@ -293,6 +293,18 @@ fn a_frame_behind_a_false_header_at_the_end_is_not_lost() {
 }
 
 #[test]
+fn the_reasons_of_each_gap_are_its_own() {
+    let ping = Ping {}.frame(0).as_bytes().to_vec();
+    // A length that no frame has, and bytes that begin none: two reasons in each gap.
+    let gap = [&[0xFD, 0xFF, 200, 0][..], &[1; 5]].concat();
+    let (events, summary) = decode(&["-P", "ucp"], &[&ping[..], &gap, &ping, &gap, &ping].concat());
+    let gaps: Vec<_> = events.iter().filter(|event| event["event"] == "skipped").collect();
+    assert_eq!((gaps.len(), &gaps[0]["reasons"]), (2, &gaps[1]["reasons"]));
+    assert_eq!(skipped_by(&events), summary["skipped_by"]);
+    assert!(summary["skipped_by"]["length"].as_u64().unwrap() > 0, "{summary}");
+}
+
+#[test]
 fn the_protocol_of_a_short_input_is_found_behind_a_false_header() {
     let ping = Ping {}.frame(0).as_bytes().to_vec();
     let input = [&[0xFD, 0xFF, 60, 0][..], &ping].concat();

@@ -144,6 +144,7 @@ fn packets_of_later_sections_have_interfaces_of_their_own() {
 fn simple_packets_have_no_time_and_unknown_blocks_are_passed_over() {
     let mut bytes = with_option(false, 9, &[6], 1);
     bytes.extend(block(false, 5, &[0; 8]));
+    bytes.extend(block(false, 5, &[]));
     bytes.extend(block(false, 3, &[2, 0, 0, 0, 7, 8, 0, 0]));
     let (seen, problem) = read(&bytes);
     assert!(problem.is_none());

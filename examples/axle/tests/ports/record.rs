@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    io::Read,
     path::PathBuf,
     process::{Command, Stdio},
     sync::atomic::{AtomicU32, Ordering},
@@ -325,5 +326,32 @@ fn every_subcommand_can_record_what_it_says_and_hears() {
         assert_eq!(writes.last().unwrap()["rps"], 0.0);
         let answers = messages("velocity_response");
         assert!(answers.len() > 10 && answers.iter().all(|event| event["direction"] == "in"));
+    });
+}
+
+#[test]
+fn a_recording_on_standard_output_is_there_at_once() {
+    undisturbed(|| {
+        // One frame, and then silence; without a line break, on which pipes are often written.
+        let ping = [0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42];
+        let line = PlayedLine::new(false, move |is_due, _| {
+            let is_due = std::mem::replace(&mut *is_due.lock().unwrap(), false);
+            if is_due { ping.to_vec() } else { Vec::new() }
+        });
+        let args = ["record", "--port", &line.path, "--protocol", "ucp", "--output", "-"];
+        let mut record = axle(&args).stdout(Stdio::piped()).spawn().unwrap();
+        let mut bytes = Vec::new();
+        let mut output = record.stdout.take().unwrap();
+        while !bytes.windows(ping.len()).any(|part| part == ping) {
+            let mut byte = [0];
+            output.read_exact(&mut byte).unwrap();
+            bytes.extend(byte);
+            if bytes.len() == 8 {
+                // The tool has begun to record.
+                *line.lock() = true;
+            }
+        }
+        record.kill().unwrap();
+        record.wait().unwrap();
     });
 }
