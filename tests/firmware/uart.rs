@@ -1,5 +1,5 @@
-//! The USART of the firmware counts overruns and damage, which QEMU's own USART never has; the clock
-//! sleeps in virtual time.
+//! The USART of the firmware counts overruns and damage, which QEMU's own USART never has; the
+//! clock sleeps in virtual time.
 
 use crate::qemu::check_uart;
 

@@ -1,6 +1,6 @@
 //! Checks cases that QEMU's USART never produces: overruns, framing errors, noise, a full queue,
-//! and a slow last byte; and the clock, which it does not model; and sleeping. Exits with status 0, or prints the
-//! failed check.
+//! and a slow last byte; and the clock, which it does not model; and sleeping. Exits with status 0,
+//! or prints the failed check.
 //!
 //! The drivers of [`uart`](axlewire_firmware::uart) and [`clock`](axlewire_firmware::clock) here
 //! work on register blocks in RAM, with SysTick playing the hardware. The stack measurement is
