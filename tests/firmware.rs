@@ -12,6 +12,10 @@
 
 #![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
 
+/// How the programs configure their roles: the file of the firmware.
+#[path = "../examples/firmware/src/config.rs"]
+#[allow(unreachable_pub, reason = "public in the firmware")]
+mod config;
 /// What the firmware counts.
 #[path = "firmware/counts.rs"]
 mod counts;
@@ -24,11 +28,18 @@ mod master;
 /// The firmware on a noisy wire.
 #[path = "firmware/noise.rs"]
 mod noise;
+/// What the programs do that QEMU cannot show.
+#[path = "firmware/programs.rs"]
+mod programs;
 /// A board in QEMU.
 #[path = "firmware/qemu.rs"]
 mod qemu;
 #[path = "support/quiet.rs"]
 mod quiet;
+/// What a line of text tells of a role: the file of the firmware.
+#[path = "../examples/firmware/src/report.rs"]
+#[allow(unreachable_pub, reason = "public in the firmware")]
+mod report;
 /// The firmware robot.
 #[path = "firmware/robot.rs"]
 mod robot;
@@ -38,6 +49,10 @@ mod setup;
 /// The firmware slave.
 #[path = "firmware/slave.rs"]
 mod slave;
+/// A line of text: the file of the firmware.
+#[path = "../examples/firmware/src/text_line.rs"]
+#[allow(unreachable_pub, dead_code, reason = "public in the firmware")]
+mod text_line;
 /// The USART of the firmware.
 #[path = "firmware/uart.rs"]
 mod uart;

@@ -9,13 +9,13 @@
 
 use core::convert::Infallible;
 
-use axlewire::time::Duration;
 use cortex_m::peripheral::NVIC;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use stm32f4::stm32f405::{GPIOA, Interrupt, Peripherals, USART1, USART2};
 
 use crate::{
     clock::{self, Clock},
+    config::Configs,
     stack::Stack,
     text_line::TextLine,
     uart::{Channel, Port, Queue},
@@ -29,9 +29,6 @@ pub static TEXT: Channel<USART2> = Channel::new(Interrupt::USART2);
 
 /// Speed of the text port, bit/s.
 const TEXT_BAUD: u32 = 115_200;
-
-/// Time for which an emulator may delay the next byte, because its host may be busy.
-const EMULATOR_PATIENCE: Duration = Duration::from_millis(100);
 
 /// All resources of a program.
 pub struct Board {
@@ -47,7 +44,8 @@ pub struct Board {
     pub lamp: Pin<5>,
     /// Deepest use of the stack.
     pub stack: Stack,
-    is_emulated: bool,
+    /// Configurations of the roles.
+    pub configs: Configs,
 }
 
 impl Board {
@@ -88,17 +86,8 @@ impl Board {
             NVIC::unmask(Interrupt::USART2);
         }
         let (driver_enable, lamp, stack) = (Pin(pins), Pin(pins), Stack::new());
-        Some(Self { clock, bus, driver_enable, text, lamp, stack, is_emulated })
-    }
-
-    /// Whether this is an emulator, whose line transfers bytes instantly.
-    pub const fn is_emulated(&self) -> bool {
-        self.is_emulated
-    }
-
-    /// The timeout `on_board`; longer in an emulator, whose host is not real-time.
-    pub fn patience(&self, on_board: Duration) -> Duration {
-        if self.is_emulated { on_board.max(EMULATOR_PATIENCE) } else { on_board }
+        let configs = Configs::new(is_emulated);
+        Some(Self { clock, bus, driver_enable, text, lamp, stack, configs })
     }
 }
 

@@ -109,6 +109,8 @@ impl DriverClock for Clock {
     fn idle_until(&mut self, until: Instant) {
         /// Longest time that SysTick can count, microseconds.
         const LONGEST: u32 = 90_000;
+        // It has 24 bits.
+        const { assert!(LONGEST <= 0xFF_FFFF / CORE_MHZ) };
         let micros = (until - self.now()).as_micros().min(LONGEST);
         if micros == 0 {
             return;

@@ -2,8 +2,10 @@
 //!
 //! * `board`: clocks, pins and the two USARTs, set up once at the start;
 //! * `clock`: microseconds, and sleeping until an event;
+//! * `config`: how the roles are configured, on a board and in QEMU;
 //! * `uart`: an interrupt-driven USART with one queue per direction;
 //! * `text_line`: a line of text without `core::fmt`;
+//! * `report`: what such a line tells of a role;
 //! * `stack`: deepest use of the stack;
 //! * `motor`, `rover`, `lag`: models of the driven hardware;
 //! * `work`: the code that `bench` measures.
@@ -17,9 +19,13 @@ pub mod board;
 #[cfg(feature = "board")]
 pub mod clock;
 #[cfg(feature = "board")]
+pub mod config;
+#[cfg(feature = "board")]
 pub mod lag;
 #[cfg(feature = "board")]
 pub mod motor;
+#[cfg(feature = "board")]
+pub mod report;
 #[cfg(feature = "board")]
 pub mod rover;
 #[cfg(feature = "board")]

@@ -2,12 +2,7 @@
 //!
 //! Avoids `core::fmt`, which would be the larger part of these programs.
 
-use core::ops::Deref;
-
 use heapless::String;
-use stm32f4::stm32f405::usart1::RegisterBlock;
-
-use crate::uart::Channel;
 
 /// Maximum length of a line, bytes, including its end. Shorter than the queue that it is sent
 /// through.
@@ -46,16 +41,6 @@ impl TextLine {
     pub fn thousandths(&mut self, name: &str, value: f32) -> &mut Self {
         // `as` truncates and saturates, so adding half away from zero rounds.
         self.number(name, (value * 1000.0 + if value < 0.0 { -0.5 } else { 0.5 }) as i32)
-    }
-
-    /// Adds the counts of lost and damaged bytes of a USART.
-    pub fn losses<U: Deref<Target = RegisterBlock> + Send>(
-        &mut self,
-        channel: &Channel<U>,
-    ) -> &mut Self {
-        self.count("overruns", channel.overruns())
-            .count("lost", channel.lost())
-            .count("damaged", channel.damaged())
     }
 
     fn digits(&mut self, sign: &str, value: u32) -> &mut Self {

@@ -20,6 +20,8 @@ use critical_section::{CriticalSection, Mutex};
 use heapless::spsc::Queue as Spsc;
 use stm32f4::stm32f405::{Interrupt, usart1::RegisterBlock};
 
+use crate::text_line::TextLine;
+
 /// Queue between an interrupt and the main loop, 511 bytes: 10 ms of a full 500 kbit/s line.
 pub type Queue = Spsc<u8, 512>;
 
@@ -187,6 +189,18 @@ impl<U: Deref<Target = RegisterBlock> + Send> Channel<U> {
     /// Number of bytes with a wrong stop bit or noise within a bit.
     pub fn damaged(&self) -> u32 {
         self.damaged.load(Relaxed)
+    }
+}
+
+impl TextLine {
+    /// Adds the counts of lost and damaged bytes of a USART.
+    pub fn losses<U: Deref<Target = RegisterBlock> + Send>(
+        &mut self,
+        channel: &Channel<U>,
+    ) -> &mut Self {
+        self.count("overruns", channel.overruns())
+            .count("lost", channel.lost())
+            .count("damaged", channel.damaged())
     }
 }
 

@@ -11,7 +11,7 @@ use axlewire::{
     drive::{Clock as _, Driver, Rs485},
     ikeya::{
         self, Master, Mode, NodeId, Position, Rps, Status,
-        master::{Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling},
+        master::{Cause, CommandError, Health, MasterEvent, NodeSet, Polling},
     },
     time::{Duration, Instant},
 };
@@ -39,9 +39,7 @@ fn main() -> ! {
 }
 
 fn run(mut board: Board) {
-    let mut config = MasterConfig::direct();
-    config.reply_timeout = board.patience(config.reply_timeout);
-    config.accepts_early = board.is_emulated();
+    let mut config = board.configs.master();
     config.polling = Polling::Every(CYCLE);
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut report_at = board.clock.now();
@@ -171,12 +169,7 @@ const fn name_of(mode: Mode) -> &'static str {
 
 /// Measurements of every node, and the counts.
 fn report(line: &mut TextLine, master: &Master, exchanges: u32) {
-    let statistics = master.statistics();
-    line.count("reads", statistics.reads)
-        .count("writes", statistics.writes)
-        .count("exchanges", exchanges)
-        .count("lost_events", master.lost_events())
-        .bus_losses();
+    line.master(master, exchanges).bus_losses();
     for node in NodeId::ALL {
         if let Some((status, _)) = master.status(node) {
             line.count("node", node.get().into());

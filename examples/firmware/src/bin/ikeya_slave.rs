@@ -10,7 +10,7 @@ use axlewire::{
     drive::{Clock as _, Driver, Rs485},
     ikeya::{
         self, Mode, NodeId, Slave, Target,
-        slave::{DipSwitch, IdReading, SlaveConfig, SlaveStatistics},
+        slave::{DipSwitch, IdReading, SlaveStatistics},
     },
     time::{Duration, Instant},
 };
@@ -24,10 +24,6 @@ serve_usarts!();
 /// Replaces a board's four DIP switches: `0000` is node 1 in velocity mode (ruling I2).
 const DIP: u8 = 0b0000;
 const READING: IdReading = IdReading::ValuePlusOne;
-
-/// Time without a command after which the motor is stopped. The protocol document defines no such
-/// time, but a motor without commands should stop.
-const WATCHDOG: Duration = Duration::from_millis(500);
 
 /// Step of the motor model; the answers change with it.
 const STEP: Duration = Duration::from_millis(5);
@@ -49,12 +45,7 @@ fn main() -> ! {
 }
 
 fn run(mut board: Board, node: NodeId, mode: Mode) {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(WATCHDOG);
-    config.idle = board.patience(config.idle);
-    // A request may only be found after waiting for the rest of a false packet. Allow five such
-    // waits, as on a 500 kbit/s line.
-    config.answer_within = config.answer_within.max(config.idle.saturating_mul(5));
+    let config = board.configs.slave();
     let mut motor = Motor::new();
     let mut slave: Slave = Slave::new(node, mode, config, Instant::from_micros(0));
     slave.set_position(motor.position());

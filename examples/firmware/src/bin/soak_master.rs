@@ -10,7 +10,7 @@ use axlewire::{
     drive::{Clock as _, Driver, Rs485},
     ikeya::{
         self, Master, NodeId, Rps,
-        master::{Health, MasterConfig, MasterEvent, Polling},
+        master::{Health, MasterEvent, Polling},
     },
     time::Duration,
 };
@@ -39,9 +39,7 @@ fn main() -> ! {
 }
 
 fn run(mut board: Board) {
-    let mut config = MasterConfig::direct();
-    config.reply_timeout = board.patience(config.reply_timeout);
-    config.accepts_early = board.is_emulated();
+    let mut config = board.configs.master();
     config.nodes = [NODE].into_iter().collect();
     config.polling = Polling::Fastest;
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);

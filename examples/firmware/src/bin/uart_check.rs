@@ -1,6 +1,6 @@
 //! Checks cases that QEMU's USART never produces: overruns, framing errors, noise, a full queue,
-//! and a slow last byte; and the clock, which it does not model. Exits with status 0, or prints the
-//! failed check.
+//! and a slow last byte; and the clock, which it does not model; and sleeping. Exits with status 0,
+//! or prints the failed check.
 //!
 //! The drivers of [`uart`](axlewire_firmware::uart) and [`clock`](axlewire_firmware::clock) here
 //! work on register blocks in RAM, with SysTick playing the hardware. The stack measurement is
@@ -17,19 +17,22 @@ use core::{
     sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed},
 };
 
-use axlewire::drive::Rs485;
+use axlewire::{
+    drive::{Clock as _, Rs485},
+    time::Duration,
+};
 use axlewire_firmware::{
-    clock,
+    clock::{self, Clock},
     stack::Stack,
     text_line::TextLine,
     uart::{Channel, Port, Queue},
 };
-use cortex_m::peripheral::{NVIC, syst::SystClkSource};
+use cortex_m::peripheral::{NVIC, SYST, syst::SystClkSource};
 use cortex_m_semihosting::{debug, hprintln};
 use embedded_hal::digital::{ErrorType, OutputPin};
 use embedded_io::Write as _;
 use panic_halt as _;
-use stm32f4::stm32f405::{Interrupt, interrupt, usart1::RegisterBlock};
+use stm32f4::stm32f405::{Interrupt, Peripherals, interrupt, usart1::RegisterBlock};
 
 /// Bits of the status register.
 const FE: u16 = 1 << 1;
@@ -99,7 +102,8 @@ fn check_all() -> Option<()> {
     the_pin_stays_on_until_the_last_stop_bit(registers, port);
     the_clock_runs_at_168_mhz_with_a_crystal_and_without()?;
     core.SYST.disable_counter();
-    Some(())
+    core.SYST.disable_interrupt();
+    the_clock_sleeps_until_its_time_or_an_interrupt(registers, core.SYST)
 }
 
 /// A byte arrives, with these bits set in the status register.
@@ -255,6 +259,42 @@ fn the_clock_runs_at_168_mhz_with_a_crystal_and_without() -> Option<()> {
         expect("the buses", rcc_word(2).read() == 0b101 << 10 | 0b100 << 13 | 0b10_10);
     }
     expect("a microsecond at 84 MHz", clock::prescaler(false) == 83);
+    Some(())
+}
+
+/// In virtual time, which the machine does not delay. With QEMU's own timers, unlike the rest.
+fn the_clock_sleeps_until_its_time_or_an_interrupt(
+    registers: Registers,
+    alarm: SYST,
+) -> Option<()> {
+    let (short, long) = (Duration::from_millis(2), Duration::from_millis(80));
+    let mut clock = Clock::new(Peripherals::take()?.TIM2, alarm, true);
+    // Takes what has happened so far.
+    let start = clock.now();
+    clock.idle_until(start + short);
+
+    arrive(registers, b'x', RXNE);
+    let start = clock.now();
+    clock.idle_until(start + long);
+    expect("no sleep after an interrupt", clock.now() < start + short);
+
+    // Its handler runs after the sleep that it has ended, and an alarm is left half way.
+    let start = clock.now();
+    critical_section::with(|_| {
+        NVIC::pend(Interrupt::USART6);
+        clock.idle_until(start + long);
+    });
+    expect("an interrupt ends a sleep", clock.now() < start + short);
+    clock.idle_until(start + long);
+    expect("it counts as an interrupt after the sleep", clock.now() < start + short);
+
+    let start = clock.now();
+    clock.idle_until(start + short);
+    let slept = clock.now() - start;
+    expect("a sleep as long as wanted", short <= slept && slept < short + short);
+    let start = clock.now();
+    clock.idle_until(start);
+    expect("no sleep until now", clock.now() < start + short);
     Some(())
 }
 

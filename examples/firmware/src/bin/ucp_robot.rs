@@ -13,7 +13,7 @@ use axlewire::{
     ucp::{
         self, Robot,
         message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus},
-        robot::{RobotConfig, RobotEvent, RobotStatistics, UpdateSource},
+        robot::{RobotEvent, RobotStatistics, UpdateSource},
     },
 };
 use axlewire_firmware::{
@@ -46,8 +46,7 @@ fn main() -> ! {
 }
 
 fn run(mut board: Board) {
-    let mut config = RobotConfig::default();
-    config.idle_margin = board.patience(config.idle_margin);
+    let config = board.configs.robot();
     let mut last = board.clock.now();
     let mut report_at = last;
     let mut driver = Driver::new(Robot::new(config, last), board.bus, board.clock);

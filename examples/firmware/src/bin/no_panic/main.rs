@@ -21,10 +21,6 @@ axlewire_firmware::on_panic!();
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    // For the self-test of the check: an index that may be out of bounds.
-    #[cfg(feature = "planted-panic")]
-    keep(input()[any(0)]);
-
     values::all();
     streams::all();
     roles::all();
