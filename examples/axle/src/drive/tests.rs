@@ -110,6 +110,19 @@ fn an_output_that_fails_is_told_behind_the_stop() {
     });
 }
 
+#[cfg(feature = "dashboard")]
+#[test]
+fn a_page_that_gave_up_is_told_behind_the_stop() {
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let (mut drive, _) = ready(&line);
+        drive.page = Page::that_gave_up();
+        let error = drive.run(command(), 300_000, &Signals::none()).unwrap_err().to_string();
+        assert_eq!(error, "the tool has a bug: its page gave up");
+        assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
+    });
+}
+
 #[test]
 fn a_port_that_is_lost_ends_the_drive() {
     undisturbed(|| {

@@ -364,6 +364,24 @@ fn a_terminal_that_goes_away_stops_the_motor() {
 }
 
 #[test]
+fn a_terminal_without_keys_that_goes_away_stops_the_motor_too() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        let args = format!("spin --page --port {port} --node 1 --rps 2 --for 600");
+        let args: Vec<_> = args.split(' ').collect();
+        let spin = axle(&args);
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "exec \"$0\" \"$@\" < /dev/null"]).arg(spin.get_program());
+        let mut spin = Terminal::spawn(shell.args(spin.get_args()), SIZE);
+        sim.line("node 1: turning at 2.00 rps");
+        spin.hang_up();
+        sim.line("node 1: command 0.00 rps");
+        sim.line("node 1: at rest");
+        assert_eq!(spin.code(), Some(1));
+    });
+}
+
+#[test]
 fn a_port_that_disappears_while_a_motor_turns_is_told_behind_the_page() {
     undisturbed(|| {
         let (sim, port) = sim(TWO_NODES);
