@@ -127,6 +127,22 @@ fn a_recording_of_a_page_that_fails_is_told() {
 }
 
 #[test]
+fn a_recording_that_fails_decides_the_exit_code_of_a_watch_that_goes_on() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("watched.pcapng");
+        let watch = format!("watch -p {port} -P ucp --record {path}");
+        let mut watch = Terminal::spawn(&mut with_little_disk(&watch), (200, 30));
+        watch.row("cannot write");
+        watch.press("q");
+        let left = watch.end();
+        assert_eq!(left.code, Some(1), "{left:?}");
+        assert!(left.text.contains("   5  report"), "{left:?}");
+        assert!(left.text.contains(&format!("axle: cannot write {path:?}")), "{left:?}");
+    });
+}
+
+#[test]
 fn a_recording_is_switched_with_a_key_and_holds_what_was_received() {
     undisturbed(|| {
         let directory = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("recordings");
