@@ -13,7 +13,7 @@ use crate::{
 
 /// A drive that is ready to begin, and its lines.
 fn ready(line: &Played<RoverState>) -> (Drive, Arc<Mutex<Vec<String>>>) {
-    let mut rover = Rover::on(line.line.clone(), PortArgs::new(None).baud_for(Protocol::Ucp));
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
     assert!(rover.find(|| false).unwrap());
     let (teller, lines) = Teller::to_memory();
     let start = rover.now();
