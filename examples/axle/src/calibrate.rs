@@ -283,11 +283,11 @@ mod tests {
     use axlewire::ucp::message::ErrorCode;
 
     use super::*;
-    use crate::played;
+    use crate::{args::PortArgs, played};
 
     /// A calibration of the IMU, on a rover that answers.
     fn calibration() -> Calibration {
-        let mut rover = Rover::on(played::rover(|_| {}).line, 115_200);
+        let mut rover = Rover::on(played::rover(|_| {}).line, &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         let start = rover.now();
         let (form, teller, kind) = (Form::of(false), Teller::new(), CalibrationKind::Imu);

@@ -75,7 +75,7 @@ fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> R
     let about = About { command: "drive", protocol: Protocol::Ucp, baud, has_echo: false };
     let wire = Line::open(&args.line, Protocol::Ucp)?;
     let (page, wire) = args.page.open(wire, &about, signals)?;
-    let mut rover = Rover::on(wire, baud);
+    let mut rover = Rover::on(wire, &args.line);
     if !rover.find(|| signals.is_raised())? {
         return signals.interrupted();
     }

@@ -16,13 +16,14 @@ use axlewire::{
     ikeya::{Mode, NodeId, master::MasterConfig},
     sim::MotorNode,
     time::Instant,
-    ucp::{Robot, Telemetry, host::HostConfig, robot::RobotConfig},
+    ucp::{Robot, Telemetry, robot::RobotConfig},
 };
 use serialport::{
     ClearBuffer, DataBits, FlowControl, Parity, Result, SerialPort, StopBits, TTYPort,
 };
 
 use crate::{
+    args::PortArgs,
     bus::{Bus, Halt},
     line::Line,
     quiet::undisturbed,
@@ -151,7 +152,7 @@ fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
         let line = broken_for_a_while(robot, |robot, now| {
             robot.set_telemetry(&Telemetry::default(), now);
         });
-        let mut rover = Rover::new(line, HostConfig::default());
+        let mut rover = Rover::on(line, &PortArgs::new(None));
         rover.stop().unwrap();
         assert!(rover.host().is_stop_sent());
     });

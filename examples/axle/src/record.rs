@@ -211,41 +211,4 @@ where
 }
 
 #[cfg(all(test, unix))]
-mod tests {
-    use axlewire::ucp::{Body, MotorControl, Ucp};
-
-    use super::*;
-    use crate::pcapng::Reader;
-
-    #[test]
-    fn a_frame_that_is_cut_off_is_written_after_a_pause_and_the_next_one_whole() {
-        let path = std::env::temp_dir().join(format!("axle-record-{}", std::process::id()));
-        let file = Recording::create(&path, true, Protocol::Ucp, "port", 115_200).unwrap();
-        let mut frames = Frames::<Ucp>::new(file);
-        let frame = MotorControl::STOP.frame(0);
-        let bytes = frame.as_bytes();
-        frames.take(&bytes[..10]).unwrap();
-        frames.take(&[]).unwrap();
-        assert_eq!(frames.account().skipped(), 0, "it may go on");
-        std::thread::sleep(Duration::from_micros(QUIET.as_micros().into()));
-        frames.take(&[]).unwrap();
-        assert_eq!(frames.account().skipped(), 10);
-        frames.take(&[bytes, bytes].concat()).unwrap();
-        frames.take(&bytes[..3]).unwrap();
-        let (account, finished) = frames.finish();
-        finished.unwrap();
-        assert_eq!((account.frames, account.skipped(), account.received), (2, 13, 61));
-        let written = std::fs::read(&path).unwrap();
-        std::fs::remove_file(&path).unwrap();
-        let mut reader = Reader::new(&written[..]);
-        let (mut packets, mut times) = (Vec::new(), Vec::new());
-        while let Ok(Some(packet)) = reader.next() {
-            packets.push(packet.bytes.to_vec());
-            times.push(packet.micros.unwrap());
-        }
-        assert_eq!(packets, [&bytes[..10], bytes, bytes, &bytes[..3]]);
-        assert!(times[1] - times[0] >= QUIET.as_micros().into(), "{times:?}");
-        assert_eq!(times[1], times[2]);
-        assert!(times.is_sorted() && times[0] > 0, "{times:?}");
-    }
-}
+mod tests;

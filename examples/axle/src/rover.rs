@@ -64,19 +64,18 @@ impl Rover {
     }
 
     pub(crate) fn open_with(args: &args::PortArgs, config: HostConfig) -> Result<Self, Failure> {
-        let (line, mut config) = (Line::open(args, Protocol::Ucp)?, config);
-        config.baud = args.baud_for(Protocol::Ucp);
-        Ok(Self::new(line, config))
+        Ok(Self::with(config, Line::open(args, Protocol::Ucp)?, args))
     }
 
     /// A rover on an open line.
-    pub(crate) fn on(line: Line, baud: u32) -> Self {
-        let mut config = HostConfig::default();
-        config.baud = baud;
-        Self::new(line, config)
+    pub(crate) fn on(line: Line, args: &args::PortArgs) -> Self {
+        Self::with(HostConfig::default(), line, args)
     }
 
-    pub(crate) fn new(line: Line, config: HostConfig) -> Self {
+    /// The same with these settings, but for the speed, which is that of the line.
+    fn with(config: HostConfig, line: Line, args: &args::PortArgs) -> Self {
+        let mut config = config;
+        config.baud = args.baud_for(Protocol::Ucp);
         let session = Session::new(line, |now| Host::new(config, now));
         Self {
             session,

@@ -231,7 +231,7 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
 
 fn stop_rover(args: &Args, lines: &mut Lines<'_>) -> Result<(), Failure> {
     let line = lines.open(Protocol::Ucp)?;
-    let mut rover = Rover::on(line, args.bus.line().baud_for(Protocol::Ucp));
+    let mut rover = Rover::on(line, args.bus.line());
     // The host's first frames are stops, whether or not the robot is heard.
     rover.find(|| false)?;
     rover.stop()?;

@@ -132,6 +132,42 @@ fn an_answer_in_another_mode_that_is_not_certain_is_no_status() {
 }
 
 #[test]
+fn a_status_does_not_count_if_another_answer_has_put_the_mode_in_doubt() {
+    undisturbed(|| {
+        // Another node has the same id. Once the first one turns, both answer one READ, then none
+        // does, and then only the first.
+        let other = Node { is_dumb: true, ..Node::position(1, POSITION) };
+        let mut reads = 0;
+        let line = played::bus(&[Node::velocity(1), other], move |_, bus| {
+            reads += u32::from(bus.nodes[0].rps == 2.0);
+            (bus.nodes[0].is_dumb, bus.nodes[1].is_dumb) = (reads == 2, reads != 1);
+        });
+        let mut bus = on(&line.line, NodeId::N1.into());
+        assert!(bus.discover(&Signals::none()).unwrap());
+        let before = line.said().len();
+        line.state.borrow_mut().nodes[0].rps = 2.0;
+        let status = bus.read(NodeId::N1, &Signals::none()).unwrap();
+        assert_eq!(status, Some(Status::Velocity(2.0)));
+        assert!(!bus.master().is_mode_in_doubt(NodeId::N1));
+        assert!(line.said().len() >= before + 3, "it was asked again");
+    });
+}
+
+#[test]
+fn a_refresh_asks_each_node_even_if_nothing_else_does() {
+    undisturbed(|| {
+        let line = turning(|_, _| {});
+        let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
+        (config.nodes, config.polling) = (both(), Polling::Manual);
+        let mut bus: Bus = Bus::new(line.line.clone(), config);
+        assert!(bus.discover(&Signals::none()).unwrap());
+        let before = line.said().len();
+        bus.refresh(both());
+        assert_eq!(line.said()[before..], [Said::Read(1), Said::Read(2)]);
+    });
+}
+
+#[test]
 fn a_refresh_learns_what_the_nodes_have_become() {
     undisturbed(|| {
         let signals = Signals::none();

@@ -13,7 +13,7 @@ use crate::{
 
 /// A drive that is ready to begin, and its lines.
 fn ready(line: &Played<RoverState>) -> (Drive, Arc<Mutex<Vec<String>>>) {
-    let mut rover = Rover::on(line.line.clone(), PortArgs::new(None).baud_for(Protocol::Ucp));
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
     assert!(rover.find(|| false).unwrap());
     let (teller, lines) = Teller::to_memory();
     let start = rover.now();
@@ -106,6 +106,19 @@ fn an_output_that_fails_is_told_behind_the_stop() {
         drive.teller = Teller::that_fails();
         let error = drive.run(command(), 300_000, &Signals::none()).unwrap_err().to_string();
         assert!(error.starts_with("cannot write the output: "), "{error}");
+        assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
+    });
+}
+
+#[cfg(feature = "dashboard")]
+#[test]
+fn a_page_that_gave_up_is_told_behind_the_stop() {
+    undisturbed(|| {
+        let line = played::rover(|_| {});
+        let (mut drive, _) = ready(&line);
+        drive.page = Page::that_gave_up();
+        let error = drive.run(command(), 300_000, &Signals::none()).unwrap_err().to_string();
+        assert_eq!(error, "the tool has a bug: its page gave up");
         assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
     });
 }

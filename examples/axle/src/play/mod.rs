@@ -12,7 +12,6 @@ use std::collections::VecDeque;
 use axlewire::{
     ikeya::board::{OneMotor, ThreeMotors},
     time::Duration,
-    ucp::host::HostConfig,
 };
 
 use crate::{
@@ -64,10 +63,9 @@ fn on_rover(plan: Plan<'_>, signals: &Signals) -> Result<(), Failure> {
 
 fn play_on_rover(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
     let drives = plan.frames.iter().any(|due| due.effect.moves());
-    let mut config = HostConfig::default();
-    config.baud = plan.bus.line().baud_for(Protocol::Ucp);
+    let args = plan.bus.line();
     if drives {
-        let mut rover = Rover::new(line.clone(), config);
+        let mut rover = Rover::on(line.clone(), args);
         if !rover.find(|| signals.is_raised())? {
             return signals.interrupted();
         }
@@ -77,7 +75,7 @@ fn play_on_rover(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Fa
         if !drives {
             return Ok(Vec::new());
         }
-        let mut rover = Rover::new(line.clone(), config);
+        let mut rover = Rover::on(line.clone(), args);
         rover.others_have_pinged();
         rover.stop()?;
         let report = rover.describe().unwrap_or_default();

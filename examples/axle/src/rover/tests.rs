@@ -2,8 +2,18 @@
 
 use std::{collections::VecDeque, time::Instant as Clock};
 
+use axlewire::{
+    endpoint::Endpoint,
+    time::wire_time,
+    ucp::{
+        Body,
+        message::{ErrorCode, Pong},
+    },
+};
+use serialport::{SerialPort as _, TTYPort};
+
 use super::*;
-use crate::{played, quiet::undisturbed};
+use crate::{args::PortArgs, played, quiet::undisturbed};
 
 #[test]
 fn a_positive_turn_is_to_the_right_and_the_text_says_so() {
@@ -39,7 +49,7 @@ fn a_rover_is_at_rest_once_every_wheel_has_been_still_for_three_reports() {
                 _ => None,
             };
         });
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         rover.stop().unwrap();
         assert!(begin.elapsed().as_millis() >= 880, "{:?}", begin.elapsed());
@@ -52,7 +62,7 @@ fn a_rover_is_at_rest_once_every_wheel_has_been_still_for_three_reports() {
 fn a_stop_is_sent_three_times_and_heard_before_a_report_counts() {
     undisturbed(|| {
         let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         let before = line.state.borrow().commands.len();
         rover.stop().unwrap();
@@ -74,7 +84,7 @@ fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
                 rover.wheels = (rover.pings > before).then_some([9; 4]);
             }
         });
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         assert!(rover.stop().is_err());
         assert_eq!(line.state.borrow().wheels, Some([9; 4]));
@@ -85,7 +95,7 @@ fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
 fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
     undisturbed(|| {
         let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         let now = rover.now();
         rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
@@ -105,7 +115,7 @@ fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
 fn the_wheels_of_a_report_are_told_in_their_order() {
     undisturbed(|| {
         let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         let end = rover.now() + Duration::from_millis(5000);
         while rover.describe().is_none() && rover.now() < end {
             rover.round(end).unwrap();
@@ -121,7 +131,7 @@ fn the_wheels_of_a_report_are_told_in_their_order() {
 fn a_search_that_is_over_finds_nothing() {
     undisturbed(|| {
         let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(!rover.find(|| true).unwrap());
         assert!(rover.find(|| false).unwrap());
         assert!(!rover.find(|| true).unwrap(), "even if it is heard");
@@ -139,7 +149,7 @@ fn a_search_that_finds_no_robot_tells_what_was_received_and_how_long_it_took() {
             })
         };
         for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
-            let mut rover = Rover::on(strays(count).line, 115_200);
+            let mut rover = Rover::on(strays(count).line, &PortArgs::new(None));
             let begin = Clock::now();
             let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
             assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
@@ -152,7 +162,7 @@ fn a_search_that_finds_no_robot_tells_what_was_received_and_how_long_it_took() {
 fn a_search_is_over_soon_after_it_is_told_so_however_silent_the_line_is() {
     undisturbed(|| {
         let line = played::rover(|rover| rover.is_dumb = true);
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         let begin = Clock::now();
         assert!(!rover.find(|| begin.elapsed().as_millis() >= 300).unwrap());
         assert!(begin.elapsed().as_millis() < 700, "{:?}", begin.elapsed());
@@ -163,7 +173,7 @@ fn a_search_is_over_soon_after_it_is_told_so_however_silent_the_line_is() {
 fn the_dead_man_of_the_host_is_noticed() {
     undisturbed(|| {
         let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         let now = rover.now();
         rover.host_mut().drive(motor_control(20, 0).unwrap(), now).unwrap();
@@ -192,7 +202,7 @@ fn a_late_pong_does_not_tell_that_a_later_ping_was_heard() {
             }
             due
         });
-        let mut rover = Rover::on(line.line.clone(), 115_200);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
         assert!(rover.find(|| false).unwrap());
         let (mark, begin) = (rover.mark(), Clock::now());
         // All pings are young: each may be answered yet, also those of the first round.
@@ -212,7 +222,7 @@ fn pings_of_others_make_every_pong_doubtful() {
     undisturbed(|| {
         let line = played::rover(|_| {});
         for has_others in [false, true] {
-            let mut rover = Rover::on(line.line.clone(), 115_200);
+            let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
             assert!(rover.find(|| false).unwrap());
             if has_others {
                 rover.others_have_pinged();
@@ -225,5 +235,57 @@ fn pings_of_others_make_every_pong_doubtful() {
             }
             assert_eq!(rover.has_heard(&mark), !has_others);
         }
+    });
+}
+
+#[test]
+fn the_host_of_a_rover_has_the_speed_of_its_line() {
+    let (_ours, theirs) = TTYPort::pair().unwrap();
+    for (baud, expected) in [(None, 115_200), (Some(57_600), 57_600)] {
+        let args = PortArgs { port: theirs.name().unwrap(), ..PortArgs::new(baud) };
+        let opened = Rover::open(&args).unwrap();
+        for rover in [opened, Rover::on(played::silence(true), &args)] {
+            assert_eq!(rover.host().wire_time(100), wire_time(100, expected));
+        }
+    }
+}
+
+#[test]
+fn commands_from_before_a_stop_are_no_stops() {
+    undisturbed(|| {
+        // With each report comes a pong, as if it had heard everything at once.
+        let mut played = played::PlayedRover::default();
+        let pong = Pong::new(ErrorCode::Fine).frame(0);
+        let line = played::played(played::RoverState::default(), move |state, bytes| {
+            let said = played.hear(state, bytes);
+            if said.is_empty() { said } else { [&said, pong.as_bytes()].concat() }
+        });
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+        assert!(rover.find(|| false).unwrap());
+        while line.state.borrow().commands.len() < 2 * STOPS as usize {
+            let now = rover.now();
+            rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
+            rover.round(now + CALL_PERIOD).unwrap();
+        }
+        let before = line.state.borrow().commands.len();
+        rover.stop().unwrap();
+        let stops = line.state.borrow().commands[before..].to_vec();
+        assert!(stops.len() >= STOPS as usize, "{stops:?}");
+    });
+}
+
+#[test]
+fn pings_that_are_lost_do_not_stay_open() {
+    undisturbed(|| {
+        let line = played::rover(|rover| rover.is_dumb = true);
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+        let begin = Clock::now();
+        assert!(!rover.find(|| begin.elapsed().as_millis() >= 1700).unwrap());
+        let (mark, pings) = (rover.mark(), rover.host().statistics().pings);
+        assert!(
+            mark.open.is_some_and(|open| (1..pings).contains(&open)),
+            "{pings} {:?}",
+            mark.open
+        );
     });
 }

@@ -92,3 +92,6 @@ impl FaultArgs {
 fn span(micros: u64) -> Duration {
     Duration::from_micros(u32::try_from(micros).unwrap_or(u32::MAX))
 }
+
+#[cfg(test)]
+mod tests;

@@ -41,7 +41,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         config.bias_request_period = None;
     }
     let mut session = Session::new(line, |now| Robot::new(config, now));
-    let (mut rover, mut last) = (Rover::new(), session.now());
+    let mut moved = Moved { rover: Rover::new(), until: session.now() };
     let mut is_moving = false;
     while stage.goes_on(session.now())? {
         let until = session.now() + STEP;
@@ -54,12 +54,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             }
             next = robot.poll_event();
         }
-        rover.step(now - last);
-        rover.command(&robot.command(now));
-        robot.set_telemetry(&rover.telemetry(), now);
-        last = now;
+        moved.advance(robot, now);
 
-        let was_moving = is_moving;
+        let (rover, was_moving) = (&moved.rover, is_moving);
         is_moving = rover.telemetry().rpm != [0; 4];
         if is_moving && !was_moving {
             stage.say(now, &Event::Moving)?;
@@ -71,7 +68,23 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let seen = session.role().statistics();
     let (commands, pings, reports) = (seen.commands, seen.pings, seen.reports);
-    stage.say(last, &Event::Statistics { commands, pings, reports })
+    stage.say(moved.until, &Event::Statistics { commands, pings, reports })
+}
+
+/// The rover as it was at this time.
+struct Moved {
+    rover: Rover,
+    until: Instant,
+}
+
+impl Moved {
+    /// Goes on as commanded until `now`, and takes the command of that moment.
+    fn advance(&mut self, robot: &mut Robot, now: Instant) {
+        self.rover.step(now - self.until);
+        self.rover.command(&robot.command(now));
+        robot.set_telemetry(&self.rover.telemetry(), now);
+        self.until = now;
+    }
 }
 
 /// What happens to the rover.

@@ -127,3 +127,6 @@ where
         self.table
     }
 }
+
+#[cfg(test)]
+mod tests;

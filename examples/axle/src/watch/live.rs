@@ -148,6 +148,15 @@ impl Live {
     }
 }
 
+#[cfg(test)]
+impl Live {
+    /// A page that has given up.
+    pub(crate) fn that_gave_up() -> Self {
+        let (tell, _) = Tell::to_memory();
+        Self { tell, is_over: Arc::default(), end: mpsc::channel().1, is_left: false }
+    }
+}
+
 impl Drop for Live {
     fn drop(&mut self) {
         // There is another failure to report.
@@ -276,3 +285,6 @@ impl Write for Tap {
         self.wire.borrow_mut().flush()
     }
 }
+
+#[cfg(test)]
+mod tests;

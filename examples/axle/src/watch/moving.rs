@@ -92,6 +92,14 @@ impl Page {
     }
 }
 
+#[cfg(all(test, unix, feature = "dashboard"))]
+impl Page {
+    /// A page that has given up.
+    pub(crate) fn that_gave_up() -> Self {
+        Self { live: Some(Live::that_gave_up()) }
+    }
+}
+
 #[cfg(not(all(unix, feature = "dashboard")))]
 impl Page {
     /// There is no page for this line.

@@ -115,16 +115,4 @@ fn automatic(now: SystemTime) -> PathBuf {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::*;
-
-    #[test]
-    fn recordings_have_names_of_their_own() {
-        assert_eq!(numbered(Path::new("a/line.pcapng"), 2), Path::new("a/line-2.pcapng"));
-        assert_eq!(numbered(Path::new("line"), 3), Path::new("line-3"));
-        let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000_000);
-        assert_eq!(automatic(time), Path::new("axle-20010909-014640.pcapng"));
-    }
-}
+mod tests;

@@ -127,6 +127,22 @@ fn a_recording_of_a_page_that_fails_is_told() {
 }
 
 #[test]
+fn a_recording_that_fails_decides_the_exit_code_of_a_watch_that_goes_on() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        let path = fresh("watched.pcapng");
+        let watch = format!("watch -p {port} -P ucp --record {path}");
+        let mut watch = Terminal::spawn(&mut with_little_disk(&watch), (200, 30));
+        watch.row("cannot write");
+        watch.press("q");
+        let left = watch.end();
+        assert_eq!(left.code, Some(1), "{left:?}");
+        assert!(left.text.contains("   5  report"), "{left:?}");
+        assert!(left.text.contains(&format!("axle: cannot write {path:?}")), "{left:?}");
+    });
+}
+
+#[test]
 fn a_recording_is_switched_with_a_key_and_holds_what_was_received() {
     undisturbed(|| {
         let directory = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("recordings");
@@ -360,6 +376,24 @@ fn a_terminal_that_goes_away_stops_the_motor() {
         sim.line("node 1: command 0.00 rps");
         sim.line("node 1: at rest");
         assert!(spin.code().is_some());
+    });
+}
+
+#[test]
+fn a_terminal_without_keys_that_goes_away_stops_the_motor_too() {
+    undisturbed(|| {
+        let (sim, port) = sim(TWO_NODES);
+        let args = format!("spin --page --port {port} --node 1 --rps 2 --for 600");
+        let args: Vec<_> = args.split(' ').collect();
+        let spin = axle(&args);
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "exec \"$0\" \"$@\" < /dev/null"]).arg(spin.get_program());
+        let mut spin = Terminal::spawn(shell.args(spin.get_args()), SIZE);
+        sim.line("node 1: turning at 2.00 rps");
+        spin.hang_up();
+        sim.line("node 1: command 0.00 rps");
+        sim.line("node 1: at rest");
+        assert_eq!(spin.code(), Some(1));
     });
 }
 

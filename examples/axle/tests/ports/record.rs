@@ -72,6 +72,21 @@ fn a_recording_has_every_frame_with_its_time() {
 }
 
 #[test]
+fn a_recording_has_the_speed_of_its_line() {
+    undisturbed(|| {
+        let (_sim, port) = sim("ucp");
+        for (args, expected) in [("", 115_200), (" --baud 57600", 57_600_u64)] {
+            let path = fresh("speed.pcapng");
+            Process::start(&format!("record -p {port} -P ucp -f 0.1 -o {path}{args}")).success();
+            let file = fs::read(&path).unwrap();
+            // Option 8 of the interface, eight bytes long.
+            let option = [&[8, 0, 8, 0][..], &expected.to_le_bytes()].concat();
+            assert!(file.windows(option.len()).any(|part| part == option), "{file:?}");
+        }
+    });
+}
+
+#[test]
 fn a_recording_that_a_signal_ends_is_complete() {
     undisturbed(|| {
         let (_sim, port) = sim("ucp");

@@ -173,6 +173,22 @@ fn stop_fails_when_a_motor_turns_on() {
 }
 
 #[test]
+fn a_motor_that_turns_on_is_the_outcome_and_a_recording_that_fails_is_told_before_it() {
+    undisturbed(|| {
+        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+        let line = played::bus(&[node], |_, _| {});
+        let stop = format!("stop -p {} -P ikeya -n 1 -j --record /dev/full", line.path);
+        let ended = Process::start(&stop).end();
+        let [recording, motor] = &ended.stderr[..] else { panic!("{ended:?}") };
+        assert!(recording.starts_with("axle: cannot create \"/dev/full\": "), "{recording}");
+        let turns_on = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+        assert_eq!((ended.code, &**motor), (Some(1), &*format!("axle: {turns_on}")));
+        let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+        assert_eq!((&outcome["at_rest"], &outcome["failure"]), (&false.into(), &turns_on.into()));
+    });
+}
+
+#[test]
 fn a_motor_that_confirms_late_has_its_time_to_coast_from_then_on() {
     undisturbed(|| {
         let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };

@@ -108,6 +108,19 @@ fn an_output_that_fails_is_told_behind_the_stop() {
     });
 }
 
+#[cfg(feature = "dashboard")]
+#[test]
+fn a_page_that_gave_up_is_told_behind_the_stop() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let (mut spin, _) = ready(&line);
+        spin.page = Page::that_gave_up();
+        let error = spin.run(speed(2.0), 200_000, &Signals::none()).unwrap_err().to_string();
+        assert_eq!(error, "the tool has a bug: its page gave up");
+        assert_eq!(line.state.borrow().nodes[0].rps, 0.0);
+    });
+}
+
 #[test]
 fn an_absence_ends_the_spin_and_nothing_is_commanded_after_it() {
     undisturbed(|| {

@@ -1,0 +1,59 @@
+//! The end of a page, and what it is told.
+
+use super::*;
+use crate::played;
+
+impl Tell {
+    /// One without a page, and what it tells.
+    pub(super) fn to_memory() -> (Self, Receiver<News>) {
+        let (news, queue) = mpsc::sync_channel(QUEUE);
+        (Self { news, lost: Arc::default(), start: Instant::now() }, queue)
+    }
+}
+
+#[test]
+fn what_moves_is_stopped_when_the_page_ends_or_panics() {
+    for is_panic in [false, true] {
+        let flag = Arc::new(AtomicBool::new(false));
+        let stop = StopAtTheEnd(Arc::clone(&flag));
+        let page = thread::spawn(move || {
+            let _stop = stop;
+            assert!(!is_panic, "planted");
+        });
+        assert_eq!(page.join().is_err(), is_panic);
+        assert!(flag.load(Ordering::SeqCst));
+    }
+}
+
+#[test]
+fn a_page_that_gave_up_cannot_be_left_as_if_nothing_had_happened() {
+    let mut live = Live::that_gave_up();
+    assert_eq!(live.leave().unwrap_err().to_string(), given_up().to_string());
+    live.leave().unwrap();
+}
+
+#[test]
+fn each_byte_is_told_once_whether_or_not_the_line_hears_what_it_sends() {
+    for (has_echo, expected) in [
+        (false, [(Source::Sent, vec![1, 2, 3]), (Source::Received, vec![7])].as_slice()),
+        (true, &[(Source::Received, vec![1, 2, 3, 7])]),
+    ] {
+        let (tell, queue) = Tell::to_memory();
+        let line = played::played((), move |(), said| match said {
+            [] => Vec::new(),
+            said if has_echo => [said, &[7]].concat(),
+            _ => vec![7],
+        });
+        let mut line = line.line.through(|wire| Tap { wire, tell, has_echo });
+        assert_eq!(line.write(&[1, 2, 3]).unwrap(), 3);
+        line.read(&mut [0; 8]).unwrap();
+        let told: Vec<_> = queue
+            .try_iter()
+            .map(|News(_, what)| match what {
+                What::Bytes(source, bytes) => (source, bytes.into_vec()),
+                _ => panic!("nothing else was told"),
+            })
+            .collect();
+        assert_eq!(told, expected, "{has_echo}");
+    }
+}
