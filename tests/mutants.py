@@ -44,6 +44,8 @@ PATIENCE = 4
 LEAST_PATIENCE_S = 60
 # The compiler has no reason to take longer.
 BUILD_S = 1200
+# A file of which no more are left is recorded with those; the rest of it need not be tried again.
+MOST_LEFT, NOT_TRIED = 40, "(not tried)"
 
 # Files, and the tests that concern them most; the first match counts.
 CONCERNED = [
@@ -232,6 +234,7 @@ class Record:
     def __init__(self):
         self.reasons = {}  # (file, key): why the change has no effect
         self.lines = {}  # file: (digest, counts, date)
+        self.left = collections.defaultdict(set)  # file: keys that are not in its counts
         self.state_file = WORK / "outcomes.json"
         self.state = json.loads(self.state_file.read_text()) if self.state_file.exists() else {}
         file = key = None
@@ -241,20 +244,32 @@ class Record:
                 self.lines[file] = (match[2], [int(match[i]) for i in (3, 4, 5)], match[6])
             elif match := re.fullmatch(r"(\S+\.rs): not done", line):
                 file = match[1]
+            elif line == f"        {NOT_TRIED}":
+                # A reason for it may be known.
+                if not self.reasons[file, key]:
+                    del self.reasons[file, key]
+                self.left[file].add(key)
             elif line.startswith("        "):
                 self.reasons[file, key] = line.strip()
             elif line.startswith("    "):
                 key = line.strip()
-                self.reasons[file, key] = ""
+                self.reasons.setdefault((file, key), "")
 
     def outcomes(self, file):
         """By key; empty if the file has changed since."""
         entry = self.state.get(file, {})
         return entry.get("outcomes", {}) if entry.get("digest") == digest(file) else {}
 
-    def is_done(self, file):
+    def has_line(self, file):
         """Whether the file has a line, of this or another machine, and has not changed since."""
         return file in self.lines and (ROOT / file).exists() and self.lines[file][0] == digest(file)
+
+    def is_done(self, file):
+        return self.has_line(file) and not self.left[file]
+
+    def is_tried(self, mutant):
+        """Whether it is in the counts of its file."""
+        return self.has_line(mutant.file) and mutant.key not in self.left[mutant.file]
 
     def keep(self, mutant, outcome, save=True):
         known = self.outcomes(mutant.file) | {mutant.key: outcome}
@@ -272,20 +287,28 @@ class Record:
         part.rename(self.state_file)
 
     def write(self, mutants):
-        """Files of which all mutants have been tried, and all survivors explained, get a line."""
+        """Files of which few mutants are left to try, and all survivors explained, get a line."""
         of_file = collections.defaultdict(list)
         for mutant in mutants:
             of_file[mutant.file].append(mutant.key)
         today = datetime.date.today().isoformat()
         for file, keys in of_file.items():
             outcomes = self.outcomes(file)
-            if not all(key in outcomes for key in keys):
+            # What an earlier run has counted stays.
+            is_rest = self.has_line(file) and self.left[file] and not set(keys) - self.left[file] <= set(outcomes)
+            new = [key for key in (self.left[file] if is_rest else keys) if key in outcomes]
+            left = {key for key in (self.left[file] if is_rest else keys) if key not in outcomes}
+            if not new or len(left) > MOST_LEFT:
                 continue
-            counts = [sum(outcomes[key] == kind for key in keys) for kind in ("caught", "unviable", "survived")]
+            counts = [sum(outcomes[key] == kind for key in new) for kind in ("caught", "unviable", "survived")]
+            survived = {key for key in new if outcomes[key] == "survived"}
+            if is_rest:
+                counts = [a + b for a, b in zip(counts, self.lines[file][1])]
+            else:
+                self.reasons = {at: why for at, why in self.reasons.items() if at[0] != file or at[1] in survived | left}
             if self.lines.get(file, ())[:2] != (digest(file), counts):
                 self.lines[file] = (digest(file), counts, today)
-            survived = {key for key in keys if outcomes[key] == "survived"}
-            self.reasons = {at: why for at, why in self.reasons.items() if at[0] != file or at[1] in survived}
+            self.left[file] = left
             # A file is done when each survivor has a reason.
             if missing := [key for key in survived if not self.reasons.get((file, key))]:
                 self.lines.pop(file, None)
@@ -298,14 +321,17 @@ class Record:
             heads[file] = f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}"
         for file, head in sorted(heads.items()):
             text.append(head)
-            for (of, key), why in sorted(self.reasons.items()):
+            left = self.left[file] if file in self.lines else ()
+            for (of, key), why in sorted([*self.reasons.items(), *(((file, key), NOT_TRIED) for key in left)]):
                 if of == file and why:
-                    text += [f"    {key}"] + [f"        {why}"] * bool(why)
+                    text += [f"    {key}", f"        {why}"]
         RECORD.write_text("\n".join(text) + "\n")
 
     def sum(self):
         caught, _, survived = (sum(counts[i] for _, counts, _ in self.lines.values()) for i in range(3))
-        return f"# {len(self.lines)} files: {caught} caught of {caught + survived} that compile."
+        left = sum(len(self.left[file]) for file in self.lines)
+        return (f"# {len(self.lines)} files: {caught} caught of {caught + survived} that compile"
+                + f"; {left} are not tried." * bool(left) + "." * (not left))
 
     def has_reason(self, mutant):
         return bool(self.reasons.get((mutant.file, mutant.key)))
@@ -455,16 +481,17 @@ def check(record):
             faults.append(f"{file}: the line is gone: {key}")
     faults += [f"{file}: the file is gone" for file in record.lines if not (ROOT / file).exists()]
     for file, (_, (_, _, survived), _) in record.lines.items():
-        listed_ = sum(of == file for of, _ in record.reasons)
+        # A reason may wait for a mutant that has not been tried.
+        listed_ = sum(of == file and key not in record.left[file] for of, key in record.reasons)
         if survived != listed_:
             faults.append(f"{file}: {survived} survived, {listed_} of them are listed")
     if record.sum() not in RECORD.read_text().splitlines():
         faults.append(f"the sum is not: {record.sum()}")
     made = collections.Counter(mutant.file for mutant in listed())
     for file, (_, counts, _) in record.lines.items():
-        if record.is_done(file) and sum(counts) != made[file]:
+        if record.has_line(file) and sum(counts) + len(record.left[file]) != made[file]:
             faults.append(f"{file}: {sum(counts)} mutants on record, but it has {made[file]}")
-    stale = [file for file in record.lines if not record.is_done(file)]
+    stale = [file for file in record.lines if not record.has_line(file)]
     print(f"{len(record.lines)} files on record, {len(stale)} of them changed since; "
           f"{len(record.reasons)} survivors with a reason")
     for fault in faults:
@@ -497,7 +524,7 @@ def main():
     if args.survivors:
         wanted = [m for m in wanted if known[m.name] == "survived" and not record.has_reason(m)]
     elif not args.again:
-        wanted = [m for m in wanted if known[m.name] is None and not record.is_done(m.file)]
+        wanted = [m for m in wanted if known[m.name] is None and not record.is_tried(m)]
     if args.shuffled:
         random.shuffle(wanted)
     print(f"{len(wanted)} of {len(mutants)} mutants to try", flush=True)
