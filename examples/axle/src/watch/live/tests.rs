@@ -57,3 +57,16 @@ fn each_byte_is_told_once_whether_or_not_the_line_hears_what_it_sends() {
         assert_eq!(told, expected, "{has_echo}");
     }
 }
+
+#[test]
+fn a_note_reaches_the_page_and_a_page_that_is_too_slow_loses_a_known_number_of_bytes() {
+    let (tell, queue) = Tell::to_memory();
+    let live = Live { tell, is_over: Arc::default(), end: mpsc::channel().1, is_left: true };
+    live.note("a note".to_owned());
+    let News(_, told) = queue.try_recv().unwrap();
+    assert!(matches!(told, What::Note(text) if text == "a note"));
+    for _ in 0..QUEUE + 2 {
+        live.tell.tell(What::Bytes(Source::Received, [7; 5].into()));
+    }
+    assert_eq!(live.tell.lost.load(Ordering::SeqCst), 10);
+}

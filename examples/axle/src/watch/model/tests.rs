@@ -153,3 +153,20 @@ fn rates_are_measured_over_a_second() {
     assert_eq!(bus.node(N1).packets.per_second, 0.0);
     assert_eq!(bus.node(N1).health(bus.at), Health::Quiet);
 }
+
+#[test]
+fn whatever_changes_the_page_is_a_revision_of_its_own() {
+    let mut played = Played::new();
+    let mut seen = vec![played.model.revision];
+    played.read(N1);
+    seen.push(played.model.revision);
+    let gap = Gap { len: 3, reason: axlewire::stream::Reason::Crc };
+    played.model.gap(gap, None, 5000);
+    seen.push(played.model.revision);
+    played.model.note("a note".to_owned(), 6000);
+    seen.push(played.model.revision);
+    played.model.tick(Counters::default(), RATE_PERIOD + 7000);
+    seen.push(played.model.revision);
+    seen.dedup();
+    assert_eq!(seen.len(), 5, "{seen:?}");
+}

@@ -38,7 +38,14 @@ fn a_second_recording_is_another_file() {
         paths.push(numbered(&named, number));
     }
     recorder.finish().unwrap();
+    recorder.start().unwrap();
+    assert!(recorder.running.is_some());
+    recorder.drop_it();
+    assert!(recorder.running.is_none(), "what has failed is given up");
+    paths.push(numbered(&named, 4));
+    assert_eq!(unused(&named), numbered(&named, 5), "the others are there");
     for path in paths {
         std::fs::remove_file(&path).unwrap();
     }
+    assert_eq!(unused(&named), named);
 }
