@@ -164,7 +164,10 @@ impl Capture {
                     let hex: String = body.iter().map(|byte| format!("{byte:02x}")).collect();
                     let fields =
                         json!({"message": "unknown", "id": 0x20, "index": index, "body": hex});
-                    capture.frame(frame.encode(&mut buffer).unwrap(), fields);
+                    // A few have FD FF in their CRC, and are not sent.
+                    if let Ok(bytes) = frame.encode(&mut buffer) {
+                        capture.frame(bytes, fields);
+                    }
                 }
             }
         }
