@@ -70,3 +70,13 @@ fn a_note_reaches_the_page_and_a_page_that_is_too_slow_loses_a_known_number_of_b
     }
     assert_eq!(live.tell.lost.load(Ordering::SeqCst), 10);
 }
+
+#[test]
+fn a_flush_of_a_tapped_line_is_one_of_its_port() {
+    let played = played::played((), |(), _| Vec::new());
+    let (tell, _queue) = Tell::to_memory();
+    let mut line = played.line.through(|wire| Tap { wire, tell, has_echo: false });
+    assert!(line.flush().is_ok());
+    played.is_gone.set(true);
+    assert!(line.flush().is_err());
+}
