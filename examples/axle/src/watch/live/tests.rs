@@ -1,5 +1,7 @@
 //! The end of a page, and what it is told.
 
+use axlewire::ucp::Ucp;
+
 use super::*;
 use crate::played;
 
@@ -69,4 +71,30 @@ fn a_note_reaches_the_page_and_a_page_that_is_too_slow_loses_a_known_number_of_b
         live.tell.tell(What::Bytes(Source::Received, [7; 5].into()));
     }
     assert_eq!(live.tell.lost.load(Ordering::SeqCst), 10);
+}
+
+#[test]
+#[ignore = "started on a terminal by a test of the screen"]
+fn looks_on_too_slowly() {
+    let (tell, queue) = Tell::to_memory();
+    tell.tell(What::Note("a note".to_owned()));
+    let is_over = Arc::new(AtomicBool::new(false));
+    let (lost, start) = (Arc::new(AtomicU64::new(10)), tell.start);
+    let looker = Looker { queue, lost, is_over: Arc::clone(&is_over), start };
+    thread::spawn(move || {
+        thread::sleep(Duration::from_millis(400));
+        is_over.store(true, Ordering::SeqCst);
+    });
+    let feed = Feed::<Ucp>::new(Model::new(Protocol::Ucp), None);
+    looker.look_on(Dashboard::open(feed, View::default(), Sink::default()).unwrap()).unwrap();
+}
+
+#[test]
+fn a_flush_of_a_tapped_line_is_one_of_its_port() {
+    let played = played::played((), |(), _| Vec::new());
+    let (tell, _queue) = Tell::to_memory();
+    let mut line = played.line.through(|wire| Tap { wire, tell, has_echo: false });
+    assert!(line.flush().is_ok());
+    played.is_gone.set(true);
+    assert!(line.flush().is_err());
 }

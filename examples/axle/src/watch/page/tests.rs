@@ -31,11 +31,16 @@ const SIZES: [(u16, u16); 12] = [
     (0, 0),
 ];
 
-/// The rows of a page, through the backend that ratatui has for tests.
-fn drawn(view: &View, model: &Model, (width, height): (u16, u16)) -> Vec<String> {
+/// A page, through the backend that ratatui has for tests.
+fn picture(view: &View, model: &Model, (width, height): (u16, u16)) -> Buffer {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| draw(view, model, frame.buffer_mut())).unwrap();
-    let buffer = terminal.backend().buffer();
+    terminal.backend().buffer().clone()
+}
+
+/// The rows of a page.
+fn drawn(view: &View, model: &Model, (width, height): (u16, u16)) -> Vec<String> {
+    let buffer = picture(view, model, (width, height));
     let row = |y| (0..width).map(|x| buffer[(x, y)].symbol()).collect::<String>();
     (0..height).map(|y| row(y).trim_end().to_owned()).collect()
 }
@@ -237,6 +242,119 @@ fn text_from_the_line_is_never_a_control_sequence() {
     let view = View { title: "\x1b[2J\u{202e}".to_owned(), ..view() };
     for row in drawn(&view, &feed.model, (80, 24)) {
         assert!(!row.contains(char::is_control), "{row:?}");
+    }
+}
+
+/// The colour in which this text is on the page.
+fn colour_of(text: &str, model: &Model, size: (u16, u16)) -> Option<Color> {
+    let rows = drawn(&view(), model, size);
+    let found = rows.iter().enumerate().find_map(|(y, row)| Some((row.find(text)?, y)));
+    let (x, y) = found.unwrap_or_else(|| panic!("no {text:?} in {rows:?}"));
+    let before = rows[y][..x].chars().count();
+    picture(&view(), model, size)[(before as u16, y as u16)].style().fg
+}
+
+/// What is known of a rover after these bytes.
+fn heard(bytes: &[u8]) -> Model {
+    let mut feed = Feed::<ucp::Ucp>::new(Model::new(Protocol::Ucp), None);
+    feed.take(Source::Received, bytes, 0);
+    feed.tick(100_000);
+    feed.model
+}
+
+#[test]
+fn the_totals_are_in_doubt_once_bytes_were_skipped() {
+    let colour = |bytes| colour_of(" skipped", &heard(bytes), (80, 24));
+    let ping = ucp::message::Ping {}.frame(0);
+    assert_ne!(colour(ping.as_bytes()), DOUBT.fg);
+    assert_eq!(colour(&[0; 5]), DOUBT.fg);
+}
+
+#[test]
+fn a_battery_below_a_fifth_is_in_doubt() {
+    for (percent, is_low) in [(0, true), (19, true), (20, false), (21, false), (100, false)] {
+        let telemetry = Telemetry { battery_pct: percent, ..Telemetry::default() };
+        let report = ucp::message::FirmwareReport::new(&telemetry, 38).frame(0);
+        let model = heard(report.as_bytes());
+        let text = format!("{percent} %, ");
+        let colour = colour_of(&text, &model, (80, 24));
+        assert_eq!(colour == DOUBT.fg, is_low, "{percent}");
+    }
+}
+
+#[test]
+fn a_command_names_its_side_unless_it_is_straight() {
+    for (turn, long, short) in [
+        (0, "command  speed 60 %, turn 0 %  (0/s)", "cmd  60 % 0 %"),
+        (1, "command  speed 60 %, turn 1 % right  (0/s)", "cmd  60 % R1 %"),
+        (-50, "command  speed 60 %, turn 50 % left  (0/s)", "cmd  60 % L50 %"),
+    ] {
+        let model = heard(MotorControl::new(60, turn).unwrap().frame(0).as_bytes());
+        assert_eq!(drawn(&view(), &model, (80, 24))[3], long);
+        assert_eq!(drawn(&view(), &model, (20, 5))[2], short);
+    }
+}
+
+#[test]
+fn a_value_of_a_rover_leaves_a_column_to_the_next_one() {
+    let model = rover();
+    for width in 20..=90 {
+        let rows = drawn(&view(), &model, (width, 19));
+        // The rows of values have a blank behind them; in two columns, both columns.
+        for row in &rows[2..if width < 90 { 15 } else { 9 }] {
+            let blanks = if width < 90 { vec![width] } else { vec![width / 2, width] };
+            for blank in blanks {
+                let cell = row.chars().nth(usize::from(blank) - 1).unwrap_or(' ');
+                assert_eq!(cell, ' ', "{width} {row:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_log_has_times_where_there_is_room_for_them() {
+    let mut model = Model::new(Protocol::Ikeya);
+    model.note("a note".to_owned(), 1_234_567);
+    let row = |width| {
+        let rows = drawn(&view(), &model, (width, 12));
+        rows.into_iter().find(|row| row.contains("a note")).unwrap()
+    };
+    for width in [20, 38, 39] {
+        assert_eq!(row(width), "a note", "{width}");
+    }
+    for width in [40, 41, 80] {
+        assert_eq!(row(width), "    1.235 s  a note", "{width}");
+    }
+}
+
+#[test]
+fn a_narrow_bus_has_short_titles_and_states_and_a_wide_one_has_long_ones() {
+    let (n1, n2) = (NodeId::N1, NodeId::N2);
+    let mut feed = Feed::<ikeya::BothDirections>::new(Model::new(Protocol::Ikeya), None);
+    let command = WriteRequest::velocity(n2, Rps::ZERO);
+    let (read, answer) = (ReadRequest::new(n1), VelocityResponse::new(n1, Rps::ZERO));
+    for bytes in [&read.as_bytes()[..], answer.as_bytes(), read.as_bytes(), command.as_bytes()] {
+        feed.take(Source::Received, bytes, 1000);
+    }
+    let words = |width| -> Vec<Vec<String>> {
+        let rows = drawn(&view(), &feed.model, (width, 12));
+        let of_row = |row: &String| row.split_whitespace().map(str::to_owned).collect();
+        rows[2..5].iter().map(of_row).collect()
+    };
+    let narrow = words(20);
+    assert_eq!(narrow[0], ["n", "state", "value"]);
+    assert_eq!(narrow[1][..3], ["1", "miss", "1"]);
+    assert_eq!(narrow[2][..2], ["2", "cmds"]);
+    let wide = words(80);
+    assert_eq!(wide[0][..4], ["node", "mode", "state", "value"]);
+    assert_eq!(wide[1][..4], ["1", "velocity", "missing", "1"]);
+    assert_eq!(wide[2][..2], ["2", "commanded"]);
+}
+
+#[test]
+fn a_latency_has_tenths_below_100_ms() {
+    for (micros, text) in [(0, "0.0 ms"), (99_900, "99.9 ms"), (100_000, "100 ms")] {
+        assert_eq!(text::millis(micros), text);
     }
 }
 

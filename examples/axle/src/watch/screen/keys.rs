@@ -109,4 +109,28 @@ mod tests {
         pass_on(&b""[..], &keys, &Sink { stop: Some(Arc::clone(&stop)) });
         assert!(stop.load(Ordering::SeqCst));
     }
+
+    #[test]
+    fn a_signal_loses_no_key_and_any_other_error_is_the_end() {
+        /// What each read gives; none is allowed after the last.
+        struct Fails(Vec<Result<u8, io::ErrorKind>>);
+        impl Read for Fails {
+            fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+                buffer[0] = self.0.remove(0)?;
+                Ok(1)
+            }
+        }
+        let typed = |front: &[_]| {
+            let stop = Arc::new(AtomicBool::new(false));
+            let (keys, queue) = mpsc::sync_channel(QUEUE);
+            let sink = Sink { stop: Some(Arc::clone(&stop)) };
+            let all = [front, &[Ok(b'x'), Err(io::ErrorKind::Other)]].concat();
+            pass_on(Fails(all), &keys, &sink);
+            assert!(stop.load(Ordering::SeqCst));
+            queue.try_iter().collect::<Vec<u8>>()
+        };
+        assert_eq!(typed(&[]), b"x");
+        assert_eq!(typed(&[Err(io::ErrorKind::Interrupted); 2]), b"x");
+        assert_eq!(typed(&[Err(io::ErrorKind::BrokenPipe)]), b"");
+    }
 }
