@@ -330,7 +330,8 @@ mod tests {
         assert_eq!(frame(2, &lamp), Ok((Side::Commander, Effect::Stand)));
         assert!(frame(9, &[1, 0]).unwrap_err().contains("firmware update"));
         for (id, len) in [(1, 2), (2, 15), (3, 0), (5, 1), (8, 5), (10, 2)] {
-            assert!(frame(id, &vec![0; len]).unwrap_err().contains("U13"), "{id} {len}");
+            let error = frame(id, &vec![0; len]).unwrap_err();
+            assert!(error.contains("bytes, which shipped robots misread (ruling U13)"), "{error}");
         }
         // A frame in a frame: shipped robots give the outer one up, and take the inner one.
         let ping = [0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42];

@@ -27,6 +27,18 @@ fn a_simulation_goes_on_for_the_time_that_was_asked_for() {
 }
 
 #[test]
+fn a_simulated_rover_tells_once_that_it_moves_and_once_that_it_is_at_rest() {
+    undisturbed(|| {
+        let (sim, port) = sim("ucp");
+        Process::start(&format!("drive -p {port} --speed 40 --turn 0 -f 0.5")).success();
+        sim.signal("INT");
+        let lines = sim.success();
+        let told = |what: &str| lines.iter().filter(|line| line.contains(what)).count();
+        assert_eq!((told("  moving"), told("  at rest after")), (1, 1), "{lines:?}");
+    });
+}
+
+#[test]
 fn a_link_in_a_folder_that_does_not_exist_is_told() {
     let line = Process::start("sim ucp --link /no/such/folder/rover").complaint(1);
     let expected = "cannot create the link \"/no/such/folder/rover\": no such directory";
