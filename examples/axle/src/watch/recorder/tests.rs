@@ -31,6 +31,11 @@ fn a_second_recording_is_another_file() {
     };
     let mut recorder =
         Recorder::<Ucp>::new(&Watched { port, protocol, baud, args: &args }).unwrap();
+    recorder.take(&[0xFD, 0xFF, 4]).unwrap();
+    recorder.finish().unwrap();
+    let recorded = std::fs::read(&named).unwrap();
+    let has_all = recorded.windows(3).any(|part| part == [0xFD, 0xFF, 4]);
+    assert!(has_all, "the beginning of a frame that the end cuts off is recorded too");
     let mut paths = vec![named.clone()];
     for number in 2..4 {
         recorder.finish().unwrap();
