@@ -98,3 +98,12 @@ fn a_flush_of_a_tapped_line_is_one_of_its_port() {
     played.is_gone.set(true);
     assert!(line.flush().is_err());
 }
+
+#[test]
+fn a_page_that_is_no_longer_wanted_is_left() {
+    let (tell, _queue) = Tell::to_memory();
+    let is_over = Arc::new(AtomicBool::new(false));
+    let (_ended, end) = mpsc::channel();
+    drop(Live { tell, is_over: Arc::clone(&is_over), end, is_left: false });
+    assert!(is_over.load(Ordering::SeqCst));
+}
