@@ -33,8 +33,9 @@ CELLS = [
     ("tests/mends.py", "tests/mends.py", r'^    \("(\w+)", "', "{count} of {count} found by a test"),
     ("fuzz/campaign --coverage", "fuzz/coverage.txt", r"^all +(\d+) +(\d+) ",
      "{1} of {0} ([fuzz/coverage.txt](fuzz/coverage.txt))"),
-    ("tests/mutants.py", "tests/mutants.txt", r"^# (\d+) files: (\d+) caught of (\d+) that compile",
-     "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)){rest}"),
+    ("tests/mutants.py", "tests/mutants.txt", r"^# (\d+) files: (\d+) caught of (\d+) that compile; (\d+) are not tried",
+     "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)); "
+     "{3} are not tried, most of them constants{rest}"),
     ("`.ci/coverage`", COVERAGE, r"(?s)^axle, all +([\d.]+) +([\d.]+)$.*^library, all +([\d.]+) +([\d.]+)$",
      "library {2} % of lines, {3} % of branches; tool {0} and {1} ([tests/coverage.txt](tests/coverage.txt))"),
     ("`.ci/prove`", ".ci/prove", r'^    "(\w+)": \("', "all {count} seen to fail"),
@@ -91,7 +92,10 @@ def fault_of(shown, record, pattern, cell):
                for number in found[0]]
     most = max((float(number) for number, *_ in found if re.fullmatch(r"[\d.]+", number)), default=0)
     count = len(found)
-    rest = shown[0].partition(")")[2].partition(")")[2] if "{rest}" in cell else ""
+    # Without a figure, what is left to do may be told in words.
+    rest = shown[0].partition("constants")[2] if "{rest}" in cell else ""
+    if re.search(r"\d", rest):
+        return f"a figure of no record: {rest}"
     expected = cell.format(*grouped, count={8: "eight"}.get(count, count), most=most, rest=rest)
     return None if shown[0] == expected else f"{shown[0]!r}, but {record} says {expected!r}"
 
