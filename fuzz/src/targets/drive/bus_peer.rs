@@ -7,6 +7,8 @@ use super::super::{oracle, port::Peer};
 /// What a node has heard and said, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Heard {
+    /// A WRITE on the line. A node that is away for that moment misses it, and then answers the
+    /// next READ: no master can know, so a stop has two payments (I12).
     Write([u8; 4]),
     /// An answer with this payload.
     Answered([u8; 4]),
@@ -51,12 +53,12 @@ impl Peer for Bus {
             return Vec::new();
         }
         let index = usize::from(packet[1] - 1);
-        if !nodes.is_there[index] {
-            return Vec::new();
-        }
         if is_write {
             let payload = [packet[2], packet[3], packet[4], packet[5]];
             nodes.log[index].push(Heard::Write(payload));
+            return Vec::new();
+        }
+        if !nodes.is_there[index] {
             return Vec::new();
         }
         nodes.count = (nodes.count + 1) % 8000;
