@@ -3,12 +3,15 @@
 
     tests/mends.py            all fixes, on a copy of the tree; prints the test that detects each
     tests/mends.py 3 5        only these findings
-    tests/mends.py --check    only checks that each fix is still found in its file
+    tests/mends.py --check    only checks that each fix is still found in its file, and on record
 
 The models run first; for faults outside their scope, the other tests named. Takes about ten
-minutes. Exit status 1 if a fix can be reverted undetected.
+minutes. `tests/mends.txt` has the test that detects each, and when it last did. Exit status 1 if a
+fix can be reverted undetected.
 """
 
+import datetime
+import hashlib
 import os
 import pathlib
 import re
@@ -19,6 +22,8 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 COPY = ROOT / "target" / "mends"
+RECORD = ROOT / "tests" / "mends.txt"
+HEAD = "# Written by tests/mends.py: number and SHA-256 of each fix, the test that detects its removal, and the date.\n"
 # Including the build. A test that runs longer waits for something that the defect prevents.
 PATIENCE_S = 300
 
@@ -139,6 +144,17 @@ def without(mend):
     return texts
 
 
+def key(mend):
+    """What a line of the record begins with; it changes with the fix."""
+    return f"{mend[0]} {hashlib.sha256(repr(mend[2:5]).encode()).hexdigest()[:8]}: "
+
+
+def record():
+    """The line of each fix, by its key; of fixes that have changed, none."""
+    lines = RECORD.read_text().splitlines() if RECORD.exists() else []
+    return {key(mend): line for mend in MENDS for line in lines if line.startswith(key(mend))}
+
+
 def copy_tree():
     """Copies the files known to git, next to the build directory of earlier copies."""
     tree = COPY / "tree"
@@ -177,13 +193,17 @@ def main(wanted):
     if unknown := set(wanted) - {mend[0] for mend in MENDS} - {"--check"}:
         sys.exit(f"no fix has this number: {', '.join(sorted(unknown))}")
     if wanted == ["--check"]:
-        return print(f"{len(mends)} fixes are in place")
+        if missing := [mend[0] for mend in MENDS if key(mend) not in record()]:
+            sys.exit(f"tests/mends.txt does not have these fixes: {', '.join(missing)}")
+        return print(f"{len(mends)} fixes are in place, and on record")
     tree = copy_tree()
     for target in {target for mend in MENDS for target in ["models", *mend[-1]]}:
         if failing(tree, target):
             sys.exit(f"tests/{target}.rs fails with all fixes in place")
     unseen = 0
-    for (number, what, _, _, _, others), texts in mends:
+    lines = record()
+    for mend, texts in mends:
+        number, what, *_, others = mend
         if wanted and number not in wanted:
             continue
         for file, text in texts.items():
@@ -192,6 +212,10 @@ def main(wanted):
         found = next((f"{target}: {name}" for target in targets if (name := failing(tree, target))), None)
         unseen += found is None
         print(f"{number:>4}  {what}: {found or 'NOT FOUND'}", flush=True)
+        lines[key(mend)] = f"{key(mend)}{found}, {datetime.date.today()}"
+        if found is None:
+            del lines[key(mend)]
+        RECORD.write_text(HEAD + "".join(f"{lines[key(it)]}\n" for it in MENDS if key(it) in lines))
         for file in texts:
             shutil.copyfile(ROOT / file, tree / file)
     sys.exit(f"{unseen} can be reverted undetected" if unseen else None)
