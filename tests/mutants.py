@@ -11,8 +11,8 @@
     tests/mutants.py --table              prints the score of each module
     tests/mutants.py --check              each survivor on record has a reason that is not stale
 
-`cargo mutants` lists the changes. Each is made in a copy of the tree; first the tests that concern
-its file run; at the end all tests of the package, for those that had passed. `tests/mutants.txt`
+`cargo mutants` lists the changes. Each is made in a copy of the tree; first the unit tests run, then
+those that concern its file; at the end all tests of the package, for those that had passed. `tests/mutants.txt`
 has the outcome of each file, and the reason of each survivor that has no effect.
 
 Exit status 1 if a change survives without a reason.
@@ -222,6 +222,13 @@ def concerned(file):
     return next(tests for pattern, tests in CONCERNED if fnmatch.fnmatch(file, pattern))
 
 
+def stages(mutant):
+    """The tests to run one after the other until one fails: those that are built quickest first."""
+    tests = concerned(mutant.file)
+    units = [kind for kind in ("--lib", "--bins") if tests.startswith(f"{kind} ")]
+    return dict.fromkeys([*units, tests, ALL[mutant.package]])
+
+
 def digest(file):
     """Of what can be mutated: not of a module of tests at the end."""
     code = re.split(r"^#\[cfg\((?:all\()?test\b.*\n(?:pub\(crate\) )?mod tests \{", (ROOT / file).read_text(), maxsplit=1, flags=re.M)[0]
@@ -340,13 +347,13 @@ class Record:
 def run(mutants, workers, until, record):
     """Tries these until the time is up; returns the survivors without a reason, and the counts."""
     counts, survivors = collections.Counter(), []
-    queue = collections.deque((mutant, concerned(mutant.file)) for mutant in mutants)
+    queue = collections.deque((mutant, *stages(mutant)) for mutant in mutants)
 
     def work(number):
         tree = Tree(number, until)
         while queue:
             try:
-                mutant, tests = queue.popleft()
+                mutant, tests, *later = queue.popleft()
             except IndexError:
                 return
             outcome = "undecided"
@@ -354,11 +361,12 @@ def run(mutants, workers, until, record):
                 tree.check_unchanged(mutant.package, tests)
                 outcome = tree.outcome(mutant, tests)
             if outcome == "undecided":
-                if tests == ALL[mutant.package]:
+                if not later:
                     print(f"not all tests were tried: {mutant.name}", flush=True)
                 continue
-            if outcome == "survived" and tests != ALL[mutant.package]:
-                queue.append((mutant, ALL[mutant.package]))
+            # A reason says more than all tests of the package could.
+            if outcome == "survived" and len(later) > record.has_reason(mutant):
+                queue.append((mutant, *later))
                 continue
             counts[outcome] += 1
             record.keep(mutant, outcome)

@@ -6,8 +6,8 @@ once, and a mutant costs the run of a few tests instead of a build. Two more thi
 first run of each test notes which mutants it reaches, and a mutant gets those tests alone, the ones
 that caught its neighbours first.
 
-What cannot be woven stays for the plain way: deleted fields of a struct, changes that confuse the
-compiler's inference, and what is only evaluated while compiling.
+What cannot be woven stays for the plain way: changes that confuse the compiler's inference, and what
+is only evaluated while compiling.
 """
 
 import bisect
@@ -158,7 +158,11 @@ class File:
         genre, replacement = mutant.genre, mutant.replacement.encode()
         ask = f"{ASK}({number})".encode()
         node = self.tree.root_node.descendant_for_byte_range(start, max(start, end - 1))
-        if genre == "FnValue":
+        if genre == "FnValue" and replacement == b"::std::iter::empty()":
+            # The type of `impl Iterator` is that of the body: the same one without its items.
+            inserts[start].append((b"core::iter::Iterator::filter({ ", (number, b""), b""))
+            inserts[end].append((b" }, |_| !" + ask, (number, b""), b")"))
+        elif genre == "FnValue":
             inserts[start].append((b"if " + ask + b" { ", (number, b"return " + replacement), b"; } "))
         elif genre == "BinaryOperator":
             while node.type not in ("binary_expression", "compound_assignment_expr"):
@@ -180,6 +184,20 @@ class File:
             if node.start_byte != start:
                 return False
             wraps[node.start_byte, node.end_byte].append((number, self.source[end : node.end_byte]))
+        elif genre == "StructField":
+            # The value of the struct that the others come from.
+            field = self.tree.root_node.descendant_for_byte_range(start, start)
+            while field is not None and field.type not in ("field_initializer", "shorthand_field_initializer"):
+                field = field.parent
+            base = field and next((it for it in field.parent.children if it.type == "base_field_initializer"), None)
+            if not base:
+                return False
+            own = b"(" + self.part(base)[2:].strip() + b")." + self.part(field).split(b":")[0].strip()
+            value = field.child_by_field_name("value")
+            if value is None:
+                inserts[field.end_byte].append((b": if " + ask + b" { ", (number, own), b" } else { " + self.part(field) + b" }"))
+            else:
+                wraps[value.start_byte, value.end_byte].append((number, own))
         elif genre in ("MatchArm", "MatchArmGuard"):
             while node.type != "match_arm":
                 node = node.parent

@@ -88,6 +88,7 @@ mod tests {
                     prop_assert_eq!(fill.is_just(from..=to), is_just);
                     prop_assert_eq!(Fill::until(wake, end).is_just(from..=to), is_just);
                     prop_assert!(!now.is_just(from..=to));
+                    prop_assert!(!Fill::now(end).is_just(from..=to));
                 }
             }
         }

@@ -126,9 +126,12 @@ mod tests {
         let answer = [0x55, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x54, 0x0E].repeat(20);
         let batch = <ToMaster as Framing>::Batch::accept_batch(&answer, false);
         assert!(batch.frames >= 14, "{batch:?}");
+        assert_eq!(batch.len, 8 * batch.frames);
         let exchange = [0xAA, 0x01, 0xBE, 0xD0, 0xBB, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x43, 0x40];
         let batch = <ToSlave as Framing>::Batch::accept_batch(&exchange.repeat(20), true);
         assert!(batch.frames >= 14, "{batch:?}");
+        // A READ of 4 bytes, and a WRITE of 8.
+        assert_eq!(batch.len, batch.frames / 2 * 12 + batch.frames % 2 * 4);
         let answer = |header| {
             let body = [header, 0x02, 0, 0, 0, 0];
             [&body[..], &crc16::compute(&body).to_le_bytes()].concat()
@@ -136,5 +139,6 @@ mod tests {
         let poll = [&exchange[..4], &answer(0x55), &exchange[..4], &answer(0x56)].concat();
         let batch = <BothDirections as Framing>::Batch::accept_batch(&poll.repeat(20), true);
         assert!(batch.frames >= 14, "{batch:?}");
+        assert_eq!(batch.len, batch.frames / 2 * 12 + batch.frames % 2 * 4);
     }
 }
