@@ -243,6 +243,10 @@ impl<B: Body> Encode for FrameOf<B> {
 
 /// A frame given by its parts, for ids for which this crate has no message (ruling U3).
 ///
+/// A shipped robot gives such a frame up at its id, and its place in the stream with it: it may not
+/// take the next frame either, **a stop included**. A [`Host`](super::Host) repeats a stop every
+/// 100 ms; [`is_stop_sent`](super::Host::is_stop_sent) says only that it has left.
+///
 /// ```
 /// use axlewire::{encode::Encode, ucp::RawFrame};
 ///
@@ -266,7 +270,7 @@ pub struct RawFrame<'a> {
 /// Refuses with [`EncodeError::KnownId`], [`EncodeError::BodyTooLong`] and
 /// [`EncodeError::NestedHeader`] what hangs, corrupts or misleads shipped robots (ruling U13): they
 /// give up a frame with an id that they do not know, and search the rest of it for another one,
-/// such as a motor command. A frame whose CRC is at fault can be sent with another index.
+/// such as a motor command. A frame whose index or CRC is at fault can be sent with another index.
 impl Encode for RawFrame<'_> {
     fn encoded_len(&self) -> usize {
         self.body.len() + LEN_WITHOUT_BODY + OUTSIDE_LEN

@@ -6,7 +6,7 @@ use axlewire::{
     error::{EncodeError, ParseError},
     stream::{Event, Frames, Reason},
     ucp::{
-        Body, Frame, FrameOf, Header, Message, RawFrame, Ucp,
+        Body, Frame, FrameOf, Header, Message, MotorControl, RawFrame, Ucp,
         message::{CalibrationKind, CalibrationStart, ErrorCode, Ping, Pong},
     },
 };
@@ -170,6 +170,23 @@ fn a_raw_frame_hides_no_other_frame_from_shipped_robots() {
         }
         assert!(is_dangerous, "without the refusal it would take {inner:?}");
     }
+}
+
+/// It goes on with what it has not read yet, 7 bytes at a time, and may read FD FF in two parts.
+#[test]
+fn a_shipped_robot_may_lose_the_stop_behind_a_raw_frame_and_takes_the_repeated_one() {
+    let stop = MotorControl::STOP.frame(0);
+    let mut lost = Vec::new();
+    for len in 0..=56 {
+        let mut buffer = [0; 64];
+        let raw = RawFrame { id: 0x20, index: 1, body: &[0; 56][..len] };
+        let raw = raw.encode(&mut buffer).unwrap();
+        let stream = [raw, stop.as_bytes(), stop.as_bytes()].concat();
+        let taken = taken_by_a_shipped_robot(&stream).len();
+        assert!(taken > 0, "{len}");
+        lost.extend((taken < 2).then_some(len));
+    }
+    assert_eq!(lost, [5, 12, 19, 26, 33, 40, 47, 54]);
 }
 
 #[test]

@@ -25,7 +25,8 @@ use crate::{
 /// --max-turns: a speed looks like a far position, and the reverse. A capture of several lines is
 /// refused, and so is one in which a commanded node changes its mode. At the end, on every error
 /// and on every signal that can be caught, what was commanded is stopped. Firmware updates, motor
-/// commands out of range and bodies of a wrong length are refused (rulings U7 and U13).
+/// commands out of range, bodies of a wrong length and frames inside others are refused (rulings U7
+/// and U13).
 ///
 /// The capture is held in memory: 4 to 40 times its size, most for the short packets of a bus.
 #[derive(Debug, clap::Args)]

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use axlewire::{
+    crc16,
     encode::Encode,
     ikeya::{self, Mode, NodeId, Position, Rps, Status, three},
     stream::{Frames, Framing},
@@ -158,6 +159,29 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
     }
 }
 
+/// The number, from 0, of the first of these frames for a robot in which another one begins: what a
+/// shipped robot takes if it has lost its place, by noise or by a frame with an unknown id.
+///
+/// Its receiver ignores the high byte of `len` and takes any body of an id from 1 to 10 (ruling
+/// U13). The other frame may go on in the next one. What the tool itself sends in between, such as
+/// stops, is not looked at.
+pub(crate) fn hidden_frame<'a>(frames: impl IntoIterator<Item = &'a [u8]>) -> Option<usize> {
+    let (mut bytes, mut begins) = (Vec::new(), Vec::new());
+    for frame in frames {
+        begins.push(bytes.len());
+        bytes.extend_from_slice(frame);
+    }
+    let is_hidden = |at: usize| {
+        let Some([0xFD, 0xFF, len @ 4..=127, _, 1..=10]) = bytes.get(at..at + 5) else {
+            return false;
+        };
+        let frame = bytes.get(at..at + 4 + usize::from(*len)).unwrap_or_default();
+        begins.binary_search(&at).is_err() && crc16::check(frame)
+    };
+    let hidden = (0..bytes.len()).find(|&at| is_hidden(at))?;
+    begins.iter().rposition(|&begin| begin < hidden)
+}
+
 impl From<Write> for Effect {
     fn from(write: Write) -> Self {
         Self::Write(write.into())
@@ -211,12 +235,9 @@ impl Write {
 
 #[cfg(test)]
 mod tests {
-    use axlewire::{
-        crc16,
-        ikeya::{
-            Rps, WriteRequest,
-            board::{OneMotor, ThreeMotors},
-        },
+    use axlewire::ikeya::{
+        WriteRequest,
+        board::{OneMotor, ThreeMotors},
     };
 
     use super::*;
@@ -337,6 +358,42 @@ mod tests {
         let ping = [0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42];
         let nested = frame(0x40, &ping).unwrap_err();
         assert!(nested.contains("(ruling U13): FD FF at byte 6"), "{nested}");
+    }
+
+    #[test]
+    fn what_is_sent_hides_no_frame_for_a_robot_that_has_lost_its_place() {
+        let sealed = |body: &[u8]| [body, &crc16::compute(body).to_le_bytes()].concat();
+        let hidden = |frames: &[&[u8]]| hidden_frame(frames.iter().copied());
+        let (ping, update) = ([0xFD, 0xFF, 4, 0, 1, 0], [0xFD, 0xFF, 6, 0, 9, 0, 40, 0]);
+        let (ping, whole_update) = (sealed(&ping), sealed(&update));
+        // Biases hold any bytes: three that are -3, for example, are FD FF each.
+        let biases = |at: usize, hidden: &[u8]| {
+            let mut frame = [0xEE; 25];
+            frame[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
+            frame[at..at + hidden.len()].copy_from_slice(hidden);
+            sealed(&frame)
+        };
+        let harmless = biases(6, &[0xFD, 0xFF].repeat(3));
+        assert_eq!(hidden(&[&ping, &harmless, &ping, &whole_update]), None);
+        for at in 6..=15 {
+            assert_eq!(hidden(&[&ping, &harmless, &biases(at, &whole_update)]), Some(2));
+        }
+        // The robot ignores the high byte of the length.
+        for (at, value, is_taken) in
+            [(3, 1, true), (4, 0, false), (4, 10, true), (4, 11, false), (2, 3, false)]
+        {
+            let mut other = update;
+            other[at] = value;
+            let found = hidden(&[&biases(6, &sealed(&other))]);
+            assert_eq!(found, is_taken.then_some(0), "{other:02X?}");
+        }
+        // One of 31 bytes that ends in the next frame: 8 of them here, and 23 there.
+        let first = biases(19, &[0xFD, 0xFF, 27, 0, 1, 0]);
+        let next = biases(6, &[]);
+        let crc = crc16::compute(&[&first[19..], &next[..21]].concat());
+        let next = biases(21, &crc.to_le_bytes());
+        assert_eq!(hidden(&[&ping, &first, &next]), Some(1));
+        assert_eq!(hidden(&[&ping, &first, &ping, &next]), None);
     }
 
     #[test]

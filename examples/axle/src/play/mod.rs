@@ -25,6 +25,7 @@ use crate::{
     signals::Signals,
     teller::Teller,
 };
+use effect::hidden_frame;
 pub(crate) use effect::{Effect, Limits, Side, of as effect_of};
 pub(crate) use player::Due;
 use player::{Part, Player};
@@ -46,6 +47,17 @@ const CALL_PERIOD: Duration = Duration::from_millis(50);
 
 /// Sends the frames of a plan.
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
+    if plan.protocol == Protocol::Ucp && plan.side == Side::Commander {
+        let frames = plan.frames.iter().map(|due| &*due.bytes);
+        if let Some(number) = hidden_frame(frames) {
+            let line = format!(
+                "another frame is hidden in frame {}, and a shipped robot may take it (ruling \
+                 U13): nothing is sent",
+                number + 1
+            );
+            return Err(Failure::Failed(line));
+        }
+    }
     let signals = Signals::listen_to_all()?;
     let result = match plan.protocol {
         Protocol::Ikeya => commanded::run::<OneMotor>(plan, &signals),

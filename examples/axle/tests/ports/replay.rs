@@ -133,6 +133,24 @@ fn pongs_of_the_capture_do_not_tell_that_the_stop_was_heard() {
     });
 }
 
+/// Shipped robots give the first frame up at its id, read past the header of the second one, and
+/// take the update that it holds.
+#[test]
+fn a_frame_hidden_in_another_one_is_not_sent() {
+    let unknown = [0xFD, 0xFF, 0x09, 0x00, 0x20, 0x01, 0, 0, 0, 0, 0, 0x41, 0xFB];
+    let update = [0xFD, 0xFF, 0x06, 0x00, 0x09, 0x00, 0x28, 0x00, 0x9C, 0x23];
+    let biases = [&[0xFD, 0xFF, 0x17, 0x00, 0x08, 0x00], &update[..], &[0; 9], &[0xAD, 0xC4]];
+    let path = file("hidden.bin", &[&unknown[..], &biases.concat()].concat());
+    let replay = format!("replay {} --protocol ucp -p /nowhere", path.to_str().unwrap());
+    let error = Process::start(&replay).complaint(1);
+    let expected = "another frame is hidden in frame 2, and a shipped robot may take it (ruling \
+                    U13): nothing is sent";
+    assert_eq!(error, expected);
+    let hex: String = biases.concat().iter().map(|byte| format!(" {byte:02X}")).collect();
+    let error = Process::start(&format!("send ucp hex{hex} -p /nowhere")).complaint(1);
+    assert!(error.starts_with("another frame is hidden in frame 1, "), "{error}");
+}
+
 #[test]
 fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
     undisturbed(|| {
