@@ -162,6 +162,8 @@ class File:
             # The type of `impl Iterator` is that of the body: the same one without its items.
             inserts[start].append((b"core::iter::Iterator::filter({ ", (number, b""), b""))
             inserts[end].append((b" }, |_| !" + ask, (number, b""), b")"))
+        elif genre == "FnValue" and replacement.startswith(b"::std::iter::"):
+            return False
         elif genre == "FnValue":
             inserts[start].append((b"if " + ask + b" { ", (number, b"return " + replacement), b"; } "))
         elif genre == "BinaryOperator":
