@@ -3,6 +3,10 @@
 a step ignores a check that fails.
 
     .ci/workflow.py --check
+
+A line of `.ci/run` must be a plain command, after whose failure bash ends the step. Any other line
+must have one of the forms of HARMLESS, or be listed in SEEN, because somebody has seen that it
+hides nothing. What `.ci/prove` plants shows what is found.
 """
 
 import collections
@@ -21,23 +25,140 @@ COMMAND = """
 
 """
 
+# How it begins.
+HEAD = ["set -euo pipefail", 'cd "$(dirname "$0")/.."', "export CARGO_TERM_COLOR=never CARGO_INCREMENTAL=0"]
+# How .ci/run ends: it runs the steps, and fails if one does.
+END = """
+names() { sed -n 's/^#: \\([a-z]*\\): .*/\\1/p' "$0"; }
+
+if [ "${1:-}" = --list ]; then
+    sed -n 's/^#: //p' "$0"
+    exit
+fi
+for name in ${*:-$(names)}; do
+    echo "== $(sed -n "s/^#: \\($name: .*\\)/\\1/p" "$0")"
+    SECONDS=0
+    # Not in a condition, where -e would not count.
+    set +e
+    (set -e; "step_$name")
+    status=$?
+    set -e
+    case $status in
+    0) echo "== $name passed in ${SECONDS} s" ;;
+    # It says why. A hosted run has all that it needs.
+    77) echo "== $name SKIPPED"; [ -z "${GITHUB_ACTIONS:-}" ] || exit 77 ;;
+    *) exit "$status" ;;
+    esac
+done
+"""
+
+# What can hide that a command fails: operators and substitutions anywhere, these words in front.
+HIDING = re.compile(
+    r"[;&`!]|\|\||[$<>]\("
+    r"|^(if|then|elif|else|fi|while|until|for|case|select|function|set|shopt|trap|return|exit|break|continue)\b"
+    r"|^(eval|exec|source|builtin|command|coproc|alias|unalias|unset|true|false|enable|declare)\b|^[:.{]( |$)"
+    r"|\| *(if|while|until|for|case|true|:)( |$)|\w\(\)")
+# Forms that hide nothing; the strings in quotes are left out.
+HARMLESS = [
+    re.compile(form) for form in (
+        r"for \w+ in [^$;&|`]+; do", "return 1",
+        # The value of a variable: a failure is that of the line.
+        r"\w+=\$\([^;&`|()]+(\|[^;&`|()]+)*\)", r"\w+=\$\(\([^;&`|()]+\)\)",
+        # What fails is told, and is a failure of the function.
+        r"[^;&`|$]+ \|\| \{ echo ''; return 1; \}",
+        # A tool is installed if it is not there.
+        r"command -v [\w-]+ >/dev/null \|\| [^;&`|]+",
+    )
+]
+SEEN = {
+    # The failure is kept in a variable, or returned.
+    "{ $soon ${turn/PATH/$path} | grep -Fx 'found: [(N1, Velocity)]'; } || status=1",
+    "grep 'node 1: turning at 2.00 rps' \"$told\" || status=1",
+    "grep 'node 1: command 0.00 rps' \"$told\" || status=1",
+    "return $status",
+    "out=$(examples/firmware/run.sh ikeya_slave -- cargo run -q -p axle -- spin --port PORT --node 1 --rps 2 --for 1) || return",
+    "$(command_of_readme 'axle -- decode') | grep -x '       328 in 15 frames' || {",
+    # Another attempt; after the last one the step fails.
+    "turn_of_readme && break",
+    "motor_in_qemu && break",
+    # A simulator in the background, which is ended. It must have printed what is expected.
+    "timeout 60 $soon $(command_of_readme 'axle -- sim ikeya') >\"$told\" &",
+    "sim=$!",
+    "for _ in $(seq 100); do",
+    "grep -q '^pty: ' \"$told\" && break",
+    "wait $sim || true",
+    # Whether there is something.
+    "if chrt -f 10 true 2>/dev/null; then soon='chrt -f 10'; fi",
+    "[ -x $venv/bin/zizmor ] || python3 -m venv $venv",
+    "if command -v rustup >/dev/null && rustup toolchain list | grep -q \"^$msrv\"; then",
+    "else",
+    "fi",
+    "[ -z \"$newer\" ] || { echo \"$newer\"; return 1; }",
+    # Goes on for some lines, up to the closing bracket.
+    "newer=$(cargo metadata --format-version 1 --all-features --filter-platform x86_64-unknown-linux-gnu |",
+    # The sets of features, which are counted.
+    "while read -r command; do",
+    "done < <(",
+    "for feature in $(features_of_library); do",
+    "echo \"$((count + 7)) sets of features\"",
+    # A function for others.
+    "command_of_readme() { grep -m1 -F \"$1\" README.md | sed 's/ *#.*//'; }",
+    # Python.
+    "while todo:",
+    "for dep in nodes[todo.pop()][\"deps\"]:",
+    "if normal and dep[\"pkg\"] not in seen:",
+    "for package in (packages[s] for s in seen):",
+    "if tuple(map(int, needs.split(\".\")[:2])) > limit:",
+}
+HELPERS = ["turn_of_readme", "features_of_library", "motor_in_qemu"]
+
 
 def main():
     steps = gate.steps()
-    matrix = re.search(r"^        steps:\n((?:          - .*\n)+)", WORKFLOW.read_text(), re.MULTILINE)
+    text = WORKFLOW.read_text()
+    matrix = re.search(r"^        steps:\n((?:          - .*\n)+)", text, re.MULTILINE)
     run = collections.Counter(" ".join(re.findall(r"- (.*)", matrix[1])).split()) if matrix else {}
     faults = [f"{step}: run {run[step]} times" for step in steps if run[step] != 1]
     faults += [f"{step}: no step of the gate" for step in run if step not in steps]
     # Nothing may hide a step that fails.
-    text = WORKFLOW.read_text()
     faults += ["the steps are not run as they should be"] * (COMMAND not in text)
     faults += [f"it hides failures: {word}" for word in ("|| true", "continue-on-error", "set +e") if word in text]
-    # Of a check; what was started in the background may have ended.
-    checks = re.findall(r"^ +(?:python3|bash|cargo|\.ci/).*$", (ROOT / ".ci" / "run").read_text(), re.MULTILINE)
-    faults += [f".ci/run hides a failure: {line.strip()}" for line in checks if re.search(r"\|\| (true|:)", line)]
-    faults += ["hardly any check is run"] * (len(checks) < 40)
+    gate_text = (ROOT / ".ci" / "run").read_text()
+    faults += faults_of_gate(gate_text, steps) + faults_of_tests(gate_text, (ROOT / "README.md").read_text())
     print(f"{len(steps)} steps, {len(faults)} faults", *faults, sep="\n")
     return bool(faults) or len(steps) < 20
+
+
+def faults_of_gate(text, steps):
+    """Where `.ci/run` could go on although a check has failed."""
+    faults = []
+    if not text.endswith(END):
+        faults.append(".ci/run does not end as it should")
+    # What is continued on the next line is one line.
+    lines = [line.strip() for line in text.removesuffix(END).replace("\\\n", "").splitlines()]
+    lines = [line for line in lines if line and not line.startswith("#")]
+    if lines[: len(HEAD)] != HEAD:
+        faults.append(f".ci/run does not begin as it should: {lines[0]}")
+    functions = re.findall(r"^(\w+)\(\) \{$", "\n".join(lines), re.MULTILINE)
+    if sorted(functions) != sorted([f"step_{step}" for step in steps] + HELPERS):
+        faults.append(".ci/run does not have each step, and its other functions, exactly once")
+    for line in lines[len(HEAD) :]:
+        code = re.sub(r"'[^']*'|\"(?:(?!\$\()[^\"`])*\"", "''", line)
+        is_harmless = any(form.fullmatch(code) for form in HARMLESS) or line in SEEN
+        is_function = line.removesuffix("() {") in functions
+        if HIDING.search(code) and not is_harmless and not is_function:
+            faults.append(f".ci/run may hide a failure: {line}")
+    checks = [line for line in lines if re.match(r"(python3|bash|cargo|\.ci/)", line)]
+    return faults + ["hardly any check is run"] * (len(checks) < 40)
+
+
+def faults_of_tests(text, readme):
+    """The step `test` is what the README tells everybody to run, and nothing else."""
+    command = re.search(r"^(cargo test\b.*?) +# the crate and the host tool", readme, re.MULTILINE)
+    if not command:
+        return ["README.md does not name the command for the tests"]
+    expected = f"\nstep_test() {{\n    {command[1]}\n}}\n"
+    return [f"the step test is not: {command[1]}"] * (expected not in text)
 
 
 if __name__ == "__main__":
