@@ -46,6 +46,8 @@ LEAST_PATIENCE_S = 60
 BUILD_S = 1200
 # A file of which no more are left is recorded with those; the rest of it need not be tried again.
 MOST_LEFT, NOT_TRIED = 40, "(not tried)"
+# Fewer words are no reason.
+LEAST_WORDS = 3
 
 # Files, and the tests that concern them most; the first match counts.
 CONCERNED = [
@@ -477,14 +479,14 @@ def table(record):
 
 
 def check(record):
-    """Every survivor on record has a reason, and its line is still in its file."""
+    """Every survivor on record has a reason in words, and its line is still in its file."""
     faults = []
     for (file, key), why in record.reasons.items():
         # Behind the first bar, or behind the second if the change itself is one of `|`.
         parts = re.sub(r" \(\d+\)$", "", key).split(" | ")
         lines = [" | ".join(parts[at:]) for at in range(1, len(parts))]
-        if not why:
-            faults.append(f"{file}: no reason: {key}")
+        if len(re.findall(r"[^\W\d_]{2,}", why)) < LEAST_WORDS:
+            faults.append(f"{file}: no reason: {key}: {why}")
         elif (ROOT / file).exists() and not any(line in (ROOT / file).read_text() for line in lines):
             faults.append(f"{file}: the line is gone: {key}")
     faults += [f"{file}: the file is gone" for file in record.lines if not (ROOT / file).exists()]
