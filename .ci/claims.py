@@ -230,7 +230,7 @@ def planted(testing, safety):
         plant_cell(at, 2, f" 9 of{cells[2]}")
         if not has_record:
             plant_cell(at, 4, f" 0 to 9{cells[4]}")
-        # Each word of each command with another one in its place; left out, if a record depends on it.
+        # Each word of each command: another one in its place; if there is a record, also none.
         for word in re.finditer(r"[^\s`,]+", cells[3]):
             before, after = cells[3][: word.start()], cells[3][word.end() :]
             if word.group() != "--":

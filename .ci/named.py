@@ -86,7 +86,7 @@ def faults(names, are_run):
 
 
 def planted(pages):
-    """Writes a name of each page in ways in which it would not be read; those that are not found."""
+    """Writes each name in ways in which it would not be read; those that are not found."""
     missed = []
     for page, (head, _, at, between) in TABLES.items():
         for row in rows(pages[page], head):

@@ -11,9 +11,10 @@
     tests/mutants.py --table              prints the score of each module
     tests/mutants.py --check              each survivor on record has a reason that is not stale
 
-`cargo mutants` lists the changes. Each is made in a copy of the tree; first the unit tests run, then
-those that concern its file; at the end all tests of the package, for those that had passed.
-`tests/mutants.txt` has the outcome of each file, and the reason of each survivor that has no effect.
+`cargo mutants` lists the changes. Each is made in a copy of the tree; first the unit tests run,
+then those that concern its file; at the end all tests of the package, for those that had passed.
+`tests/mutants.txt` has the outcome of each file, and the reason of each survivor that has no
+effect.
 
 Exit status 1 if a change survives without a reason.
 """

@@ -6,8 +6,8 @@ once, and a mutant costs the run of a few tests instead of a build. Two more thi
 first run of each test notes which mutants it reaches, and a mutant gets those tests alone, the ones
 that caught its neighbours first.
 
-What cannot be woven stays for the plain way: changes that confuse the compiler's inference, and what
-is only evaluated while compiling.
+What cannot be woven stays for the plain way: changes that confuse the compiler's inference, and
+what is only evaluated while compiling.
 """
 
 import bisect
