@@ -6,7 +6,7 @@ use std::{cell::RefCell, rc::Rc};
 #[cfg(feature = "ucp")]
 use axlewire::ucp::{Host, host::HostConfig};
 use axlewire::{
-    drive::{Clock, DriveError, Driver},
+    drive::{Clock, DriveError, Driver, WithDelay},
     endpoint::{Endpoint, Unsent},
     ikeya::{
         Master, NodeId,
@@ -14,6 +14,7 @@ use axlewire::{
     },
     time::{Duration, Instant},
 };
+use embedded_hal_async::delay::DelayNs;
 
 use crate::{
     bus_rig::{Story, only_two_and_five},
@@ -71,6 +72,8 @@ pub(crate) struct Pausing {
     pub(crate) is_sent: bool,
     pub(crate) repeats: bool,
     pub(crate) unsent: Vec<Unsent>,
+    /// What it knew of that when all had left.
+    pub(crate) unsent_when_flushed: Option<Vec<Unsent>>,
 }
 
 impl Endpoint for Pausing {
@@ -89,6 +92,9 @@ impl Endpoint for Pausing {
     fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
         self.unsent.push(unsent);
         self.is_sent &= !self.repeats;
+    }
+    fn handle_flushed(&mut self, _: Instant) {
+        self.unsent_when_flushed = Some(self.unsent.clone());
     }
     fn poll_event(&mut self) -> Option<()> {
         None
@@ -179,6 +185,15 @@ fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long() {
 }
 
 #[test]
+fn a_role_is_told_that_a_frame_was_given_up_before_it_is_told_that_all_has_left() {
+    for (rest_after_us, expected) in [(60 + 980, vec![]), (60 + 981, vec![Unsent::CutOff])] {
+        let mut driver = in_two(rest_after_us, 0);
+        driver.service().unwrap();
+        assert_eq!(driver.role().unsent_when_flushed, Some(expected), "{rest_after_us} us");
+    }
+}
+
+#[test]
 fn a_failed_flush_behind_a_frame_in_doubt_counts_for_it_and_for_the_frames_before() {
     for (rest_after_us, expected) in
         [(60 + 980, vec![Unsent::Unflushed]), (60 + 981, vec![Unsent::CutOff, Unsent::Unflushed])]
@@ -187,6 +202,31 @@ fn a_failed_flush_behind_a_frame_in_doubt_counts_for_it_and_for_the_frames_befor
         assert_eq!(driver.service(), Err(DriveError::Port(Unplugged)));
         assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
     }
+}
+
+/// A delay that is late by 1 %, and notes how long it was asked to wait.
+struct Late(World, Rc<RefCell<Vec<u32>>>);
+
+impl DelayNs for Late {
+    async fn delay_ns(&mut self, _: u32) {
+        panic!("asked for microseconds");
+    }
+    async fn delay_us(&mut self, us: u32) {
+        self.1.borrow_mut().push(us);
+        self.0.step(u64::from(us) * 101 / 100);
+    }
+}
+
+#[test]
+fn an_async_call_delays_for_a_second_at_most_and_asks_its_clock_in_between() {
+    let (world, asked) = (World::default(), Rc::default());
+    let delay = Late(world.clone(), Rc::clone(&asked));
+    let time = WithDelay { clock: VirtualClock(world.clone()), delay };
+    let mut driver = Driver::new(Recorder::default(), End::new(&world, 20), time);
+    let deadline = Instant::from_micros(2_500_000);
+    assert_eq!(world.block_on(driver.next_event_async(deadline)), Ok(None));
+    assert_eq!(*asked.borrow(), [1_000_000, 1_000_000, 480_000]);
+    assert_eq!(world.now() - deadline, Duration::from_micros(4800), "errors do not add up");
 }
 
 /// A clock that is set back by 500 us once, and notes until when it is asked to idle.

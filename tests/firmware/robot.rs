@@ -245,6 +245,48 @@ fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
     });
 }
 
+#[test]
+fn the_robot_shows_the_latest_network_state_also_after_a_higher_one() {
+    undisturbed(|| {
+        let Some((mut board, mut rover)) = linked() else { return };
+        for (state, number) in [(NetworkState::Connected, 3), (NetworkState::Disconnected, 2)] {
+            let now = rover.now();
+            rover.role_mut().set_network_state(state, now).unwrap();
+            board_shows(&mut board, &mut rover, |told| told.at("network") == number);
+        }
+    });
+}
+
+/// Asks for a report in each of the next steps: the requests wait until then.
+fn ask_in_steps(board: &mut Board, steps: u32) {
+    for _ in 0..steps {
+        board.ask();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn the_wheels_turn_from_the_step_on_in_which_a_command_is_taken() {
+    undisturbed(|| {
+        let Some(mut board) = Board::start(Program::Robot) else { return };
+        let mut wire = Wire::new(board.bus());
+        let drive = MotorControl::new(20, 0).unwrap();
+        for _ in 0..5 {
+            board.report_when("at rest", |told| told.at("speed") == 0 && told.at("left_rpm") == 0);
+            let seen = board.reports().len();
+            ask_in_steps(&mut board, 5);
+            wire.send(drive.frame(0).as_bytes());
+            ask_in_steps(&mut board, 15);
+            board.report_when("driving", |told| told.at("speed") == 20);
+            let reports = board.reports();
+            let told = reports[seen..].iter().find(|told| told.at("speed") == 20).unwrap();
+            // A step of 10 ms of 24 rpm, with a time constant of 150 ms.
+            assert!(told.at("left_rpm") >= 1 && told.at("right_rpm") >= 1, "{told:?}");
+            wire.send(MotorControl::STOP.frame(0).as_bytes());
+        }
+    });
+}
+
 /// Runs the host until the robot's report matches.
 pub(crate) fn board_shows(
     board: &mut Board,

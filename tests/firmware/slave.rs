@@ -212,6 +212,28 @@ fn packet(packet: &impl Encode) -> Vec<u8> {
 }
 
 #[test]
+fn a_motor_speeds_up_in_steps_that_are_short_compared_with_its_time_constant() {
+    undisturbed(|| {
+        let Some(board) = Board::start(Program::Slave) else { return };
+        let mut master = Bare::new(board);
+        let seen = master.board.reports().len();
+        master.write(3.0);
+        // One report for each step, until the watchdog stops the motor.
+        for _ in 0..80 {
+            master.board.ask();
+            std::thread::sleep(std::time::Duration::from_millis(3));
+        }
+        master.board.report_when("at speed", |told| told.at("mrps") > 2900);
+        let reports = master.board.reports();
+        let mut speeds: Vec<_> = reports[seen..].iter().map(|told| told.at("mrps")).collect();
+        speeds.dedup();
+        let on_the_way = speeds.iter().take_while(|speed| **speed <= 2900).filter(|it| **it > 0);
+        // 36 steps of 5 ms, at a time constant of 50 ms; steps of 50 ms would be 5.
+        assert!(on_the_way.count() >= 12, "{speeds:?}");
+    });
+}
+
+#[test]
 fn ten_thousand_exchanges_lose_no_byte_at_either_end() {
     undisturbed(|| {
         const EXCHANGES: u32 = 10_000;

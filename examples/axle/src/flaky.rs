@@ -2,10 +2,6 @@
 
 use std::{
     io::{self, ErrorKind, Read, Write},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
     thread,
     time::{Duration, Instant as Clock},
 };
@@ -30,28 +26,39 @@ use crate::{
     rover::Rover,
 };
 
-/// A port whose reads and writes fail while it is broken.
+/// How reads and writes fail.
+#[derive(Default)]
+struct Faults {
+    read: Option<ErrorKind>,
+    write: Option<ErrorKind>,
+}
+
+/// A port that fails at times, which count from its start, milliseconds.
 struct Flaky {
     port: TTYPort,
-    is_broken: Arc<AtomicBool>,
+    start: Clock,
+    faults: fn(u128) -> Faults,
 }
 
 impl Flaky {
-    fn check(&self) -> io::Result<()> {
-        let is_broken = self.is_broken.load(Ordering::SeqCst);
-        if is_broken { Err(ErrorKind::Other.into()) } else { Ok(()) }
+    fn faults(&self) -> Faults {
+        (self.faults)(self.start.elapsed().as_millis())
     }
+}
+
+fn check(fault: Option<ErrorKind>) -> io::Result<()> {
+    fault.map_or(Ok(()), |kind| Err(kind.into()))
 }
 
 impl Read for Flaky {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.check().and_then(|()| self.port.read(bytes))
+        check(self.faults().read).and_then(|()| self.port.read(bytes))
     }
 }
 
 impl Write for Flaky {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.check().and_then(|()| self.port.write(bytes))
+        check(self.faults().write).and_then(|()| self.port.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -100,24 +107,27 @@ impl SerialPort for Flaky {
     }
 }
 
-/// A broken port that recovers after half a second, with this role at the other end.
-fn broken_for_a_while<E: Endpoint + Send + 'static>(
+/// Half a second in which nothing goes.
+fn broken_at_first(millis: u128) -> Faults {
+    let fault = (millis < 500).then_some(ErrorKind::Other);
+    Faults { read: fault, write: fault }
+}
+
+/// A port with these faults, and this role at the other end.
+fn flaky<E: Endpoint + Send + 'static>(
+    faults: fn(u128) -> Faults,
     role: impl FnOnce(Instant) -> E,
     mut react: impl FnMut(&mut E, Instant) + Send + 'static,
 ) -> Line {
     let (mut theirs, ours) = TTYPort::pair().unwrap();
-    let is_broken = Arc::new(AtomicBool::new(true));
-    let flaky = Flaky { port: ours, is_broken: Arc::clone(&is_broken) };
     let start = Clock::now();
+    let flaky = Flaky { port: ours, start, faults };
     let now = move || Instant::from_micros(start.elapsed().as_micros() as u64);
     let mut role = role(now());
     theirs.set_timeout(Duration::from_millis(5)).unwrap();
     thread::spawn(move || {
         let mut buffer = [0; 256];
         while start.elapsed() < Duration::from_secs(10) {
-            if start.elapsed() > Duration::from_millis(500) {
-                is_broken.store(false, Ordering::SeqCst);
-            }
             let len = theirs.read(&mut buffer).unwrap_or(0);
             role.handle_input(&buffer[..len], now());
             role.handle_timeout(now());
@@ -136,7 +146,7 @@ fn broken_for_a_while<E: Endpoint + Send + 'static>(
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
     undisturbed(|| {
         let node = |_| MotorNode::new(NodeId::N1, Mode::Velocity);
-        let line = broken_for_a_while(node, |_, _| {});
+        let line = flaky(broken_at_first, node, |_, _| {});
         let mut config = MasterConfig::usb_adapter();
         config.accepts_early = true;
         let mut bus: Bus = Bus::new(line, config);
@@ -149,11 +159,38 @@ fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_bus() {
 fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
     undisturbed(|| {
         let robot = |now| Robot::new(RobotConfig::default(), now);
-        let line = broken_for_a_while(robot, |robot, now| {
+        let line = flaky(broken_at_first, robot, |robot, now| {
             robot.set_telemetry(&Telemetry::default(), now);
         });
         let mut rover = Rover::on(line, &PortArgs::new(None));
         rover.stop().unwrap();
+        assert!(rover.host().is_stop_sent());
+    });
+}
+
+#[test]
+fn a_stop_of_a_rover_is_not_over_while_the_last_one_sent_has_not_left() {
+    undisturbed(|| {
+        // Enough stops leave and are heard before. Then the port fails, and later only takes
+        // nothing, which may pass.
+        let faults = |millis| {
+            let write = match millis {
+                700..1000 => Some(ErrorKind::Other),
+                1000..1400 => Some(ErrorKind::TimedOut),
+                _ => None,
+            };
+            Faults { write, ..Faults::default() }
+        };
+        let (begin, robot) = (Clock::now(), |now| Robot::new(RobotConfig::default(), now));
+        let line = flaky(faults, robot, |robot, now| {
+            // It reports once the host has failed to repeat its stop, which it does each 100 ms.
+            if now >= Instant::from_millis(850) {
+                robot.set_telemetry(&Telemetry::default(), now);
+            }
+        });
+        let mut rover = Rover::on(line, &PortArgs::new(None));
+        rover.stop().unwrap();
+        assert!(begin.elapsed() >= Duration::from_millis(1400), "{:?}", begin.elapsed());
         assert!(rover.host().is_stop_sent());
     });
 }

@@ -26,6 +26,8 @@ pub(crate) struct Played<T> {
     pub(crate) state: Rc<RefCell<T>>,
     /// Whether the port has failed.
     pub(crate) is_gone: Rc<Cell<bool>>,
+    /// When a port that has failed works again.
+    pub(crate) back_at: Rc<Cell<Option<Instant>>>,
 }
 
 struct PlayedWire<P> {
@@ -33,6 +35,7 @@ struct PlayedWire<P> {
     play: P,
     unread: VecDeque<u8>,
     is_gone: Rc<Cell<bool>>,
+    back_at: Rc<Cell<Option<Instant>>>,
 }
 
 /// A bus with these nodes; `on_request` is called before a node reacts.
@@ -57,7 +60,8 @@ pub(crate) fn rover(mut on_bytes: impl FnMut(&mut RoverState) + 'static) -> Play
 /// A silent line.
 pub(crate) fn silence(is_instant: bool) -> Line {
     let play = |_: &[u8]| Vec::new();
-    let wire = PlayedWire { play, unread: VecDeque::new(), is_gone: Rc::default() };
+    let (is_gone, back_at) = (Rc::default(), Rc::default());
+    let wire = PlayedWire { play, unread: VecDeque::new(), is_gone, back_at };
     Line::new("played", wire, is_instant)
 }
 
@@ -67,13 +71,15 @@ pub(crate) fn played<T: 'static>(
     mut play: impl FnMut(&mut T, &[u8]) -> Vec<u8> + 'static,
 ) -> Played<T> {
     let (state, is_gone) = (Rc::new(RefCell::new(state)), Rc::new(Cell::new(false)));
+    let back_at = Rc::new(Cell::new(None));
     let theirs = Rc::clone(&state);
     let wire = PlayedWire {
         play: move |bytes: &[u8]| play(&mut theirs.borrow_mut(), bytes),
         unread: VecDeque::new(),
         is_gone: Rc::clone(&is_gone),
+        back_at: Rc::clone(&back_at),
     };
-    Played { line: Line::new("played", wire, true), state, is_gone }
+    Played { line: Line::new("played", wire, true), state, is_gone, back_at }
 }
 
 impl Played<BusState> {
@@ -90,7 +96,8 @@ impl Played<BusState> {
 
 impl<P: FnMut(&[u8]) -> Vec<u8>> PlayedWire<P> {
     fn check(&self) -> io::Result<()> {
-        match self.is_gone.get() {
+        let is_back = self.back_at.get().is_some_and(|at| Instant::now() >= at);
+        match self.is_gone.get() && !is_back {
             true => Err(io::Error::new(ErrorKind::BrokenPipe, "unplugged")),
             false => Ok(()),
         }

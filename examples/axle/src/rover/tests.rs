@@ -92,6 +92,31 @@ fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
 }
 
 #[test]
+fn reports_from_before_a_stop_was_heard_do_not_count_towards_those_behind_it() {
+    undisturbed(|| {
+        // It stands still all the time, but reports nothing from the third stop on, until it has
+        // answered three pings: at the second at the latest it is known to have heard.
+        let mut played = played::PlayedRover::default();
+        let pong = Pong::new(ErrorCode::Fine).frame(0);
+        let mut answered = 0;
+        let line = played::played(played::RoverState::default(), move |state, bytes| {
+            let pings = state.pings;
+            let said = played.hear(state, bytes);
+            if state.pings > pings && state.is_dumb {
+                answered += 1;
+                state.is_dumb = answered < 3;
+                return pong.as_bytes().to_vec();
+            }
+            state.is_dumb |= answered == 0 && state.commands.len() >= STOPS as usize;
+            said
+        });
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+        rover.stop().unwrap();
+        assert!(!line.state.borrow().is_dumb, "it has told nothing since");
+    });
+}
+
+#[test]
 fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
     undisturbed(|| {
         let line = played::rover(|_| {});

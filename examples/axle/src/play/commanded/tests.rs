@@ -184,6 +184,27 @@ fn nodes_that_have_turned_and_fall_silent_may_be_moving_each_of_them() {
 }
 
 #[test]
+fn a_port_that_fails_for_one_master_is_told_although_the_other_master_stops_its_node() {
+    undisturbed(|| {
+        let line = played::bus(&[Node::velocity(1), Node::velocity(3)], |_, _| {});
+        let writes = [speed(NodeId::N1, 1.0), speed(NodeId::N3, 1.0)];
+        let ready = prepare(&line, &writes, &Signals::none()).unwrap().unwrap();
+        let mut seen = ready.modes;
+        // The other master has to hear this one first.
+        seen.learn(NodeId::N3, Mode::Position);
+        line.state.borrow_mut().nodes[1].rps = 1.0;
+        // A stop is waited for for 3 s; the next one has 3 s again.
+        line.is_gone.set(true);
+        line.back_at.set(Some(std::time::Instant::now() + std::time::Duration::from_millis(3500)));
+        let error = ready.stop(seen).unwrap_err().to_string();
+        let says = "port \"played\" failed: unplugged; node 1 was told to stop and has not \
+                    confirmed it: it may be moving";
+        assert_eq!(error, says);
+        assert_eq!(line.state.borrow().nodes[1].rps, 0.0);
+    });
+}
+
+#[test]
 fn a_node_that_has_turned_without_a_word_gets_no_stop_of_its_old_mode() {
     undisturbed(|| {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});

@@ -206,6 +206,28 @@ fn an_echo_may_come_in_pieces() {
 }
 
 #[test]
+fn the_echo_behind_a_damaged_one_or_a_lost_frame_is_taken_out_again() {
+    // What comes back of the first frame: damaged, or the part that has left.
+    let [first, second] = [read(ONE), read(NodeId::N2)];
+    let damaged = [first[0], !first[1], first[2], first[3]];
+    for (comes_back, is_lost) in [(&damaged[..], false), (&first[..2], true)] {
+        let mut part = part(Protocol::Ikeya, &[(0, &first), (50, &second)]);
+        part.has_echo = true;
+        let mut player = player(part);
+        sent(&mut player, 0);
+        if is_lost {
+            player.handle_unsent(Unsent::CutOff, at(3));
+        }
+        player.handle_input(comes_back, at(5));
+        assert_eq!(sent(&mut player, 50), [second]);
+        player.handle_input(&second, at(55));
+        let lines = [player.poll_event(), player.finish()];
+        let text: String = lines.into_iter().flatten().collect();
+        assert_eq!(text.matches("read_request").count(), 2, "those sent: {text}");
+    }
+}
+
+#[test]
 fn each_line_has_its_time_and_the_last_one_comes_at_the_end() {
     let style = Style::text("node", TimeColumn::Relative);
     let mut player = Player::new(part(Protocol::Ikeya, &[]), style, at(0));

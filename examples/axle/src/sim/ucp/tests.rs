@@ -15,6 +15,18 @@ fn a_request_for_an_update_is_told_and_ignored() {
 }
 
 #[test]
+fn a_command_counts_from_the_moment_at_which_the_rover_is_looked_at_and_not_before() {
+    let at = Instant::from_millis;
+    let mut robot = Robot::new(RobotConfig::default(), at(0));
+    let mut moved = Moved { rover: Rover::new(), until: at(0) };
+    robot.handle_input(MotorControl::new(50, 0).unwrap().frame(0).as_bytes(), at(400));
+    moved.advance(&mut robot, at(400));
+    assert_eq!((moved.rover.telemetry().rpm, moved.rover.distance_m()), ([0; 4], 0.0));
+    moved.advance(&mut robot, at(450));
+    assert!(moved.rover.distance_m() > 0.0);
+}
+
+#[test]
 fn a_rover_goes_as_far_as_it_drives_long_however_often_it_is_looked_at() {
     let goes = |step_ms| {
         let start = Instant::from_micros(0);
