@@ -96,6 +96,8 @@ pub trait Endpoint {
     }
 
     /// All bytes that the port has taken have left by `now`. Does nothing by default.
+    ///
+    /// That a frame was given up is told before, by [`handle_unsent`](Self::handle_unsent).
     fn handle_flushed(&mut self, now: Instant) {
         let _ = now;
     }
