@@ -100,6 +100,7 @@ mod tests {
         assert_eq!((full.end(), full.is_just(1..=Fill::MAX), full.missing()), (Fill::MAX, true, 0));
         let full = Fill::now(0).plus(Fill::MAX);
         assert_eq!((full.end(), full.is_early()), (Fill::MAX, false));
+        assert!(Fill::now(0).plus(Fill::MAX + 1).is_early(), "one more is too long");
         let empty = Fill::until(Fill::MAX, 0);
         assert_eq!((empty.end(), empty.missing(), empty.is_early()), (0, Fill::MAX, true));
     }
