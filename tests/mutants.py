@@ -81,6 +81,9 @@ CONCERNED = [
     ("examples/axle/src/rover*", "--bins --test ports rover"),
     ("examples/axle/src/spin/*", "--bins --test ports spin"),
     ("examples/axle/src/stop*", "--bins --test ports stop"),
+    ("examples/axle/src/decode/*", "--bins --test decode --test whole --test summed --test times"),
+    ("examples/axle/src/input.rs", "--bins --test ports progress"),
+    ("examples/axle/src/sim/*", "--bins --test ports sim"),
     ("examples/axle/src/*", "--bins"),
     ("examples/firmware/src/*", "--test firmware"),
 ]
