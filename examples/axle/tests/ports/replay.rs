@@ -1,6 +1,7 @@
 //! `axle replay`: a capture is sent again; what it moves is stopped.
 
 use axlewire::{
+    crc16,
     ikeya::{NodeId, ReadRequest, Rps, VelocityResponse, WriteRequest},
     ucp::{Body, MotorControl, message::Ping},
 };
@@ -147,8 +148,26 @@ fn a_frame_hidden_in_another_one_is_not_sent() {
                     U13): nothing is sent";
     assert_eq!(error, expected);
     let hex: String = biases.concat().iter().map(|byte| format!(" {byte:02X}")).collect();
-    let error = Process::start(&format!("send ucp hex{hex} -p /nowhere")).complaint(1);
+    let error = Process::start(&format!("send -p /nowhere ucp hex{hex}")).complaint(1);
     assert!(error.starts_with("another frame is hidden in frame 1, "), "{error}");
+}
+
+#[test]
+fn what_would_be_a_hidden_frame_for_a_robot_is_none_for_a_host_or_a_motor() {
+    let update = [0xFD, 0xFF, 0x06, 0x00, 0x09, 0x00, 0x28, 0x00, 0x9C, 0x23];
+    let sealed = |begin: &[u8]| {
+        let frame = [begin, &update, &[0; 2]].concat();
+        [&frame[..], &crc16::compute(&frame).to_le_bytes()].concat()
+    };
+    let (result, write) = (sealed(&[0xFD, 0xFF, 16, 0, 6, 0]), sealed(&[0xBB, 0x01]));
+    for (bytes, options) in
+        [(&result, "--protocol ucp --as device"), (&write, "--protocol ikeya-3 --move")]
+    {
+        let path = file("no_robot.bin", bytes);
+        let replay = format!("replay {} {options} -p /nowhere", path.to_str().unwrap());
+        let error = Process::start(&replay).complaint(1);
+        assert!(error.contains("/nowhere"), "{error}");
+    }
 }
 
 #[test]
