@@ -84,6 +84,8 @@ CONCERNED = [
     ("examples/axle/src/decode/*", "--bins --test decode --test whole --test summed --test times"),
     ("examples/axle/src/input.rs", "--bins --test ports progress"),
     ("examples/axle/src/sim/*", "--bins --test ports sim"),
+    ("examples/axle/src/play/*", "--bins --test ports replay"),
+    ("examples/axle/src/watch/*", "--bins --test ports page"),
     ("examples/axle/src/*", "--bins"),
     ("examples/firmware/src/*", "--test firmware"),
 ]

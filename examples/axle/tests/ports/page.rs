@@ -114,6 +114,39 @@ fn spin_shows_three_motors_on_the_page() {
 }
 
 #[test]
+fn the_title_says_what_runs_where_the_load_is_that_of_the_line_and_the_locale_decides_on_blocks() {
+    undisturbed(|| {
+        let bus = talking_bus();
+        let (_sim, port) = sim("ikeya --node 1:velocity");
+        let watch = format!("watch --port {} --protocol ikeya", bus.path);
+        let spin = format!("spin -p {port} -n 1 --rps 2.5 -f 600 --page");
+        for (line, title) in [
+            (&watch, format!("axle watch  {}  ikeya  500000 bit/s", bus.path)),
+            (&spin, format!("axle spin  {port}  ikeya  500000 bit/s")),
+        ] {
+            for (locale, is_ascii) in [("C.UTF-8", false), ("C", true)] {
+                let words: Vec<_> = line.split_whitespace().collect();
+                let mut page = Terminal::spawn(axle(&words).env("LC_ALL", locale), SIZE);
+                page.row("2.50 rps");
+                // Until there is a trend, and a rate.
+                wait_until("a trend", || {
+                    let row = page.row("2.50 rps");
+                    row.chars().any(|it| "▁▂▃▄▅▆▇█".contains(it)) || is_ascii
+                });
+                let totals = page.row("load ");
+                let load = totals.split_once("load ").unwrap().1.split_once(" %").unwrap().0;
+                assert!((0..=100).contains(&load.parse().unwrap()), "{totals}");
+                let text = page.text();
+                assert!(text.starts_with(&title), "{text}");
+                assert_eq!(text.is_ascii(), is_ascii, "{text}");
+                page.press("q");
+                assert_eq!(page.end().code, Some(0));
+            }
+        }
+    });
+}
+
+#[test]
 fn a_recording_of_a_page_that_fails_is_told() {
     undisturbed(|| {
         let (_sim, port) = sim(TWO_NODES);

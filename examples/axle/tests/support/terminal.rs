@@ -74,12 +74,14 @@ impl Terminal {
         let ours = File::from(ours);
         let end = || Stdio::from(theirs.try_clone().unwrap());
         set_size(&ours, (columns, rows));
+        if !command.get_envs().any(|(name, _)| name == "LC_ALL") {
+            command.env("LC_ALL", "C.UTF-8");
+        }
         let child = command
             .stdin(end())
             .stdout(end())
             .stderr(end())
             .env("TERM", "xterm-256color")
-            .env("LC_ALL", "C.UTF-8")
             .spawn()
             .unwrap();
         let parser = vt100::Parser::new(rows, columns, 0);
