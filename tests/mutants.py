@@ -490,7 +490,7 @@ def check(record):
     for (file, key), why in record.reasons.items():
         # Behind the first bar, or behind the second if the change itself is one of `|`.
         parts = re.sub(r" \(\d+\)$", "", key).split(" | ")
-        lines = [" | ".join(parts[at:]) for at in range(1, len(parts))]
+        lines = [" | ".join(parts[at:]).removeprefix("| ") for at in range(1, len(parts))]
         if len(re.findall(r"[^\W\d_]{2,}", why)) < LEAST_WORDS:
             faults.append(f"{file}: no reason: {key}: {why}")
         elif (ROOT / file).exists() and not any(line in (ROOT / file).read_text() for line in lines):
