@@ -83,7 +83,7 @@ CONCERNED = [
     ("examples/axle/src/stop*", "--bins --test ports stop"),
     ("examples/axle/src/decode/*", "--bins --test decode --test whole --test summed --test times"),
     ("examples/axle/src/input.rs", "--bins --test ports progress"),
-    ("examples/axle/src/sim/*", "--bins --test ports sim"),
+    ("examples/axle/src/sim/*", "--bins --test ports rover"),
     ("examples/axle/src/play/*", "--bins --test ports replay"),
     ("examples/axle/src/watch/*", "--bins --test ports page"),
     ("examples/axle/src/*", "--bins"),

@@ -25,3 +25,20 @@ fn the_progress_bar_fits_into_60_columns() {
         std::fs::remove_file(&path).unwrap();
     });
 }
+
+#[test]
+fn a_file_up_to_8_mib_is_decoded_without_a_progress_bar() {
+    for (len, has_bar) in [(8 << 20, false), ((8 << 20) + 1, true)] {
+        let path = file("short.bin", &vec![0; len]);
+        let command = format!(
+            "{} decode --protocol ucp {} > /dev/null; echo done",
+            env!("CARGO_BIN_EXE_axle"),
+            path.display()
+        );
+        let mut terminal = Terminal::spawn(Command::new("sh").args(["-c", &command]), (80, 10));
+        terminal.row("done");
+        assert_eq!(terminal.has_had(" of 8.00 MiB ["), has_bar, "{len}");
+        assert_eq!(terminal.code(), Some(0));
+        std::fs::remove_file(&path).unwrap();
+    }
+}

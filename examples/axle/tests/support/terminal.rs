@@ -126,8 +126,12 @@ impl Terminal {
 
     /// Whether there was a page at any time.
     pub(crate) fn has_had_page(&self) -> bool {
-        const ENTER: &[u8] = b"\x1b[?1049h";
-        self.shown().bytes.windows(ENTER.len()).any(|part| part == ENTER)
+        self.has_had("\x1b[?1049h")
+    }
+
+    /// Whether these bytes came at any time.
+    pub(crate) fn has_had(&self, text: &str) -> bool {
+        self.shown().bytes.windows(text.len()).any(|part| part == text.as_bytes())
     }
 
     /// The first row with this text, as soon as there is one.
