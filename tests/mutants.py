@@ -230,10 +230,11 @@ def concerned(file):
     return next(tests for pattern, tests in CONCERNED if fnmatch.fnmatch(file, pattern))
 
 
-def stages(mutant):
+def stages(mutant, is_sample):
     """The tests to run one after the other until one fails: those that are built quickest first."""
     tests = concerned(mutant.file)
-    units = [kind for kind in ("--lib", "--bins") if tests.startswith(f"{kind} ")]
+    # In a sample there are too few mutants for what it takes to build each stage once.
+    units = [kind for kind in ("--lib", "--bins") if tests.startswith(f"{kind} ") and not is_sample]
     return dict.fromkeys([*units, tests, ALL[mutant.package]])
 
 
@@ -352,10 +353,10 @@ class Record:
         return bool(self.reasons.get((mutant.file, mutant.key)))
 
 
-def run(mutants, workers, until, record):
+def run(mutants, workers, until, record, is_sample=False):
     """Tries these until the time is up; returns the survivors without a reason, and the counts."""
     counts, survivors = collections.Counter(), []
-    queue = collections.deque((mutant, *stages(mutant)) for mutant in mutants)
+    queue = collections.deque((mutant, *stages(mutant, is_sample)) for mutant in mutants)
 
     def work(number):
         tree = Tree(number, until)
@@ -460,7 +461,7 @@ def sample(record, minutes):
     print(f"seed {seed[:12]}: {len(mutants)} mutants of the change, {len(others)} of other files")
     # Of one kind together: each has to be built once.
     chosen = sorted(mutants[:60], key=lambda m: concerned(m.file)) + sorted(others, key=lambda m: concerned(m.file))
-    survivors, counts = run(chosen, 1, until, record)
+    survivors, counts = run(chosen, 1, until, record, is_sample=True)
     tried = sum(counts.values())
     print(f"tried {tried} of {len(mutants) + len(others)}: "
           + ", ".join(f"{counts[kind]} {kind}" for kind in ("caught", "unviable", "survived")))
