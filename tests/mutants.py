@@ -375,7 +375,8 @@ def run(mutants, workers, until, record, is_sample=False):
                 continue
             # A reason says more than all tests of the package could.
             if outcome == "survived" and len(later) > record.has_reason(mutant):
-                queue.append((mutant, *later))
+                # A sample decides as many as there is time for, those of the change first.
+                (queue.appendleft if is_sample else queue.append)((mutant, *later))
                 continue
             counts[outcome] += 1
             record.keep(mutant, outcome)
