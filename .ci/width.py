@@ -6,10 +6,10 @@
 
 Why: rustfmt leaves comments as wide as they are, and nothing else in the gate measures them.
 
-The files are those that git knows. In Rust, Python, shell scripts and TOML, the lines that are or
-contain comments are measured, in Python also those of strings in triple quotes; in Markdown, all
-lines but those of fenced code. Rows of tables and lines
-that are only a link cannot be broken and may be wider, in comments as well.
+The files are those that git knows; scripts without a suffix are told by their first line. In Rust,
+Python, shell scripts and TOML, the lines that are or contain comments are measured, in Python also
+those of strings in triple quotes; in Markdown, all lines but those of fenced code. Rows of tables
+and lines that are only a link cannot be broken and may be wider, in comments as well.
 """
 
 import argparse
@@ -22,6 +22,7 @@ LIMIT = 100
 # Fewer files mean that the script did not read what it should.
 LEAST_FILES = 100
 HASH_SUFFIXES = (".sh", ".toml")
+FIRST_OF_PYTHON = "#!/usr/bin/env python3"
 ONLY_LINK = re.compile(r"\W*(\[[^\]]*\][(:]?\s*)?<?https?://\S+\W*$|\[[^\]]*\](: ?\S+|\(\S+\))\W*$")
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -55,16 +56,21 @@ def files():
 def reader(name):
     """The function that picks the comments or the prose, by the name of the file."""
     path = Path(name)
+    first = first_line(ROOT / name) if not path.suffix else ""
     if path.suffix == ".rs":
         # `/*` as well: the crate has no such comments.
         return lambda lines: [*comments("//")(lines), *comments("/*")(lines)]
     if path.suffix == ".md":
         return prose
-    if path.suffix == ".py":
+    if path.suffix == ".py" or first == FIRST_OF_PYTHON:
         return python
-    if path.suffix in HASH_SUFFIXES or (path.parent.name == ".ci" and not path.suffix):
+    if path.suffix in HASH_SUFFIXES or first.startswith("#!/"):
         return comments("#")
     return None
+
+
+def first_line(path):
+    return path.read_bytes().split(b"\n", 1)[0].decode(errors="replace") if path.is_file() else ""
 
 
 def wide_lines(name):

@@ -10,8 +10,6 @@ minutes. `tests/mends.txt` has the test that detects each, and when it last did.
 fix can be reverted undetected.
 """
 
-import datetime
-import hashlib
 import os
 import pathlib
 import re
@@ -21,9 +19,11 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / ".ci"))
+from ledger import Ledger  # noqa: E402
+
 COPY = ROOT / "target" / "mends"
-RECORD = ROOT / "tests" / "mends.txt"
-HEAD = "# Written by tests/mends.py: number and SHA-256 of each fix, the test that detects its removal, and the date.\n"
+COMMENT = "# Written by tests/mends.py: number and SHA-256 of each fix, the test that detects its removal, and the date."
 # Including the build. A test that runs longer waits for something that the defect prevents.
 PATIENCE_S = 300
 
@@ -144,17 +144,6 @@ def without(mend):
     return texts
 
 
-def key(mend):
-    """What a line of the record begins with; it changes with the fix."""
-    return f"{mend[0]} {hashlib.sha256(repr(mend[2:5]).encode()).hexdigest()[:8]}: "
-
-
-def record():
-    """The line of each fix, by its key; of fixes that have changed, none."""
-    lines = RECORD.read_text().splitlines() if RECORD.exists() else []
-    return {key(mend): line for mend in MENDS for line in lines if line.startswith(key(mend))}
-
-
 def copy_tree():
     """Copies the files known to git, next to the build directory of earlier copies."""
     tree = COPY / "tree"
@@ -190,10 +179,11 @@ def failing(tree, target):
 
 def main(wanted):
     mends = [(mend, without(mend)) for mend in MENDS]
+    ledger = Ledger(ROOT / "tests" / "mends.txt", COMMENT, {mend[0]: mend[2:5] for mend in MENDS})
     if unknown := set(wanted) - {mend[0] for mend in MENDS} - {"--check"}:
         sys.exit(f"no fix has this number: {', '.join(sorted(unknown))}")
     if wanted == ["--check"]:
-        if missing := [mend[0] for mend in MENDS if key(mend) not in record()]:
+        if missing := ledger.missing():
             sys.exit(f"tests/mends.txt does not have these fixes: {', '.join(missing)}")
         return print(f"{len(mends)} fixes are in place, and on record")
     tree = copy_tree()
@@ -201,9 +191,7 @@ def main(wanted):
         if failing(tree, target):
             sys.exit(f"tests/{target}.rs fails with all fixes in place")
     unseen = 0
-    lines = record()
-    for mend, texts in mends:
-        number, what, *_, others = mend
+    for (number, what, _, _, _, others), texts in mends:
         if wanted and number not in wanted:
             continue
         for file, text in texts.items():
@@ -212,10 +200,7 @@ def main(wanted):
         found = next((f"{target}: {name}" for target in targets if (name := failing(tree, target))), None)
         unseen += found is None
         print(f"{number:>4}  {what}: {found or 'NOT FOUND'}", flush=True)
-        lines[key(mend)] = f"{key(mend)}{found}, {datetime.date.today()}"
-        if found is None:
-            del lines[key(mend)]
-        RECORD.write_text(HEAD + "".join(f"{lines[key(it)]}\n" for it in MENDS if key(it) in lines))
+        ledger.keep(number, found)
         for file in texts:
             shutil.copyfile(ROOT / file, tree / file)
     sys.exit(f"{unseen} can be reverted undetected" if unseen else None)

@@ -272,6 +272,14 @@ impl Board {
         self.text.write_all(b"?").unwrap();
     }
 
+    /// Asks so often, with a pause behind each request.
+    pub(crate) fn ask_for_a_while(&mut self, times: u32, pause: Duration) {
+        for _ in 0..times {
+            self.ask();
+            thread::sleep(pause);
+        }
+    }
+
     /// Sends more to the text port than its queue holds. Byte by byte: QEMU forgets the interrupt
     /// of a byte that is already waiting when its predecessor is fetched, until a line is sent.
     pub(crate) fn flood_text(&mut self) {

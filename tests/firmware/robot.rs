@@ -257,26 +257,20 @@ fn the_robot_shows_the_latest_network_state_also_after_a_higher_one() {
     });
 }
 
-/// Asks for a report in each of the next steps: the requests wait until then.
-fn ask_in_steps(board: &mut Board, steps: u32) {
-    for _ in 0..steps {
-        board.ask();
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-}
-
 #[test]
 fn the_wheels_turn_from_the_step_on_in_which_a_command_is_taken() {
     undisturbed(|| {
         let Some(mut board) = Board::start(Program::Robot) else { return };
         let mut wire = Wire::new(board.bus());
         let drive = MotorControl::new(20, 0).unwrap();
+        // Requests wait for the next step.
+        let pause = std::time::Duration::from_millis(1);
         for _ in 0..5 {
             board.report_when("at rest", |told| told.at("speed") == 0 && told.at("left_rpm") == 0);
             let seen = board.reports().len();
-            ask_in_steps(&mut board, 5);
+            board.ask_for_a_while(5, pause);
             wire.send(drive.frame(0).as_bytes());
-            ask_in_steps(&mut board, 15);
+            board.ask_for_a_while(15, pause);
             board.report_when("driving", |told| told.at("speed") == 20);
             let reports = board.reports();
             let told = reports[seen..].iter().find(|told| told.at("speed") == 20).unwrap();

@@ -219,10 +219,7 @@ fn a_motor_speeds_up_in_steps_that_are_short_compared_with_its_time_constant() {
         let seen = master.board.reports().len();
         master.write(3.0);
         // One report for each step, until the watchdog stops the motor.
-        for _ in 0..80 {
-            master.board.ask();
-            std::thread::sleep(std::time::Duration::from_millis(3));
-        }
+        master.board.ask_for_a_while(80, std::time::Duration::from_millis(3));
         master.board.report_when("at speed", |told| told.at("mrps") > 2900);
         let reports = master.board.reports();
         let mut speeds: Vec<_> = reports[seen..].iter().map(|told| told.at("mrps")).collect();
