@@ -507,8 +507,9 @@ def check(record):
         faults.append(f"the sum is not: {record.sum()}")
     made = collections.Counter(mutant.file for mutant in listed())
     for file, (_, counts, _) in record.lines.items():
-        if record.has_line(file) and sum(counts) + len(record.left[file]) != made[file]:
-            faults.append(f"{file}: {sum(counts)} mutants on record, but it has {made[file]}")
+        listed_ = sum(counts) + len(record.left[file])
+        if record.has_line(file) and listed_ != made[file]:
+            faults.append(f"{file}: {listed_} mutants on record, but it has {made[file]}")
     stale = [file for file in record.lines if not record.has_line(file)]
     print(f"{len(record.lines)} files on record, {len(stale)} of them changed since; "
           f"{len(record.reasons)} survivors with a reason")
