@@ -163,23 +163,50 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
 /// shipped robot takes if it has lost its place, by noise or by a frame with an unknown id.
 ///
 /// Its receiver ignores the high byte of `len` and takes any body of an id from 1 to 10 (ruling
-/// U13). The other frame may go on in the next one. What the tool itself sends in between, such as
-/// stops, is not looked at.
+/// U13). The other frame may go on in what is sent next: in the next frame, or in a stop, which the
+/// tool sends on its own, in front of any frame and behind the last.
 pub(crate) fn hidden_frame<'a>(frames: impl IntoIterator<Item = &'a [u8]>) -> Option<usize> {
-    let (mut bytes, mut begins) = (Vec::new(), Vec::new());
-    for frame in frames {
-        begins.push(bytes.len());
-        bytes.extend_from_slice(frame);
+    let frames: Vec<_> = frames.into_iter().collect();
+    let mut left = CONTINUATIONS;
+    frames.iter().enumerate().position(|(number, frame)| {
+        let behind = frames.get(number + 1..).unwrap_or_default();
+        let begins = frame.iter().enumerate().skip(1).filter(|(_, byte)| **byte == 0xFD);
+        let mut begun = begins.map(|(at, _)| frame.get(at..).unwrap_or_default().to_vec());
+        begun.any(|mut begun| becomes_a_frame(&mut begun, behind, &mut left))
+    })
+}
+
+/// How many ways to go on are tried. A capture made to have more hides something for certain.
+const CONTINUATIONS: u32 = 1_000_000;
+
+/// Whether these bytes, with what may be sent behind them, begin with a frame that a shipped robot
+/// takes.
+fn becomes_a_frame(begun: &mut Vec<u8>, behind: &[&[u8]], left: &mut u32) -> bool {
+    let is = |at: usize, fits: fn(u8) -> bool| begun.get(at).is_none_or(|&byte| fits(byte));
+    let is_header = is(0, |sync| sync == 0xFD)
+        && is(1, |sync| sync == 0xFF)
+        && is(2, |len| (4..=127).contains(&len))
+        && is(4, |id| (1..=10).contains(&id));
+    if !is_header {
+        return false;
     }
-    let is_hidden = |at: usize| {
-        let Some([0xFD, 0xFF, len @ 4..=127, _, 1..=10]) = bytes.get(at..at + 5) else {
-            return false;
-        };
-        let frame = bytes.get(at..at + 4 + usize::from(*len)).unwrap_or_default();
-        begins.binary_search(&at).is_err() && crc16::check(frame)
+    let whole = begun.get(2).map_or(usize::MAX, |&len| 4 + usize::from(len));
+    if let Some(frame) = begun.get(..whole) {
+        return crc16::check(frame);
+    }
+    if *left == 0 {
+        return true;
+    }
+    *left -= 1;
+    let (stop, len) = (MotorControl::STOP.frame(0), begun.len());
+    let mut goes_on = |next: &[u8], behind: &[&[u8]]| {
+        begun.extend_from_slice(next);
+        let becomes_one = becomes_a_frame(begun, behind, left);
+        begun.truncate(len);
+        becomes_one
     };
-    let hidden = (0..bytes.len()).find(|&at| is_hidden(at))?;
-    begins.iter().rposition(|&begin| begin < hidden)
+    goes_on(stop.as_bytes(), behind)
+        || behind.split_first().is_some_and(|(next, behind)| goes_on(next, behind))
 }
 
 impl From<Write> for Effect {
@@ -394,6 +421,50 @@ mod tests {
         let next = biases(21, &crc.to_le_bytes());
         assert_eq!(hidden(&[&ping, &first, &next]), Some(1));
         assert_eq!(hidden(&[&ping, &first, &ping, &next]), None);
+    }
+
+    #[test]
+    fn a_frame_that_a_stop_of_the_tool_would_complete_is_hidden() {
+        // The end of these biases and the front of a stop are a motor command.
+        let mut biases = [0; 27];
+        biases[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
+        biases[9..15].copy_from_slice(&[0xFD, 0xFF, 20, 0, 2, 0]);
+        biases[15] = 100;
+        let stop = MotorControl::STOP.frame(0);
+        let stop = stop.as_bytes();
+        let ping = [0xFD, 0xFF, 4, 0, 1, 0, 1, 0x42];
+        // What is taken for its CRC is in the stop, so the CRC of the biases has to fit.
+        let fits = (0..1_u32 << 20).find(|free| {
+            [biases[6], biases[7], biases[8], _] = free.to_le_bytes();
+            let crc = crc16::compute(&biases[..25]);
+            biases[25..].copy_from_slice(&crc.to_le_bytes());
+            crc16::check(&[&biases[9..], &stop[..6]].concat())
+        });
+        assert!(fits.is_some());
+        for frames in [vec![&biases[..]], vec![&ping, &biases, &ping], vec![&biases[..], &ping]] {
+            let number = frames.iter().position(|frame| *frame == biases);
+            assert_eq!(hidden_frame(frames.iter().copied()), number);
+        }
+        // With another value in front of it, it has the wrong CRC.
+        biases[6] ^= 1;
+        let crc = crc16::compute(&biases[..25]);
+        biases[25..].copy_from_slice(&crc.to_le_bytes());
+        assert_eq!(hidden_frame([&biases[..], &ping]), None);
+    }
+
+    #[test]
+    fn a_capture_with_endless_ways_to_go_on_is_refused_in_bounded_work() {
+        // Each has a header of 127 bytes at its end, behind which 8 bytes follow again and again.
+        let mut biases = [0xEE; 25];
+        biases[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
+        biases[20..].copy_from_slice(&[0xFD, 0xFF, 127, 0, 1]);
+        let biases = [&biases[..], &crc16::compute(&biases).to_le_bytes()].concat();
+        let ping = [0xFD, 0xFF, 4, 0, 1, 0, 1, 0x42];
+        let mut frames = vec![&biases[..]];
+        frames.extend([&ping[..]; 16]);
+        let many: Vec<_> = frames.iter().copied().cycle().take(100_000).collect();
+        assert_eq!(hidden_frame(frames), None);
+        assert!(hidden_frame(many).is_some_and(|number| number > 17));
     }
 
     #[test]
