@@ -196,4 +196,16 @@ mod tests {
         let says = "cannot write the output: the reader has stalled";
         assert_eq!(finished(teller).unwrap_err(), says);
     }
+
+    #[test]
+    fn ten_thousand_lines_wait_for_a_reader_that_stalls_for_a_while() {
+        let (go_on, wait) = mpsc::channel::<()>();
+        let mut teller = Teller::to(move |_| {
+            let _ = wait.recv();
+            Ok(())
+        });
+        (0..10_000).for_each(|_| teller.say(line()).unwrap());
+        drop(go_on);
+        assert_eq!(finished(teller), Ok(()));
+    }
 }
