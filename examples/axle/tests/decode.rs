@@ -321,6 +321,10 @@ fn where_the_beginning_tells_no_protocol_the_option_is_named() {
     assert!(stderr.starts_with("axle: no frame of any protocol in the first "), "{stderr}");
     assert!(stderr.ends_with(" bytes: use --protocol to decode them all\n"), "{stderr}");
     assert_eq!(decode(&["-P", "ucp"], &late).1["frames"], 1);
+    // In the first 64 KiB it is found, in whatever pieces they come.
+    let soon = [&[0; 60_000][..], &ping].concat();
+    let found = stdout(run_in_pieces(&["decode", "--json"], &soon, 1000));
+    assert!(found.starts_with(r#"{"event":"protocol","protocol":"ucp""#), "{found}");
     // All of a short input has been looked at.
     let stderr = String::from_utf8(run(&["decode"], &[0; 70]).stderr).unwrap();
     assert_eq!(stderr, "axle: no frame of any protocol in the first 70 bytes\n");
