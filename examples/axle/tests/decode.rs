@@ -321,9 +321,16 @@ fn where_the_beginning_tells_no_protocol_the_option_is_named() {
     assert!(stderr.starts_with("axle: no frame of any protocol in the first "), "{stderr}");
     assert!(stderr.ends_with(" bytes: use --protocol to decode them all\n"), "{stderr}");
     assert_eq!(decode(&["-P", "ucp"], &late).1["frames"], 1);
-    // In the first 64 KiB it is found, in whatever pieces they come.
-    let soon = [&[0; 60_000][..], &ping].concat();
-    let found = stdout(run_in_pieces(&["decode", "--json"], &soon, 1000));
+    // In the first 64 KiB it is found, however slowly they come.
+    let (piped, args) = (Stdio::piped, ["decode", "--json"]);
+    let mut child = axle(&args).stdin(piped()).stdout(piped()).spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    for piece in [&[0; 2000][..], &ping] {
+        stdin.write_all(piece).unwrap();
+        thread::sleep(Duration::from_millis(300));
+    }
+    drop(stdin);
+    let found = stdout(child.wait_with_output().unwrap());
     assert!(found.starts_with(r#"{"event":"protocol","protocol":"ucp""#), "{found}");
     // All of a short input has been looked at.
     let stderr = String::from_utf8(run(&["decode"], &[0; 70]).stderr).unwrap();
