@@ -4,7 +4,8 @@ a step ignores a check that fails.
 
     .ci/workflow.py --check
 
-A line of `.ci/run` must be a plain command, after whose failure bash ends the step. Any other line
+Each line of the workflow must be one of those that are named here. A line of `.ci/run` must be a
+plain command, after whose failure bash ends the step. Any other line
 must have one of the forms of HARMLESS, or be listed in SEEN, because somebody has seen that it
 hides nothing. What `.ci/prove` plants shows what is found.
 """
@@ -19,11 +20,76 @@ import gate
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORKFLOW = ROOT / ".github" / "workflows" / "gate.yml"
 
-COMMAND = """
-          read -ra steps <<<"$STEPS"
-          bash .ci/run "${steps[@]}"
+# When and with what it runs: all above the jobs.
+BEGIN = """
+name: gate
 
+on:
+  push:
+    branches: [main]
+  pull_request:
+  schedule:
+    - cron: "17 3 * * 1"
+
+permissions: {}
+
+concurrency:
+  group: gate-${{ github.ref }}
+  cancel-in-progress: true
+
+env:
+  CARGO_TERM_COLOR: never
+
+jobs:
 """
+# Of each job: the lines that it must have, in this order. `STEPS` stands for lists of steps.
+STEPS = "- STEPS"
+JOBS = {
+    "steps": [
+        STEPS,
+        "STEPS: ${{ matrix.steps }}",
+        "run: |",
+        'read -ra steps <<<"$STEPS"',
+        'bash .ci/run "${steps[@]}"',
+    ],
+    "complete": ["- run: python3 .ci/workflow.py --check"],
+    "msrv": [
+        "run: |",
+        r"""msrv=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)""",
+        'rustup toolchain install "$msrv" --profile minimal',
+        'cargo "+$msrv" check -p axlewire --lib --all-features',
+    ],
+    "other-systems": ["os: [macos-14, windows-2022]", "runs-on: ${{ matrix.os }}", "- run: cargo test"],
+    # Only what takes too long for every change has a condition.
+    "evidence": [
+        "if: github.event_name == 'schedule'",
+        "- bash tests/exhaustive.sh",
+        "- bash .ci/reproduce",
+        "- .ci/sbom",
+        "- .ci/coverage",
+        "- .ci/prove",
+        "- fuzz/campaign all --minutes 15",
+        "- tests/mutants.py --minutes 300 --workers 4",
+        "- cargo test --release --test soak -- --ignored --nocapture",
+        "- cargo test --release --test campaign -- --ignored --nocapture",
+        "COMMAND: ${{ matrix.command }}",
+        "run: |",
+        'read -ra command <<<"$COMMAND"',
+        '"${command[@]}"',
+    ],
+    "advisories": [
+        "- run: cargo deny --workspace --config deny.toml check advisories",
+        "run: |",
+        "read -r _ commit <.ci/api-released",
+        'cargo semver-checks -p axlewire --all-features --baseline-rev "$commit"',
+    ],
+}
+# What any job may say besides; nothing of it decides whether or what a job checks.
+BESIDES = re.compile(
+    r"runs-on: ubuntu-24\.04|timeout-minutes: \d+|permissions:|contents: read|strategy:|fail-fast: false|matrix:"
+    r"|(- )?name: [\w ${}.]+|(steps|command|with|env):|fetch-depth: 0|persist-credentials: false"
+    r"|- uses: actions/checkout@[0-9a-f]{40} # v[\d.]+|(- )?run: rustup toolchain install [\w ,&-]+"
+    r"|- run: cargo install --locked( cargo-[\w-]+)+")
 
 # How it begins.
 HEAD = ["set -euo pipefail", 'cd "$(dirname "$0")/.."', "export CARGO_TERM_COLOR=never CARGO_INCREMENTAL=0"]
@@ -115,22 +181,35 @@ HELPERS = ["turn_of_readme", "features_of_library", "motor_in_qemu"]
 
 def main():
     steps = gate.steps()
-    text = WORKFLOW.read_text()
-    matrix = re.search(r"^        steps:\n((?:          - .*\n)+)", text, re.MULTILINE)
-    run = collections.Counter(" ".join(re.findall(r"- (.*)", matrix[1])).split()) if matrix else {}
-    faults = [f"{step}: run {run[step]} times" for step in steps if run[step] != 1]
-    faults += [f"{step}: no step of the gate" for step in run if step not in steps]
-    # Nothing may hide a step that fails.
-    faults += ["the steps are not run as they should be"] * (COMMAND not in text)
-    words = ("|| true", "|| :", "; true", "continue-on-error", "set +e", "shell:")
-    faults += [f"it hides failures: {word}" for word in words if word in text]
-    # Only what takes too long for every change has a condition.
-    conditions = re.findall(r"\bif: .*", text)
-    faults += [f"it may skip a job: {line}" for line in conditions if line != "if: github.event_name == 'schedule'"]
+    faults = faults_of_workflow(WORKFLOW.read_text(), steps)
     gate_text = (ROOT / ".ci" / "run").read_text()
     faults += faults_of_gate(gate_text, steps) + faults_of_tests(gate_text, (ROOT / "README.md").read_text())
     print(f"{len(steps)} steps, {len(faults)} faults", *faults, sep="\n")
     return bool(faults) or len(steps) < 20
+
+
+def faults_of_workflow(text, steps):
+    """What it does not run, or may not run, or what may hide that it fails."""
+    # The first line says what it is for.
+    begin, _, jobs = text.partition("\njobs:\n")
+    faults = ["gate.yml does not begin as it should"] * ("\n" + begin.partition("\n")[2] + "\njobs:\n" != BEGIN)
+    names = re.findall(r"^  (\S+):$", jobs, re.MULTILINE)
+    if sorted(names) != sorted(JOBS):
+        return [*faults, f"gate.yml does not have each job exactly once: {' '.join(names)}"]
+    run = collections.Counter()
+    for name, body in zip(names, re.split(r"^  \S+:$", jobs, flags=re.MULTILINE)[1:]):
+        due = list(JOBS[name])
+        for line in map(str.strip, body.splitlines()):
+            words = line.removeprefix("- ").split()
+            if line.startswith("- ") and name == "steps" and set(words) <= set(steps):
+                run.update(words)
+                line = STEPS
+            if due and line == due[0]:
+                due.pop(0)
+            elif line and not line.startswith("#") and not BESIDES.fullmatch(line) and line != STEPS:
+                faults.append(f"gate.yml: {name}: not a line that it may have: {line}")
+        faults += [f"gate.yml: {name}: missing: {line}" for line in due]
+    return faults + [f"{step}: run {run[step]} times" for step in steps if run[step] != 1]
 
 
 def faults_of_gate(text, steps):
