@@ -42,7 +42,7 @@ CELLS = [
      "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)){3}"),
     ("`.ci/coverage`", COVERAGE, r"(?s)^axle, all +([\d.]+) +([\d.]+)$.*^library, all +([\d.]+) +([\d.]+)$",
      "library {2} % of lines, {3} % of branches; tool {0} and {1} ([tests/coverage.txt](tests/coverage.txt))"),
-    ("`.ci/prove`", ".ci/prove.txt", r"^(\w+) [0-9a-f]{8}: ", "all {count} seen to fail ([.ci/prove.txt](.ci/prove.txt))"),
+    ("`.ci/prove`", ".ci/prove.txt", r"^(\w+) [0-9a-f]{8} [0-9a-f]{8}: ", "all {count} seen to fail ([.ci/prove.txt](.ci/prove.txt))"),
     ("`cargo test --release --test soak -- --ignored --nocapture`", HOURS, r"In all ([\d,]+) READ and ([\d,]+) reports",
      "{0} READ, {1} reports; no invariant broken ([tests/soak.txt](tests/soak.txt))"),
     ("`AXLE_HOUR_MINUTES=60 cargo test --release -p axle --test hour -- --ignored --nocapture`", HOURS,

@@ -5,9 +5,9 @@ a step ignores a check that fails.
     .ci/workflow.py --check
 
 Each line of the workflow must be one of those that are named here. A line of `.ci/run` must be a
-plain command, after whose failure bash ends the step. Any other line
-must have one of the forms of HARMLESS, or be listed in SEEN, because somebody has seen that it
-hides nothing. What `.ci/prove` plants shows what is found.
+plain command, after whose failure bash ends the step. Any other line must have one of the forms of
+HARMLESS, or be listed in SEEN, because somebody has seen that it hides nothing. What `.ci/prove`
+plants shows what is found; its record is void once a step has changed.
 """
 
 import collections
@@ -124,6 +124,15 @@ HIDING = re.compile(
     r"|^(if|then|elif|else|fi|while|until|for|case|select|function|set|shopt|trap|return|exit|break|continue)\b"
     r"|^(eval|exec|source|builtin|command|coproc|alias|unalias|unset|true|false|enable|declare)\b|^[:.{]( |$)"
     r"|\| *(if|while|until|for|case|true|:)( |$)|\w\(\)")
+# A check that is only listed, built or said; a here-document.
+IDLE = re.compile(r"(?<!<)<<(?!<)|(^|\s)--?(no-run|list|skip|help|version|dry-run|[hV])\b")
+# How a line may begin: with what runs a check, or with what prepares or compares something.
+PLAIN = re.compile(
+    r"cargo (fmt|clippy|test|build|run|doc|check|hack) ?|cargo \"\+\$msrv\" check |python3 (\.ci|tests|benches)/\w"
+    r"|bash (\.ci|examples/firmware|benches)/\w|\.ci/\w|\$venv/bin/(pip|zizmor|check-jsonschema) |\$command --quiet <"
+    r"|RUSTDOCFLAGS=\"-D warnings\" cargo doc |AXLE_HOUR_MINUTES=0\.33 cargo test |local -x RUSTFLAGS=\"-D warnings\"$"
+    r"|local [a-z]|grep -|sed -?[\w ]*['\"]|\[ \S+ -\w+ \d+ \]$|echo (\"[^\"]*\"|'[^']*')$"
+    r"|no_std_features=|sleep [\d.]+$|kill \$sim$|rm \"\$told\"$|(done|\)|\})$")
 # Forms that hide nothing; the strings in quotes are left out.
 HARMLESS = [
     re.compile(form) for form in (
@@ -131,7 +140,7 @@ HARMLESS = [
         # The value of a variable: a failure is that of the line.
         r"\w+=\$\([^;&`|()]+(\|[^;&`|()]+)*\)", r"\w+=\$\(\([^;&`|()]+\)\)",
         # What fails is told, and is a failure of the function.
-        r"[^;&`|$]+ \|\| \{ echo ''; return 1; \}",
+        r"grep [^;&`|$]+ \|\| \{ echo ''; return 1; \}",
         # A tool is installed if it is not there.
         r"command -v [\w-]+ >/dev/null \|\| [^;&`|]+",
     )
@@ -170,11 +179,26 @@ SEEN = {
     # A function for others.
     "command_of_readme() { grep -m1 -F \"$1\" README.md | sed 's/ *#.*//'; }",
     # Python.
+    "python3 -c '",
+    "import json, sys",
+    "meta = json.load(sys.stdin)",
+    'packages = {p["id"]: p for p in meta["packages"]}',
+    'nodes = {n["id"]: n for n in meta["resolve"]["nodes"]}',
+    'limit = tuple(map(int, sys.argv[1].split(".")))',
+    'todo = [p["id"] for p in meta["packages"] if p["name"] == "axlewire"]',
+    "seen = set(todo)",
     "while todo:",
     "for dep in nodes[todo.pop()][\"deps\"]:",
     "if normal and dep[\"pkg\"] not in seen:",
+    "normal = any(kind[\"kind\"] in (None, \"build\") for kind in dep[\"dep_kinds\"])",
+    'seen.add(dep["pkg"])',
+    'todo.append(dep["pkg"])',
     "for package in (packages[s] for s in seen):",
+    'needs = package["rust_version"] or "1.0"',
     "if tuple(map(int, needs.split(\".\")[:2])) > limit:",
+    'print(package["name"], package["version"], "needs", needs)',
+    'assert len(seen) > 5, "the dependency graph was not read"',
+    "' \"$msrv\")",
 }
 HELPERS = ["turn_of_readme", "features_of_library", "motor_in_qemu"]
 
@@ -229,8 +253,12 @@ def faults_of_gate(text, steps):
         code = re.sub(r"'[^']*'|\"(?:(?!\$\()[^\"`])*\"", "''", line)
         is_harmless = any(form.fullmatch(code) for form in HARMLESS) or line in SEEN
         is_function = line.removesuffix("() {") in functions
-        if HIDING.search(code) and not is_harmless and not is_function:
+        if is_harmless or is_function:
+            continue
+        if HIDING.search(code):
             faults.append(f".ci/run may hide a failure: {line}")
+        elif IDLE.search(code) or not PLAIN.match(line):
+            faults.append(f".ci/run may check nothing: {line}")
     checks = [line for line in lines if re.match(r"(python3|bash|cargo|\.ci/)", line)]
     return faults + ["hardly any check is run"] * (len(checks) < 40)
 
