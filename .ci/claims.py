@@ -8,6 +8,7 @@ A row with a record has exactly the command that is named here. A row without on
 those in SAID. `benches/noise.py` checks the figures of the noise.
 """
 
+import functools
 import re
 import sys
 from pathlib import Path
@@ -15,6 +16,9 @@ from pathlib import Path
 import gate
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / "tests"))
+import mutants  # noqa: E402
+
 STEPS = gate.steps()
 # A row of the table of motors that stop.
 MOTOR = re.compile(r"^\| (?:bus|rover)\b.*\| [\d.]+ \|$", re.MULTILINE)
@@ -39,7 +43,7 @@ CELLS = [
      "{1} of {0} ([fuzz/coverage.txt](fuzz/coverage.txt))"),
     ("`tests/mutants.py --woven`, `tests/mutants.py --table`", "tests/mutants.txt",
      r"^# (\d+) files: (\d+) caught of (\d+) that compile(; \d+ are not tried)?\.$",
-     "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)){3}"),
+     "{1} of {2} viable ones in {0} files caught, the others explained ([tests/mutants.txt](tests/mutants.txt)){3}{not_tried}"),
     ("`.ci/coverage`", COVERAGE, r"(?s)^axle, all +([\d.]+) +([\d.]+)$.*^library, all +([\d.]+) +([\d.]+)$",
      "library {2} % of lines, {3} % of branches; tool {0} and {1} ([tests/coverage.txt](tests/coverage.txt))"),
     ("`.ci/prove`", ".ci/prove.txt", r"^(\w+) [0-9a-f]{8} [0-9a-f]{8}: ", "all {count} seen to fail ([.ci/prove.txt](.ci/prove.txt))"),
@@ -120,8 +124,15 @@ def fault_of(shown, record, pattern, cell):
                for number in found[0]]
     most = max((float(number) for number, *_ in found if re.fullmatch(r"[\d.]+", number)), default=0)
     count = len(found)
-    expected = cell.format(*grouped, count={8: "eight"}.get(count, count), most=most)
+    expected = cell.format(*grouped, count={8: "eight"}.get(count, count), most=most, not_tried=not_tried())
     return None if shown[0] == expected else f"{shown[0]!r}, but {record} says {expected!r}"
+
+
+@functools.cache
+def not_tried():
+    """How many files the record of the mutants does not have, such as new ones."""
+    files = len(mutants.Record().not_tried())
+    return f"; files not tried: {files}" * bool(files)
 
 
 def faults_of(command):
