@@ -8,8 +8,9 @@ Why: rustfmt leaves comments as wide as they are, and nothing else in the gate m
 
 The files are those that git knows; scripts without a suffix are told by their first line. In Rust,
 Python, shell scripts and TOML, the lines that are or contain comments are measured, in Python also
-those of strings in triple quotes; in Markdown, all lines but those of fenced code. Rows of tables
-and lines that are only a link cannot be broken and may be wider, in comments as well.
+those of strings in triple quotes; in Markdown, all lines but those between two fences of code. Rows
+of tables, in Markdown and in the docs of Rust, and lines that are only a link cannot be broken and
+may be wider.
 """
 
 import argparse
@@ -75,35 +76,45 @@ def first_line(path):
 
 def wide_lines(name):
     lines = (ROOT / name).read_text().splitlines()
+    has_tables = Path(name).suffix in (".md", ".rs")
     return [(number, line) for number, line in reader(name)(lines)
-            if len(line) > LIMIT and can_be_broken(line)]
+            if len(line) > LIMIT and not is_whole(line, has_tables)]
 
 
 def comments(mark):
+    """Lines that begin with it, or have it behind code."""
     return lambda lines: [(number, line) for number, line in enumerate(lines, 1)
-                          if line.lstrip().startswith(mark) or f" {mark} " in line]
+                          if line.lstrip().startswith(mark) or f" {mark}" in line]
 
 
 def python(lines):
     is_text = False
     for number, line in enumerate(lines, 1):
         was_text, is_text = is_text, is_text ^ (line.count('"""') % 2 == 1)
-        if was_text or '"""' in line or line.lstrip().startswith("#") or " # " in line:
+        if was_text or '"""' in line or line.lstrip().startswith("#") or " #" in line:
             yield number, line
 
 
 def prose(lines):
-    is_code = False
+    fence, code = None, []
     for number, line in enumerate(lines, 1):
-        if re.match(r"\s*(```|~~~)", line):
-            is_code = not is_code
-        elif not is_code:
+        mark = re.match(r"\s*(```+|~~~+)", line)
+        if fence:
+            code.append((number, line))
+            if mark and mark[1].startswith(fence) and line.strip() == mark[1]:
+                fence, code = None, []
+        elif mark:
+            fence = mark[1]
+        else:
             yield number, line
+    # Behind a fence that is not closed is no code.
+    yield from code
 
 
-def can_be_broken(line):
+def is_whole(line, has_tables):
+    """Whether it cannot be broken."""
     text = line.lstrip(" /!#")
-    return not (text.startswith("|") or ONLY_LINK.match(text))
+    return has_tables and text.startswith("|") or bool(ONLY_LINK.match(text))
 
 
 if __name__ == "__main__":

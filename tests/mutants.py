@@ -9,12 +9,13 @@
     tests/mutants.py --survivors          tries again what survived without a reason
     tests/mutants.py --sample             a sample of the mutants of the last commit, for the gate
     tests/mutants.py --table              prints the score of each module
-    tests/mutants.py --check              each survivor on record has a reason that is not stale
+    tests/mutants.py --check              the record is whole, each survivor has a reason that fits;
+                                          names the files that are not on record
 
 `cargo mutants` lists the changes. Each is made in a copy of the tree; first the unit tests run,
 then those that concern its file; at the end all tests of the package, for those that had passed.
 `tests/mutants.txt` has the outcome of each file, and the reason of each survivor that has no
-effect.
+effect. A file whose entry was changed by hand, but for a reason, counts as not tried.
 
 Exit status 1 if a change survives without a reason.
 """
@@ -38,6 +39,9 @@ import time
 import quick
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.append(str(ROOT / ".ci"))
+from ledger import short_sha  # noqa: E402
+
 RECORD = ROOT / "tests" / "mutants.txt"
 WORK = ROOT / "target" / "mutants"
 # Tests that take so many times as long as without a change wait for something that it prevents.
@@ -95,7 +99,9 @@ OF_TESTS = ("examples/axle/src/flaky.rs", "examples/axle/src/played.rs")
 # The images for QEMU. What they run is tried; what `bench.sh` and `no_panic.sh` build is not.
 FIRMWARE = "axlewire-firmware"
 IMAGES = ("ikeya_slave", "ikeya_master", "ucp_robot", "uart_check")
-IN_QEMU = re.compile("examples/firmware/src/(?!bin/(bench|size_|no_panic|soak_)|work)")
+IN_QEMU = re.compile("examples/firmware/src/(?!bin/(bench|size_|no_panic|planted_|soak_)|work)")
+# Where its files are.
+FOLDERS = ("src", "examples/axle/src", "examples/firmware/src")
 # What runs at the end if those pass: everything of the package.
 ALL = {
     "axlewire": "--lib --tests --features tokio",
@@ -126,6 +132,21 @@ class Mutant:
         return "\n".join(head) + self.replacement + "\n".join(tail)
 
 
+def is_changed(file):
+    """Whether it changes this file, by its name: what is tested, not what tests."""
+    is_firmware = file.startswith("examples/firmware/")
+    # The tool borrows modules of the tests, and has some of its own.
+    is_of_tests = re.search(r"(^|/)tests(/|\.rs$)", file) or file in OF_TESTS
+    return file.endswith(".rs") and not is_of_tests and (not is_firmware or bool(IN_QEMU.match(file)))
+
+
+def sources():
+    """All files that it changes, and those in which there is nothing to change."""
+    files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", *FOLDERS], cwd=ROOT, check=True,
+                           stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    return [file for file in sorted(set(files)) if is_changed(file) and (ROOT / file).is_file()]
+
+
 def listed(*options):
     """All mutants of library, tool and firmware by file; one key is listed once."""
     def items(*words):
@@ -140,8 +161,7 @@ def listed(*options):
     mutants, seen = [], collections.Counter()
     for item in items("-p", "axlewire", "-p", "axle") + firmware:
         file = item["file"]
-        # The tool borrows modules of the tests, and has some of its own.
-        if "tests" in file or file in OF_TESTS or item["package"] == FIRMWARE and not IN_QEMU.match(file):
+        if not is_changed(file):
             continue
         if file not in sources:
             sources[file] = (ROOT / file).read_text()
@@ -251,15 +271,20 @@ class Record:
         self.reasons = {}  # (file, key): why the change has no effect
         self.lines = {}  # file: (digest, counts, date)
         self.left = collections.defaultdict(set)  # file: keys that are not in its counts
+        self.empty = set()  # files in which there is nothing to change
+        seals = {}
         self.state_file = WORK / "outcomes.json"
         self.state = json.loads(self.state_file.read_text()) if self.state_file.exists() else {}
         file = key = None
         for line in RECORD.read_text().splitlines() if RECORD.exists() else []:
-            if match := re.fullmatch(r"(\S+\.rs) (\w+): (\d+) caught, (\d+) unviable, (\d+) survived, (\S+)", line):
+            if match := re.fullmatch(r"(\S+\.rs) (\w+): (\d+) caught, (\d+) unviable, (\d+) survived, ([\d-]+)(?:, (\w+))?", line):
                 file = match[1]
+                seals[file] = match[7]
                 self.lines[file] = (match[2], [int(match[i]) for i in (3, 4, 5)], match[6])
             elif match := re.fullmatch(r"(\S+\.rs): not done", line):
                 file = match[1]
+            elif match := re.fullmatch(r"(\S+\.rs): nothing to change", line):
+                self.empty.add(match[1])
             elif line == f"        {NOT_TRIED}":
                 # A reason for it may be known.
                 if not self.reasons[file, key]:
@@ -270,6 +295,19 @@ class Record:
             elif line.startswith("    "):
                 key = line.strip()
                 self.reasons.setdefault((file, key), "")
+        # Their counts are worth nothing.
+        self.broken = [file for file in self.lines if seals[file] != self.seal(file)]
+        for file in self.broken:
+            del self.lines[file]
+
+    def seal(self, file):
+        """The SHA-256 of all that its entry says, but for the reasons."""
+        survived = sorted(key for (of, key), why in self.reasons.items() if of == file and why and key not in self.left[file])
+        return short_sha([file, *self.lines[file], survived, sorted(self.left[file])])
+
+    def not_tried(self):
+        """The files of which it says nothing, such as new ones."""
+        return [file for file in sources() if file not in self.lines and file not in self.empty]
 
     def outcomes(self, file):
         """By key; empty if the file has changed since."""
@@ -332,9 +370,10 @@ class Record:
         self.lines = {file: line for file, line in self.lines.items() if (ROOT / file).exists()}
         text = ["# Written by tests/mutants.py: of each file the SHA-256 of its code, what became of its changes, and the date.",
                 "# Below it each change that survived, and why it has no effect.", self.sum(), ""]
-        heads = {file: f"{file}: not done" for (file, _), why in self.reasons.items() if why}
+        heads = {file: f"{file}: nothing to change" for file in sources() if file not in of_file}
+        heads |= {file: f"{file}: not done" for (file, _), why in self.reasons.items() if why}
         for file, (sha, counts, date) in self.lines.items():
-            heads[file] = f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}"
+            heads[file] = f"{file} {sha}: {counts[0]} caught, {counts[1]} unviable, {counts[2]} survived, {date}, {self.seal(file)}"
         for file, head in sorted(heads.items()):
             text.append(head)
             left = self.left[file] if file in self.lines else ()
@@ -497,7 +536,9 @@ def check(record):
             faults.append(f"{file}: no reason: {key}: {why}")
         elif (ROOT / file).exists() and not any(line in (ROOT / file).read_text() for line in lines):
             faults.append(f"{file}: the line is gone: {key}")
-    faults += [f"{file}: the file is gone" for file in record.lines if not (ROOT / file).exists()]
+    faults += [f"{file}: the entry was changed by hand" for file in record.broken]
+    known = sources()
+    faults += [f"{file}: there is no such file to change" for file in [*record.lines, *record.empty] if file not in known]
     for file, (_, (_, _, survived), _) in record.lines.items():
         # A reason may wait for a mutant that has not been tried.
         listed_ = sum(of == file and key not in record.left[file] for of, key in record.reasons)
@@ -510,9 +551,13 @@ def check(record):
         listed_ = sum(counts) + len(record.left[file])
         if record.has_line(file) and listed_ != made[file]:
             faults.append(f"{file}: {listed_} mutants on record, but it has {made[file]}")
+    faults += [f"{file}: nothing to change on record, but it has {made[file]} mutants"
+               for file in record.empty if made[file]]
     stale = [file for file in record.lines if not record.has_line(file)]
     print(f"{len(record.lines)} files on record, {len(stale)} of them changed since; "
           f"{len(record.reasons)} survivors with a reason")
+    not_tried = record.not_tried()
+    print(f"{len(not_tried)} files are not tried: {' '.join(not_tried)}")
     for fault in faults:
         print(fault)
     return bool(faults) or not record.lines
