@@ -244,8 +244,9 @@ impl<B: Body> Encode for FrameOf<B> {
 /// A frame given by its parts, for ids for which this crate has no message (ruling U3).
 ///
 /// A shipped robot gives such a frame up at its id, and its place in the stream with it: it may not
-/// take the next frame either, nor the one behind that, **a stop included**. A [`Host`](super::Host) repeats a stop every
-/// 100 ms; [`is_stop_sent`](super::Host::is_stop_sent) says only that it has left.
+/// take the next frame either, nor the one behind that, **a stop included**. A
+/// [`Host`](super::Host) repeats a stop every 100 ms;
+/// [`is_stop_sent`](super::Host::is_stop_sent) says only that it has left.
 ///
 /// ```
 /// use axlewire::{encode::Encode, ucp::RawFrame};

@@ -133,8 +133,8 @@ fn a_body_above_56_bytes_is_refused_and_56_is_sent() {
 }
 
 /// The frames that the receiver of shipped robots (v6.38) takes: it reads 7 bytes, looks for FD FF
-/// in them, where a byte other than FF behind FD is not looked at again, reads on as `len` says, and
-/// gives a frame up at an id other than 1 to 10 without a search in what it has not read yet.
+/// in them, where a byte other than FF behind FD is not looked at again, reads on as `len` says,
+/// and gives a frame up at an id other than 1 to 10 without a search in what it has not read yet.
 fn taken_by_a_shipped_robot(stream: &[u8]) -> Vec<&[u8]> {
     let (mut taken, mut at) = (Vec::new(), 0);
     while at < stream.len() {
