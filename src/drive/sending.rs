@@ -65,7 +65,8 @@ impl Wait {
 enum Flush {
     /// Nothing.
     Done,
-    /// Bytes written since the last flush.
+    /// Bytes that it has been asked to take since the last flush, perhaps in a call that was
+    /// dropped.
     Due,
     /// The same, and the role knows that they may be lost.
     Failed,
@@ -116,7 +117,6 @@ impl Sending {
         silence: Duration,
     ) -> Option<Unsent> {
         self.outbox.taken(count);
-        self.flush = Flush::Due;
         let asked_at = self.asked_at;
         let before = self.begun.unwrap_or(Begun {
             left_at: asked_at,

@@ -156,6 +156,35 @@ fn a_role_is_told_of_a_failed_flush_once_for_everything_written_since_the_last()
 }
 
 #[test]
+fn a_role_is_told_again_of_a_failed_flush_if_its_port_has_been_asked_to_take_more_since() {
+    for (step, round) in [
+        (Step::Error, ROUNDS[0]),
+        (Step::Error, ROUNDS[1]),
+        (Step::Zero, ASYNC),
+        (Step::Stall, ASYNC),
+    ] {
+        let port = Script {
+            writes: [bytes(2), step.clone()].into(),
+            flushes: [Step::Error, Step::Error].into(),
+            ..Script::default()
+        };
+        let mut driver = scripted(Recorder::sending(&[b"12"]), port);
+        assert_eq!(round(&mut driver), Some(Err(GONE)));
+        assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
+        driver.role_mut().frames.push_back(b"34".into());
+        // It fails, or is dropped while it waits; the next flush fails again.
+        let is_dropped = matches!(step, Step::Stall);
+        assert_eq!(round(&mut driver).is_none(), is_dropped);
+        if is_dropped {
+            assert_eq!(driver.role().unsent(), [Unsent::Unflushed], "there is nothing to tell yet");
+            assert_eq!(round(&mut driver), Some(Err(GONE)));
+        }
+        let told = [Unsent::Unflushed, Unsent::Untouched, Unsent::Unflushed];
+        assert_eq!(driver.role().unsent(), told, "{step:?}");
+    }
+}
+
+#[test]
 fn a_role_is_told_of_discarded_frames() {
     for round in ROUNDS {
         let port = Script {

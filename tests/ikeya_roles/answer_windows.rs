@@ -145,6 +145,68 @@ fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_count
 }
 
 #[test]
+fn a_late_flush_keeps_the_line_free_for_the_answer_also_behind_a_write() {
+    for next_is_stop in [false, true] {
+        let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+        desk.master.read(NodeId::N3, desk.now).unwrap();
+        desk.turn();
+        desk.master.handle_taken(desk.now);
+        desk.silence();
+        // After a second the port takes a WRITE as well, and then all of it leaves.
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        desk.master.handle_taken(desk.now);
+        desk.master.handle_flushed(desk.now);
+        let end = desk.now + US(660);
+        if next_is_stop {
+            desk.master.stop(NodeId::N1, desk.now);
+        } else {
+            desk.master.read(NodeId::N1, desk.now).unwrap();
+        }
+        assert_eq!(desk.master.poll_transmit(desk.now), None, "stop {next_is_stop}");
+        desk.hear(300, &position(NodeId::N3, turns(2)));
+        assert_eq!(desk.master.node_statistics(NodeId::N3).late, 1);
+        let stop = write(NodeId::N1, 0.0);
+        let expected = if next_is_stop { stop } else { read(NodeId::N1) };
+        assert_eq!((desk.packet(), desk.now), (expected, end));
+    }
+}
+
+#[test]
+fn every_node_whose_request_left_late_is_guarded_and_no_node_that_was_only_told_something() {
+    for is_asked in [false, true] {
+        let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+        desk.master.read(NodeId::N3, desk.now).unwrap();
+        desk.turn();
+        desk.master.handle_taken(desk.now);
+        desk.silence();
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        desk.master.read(NodeId::N1, desk.now).unwrap();
+        if is_asked {
+            assert_eq!(desk.turn(), read(NodeId::N1), "both have been asked");
+            desk.master.handle_taken(desk.now);
+        }
+        desk.master.handle_flushed(desk.now);
+        let end = desk.now + US(660);
+        if !is_asked {
+            assert_eq!((desk.turn(), desk.now), (read(NodeId::N1), end));
+            desk.hear(340, &velocity(NodeId::N1, 1.0));
+        }
+        // An answer up to the end of the guard meets no window.
+        desk.now = end + US(499);
+        desk.hear(0, &position(NodeId::N3, turns(9)));
+        assert_eq!(desk.master.node_statistics(NodeId::N3).late, 1);
+        let mut asked = vec![];
+        while asked != read(NodeId::N3) {
+            asked = desk.turn();
+            assert!(desk.now >= end + US(500), "{asked:02x?} at {:?}", desk.now);
+            desk.silence();
+        }
+    }
+}
+
+#[test]
 fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.turn();
@@ -170,7 +232,10 @@ fn a_request_given_up_in_doubt_keeps_the_line_free_for_its_answer() {
     desk.now = begin + US(400);
     desk.hear(300, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.told(), []);
-    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert_eq!(desk.master.poll_timeout(), Some(begin + US(400 + 660 + 500)), "and the guard");
+    assert_eq!(desk.master.poll_transmit(begin + US(400 + 660)), None);
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    assert_eq!(desk.packet(), write(NodeId::N1, 1.0), "it waits for no late answer");
     assert_eq!(desk.now, begin + US(400 + 660));
 }
 

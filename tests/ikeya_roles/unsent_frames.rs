@@ -97,6 +97,38 @@ fn a_set_point_that_did_not_leave_is_never_sent_once_it_is_dropped() {
 }
 
 #[test]
+fn a_stop_and_the_news_that_a_packet_did_not_leave_may_come_in_either_order() {
+    for (node, answers) in [(N1, true), (N3, true), (N1, false), (N3, false)] {
+        let mut desk = Desk::with_nodes(direct(), &[node]);
+        if !answers {
+            desk.answer(node.0, Answer::Silence);
+        }
+        for step in 0..60_u8 {
+            match step % 20 {
+                // A set-point to be confirmed, which fails if the node is lost.
+                3 if node == N1 => drop(desk.master.set_velocity(node.0, rps(1.0), desk.now)),
+                3 => drop(desk.master.set_position(node.0, turns(1), desk.now)),
+                5 => drop(desk.master.confirm(node.0, desk.now)),
+                12 => desk.master.stop(node.0, desk.now),
+                _ => {}
+            }
+            let mut before = desk.clone();
+            before.packet();
+            for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
+                let (mut first, mut last) = (before.clone(), before.clone());
+                first.master.stop(node.0, first.now);
+                fail(&mut first, unsent);
+                fail(&mut last, unsent);
+                last.master.stop(node.0, last.now);
+                let [first, last] = [first, last].map(|desk| format!("{:?}", desk.master));
+                assert_eq!(first, last, "{node:?} {answers} {step} {unsent:?}");
+            }
+            desk.exchange();
+        }
+    }
+}
+
+#[test]
 fn a_stop_write_that_did_not_leave_pays_nothing() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
         let mut desk = Desk::with_nodes(manual(), &[N1]);
@@ -253,6 +285,29 @@ fn a_node_in_the_search_is_asked_again_at_once_when_its_read_did_not_leave() {
     let begin = desk.now;
     fail(&mut desk, Unsent::Untouched);
     assert_eq!((desk.turn(), desk.now), (read(NodeId::N1), begin));
+}
+
+#[test]
+fn a_read_of_the_search_that_was_cut_off_is_repeated_as_soon_as_the_silence_is_over() {
+    for (node, is_stop) in [(N1, false), (N1, true), (N3, false), (N3, true)] {
+        let mut desk = Desk::with_nodes(direct(), &[node]);
+        desk.lose(node.0);
+        if is_stop {
+            desk.master.stop(node.0, desk.now);
+            // The attempt that is made at once.
+            desk.turn();
+            desk.silence();
+        }
+        assert_eq!(desk.turn(), read(node.0));
+        for _ in 0..3 {
+            // A moving node that is back must not run on for the pause of the search.
+            desk.now += US(200);
+            fail(&mut desk, Unsent::CutOff);
+            let noticed = desk.now;
+            assert_eq!(desk.turn(), read(node.0));
+            assert_eq!(desk.now, noticed + US(80 + 2 * 100), "{node:?}, stop {is_stop}");
+        }
+    }
 }
 
 #[test]

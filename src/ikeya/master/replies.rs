@@ -48,15 +48,15 @@ impl<B: Board> Master<B> {
         asked.scans = asked.scans.saturating_add(is_scan.into());
         let deadline = request_end + self.answer_time();
         self.window = Some(Window { node, request_end, deadline, heard: Heard::Nothing });
-        if self.held == Held::Last {
+        if self.held != Held::Nothing {
             self.held = Held::Several;
         }
     }
 
     /// The port has taken a request, and may hold it: the next one waits for its flush.
     pub(super) fn hold_line(&mut self, now: Instant) {
-        if self.window.is_some() && self.held == Held::Nothing {
-            self.held = Held::Last;
+        if let (Some(window), Held::Nothing) = (&self.window, self.held) {
+            self.held = Held::Last(window.node);
             self.line_free = Some(now + HELD);
         }
     }
@@ -64,13 +64,11 @@ impl<B: Board> Master<B> {
     /// What the port has held has left, at the latest by now.
     pub(super) fn expect_answer(&mut self, left_by: Instant) {
         let held = core::mem::replace(&mut self.held, Held::Nothing);
-        if held == Held::Nothing {
-            return;
-        }
         let answer_by = left_by + self.answer_time();
         let is_open = self.window.as_ref().is_some_and(|window| left_by <= window.deadline);
-        match &mut self.window {
-            Some(window) if is_open && held == Held::Last => {
+        match (&mut self.window, held) {
+            (_, Held::Nothing) => {}
+            (Some(window), Held::Last(_)) if is_open => {
                 window.deadline = window.deadline.max(answer_by);
                 let gap = self.config.turnaround_gap;
                 self.line_free = Some(window.request_end.max(left_by) + gap);
@@ -79,8 +77,10 @@ impl<B: Board> Master<B> {
                 // The answer comes too late, or may be that of an earlier request.
                 self.close_window();
                 let guarded_until = Some(answer_by + self.config.late_guard);
-                if let Some(sent) = self.sent {
-                    self.nodes[sent.choice.index & 7].guarded_until = guarded_until;
+                for id in NodeId::ALL {
+                    if held == Held::Several || held == Held::Last(id) {
+                        self.node_mut(id).guarded_until = guarded_until;
+                    }
                 }
                 self.line_free = Some(answer_by);
                 self.is_behind_write = false;

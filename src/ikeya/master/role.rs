@@ -61,9 +61,9 @@ const EVENTS: usize = 16;
 /// that cannot be told from the next one: the protocol has no sequence numbers.
 ///
 /// A port may hold a request back. If its flush ends within the window, the window begins there. If
-/// it ends later, the answer is not taken, and the line is kept free for it. If it has not ended a
-/// second after the port took the request, the master continues, but takes no answer until a flush
-/// has ended.
+/// it ends later, the answer is not taken, and the line is kept free for it; the node is not polled
+/// again before its guard is over. If it has not ended a second after the port took the request,
+/// the master continues, but takes no answer until a flush has ended.
 ///
 /// # Modes
 ///

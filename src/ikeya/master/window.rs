@@ -17,8 +17,8 @@ pub(super) struct Window {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Held {
     Nothing,
-    /// The last exchange.
-    Last,
+    /// The last exchange, with this node.
+    Last(NodeId),
     /// Earlier ones as well: it is unknown whose answer comes.
     Several,
 }
