@@ -35,6 +35,18 @@ fn a_page_that_gave_up_cannot_be_left_as_if_nothing_had_happened() {
 }
 
 #[test]
+fn a_second_of_a_full_bus_waits_for_the_page_and_what_is_more_is_counted() {
+    let (tell, queue) = Tell::to_memory();
+    let piece = || What::Bytes(Source::Received, [1, 2, 3, 4].into());
+    // 50,000 bytes per second, in packets of 4 and 8.
+    (0..10_000).for_each(|_| tell.tell(piece()));
+    assert_eq!(tell.lost.load(Ordering::Relaxed), 0);
+    (0..QUEUE).for_each(|_| tell.tell(piece()));
+    assert_eq!(tell.lost.load(Ordering::Relaxed), 4 * 10_000);
+    assert_eq!(queue.try_iter().count(), QUEUE);
+}
+
+#[test]
 fn each_byte_is_told_once_whether_or_not_the_line_hears_what_it_sends() {
     for (has_echo, expected) in [
         (false, [(Source::Sent, vec![1, 2, 3]), (Source::Received, vec![7])].as_slice()),
