@@ -185,7 +185,8 @@ const fn leading_bits(power: i32) -> u64 {
             return (of_five << (64 - bits)) as u64;
         }
         let cut = bits - 64;
-        return (of_five >> cut) as u64 + ((of_five << (128 - cut)) != 0) as u64;
+        // It is odd, so what is cut off is never 0.
+        return (of_five >> cut) as u64 + 1;
     }
     // Long division of a power of two, until the quotient has 64 bits.
     let (mut quotient, mut rest) = (0u64, 1u128);
@@ -196,5 +197,43 @@ const fn leading_bits(power: i32) -> u64 {
             rest -= of_five;
         }
     }
-    quotient + (rest != 0) as u64
+    // The division by an odd number never ends.
+    quotient + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A product: what is above 128 bits, and the rest.
+    fn product(value: u64, factor: u128) -> (u128, u128) {
+        let value = u128::from(value);
+        let (low, high) = (value * (factor & u128::from(u64::MAX)), value * (factor >> 64));
+        let (rest, carries) = low.overflowing_add(high << 64);
+        ((high >> 64) + u128::from(carries), rest)
+    }
+
+    #[test]
+    fn each_power_has_its_leading_bits_rounded_up() {
+        for power in MIN_POWER..=MAX_POWER {
+            let (found, of_five) = (power_of_ten(power), 5u128.pow(power.unsigned_abs()));
+            let bits = 128 - of_five.leading_zeros();
+            assert!(found >= 1 << 63, "{power}: {found:#X}");
+            if power >= 0 {
+                let right = match bits.checked_sub(64) {
+                    Some(cut) => of_five.div_ceil(1 << cut),
+                    None => of_five << (64 - bits),
+                };
+                assert_eq!(u128::from(found), right, "{power}");
+                continue;
+            }
+            // found / 2^(63 + bits) is not below 1 / 5^-power, and the number before it is.
+            let one = match (63 + bits).checked_sub(128) {
+                Some(above) => (1u128 << above, 0),
+                None => (0, 1u128 << (63 + bits)),
+            };
+            assert!(product(found, of_five) >= one, "{power}: {found:#X}");
+            assert!(product(found - 1, of_five) < one, "{power}: {found:#X}");
+        }
+    }
 }
