@@ -360,6 +360,11 @@ end
 local ikeya = Proto("axle_ikeya", "Ikeya MD motor bus")
 local ucp = Proto("axle_ucp", "UCP rover link")
 
+local function warning(abbr, name, title, group, severity)
+    return ProtoExpert.new(
+        abbr .. "." .. name, title, expert.group[group], expert.severity[severity])
+end
+
 -- The fields and warnings that both protocols have.
 local function common_fields(abbr)
     local function name(suffix) return abbr .. "." .. suffix end
@@ -390,20 +395,9 @@ local function common_fields(abbr)
         answer = ProtoField.framenum(name("answer_in"), "Answered in packet", base.NONE,
             frametype.RESPONSE),
     }, {
-        bad_crc = ProtoExpert.new(name("bad_crc"), "Wrong checksum", expert.group.CHECKSUM,
-            expert.severity.ERROR),
-        gap = ProtoExpert.new(name("gap"), "Skipped bytes", expert.group.MALFORMED,
-            expert.severity.WARN),
-        hazard = ProtoExpert.new(name("hazard"), "Hazard", expert.group.PROTOCOL,
-            expert.severity.ERROR),
-        late = ProtoExpert.new(name("late"), "Late answer", expert.group.SEQUENCE,
-            expert.severity.WARN),
-        foreign = ProtoExpert.new(name("foreign"), "Foreign answer", expert.group.SEQUENCE,
-            expert.severity.WARN),
-        unanswered = ProtoExpert.new(name("unanswered"), "Not answered", expert.group.SEQUENCE,
-            expert.severity.NOTE),
-        remark = ProtoExpert.new(name("remark"), "Unusual value", expert.group.PROTOCOL,
-            expert.severity.WARN),
+        bad_crc = warning(abbr, "bad_crc", "Wrong checksum", "CHECKSUM", "ERROR"),
+        gap = warning(abbr, "gap", "Skipped bytes", "UNDECODED", "WARN"),
+        unanswered = warning(abbr, "unanswered", "Not answered", "SEQUENCE", "NOTE"),
     }
 end
 
@@ -428,6 +422,14 @@ for motor = 0, 3 do
     IKEYA["rps" .. motor] = ProtoField.float(name .. "rps", "Speed" .. of .. ", 1/s")
     IKEYA["count" .. motor] = ProtoField.int16(name .. "count", "Count" .. of .. ", 1/8192 turn")
     IKEYA["rotation" .. motor] = ProtoField.int16(name .. "rotation", "Rotation" .. of .. ", turns")
+end
+for name, of in pairs({
+    late = { "Late answer", "SEQUENCE", "WARN" },
+    foreign = { "Foreign answer", "SEQUENCE", "WARN" },
+    mode_changed = { "Another mode", "PROTOCOL", "WARN" },
+    not_a_number = { "Not a number", "PROTOCOL", "WARN" },
+}) do
+    IKEYA_EXPERTS[name] = warning("axle_ikeya", name, of[1], of[2], of[3])
 end
 register(ikeya, IKEYA, IKEYA_EXPERTS)
 ikeya.prefs.window = Pref.uint("Reply window, µs", 20000,
@@ -561,6 +563,8 @@ UCP["report.layout"] = ProtoField.string("axle_ucp.report.layout", "Layout")
 UCP["network_state.state_width"] = ProtoField.uint8(
     "axle_ucp.network_state.state_width", "Width of the state", base.UNIT_STRING, { " byte", " bytes" })
 UCP["unknown.body"] = ProtoField.bytes("axle_ucp.unknown.body", "Body")
+UCP_EXPERTS.hazard = warning("axle_ucp", "hazard", "Hazard", "PROTOCOL", "ERROR")
+UCP_EXPERTS.battery = warning("axle_ucp", "battery", "Impossible charge", "PROTOCOL", "WARN")
 register(ucp, UCP, UCP_EXPERTS)
 
 -- What a frame shows. `range` is its bytes. Returns a line for the packet list.
@@ -578,6 +582,7 @@ local function show_ikeya(frame, range, item, kind)
     local is_write, texts = frame.name == "write", {}
     local values = range:len() > READ_LEN and range(2, range:len() - 4) or nil
     local shows_speed = frame.name == "velocity_response" or is_write
+    local is_odd = false
     local shows_position = frame.name == "position_response" or is_write
     for motor = 1, values and kind.motors or 0 do
         local suffix = kind.motors > 1 and motor or 0
@@ -588,10 +593,7 @@ local function show_ikeya(frame, range, item, kind)
                 texts[#texts + 1] = speed_in_words(value:le_float())
             end
             local rps = value:le_float()
-            local is_number = rps == rps and math.abs(rps) ~= math.huge
-            if not is_number and (not is_write or frame.mode == "velocity") then
-                item:add_proto_expert_info(IKEYA_EXPERTS.remark, "The speed is not a number (ruling I4)")
-            end
+            is_odd = is_odd or rps ~= rps or math.abs(rps) == math.huge
         end
         if shows_position then
             -- All counts precede all rotations.
@@ -610,8 +612,11 @@ local function show_ikeya(frame, range, item, kind)
         if frame.mode then item:add(IKEYA.mode, frame.mode):set_generated() end
         if not frame.mode then texts = { hex(values:raw()) } end
     end
+    if is_odd and (not is_write or frame.mode == "velocity") then
+        item:add_proto_expert_info(IKEYA_EXPERTS.not_a_number, "The speed is no finite number (ruling I4)")
+    end
     if frame.mode_before then
-        item:add_proto_expert_info(IKEYA_EXPERTS.remark, ("Node %d was in %s mode before (ruling I11)")
+        item:add_proto_expert_info(IKEYA_EXPERTS.mode_changed, ("Node %d was in %s mode before (ruling I11)")
             :format(frame.node, frame.mode_before))
     end
     if frame.is_late then
@@ -671,7 +676,7 @@ local function show_ucp(frame, range, item)
         if value[1] == "state" then
             item:add(UCP["network_state.state_width"], body, body:len()):set_generated()
         elseif value[1] == "battery_pct" and body(0, 2):le_uint() > 100 then
-            item:add_proto_expert_info(UCP_EXPERTS.remark, "Battery above 100 % (ruling U5)")
+            item:add_proto_expert_info(UCP_EXPERTS.battery, "Battery above 100 % (ruling U5)")
         end
     end
     if message == UNKNOWN then
