@@ -9,6 +9,7 @@ mod bus;
 mod calibrate;
 mod decode;
 mod drive;
+mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
@@ -105,6 +106,7 @@ enum Command {
     Network(network::Args),
     Watch(watch::Args),
     Record(record::Args),
+    Extcap(extcap::Args),
     Replay(replay::Args),
     Send(send::Args),
     #[cfg(unix)]
@@ -164,6 +166,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Network(args) => network::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(args),
+        Command::Extcap(args) => extcap::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
