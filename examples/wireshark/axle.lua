@@ -298,11 +298,11 @@ end
 local DIRECTIONS = { "unknown", "in", "out" }
 
 -- All that would follow if the line ended now: the events of each direction, and the exchanges.
+-- On a bus, only READs are short enough to be found then, so that modes play no part.
 local function ending_of(line)
     if line.ending and line.ending.received == line.received then return line.ending end
     local state = new_state()
     state.has_requests, state.asked = line.state.has_requests, line.state.asked
-    for node, mode in pairs(line.state.modes) do state.modes[node] = mode end
     for name, frame in pairs(line.state.open) do state.open[name] = frame end
     local copy = { kind = line.kind, state = state }
     local ending = { received = line.received, state = state, events = {} }

@@ -26,7 +26,9 @@ from collections import Counter
 from pathlib import Path
 
 import corpora
+import damages
 import expected
+import live
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -154,10 +156,15 @@ class Comparison:
     def differ(self, where, text):
         self.differences.append(f"{where}: {text}")
 
-    def compare(self, name, capture, rows, shown):
+    def compare(self, name, capture, rows, shown, parts):
         """Compares a capture."""
         # The tool counts interfaces through all sections, Wireshark in each.
-        first, self.streams = corpora.read(capture)
+        first, self.streams, ends = corpora.read(capture)
+        wanted_parts = sum(
+            row["offset"] < end < row["offset"] + row["length"]
+            for row in rows for end in ends[row.get("interface"), row.get("direction")])
+        if parts != wanted_parts:
+            self.differ(name, f"{parts} parts of frames and gaps, not {wanted_parts}")
         facts = expected.exchanges(rows)
         wanted = {}
         for number, row in enumerate(rows):
@@ -239,8 +246,8 @@ def check_captures(user, captures, script=None):
     """Compares all captures; `script` is instead of the one that is installed."""
     comparison = Comparison()
     for name, (path, bytes, rows) in captures.items():
-        shown, _ = shown_by_tshark(user, path, script)
-        comparison.compare(name, bytes, rows, shown)
+        shown, parts = shown_by_tshark(user, path, script)
+        comparison.compare(name, bytes, rows, shown, parts)
     return comparison
 
 
@@ -252,6 +259,60 @@ def write_captures(folder):
         path.write_bytes(bytes)
         written[name] = (path, bytes, decoded(path))
     return written
+
+
+def planted(user, captures, folder):
+    """Plants each damage in its own copy of axle.lua. Prints what was not found; 0 if all were."""
+    text, missed = (HERE / "axle.lua").read_text(), 0
+    whole = folder / "axle.lua"
+    whole.write_text(text)
+    if check_captures(user, captures, whole).differences:
+        print("there are differences without a damage")
+        return 1
+    for number, (old, new) in enumerate(damages.DAMAGES, 1):
+        script = folder / f"damage-{number}.lua"
+        script.write_text(text.replace(old, new))
+        if text.count(old) != 1:
+            problem = f"its text is there {text.count(old)} times"
+        else:
+            problem = problem_with(user, captures, script)
+        if problem:
+            missed += 1
+            print(f"{old!r} as {new!r}: {problem}")
+    print(f"{len(damages.DAMAGES) - missed} of {len(damages.DAMAGES)} damages found")
+    return missed > 0
+
+
+def problem_with(user, captures, script):
+    """Why this damage is not found; None if it is."""
+    for capture in captures.items():
+        try:
+            if check_captures(user, dict([capture]), script).differences:
+                return None
+        except Broken as broken:
+            # A script that fails while it reads is found as well; one that does not load is not
+            # the damage that was meant.
+            return None if "packet" in str(broken) else f"does not load: {broken}"
+    return "NOT FOUND"
+
+
+def check_live(user, comparison):
+    """Captures live lines, and compares what was captured. Returns the number of packets."""
+    axle = user.home / "axle"
+    count = 0
+    for name, run in (("rover", live.of_rover), ("bus", live.of_bus)):
+        path = user.home / f"{name}.pcapng"
+        lines = run(user, axle, path)
+        if len(lines) < 100:
+            comparison.differ(f"live {name}", f"only {len(lines)} packets")
+        if sum(len(line) == 2 and line[1] != "" for line in lines) < 70:
+            comparison.differ(f"live {name}", f"hardly any frames: {lines[:5]}")
+        if not all(line[0].startswith("/dev/") for line in lines):
+            comparison.differ(f"live {name}", f"no name of the port: {lines[:5]}")
+        shown, parts = shown_by_tshark(user, path)
+        comparison.compare(f"live {name}", path.read_bytes(), decoded(path), shown, parts)
+        count += len(lines)
+    return count
 
 
 def main():
@@ -269,13 +330,16 @@ def main():
         user, captures = User(folder), write_captures(folder)
         if args.planted:
             return planted(user, captures, Path(folder))
-        subprocess.run(["bash", HERE / "install.sh", "--to", user.home, "--axle", AXLE], check=True,
-                       stdout=subprocess.DEVNULL)
+        # The user may not be allowed to read the folders that the tool is in.
+        axle = shutil.copy(AXLE, user.home / "axle")
+        install = ["bash", HERE / "install.sh", "--to", user.home, "--axle", axle]
+        subprocess.run(install, check=True, stdout=subprocess.DEVNULL)
         found = check_captures(user, captures)
+        packets = check_live(user, found)
         if found.values < LEAST_VALUES:
             found.differ("check", f"only {found.values} values were compared")
         print(f"{found.values} values of {found.frames} frames and {found.gaps} gaps in "
-              f"{len(captures)} captures, {found.facts} answer times, requests, answers and "
+              f"{len(captures)} captures and {packets} live packets, {found.facts} answer times, requests, answers and "
               f"warnings: {len(found.differences)} differences")
         print(*found.differences[:20], sep="\n", end="\n" if found.differences else "")
         return bool(found.differences)

@@ -43,9 +43,9 @@ class PcapNg:
 
 
 def read(file):
-    """The number of the first interface of each section, and the bytes of each interface in each
-    direction. Little-endian files only, as the tool writes them."""
-    at, first, interfaces, streams = 0, {}, 0, {}
+    """The number of the first interface of each section; and the bytes of each interface in each
+    direction, with the ends of their packets. Little-endian files only, as the tool writes them."""
+    at, first, interfaces, streams, ends = 0, {}, 0, {}, {}
     while at < len(file):
         kind, length = struct.unpack_from("<II", file, at)
         body = file[at + 8:at + length - 4]
@@ -59,8 +59,9 @@ def read(file):
             way = struct.unpack("<HHI", flags)[2] if len(flags) == 8 else UNKNOWN
             key = (first[len(first)] + interface, {IN: "in", OUT: "out"}.get(way))
             streams[key] = streams.get(key, b"") + body[20:20 + held]
+            ends.setdefault(key, []).append(len(streams[key]))
         at += length
-    return first, streams
+    return first, streams, ends
 
 
 def padded(bytes):
@@ -215,15 +216,19 @@ def of_story():
         (OUT, ucp(2, bytes(15)), 10), (OUT, ucp(0x0A, b"\3"), 10), (OUT, ucp(0x0A, b"\4\0\0\1"), 10),
         (OUT, ucp(0x42, b"hello"), 10), (OUT, ucp(0x42), 10), (OUT, ucp(0x42, bytes(56)), 10),
         (OUT, ucp(0x42, bytes(57)), 10), (OUT, ucp(1, index=255), 10),
-        (IN, ucp(1, b"\0")[:-1], 10),
+        (OUT, b"\xFD\xFF\3\0", 10), (IN, b"\xFD", 10), (IN, ucp(1, b"\0")[:-1], 10),
     ]:
         file.packet(rover, frame, way, step)
+    # An answer behind a false header, found at the end only.
+    last = file.interface("ucp", "COM3")
+    file.packet(last, ucp(1, index=3), OUT)
+    file.packet(last, b"\xFD\xFF\x3C\0" + ucp(1, b"\0", 4), IN)
     return file
 
 
 def all_of():
     """Name and bytes of each capture."""
-    made = {"vectors": of_vectors(), "captures": of_captures(1), "story": of_story()}
+    made = {"story": of_story(), "vectors": of_vectors(), "captures": of_captures(1)}
     made |= {f"noise-{seed}": of_noise(seed) for seed in (1, 2, 3)}
     made = {name: bytes(file.bytes) for name, file in made.items()}
     for path in sorted((ROOT / "examples/captures").glob("*.pcapng")):
