@@ -245,7 +245,8 @@ local function meet_ikeya(line, frame)
         return
     end
     local mode = header == VELOCITY and "velocity" or "position"
-    if state.modes[node] and state.modes[node] ~= mode then frame.mode_before = state.modes[node] end
+    local known = state.modes[node]
+    if known and known ~= mode then frame.mode_before = known end
     state.modes[node] = mode
     local asked = state.asked
     if asked and asked.node == node then
@@ -365,35 +366,40 @@ local function warning(abbr, name, title, group, severity)
         abbr .. "." .. name, title, expert.group[group], expert.severity[severity])
 end
 
+local BYTES = { " byte", " bytes" }
+
 -- The fields and warnings that both protocols have.
 local function common_fields(abbr)
     local function name(suffix) return abbr .. "." .. suffix end
     return {
         offset = ProtoField.uint64(name("offset"), "Offset in the bytes of its direction"),
-        length = ProtoField.uint32(name("length"), "Length", base.UNIT_STRING, { " byte", " bytes" }),
+        length = ProtoField.uint32(name("length"), "Length", base.UNIT_STRING, BYTES),
         protocol = ProtoField.string(name("protocol"), "Protocol"),
         message = ProtoField.string(name("message"), "Message"),
         bytes = ProtoField.bytes(name("bytes"), "Bytes"),
         skipped_offset = ProtoField.uint64(name("skipped.offset"), "Offset of the skipped bytes"),
         skipped_length = ProtoField.uint32(
-            name("skipped.length"), "Skipped", base.UNIT_STRING, { " byte", " bytes" }),
+            name("skipped.length"), "Skipped", base.UNIT_STRING, BYTES),
         reason = ProtoField.string(name("skipped.reason"), "Reason of the first byte"),
-        reason_header = ProtoField.uint32(name("skipped.reasons.header"), "Bytes that start no frame"),
-        reason_length = ProtoField.uint32(name("skipped.reasons.length"), "Bytes with invalid lengths"),
+        reason_header = ProtoField.uint32(
+            name("skipped.reasons.header"), "Bytes that start no frame"),
+        reason_length = ProtoField.uint32(
+            name("skipped.reasons.length"), "Bytes with invalid lengths"),
         reason_id = ProtoField.uint32(name("skipped.reasons.id"), "Bytes for invalid nodes"),
         reason_crc = ProtoField.uint32(name("skipped.reasons.crc"), "Bytes with wrong checksums"),
         reason_idle = ProtoField.uint32(name("skipped.reasons.idle"), "Bytes of truncated frames"),
-        so_far = ProtoField.uint32(name("skipped_so_far"), "Skipped so far",
-            base.UNIT_STRING, { " byte", " bytes" }),
-        pending = ProtoField.uint32(name("pending"), "May still become a frame",
-            base.UNIT_STRING, { " byte", " bytes" }),
+        so_far = ProtoField.uint32(
+            name("skipped_so_far"), "Skipped so far", base.UNIT_STRING, BYTES),
+        pending = ProtoField.uint32(
+            name("pending"), "May still become a frame", base.UNIT_STRING, BYTES),
         ends_in = ProtoField.framenum(name("ends_in"), "Goes on, and ends in packet"),
-        took = ProtoField.uint32(name("response_time_us"), "Response time", base.UNIT_STRING, { " µs" }),
+        took = ProtoField.uint32(
+            name("response_time_us"), "Response time", base.UNIT_STRING, { " µs" }),
         clock = ProtoField.string(name("response_time_of"), "Response time as seen by"),
-        request = ProtoField.framenum(name("request_in"), "Answer to packet", base.NONE,
-            frametype.REQUEST),
-        answer = ProtoField.framenum(name("answer_in"), "Answered in packet", base.NONE,
-            frametype.RESPONSE),
+        request = ProtoField.framenum(
+            name("request_in"), "Answer to packet", base.NONE, frametype.REQUEST),
+        answer = ProtoField.framenum(
+            name("answer_in"), "Answered in packet", base.NONE, frametype.RESPONSE),
     }, {
         bad_crc = warning(abbr, "bad_crc", "Wrong checksum", "CHECKSUM", "ERROR"),
         gap = warning(abbr, "gap", "Skipped bytes", "UNDECODED", "WARN"),
@@ -432,10 +438,10 @@ for name, of in pairs({
     IKEYA_EXPERTS[name] = warning("axle_ikeya", name, of[1], of[2], of[3])
 end
 register(ikeya, IKEYA, IKEYA_EXPERTS)
-ikeya.prefs.window = Pref.uint("Reply window, µs", 20000,
+ikeya.prefs.reply_window_us = Pref.uint("Reply window, µs", reply_window.ikeya,
     "Answers that take longer are marked as late (ruling I7): 20000 suits a USB adapter, 500 a "
     .. "UART of the recording machine. The time on the wire is added.")
-function ikeya.prefs_changed() reply_window.ikeya = ikeya.prefs.window end
+function ikeya.prefs_changed() reply_window.ikeya = ikeya.prefs.reply_window_us end
 
 -- UCP.
 
@@ -474,13 +480,18 @@ local POWER = { "power_w", "uint8", "Power", " W" }
 local VOLTAGE = { "voltage_dv", "uint8", "Voltage, 0.1 V", nil, nil, VOLTS }
 local CURRENT = { "current_ca", "uint16", "Current, 0.01 A", nil, nil, AMPERES }
 local ACC_BIAS = { "acc_bias", "int16", "Bias of the accelerometer, 1/16384 g", nil, XYZ, G }
-local GYRO_BIAS = { "gyro_bias", "int16", "Bias of the gyroscope, 1/16.4 °/s", nil, XYZ, DEGREES_PER_S }
+local GYRO_BIAS = {
+    "gyro_bias", "int16", "Bias of the gyroscope, 1/16.4 °/s", nil, XYZ, DEGREES_PER_S,
+}
 local MAG_BIAS = { "mag_bias", "int16", "Bias of the magnetometer, sensor counts", nil, XYZ }
 local FIRMWARE = { "version", "uint16", "Version of the firmware" }
 
 -- The messages by id and length of the body (rulings U4, U5, U8). `from` is the sender.
 local MESSAGES = {
-    [1] = { [0] = { name = "ping", from = "host" }, [1] = { name = "pong", from = "robot", err(ERR) } },
+    [1] = {
+        [0] = { name = "ping", from = "host" },
+        [1] = { name = "pong", from = "robot", err(ERR) },
+    },
     [2] = { [16] = {
         name = "motor_control", from = "host",
         { "speed", "int16", "Speed, positive forward", " %" },
@@ -561,7 +572,7 @@ for _, by_len in pairs(MESSAGES) do
 end
 UCP["report.layout"] = ProtoField.string("axle_ucp.report.layout", "Layout")
 UCP["network_state.state_width"] = ProtoField.uint8(
-    "axle_ucp.network_state.state_width", "Width of the state", base.UNIT_STRING, { " byte", " bytes" })
+    "axle_ucp.network_state.state_width", "Width of the state", base.UNIT_STRING, BYTES)
 UCP["unknown.body"] = ProtoField.bytes("axle_ucp.unknown.body", "Body")
 UCP_EXPERTS.hazard = warning("axle_ucp", "hazard", "Hazard", "PROTOCOL", "ERROR")
 UCP_EXPERTS.battery = warning("axle_ucp", "battery", "Impossible charge", "PROTOCOL", "WARN")
@@ -575,6 +586,10 @@ end
 
 local function speed_in_words(rps)
     return ("%.2f rps"):format(rps)
+end
+
+local function warn(item, warning_of, form, ...)
+    item:add_proto_expert_info(warning_of, form:format(...))
 end
 
 local function show_ikeya(frame, range, item, kind)
@@ -613,20 +628,21 @@ local function show_ikeya(frame, range, item, kind)
         if not frame.mode then texts = { hex(values:raw()) } end
     end
     if is_odd and (not is_write or frame.mode == "velocity") then
-        item:add_proto_expert_info(IKEYA_EXPERTS.not_a_number, "The speed is no finite number (ruling I4)")
+        warn(item, IKEYA_EXPERTS.not_a_number, "The speed is no finite number (ruling I4)")
     end
     if frame.mode_before then
-        item:add_proto_expert_info(IKEYA_EXPERTS.mode_changed, ("Node %d was in %s mode before (ruling I11)")
-            :format(frame.node, frame.mode_before))
+        warn(item, IKEYA_EXPERTS.mode_changed,
+            "Node %d was in %s mode before (ruling I11)", frame.node, frame.mode_before)
     end
     if frame.is_late then
-        item:add_proto_expert_info(IKEYA_EXPERTS.late, ("Late answer: %d µs (ruling I7)"):format(frame.took))
+        warn(item, IKEYA_EXPERTS.late, "Late answer: %d µs (ruling I7)", frame.took)
     elseif frame.is_foreign then
-        item:add_proto_expert_info(IKEYA_EXPERTS.foreign, ("Node %d answered when node %d was asked in "
-            .. "packet %d (ruling I7)"):format(frame.node, frame.asked.node, frame.asked.number))
+        warn(item, IKEYA_EXPERTS.foreign,
+            "Node %d answered when node %d was asked in packet %d (ruling I7)",
+            frame.node, frame.asked.node, frame.asked.number)
     elseif frame.is_unasked then
-        item:add_proto_expert_info(IKEYA_EXPERTS.foreign,
-            ("Node %d answered, but no answer was due (ruling I7)"):format(frame.node))
+        warn(item, IKEYA_EXPERTS.foreign,
+            "Node %d answered, but no answer was due (ruling I7)", frame.node)
     end
     local values_text = #texts > 0 and ": " .. table.concat(texts, ", ") or ""
     return ("%s, node %d%s"):format(frame.name, frame.node, values_text)
@@ -676,7 +692,7 @@ local function show_ucp(frame, range, item)
         if value[1] == "state" then
             item:add(UCP["network_state.state_width"], body, body:len()):set_generated()
         elseif value[1] == "battery_pct" and body(0, 2):le_uint() > 100 then
-            item:add_proto_expert_info(UCP_EXPERTS.battery, "Battery above 100 % (ruling U5)")
+            warn(item, UCP_EXPERTS.battery, "Battery above 100 %% (ruling U5)")
         end
     end
     if message == UNKNOWN then
@@ -742,7 +758,7 @@ local function show_frame(event, packet, tvb, tree, view)
     elseif answer then
         item:add(fields.answer, answer.number):set_generated()
     elseif state.unanswered[event] or (ending and ending.unanswered[event]) then
-        item:add_proto_expert_info(experts.unanswered, "Not answered before the next request")
+        warn(item, experts.unanswered, "Not answered before the next request")
     end
     if event.is_echo then text = text .. " (echo)" end
     item:append_text(", " .. text)
@@ -784,15 +800,17 @@ local function show_gap(gap, packet, tvb, tree, view, is_open)
         if (gap.by[gap.reason] or 0) < length then
             for _, reason in ipairs(REASONS) do
                 local count = gap.by[reason]
-                if count then item:add(fields["reason_" .. reason], range, count):set_generated() end
+                if count then
+                    item:add(fields["reason_" .. reason], range, count):set_generated()
+                end
             end
         end
     end
     item:add_proto_expert_info(gap.by.crc and experts.bad_crc or experts.gap, text)
     local len = packet.line.kind.name == "ucp" and gap.by.length and too_long_frame(gap.bytes)
     if len then
-        item:add_proto_expert_info(experts.hazard,
-            ("A frame of length %d: above 60 it overruns shipped robots (ruling U13)"):format(len))
+        warn(item, experts.hazard,
+            "A frame of length %d: above 60 it overruns shipped robots (ruling U13)", len)
     end
     return text
 end
@@ -833,7 +851,10 @@ local function addresses(frame, kind)
 end
 
 local VIEWS = {
-    ikeya = { proto = ikeya, fields = IKEYA, experts = IKEYA_EXPERTS, show = show_ikeya, title = "Ikeya MD" },
+    ikeya = {
+        proto = ikeya, fields = IKEYA, experts = IKEYA_EXPERTS, show = show_ikeya,
+        title = "Ikeya MD",
+    },
     ucp = { proto = ucp, fields = UCP, experts = UCP_EXPERTS, show = show_ucp, title = "UCP" },
 }
 VIEWS["ikeya-3"] = VIEWS.ikeya
@@ -851,8 +872,7 @@ local function dissect(tvb, pinfo, tree)
         packet = take(key, kind, direction or "unknown", tvb:raw(), pinfo.number, micros)
     end
     local line, stream = packet.line, packet.stream
-    local base_view = VIEWS[kind.name]
-    local view = setmetatable({}, { __index = base_view })
+    local view = setmetatable({}, { __index = VIEWS[kind.name] })
     local shared, is_over = {}, pinfo.visited
     append_shared(shared, stream.events, packet.begin, packet.finish)
     if is_over then

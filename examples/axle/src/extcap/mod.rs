@@ -155,9 +155,10 @@ where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    let signals = Signals::listen()?;
     let line = Line::connect(port, baud)?;
+    // Waits for a reader; a signal ends the process then, because nothing listens yet.
     let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
+    let signals = Signals::listen()?;
     let (_, recorded) = record_line::<F>(line, file, None, &signals);
     recorded
 }
