@@ -36,7 +36,7 @@ DAMAGES = [
     ("IKEYA_BYTE = 20", "IKEYA_BYTE = 19"),
     ("frame.mode = state.modes[node]", "frame.mode = nil"),
     ("header == VELOCITY and \"velocity\" or \"position\"", "header == VELOCITY and \"position\" or \"velocity\""),
-    ("state.modes[node] ~= mode", "state.modes[node] == mode"),
+    ("known and known ~= mode", "known and known == mode"),
     ("asked.direction ~= frame.direction", "false"),
     ("if asked then state.unanswered[asked] = true end\n        state.has", "state.has"),
     ("line.kind.motors == 3", "line.kind.motors == 4"),
