@@ -79,13 +79,13 @@ fn link() -> Link {
 fn plan(millis: u32) -> Result<Option<MotorControl>, Box<dyn Error>> {
     Ok(Some(match millis {
         1000..3000 => MotorControl::turn_right(60, 0)?,
-        3000..5000 => MotorControl::turn_right(50, 40)?.with_front_led(true),
+        3000..5000 => MotorControl::turn_right(50, 60)?.with_front_led(true),
         5000..6500 => MotorControl::turn_right(90, 0)?.with_front_led(true),
         6500..8000 => MotorControl::turn_left(60, 30)?.with_front_led(true),
         8000..12_500 => MotorControl::turn_right(70, 0)?.with_front_led(true),
         12_500..14_000 => MotorControl::turn_left(45, 60)?,
         14_000..15_200 => MotorControl::turn_right(-40, 0)?,
-        15_200..16_500 => MotorControl::turn_right(0, 50)?,
+        15_200..16_500 => MotorControl::turn_right(0, 75)?,
         _ => return Ok(None),
     }))
 }

@@ -37,7 +37,7 @@ pub(crate) fn story() -> Result<Vec<u8>, Box<dyn Error>> {
         let now = bus.now();
         let master = bus.head_mut();
         match millis {
-            400..9000 if millis % 200 == 0 => command(master, millis, now)?,
+            400..9000 if millis.is_multiple_of(200) => command(master, millis, now)?,
             9000 => master.stop_all(now),
             _ => {}
         }
