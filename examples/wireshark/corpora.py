@@ -181,11 +181,12 @@ def of_story():
         (OUT, bus(read, 2), 1000), (IN, rps(speed, 2, 0.0), 20_240),       # just in time
         (OUT, bus(read, 2), 1000), (IN, rps(speed, 2, 0.0), 20_241),       # late
         (OUT, bus(read, 3), 1000), (IN, rps(speed, 1, 1.5), 500),          # another node
-        (IN, bus(position, 3, struct.pack("<hh", 5, -2)), 100),            # and the one that was asked
-        (IN, bus(position, 3, struct.pack("<hh", 5, -2)), 100),            # once more
+        (IN, bus(position, 3, struct.pack("<hh", 5, -2)), 100),  # and the one that was asked
+        (IN, bus(position, 3, struct.pack("<hh", 5, -2)), 100),  # once more
         (OUT, bus(read, 4), 1000), (OUT, bus(read, 4), 30_000),            # not answered, repeated
         (IN, bus(read, 4), 50), (IN, rps(speed, 4, -0.25), 300),           # an echo
-        (OUT, rps(write, 1, 2.0), 100), (OUT, rps(write, 3, 2.0), 100), (OUT, rps(write, 7, 2.0), 100),
+        (OUT, rps(write, 1, 2.0), 100), (OUT, rps(write, 3, 2.0), 100),
+        (OUT, rps(write, 7, 2.0), 100),
         (OUT, bus(read, 1), 100), (IN, bus(position, 1, b"\1\0\2\0"), 300),  # the mode has changed
         (OUT, rps(write, 4, float("nan")), 100), (IN, rps(speed, 5, float("inf")), 100),
         (IN, bus(speed, 9, bytes(4)), 100), (IN, rps(speed, 6, float("-inf"))[:-1], 100),
@@ -201,7 +202,8 @@ def of_story():
         file.packet(three, packet, way, step)
     rover = file.interface("ucp", "/dev/ttyACM0")
     report = struct.pack("<H13hBBHH", 250, *range(-6, 7), 12, 119, 204, 38)
-    motor = lambda speed, angular, version=0: struct.pack("<4hHHI", speed, angular, 100, 0, version, 0, 0)
+    def motor(speed, angular, version=0):
+        return struct.pack("<4hHHI", speed, angular, 100, 0, version, 0, 0)
     for way, frame, step in [
         (IN, ucp(8), 100), (OUT, ucp(8, bytes(range(19))), 2_000),
         (OUT, ucp(1, index=1), 100), (OUT, ucp(1, index=2), 900_000), (IN, ucp(1, b"\0"), 1_500),
@@ -213,7 +215,8 @@ def of_story():
         (OUT, ucp(2, motor(100, -100)), 10), (OUT, ucp(2, motor(101, 0)), 10),
         (OUT, ucp(2, motor(0, -101)), 10), (OUT, ucp(2, motor(0, 0, 38)), 10),
         (OUT, ucp(2, motor(0, 0, 39)), 10), (OUT, ucp(2, motor(0, 0, 32768)), 10),
-        (OUT, ucp(2, bytes(15)), 10), (OUT, ucp(0x0A, b"\3"), 10), (OUT, ucp(0x0A, b"\4\0\0\1"), 10),
+        (OUT, ucp(2, bytes(15)), 10), (OUT, ucp(0x0A, b"\3"), 10),
+        (OUT, ucp(0x0A, b"\4\0\0\1"), 10),
         (OUT, ucp(0x42, b"hello"), 10), (OUT, ucp(0x42), 10), (OUT, ucp(0x42, bytes(56)), 10),
         (OUT, ucp(0x42, bytes(57)), 10), (OUT, ucp(1, index=255), 10),
         (OUT, b"\xFD\xFF\3\0", 10), (IN, b"\xFD", 10), (IN, ucp(1, b"\0")[:-1], 10),
