@@ -779,6 +779,11 @@ local function too_long_frame(bytes)
     end
 end
 
+local function warn_of_gap(gap, item, view, text)
+    local experts = view.experts
+    item:add_proto_expert_info(gap.by.crc and experts.bad_crc or experts.gap, text)
+end
+
 -- The gap that ends in this packet, or the one that is still open.
 local function show_gap(gap, packet, tvb, tree, view, is_open)
     local fields, experts = view.fields, view.experts
@@ -806,7 +811,7 @@ local function show_gap(gap, packet, tvb, tree, view, is_open)
             end
         end
     end
-    item:add_proto_expert_info(gap.by.crc and experts.bad_crc or experts.gap, text)
+    warn_of_gap(gap, item, view, text)
     local len = packet.line.kind.name == "ucp" and gap.by.length and too_long_frame(gap.bytes)
     if len then
         warn(item, experts.hazard,
@@ -824,6 +829,7 @@ local function show_part(event, packet, tvb, tree, view)
     item:add(view.fields.ends_in, range, event.number):set_generated()
     local text = ("%d of %d bytes of a %s"):format(range:len(), event.finish - event.begin, what)
     item:append_text(", " .. text)
+    if event.reason then warn_of_gap(event, item, view, text) end
     return text
 end
 
