@@ -6,8 +6,8 @@
 -- bytes, decoded as `axle decode` does it, and the fields are those of `axle decode --json`.
 --
 -- The first pass over a capture knows only what has been read so far: an open gap is shown "so
--- far". Once a packet is shown again, as in a window or with `tshark -2`, the end of what has been
--- read counts as the end of the capture.
+-- far". Once a packet is shown again, as in a window or with `tshark -2 -R frame`, the end of what
+-- has been read counts as the end of the capture.
 --
 -- Parts, from the top: checksum, framings, streams, lines (modes, requests and answers), fields,
 -- and what a packet shows. Runs with Lua 5.2 to 5.4: no operators on bits.
@@ -717,6 +717,8 @@ local function clock_of(port)
     local name = port and port:lower() or ""
     if name:find("usb") or name:find("acm") then
         return "the machine behind the USB adapter: up to 16 ms are the adapter's"
+    elseif name:find("^tcp:") then
+        return "the recording machine: the time of the network is in it"
     elseif name:find("pts/") then
         return "the recording machine, on a pseudo-terminal: no wire, no adapter"
     end
@@ -876,6 +878,7 @@ local function dissect(tvb, pinfo, tree)
         local direction = ({ [P2P_DIR_RECV] = "in", [P2P_DIR_SENT] = "out" })[pinfo.p2p_dir]
         local micros = math.floor(pinfo.abs_ts * 1e6 + 0.5)
         packet = take(key, kind, direction or "unknown", tvb:raw(), pinfo.number, micros)
+        packet.is_blind = not interface
     end
     local line, stream = packet.line, packet.stream
     local view = setmetatable({}, { __index = VIEWS[kind.name] })
@@ -902,6 +905,11 @@ local function dissect(tvb, pinfo, tree)
     if not is_over and #stream.held > 0 and stream.offset < packet.finish then
         texts[#texts + 1] = show_pending(packet, tvb, tree, view)
     end
+    -- The first pass of `tshark -2` knows no interfaces without `-R frame`.
+    local interface = packet.is_blind and interface_id()
+    if interface and interface.value > 0 then
+        texts[#texts + 1] = "decoded as if there were one interface only: use tshark -R frame"
+    end
     pinfo.cols.protocol = view.title
     pinfo.cols.info = table.concat(texts, "; ")
     return tvb:len()
@@ -914,10 +922,3 @@ local encapsulations = DissectorTable.get("wtap_encap")
 encapsulations:add(wtap.USER0, ikeya)
 encapsulations:add(wtap.USER1, ikeya)
 encapsulations:add(wtap.USER3, ucp)
-
--- Only with a tree in the first pass does a window know the interfaces, of which each has streams
--- of its own. `tshark -2` needs `-R frame` for that.
-if gui_enabled() then
-    local tap = Listener.new("frame", "axle_ikeya or axle_ucp")
-    function tap.packet() end
-end

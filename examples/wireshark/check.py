@@ -296,6 +296,22 @@ def problem_with(user, captures, script):
     return "NOT FOUND"
 
 
+def check_one_pass(user, captures, comparison):
+    """A first pass shows the frames as they come. A second one tells if the first knew no
+    interfaces."""
+    path, _, rows = captures["vectors"]
+    frames = sum(row["event"] == "frame" for row in rows)
+    shown, _ = shown_by_tshark(user, path, options=())
+    found = sum("message" in item.fields for item in shown)
+    if found != frames:
+        comparison.differ("one pass", f"{found} frames instead of {frames}")
+    path, _, _ = captures["noise-1"]
+    command = ["tshark", "-2", "-r", path, "-T", "fields", "-e", "_ws.col.Info"]
+    told = user.run(command).decode().count("as if there were one interface only")
+    if told < 100:
+        comparison.differ("without -R frame", f"told of {told} packets")
+
+
 def check_live(user, comparison):
     """Captures live lines, and compares what was captured. Returns the number of packets."""
     axle = user.home / "axle"
@@ -335,6 +351,7 @@ def main():
         install = ["bash", HERE / "install.sh", "--to", user.home, "--axle", axle]
         subprocess.run(install, check=True, stdout=subprocess.DEVNULL)
         found = check_captures(user, captures)
+        check_one_pass(user, captures, found)
         packets = check_live(user, found)
         if found.values < LEAST_VALUES:
             found.differ("check", f"only {found.values} values were compared")
