@@ -683,8 +683,8 @@ local function show_ucp(frame, range, item)
             local number = value[2] == "int16" and bytes:le_int() or bytes:le_uint()
             local shown = item:add_le(ucp_field(message, value, part), bytes)
             if in_words then shown:append_text(" (" .. in_words(number) .. ")") end
-            if type(words) == "table" then number = words[number] or number end
-            numbers[#numbers + 1] = in_words and in_words(number) or tostring(number)
+            local text = in_words and in_words(number) or ("%d"):format(number)
+            numbers[#numbers + 1] = type(words) == "table" and words[number] or text
             at = at + width
         end
         local unit = type(words) == "string" and words or ""

@@ -17,6 +17,7 @@ import argparse
 import json
 import os
 import pwd
+import re
 import shutil
 import subprocess
 import sys
@@ -312,6 +313,19 @@ def check_one_pass(user, captures, comparison):
         comparison.differ("without -R frame", f"told of {told} packets")
 
 
+def check_filters(user, captures, comparison):
+    """Each filter of README.md finds something in one of the captures."""
+    filters = re.findall(r"^\| `(.*?)` \|", (HERE / "README.md").read_text(), re.MULTILINE)
+    for wanted in filters:
+        found = b""
+        for path, _, _ in captures.values():
+            found = found or user.run(["tshark", "-2", "-R", "frame", "-r", path, "-Y", wanted])
+        if not found:
+            comparison.differ("README.md", f"nothing for the filter {wanted}")
+    if len(filters) < 8:
+        comparison.differ("README.md", f"only {len(filters)} filters")
+
+
 def check_live(user, comparison):
     """Captures live lines, and compares what was captured. Returns the number of packets."""
     axle = user.home / "axle"
@@ -352,6 +366,7 @@ def main():
         subprocess.run(install, check=True, stdout=subprocess.DEVNULL)
         found = check_captures(user, captures)
         check_one_pass(user, captures, found)
+        check_filters(user, captures, found)
         packets = check_live(user, found)
         if found.values < LEAST_VALUES:
             found.differ("check", f"only {found.values} values were compared")

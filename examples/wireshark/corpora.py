@@ -201,7 +201,7 @@ def of_story():
     ]:
         file.packet(three, packet, way, step)
     rover = file.interface("ucp", "/dev/ttyACM0")
-    report = struct.pack("<H13hBBHH", 250, *range(-6, 7), 12, 119, 204, 38)
+    report = struct.pack("<H13hBBHH", 200, *range(-6, 7), 12, 119, 204, 38)
     def motor(speed, angular, version=0):
         return struct.pack("<4hHHI", speed, angular, 100, 0, version, 0, 0)
     for way, frame, step in [
@@ -212,6 +212,7 @@ def of_story():
         (IN, ucp(7, bytes(6)), 10), (OUT, ucp(7, b"\0"), 20), (OUT, ucp(9, b"\x27\0"), 10),
         (IN, ucp(9, b"\2"), 400_000), (IN, ucp(1, b"\1"), 10),
         (IN, ucp(5, report, 9), 100), (OUT, ucp(5, report, 9), 100), (IN, ucp(5, report[2:]), 100),
+        (IN, ucp(5, b"\x0C\0" + report[2:]), 100),
         (OUT, ucp(2, motor(100, -100)), 10), (OUT, ucp(2, motor(101, 0)), 10),
         (OUT, ucp(2, motor(0, -101)), 10), (OUT, ucp(2, motor(0, 0, 38)), 10),
         (OUT, ucp(2, motor(0, 0, 39)), 10), (OUT, ucp(2, motor(0, 0, 32768)), 10),

@@ -79,7 +79,7 @@ DAMAGES = [
     ("math.abs(angular) > 100", "angular > 100"),
     ("message.name == \"report\" and frame.direction == \"out\"", "message.name == \"report\" and frame.direction == \"in\""),
     ("elseif message == UNKNOWN and MESSAGES", "elseif message == UNKNOWN and not MESSAGES"),
-    ("body(0, 2):le_uint() > 100", "body(0, 2):le_uint() > 255"),
+    ("body(0, 2):le_uint() > 100", "body(0, 2):le_uint() > 200"),
     ("is_odd or rps ~= rps or", "is_odd or"),
     ("math.abs(rps) == math.huge", "rps == math.huge"),
     ("experts.unanswered, \"Not", "experts.gap, \"Not"),
