@@ -66,15 +66,15 @@ pub(crate) struct Args {
     extcap_capture_filter: Option<String>,
 
     /// The port, for the interface `axle`: such as /dev/ttyUSB0 or COM3; or tcp:HOST:PORT
-    #[arg(long, value_name = "PATH")]
+    #[arg(short, long, value_name = "PATH")]
     port: Option<String>,
 
     /// Line speed, bit/s; 0 is that of the protocol
-    #[arg(long, default_value_t = 0)]
+    #[arg(short, long, default_value_t = 0)]
     baud: u32,
 
     /// Protocol of the line
-    #[arg(long, value_enum)]
+    #[arg(short = 'P', long, value_enum)]
     protocol: Option<Protocol>,
 }
 
