@@ -314,16 +314,17 @@ def check_one_pass(user, captures, comparison):
 
 
 def check_filters(user, captures, comparison):
-    """Each filter of README.md finds something in one of the captures."""
+    """Each filter of README.md and of the colours finds something in one of the captures."""
     filters = re.findall(r"^\| `(.*?)` \|", (HERE / "README.md").read_text(), re.MULTILINE)
+    filters += re.findall(r"^@.*?@(.*?)@", (HERE / "colours").read_text(), re.MULTILINE)
     for wanted in filters:
         found = b""
         for path, _, _ in captures.values():
             found = found or user.run(["tshark", "-2", "-R", "frame", "-r", path, "-Y", wanted])
         if not found:
-            comparison.differ("README.md", f"nothing for the filter {wanted}")
-    if len(filters) < 8:
-        comparison.differ("README.md", f"only {len(filters)} filters")
+            comparison.differ("filters", f"nothing is found by {wanted}")
+    if len(filters) < 12:
+        comparison.differ("filters", f"only {len(filters)} filters")
 
 
 def check_live(user, comparison):
