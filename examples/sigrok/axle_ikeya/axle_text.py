@@ -70,7 +70,8 @@ def shortest_digits(value):
         fits = [number for number in (floor, floor + 1) if number > 0 and
                 (low <= number * unit <= high if is_even else low < number * unit < high)]
         if fits:
-            number = str(min(fits, key=lambda number: abs(number * unit - exact)))
+            # From the middle up.
+            number = str(min(fits, key=lambda number: (abs(number * unit - exact), -number)))
             digits = number.rstrip("0")
             return digits, power + len(number) - len(digits)
         power -= 1
