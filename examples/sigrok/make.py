@@ -10,6 +10,7 @@ is deterministic.
 
 import json
 import os
+import struct
 import sys
 import zipfile
 from pathlib import Path
@@ -103,3 +104,112 @@ def ucp(number, body, index=0):
 
 def read(node):
     return sealed("aa%02x" % node)
+
+
+def answer(node, rps):
+    return sealed("55%02x" % node + struct.pack("<f", rps).hex())
+
+
+def motors():
+    """A master and three motors. The master writes a NaN; the second motor answers late; the third
+    damages an answer, and later loses its plug for a while."""
+    master, slaves = Line(IKEYA_BAUD), Line(IKEYA_BAUD)
+    at = micros(280)
+    for cycle in range(9):
+        for node, time in ((1, 21.4), (2, 63.0 - 5 * cycle), (3, 24.8)):
+            is_first = cycle == 0
+            for attempt in range(2 if is_first and node == 3 else 1):
+                at = master.send(read(node), at + micros(30))
+                reply = bytearray(answer(node, 0.25 * cycle + 0.5))
+                if is_first and node == 3 and attempt == 0:
+                    reply[4] ^= 0x10
+                if node == 3 and 3 <= cycle <= 5:
+                    at += micros(500)
+                else:
+                    at = slaves.send(reply, at + micros(time))
+            if cycle % 3 == 0:
+                speed = float("nan") if is_first and node == 1 else 2.5
+                at = master.send(sealed("bb%02x" % node + struct.pack("<f", speed).hex()),
+                                 at + micros(30))
+    return master, slaves
+
+
+def rover():
+    """A host and its rover: pings, commands, reports, one of them damaged, and hazards."""
+    host, robot = Line(UCP_BAUD), Line(UCP_BAUD)
+    reports = [frame for frame in vectors("ucp") if frame[4] == 5 and len(frame) == 44]
+    at = micros(2000)
+    for number in range(6):
+        report = bytearray(reports[1 + number % 3])
+        report[5] = number
+        report[-2:] = crc(report[:-2])
+        if number == 2:
+            report[20] ^= 0x04
+        robot.send(report, at)
+        speed = 20 * number
+        # From 101 % on it is out of range; the last one would start an update.
+        command = struct.pack("<hhhhHHI", speed + 1 if number == 5 else speed, -10, 100, 0,
+                              39 if number == 4 else 0, 0, 0)
+        end = host.send(ucp(2, command, number), at + micros(5000))
+        if number % 2 == 0:
+            end = host.send(ucp(1, b"", number), end + micros(300))
+            robot.send(ucp(1, b"\0"), end + micros(350 + 200 * number))
+        at += micros(20_000)
+    return host, robot
+
+
+# Width of a window.
+PIXELS = 1300
+
+# What `demo` makes: the lines, the decoder and the time to be seen first, µs.
+DEMOS = {
+    "demo": (motors, "axle_ikeya", IKEYA_BAUD, 1750),
+    "rover": (rover, "axle_ucp", UCP_BAUD, 14_000),
+}
+
+
+def demo(path):
+    """Writes a capture to look at, and a set-up for PulseView beside it."""
+    path = Path(path)
+    if path.suffix != ".sr" or path.stem not in DEMOS:
+        sys.exit("make.py: not one of " + ", ".join(name + ".sr" for name in DEMOS))
+    lines, decoder, baud, seen = DEMOS[path.stem]
+    lines = lines()
+    end = max(line.places[-1][1] for line in lines)
+    write(path, ["TX", "RX"], lines, int(end + micros(25_000)))
+    beside = path.with_suffix(".part")
+    beside.write_text(setup(decoder, baud, seen))
+    os.replace(beside, path.with_suffix(".pvs"))
+
+
+def setup(decoder, baud, seen):
+    """The set-up of PulseView that it restores with a capture of the same name: the two wires, the
+    decoders, their settings, and what is in view."""
+    lines = ["[General]", "decode_signals=1", "generated_signals=0", "views=1"]
+    bytes_of_baud = "".join("\\x%02x" % byte for byte in baud.to_bytes(8, "little"))
+    signal = {
+        "name": decoder, "enabled": "true", "decoders": 2, "channels": 2,
+        "decoder0\\id": "uart", "decoder0\\visible": "true", "decoder0\\options": 1,
+        "decoder0\\option0\\name": "baudrate", "decoder0\\option0\\type": "x",
+        "decoder0\\option0\\value": '"@ByteArray(%s)"' % bytes_of_baud,
+        "decoder0\\row0\\visible": "false", "decoder0\\row5\\visible": "false",
+        "decoder1\\id": decoder, "decoder1\\visible": "true", "decoder1\\options": 0,
+        "channel0\\name": "RX", "channel0\\initial_pin_state": 2,
+        "channel0\\assigned_signal_name": "RX",
+        "channel1\\name": "TX", "channel1\\initial_pin_state": 2,
+        "channel1\\assigned_signal_name": "TX",
+    }
+    lines += ["", "[decode_signal0]"] + ["%s=%s" % item for item in signal.items()]
+    # Seconds per pixel.
+    lines += ["", "[view0]", "scale=%g" % (seen / 1e6 / PIXELS)]
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    demo(sys.argv[1])
+
+
+if __name__ == "__main__":
+    main()

@@ -207,7 +207,6 @@ class WireDecoder(srd.Decoder):
             self.quiet(wire, es)
 
     def byte(self, wire, byte):
-        self.quiet(wire, byte.ss)
         search = self.searches.get(wire)
         if search is None:
             search = self.searches[wire] = Search(self.judge)

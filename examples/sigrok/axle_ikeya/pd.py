@@ -200,7 +200,8 @@ class Decoder(WireDecoder):
             kind, verdict = "late", "after the master's timeout of %d µs (I7)" % timeout
             in_time = False
         text = "node %d: %s, %s" % (node, time, verdict)
-        self.note(kind, ss, max(es, ss + 1), [text, "node %d: %s" % (node, time), time])
+        self.note(kind, ss, max(es, ss + 1),
+                  [text, "node %d: %s" % (node, time), time, "%d" % round(micros)])
         if in_time:
             self.strikes[node] = 0
         else:
