@@ -3,9 +3,15 @@
 
     examples/sigrok/make.py demo.sr        motors on a bus: late, missing and damaged answers
     examples/sigrok/make.py rover.sr       a rover's link: pings, reports, hazards
+    examples/sigrok/make.py CAPTURE.pcapng OUT.sr [FROM TO]
+                                           what `axle` has recorded, or some seconds of it
 
-Both have the wires TX (master or host) and RX. The frames are those of tests/vectors; the result
-is deterministic.
+All have the wires TX, of the master or host or of the program that has recorded, and RX. Beside the
+capture lies a set-up for PulseView with the decoders (.pvs). The first two are always the same.
+
+A recording has the time at which a program had got the last byte of a chunk, not the edges on a
+wire: each chunk is drawn so that it ends at its time, or later if its wire is still busy. Response
+times are then those of the program, its machine and its adapter.
 """
 
 import json
@@ -174,15 +180,103 @@ def demo(path):
     if path.suffix != ".sr" or path.stem not in DEMOS:
         sys.exit("make.py: not one of " + ", ".join(name + ".sr" for name in DEMOS))
     lines, decoder, baud, seen = DEMOS[path.stem]
-    lines = lines()
-    end = max(line.places[-1][1] for line in lines)
+    put(path, lines(), setup(decoder, baud, seen, {}))
+
+
+def put(path, lines, text):
+    """Writes the capture, and the set-up beside it."""
+    path = Path(path)
+    end = max(line.places[-1][1] for line in lines if line.places)
     write(path, ["TX", "RX"], lines, int(end + micros(25_000)))
     beside = path.with_suffix(".part")
-    beside.write_text(setup(decoder, baud, seen))
+    beside.write_text(text)
     os.replace(beside, path.with_suffix(".pvs"))
 
 
-def setup(decoder, baud, seen):
+class Unusable(Exception):
+    """A recording that cannot be drawn."""
+
+
+# Longest part of a recording that is drawn, seconds: five million samples each.
+MOST_SECONDS = 20
+
+# By the description that `axle record` gives an interface: decoder and its options.
+PROTOCOLS = {
+    "ikeya": ("axle_ikeya", {}),
+    "ikeya-3": ("axle_ikeya", {"boards": "three"}),
+    "ucp": ("axle_ucp", {}),
+}
+
+
+def recording(path, out, begin, end):
+    """Draws the first line of a pcapng file."""
+    data = Path(path).read_bytes()
+    interface, packets = first_line(data)
+    name = interface.get(3, b"").decode(errors="replace")
+    if name not in PROTOCOLS or len(interface.get(8, b"")) != 8:
+        raise Unusable("not a line that axle has recorded: " + (name or "no protocol"))
+    baud = int.from_bytes(interface[8], "little")
+    if not 300 <= baud <= SAMPLE_RATE // 5:
+        raise Unusable("%d bit/s cannot be drawn at 5 MHz" % baud)
+    if not packets:
+        raise Unusable("no packet")
+    start = packets[0][0]
+    last = (max(time for time, _, _ in packets) - start) / 1e6
+    begin, end = begin or 0.0, last + 0.001 if end is None else end
+    if end - begin > MOST_SECONDS:
+        raise Unusable("longer than %d s: choose a part by FROM and TO, seconds" % MOST_SECONDS)
+    lines, free = {True: Line(baud), False: Line(baud)}, {True: 0.0, False: 0.0}
+    # Room for the first chunk, which ends at its time.
+    lead = 0.002 - begin
+    for time, is_sent, chunk in packets:
+        seconds = (time - start) / 1e6
+        if begin <= seconds <= end:
+            at = (seconds + lead) * SAMPLE_RATE - len(chunk) * BITS * SAMPLE_RATE / baud
+            free[is_sent] = lines[is_sent].send(chunk, max(at, free[is_sent], 0.0))
+    if not any(line.places for line in lines.values()):
+        raise Unusable("nothing is in this part")
+    decoder, options = PROTOCOLS[name]
+    put(out, [lines[True], lines[False]], setup(decoder, baud, 2000, options))
+
+
+def first_line(data):
+    """The options of the first interface, and its packets: time, whether sent, bytes."""
+    if data[:4] != b"\x0a\x0d\x0d\x0a" or data[8:12] != b"\x4d\x3c\x2b\x1a":
+        raise Unusable("not pcapng as axle writes it")
+    at, interface, packets = 0, None, []
+    while at + 12 <= len(data):
+        kind, length = struct.unpack_from("<II", data, at)
+        body = data[at + 8:at + length - 4]
+        if length < 12 or at + length > len(data):
+            # Cut off: what is before counts.
+            break
+        if kind == 1 and interface is None:
+            interface = options_of(body[8:])
+            if interface.get(9) != b"\x06":
+                raise Unusable("its times are not in microseconds")
+        elif kind == 6 and len(body) >= 20:
+            number, high, low, held = struct.unpack_from("<IIII", body)
+            flags = options_of(body[20 + (held + 3) // 4 * 4:]).get(2, b"\0")
+            if number == 0:
+                packets.append((high << 32 | low, flags[0] & 3 == 2, body[20:20 + held]))
+        at += length
+    if interface is None:
+        raise Unusable("no interface")
+    return interface, packets
+
+
+def options_of(data):
+    found, at = {}, 0
+    while at + 4 <= len(data):
+        code, length = struct.unpack_from("<HH", data, at)
+        if code == 0:
+            break
+        found[code] = data[at + 4:at + 4 + length]
+        at += 4 + (length + 3) // 4 * 4
+    return found
+
+
+def setup(decoder, baud, seen, options):
     """The set-up of PulseView that it restores with a capture of the same name: the two wires, the
     decoders, their settings, and what is in view."""
     lines = ["[General]", "decode_signals=1", "generated_signals=0", "views=1"]
@@ -193,12 +287,16 @@ def setup(decoder, baud, seen):
         "decoder0\\option0\\name": "baudrate", "decoder0\\option0\\type": "x",
         "decoder0\\option0\\value": '"@ByteArray(%s)"' % bytes_of_baud,
         "decoder0\\row0\\visible": "false", "decoder0\\row5\\visible": "false",
-        "decoder1\\id": decoder, "decoder1\\visible": "true", "decoder1\\options": 0,
+        "decoder1\\id": decoder, "decoder1\\visible": "true", "decoder1\\options": len(options),
         "channel0\\name": "RX", "channel0\\initial_pin_state": 2,
         "channel0\\assigned_signal_name": "RX",
         "channel1\\name": "TX", "channel1\\initial_pin_state": 2,
         "channel1\\assigned_signal_name": "TX",
     }
+    for number, (name, value) in enumerate(options.items()):
+        group = "decoder1\\option%d\\" % number
+        signal |= {group + "name": name, group + "type": "s",
+                   group + "value": '"@ByteArray(%s\\0)"' % value}
     lines += ["", "[decode_signal0]"] + ["%s=%s" % item for item in signal.items()]
     # Seconds per pixel.
     lines += ["", "[view0]", "scale=%g" % (seen / 1e6 / PIXELS)]
@@ -206,9 +304,17 @@ def setup(decoder, baud, seen):
 
 
 def main():
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    demo(sys.argv[1])
+    arguments = sys.argv[1:]
+    try:
+        if len(arguments) == 1:
+            demo(arguments[0])
+        elif len(arguments) in (2, 4) and arguments[1].endswith(".sr"):
+            recording(arguments[0], arguments[1], *map(float, arguments[2:] or (0,)),
+                      *([] if arguments[2:] else [None]))
+        else:
+            sys.exit(__doc__.strip())
+    except (OSError, Unusable, ValueError) as problem:
+        sys.exit("make.py: %s: %s" % (arguments[0], problem))
 
 
 if __name__ == "__main__":
