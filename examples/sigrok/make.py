@@ -314,7 +314,7 @@ def main():
         else:
             sys.exit(__doc__.strip())
     except (OSError, Unusable, ValueError) as problem:
-        sys.exit("make.py: %s: %s" % (arguments[0], problem))
+        sys.exit("make.py: %s: %s" % (arguments[0], getattr(problem, "strerror", None) or problem))
 
 
 if __name__ == "__main__":
