@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Compares the sigrok decoders with `axle decode`, on captures that `make.py` renders.
 
-    examples/sigrok/check.py AXLE              AXLE is the program; silent if all is well
-    examples/sigrok/check.py AXLE --planted    damages the decoders in many ways, and sees each found
+    examples/sigrok/check.py AXLE              AXLE is the program; prints what was compared
+    examples/sigrok/check.py AXLE --planted    damages the decoders, too, and sees each damage found
 
 Of the same bytes, every packet, value, byte and gap must be that of `axle decode`, in its place in
 time. Response times must be those that were put there, to within a bit time. Each hazard must give
@@ -238,6 +238,9 @@ class Cases:
             if count == 2 or time >= 0:
                 story.asks(read(node)).answers(sealed("55%02x" % node + speed.hex()), time)
                 story.says(judged(node, time))
+        story.asks(read(2)).asks(read(3)).says(("missing", None, "node 2: no answer"))
+        # Nothing follows but silence.
+        story.says(("missing", None, "node 3: no answer"))
         return story.case(self, "times-%d" % count, "ikeya")
 
     def rover_times(self):
@@ -878,6 +881,8 @@ DAMAGES = (
     (WIRE, '"little", signed=True', '"big", signed=True'),
     (WIRE, '"little", signed=True', '"little"'),
     # Times and silence.
+    (NODE, "            self.give_up(None)\n", "            pass\n"),
+    (NODE, "and self.open.es <= since", "and self.open.es < 0"),
     (WIRE, "samples * 1e6", "samples * 1e5"),
     (WIRE, "micros / 1e3", "micros / 1e2"),
     (WIRE, "            self.quiet(wire, es)\n", "            pass\n"),

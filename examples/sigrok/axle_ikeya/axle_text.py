@@ -8,7 +8,7 @@ COUNTS_PER_TURN = 8192
 
 
 def fixed(is_negative, magnitude, decimals, width=0):
-    """`magnitude` / 10^`decimals`, aligned right. The sign is kept for a number that rounds to 0."""
+    """`magnitude` / 10^`decimals`, aligned right. A number that rounds to 0 has a sign."""
     text = "%d" % (magnitude // 10**decimals)
     if decimals:
         text += ".%0*d" % (decimals, magnitude % 10**decimals)

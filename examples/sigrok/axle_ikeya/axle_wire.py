@@ -216,10 +216,14 @@ class WireDecoder(srd.Decoder):
         """Ends what is open on a wire if it has been silent for long."""
         search = self.searches.get(wire)
         limit = self.options["silence_ms"]
-        if search is None or limit <= 0 or not search.is_open():
+        if search is None or limit <= 0 or self.micros(until - search.end) < limit * 1e3:
             return
-        if self.micros(until - search.end) >= limit * 1e3:
+        if search.is_open():
             self.show(wire, search.idle())
+        self.silent(search.end)
+
+    def silent(self, since):
+        """A wire has long been silent, since this sample."""
 
     def end(self):
         """Nothing follows. Called by versions of libsigrokdecode that know the end of a capture."""

@@ -150,6 +150,11 @@ class Decoder(WireDecoder):
         if is_answered:
             self.open = Request(node, frame, NAMES[header], wire)
 
+    def silent(self, since):
+        """No answer comes to a request from before."""
+        if self.open is not None and self.open.es <= since:
+            self.give_up(None)
+
     def give_up(self, until):
         request, self.open = self.open, None
         if request is None:

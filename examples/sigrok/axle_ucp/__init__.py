@@ -1,5 +1,5 @@
 """
-UCP: the serial link between the Linux board and the motor board of a rover, 115200 bit/s (axlewire).
+UCP: the link between the Linux board and the motor board of a rover, 115200 bit/s (axlewire).
 
 Messages, values with units, gaps, response times and hazards. The frames and gaps are those of
 `axle decode`. Needs the folder `axle_ikeya` beside this one.
