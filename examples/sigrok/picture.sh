@@ -17,7 +17,8 @@ if [ "${2:-}" != inside ]; then
     exec xvfb-run -a -s "-screen 0 1500x500x24" bash ./picture.sh "$out" inside
 fi
 scratch=$(mktemp -d)
-trap 'kill $viewer 2>/dev/null || true; wait 2>/dev/null || true; rm -r "$scratch"' EXIT
+viewer=
+trap '[ -z "$viewer" ] || { kill "$viewer" || true; wait || true; }; rm -r "$scratch"' EXIT
 mkdir -p "$scratch/home" "$scratch/run" "$scratch/decoders"
 chmod 700 "$scratch/run"
 cp -r axle_ikeya axle_ucp "$scratch/decoders"
