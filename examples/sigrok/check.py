@@ -41,6 +41,8 @@ class Wrong(Exception):
 def main():
     if len(sys.argv) < 2 or sys.argv[2:] not in ([], ["--planted"]):
         sys.exit(__doc__.split("\n\n")[1])
+    if not Path(sys.argv[1]).is_file():
+        sys.exit("check.py: no such program: " + sys.argv[1])
     if not shutil.which("sigrok-cli"):
         sys.exit("sigrok-cli is missing: install the Debian packages sigrok-cli and libsigrokdecode4")
     with tempfile.TemporaryDirectory(prefix="axle-sigrok-") as scratch:
@@ -505,6 +507,7 @@ HAZARDS = {
         (ucp(0x20, b"\1\xfd\xff\2"), ["another FD FF inside: robots may take it for a frame (U13)"]),
         (b"\xfd\xff\x3d\0" + bytes(6), [LENGTH]),
         (b"\xfd\xff\0\0", [LENGTH]),
+        (b"\xfd\xff\3\0" + bytes(6), [LENGTH]),
         (b"\xfd\xff\4\1", [LENGTH]),
         (b"\xfd\0", []),
     ),
@@ -530,6 +533,8 @@ HAZARDS = {
         (read(5) + answer(5, 0.0), []),
         (read(5) + read(5) + read(5) + answer(5, 0.0), []),
         (sealed("bb050000803f") + answer(5, 0.0), [UNASKED % 5]),
+        (3 * read(7) + answer(7, 0.0), []),
+        (2 * read(7) + answer(7, 0.0), []),
     ),
 }
 
@@ -592,7 +597,8 @@ def values_of_ikeya():
     for _ in range(100):
         position = chance.getrandbits(32).to_bytes(4, "little").hex()
         out += [sealed("5603" + position), sealed("bb03" + position)]
-    edges = [(0, 0), (-1, 0), (4096, 0), (-8192, 1), (32767, 32767), (-32768, -32768), (1, -1)]
+    # 256 and 768 counts are halves of a ten-thousandth of a turn, which round to even.
+    edges = [(256, 0), (768, 0), (-256, 0), (0, 0), (-1, 0), (4096, 0), (-8192, 1), (32767, 32767), (-32768, -32768), (1, -1)]
     out += [sealed("5603" + struct.pack("<hh", *edge).hex()) for edge in edges]
     return b"".join(out)
 
@@ -611,7 +617,7 @@ def values_of_ucp():
     for front in (0, 100, 99, -1):
         out.append(motor(60, -20, front))
     # Halves, which round to even.
-    for raw in (82, 246, 1638, -82, -41, 8192, 41, 409, 573, -16384, 1, -1, 0):
+    for raw in (2048, 6144, -2048, 82, 246, 1638, -82, -41, 8192, 41, 409, 573, -16384, 1, -1, 0):
         out.append(ucp(5, struct.pack("<H4h3h", 100, 1, -1, 9999, 0, raw, -raw, raw) + bytes(20)))
         out.append(ucp(5, struct.pack("<H4h3h3h", 100, 1, -1, 9999, 0, 0, 0, 0, raw, -raw, raw)
                        + bytes(14)))

@@ -140,8 +140,8 @@ class Search:
 class Request:
     """A frame that is to be answered."""
 
-    def __init__(self, key, frame, name, wire):
-        self.key, self.es, self.name, self.wire = key, frame.es, name, wire
+    def __init__(self, key, frame):
+        self.key, self.es = key, frame.es
 
 
 class WireDecoder(srd.Decoder):

@@ -100,9 +100,9 @@ class Decoder(WireDecoder):
         self.note(CLASSES[header], frame.ss, frame.es, [text, head, short, short[0].upper()])
         self.values(frame, header, payload, mode)
         if header in TO_SLAVE:
-            self.request(wire, frame, header, node)
+            self.request(frame, header, node)
         else:
-            self.response(wire, frame, header, node)
+            self.response(frame, header, node)
         if header == VELOCITY or (header == WRITE and mode == VELOCITY):
             self.check_speeds(frame, header, node, payload)
 
@@ -143,12 +143,12 @@ class Decoder(WireDecoder):
                 text = "node %d: %s rps: %s (I4)" % (node, shortest(speed), does)
                 self.warn(frame.ss, frame.es, text, "not finite", "!")
 
-    def request(self, wire, frame, header, node):
+    def request(self, frame, header, node):
         """The master has given up what was open (ruling I7)."""
         self.give_up(frame.ss)
         is_answered = header == READ or self.options["boards"] == "three"
         if is_answered:
-            self.open = Request(node, frame, NAMES[header], wire)
+            self.open = Request(node, frame)
 
     def silent(self, since):
         """No answer comes to a request from before."""
@@ -172,7 +172,7 @@ class Decoder(WireDecoder):
             text = "node %d: %d requests in a row without an answer in time: abnormal (I7)"
             self.warn(ss, es, text % (node, STRIKES), "node %d abnormal" % node, "abnormal")
 
-    def response(self, wire, frame, header, node):
+    def response(self, frame, header, node):
         self.learn(frame, header, node)
         request = self.open
         if request is None:

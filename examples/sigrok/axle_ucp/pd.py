@@ -269,8 +269,8 @@ class Decoder(WireDecoder):
         text = head + (": " + contents if contents else "")
         kind = "to-robot" if message.is_from_host else "to-host"
         self.note(kind, frame.ss, frame.es, [text, head, message.name, "%d" % number])
-        self.check(wire, frame, message, number, index, of)
-        self.answer(wire, frame, message, index)
+        self.check(wire, frame, message, index, of)
+        self.answer(frame, message)
 
     def unknown(self, wire, frame, number, index, body):
         """An unknown id, or a length of body that no message has (ruling U3)."""
@@ -308,7 +308,7 @@ class Decoder(WireDecoder):
     def hazard(self, frame, text):
         self.warn(frame.ss, frame.es, text, "hazard", "!")
 
-    def check(self, wire, frame, message, number, index, of):
+    def check(self, wire, frame, message, index, of):
         if message.name == "motor_control":
             self.check_motor(frame, of)
         elif message.name == "ota_request" and of["version"][0] > LAST_HARMLESS_VERSION:
@@ -356,18 +356,18 @@ class Decoder(WireDecoder):
             text = "report %d after %d: reports are missing (U9)" % (index, last)
             self.warn(frame.ss, frame.es, text, "index", "I")
 
-    def answer(self, wire, frame, message, index):
+    def answer(self, frame, message):
         if message.name in ANSWERS:
             self.close(message.name, frame.ss)
-            self.open[message.name] = Request(message.name, frame, message.name, wire)
+            self.open[message.name] = Request(message.name, frame)
         request = self.open.pop(ANSWERED.get(message.name), None)
         if request is None:
             return
         samples = frame.ss - request.es
         time = self.time(samples)
-        text = "%s answered after %s" % (request.name, time)
+        text = "%s answered after %s" % (request.key, time)
         ss, es = min(request.es, frame.ss), max(request.es, frame.ss)
-        self.note("answer", ss, max(es, ss + 1), [text, "%s %s" % (request.name, time), time])
+        self.note("answer", ss, max(es, ss + 1), [text, "%s %s" % (request.key, time), time])
 
     def close(self, name, until):
         """A request that is repeated was not answered."""
