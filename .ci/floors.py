@@ -87,6 +87,8 @@ FLOORS = [
     ["ucp"],
     # Two doors, and a line for tests.
     ["io", "drive", "sim"],
+    # Pages, without code.
+    ["guide"],
     ["crate"],
 ]
 

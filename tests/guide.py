@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs what the guide shows: its Rust code as doc tests, its commands, and compares what they print.
+"""Runs what the guide shows: its Rust code as doc tests; its commands, and what they print.
 
     tests/guide.py             everything; exit code 1 if a fault is found
     tests/guide.py CHAPTER     the commands of these chapters only
@@ -151,11 +151,11 @@ def faults_of_text(texts, index):
 
 
 def neighbours(order, titles, place):
-    """The last line of a chapter."""
-    link = lambda name: f"[{titles.get(name, name)}](super::{name})"
+    """The last lines of a chapter."""
+    link = lambda name: f"[{titles.get(name, name)}](crate::guide::{name})"
     before = [f"← {link(order[place - 1])}"] if place else []
     behind = [f"{link(order[place + 1])} →"] if place + 1 < len(order) else []
-    return " | ".join([*before, "[Contents](super)", *behind]) + "\n"
+    return " ·\n".join([*before, "[Contents](crate::guide)", *behind]) + "\n"
 
 
 def faults_of_block(block, features):
@@ -299,7 +299,7 @@ def planted(texts, index):
         "a chapter that is not listed": faults_of_text(texts, re.sub(rf"//! \d+\. \[[^\]]*\]\({name}\).*\n", "", index)),
         "a chapter that is no module": faults_of_text(texts, index.replace(f"    {name}\n", "")),
         "two chapters swapped": faults_of_text(texts, index.replace("    timing\n    staying_safe\n", "    staying_safe\n    timing\n")),
-        "a wrong link to the next": faults_of_text(changed(name, "(super::ucp_in_ten_minutes) →", "(super::timing) →"), index),
+        "a wrong link to the next": faults_of_text(changed(name, "(crate::guide::ucp_in_ten_minutes) →", "(crate::guide::timing) →"), index),
         "no links at the end": faults_of_text({**texts, name: texts[name].rpartition("\n\n")[0] + "\n"}, index),
         "another title": faults_of_text(changed(name, "Ikeya in ten", "Ikeya in nine"), index),
         "a doc test that did not run": faults_of_tests(texts, passes.partition("\n")[2]),
