@@ -11,8 +11,8 @@ reason why it is not:
 
 * Rust blocks are doc tests. Each must have run and passed; `ignore` and `no_run` need a reason.
 * `console` blocks are run by bash in an empty folder with a link to `examples`, one shell per
-  command. A line `$ command` is followed by exactly what the command prints. One that ends in `&`
-  goes on until the end of the chapter, and the next one waits until its `--link` is there.
+  command. A line `$ command`, which `> ` continues, is followed by exactly what it prints. One that
+  ends in `&` goes on until the end of the chapter, and the next waits until its `--link` is there.
 * `toml` blocks depend on this crate: with features that it has.
 * `diff` blocks are patches that are applied by another test, word for word.
 
@@ -36,6 +36,7 @@ SPIN = "examples/host/src/bin/spin.rs"
 # The blocks that are not run: (chapter, first line) and the reason.
 NOT_RUN = {
     ("start_on_a_pc", "cargo install --path examples/axle"): "installs for the user; it is built here",
+    ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ikeya"): "a page on a terminal, on an adapter",
     ("start_on_a_pc", "cargo new turn && cd turn"): "makes a project; the gate builds the same program",
     ("start_on_a_pc", "use axlewire::drive::{Driver, SerialPort, StdClock};"):
         f"opens a port; it is the text of {SPIN}, which the next block runs",
@@ -196,6 +197,8 @@ def commands_of(text, chapter=""):
                 break
             if line.startswith("$ "):
                 commands.append((number, line[2:], []))
+            elif commands and line.startswith("> ") and not commands[-1][2]:
+                commands[-1] = (commands[-1][0], f"{commands[-1][1]}\n{line[2:]}", [])
             elif commands:
                 commands[-1][2].append(line)
     return commands
@@ -262,17 +265,15 @@ def appears(link):
 
 def rewritten(text, printed):
     """The chapter with what its commands have printed."""
-    lines, out, is_in, is_old = text.splitlines(), [], False, False
-    for number, line in enumerate(lines, 1):
-        if FENCE.match(line):
-            is_in, is_old = line == "```console", False
-        elif is_in and line.startswith("$ "):
-            out += [line, *printed.get(number, [])]
+    out, is_in, due, is_old = [], False, [], False
+    for number, line in enumerate(text.splitlines(), 1):
+        if FENCE.match(line) or is_in and line.startswith("$ "):
+            out += due
+            is_in, is_old, due = line == "```console" or line.startswith("$ "), False, printed.get(number, [])
+        elif is_in and not line.startswith("> "):
             is_old = True
-            continue
-        elif is_in and is_old:
-            continue
-        out.append(line)
+        if not is_old:
+            out.append(line)
     return "\n".join(out) + "\n"
 
 
