@@ -1,41 +1,13 @@
 //! Bodies (ruling U4): the plain ones, which the table of messages declares, and those that have a
 //! rule for what may be sent. All numbers are little-endian (B5).
 
+pub(super) use super::plain::body;
 use super::{
     catalogue::catalogue,
-    codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+    codes::*,
     plain::plain_bodies,
 };
 use crate::error::EncodeError;
-
-/// Declares bodies: a struct of private byte fields, alignment 1, the id of its message, and the
-/// getters whose values `{:?}` shows.
-macro_rules! body {
-    ($(
-        $(#[$meta:meta])*
-        pub struct $name:ident($id:ident) { $($field:ident: $ty:ty),* } => $($getter:ident),*;
-    )+) => {$(
-        $(#[$meta])*
-        #[derive(Clone, Copy, Eq, Hash, PartialEq)]
-        #[derive(
-            zerocopy::FromBytes, zerocopy::IntoBytes, zerocopy::Immutable, zerocopy::KnownLayout,
-            zerocopy::Unaligned,
-        )]
-        #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-        #[repr(C)]
-        pub struct $name { $($field: $ty),* }
-
-        $crate::ucp::frame::debug_values! { $name: $($getter),* }
-
-        impl $crate::ucp::frame::sealed::Sealed for $name {}
-
-        impl $crate::ucp::frame::Body for $name {
-            const ID: $crate::ucp::header::MessageId = $crate::ucp::header::MessageId::$id;
-        }
-    )+};
-}
-pub(super) use body;
 
 catalogue! { plain_bodies }
 

@@ -1,8 +1,8 @@
-//! Tables of the messages and of their codes: the one place that lists them (ruling U4).
+//! The messages and their codes: the one place that lists them (ruling U4).
 //!
-//! Both are handed, as they are, to macros that make code of them: `message_ids` makes
-//! `MessageId`, `plain_bodies` the bodies, `messages` the enum `Message`, and `codes` the codes.
-//! Decoding, encoding, printing and `serde` follow from these. **A new message is a new entry.**
+//! Each table is handed, as it is, to macros that make code of it, as an X-macro of C is:
+//! `message_ids` makes `MessageId`, `plain_bodies` the bodies, `messages` the enum `Message`, and
+//! `codes` the codes. Decoding, encoding, text and `serde` follow. **A new message is a new entry:**
 //!
 //! ```text
 //! /// What the id is for.
@@ -15,21 +15,22 @@
 //! }
 //! ```
 //!
-//! An entry has the direction, the name in snake case, the variant of `Message` with what it holds,
-//! and the fields of the body in the order of the wire:
+//! The entry has the direction, the name in snake case, the variant of `Message` with what it
+//! holds, and the fields of the body in the order on the wire. Of each field:
 //!
-//! * `[u8; 2]`: the bytes on the wire.
-//! * `as u16`: the value in them: an integer of up to 32 bits, a code, or an array of those.
+//! * `[u8; 2]`: the bytes on the wire, little-endian.
+//! * `as u16`: the value in them: an integer of 8, 16 or 32 bits, a code, or an array of those.
 //! * `= "field_ms"`: its key in JSON.
-//! * `in "ms"`: its unit in text, which may be missing.
+//! * `in "ms"`: its unit in text, `field 40 ms`; optional.
 //!
-//! The struct, `new`, a getter for each field, text and data are made of these: a *plain* message.
-//! `;` in place of the fields: the body has rules of its own, and another file has it, with the
-//! name, unit or range of each value.
+//! The struct, `new`, a getter of each field, text and data are made of these: a *plain* message.
+//! With `;` in place of the fields, the body is written by hand, with `Print` in `contents` and
+//! `Fields` in `serialize`: for a range, a layout of its own, or a rule for what may be sent.
 //!
-//! A name must not occur twice in a direction unless both are layouts of one message. Two bodies
-//! with one id and one length, a body of more than 56 bytes, and a key that every frame has do not
-//! compile.
+//! It does not compile if two bodies of an id have one length, if a body is longer than 56 bytes,
+//! or if a key is one that every frame has. `tests/new_message.py` adds a message here, and counts
+//! what had to change. `tests/ucp/messages.rs` has ruling U4 once more, and fails until the message
+//! is there, too. The page `fields` and the JSON Schema of the tool are for people.
 
 /// The messages, by id.
 macro_rules! catalogue {
@@ -71,8 +72,7 @@ macro_rules! catalogue {
 
             /// Calibration end to the robot, its acknowledgement to the host.
             CalibrationEnd = 4 {
-                /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11). The result follows
-                /// later.
+                /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11).
                 to_robot "calibration_end" CalibrationEnd(&'a CalibrationEnd) {
                     /// Sensors that were calibrated.
                     kind: u8 as CalibrationKind = "type",
@@ -96,10 +96,10 @@ macro_rules! catalogue {
 
             /// Accelerometer and gyroscope biases to the host, their acknowledgement to the robot.
             ImuBias = 6 {
-                /// Robot to host, the result of an IMU calibration: `acc: 3 × i16 | gyro: 3 × i16`, 12
-                /// bytes, in the raw units of the [report](super::message::Report).
+                /// Robot to host, the result of an IMU calibration, raw as in a
+                /// [report](super::message::Report): `acc: 3 × i16 | gyro: 3 × i16`, 12 bytes.
                 ///
-                /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
+                /// Repeated every 1000 ms until acknowledged; the robot does not store it (U11).
                 to_host "imu_bias" ImuBias(&'a ImuBias) {
                     /// Accelerometer biases x, y, z, raw.
                     acc: [[u8; 2]; 3] as [i16; 3] = "acc_bias",
@@ -116,10 +116,10 @@ macro_rules! catalogue {
 
             /// Magnetometer biases to the host, their acknowledgement to the robot.
             MagBias = 7 {
-                /// Robot to host, the result of a magnetometer calibration: `mag: 3 × i16`, 6 bytes, in
-                /// the raw units of the [report](super::message::Report).
+                /// Robot to host, the result of a magnetometer calibration, raw as in a
+                /// [report](super::message::Report): `mag: 3 × i16`, 6 bytes.
                 ///
-                /// Repeated every 1000 ms until acknowledged; the robot does not store it (ruling U11).
+                /// Repeated every 1000 ms until acknowledged; the robot does not store it (U11).
                 to_host "mag_bias" MagBias(&'a MagBias) {
                     /// Magnetometer biases x, y, z, raw.
                     mag: [[u8; 2]; 3] as [i16; 3] = "mag_bias",
@@ -134,8 +134,8 @@ macro_rules! catalogue {
 
             /// Request for the stored biases to the host, the biases to the robot.
             Biases = 8 {
-                /// Robot to host, asks for the stored biases at boot, every 1000 ms until answered. No
-                /// body.
+                /// Robot to host, asks for the stored biases at boot, every 1000 ms until answered.
+                /// No body.
                 to_host "bias_request" BiasRequest(&'a BiasRequest) {}
 
                 to_robot "biases" Biases(&'a Biases);
@@ -145,8 +145,8 @@ macro_rules! catalogue {
             Ota = 9 {
                 to_robot "ota_request" OtaRequest(&'a RawOtaRequest);
 
-                /// Robot to host, answers an [`OtaRequest`](super::message::OtaRequest): `err`, 1 byte.
-                /// Shipped robots never send it.
+                /// Robot to host, answers an [`OtaRequest`](super::message::OtaRequest): `err`, 1
+                /// byte. Shipped robots never send it.
                 to_host "ota_ack" OtaAck(&'a OtaAck) {
                     /// The robot's decision on the request.
                     status: u8 as OtaStatus = "err",
@@ -163,8 +163,8 @@ macro_rules! catalogue {
 }
 pub(super) use catalogue;
 
-/// The codes: values with a name. An entry has the bytes on the wire, the word in front of a value
-/// without a name, and for each value the variant and its text.
+/// The codes: integers whose values have names. An entry has the integer, twice, the word in front
+/// of a value without a name, and of each value the variant and its text.
 macro_rules! catalogue_of_codes {
     ($expand:ident) => {
         $expand! {

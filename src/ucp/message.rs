@@ -73,7 +73,7 @@ impl<'a> Held<'a> for Report<'a> {
     }
 }
 
-/// Whether the messages of one id can be told apart by the lengths of their bodies, and can be sent.
+/// Whether the bodies of one id can be told apart by their lengths, and none is too long.
 const fn are_distinct(messages: &[&[usize]]) -> bool {
     // A bit for each length that has occurred.
     let mut occurred = 0_u64;
@@ -113,6 +113,14 @@ macro_rules! messages {
         }
 
         impl<'a> Message<'a> {
+            /// Fails to compile if id and length do not determine the message.
+            const LENGTHS_ARE_DISTINCT: () = {
+                $(assert!(
+                    are_distinct(&[$(<$held as Held<'a>>::LENGTHS),+]),
+                    concat!(stringify!($id), ": two bodies have one length, or one is too long")
+                );)+
+            };
+
             /// The name in snake case, as in the JSON of `axle decode`: `ping`, `motor_control`.
             /// The two widths of a network state have one name, and so have the two layouts of a
             /// report.
@@ -187,14 +195,6 @@ macro_rules! messages {
                 }
             }
         }
-
-        /// Ids and lengths determine the messages.
-        const fn check_lengths<'a>() {
-            $(assert!(
-                are_distinct(&[$(<$held as Held<'a>>::LENGTHS),+]),
-                concat!(stringify!($id), ": two bodies have one length, or one is too long")
-            );)+
-        }
     };
 }
 
@@ -210,4 +210,20 @@ macro_rules! is_from_host {
 
 catalogue! { messages }
 
-const _: () = check_lengths();
+const _: () = Message::LENGTHS_ARE_DISTINCT;
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_BODY_LEN, are_distinct};
+
+    #[test]
+    fn messages_of_an_id_need_different_lengths_that_can_be_sent() {
+        assert!(are_distinct(&[]) && are_distinct(&[&[0]]));
+        assert!(are_distinct(&[&[0], &[1], &[36, 34], &[MAX_BODY_LEN]]));
+        assert!(!are_distinct(&[&[0], &[0]]));
+        assert!(!are_distinct(&[&[1], &[36, 34], &[7, 36]]));
+        assert!(!are_distinct(&[&[34, 34]]));
+        assert!(!are_distinct(&[&[1], &[MAX_BODY_LEN + 1]]));
+        assert!(!are_distinct(&[&[256]]));
+    }
+}

@@ -1,5 +1,34 @@
-//! Makes the bodies of plain messages of the table in `catalogue`: all that is needed of a struct
-//! of bytes and a list of its values.
+//! Makes bodies: the struct of bytes of any of them, and all that a plain message of the table in
+//! `catalogue` needs.
+
+/// Declares bodies: a struct of private byte fields, alignment 1, the id of its message, and the
+/// getters whose values `{:?}` shows.
+macro_rules! body {
+    ($(
+        $(#[$meta:meta])*
+        pub struct $name:ident($id:ident) { $($field:ident: $ty:ty),* } => $($getter:ident),*;
+    )+) => {$(
+        $(#[$meta])*
+        #[derive(Clone, Copy, Eq, Hash, PartialEq)]
+        #[derive(
+            zerocopy::FromBytes, zerocopy::IntoBytes, zerocopy::Immutable, zerocopy::KnownLayout,
+            zerocopy::Unaligned,
+        )]
+        #[cfg_attr(feature = "bytemuck", derive(bytemuck::Pod, bytemuck::Zeroable))]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[repr(C)]
+        pub struct $name { $($field: $ty),* }
+
+        $crate::ucp::frame::debug_values! { $name: $($getter),* }
+
+        impl $crate::ucp::frame::sealed::Sealed for $name {}
+
+        impl $crate::ucp::frame::Body for $name {
+            const ID: $crate::ucp::header::MessageId = $crate::ucp::header::MessageId::$id;
+        }
+    )+};
+}
+pub(super) use body;
 
 /// The bodies of all plain messages.
 macro_rules! plain_bodies {
@@ -22,7 +51,7 @@ macro_rules! plain_body {
 
     // No value, so neither `new` nor getters.
     ($(#[$doc:meta])* $name:ident($id:ident) {}) => {
-        $crate::ucp::body::body! { $(#[$doc])* pub struct $name($id) {} =>; }
+        $crate::ucp::plain::body! { $(#[$doc])* pub struct $name($id) {} =>; }
 
         impl $crate::ucp::value::Print for $name {
             fn print(&self, _: &mut $crate::text::Line<'_>, _: &'static str) {}
@@ -40,7 +69,7 @@ macro_rules! plain_body {
         $(#[$field_doc:meta])*
         $field:ident: $wire:ty as $value:ty = $key:literal $(in $unit:literal)?,
     )+}) => {
-        $crate::ucp::body::body! {
+        $crate::ucp::plain::body! {
             $(#[$doc])*
             pub struct $name($id) { $($field: $wire),+ } => $($field),+;
         }
@@ -95,4 +124,20 @@ pub(super) const fn is_free(key: &str) -> bool {
     let of_tool =
         matches!(key.as_bytes(), b"event" | b"offset" | b"t" | b"interface" | b"direction");
     !(of_library || of_tool)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_free;
+
+    #[test]
+    fn a_field_may_not_have_the_key_of_another_field_of_the_same_frame() {
+        for key in ["length", "protocol", "message", "id", "index", "bytes"] {
+            assert!(!is_free(key), "{key}");
+        }
+        for key in ["event", "offset", "t", "interface", "direction"] {
+            assert!(!is_free(key), "{key}");
+        }
+        assert!(is_free("err") && is_free("acc_bias") && is_free("time"));
+    }
 }

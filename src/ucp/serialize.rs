@@ -1,7 +1,7 @@
 //! Frames and messages as data for `serde`: flat maps with the fields of `axle decode --json`.
 //!
-//! Plain bodies have theirs from the table of messages; the others are written by hand: a derive would
-//! need a second set of types, and flattening copies every field.
+//! Plain bodies have theirs from the table of messages. The others are written by hand: a derive
+//! would need a second set of types, and flattening copies every field.
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 

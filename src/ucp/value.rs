@@ -118,3 +118,48 @@ impl<V: Value, const N: usize> Value for [V; N] {
         line.spaced(self, |line, value| value.print(line));
     }
 }
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use core::fmt::Debug;
+    use std::string::String;
+
+    use super::{List, Value};
+    use crate::{text::Line, ucp::codes::ErrorCode};
+
+    /// Asserts the bytes of a value, back and forth, and its text behind the name `n`.
+    fn is<V: Value + Debug + PartialEq>(value: V, wire: V::Wire, text: &str)
+    where
+        V::Wire: Debug + PartialEq,
+    {
+        assert_eq!((value.to_wire(), V::from_wire(wire)), (wire, value));
+        let mut out = String::new();
+        let mut line = Line::new(&mut out);
+        List::new(&mut line, ": ").value("n", value, "");
+        line.end().unwrap();
+        assert_eq!(out, text);
+    }
+
+    #[test]
+    fn values_are_little_endian_and_have_a_name_in_front_unless_they_are_words() {
+        is(200_u8, 200, ": n 200");
+        is(-1_i8, -1, ": n -1");
+        is(0xABCD_u16, [0xCD, 0xAB], ": n 43981");
+        is(-2_i16, [0xFE, 0xFF], ": n -2");
+        is(u32::MAX - 1, [0xFE, 0xFF, 0xFF, 0xFF], ": n 4294967294");
+        is(i32::MIN, [0, 0, 0, 0x80], ": n -2147483648");
+        is([1_u16, 2, 3], [[1, 0], [2, 0], [3, 0]], ": n 1 2 3");
+        is(ErrorCode::Damaged, 1, ": damaged");
+        is(ErrorCode::Other(9), 9, ": err 9");
+    }
+
+    #[test]
+    fn a_list_has_commas_between_its_values_and_units_behind_them() {
+        let mut out = String::new();
+        let mut line = Line::new(&mut out);
+        let list = List::new(&mut line, "");
+        list.value("level", 7_u8, "%").value("err", ErrorCode::Fine, "").value("t", -3_i8, "ms");
+        line.end().unwrap();
+        assert_eq!(out, "level 7 %, fine, t -3 ms");
+    }
+}
