@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! /// What the id is for.
-//! Id = 0x30 {
+//! Id = 0x42 {
 //!     /// What the message is for.
 //!     to_robot "name_in_json" Name(&'a Name) {
 //!         /// What the value is.

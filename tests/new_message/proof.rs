@@ -18,12 +18,12 @@ use serde_json::{json, to_value};
 
 /// `brightness 80 | colour 1 | time 1500`, in a frame made by hand but for its CRC.
 fn set_lamp() -> Vec<u8> {
-    sealed(&[0xFD, 0xFF, 0x08, 0x00, 0x30, 0x07, 80, 1, 0xDC, 0x05])
+    sealed(&[0xFD, 0xFF, 0x08, 0x00, 0x42, 0x07, 80, 1, 0xDC, 0x05])
 }
 
 /// `temperature 25, -3 | err 0`
 fn lamp_state() -> Vec<u8> {
-    sealed(&[0xFD, 0xFF, 0x09, 0x00, 0x30, 0x02, 25, 0, 0xFD, 0xFF, 0])
+    sealed(&[0xFD, 0xFF, 0x09, 0x00, 0x42, 0x02, 25, 0, 0xFD, 0xFF, 0])
 }
 
 fn sealed(bytes: &[u8]) -> Vec<u8> {
@@ -60,11 +60,11 @@ fn it_has_its_id_its_name_and_its_direction() {
     let (command, answer) = (set_lamp(), lamp_state());
     for (bytes, name, from_host) in [(command, "set_lamp", true), (answer, "lamp_state", false)] {
         let message = Frame::parse(&bytes).unwrap().message();
-        assert_eq!((message.id(), message.name()), (0x30, name));
+        assert_eq!((message.id(), message.name()), (0x42, name));
         assert_eq!(message.is_from_host(), Some(from_host));
     }
-    assert_eq!(MessageId::from_u8(0x30), Some(MessageId::Lamp));
-    assert_eq!((SetLamp::ID as u8, LampState::ID as u8), (0x30, 0x30));
+    assert_eq!(MessageId::from_u8(0x42), Some(MessageId::Lamp));
+    assert_eq!((SetLamp::ID as u8, LampState::ID as u8), (0x42, 0x42));
 }
 
 #[test]
@@ -90,13 +90,13 @@ fn it_is_data_with_the_keys_of_its_fields() {
     assert_eq!(
         to_value(Frame::parse(&command).unwrap()).unwrap(),
         json!({
-            "length": 12, "protocol": "ucp", "message": "set_lamp", "id": 48, "index": 7,
+            "length": 12, "protocol": "ucp", "message": "set_lamp", "id": 66, "index": 7,
             "brightness_pct": 80, "colour": 1, "time_ms": 1500, "bytes": hex(&command),
         })
     );
     assert_eq!(
         to_value(Frame::parse(&answer).unwrap().message()).unwrap(),
-        json!({"message": "lamp_state", "id": 48, "temperature_c": [25, -3], "err": 0})
+        json!({"message": "lamp_state", "id": 66, "temperature_c": [25, -3], "err": 0})
     );
 }
 
@@ -107,12 +107,12 @@ fn hex(bytes: &[u8]) -> String {
 #[test]
 fn a_body_of_another_length_is_unknown_and_cannot_be_sent_as_a_raw_frame() {
     for length in (0..=56).filter(|length| ![4, 5].contains(length)) {
-        let header = [0xFD, 0xFF, length as u8 + 4, 0, 0x30, 0];
+        let header = [0xFD, 0xFF, length as u8 + 4, 0, 0x42, 0];
         let bytes = sealed(&[&header[..], &vec![1; length]].concat());
         assert!(matches!(Frame::parse(&bytes).unwrap().message(), Message::Unknown(_)), "{length}");
     }
-    let raw = RawFrame { id: 0x30, index: 0, body: &[] };
-    assert_eq!(raw.encode(&mut [0; 64]), Err(EncodeError::KnownId { id: 0x30 }));
+    let raw = RawFrame { id: 0x42, index: 0, body: &[] };
+    assert_eq!(raw.encode(&mut [0; 64]), Err(EncodeError::KnownId { id: 0x42 }));
 }
 
 #[test]
@@ -132,6 +132,6 @@ fn a_role_that_has_no_use_for_it_counts_it_and_the_application_of_a_host_gets_it
     let events = std::iter::from_fn(|| host.poll_event());
     let got: Vec<_> = events.filter(|event| matches!(event, HostEvent::Unknown(_))).collect();
     let [HostEvent::Unknown(frame)] = &got[..] else { panic!("{got:?}") };
-    let raw = RawFrame { id: 0x30, index: 2, body: &[25, 0, 0xFD, 0xFF, 0] };
+    let raw = RawFrame { id: 0x42, index: 2, body: &[25, 0, 0xFD, 0xFF, 0] };
     assert_eq!(frame.as_raw(), raw);
 }
