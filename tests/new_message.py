@@ -42,7 +42,7 @@ DATA = [
     {"event": "frame", "offset": 12, "length": 13, "protocol": "ucp", "message": "lamp_state", "id": 66,
      "index": 2, "temperature_c": [25, -3], "err": 0},
 ]
-TEXT = ["66 set_lamp 7 brightness 80 %, red, time 1500 ms", "66 lamp_state 2 temperature 25 -3 C, fine"]
+TEXT = ["12 set_lamp 7 brightness 80 %, red, time 1500 ms", "13 lamp_state 2 temperature 25 -3 C, fine"]
 
 # What is spoilt, the text in the patch, its replacement, and what is then said.
 CHECK, TEST, COUNT = "check", "test", "count"
