@@ -37,6 +37,9 @@ SPIN = "examples/host/src/bin/spin.rs"
 NOT_RUN = {
     ("start_on_a_pc", "cargo install --path examples/axle"): "installs for the user; it is built here",
     ("adding_a_message", "python3 tests/new_message.py"): "takes minutes; the step `message` of the gate is this command",
+    ("recording_and_looking", "cargo install --path examples/axle --features mcap,parquet,plot"): "heavy features; the tests of axle use them",
+    ("recording_and_looking", "axle plot examples/captures/motors.pcapng -o motors.svg"): "a heavy feature; the tests of axle use it",
+    ("recording_and_looking", "bash examples/wireshark/install.sh"): "needs tshark; examples/wireshark checks it",
     ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ikeya"): "a page on a terminal, on an adapter",
     ("start_on_a_pc", "cargo new turn && cd turn"): "makes a project; the gate builds the same program",
     ("start_on_a_pc", "use axlewire::drive::{Driver, SerialPort, StdClock};"):
@@ -216,7 +219,7 @@ def run_commands(chapter, text, is_written=False):
         is_live = any(command.endswith("&") for _, command, _ in commands)
         if not faults or is_written or not is_live:
             break
-        print(f"attempt {attempt}: {faults[0].strip()}", file=sys.stderr)
+        print(f"attempt {attempt}: {faults[0].strip().splitlines()[0]}", file=sys.stderr)
         time.sleep(5)
     return ([] if is_written else faults), printed
 
