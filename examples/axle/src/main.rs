@@ -42,6 +42,7 @@ mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod tables;
 mod teller;
 mod watch;
 
