@@ -50,6 +50,8 @@ pub(crate) struct Table {
 pub(crate) struct Tables {
     /// By protocol; the gaps are the last.
     all: Vec<Table>,
+    /// The first of each protocol.
+    first: [usize; 3],
     /// The table of the last frame: the next is often of the same message.
     last: usize,
     has_times: bool,
@@ -70,17 +72,22 @@ impl Tables {
     /// Empty tables. Without times there are no columns of time, interface and direction.
     pub(crate) fn new(has_times: bool) -> Result<Self, Failure> {
         let Some(described) = described::all() else { return Err(bug()) };
-        let all = described.into_iter().map(|it| Table::new(it, has_times)).collect();
-        Ok(Self { all, last: 0, has_times, count: 0, is_full: false, unfit: None })
+        let mut all: Vec<_> = described.into_iter().map(|it| Table::new(it, has_times)).collect();
+        let place = |table: &Table| table.protocol.map_or(3, |protocol| protocol as usize);
+        all.sort_by_key(place);
+        let first = [0, 1, 2].map(|protocol| all.partition_point(|it| place(it) < protocol));
+        Ok(Self { all, first, last: 0, has_times, count: 0, is_full: false, unfit: None })
     }
 
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
         let mode = frame.commands().and_then(|node| modes.of(node));
         let name = frame.name();
-        let is_its = |table: &Table| table.message == name && table.protocol == Some(S::PROTOCOL);
+        let is_its = |table: &Table| table.protocol == Some(S::PROTOCOL) && table.message == name;
         if !self.all.get(self.last).is_some_and(is_its) {
-            self.last = self.all.iter().position(is_its).unwrap_or(usize::MAX);
+            let first = self.first.get(S::PROTOCOL as usize).copied().unwrap_or_default();
+            let its = self.all.iter().skip(first).position(is_its);
+            self.last = its.map_or(usize::MAX, |at| first + at);
         }
         self.add(self.last, at, |table, from| {
             let (slots, columns) = (&*table.slots, &mut *table.columns);

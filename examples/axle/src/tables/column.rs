@@ -25,7 +25,7 @@ pub(crate) enum Values {
     /// Places in the list of names.
     Name(Vec<u8>),
     /// The end of each text, and all texts in one.
-    Text(Vec<usize>, String),
+    Text(Vec<u32>, String),
 }
 
 /// One value.
@@ -82,7 +82,7 @@ impl Column {
             (Values::Name(_), _) => return None,
             (Values::Text(ends, text), _) => {
                 let begin = at.checked_sub(1).and_then(|before| ends.get(before)).unwrap_or(&0);
-                Cell::Text(text.get(*begin..*ends.get(at)?)?)
+                Cell::Text(text.get(*begin as usize..*ends.get(at)? as usize)?)
             }
         })
     }
@@ -152,7 +152,7 @@ impl Column {
         match (&mut self.values, &self.kind) {
             (Values::Text(ends, text), _) => {
                 text.push_str(value);
-                ends.push(text.len());
+                ends.push(u32::try_from(text.len()).map_err(|_| Unfit)?);
             }
             (Values::Name(values), Type::Name(names)) => {
                 let place = names.iter().position(|name| *name == value).ok_or(Unfit)?;
