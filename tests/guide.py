@@ -39,7 +39,9 @@ NOT_RUN = {
     ("adding_a_message", "python3 tests/new_message.py"): "takes minutes; the step `message` of the gate is this command",
     ("recording_and_looking", "cargo install --path examples/axle --features mcap,parquet,plot"): "heavy features; the tests of axle use them",
     ("recording_and_looking", "axle plot examples/captures/motors.pcapng -o motors.svg"): "a heavy feature; the tests of axle use it",
-    ("recording_and_looking", "bash examples/wireshark/install.sh"): "needs tshark; examples/wireshark checks it",
+    ("recording_and_looking", "examples/wireshark/install.sh"): "needs tshark; examples/wireshark checks it",
+    ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ucp --udp 127.0.0.1:9870"):
+        "an adapter, and a program that listens; the tests of axle send to one",
     ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ikeya"): "a page on a terminal, on an adapter",
     ("start_on_a_pc", "cargo new turn && cd turn"): "makes a project; the gate builds the same program",
     ("start_on_a_pc", "use axlewire::drive::{Driver, SerialPort, StdClock};"):
