@@ -122,7 +122,7 @@ impl<V: Value, const N: usize> Value for [V; N] {
 #[cfg(all(test, feature = "std"))]
 mod tests {
     use core::fmt::Debug;
-    use std::string::String;
+    use alloc::string::String;
 
     use super::{List, Value};
     use crate::{text::Line, ucp::codes::ErrorCode};
