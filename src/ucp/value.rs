@@ -121,8 +121,8 @@ impl<V: Value, const N: usize> Value for [V; N] {
 
 #[cfg(all(test, feature = "std"))]
 mod tests {
-    use core::fmt::Debug;
     use alloc::string::String;
+    use core::fmt::Debug;
 
     use super::{List, Value};
     use crate::{text::Line, ucp::codes::ErrorCode};
