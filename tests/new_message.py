@@ -7,8 +7,8 @@
 `tests/new_message/added.patch` adds the message, a lamp with an invented id, as a program that
 speaks a UCP of its own would. It may change one file of what is published: this counts. The guide
 shows the same patch. Then `tests/new_message/proof.rs` runs in the copy: bytes, decoding, text,
-data, roles. The tool of the copy decodes the message by name. The tests that have ruling U4 once
-more, in `tests/ucp/messages.rs`, fail in the copy: an id that the ruling does not have is noticed.
+data, roles. The tool of the copy decodes the message by name. Three tests in `tests/ucp` that have
+ruling U4 once more fail in the copy: an id that the ruling does not have is noticed.
 
 Exit status 1 if something is not as said here.
 """
@@ -81,7 +81,7 @@ def main():
 
 
 def proven():
-    """Builds and runs all of it; what it found, in a few words."""
+    """Builds and runs all of it: what it found."""
     changed, added = applied((FOLDER / "added.patch").read_text())
     of_docs = pages()
     tests = tests_pass()
@@ -113,7 +113,7 @@ def planted():
 
 
 def applied(patch):
-    """Makes the copy anew with this patch: how many files it changed, and how many lines it added."""
+    """Makes the copy anew with this patch: how many files it changed, how many lines it added."""
     names = git("ls-files", "-z", "-co", "--exclude-standard", cwd=ROOT).split("\0")
     known = {name for name in names if name and (ROOT / name).is_file()}
     for old in [path for path in COPY.rglob("*") if path.is_file()]:

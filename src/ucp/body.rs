@@ -2,11 +2,7 @@
 //! rule for what may be sent. All numbers are little-endian (B5).
 
 pub(super) use super::plain::body;
-use super::{
-    catalogue::catalogue,
-    codes::*,
-    plain::plain_bodies,
-};
+use super::{catalogue::catalogue, codes::*, plain::plain_bodies};
 use crate::error::EncodeError;
 
 catalogue! { plain_bodies }

@@ -2,7 +2,9 @@
 //!
 //! Each table is handed, as it is, to macros that make code of it, as an X-macro of C is:
 //! `message_ids` makes `MessageId`, `plain_bodies` the bodies, `messages` the enum `Message`, and
-//! `codes` the codes. Decoding, encoding, text and `serde` follow. **A new message is a new entry:**
+//! `codes` the codes. Decoding, encoding, text and `serde` follow.
+//!
+//! **A new message is a new entry:**
 //!
 //! ```text
 //! /// What the id is for.
@@ -28,9 +30,11 @@
 //! `Fields` in `serialize`: for a range, a layout of its own, or a rule for what may be sent.
 //!
 //! It does not compile if two bodies of an id have one length, if a body is longer than 56 bytes,
-//! or if a key is one that every frame has. `tests/new_message.py` adds a message here, and counts
-//! what had to change. `tests/ucp/messages.rs` has ruling U4 once more, and fails until the message
-//! is there, too. The page `fields` and the JSON Schema of the tool are for people.
+//! or if a key is one that every frame has. The roles do not send it: that is for them to say.
+//!
+//! `tests/new_message.py` adds a message here, and counts what had to change. Three tests in
+//! `tests/ucp` have ruling U4 once more, and fail until the message is there, too. The page
+//! `fields` and the JSON Schema of the tool describe the messages of the ruling to people.
 
 /// The messages, by id.
 macro_rules! catalogue {

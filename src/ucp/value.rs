@@ -121,8 +121,8 @@ impl<V: Value, const N: usize> Value for [V; N] {
 
 #[cfg(all(test, feature = "std"))]
 mod tests {
+    use alloc::string::String;
     use core::fmt::Debug;
-    use std::string::String;
 
     use super::{List, Value};
     use crate::{text::Line, ucp::codes::ErrorCode};
