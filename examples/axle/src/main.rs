@@ -4,12 +4,14 @@
 //! that distinguishes usage errors from other failures.
 
 mod args;
+mod beside;
 mod boards;
 mod bus;
 mod calibrate;
 mod decode;
 mod drive;
 mod extcap;
+mod export;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
@@ -43,6 +45,7 @@ mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod tables;
 mod teller;
 mod watch;
 
@@ -96,6 +99,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Decode(decode::Args),
+    Export(export::Args),
     Scan(scan::Args),
     Spin(spin::Args),
     Drive(drive::Args),
@@ -156,6 +160,7 @@ fn with_negative_numbers(command: Description) -> Description {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Decode(args) => decode::run(args),
+        Command::Export(args) => export::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),
         Command::Drive(args) => drive::run(args),
