@@ -10,8 +10,8 @@ mod bus;
 mod calibrate;
 mod decode;
 mod drive;
-mod extcap;
 mod export;
+mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
