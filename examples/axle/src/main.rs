@@ -26,6 +26,7 @@ mod ping;
 mod play;
 #[cfg(all(test, unix))]
 mod played;
+mod plot;
 mod ports;
 #[cfg(test)]
 #[path = "../../../tests/support/quiet.rs"]
@@ -95,6 +96,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Decode(decode::Args),
+    Plot(plot::Args),
     Scan(scan::Args),
     Spin(spin::Args),
     Drive(drive::Args),
@@ -154,6 +156,7 @@ fn with_negative_numbers(command: Description) -> Description {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Decode(args) => decode::run(args),
+        Command::Plot(args) => plot::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),
         Command::Drive(args) => drive::run(args),
