@@ -43,6 +43,7 @@ mod signals;
 mod sim;
 mod spin;
 mod stop;
+mod tables;
 mod teller;
 mod watch;
 

@@ -1,5 +1,7 @@
 //! Which protocol a stream of bytes is.
 
+use core::fmt;
+
 use axlewire::{
     ikeya::{self, three},
     stream::Framing,
@@ -15,6 +17,44 @@ pub(super) struct Share {
     pub(super) protocol: Protocol,
     pub(super) framed: u64,
     pub(super) frames: u64,
+}
+
+/// What the beginning of raw bytes seems to be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Guess {
+    /// The largest first.
+    pub(super) shares: [Share; 3],
+    /// Number of bytes that were looked at.
+    pub(super) len: usize,
+}
+
+impl Guess {
+    pub(super) const fn protocol(&self) -> Protocol {
+        let [best, ..] = &self.shares;
+        best.protocol
+    }
+
+    /// The first line of a listing as JSON.
+    pub(crate) fn json(&self) -> String {
+        let share = |share: &Share| format!("\"{}\":{}", share.protocol.name(), share.framed);
+        format!(
+            "{{\"event\":\"protocol\",\"protocol\":\"{}\",\"received\":{},\"framed\":{{{}}}}}",
+            self.protocol().name(),
+            self.len,
+            self.shares.each_ref().map(share).join(",")
+        )
+    }
+}
+
+/// The same for people.
+impl fmt::Display for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [best, others @ ..] = &self.shares;
+        let (name, framed, len) = (best.protocol.name(), best.framed, self.len);
+        let share = |share: &Share| format!("{} {}", share.protocol.name(), share.framed);
+        let others = others.each_ref().map(share).join(", ");
+        write!(f, "protocol {name}: {framed} of the first {len} bytes are in its frames ({others})")
+    }
 }
 
 /// The most bytes that are looked at.

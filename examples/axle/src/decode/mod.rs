@@ -8,6 +8,7 @@ mod parallel;
 mod printer;
 mod stream;
 mod walk;
+mod whole;
 
 use std::{
     io::{self, Write},
@@ -26,13 +27,14 @@ use crate::{
     listing::{Modes, Shown, Style, TimeColumn},
     pcapng,
 };
-use detect::Share;
+use detect::{Guess, Share};
 pub(crate) use framing::Choice;
 use framing::for_framing;
 use printer::Printer;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
-pub(crate) use walk::walk;
+pub(crate) use walk::{Next, Walked, walk};
+pub(crate) use whole::{Chosen, choose, walk_into};
 
 /// The most threads that are used: each has its own buffers, and the more there are, the shorter
 /// are the parts of the file.
@@ -190,47 +192,31 @@ fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> Stri
 
 /// Finds out the protocol of raw bytes, and says how sure it is.
 fn detected(args: &Args, choice: Choice, input: &mut Input) -> Result<Protocol, Failure> {
+    let guess = guess(choice, input)?;
+    let told = match (args.json, guess.len) {
+        (_, 0) => Ok(()),
+        (true, _) => writeln!(io::stdout(), "{}", guess.json()),
+        (false, _) => writeln!(io::stdout(), "{guess}\n"),
+    };
+    told.map_err(Failure::Write)?;
+    Ok(guess.protocol())
+}
+
+/// Finds out the protocol of raw bytes.
+fn guess(choice: Choice, input: &mut Input) -> Result<Guess, Failure> {
     let sample = input.peek(detect::SAMPLE_LEN, |sample| {
         detect::is_sure(&detect::shares(sample), sample.len())
     })?;
-    let (shares, len) = (detect::shares(sample), sample.len());
-    let [best, others @ ..] = &shares;
-    if best.framed == 0 && len > 0 {
-        let line = format!("no frame of any protocol in the first {len} bytes");
+    let guess = Guess { shares: detect::shares(sample), len: sample.len() };
+    let [best, ..] = guess.shares;
+    if best.framed == 0 && guess.len > 0 {
+        let line = format!("no frame of any protocol in the first {} bytes", guess.len);
         let hint =
-            if len < detect::SAMPLE_LEN { "" } else { ": use --protocol to decode them all" };
+            if guess.len < detect::SAMPLE_LEN { "" } else { ": use --protocol to decode them all" };
         return Err(Failure::Failed(line + hint));
     }
     choice.permits(best.protocol)?;
-    let mut out = io::stdout().lock();
-    let told = match (args.json, len) {
-        (_, 0) => Ok(()),
-        (true, _) => {
-            let found: Vec<_> = shares
-                .iter()
-                .map(|share| format!("\"{}\":{}", share.protocol.name(), share.framed))
-                .collect();
-            writeln!(
-                out,
-                "{{\"event\":\"protocol\",\"protocol\":\"{}\",\"received\":{len},\"framed\":{{{}}}}}",
-                best.protocol.name(),
-                found.join(",")
-            )
-        }
-        (false, _) => {
-            let (name, framed) = (best.protocol.name(), best.framed);
-            let others =
-                others.iter().map(|share| format!("{} {}", share.protocol.name(), share.framed));
-            let others: Vec<_> = others.collect();
-            writeln!(
-                out,
-                "protocol {name}: {framed} of the first {len} bytes are in its frames ({})\n",
-                others.join(", ")
-            )
-        }
-    };
-    told.map_err(Failure::Write)?;
-    Ok(best.protocol)
+    Ok(guess)
 }
 
 /// The form of the lines; `None` for the summary alone.

@@ -10,6 +10,7 @@ use axlewire::{
 use crate::{
     listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style, Table},
     pcapng::Direction,
+    tables::Tables,
 };
 
 /// Length of the longest frame of any protocol.
@@ -28,6 +29,8 @@ pub(crate) struct Sheet {
     pub(crate) taken: Option<(Vec<Taken>, BTreeSet<NodeId>)>,
     /// Their counts, if they are wanted.
     pub(crate) table: Option<Table>,
+    /// Frames and gaps as rows of typed columns, if they are wanted.
+    pub(crate) tables: Option<Tables>,
     /// How many more frames are wanted, if not all.
     pub(crate) wanted: Option<u64>,
 }
@@ -52,6 +55,7 @@ impl Sheet {
             modes: Modes::default(),
             taken: None,
             table: None,
+            tables: None,
             wanted: None,
         }
     }
@@ -66,6 +70,7 @@ impl Sheet {
         self.style.is_none()
             && self.taken.is_none()
             && self.table.is_none()
+            && self.tables.is_none()
             && self.wanted.is_none()
     }
 
@@ -75,6 +80,9 @@ impl Sheet {
         }
         if let Some(table) = &mut self.table {
             table.count_in(frame, &self.modes);
+        }
+        if let Some(tables) = &mut self.tables {
+            tables.frame(at, frame, &self.modes);
         }
         let before = self.modes;
         frame.teach(&mut self.modes);
@@ -214,6 +222,9 @@ where
 }
 
 fn list_gap(sheet: &mut Sheet, at: Place, gap: &SkippedBytes) {
+    if let Some(tables) = &mut sheet.tables {
+        tables.gap(at, gap);
+    }
     if let Some(style) = sheet.style {
         style.gap(&mut sheet.out, &mut sheet.clock, at, gap);
     }

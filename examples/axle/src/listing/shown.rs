@@ -9,6 +9,7 @@ use axlewire::{
 use serde::Serialize;
 
 use super::Out;
+use crate::args::Protocol;
 
 /// The modes of the nodes of a bus, as far as their answers have told them: the bytes of a WRITE do
 /// not say whether they are a speed or a position (ruling I3).
@@ -44,6 +45,8 @@ impl Modes {
 
 /// A frame of any protocol.
 pub(crate) trait Shown: Serialize + Copy {
+    const PROTOCOL: Protocol;
+
     fn name(&self) -> &'static str;
 
     fn bytes(&self) -> &[u8];
@@ -69,6 +72,8 @@ pub(crate) trait Shown: Serialize + Copy {
 }
 
 impl Shown for &ucp::Frame {
+    const PROTOCOL: Protocol = Protocol::Ucp;
+
     fn name(&self) -> &'static str {
         self.message().name()
     }
@@ -93,7 +98,7 @@ impl Shown for &ucp::Frame {
 
 /// Packets of one kind of board: those of a direction, and of both.
 macro_rules! shown {
-    ($of:path) => {
+    ($of:path, $protocol:expr) => {
         const _: () = {
             use $of as of;
 
@@ -113,7 +118,7 @@ macro_rules! shown {
             }
 
             impl Shown for of::Request<'_> {
-                shown!(@ common);
+                shown!(@ common $protocol);
 
                 fn commands(&self) -> Option<NodeId> {
                     commands(self)
@@ -121,7 +126,7 @@ macro_rules! shown {
             }
 
             impl Shown for of::Response<'_> {
-                shown!(@ common);
+                shown!(@ common $protocol);
 
                 fn teach(&self, modes: &mut Modes) {
                     teach(self, modes);
@@ -129,7 +134,7 @@ macro_rules! shown {
             }
 
             impl Shown for of::Packet<'_> {
-                shown!(@ common);
+                shown!(@ common $protocol);
 
                 fn commands(&self) -> Option<NodeId> {
                     match self {
@@ -146,7 +151,9 @@ macro_rules! shown {
             }
         };
     };
-    (@ common) => {
+    (@ common $protocol:expr) => {
+        const PROTOCOL: Protocol = $protocol;
+
         fn name(&self) -> &'static str {
             self.name()
         }
@@ -166,5 +173,5 @@ macro_rules! shown {
     };
 }
 
-shown!(ikeya);
-shown!(three);
+shown!(ikeya, Protocol::Ikeya);
+shown!(three, Protocol::Ikeya3);

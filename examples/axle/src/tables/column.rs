@@ -1,0 +1,183 @@
+//! Values of one column.
+
+use super::{Type, row::Unfit};
+
+/// A column: its values, where there are any.
+#[derive(Debug)]
+pub(crate) struct Column {
+    pub(crate) name: String,
+    pub(crate) kind: Type,
+    /// What 1 is; `none` for what is not measured.
+    pub(crate) unit: &'static str,
+    pub(crate) values: Values,
+    /// Which rows have a value; `None` if all must.
+    pub(crate) present: Option<Vec<bool>>,
+}
+
+/// The values of the rows that have one.
+#[derive(Debug)]
+pub(crate) enum Values {
+    /// Integers of up to 32 bits; a `u32` as the `i32` of the same bits.
+    Small(Vec<i32>),
+    /// `u64` and times.
+    Large(Vec<u64>),
+    Float(Vec<f32>),
+    /// Places in the list of names.
+    Name(Vec<u8>),
+    /// The end of each text, and all texts in one.
+    Text(Vec<usize>, String),
+}
+
+/// One value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Cell<'a> {
+    Integer(i64),
+    Unsigned(u64),
+    Float(f32),
+    /// Microseconds since 1970.
+    Time(u64),
+    /// A name or hex digits.
+    Text(&'a str),
+}
+
+impl Column {
+    pub(super) fn new(name: String, kind: Type, unit: &'static str, is_optional: bool) -> Self {
+        let values = match kind {
+            Type::U8 | Type::I16 | Type::U16 | Type::U32 => Values::Small(Vec::new()),
+            Type::U64 | Type::Time => Values::Large(Vec::new()),
+            Type::F32 => Values::Float(Vec::new()),
+            Type::Name(_) => Values::Name(Vec::new()),
+            Type::Text => Values::Text(Vec::new(), String::new()),
+        };
+        let present = is_optional.then(Vec::new);
+        Self { name, kind, unit, values, present }
+    }
+
+    /// The values of the rows in their order.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = Option<Cell<'_>>> {
+        let (mut row, mut next) = (0, 0);
+        let rows = self.present.as_ref().map_or_else(|| self.values.len(), Vec::len);
+        core::iter::from_fn(move || {
+            if row == rows {
+                return None;
+            }
+            let is_there = self.present.as_ref().is_none_or(|it| it.get(row) == Some(&true));
+            row += 1;
+            next += usize::from(is_there);
+            Some(is_there.then(|| self.cell(next - 1)).flatten())
+        })
+    }
+
+    /// One of the values.
+    fn cell(&self, at: usize) -> Option<Cell<'_>> {
+        Some(match (&self.values, &self.kind) {
+            (Values::Small(values), Type::U32) => Cell::Integer((*values.get(at)? as u32).into()),
+            (Values::Small(values), _) => Cell::Integer((*values.get(at)?).into()),
+            (Values::Large(values), Type::Time) => Cell::Time(*values.get(at)?),
+            (Values::Large(values), _) => Cell::Unsigned(*values.get(at)?),
+            (Values::Float(values), _) => Cell::Float(*values.get(at)?),
+            (Values::Name(values), Type::Name(names)) => {
+                Cell::Text(names.get(usize::from(*values.get(at)?))?)
+            }
+            (Values::Name(_), _) => return None,
+            (Values::Text(ends, text), _) => {
+                let begin = at.checked_sub(1).and_then(|before| ends.get(before)).unwrap_or(&0);
+                Cell::Text(text.get(*begin..*ends.get(at)?)?)
+            }
+        })
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.present.as_mut().map(Vec::clear).unwrap_or_default();
+        match &mut self.values {
+            Values::Small(values) => values.clear(),
+            Values::Large(values) => values.clear(),
+            Values::Float(values) => values.clear(),
+            Values::Name(values) => values.clear(),
+            Values::Text(ends, text) => {
+                ends.clear();
+                text.clear();
+            }
+        }
+    }
+
+    #[inline]
+    fn is_present(&mut self) {
+        if let Some(present) = &mut self.present {
+            present.push(true);
+        }
+    }
+
+    /// A row without a value.
+    pub(super) fn absent(&mut self) -> Result<(), Unfit> {
+        self.present.as_mut().ok_or(Unfit)?.push(false);
+        Ok(())
+    }
+
+    #[inline]
+    pub(super) fn integer(&mut self, value: i64) -> Result<(), Unfit> {
+        self.is_present();
+        match &mut self.values {
+            // All types of this width take their values only: the schema says so, and a test does.
+            Values::Small(values) => values.push(value as i32),
+            Values::Large(values) => values.push(value as u64),
+            _ => return Err(Unfit),
+        }
+        Ok(())
+    }
+
+    #[inline]
+    pub(super) fn unsigned(&mut self, value: u64) -> Result<(), Unfit> {
+        self.is_present();
+        match &mut self.values {
+            Values::Small(values) => values.push(u32::try_from(value).map_err(|_| Unfit)? as i32),
+            Values::Large(values) => values.push(value),
+            _ => return Err(Unfit),
+        }
+        Ok(())
+    }
+
+    #[inline]
+    pub(super) fn float(&mut self, value: f32) -> Result<(), Unfit> {
+        self.is_present();
+        let Values::Float(values) = &mut self.values else { return Err(Unfit) };
+        values.push(value);
+        Ok(())
+    }
+
+    /// A name, hex digits, or a speed that JSON has no number for.
+    #[inline]
+    pub(super) fn text(&mut self, value: &str) -> Result<(), Unfit> {
+        self.is_present();
+        match (&mut self.values, &self.kind) {
+            (Values::Text(ends, text), _) => {
+                text.push_str(value);
+                ends.push(text.len());
+            }
+            (Values::Name(values), Type::Name(names)) => {
+                let place = names.iter().position(|name| *name == value).ok_or(Unfit)?;
+                values.push(place as u8);
+            }
+            (Values::Float(values), _) => values.push(match value {
+                "nan" => f32::NAN,
+                "inf" => f32::INFINITY,
+                "-inf" => f32::NEG_INFINITY,
+                _ => return Err(Unfit),
+            }),
+            _ => return Err(Unfit),
+        }
+        Ok(())
+    }
+}
+
+impl Values {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Small(values) => values.len(),
+            Self::Large(values) => values.len(),
+            Self::Float(values) => values.len(),
+            Self::Name(values) => values.len(),
+            Self::Text(ends, _) => ends.len(),
+        }
+    }
+}
