@@ -4,6 +4,9 @@
 Every frame in them was sent or accepted by a running implementation. The additions are typical
 line faults: stray bytes, a flipped bit, a truncated frame, a false header. The result is
 deterministic.
+
+The two captures with times, motors.pcapng and drive.pcapng, are simulated instead:
+`cargo run -p host-examples --features sim --bin stories -- examples/captures` makes them.
 """
 import json
 from pathlib import Path
