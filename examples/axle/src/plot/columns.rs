@@ -141,11 +141,6 @@ impl Columns {
         self.columns.last().map(|column| column.last)
     }
 
-    /// First and last place.
-    pub(super) fn reach(&self) -> Option<(u64, u64)> {
-        Some((self.columns.first()?.first.x, self.columns.last()?.last.x))
-    }
-
     /// Lowest and highest value.
     pub(super) fn range(&self) -> Option<(f64, f64)> {
         let lows = self.columns.iter().map(|column| column.low.y).reduce(f64::min);
@@ -188,7 +183,7 @@ mod tests {
         let expected = [(1, 5.0), (2, -1.0), (2, 7.0), (2, 0.0), (9, 3.0)];
         assert_eq!(points(&columns), expected.map(|(x, y)| Point { x, y }));
         assert_eq!((columns.width(), columns.count()), (1, 5));
-        assert_eq!((columns.range(), columns.reach()), (Some((-1.0, 7.0)), Some((1, 9))));
+        assert_eq!(columns.range(), Some((-1.0, 7.0)));
     }
 
     #[test]
@@ -205,7 +200,8 @@ mod tests {
         assert!(points.len() <= 4 * MOST);
         assert_eq!(columns.count(), len);
         assert_eq!(columns.range(), Some((0.0, 99.0 + (123_456 % 7) as f64)));
-        assert_eq!(columns.reach(), Some((0, (len - 1) * 250)));
+        let ends = [points[0].x, points[points.len() - 1].x];
+        assert_eq!(ends, [0, (len - 1) * 250]);
         assert!(points.is_sorted_by_key(|point| point.x));
         // Each column has what is lowest and highest in it.
         let width = columns.width();

@@ -132,16 +132,16 @@ impl Layout {
 
     fn draw_all<P: Pen>(&self, picture: &Picture, area: &Area<'_, P>) -> Result<(), Problem> {
         area.fill(&RGBColor(0xFF, 0xFF, 0xFF))?;
-        let title = text(LARGE, FontStyle::Bold, INK, HPos::Left);
+        let title = text(LARGE, FontStyle::Bold, &INK, HPos::Left);
         area.draw_text(&picture.title, &title, (fine(EDGE), fine(14)))?;
         for (panel, place) in picture.panels.iter().zip(&self.places) {
             self.panel(panel, &picture.axis, *place, area)?;
         }
-        let small = text(SMALL, FontStyle::Normal, SOFT, HPos::Center);
+        let small = text(SMALL, FontStyle::Normal, &SOFT, HPos::Center);
         let mut below = self.height - EDGE - NOTE * (1 + picture.notes.len() as i32);
         let middle = fine((EDGE + self.left + WIDTH as i32 - EDGE - RIGHT) / 2);
         area.draw_text(&picture.axis.title, &small, (middle, fine(below)))?;
-        let note = text(SMALL, FontStyle::Normal, SOFT, HPos::Left);
+        let note = text(SMALL, FontStyle::Normal, &SOFT, HPos::Left);
         for line in &picture.notes {
             below += NOTE;
             area.draw_text(line, &note, (fine(EDGE), fine(below)))?;
@@ -186,7 +186,7 @@ impl Layout {
             .y_labels(if is_rows { 0 } else { (height - HEADER) as usize / 28 + 1 })
             .x_label_formatter(&|x| number(*x, x_span))
             .y_label_formatter(&|y| if is_rows { String::new() } else { number(*y, step) })
-            .label_style(text(SMALL, FontStyle::Normal, SOFT, HPos::Left))
+            .label_style(text(SMALL, FontStyle::Normal, &SOFT, HPos::Left))
             .set_all_tick_mark_size(fine(3))
             .draw()?;
         if is_rows {
@@ -203,8 +203,8 @@ impl Layout {
 
 /// The title of a panel, and its legend at the right.
 fn header<P: Pen>(panel: &Panel, width: i32, area: &Area<'_, P>) -> Result<(), Problem> {
-    let bold = text(NORMAL, FontStyle::Bold, INK, HPos::Left);
-    let soft = text(SMALL, FontStyle::Normal, SOFT, HPos::Left);
+    let bold = text(NORMAL, FontStyle::Bold, &INK, HPos::Left);
+    let soft = text(SMALL, FontStyle::Normal, &SOFT, HPos::Left);
     let middle = fine(HEADER / 2);
     area.draw_text(panel.title, &bold, (0, middle))?;
     let mut x = area.estimate_text_size(panel.title, &bold)?.0 as i32;
@@ -240,7 +240,7 @@ fn curve<P: Pen>(
         return dots(series, axis, scale, chart);
     }
     let style = match series.look {
-        Look::Held => colour(series.colour).mix(0.28).stroke_width(thick(4.0)),
+        Look::Held | Look::Wide => colour(series.colour).mix(0.28).stroke_width(thick(4.0)),
         _ => colour(series.colour).mix(1.0).stroke_width(thick(1.2)),
     };
     let mut pieces = columns.pieces().peekable();
@@ -294,8 +294,8 @@ fn rows_of_ticks<P: Pen>(
     chart: &mut Chart<'_, '_, P>,
     begin: i32,
 ) -> Result<(), Problem> {
-    let label = text(SMALL, FontStyle::Normal, SOFT, HPos::Right);
-    let total = text(SMALL, FontStyle::Normal, SOFT, HPos::Left);
+    let label = text(SMALL, FontStyle::Normal, &SOFT, HPos::Right);
+    let total = text(SMALL, FontStyle::Normal, &SOFT, HPos::Left);
     let (width, _) = area.dim_in_pixel();
     for (row, series) in panel.series.iter().enumerate() {
         let middle = fine(HEADER + ROW / 2 + ROW * row as i32);
@@ -384,9 +384,9 @@ fn colour(number: usize) -> RGBAColor {
 }
 
 /// The style of a text, which is in the middle of its height.
-fn text(size: f64, weight: FontStyle, colour: RGBColor, side: HPos) -> TextStyle<'static> {
+fn text(size: f64, weight: FontStyle, colour: &'static RGBColor, side: HPos) -> TextStyle<'static> {
     let font = ("sans-serif", size * f64::from(FINE), weight).into_font();
-    TextStyle::from(font).color(&colour.to_rgba()).pos(Pos::new(side, VPos::Center))
+    TextStyle::from(font).color(colour).pos(Pos::new(side, VPos::Center))
 }
 
 /// A number with as many decimals as an axis over this span needs.

@@ -73,6 +73,8 @@ pub(super) struct Series {
 pub(super) enum Look {
     /// Measured: a line from value to value.
     Line,
+    /// The same, wide and pale behind the others.
+    Wide,
     /// Commanded: holds until the next, a wide pale line behind the others.
     Held,
     /// Commanded, in a panel of its own.
@@ -86,6 +88,7 @@ impl Look {
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Line => "line",
+            Self::Wide => "wide",
             Self::Held => "held",
             Self::Step => "step",
             Self::Dots => "dots",

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     args::Protocol,
-    decode::{self, Choice, Sheet},
+    decode::{self, Sheet},
     failure::Failure,
     input::Input,
     listing::Style,
@@ -23,20 +23,16 @@ const BITS: f64 = 10.0;
 /// Reads the capture of these arguments.
 pub(super) fn picture(args: &Args) -> Result<Picture, Failure> {
     let mut input = Input::open(Some(&args.file))?;
+    let chosen = decode::choose(&mut input, args.protocol)?;
     let mut sheet = Sheet::new(Some(Style::Json));
-    let choice = Choice { protocol: args.protocol, direction: None };
     let mut reading = Reading::new(args);
-    let walked = decode::walk(&mut input, choice, &mut sheet, |next, sheet| {
-        reading.lines(sheet)?;
-        reading.is_next(next.protocol, next.interface)?;
-        Ok(true)
-    });
     // What was read before a failure is not drawn: nobody would see that the rest is missing.
-    if let Some(failure) = walked.broken {
-        return Err(failure);
-    }
+    chosen.walk(&mut input, &mut sheet, |next, sheet| {
+        reading.lines(sheet)?;
+        reading.is_next(next.protocol, next.interface)
+    })?;
     reading.lines(&mut sheet)?;
-    reading.finish(walked.account.received)
+    reading.finish()
 }
 
 /// What was read so far.
@@ -114,25 +110,19 @@ impl<'a> Reading<'a> {
         self.frames += u64::from(line.event == "frame");
         match &mut self.curves {
             Some(Curves::Bus(bus)) => bus.take(line, x, has_times),
-            Some(Curves::Rover(rover)) => rover.take(line, x),
+            Some(Curves::Rover(rover)) => rover.take(line, x, has_times),
             None => {}
         }
     }
 
-    fn finish(self, received: u64) -> Result<Picture, Failure> {
+    fn finish(self) -> Result<Picture, Failure> {
         let file = &self.args.file;
         let failed = |line| Err(Failure::Failed(line));
-        if received == 0 {
-            return failed(format!("{file:?} has no bytes: there is nothing to draw"));
-        }
         let (Some((protocol, _)), Some(curves), Some(reach)) = (self.line, self.curves, self.reach)
         else {
             return failed(format!("{file:?} has nothing on that interface"));
         };
         let name = protocol.name();
-        if self.frames == 0 {
-            return failed(format!("no {name} frame in {received} bytes: is it another protocol?"));
-        }
         let axis = axis(self.has_times == Some(true), self.args.baud, reach);
         let mut notes = match &curves {
             Curves::Bus(bus) => bus.notes(),

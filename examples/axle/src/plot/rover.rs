@@ -13,6 +13,12 @@ const DEGREES_PER_SECOND: f64 = 16.4;
 const VOLT: f64 = 10.0;
 const AMPERE: f64 = 100.0;
 
+/// Time without a report after which the curves are interrupted (ruling U10), microseconds.
+const LINK_TIMEOUT: u64 = 500_000;
+
+/// A larger step of the heading is one over north, degrees.
+const HALF_TURN: f64 = 180.0;
+
 const WHEELS: [&str; 4] = ["front left", "front right", "back left", "back right"];
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -30,7 +36,8 @@ pub(super) struct Rover {
     current: Group,
     power: Group,
     errors: Errors,
-    last_index: Option<u8>,
+    /// Index and place of the last report.
+    last: Option<(u8, u64)>,
 }
 
 /// A panel that fills.
@@ -55,6 +62,17 @@ impl Group {
         Self(Panel { title, unit, size, least, series: series.collect(), hint: "" })
     }
 
+    /// The wheels of one side turn alike: those in front are drawn behind the others.
+    fn with_wide_front(mut self) -> Self {
+        self.0.series.iter_mut().take(2).for_each(|series| series.look = Look::Wide);
+        self.0.hint = "wide and pale: front";
+        self
+    }
+
+    fn cut(&mut self) {
+        self.0.series.iter_mut().for_each(|series| series.columns.cut());
+    }
+
     /// Takes in a value for each of its curves; `one` is what 1 of the unit is.
     fn put(&mut self, x: u64, values: &Numbers, one: f64) {
         for (series, value) in self.0.series.iter_mut().zip(values.all()) {
@@ -70,7 +88,8 @@ impl Default for Rover {
         let with_zero = Some((0.0, 0.0));
         Self {
             command: Group::new(("Command", "%", Low), Step, with_zero, &["speed", "steering"]),
-            wheels: Group::new(("Wheel speed", "1/min", Tall), Line, with_zero, &WHEELS),
+            wheels: Group::new(("Wheel speed", "1/min", Tall), Line, with_zero, &WHEELS)
+                .with_wide_front(),
             heading: Group::new(("Heading", "°", Half), Line, Some((0.0, 360.0)), &[""]),
             field: Group::new(("Magnetic field", "counts", Half), Line, None, &AXES),
             acceleration: Group::new(("Acceleration", "g", Half), Line, None, &AXES),
@@ -80,14 +99,14 @@ impl Default for Rover {
             current: Group::new(("Current", "A", Half), Line, with_zero, &[""]),
             power: Group::new(("Power", "W", Half), Line, with_zero, &[""]),
             errors: Errors::default(),
-            last_index: None,
+            last: None,
         }
     }
 }
 
 impl Rover {
-    /// Takes in a line.
-    pub(super) fn take(&mut self, line: &Line<'_>, x: u64) {
+    /// Takes in a line; `has_times` says whether the places are times.
+    pub(super) fn take(&mut self, line: &Line<'_>, x: u64, has_times: bool) {
         if line.event != "frame" {
             return self.errors.gap(line, x);
         }
@@ -97,7 +116,7 @@ impl Rover {
                 let both = command.beside(steering);
                 self.command.put(x, &both, 1.0);
             }
-            "report" => self.report(line, x),
+            "report" => self.report(line, x, has_times),
             // What it means in the answer to an update is something else.
             "ota_ack" => {}
             _ if line.err.is_some_and(|err| err != 0) => self.errors.refused(x),
@@ -105,14 +124,20 @@ impl Rover {
         }
     }
 
-    fn report(&mut self, line: &Line<'_>, x: u64) {
-        if let Some(index) = line.index {
-            match self.last_index.replace(index) {
-                // The same one again.
-                Some(last) if last == index => {}
-                Some(last) => self.errors.lost(index.wrapping_sub(last).wrapping_sub(1), x),
-                None => {}
+    fn report(&mut self, line: &Line<'_>, x: u64, has_times: bool) {
+        let last = line.index.and_then(|index| self.last.replace((index, x)));
+        if let (Some(index), Some((before, since))) = (line.index, last) {
+            // The same one again: none is missing.
+            self.errors.lost(index.wrapping_sub(before).saturating_sub(1), x);
+            if has_times && x.saturating_sub(since) > LINK_TIMEOUT {
+                self.measured().for_each(Group::cut);
             }
+        }
+        let before = self.heading.0.series.first().and_then(|series| series.columns.last());
+        if let (Some(before), [now]) = (before, line.heading.all())
+            && (now - before.y).abs() > HALF_TURN
+        {
+            self.heading.cut();
         }
         self.wheels.put(x, &line.rpm, 1.0);
         self.heading.put(x, &line.heading, 1.0);
@@ -123,6 +148,14 @@ impl Rover {
         self.voltage.put(x, &line.voltage_dv, VOLT);
         self.current.put(x, &line.current_ca, AMPERE);
         self.power.put(x, &line.power_w, 1.0);
+    }
+
+    /// All that reports fill.
+    fn measured(&mut self) -> impl Iterator<Item = &mut Group> {
+        let Self { wheels, heading, acceleration, turning, field, battery, .. } = self;
+        let Self { voltage, current, power, .. } = self;
+        [wheels, heading, acceleration, turning, field, battery, voltage, current, power]
+            .into_iter()
     }
 
     /// The panels that have something to show.
