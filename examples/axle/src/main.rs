@@ -4,11 +4,13 @@
 //! that distinguishes usage errors from other failures.
 
 mod args;
+mod beside;
 mod boards;
 mod bus;
 mod calibrate;
 mod decode;
 mod drive;
+mod export;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
@@ -98,6 +100,7 @@ struct Cli {
 enum Command {
     Decode(decode::Args),
     Plot(plot::Args),
+    Export(export::Args),
     Scan(scan::Args),
     Spin(spin::Args),
     Drive(drive::Args),
@@ -158,6 +161,7 @@ fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Decode(args) => decode::run(args),
         Command::Plot(args) => plot::run(args),
+        Command::Export(args) => export::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),
         Command::Drive(args) => drive::run(args),

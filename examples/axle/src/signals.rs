@@ -57,6 +57,16 @@ pub(crate) struct Signals {
     console: std::cell::RefCell<console::Console>,
 }
 
+/// The signals that end a subcommand, for another thread.
+#[derive(Debug)]
+pub(crate) struct Watcher(Arc<AtomicBool>);
+
+impl Watcher {
+    pub(crate) fn is_raised(&self) -> bool {
+        self.0.load(Ordering::SeqCst)
+    }
+}
+
 impl Signals {
     /// For a subcommand that moves nothing: Ctrl-C and similar signals set a flag. If the tool has
     /// not ended a second later, because it waits for a reader of its output, the next one ends it
@@ -107,6 +117,11 @@ impl Signals {
             }
         }
         Ok(signals)
+    }
+
+    /// The same for another thread. On Windows it learns what this one has seen.
+    pub(crate) fn watcher(&self) -> Watcher {
+        Watcher(Arc::clone(&self.end))
     }
 
     /// Whether any signal has come.

@@ -14,6 +14,8 @@ use crate::{
 };
 pub(crate) use column::{Cell, Column, Values};
 pub(crate) use described::Type;
+#[cfg(feature = "mcap")]
+pub(crate) use described::json_schema;
 use described::{Described, Kind};
 use row::{Row, Slot, Unfit};
 
@@ -189,10 +191,7 @@ impl Table {
                 slots.push(Slot { name, first, width: columns.len() - place - first });
             }
         }
-        let name = match of.protocol {
-            Some(protocol) => format!("{}.{}", protocol.name(), of.message),
-            None => of.message.to_owned(),
-        };
+        let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
         Self { name, protocol, message, columns, numbers, slots }
     }
@@ -224,6 +223,14 @@ impl Table {
             None => direction.absent()?,
         }
         Ok(PLACE.len())
+    }
+}
+
+/// The name of a table: protocol and message, or `skipped`.
+pub(crate) fn name(protocol: Option<Protocol>, message: &str) -> String {
+    match protocol {
+        Some(protocol) => format!("{}.{message}", protocol.name()),
+        None => message.to_owned(),
     }
 }
 

@@ -94,7 +94,7 @@ pub(crate) enum Direction {
 
 /// What `--protocol` accepts: a protocol, or `None` for auto.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-struct Named(Option<Protocol>);
+pub(crate) struct Named(pub(crate) Option<Protocol>);
 
 impl ValueEnum for Named {
     fn value_variants<'a>() -> &'a [Self] {

@@ -8,6 +8,7 @@ use axlewire::{
 };
 
 use crate::{
+    args::Protocol,
     listing::{LineClock, Modes, Out, Place, Shown, SkippedBytes, Style, Table},
     pcapng::Direction,
     tables::Tables,
@@ -23,6 +24,8 @@ pub(crate) struct Sheet {
     pub(crate) style: Option<Style>,
     pub(crate) out: Out,
     clock: LineClock,
+    /// What each line is about, if that is wanted.
+    pub(crate) marks: Option<Vec<Mark>>,
     /// Modes of the nodes on the line whose bytes are fed.
     pub(crate) modes: Modes,
     /// The frames themselves, if they are wanted, and the nodes that changed their modes meanwhile.
@@ -33,6 +36,18 @@ pub(crate) struct Sheet {
     pub(crate) tables: Option<Tables>,
     /// How many more frames are wanted, if not all.
     pub(crate) wanted: Option<u64>,
+}
+
+/// What a line of a sheet is about.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mark {
+    /// Where the line ends in [`Sheet::out`].
+    pub(crate) end: usize,
+    pub(crate) at: Place,
+    /// `None` for a gap.
+    pub(crate) protocol: Option<Protocol>,
+    /// Name of the message; `skipped` for a gap.
+    pub(crate) message: &'static str,
 }
 
 /// A frame of a capture.
@@ -52,6 +67,7 @@ impl Sheet {
             style,
             out: Out::default(),
             clock: LineClock::default(),
+            marks: None,
             modes: Modes::default(),
             taken: None,
             table: None,
@@ -74,9 +90,13 @@ impl Sheet {
             && self.wanted.is_none()
     }
 
-    fn take(&mut self, at: Place, frame: &impl Shown) {
+    fn take<S: Shown>(&mut self, at: Place, frame: &S) {
         if let Some(style) = self.style {
             style.frame(&mut self.out, &mut self.clock, at, frame, &self.modes);
+        }
+        if let Some(marks) = &mut self.marks {
+            let (end, protocol, message) = (self.out.0.len(), Some(S::PROTOCOL), frame.name());
+            marks.push(Mark { end, at, protocol, message });
         }
         if let Some(table) = &mut self.table {
             table.count_in(frame, &self.modes);
@@ -227,6 +247,10 @@ fn list_gap(sheet: &mut Sheet, at: Place, gap: &SkippedBytes) {
     }
     if let Some(style) = sheet.style {
         style.gap(&mut sheet.out, &mut sheet.clock, at, gap);
+    }
+    if let Some(marks) = &mut sheet.marks {
+        let end = sheet.out.0.len();
+        marks.push(Mark { end, at, protocol: None, message: "skipped" });
     }
 }
 

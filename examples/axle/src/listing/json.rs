@@ -76,7 +76,7 @@ fn begin(out: &mut Out, event: &str, at: Place) {
 }
 
 /// Microseconds as seconds.
-fn seconds(out: &mut Out, micros: u64) {
+pub(crate) fn seconds(out: &mut Out, micros: u64) {
     out.number(micros / 1_000_000);
     out.text(".");
     super::row::six_digits(out, micros % 1_000_000);

@@ -10,7 +10,7 @@ use std::fmt;
 use axlewire::stream::{Counters, Reason};
 
 use crate::pcapng::Direction;
-pub(crate) use json::summary as json_summary;
+pub(crate) use json::{seconds, summary as json_summary};
 pub(crate) use row::{TimeColumn, print_summary};
 pub(crate) use shown::{Modes, Shown};
 pub(crate) use table::Table;

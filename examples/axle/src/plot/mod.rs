@@ -31,11 +31,7 @@ mod svg;
 
 use std::path::PathBuf;
 
-use crate::{
-    EXIT_CODES,
-    args::{self, Protocol},
-    failure::Failure,
-};
+use crate::{EXIT_CODES, args, decode::Named, failure::Failure};
 
 /// Draw a capture: as SVG, as PNG, or as a page to zoom in
 ///
@@ -51,9 +47,10 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    /// Protocol of the line; a pcapng file has its own, raw bytes need it
-    #[arg(short = 'P', long, value_enum)]
-    protocol: Option<Protocol>,
+    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
+    /// most bytes at the beginning of raw bytes
+    #[arg(short = 'P', long, value_enum, default_value = "auto")]
+    protocol: Named,
 
     /// The line to draw, if a pcapng file has several: its number from 0
     #[arg(long, value_name = "N")]
@@ -63,9 +60,13 @@ pub(crate) struct Args {
     #[arg(short, long, value_parser = args::baud())]
     baud: Option<u32>,
 
-    /// The picture: its name ends with .svg, .png or .html; one of that name is replaced
+    /// The picture: .svg, .png or .html
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+
+    /// Overwrite the picture if there is one
+    #[arg(long)]
+    force: bool,
 
     /// The capture, raw bytes or pcapng; - is standard input
     file: PathBuf,
@@ -81,12 +82,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         output::Format::Png => draw::to_png(&picture)?,
         output::Format::Html => html::page(&picture)?.into_bytes(),
     };
-    output::write(&args.output, &bytes)
+    output::write(&args.output, args.force, &bytes)
 }
 
 /// Runs the subcommand.
 #[cfg(not(feature = "plot"))]
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let Args { protocol: _, interface: _, baud: _, output: _, file: _ } = args;
-    Err(Failure::Usage("this build draws nothing: build it with --features plot".to_owned()))
+    let Args { protocol: Named(_), interface: _, baud: _, output: _, force: _, file: _ } = args;
+    let line = "this axle was built without the feature plot: build it with --features plot";
+    Err(Failure::Usage(line.to_owned()))
 }

@@ -38,12 +38,12 @@ const panels = data.panels.map(panel => {
     button.textContent = series.name;
     button.style.setProperty("--of", colour(series));
     button.setAttribute("aria-pressed", "true");
-    // A set-point goes with what is measured: its name begins with the name of that.
+    // A set-point goes with what is measured: it has the same colour.
     button.onclick = () => {
       const isShown = button.getAttribute("aria-pressed") === "false";
       button.setAttribute("aria-pressed", String(isShown));
       for (const other of panel.series) {
-        if (other === series || other.name.startsWith(series.name + ",")) {
+        if (other.colour === series.colour) {
           isShown ? hidden.delete(other) : hidden.add(other);
         }
       }

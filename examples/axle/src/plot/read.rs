@@ -23,7 +23,7 @@ const BITS: f64 = 10.0;
 /// Reads the capture of these arguments.
 pub(super) fn picture(args: &Args) -> Result<Picture, Failure> {
     let mut input = Input::open(Some(&args.file))?;
-    let chosen = decode::choose(&mut input, args.protocol)?;
+    let chosen = decode::choose(&mut input, args.protocol.0)?;
     let mut sheet = Sheet::new(Some(Style::Json));
     let mut reading = Reading::new(args);
     // What was read before a failure is not drawn: nobody would see that the rest is missing.

@@ -62,9 +62,13 @@ impl Group {
         Self(Panel { title, unit, size, least, series: series.collect(), hint: "" })
     }
 
-    /// The wheels of one side turn alike: those in front are drawn behind the others.
+    /// The wheels of one side turn alike: those in front are wide and pale behind the others.
     fn with_wide_front(mut self) -> Self {
-        self.0.series.iter_mut().take(2).for_each(|series| series.look = Look::Wide);
+        for (number, series) in self.0.series.iter_mut().enumerate() {
+            let is_front = number < 2;
+            series.look = if is_front { Look::Wide } else { Look::Line };
+            (series.colour, series.is_named) = (number % 2, !is_front);
+        }
         self.0.hint = "wide and pale: front";
         self
     }

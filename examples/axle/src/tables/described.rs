@@ -66,6 +66,60 @@ pub(super) struct Described {
     pub(super) fields: Vec<Field>,
 }
 
+impl Type {
+    /// Its name in the list of columns.
+    pub(crate) const fn name(&self) -> &'static str {
+        match self {
+            Self::U8 => "u8",
+            Self::I16 => "i16",
+            Self::U16 => "u16",
+            Self::U32 => "u32",
+            Self::U64 => "u64",
+            Self::F32 => "f32",
+            Self::Time => "time",
+            Self::Name(_) => "name",
+            Self::Text => "hex",
+        }
+    }
+}
+
+/// A JSON Schema of the lines of one message, without references and with units: what viewers of
+/// MCAP read.
+#[cfg(feature = "mcap")]
+pub(crate) fn json_schema(protocol: Option<Protocol>, message: &str) -> Option<String> {
+    use serde_json::{Map, Value, json};
+
+    let value = |of: &Type| match of {
+        Type::F32 | Type::Time => json!({"type": "number"}),
+        Type::Name(_) | Type::Text => json!({"type": "string"}),
+        _ => json!({"type": "integer"}),
+    };
+    let described =
+        all()?.into_iter().find(|it| (it.protocol, it.message) == (protocol, message))?;
+    let mut properties = Map::new();
+    for field in &described.fields {
+        let mut property = match &field.kind {
+            Kind::One(of) => value(of),
+            Kind::Array(of, len) => {
+                json!({"type": "array", "items": value(of), "minItems": len, "maxItems": len})
+            }
+            Kind::Object(of, names) => {
+                let all: Map<String, Value> =
+                    names.iter().map(|name| ((*name).to_owned(), value(of))).collect();
+                json!({"type": "object", "properties": all})
+            }
+        };
+        if let (Some(object), true) = (property.as_object_mut(), field.unit != "none") {
+            object.insert("unit".to_owned(), field.unit.into());
+            object.insert("description".to_owned(), format!("unit: {}", field.unit).into());
+        }
+        properties.insert(field.name.to_owned(), property);
+    }
+    let title = super::name(protocol, message);
+    let schema = json!({"title": title, "type": "object", "properties": properties});
+    serde_json::to_string(&schema).ok()
+}
+
 /// All messages of all protocols, and the gaps. `None` if the schema is not what it should be,
 /// which the tests exclude.
 pub(super) fn all() -> Option<Vec<Described>> {

@@ -1,0 +1,137 @@
+//! `axle export`: a capture as a file for other tools.
+
+mod csv;
+mod lines;
+#[cfg(feature = "mcap")]
+mod mcap;
+#[cfg(feature = "parquet")]
+mod parquet;
+
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    EXIT_CODES, beside,
+    decode::{self, Chosen, Named, Walked},
+    failure::Failure,
+    input::Input,
+    listing,
+    signals::Signals,
+};
+
+/// Export a capture for Foxglove, PlotJuggler, DuckDB, pandas and spreadsheets
+///
+/// Reads what `axle decode` reads and gives the same values as `axle decode --json`. The extension
+/// of the output chooses its form:
+///
+///   .jsonl    the lines of `axle decode --json`
+///   .mcap     a topic per message, with a JSON Schema; for Foxglove and PlotJuggler
+///   .csv      a folder with a table per message, and columns.csv with the units
+///   .parquet  the same as Parquet
+///
+/// A table has the name of its protocol and message, such as ucp.report; the gaps are in skipped.
+/// Times are those of a pcapng file. Raw bytes have none: their tables have no columns for time,
+/// interface and direction, and MCAP has the offset instead, a nanosecond per byte.
+///
+/// The output is written under another name first, so that it is there as a whole or not at all.
+/// Memory use does not grow with the input.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES, verbatim_doc_comment)]
+pub(crate) struct Args {
+    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
+    /// most bytes at the beginning of raw bytes
+    #[arg(short = 'P', long, value_enum, default_value = "auto")]
+    protocol: Named,
+
+    /// The file or, for .csv and .parquet, the folder
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+
+    /// Overwrite the output if there is one
+    #[arg(long)]
+    force: bool,
+
+    /// The capture; - is standard input
+    file: PathBuf,
+}
+
+/// A form of the output.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Format {
+    Csv,
+    Lines,
+    Mcap,
+    Parquet,
+}
+
+/// What an exporter needs.
+struct Job<'a> {
+    input: Input,
+    chosen: Chosen,
+    output: &'a Path,
+    force: bool,
+    signals: Signals,
+}
+
+impl Job<'_> {
+    /// Fails after a signal.
+    fn go_on(signals: &Signals) -> Result<(), Failure> {
+        if signals.is_raised() { Err(beside::interrupted()) } else { Ok(()) }
+    }
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let format = format_of(&args.output)?;
+    let signals = Signals::listen()?;
+    let mut input = Input::open(Some(&args.file))?;
+    let chosen = decode::choose(&mut input, args.protocol.0)?;
+    let (output, force) = (&*args.output, args.force);
+    let job = Job { input, chosen, output, force, signals };
+    let walked = match format {
+        Format::Csv => csv::export(job),
+        Format::Lines => lines::export(job),
+        #[cfg(feature = "mcap")]
+        Format::Mcap => mcap::export(job),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::export(job),
+        #[allow(unreachable_patterns, reason = "with all features")]
+        Format::Mcap | Format::Parquet => return Ok(()),
+    }?;
+    tell(&walked, &args.output).map_err(Failure::Write)
+}
+
+fn tell(walked: &Walked, output: &Path) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    listing::print_summary(&mut out, &walked.account, false)?;
+    writeln!(out, "written to {output:?}")?;
+    out.flush()
+}
+
+/// The format of this file, if this build has it.
+fn format_of(output: &Path) -> Result<Format, Failure> {
+    let extension = output.extension().and_then(|it| it.to_str()).unwrap_or_default();
+    let (format, feature) = match extension.to_ascii_lowercase().as_str() {
+        "csv" => (Format::Csv, None),
+        "jsonl" => (Format::Lines, None),
+        "mcap" => (Format::Mcap, (!cfg!(feature = "mcap")).then_some("mcap")),
+        "parquet" => (Format::Parquet, (!cfg!(feature = "parquet")).then_some("parquet")),
+        _ => {
+            let line = format!("{output:?} does not end in .csv, .jsonl, .mcap or .parquet");
+            return Err(Failure::Usage(line));
+        }
+    };
+    match feature {
+        None => Ok(format),
+        Some(feature) => Err(Failure::Usage(format!(
+            "this axle was built without the feature {feature}: build it with --features {feature}"
+        ))),
+    }
+}
+
+/// The failure to write this file.
+fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> Failure {
+    Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
+}

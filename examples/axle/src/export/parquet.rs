@@ -1,0 +1,171 @@
+//! Parquet: a folder with a file per table.
+
+use std::{collections::BTreeMap, fs::File, path::Path, path::PathBuf, sync::Arc};
+
+use parquet::{
+    basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physical},
+    data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type},
+    errors::ParquetError,
+    file::{
+        metadata::KeyValue,
+        properties::{EnabledStatistics, WriterProperties, WriterVersion},
+        writer::{SerializedColumnWriter, SerializedFileWriter},
+    },
+    schema::types::{ColumnPath, Type as Field},
+};
+
+use super::{
+    Job, cannot_write,
+    csv::{Both, List},
+};
+use crate::{
+    beside::Beside,
+    decode::{self, Walked},
+    failure::Failure,
+    tables::{Column, Sink, Table, Type, Values},
+};
+
+pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
+    let (beside, path) = Beside::folder(job.output, job.force, "parquet")?;
+    beside.end_on(&job.signals);
+    let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
+    let mut list = List::default();
+    let mut sink = Both(&mut folder, &mut list);
+    let go_on = || Job::go_on(&job.signals);
+    let walked = decode::walk_into(&mut job.input, &job.chosen, &mut sink, go_on)?;
+    for mut file in folder.files.into_values() {
+        file.finish().map_err(|error| cannot_write(job.output, &error))?;
+    }
+    list.write(&folder.path).map_err(|error| cannot_write(job.output, &error))?;
+    beside.keep()?;
+    Ok(walked)
+}
+
+/// A file per table.
+struct Folder<'a> {
+    path: PathBuf,
+    /// The name that it will have.
+    output: &'a Path,
+    files: BTreeMap<String, SerializedFileWriter<File>>,
+}
+
+impl Sink for Folder<'_> {
+    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
+        let cannot = |error: ParquetError| cannot_write(self.output, &error);
+        if !self.files.contains_key(&table.name) {
+            let file = create(&self.path, table).map_err(cannot)?;
+            self.files.insert(table.name.clone(), file);
+        }
+        let Some(file) = self.files.get_mut(&table.name) else { return Ok(()) };
+        group(file, table).map_err(cannot)
+    }
+}
+
+fn create(folder: &Path, table: &Table) -> Result<SerializedFileWriter<File>, ParquetError> {
+    let fields = table.columns.iter().map(|column| field(column).map(Arc::new));
+    let fields = fields.collect::<Result<_, _>>()?;
+    let schema = Field::group_type_builder(&table.name).with_fields(fields).build()?;
+    let units = table.columns.iter().filter(|column| column.unit != "none");
+    let units =
+        units.map(|column| KeyValue::new(format!("unit:{}", column.name), column.unit.to_owned()));
+    // Plain values: looking each up in a dictionary takes longer than writing it, and most are
+    // measurements, of which there are many. Statistics are for what is searched.
+    let mut properties = WriterProperties::builder()
+        .set_writer_version(WriterVersion::PARQUET_1_0)
+        .set_created_by("axle".to_owned())
+        .set_encoding(Encoding::PLAIN)
+        .set_dictionary_enabled(false)
+        .set_statistics_enabled(EnabledStatistics::None)
+        .set_offset_index_disabled(true)
+        .set_write_batch_size(8 * 1024)
+        .set_key_value_metadata(Some(units.collect()));
+    for column in &table.columns {
+        let path = ColumnPath::from(&*column.name);
+        if matches!(column.kind, Type::Name(_)) {
+            properties = properties.set_column_dictionary_enabled(path, true);
+        } else if ["t", "offset"].contains(&&*column.name) {
+            properties = properties.set_column_statistics_enabled(path, EnabledStatistics::Chunk);
+        }
+    }
+    let file = File::create(folder.join(format!("{}.parquet", table.name)))?;
+    SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))
+}
+
+fn field(column: &Column) -> Result<Field, ParquetError> {
+    let (physical, logical) = match column.kind {
+        Type::U8 => (Physical::INT32, Some(LogicalType::integer(8, false))),
+        Type::I16 => (Physical::INT32, Some(LogicalType::integer(16, true))),
+        Type::U16 => (Physical::INT32, Some(LogicalType::integer(16, false))),
+        Type::U32 => (Physical::INT32, Some(LogicalType::integer(32, false))),
+        Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
+        Type::F32 => (Physical::FLOAT, None),
+        Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
+        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+    };
+    let repetition = match column.present {
+        Some(_) => Repetition::OPTIONAL,
+        None => Repetition::REQUIRED,
+    };
+    Field::primitive_type_builder(&column.name, physical)
+        .with_repetition(repetition)
+        .with_logical_type(logical)
+        .build()
+}
+
+/// Writes the rows as one row group.
+fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), ParquetError> {
+    let mut group = file.next_row_group()?;
+    for column in &table.columns {
+        let Some(mut to) = group.next_column()? else { break };
+        let levels = column.present.as_ref();
+        let levels: Option<Vec<i16>> =
+            levels.map(|present| present.iter().map(|is_there| i16::from(*is_there)).collect());
+        let levels = levels.as_deref();
+        match &column.values {
+            Values::Small(values) => put::<Int32Type>(&mut to, values, levels)?,
+            Values::Float(values) => put::<FloatType>(&mut to, values, levels)?,
+            Values::Large(values) => {
+                let values = values.iter().map(|value| i64::try_from(*value));
+                let values = values.collect::<Result<Vec<_>, _>>().map_err(|_| {
+                    let line =
+                        "Parquet has no times after the year 294246, and the capture has one";
+                    ParquetError::General(line.to_owned())
+                })?;
+                put::<Int64Type>(&mut to, &values, levels)?;
+            }
+            Values::Name(values) => {
+                let Type::Name(names) = &column.kind else { continue };
+                let names: Vec<_> =
+                    names.iter().map(|name| text(name.as_bytes().to_vec())).collect();
+                let name = |at: &u8| names.get(usize::from(*at)).cloned().unwrap_or_default();
+                let values: Vec<_> = values.iter().map(name).collect();
+                put::<ByteArrayType>(&mut to, &values, levels)?;
+            }
+            Values::Text(ends, all) => {
+                let all = text(all.clone().into_bytes());
+                let mut begin = 0;
+                let values: Vec<_> = ends
+                    .iter()
+                    .map(|end| all.slice(core::mem::replace(&mut begin, *end), *end - begin))
+                    .collect();
+                put::<ByteArrayType>(&mut to, &values, levels)?;
+            }
+        }
+        to.close()?;
+    }
+    group.close()?;
+    Ok(())
+}
+
+fn text(bytes: Vec<u8>) -> ByteArray {
+    bytes.into()
+}
+
+fn put<T: DataType>(
+    to: &mut SerializedColumnWriter<'_>,
+    values: &[T::T],
+    levels: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    to.typed::<T>().write_batch(values, levels, None)?;
+    Ok(())
+}
