@@ -3,13 +3,10 @@
 use core::{convert::Infallible, ops::Range};
 
 use plotters::{
-    coord::{
-        Shift,
-        types::RangedCoordf64,
-    },
+    coord::{Shift, types::RangedCoordf64},
     prelude::{
         Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DrawingArea, FontStyle,
-        IntoDrawingArea, IntoFont, PathElement, RGBAColor, RGBColor, TextStyle, TRANSPARENT,
+        IntoDrawingArea, IntoFont, PathElement, RGBAColor, RGBColor, TRANSPARENT, TextStyle,
     },
     style::text_anchor::{HPos, Pos, VPos},
 };
@@ -94,9 +91,9 @@ impl Layout {
             let is_pair = pair.is_some_and(|other| other.size == Size::Half);
             rest = if is_pair { others.get(1..).unwrap_or_default() } else { others };
             // Where panels of another width follow, the axis is another one.
-            let is_last = rest.first().is_none_or(|next| {
-                (next.size == Size::Half) != (panel.size == Size::Half)
-            });
+            let is_last = rest
+                .first()
+                .is_none_or(|next| (next.size == Size::Half) != (panel.size == Size::Half));
             let labels = if is_last { LABELS } else { 0 };
             let plot = match panel.size {
                 Size::Tall => 190,
@@ -245,8 +242,7 @@ fn curve<P: Pen>(
     };
     let mut pieces = columns.pieces().peekable();
     while let Some(piece) = pieces.next() {
-        let mut points: Vec<_> =
-            piece.iter().map(|point| (axis.of(point.x), point.y)).collect();
+        let mut points: Vec<_> = piece.iter().map(|point| (axis.of(point.x), point.y)).collect();
         if matches!(series.look, Look::Held | Look::Step) {
             points = stairs(&points);
             // It holds until somebody says otherwise.

@@ -2,9 +2,7 @@
 
 use serde::Serialize;
 
-use super::{
-    picture::{Look, PALETTE, Panel, Picture, Series, Size},
-};
+use super::picture::{Look, PALETTE, Panel, Picture, Series, Size};
 use crate::failure::Failure;
 
 const PAGE: &str = include_str!("page.html");

@@ -35,9 +35,10 @@ impl Letters {
 
     /// Height of a capital letter, for letters of this size.
     pub(super) fn height(&self, size: f32) -> f32 {
-        let capital = self.regular.capital_height().map_or(0.73, |height| {
-            f32::from(height) / f32::from(self.regular.units_per_em())
-        });
+        let capital = self
+            .regular
+            .capital_height()
+            .map_or(0.73, |height| f32::from(height) / f32::from(self.regular.units_per_em()));
         capital * size
     }
 

@@ -170,7 +170,8 @@ mod tests {
         let line: Line<'_> = serde_json::from_str(three).unwrap();
         let [one, two, three] = line.rps.all() else { panic!("{line:?}") };
         assert!(*one == 1.0 && two.is_nan() && *three == f64::NEG_INFINITY);
-        let gap = r#"{"event":"skipped","offset":8,"length":4,"reason":"id","reasons":{"id":1,"crc":3}}"#;
+        let gap =
+            r#"{"event":"skipped","offset":8,"length":4,"reason":"id","reasons":{"id":1,"crc":3}}"#;
         let line: Line<'_> = serde_json::from_str(gap).unwrap();
         assert_eq!((line.reason, line.reasons["crc"]), ("id", 3));
     }

@@ -32,6 +32,8 @@ mod svg;
 use std::path::PathBuf;
 
 use crate::{EXIT_CODES, args, decode::Named, failure::Failure};
+#[cfg(feature = "plot")]
+use crate::{input::Input, signals::Signals};
 
 /// Draw a capture: as SVG, as PNG, or as a page to zoom in
 ///
@@ -76,13 +78,16 @@ pub(crate) struct Args {
 #[cfg(feature = "plot")]
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
-    let picture = read::picture(args)?;
+    let signals = Signals::listen()?;
+    let input = Input::open(Some(&args.file))?;
+    let output = output::Output::create(&args.output, args.force, &signals)?;
+    let picture = read::picture(args, input, &signals)?;
     let bytes = match format {
         output::Format::Svg => draw::to_svg(&picture)?.into_bytes(),
         output::Format::Png => draw::to_png(&picture)?,
         output::Format::Html => html::page(&picture)?.into_bytes(),
     };
-    output::write(&args.output, args.force, &bytes)
+    output.finish(&bytes)
 }
 
 /// Runs the subcommand.

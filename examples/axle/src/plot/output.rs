@@ -1,8 +1,8 @@
 //! The file of a picture.
 
-use std::{io::Write, path::Path};
+use std::{fs::File, io::Write, path::Path};
 
-use crate::{beside::Beside, failure::Failure};
+use crate::{beside::Beside, failure::Failure, signals::Signals};
 
 /// What a picture is made as.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -25,13 +25,29 @@ impl Format {
     }
 }
 
-/// Writes a file that is there as a whole or not at all.
-pub(super) fn write(path: &Path, force: bool, bytes: &[u8]) -> Result<(), Failure> {
-    let (beside, mut file) = Beside::file(path, force)?;
-    // A full disk may tell it no earlier than at the end.
-    let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    written.map_err(|error| {
-        Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
-    })?;
-    beside.keep()
+/// A file that is there as a whole or not at all; a signal ends the tool and leaves nothing.
+pub(super) struct Output<'a> {
+    path: &'a Path,
+    beside: Beside,
+    file: File,
+}
+
+impl<'a> Output<'a> {
+    /// Fails at once if the file cannot be written, not after a long capture.
+    pub(super) fn create(path: &'a Path, force: bool, signals: &Signals) -> Result<Self, Failure> {
+        let (beside, file) = Beside::file(path, force)?;
+        beside.end_on(signals);
+        Ok(Self { path, beside, file })
+    }
+
+    /// Writes all of it.
+    pub(super) fn finish(self, bytes: &[u8]) -> Result<(), Failure> {
+        let Self { path, beside, mut file } = self;
+        // A full disk may tell it no earlier than at the end.
+        let written = file.write_all(bytes).and_then(|()| file.sync_all());
+        written.map_err(|error| {
+            Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
+        })?;
+        beside.keep()
+    }
 }

@@ -118,15 +118,16 @@ impl Panel {
     /// Lowest and highest value to be shown, with some room.
     pub(super) fn range(&self) -> (f64, f64) {
         let ranges = self.series.iter().filter_map(|series| series.columns.range());
-        let all = ranges.chain(self.least).reduce(|(low, high), (lower, higher)| {
-            (low.min(lower), high.max(higher))
-        });
+        let all = ranges
+            .chain(self.least)
+            .reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)));
         let (low, high) = all.unwrap_or((0.0, 1.0));
         let room = match high - low {
             0.0 => (high.abs() * 0.1).max(1.0),
             span => span * 0.06,
         };
-        let is_end = |end: fn(&(f64, f64)) -> f64, value| self.least.as_ref().map(end) == Some(value);
+        let is_end =
+            |end: fn(&(f64, f64)) -> f64, value| self.least.as_ref().map(end) == Some(value);
         let below = if is_end(|(low, _)| *low, low) && low < high { 0.0 } else { room };
         (low - below, high + room)
     }

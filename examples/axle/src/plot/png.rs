@@ -20,7 +20,8 @@ impl Png {
     /// A white picture of this size in pixels.
     pub(super) fn new((width, height): (u32, u32)) -> Result<Self, Failure> {
         let pixmap = Pixmap::new(width * SCALE, height * SCALE);
-        let mut pixmap = pixmap.ok_or_else(|| Failure::Failed("the picture is too large".into()))?;
+        let mut pixmap =
+            pixmap.ok_or_else(|| Failure::Failed("the picture is too large".into()))?;
         pixmap.fill(Color::WHITE);
         Ok(Self(pixmap))
     }

@@ -11,23 +11,31 @@ use super::{
 };
 use crate::{
     args::Protocol,
+    beside,
     decode::{self, Sheet},
     failure::Failure,
     input::Input,
     listing::Style,
+    signals::Signals,
 };
 
 /// Bits of a byte on the line, with start and stop bit.
 const BITS: f64 = 10.0;
 
 /// Reads the capture of these arguments.
-pub(super) fn picture(args: &Args) -> Result<Picture, Failure> {
-    let mut input = Input::open(Some(&args.file))?;
+pub(super) fn picture(
+    args: &Args,
+    mut input: Input,
+    signals: &Signals,
+) -> Result<Picture, Failure> {
     let chosen = decode::choose(&mut input, args.protocol.0)?;
     let mut sheet = Sheet::new(Some(Style::Json));
     let mut reading = Reading::new(args);
     // What was read before a failure is not drawn: nobody would see that the rest is missing.
     chosen.walk(&mut input, &mut sheet, |next, sheet| {
+        if signals.is_raised() {
+            return Err(beside::interrupted());
+        }
         reading.lines(sheet)?;
         reading.is_next(next.protocol, next.interface)
     })?;
