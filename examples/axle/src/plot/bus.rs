@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use axlewire::ikeya::Position;
+
 use super::{
     columns::Columns,
     errors::Errors,
@@ -10,7 +12,7 @@ use super::{
 };
 
 /// Counts of a turn (ruling I5).
-const COUNTS: f64 = 8192.0;
+const COUNTS: f64 = Position::COUNTS_PER_REVOLUTION as f64;
 
 /// READs in a row without an answer that make a node silent (ruling I7): its curve ends.
 const STRIKES: u32 = 3;
@@ -105,6 +107,7 @@ impl Bus {
     }
 
     fn answer(&mut self, node: u8, mode: Mode, x: u64, has_times: bool) {
+        let known = self.nodes.entry(node).or_default();
         match self.asked {
             Some((asked, since)) if asked == node => {
                 self.asked = None;
@@ -113,12 +116,12 @@ impl Bus {
                     self.response.entry(node).or_default().push(x, millis);
                 }
             }
-            // Not the one that was asked (ruling I7).
+            // Behind the next request (ruling I7).
+            _ if known.missing > 0 => self.errors.late(node, x),
             Some(_) => self.errors.stray(node, x),
             // The requests are not in the capture.
             None => {}
         }
-        let known = self.nodes.entry(node).or_default();
         known.missing = 0;
         if known.mode.replace(mode).is_some_and(|before| before != mode) {
             // The change ends the set-point (ruling I11).

@@ -14,6 +14,8 @@ use super::{
 enum Row {
     /// A poll of this node without an answer before the next request.
     Silent(u8),
+    /// An answer of this node behind the next request.
+    Late(u8),
     /// An answer of this node that nobody had asked for.
     Stray(u8),
     /// Reports missing in the count of their indices (ruling U9).
@@ -38,6 +40,10 @@ impl Errors {
 
     pub(super) fn silent(&mut self, node: u8, x: u64) {
         self.put(Row::Silent(node), x);
+    }
+
+    pub(super) fn late(&mut self, node: u8, x: u64) {
+        self.put(Row::Late(node), x);
     }
 
     pub(super) fn stray(&mut self, node: u8, x: u64) {
@@ -72,6 +78,7 @@ impl Errors {
         let series = self.0.into_iter().map(|(row, columns)| {
             let (name, colour) = match row {
                 Row::Silent(node) => (format!("node {node} silent"), bus::colour(node)),
+                Row::Late(node) => (format!("node {node} late"), bus::colour(node)),
                 Row::Stray(node) => (format!("node {node} unasked"), bus::colour(node)),
                 Row::Lost => ("report lost".to_owned(), 1),
                 Row::Refused => ("refused".to_owned(), 3),

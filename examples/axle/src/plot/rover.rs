@@ -1,5 +1,7 @@
 //! A rover: commands, what its reports say, and what was lost.
 
+use axlewire::ucp::Telemetry;
+
 use super::{
     columns::Columns,
     errors::Errors,
@@ -8,8 +10,10 @@ use super::{
 };
 
 /// What 1 is in the fields of a report; see the page `fields` of the library.
-const G: f64 = 16384.0;
+const G: f64 = Telemetry::ACC_PER_G as f64;
+/// The same number as the library's, which as an `f32` is a little below 16.4.
 const DEGREES_PER_SECOND: f64 = 16.4;
+const _: () = assert!(DEGREES_PER_SECOND as f32 == Telemetry::GYRO_PER_DEG_PER_S);
 const VOLT: f64 = 10.0;
 const AMPERE: f64 = 100.0;
 
