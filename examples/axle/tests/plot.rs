@@ -182,10 +182,13 @@ fn the_curves_of_a_bus_are_what_decode_says() {
             ("write", _) => panic!("its mode is not known: {line}"),
             (response, _) => {
                 let (panel, value) = match response {
-                    "velocity_response" => ("Velocity", line["rps"].as_f64().unwrap()),
-                    _ => ("Position", turns()),
+                    "velocity_response" => ("Velocity", line["rps"].as_f64()),
+                    _ => ("Position", Some(turns())),
                 };
-                put(panel, format!("node {node}"), x, value);
+                match value {
+                    Some(value) => put(panel, format!("node {node}"), x, value),
+                    None => put("Errors", format!("node {node} NaN"), x, 1.0),
+                }
                 if let Some((of, since)) = asked.take() {
                     assert_eq!(of, node);
                     let millis = ((x - since) * 1e6).round() / 1e3;
@@ -207,9 +210,19 @@ fn the_curves_of_a_bus_are_what_decode_says() {
             assert_eq!(count_of(&page, name), points.len() as u64, "{name:?}");
             points.dedup();
         }
-        assert_eq!(found[name], points, "{name:?}");
+        same(&found[name], &points, name);
     }
     assert!(found.len() > 30 && lines.len() > 2000);
+}
+
+/// The same points. Reading a number from JSON may change its last bit.
+#[cfg(feature = "plot")]
+fn same(found: &[(f64, f64)], expected: &[(f64, f64)], name: &(String, String)) {
+    assert_eq!(found.len(), expected.len(), "{name:?}");
+    for (found, expected) in found.iter().zip(expected) {
+        let is_near = (found.1 - expected.1).abs() <= 1e-12 * expected.1.abs();
+        assert!(found.0 == expected.0 && is_near, "{name:?}: {found:?} is not {expected:?}");
+    }
 }
 
 /// The number of all values of a curve.
@@ -275,7 +288,9 @@ fn the_curves_of_a_rover_are_what_decode_says() {
     }
     found.retain(|(panel, _), _| panel != "Errors");
     assert_eq!(found.len(), 20);
-    assert_eq!(found, expected);
+    for (name, points) in &expected {
+        same(&found[name], points, name);
+    }
     assert!(lost > 40, "the loose plug: {lost}");
 }
 

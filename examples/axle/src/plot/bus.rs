@@ -59,6 +59,11 @@ impl Bus {
     /// Takes in a line; `has_times` says whether the places are times.
     pub(super) fn take(&mut self, line: &Line<'_>, x: u64, has_times: bool) {
         let Some(node) = line.node else { return self.errors.gap(line, x) };
+        if (line.mode == Some(Mode::Velocity) || line.message == "velocity_response")
+            && line.rps.all().iter().any(|rps| !rps.is_finite())
+        {
+            self.errors.nan(node, x);
+        }
         let as_turns = |count, rotation: f64| rotation + count / COUNTS;
         match line.message {
             "read_request" => self.ask(node, x),

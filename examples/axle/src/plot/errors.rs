@@ -18,6 +18,8 @@ enum Row {
     Late(u8),
     /// An answer of this node that nobody had asked for.
     Stray(u8),
+    /// A speed of this node that is no number (ruling I4).
+    Nan(u8),
     /// Reports missing in the count of their indices (ruling U9).
     Lost,
     /// The other side says that a frame arrived damaged (ruling U12).
@@ -44,6 +46,10 @@ impl Errors {
 
     pub(super) fn late(&mut self, node: u8, x: u64) {
         self.put(Row::Late(node), x);
+    }
+
+    pub(super) fn nan(&mut self, node: u8, x: u64) {
+        self.put(Row::Nan(node), x);
     }
 
     pub(super) fn stray(&mut self, node: u8, x: u64) {
@@ -80,6 +86,7 @@ impl Errors {
                 Row::Silent(node) => (format!("node {node} silent"), bus::colour(node)),
                 Row::Late(node) => (format!("node {node} late"), bus::colour(node)),
                 Row::Stray(node) => (format!("node {node} unasked"), bus::colour(node)),
+                Row::Nan(node) => (format!("node {node} NaN"), bus::colour(node)),
                 Row::Lost => ("report lost".to_owned(), 1),
                 Row::Refused => ("refused".to_owned(), 3),
                 Row::Crc => ("bad CRC".to_owned(), ERROR),
