@@ -168,7 +168,7 @@ function paint(shown) {
     pen.fillText(text(tick, across.decimals), px(tick), height - 4);
   }
   if (!isRows) {
-    const up = ticksOf(shown.low, shown.high, (shown.bottom - shown.top) / 34);
+    const up = ticksOf(shown.low, shown.high, (shown.bottom - shown.top) / 28);
     pen.textAlign = "right";
     for (const tick of up.ticks) {
       line(shown.left, crisp(py(tick)), shown.right, crisp(py(tick)), style("--grid"));
@@ -226,7 +226,6 @@ function curve(pen, series, row, px, py) {
     pen.globalAlpha = .32;
     pen.lineWidth = 5;
   }
-  const isStep = series.look === "held" || series.look === "step";
   pen.beginPath();
   let before = null;
   for (let at = first; at < last; at++) {
@@ -234,7 +233,7 @@ function curve(pen, series, row, px, py) {
     if (y === null) { before = null; continue; }
     if (before === null) pen.moveTo(px(series.x[at]), py(y));
     else {
-      if (isStep) pen.lineTo(px(series.x[at]), py(before));
+      if (isHeld(series)) pen.lineTo(px(series.x[at]), py(before));
       pen.lineTo(px(series.x[at]), py(y));
     }
     // A value between two interruptions is seen all the same.
@@ -248,16 +247,11 @@ function curve(pen, series, row, px, py) {
   pen.globalAlpha = 1;
 }
 
-// The value of a series beside x: the nearest that is near enough, and what is held there.
-function valueAt(series, x, near) {
-  let at = find(series.x, x);
-  const isHeld = series.look === "held" || series.look === "step";
-  if (isHeld) {
-    if (series.x[at] !== x) at--;
-    while (at + 1 < series.x.length && series.x[at + 1] === x) at++;
-    if (at < 0 || (at === series.x.length - 1 && x > series.x[at] + near && !series.open)) return null;
-    return series.y[at] === null ? null : at;
-  }
+const isHeld = series => series.look === "held" || series.look === "step";
+
+// The value of a series that is nearest to x, if it is near enough.
+function nearestAt(series, x, near) {
+  const at = find(series.x, x);
   let best = null;
   for (let other = Math.max(0, at - 2); other < Math.min(series.x.length, at + 3); other++) {
     if (series.y[other] === null) continue;
@@ -265,6 +259,15 @@ function valueAt(series, x, near) {
     if (distance <= near && (best === null || distance < Math.abs(series.x[best] - x))) best = other;
   }
   return best;
+}
+
+// The value that is held at x.
+function heldAt(series, x) {
+  let at = find(series.x, x);
+  if (series.x[at] !== x) at--;
+  while (at + 1 < series.x.length && series.x[at + 1] === x) at++;
+  const isOver = at === series.x.length - 1 && x > series.x[at] && !(series.look === "held" && series.open);
+  return at < 0 || isOver || series.y[at] === null ? null : at;
 }
 
 function showTip(shown, clientX, clientY) {
@@ -276,15 +279,15 @@ function showTip(shown, clientX, clientY) {
   const series = shown.panel.series.filter(series => !hidden.has(series));
   // All values are those of the place that is nearest.
   let nearest = Infinity;
-  for (const one of series.filter(one => one.look !== "held" && one.look !== "step")) {
-    const at = valueAt(one, x, perPixel * NEAR);
+  for (const one of series) {
+    const at = nearestAt(one, x, perPixel * NEAR);
     if (at !== null && Math.abs(one.x[at] - x) < nearest) {
       nearest = Math.abs(one.x[at] - x);
       place = one.x[at];
     }
   }
   for (const one of series) {
-    const at = valueAt(one, place, perPixel * NEAR / 2);
+    const at = isHeld(one) ? heldAt(one, place) : nearestAt(one, place, perPixel * NEAR / 2);
     if (at === null) continue;
     const unit = one.look === "ticks" ? "×" : " " + shown.panel.unit;
     rows.push({ one, at, text: String(one.y[at]).replace("-", "−") + unit });
@@ -323,8 +326,7 @@ function showTip(shown, clientX, clientY) {
     for (const row of rows) {
       pen.fillStyle = colour(row.one);
       pen.beginPath();
-      const isHeld = row.one.look === "held" || row.one.look === "step";
-      pen.arc(other.px(isHeld ? place : row.one.x[row.at]), other.py(row.one.y[row.at]), 3.5, 0, 7);
+      pen.arc(other.px(isHeld(row.one) ? place : row.one.x[row.at]), other.py(row.one.y[row.at]), 3.5, 0, 7);
       pen.fill();
     }
   }
