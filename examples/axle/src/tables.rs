@@ -50,6 +50,8 @@ pub(crate) struct Table {
 pub(crate) struct Tables {
     /// By protocol; the gaps are the last.
     all: Vec<Table>,
+    /// The first of each protocol.
+    first: [usize; 3],
     /// The table of the last frame: the next is often of the same message.
     last: usize,
     has_times: bool,
@@ -70,22 +72,27 @@ impl Tables {
     /// Empty tables. Without times there are no columns of time, interface and direction.
     pub(crate) fn new(has_times: bool) -> Result<Self, Failure> {
         let Some(described) = described::all() else { return Err(bug()) };
-        let all = described.into_iter().map(|it| Table::new(it, has_times)).collect();
-        Ok(Self { all, last: 0, has_times, count: 0, is_full: false, unfit: None })
+        let mut all: Vec<_> = described.into_iter().map(|it| Table::new(it, has_times)).collect();
+        let place = |table: &Table| table.protocol.map_or(3, |protocol| protocol as usize);
+        all.sort_by_key(place);
+        let first = [0, 1, 2].map(|protocol| all.partition_point(|it| place(it) < protocol));
+        Ok(Self { all, first, last: 0, has_times, count: 0, is_full: false, unfit: None })
     }
 
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
         let mode = frame.commands().and_then(|node| modes.of(node));
         let name = frame.name();
-        let is_its = |table: &Table| table.message == name && table.protocol == Some(S::PROTOCOL);
+        let is_its = |table: &Table| table.protocol == Some(S::PROTOCOL) && table.message == name;
         if !self.all.get(self.last).is_some_and(is_its) {
-            self.last = self.all.iter().position(is_its).unwrap_or(usize::MAX);
+            let first = self.first.get(S::PROTOCOL as usize).copied().unwrap_or_default();
+            let its = self.all.iter().skip(first).position(is_its);
+            self.last = its.map_or(usize::MAX, |at| first + at);
         }
         self.add(self.last, at, |table, from| {
             let (slots, columns) = (&*table.slots, &mut *table.columns);
             let columns = columns.get_mut(from..).unwrap_or_default();
-            frame.serialize(Row { slots, columns, mode })
+            frame.serialize(Row { slots, columns, whole: frame.bytes(), mode })
         });
     }
 
@@ -188,17 +195,13 @@ impl Table {
             if is_place {
                 place = columns.len();
             } else if name != "event" {
-                slots.push(Slot { name, first, width: columns.len() - place - first });
+                let (width, is_whole) = (columns.len() - place - first, name == "bytes");
+                slots.push(Slot { name, first, width, is_whole });
             }
         }
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
         Self { name, protocol, message, columns, numbers, slots }
-    }
-
-    /// A column by its name.
-    pub(crate) fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == name)
     }
 
     /// Fills the columns of a place, and returns their number.

@@ -1,6 +1,12 @@
 //! Parquet: a folder with a file per table.
 
-use std::{collections::BTreeMap, fs::File, path::Path, path::PathBuf, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use parquet::{
     basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physical},
@@ -100,7 +106,8 @@ fn field(column: &Column) -> Result<Field, ParquetError> {
         Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
         Type::F32 => (Physical::FLOAT, None),
         Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
-        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Name(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Bytes => (Physical::BYTE_ARRAY, None),
     };
     let repetition = match column.present {
         Some(_) => Repetition::OPTIONAL,
@@ -117,39 +124,12 @@ fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), Par
     let mut group = file.next_row_group()?;
     for column in &table.columns {
         let Some(mut to) = group.next_column()? else { break };
-        let levels = column.present.as_ref();
-        let levels: Option<Vec<i16>> =
-            levels.map(|present| present.iter().map(|is_there| i16::from(*is_there)).collect());
-        let levels = levels.as_deref();
-        match &column.values {
-            Values::Small(values) => put::<Int32Type>(&mut to, values, levels)?,
-            Values::Float(values) => put::<FloatType>(&mut to, values, levels)?,
-            Values::Large(values) => {
-                let values = values.iter().map(|value| i64::try_from(*value));
-                let values = values.collect::<Result<Vec<_>, _>>().map_err(|_| {
-                    let line =
-                        "Parquet has no times after the year 294246, and the capture has one";
-                    ParquetError::General(line.to_owned())
-                })?;
-                put::<Int64Type>(&mut to, &values, levels)?;
-            }
-            Values::Name(values) => {
-                let Type::Name(names) = &column.kind else { continue };
-                let names: Vec<_> =
-                    names.iter().map(|name| text(name.as_bytes().to_vec())).collect();
-                let name = |at: &u8| names.get(usize::from(*at)).cloned().unwrap_or_default();
-                let values: Vec<_> = values.iter().map(name).collect();
-                put::<ByteArrayType>(&mut to, &values, levels)?;
-            }
-            Values::Text(ends, all) => {
-                let all = text(all.clone().into_bytes());
-                let mut begin = 0;
-                let values: Vec<_> = ends
-                    .iter()
-                    .map(|end| all.slice(core::mem::replace(&mut begin, *end), *end - begin))
-                    .collect();
-                put::<ByteArrayType>(&mut to, &values, levels)?;
-            }
+        let names = match &column.kind {
+            Type::Name(names) => names.iter().map(|name| ByteArray::from(*name)).collect(),
+            _ => Vec::new(),
+        };
+        for piece in pieces(column) {
+            write(&mut to, column, &names, &piece)?;
         }
         to.close()?;
     }
@@ -157,15 +137,87 @@ fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), Par
     Ok(())
 }
 
-fn text(bytes: Vec<u8>) -> ByteArray {
-    bytes.into()
+/// Rows that are converted at once: their values stay in a processor's own cache.
+const PIECE: usize = 2048;
+
+/// Some rows of a column.
+struct Piece {
+    values: Range<usize>,
+    /// For each row, 1 if it has a value; `None` if all have.
+    levels: Option<Vec<i16>>,
+}
+
+fn pieces(column: &Column) -> impl Iterator<Item = Piece> {
+    let rows = column.present.as_ref().map_or(column.values.len(), Vec::len);
+    let mut next = 0;
+    (0..rows).step_by(PIECE).map(move |row| {
+        let rows = row..(row + PIECE).min(rows);
+        let present = column.present.as_ref().and_then(|present| present.get(rows.clone()));
+        let levels = present.map(|it| it.iter().copied().map(i16::from).collect::<Vec<_>>());
+        let count = match &levels {
+            Some(levels) => levels.iter().filter(|level| **level == 1).count(),
+            None => rows.len(),
+        };
+        let values = next..next + count;
+        next += count;
+        Piece { values, levels }
+    })
+}
+
+fn write(
+    to: &mut SerializedColumnWriter<'_>,
+    column: &Column,
+    names: &[ByteArray],
+    piece: &Piece,
+) -> Result<(), ParquetError> {
+    let range = piece.values.clone();
+    match &column.values {
+        Values::Small(values) => put::<Int32Type>(to, part(values, range), piece),
+        Values::Float(values) => put::<FloatType>(to, part(values, range), piece),
+        Values::Large(values) => {
+            let values = part(values, range).iter().map(|value| i64::try_from(*value));
+            let values = values.collect::<Result<Vec<_>, _>>().map_err(|_| {
+                let line = "Parquet has no times after the year 294246, and the capture has one";
+                ParquetError::General(line.to_owned())
+            })?;
+            put::<Int64Type>(to, &values, piece)
+        }
+        Values::Name(values) => {
+            let name = |at: &u8| names.get(usize::from(*at)).cloned().unwrap_or_default();
+            let values: Vec<_> = part(values, range).iter().map(name).collect();
+            put::<ByteArrayType>(to, &values, piece)
+        }
+        Values::Bytes(ends, all) => {
+            let before = range.start.checked_sub(1).and_then(|at| ends.get(at));
+            let first = before.map_or(0, |end| *end as usize);
+            let ends = part(ends, range);
+            let last = ends.last().map_or(first, |end| *end as usize);
+            // One buffer for all of them.
+            let all = ByteArray::from(all.get(first..last).unwrap_or_default());
+            let mut begin = 0;
+            let values: Vec<_> = ends
+                .iter()
+                .map(|end| {
+                    let end = *end as usize - first;
+                    let text = all.slice(begin, end - begin);
+                    begin = end;
+                    text
+                })
+                .collect();
+            put::<ByteArrayType>(to, &values, piece)
+        }
+    }
+}
+
+fn part<T>(values: &[T], range: Range<usize>) -> &[T] {
+    values.get(range).unwrap_or_default()
 }
 
 fn put<T: DataType>(
     to: &mut SerializedColumnWriter<'_>,
     values: &[T::T],
-    levels: Option<&[i16]>,
+    piece: &Piece,
 ) -> Result<(), ParquetError> {
-    to.typed::<T>().write_batch(values, levels, None)?;
+    to.typed::<T>().write_batch(values, piece.levels.as_deref(), None)?;
     Ok(())
 }

@@ -19,6 +19,8 @@ pub(super) struct Slot {
     pub(super) first: usize,
     /// Number of its columns; 0 for a field that is the same in the whole table.
     pub(super) width: usize,
+    /// Whether it is the whole frame, which is at hand without hex digits.
+    pub(super) is_whole: bool,
 }
 
 /// A frame does not fit the columns: its fields are not those of the schema.
@@ -47,6 +49,8 @@ pub(super) struct Row<'a> {
     /// Those that have not come yet.
     pub(super) slots: &'a [Slot],
     pub(super) columns: &'a mut [Column],
+    /// The bytes of the frame.
+    pub(super) whole: &'a [u8],
     /// The mode of the node, which is told behind the fields of the frame.
     pub(super) mode: Option<Mode>,
 }
@@ -73,8 +77,9 @@ impl SerializeMap for Row<'_> {
         Err(Unfit)
     }
 
-    /// The fields come in the order of the columns, so that no name is looked up.
-    #[inline]
+    /// The fields come in the order of the columns, so that no name is looked up. Inlined into the
+    /// serializer of the frame, where the key is a constant and its comparison a few instructions.
+    #[inline(always)]
     fn serialize_entry<K, V>(&mut self, key: &K, value: &V) -> Fit
     where
         K: ?Sized + Serialize,
@@ -84,8 +89,10 @@ impl SerializeMap for Row<'_> {
             let (slot, rest) = self.slots.split_first().ok_or(Unfit)?;
             self.slots = rest;
             if key.serialize(IsName(slot.name))? {
+                let whole = self.whole;
                 return match slot.width {
                     0 => Ok(()),
+                    _ if slot.is_whole => Cells(self.columns_of(slot)?).one()?.bytes(whole),
                     _ => value.serialize(Cells(self.columns_of(slot)?)),
                 };
             }
@@ -114,7 +121,7 @@ impl SerializeMap for Row<'_> {
 struct Cells<'a>(&'a mut [Column]);
 
 impl Cells<'_> {
-    #[inline]
+    #[inline(always)]
     fn one(&mut self) -> Result<&mut Column, Unfit> {
         self.0.first_mut().ok_or(Unfit)
     }
@@ -124,7 +131,7 @@ impl SerializeTuple for Cells<'_> {
     type Ok = ();
     type Error = Unfit;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_element<T: ?Sized + Serialize>(&mut self, value: &T) -> Fit {
         let columns = core::mem::take(&mut self.0);
         let (column, rest) = columns.split_first_mut().ok_or(Unfit)?;
@@ -230,63 +237,63 @@ impl<'a> Serializer for Cells<'a> {
     type SerializeTuple = Cells<'a>;
     type SerializeMap = Impossible<(), Unfit>;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i8(mut self, value: i8) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i16(mut self, value: i16) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i32(mut self, value: i32) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_i64(mut self, value: i64) -> Fit {
         self.one()?.integer(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u8(mut self, value: u8) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u16(mut self, value: u16) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u32(mut self, value: u32) -> Fit {
         self.one()?.integer(value.into())
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_u64(mut self, value: u64) -> Fit {
         self.one()?.unsigned(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_f32(mut self, value: f32) -> Fit {
         self.one()?.float(value)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_str(mut self, value: &str) -> Fit {
         self.one()?.text(value)
     }
 
     /// One value of a message, for the ids and codes of the library.
-    #[inline]
+    #[inline(always)]
     fn serialize_newtype_struct<T: ?Sized + Serialize>(self, _: &'static str, value: &T) -> Fit {
         value.serialize(self)
     }
 
-    #[inline]
+    #[inline(always)]
     fn serialize_tuple(self, _: usize) -> Result<Self, Unfit> {
         Ok(self)
     }
@@ -307,7 +314,7 @@ impl Serializer for IsName<'_> {
     type SerializeTuple = Impossible<bool, Unfit>;
     type SerializeMap = Impossible<bool, Unfit>;
 
-    #[inline]
+    #[inline(always)]
     fn serialize_str(self, value: &str) -> Result<bool, Unfit> {
         Ok(value == self.0)
     }
