@@ -398,6 +398,19 @@ fn an_svg_has_each_point_at_its_place() {
 
 #[cfg(feature = "plot")]
 #[test]
+fn the_pictures_of_the_readme_are_up_to_date() {
+    let folder = Folder::new("readme");
+    for name in ["motors", "drive"] {
+        let drawn = plot(&format!("{name}.pcapng"), &[], &folder.path("a.svg"));
+        let shots = Path::new(env!("CARGO_MANIFEST_DIR")).join("screenshots");
+        let kept = fs::read(shots.join(format!("{name}.svg"))).unwrap();
+        assert!(drawn == kept, "{name}.svg is not: screenshots.sh draws it anew");
+        assert!(drawn.len() < 120_000, "{} bytes", drawn.len());
+    }
+}
+
+#[cfg(feature = "plot")]
+#[test]
 fn a_curve_ends_where_a_node_falls_silent() {
     let folder = Folder::new("silent");
     let read = *ReadRequest::new(NodeId::N1).as_bytes();

@@ -38,14 +38,15 @@ use crate::{input::Input, signals::Signals};
 /// Draw a capture: as SVG, as PNG, or as a page to zoom in
 ///
 /// A motor bus: set-point and measured value of each node, response times, errors. A rover:
-/// commands, wheel speeds, heading, sensors, battery, power, and what was lost. The values are those
-/// of axle decode --json; the page is one file and needs no network.
+/// commands, wheel speeds, heading, sensors, battery, power, and what was lost. The values are
+/// those of `axle decode --json`; the page is one file and needs no network.
 ///
 /// Raw bytes have no times: the axis is the byte offset, or with --baud the time that the bytes
 /// take on the line, without pauses.
 ///
-/// Memory use does not grow with the input: of a long capture, first, lowest, highest and last value
-/// of each of some thousand columns are kept, and the picture says how wide a column is.
+/// Memory use does not grow with the input: of a long capture, first, lowest, highest and last
+/// value of each of some thousand columns are kept, and the picture says how wide a column is.
+/// Needs the feature plot of the tool.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
