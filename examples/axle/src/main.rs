@@ -11,6 +11,7 @@ mod calibrate;
 mod decode;
 mod drive;
 mod export;
+mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
@@ -111,6 +112,7 @@ enum Command {
     Network(network::Args),
     Watch(watch::Args),
     Record(record::Args),
+    Extcap(extcap::Args),
     Replay(replay::Args),
     Send(send::Args),
     #[cfg(unix)]
@@ -172,6 +174,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Network(args) => network::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(args),
+        Command::Extcap(args) => extcap::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
