@@ -315,7 +315,7 @@ def from_text(text, kind):
         return micros_of(text)
     if kind == "f32":
         return bits(text)
-    return text if kind in ("name", "hex") else int(text)
+    return text if kind in ("name", "bytes") else int(text)
 
 
 def read_csv(path, columns):
@@ -339,7 +339,9 @@ def read_csv_by_duckdb(path, columns):
 
 
 def from_value(value, kind):
-    return bits(value) if kind == "f32" and value is not None else value
+    if value is None:
+        return None
+    return bits(value) if kind == "f32" else value.hex() if kind == "bytes" else value
 
 
 def read_parquet(path, columns):
@@ -350,7 +352,7 @@ def read_parquet(path, columns):
              if key.startswith(b"unit:")}
     types = {"u8": pyarrow.uint8(), "i16": pyarrow.int16(), "u16": pyarrow.uint16(), "u32": pyarrow.uint32(),
              "u64": pyarrow.uint64(), "f32": pyarrow.float32(), "time": pyarrow.timestamp("us", "UTC"),
-             "name": pyarrow.string(), "hex": pyarrow.string()}
+             "name": pyarrow.string(), "bytes": pyarrow.binary()}
     lists = {}
     for field in table.schema:
         kind = columns.get(field.name, (None, None))[1]

@@ -106,7 +106,8 @@ fn field(column: &Column) -> Result<Field, ParquetError> {
         Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
         Type::F32 => (Physical::FLOAT, None),
         Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
-        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Name(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Bytes => (Physical::BYTE_ARRAY, None),
     };
     let repetition = match column.present {
         Some(_) => Repetition::OPTIONAL,
@@ -186,7 +187,7 @@ fn write(
             let values: Vec<_> = part(values, range).iter().map(name).collect();
             put::<ByteArrayType>(to, &values, piece)
         }
-        Values::Text(ends, all) => {
+        Values::Bytes(ends, all) => {
             let before = range.start.checked_sub(1).and_then(|at| ends.get(at));
             let first = before.map_or(0, |end| *end as usize);
             let ends = part(ends, range);
