@@ -279,7 +279,7 @@ def unit_of(table, column):
 
 
 def fits(value, schema):
-    """Whether a value has the type that the schema says. A number with a fraction is a text here."""
+    """Whether a value has the type of the schema. A number with a fraction is a text here."""
     kind = (schema or {}).get("type")
     if kind == "array":
         return (isinstance(value, list) and schema["minItems"] == len(value) == schema["maxItems"]

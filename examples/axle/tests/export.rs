@@ -1,5 +1,5 @@
-//! `axle export`: exact files, bad input, and nothing half-written. export.py reads MCAP and Parquet
-//! back and compares every value.
+//! `axle export`: exact files, bad input, and nothing half-written. export.py reads MCAP and
+//! Parquet back and compares every value.
 
 mod support;
 
