@@ -12,7 +12,9 @@ use crate::{
     failure::Failure,
     listing::{Modes, Place, REASONS, Shown, SkippedBytes},
 };
-pub(crate) use column::{Cell, Column, Values};
+#[cfg(feature = "parquet")]
+pub(crate) use column::Values;
+pub(crate) use column::{Cell, Column};
 pub(crate) use described::Type;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;

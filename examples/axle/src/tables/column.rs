@@ -161,8 +161,8 @@ impl Column {
         self.is_present();
         match (&mut self.values, &self.kind) {
             (Values::Bytes(ends, bytes), _) => {
-                let (pairs, []) = value.as_bytes().as_chunks() else { return Err(Unfit) };
-                for [high, low] in pairs {
+                for pair in value.as_bytes().chunks(2) {
+                    let [high, low] = pair else { return Err(Unfit) };
                     bytes.push(digit(*high)? << 4 | digit(*low)?);
                 }
                 ends.push(u32::try_from(bytes.len()).map_err(|_| Unfit)?);
