@@ -546,6 +546,31 @@ fn one_line_of_several_is_drawn_when_it_is_chosen() {
     assert_eq!(names("1"), expected(&[("Velocity", "node 5")]));
 }
 
+#[cfg(feature = "plot")]
+#[test]
+fn each_motor_of_a_board_of_three_has_its_curves() {
+    use axlewire::ikeya::three;
+    let folder = Folder::new("three");
+    let speeds = |first: f32| [first, -1.0, 2.5].map(|rps| Rps::new(rps).unwrap());
+    let mut bytes = vec![];
+    for first in [0.5, 0.75, 1.0] {
+        bytes.extend(ReadRequest::new(NodeId::N2).as_bytes());
+        bytes.extend(three::VelocityResponse::new(NodeId::N2, speeds(first)).as_bytes());
+    }
+    let path = folder.path("three.bin");
+    fs::write(&path, &bytes).unwrap();
+    let page = page(&path, &["-P", "ikeya-3"]);
+    let velocity = |motor: &str| ("Velocity".to_owned(), format!("node 2, motor {motor}"));
+    let found = curves(&page);
+    let expected = [
+        (velocity("1"), vec![(4.0, 0.5), (24.0, 0.75), (44.0, 1.0)]),
+        (velocity("2"), vec![(4.0, -1.0), (24.0, -1.0), (44.0, -1.0)]),
+        (velocity("3"), vec![(4.0, 2.5), (24.0, 2.5), (44.0, 2.5)]),
+    ];
+    assert_eq!(found, expected.into());
+    assert!(page["panels"][0]["hint"].as_str().unwrap().contains("the three motors of a node"));
+}
+
 /// Draws a rover's reports from standard input; the peak of the tool's memory in KiB, and the page.
 #[cfg(all(feature = "plot", target_os = "linux"))]
 fn peak_of(reports: usize, folder: &Folder) -> (usize, Value) {

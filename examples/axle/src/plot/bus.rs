@@ -145,7 +145,10 @@ impl Bus {
             size: Size::Tall,
             least: None,
             series: curves.series(is_of_three),
-            hint: "wide and pale: set-point",
+            hint: match is_of_three {
+                true => "wide and pale: set-point; a colour for the three motors of a node",
+                false => "wide and pale: set-point",
+            },
         };
         let response = self.response.into_iter().map(|(node, columns)| Series {
             name: format!("node {node}"),

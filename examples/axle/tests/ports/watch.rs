@@ -259,3 +259,23 @@ fn a_host_that_cannot_be_found_is_told_before_the_watch_begins() {
     let output = run(&["watch", "-", "-P", "ucp", "--udp", "127.0.0.1:9870"], &[]);
     assert_eq!(output.status.code(), Some(2));
 }
+
+#[test]
+fn the_page_sends_datagrams_too() {
+    undisturbed(|| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        let (_sim, port) = sim("ucp");
+        let to = socket.local_addr().unwrap();
+        let args = format!("watch --port {port} --protocol ucp --for 1 --udp {to}");
+        let mut watch = Terminal::start(&args, (80, 24));
+        let mut buffer = [0; 4096];
+        for _ in 0..10 {
+            let len = socket.recv(&mut buffer).unwrap();
+            let line: Value = serde_json::from_slice(&buffer[..len]).unwrap();
+            assert!(line["event"] == "frame" && line["t"].as_f64().unwrap() > 1e9, "{line}");
+        }
+        assert_eq!(watch.code(), Some(0));
+        assert!(watch.has_had_page());
+    });
+}
