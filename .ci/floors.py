@@ -63,8 +63,10 @@ FLOORS = [
     ["ikeya::slave"],
     ["ikeya"],
     # The rover: frames, messages, framing, then the two roles.
+    ["ucp::catalogue", "ucp::value"],
     ["ucp::header", "ucp::codes"],
     ["ucp::frame"],
+    ["ucp::plain"],
     ["ucp::body"],
     ["ucp::motor", "ucp::report", "ucp::update"],
     ["ucp::message"],
@@ -87,6 +89,8 @@ FLOORS = [
     ["ucp"],
     # Two doors, and a line for tests.
     ["io", "drive", "sim"],
+    # Pages, without code.
+    ["guide"],
     ["crate"],
 ]
 

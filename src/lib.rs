@@ -14,6 +14,7 @@
 //!
 //! | you want to | see |
 //! |---|---|
+//! | learn it step by step | the pages of `guide` |
 //! | turn a motor or drive a rover over a port | `drive::Driver` |
 //! | run a role in your own loop, without a port and a clock | [`endpoint::Endpoint`] |
 //! | decode a capture or a stream, build a packet | the pages `ikeya` and `ucp` |
@@ -86,6 +87,8 @@ mod outbox;
 #[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("fields.md")]
 pub mod fields {}
+#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+pub mod guide;
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[cfg_attr(any(not(doctest), feature = "serialport"), doc = include_str!("on_a_pc.md"))]
 pub mod on_a_pc {}

@@ -2,17 +2,18 @@
 
 use core::fmt::{self, Write};
 
+use super::{catalogue::catalogue_of_codes, value::Value};
 use crate::text::Line;
 
-/// A code with names for some values; `Other` keeps the rest as received and prints as a number
+/// Codes with names for some values; `Other` keeps the rest as received and prints as a number
 /// behind a word.
-macro_rules! code {
-    (
+macro_rules! codes {
+    ($(
         $(#[$meta:meta])*
         $name:ident: $raw:ty = $serde:literal, $other:literal {
             $($(#[$variant_meta:meta])* $variant:ident = $value:literal, $text:literal;)+
         }
-    ) => {
+    )+) => {$(
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -50,9 +51,21 @@ macro_rules! code {
             }
         }
 
-        impl $name {
+        impl Value for $name {
+            type Wire = <$raw as Value>::Wire;
+
+            const IS_WORDS: bool = true;
+
+            fn from_wire(bytes: Self::Wire) -> Self {
+                <$raw>::from_wire(bytes).into()
+            }
+
+            fn to_wire(self) -> Self::Wire {
+                <$raw>::from(self).to_wire()
+            }
+
             /// Appends the words, or the number of a value without a name.
-            pub(super) fn print(self, line: &mut Line<'_>) {
+            fn print(self, line: &mut Line<'_>) {
                 match self {
                     $(Self::$variant => line.text($text),)+
                     Self::Other(other) => {
@@ -75,55 +88,7 @@ macro_rules! code {
                 }
             }
         }
-    };
+    )+};
 }
 
-code! {
-    /// Verdict of a pong or an acknowledgement on the frame that it answers (ruling U12).
-    ErrorCode: u8 = "u8", "err" {
-        /// It arrived undamaged.
-        Fine = 0, "fine";
-        /// It arrived damaged.
-        Damaged = 1, "damaged";
-    }
-}
-
-code! {
-    /// Sensors to calibrate.
-    CalibrationKind: u8 = "u8", "type" {
-        /// The magnetometer; the host must turn the robot meanwhile.
-        Magnetometer = 1, "magnetometer";
-        /// Accelerometer and gyroscope; the robot must stand still meanwhile.
-        Imu = 2, "IMU";
-    }
-}
-
-code! {
-    /// The robot's answer to a firmware update request. Shipped robots never send it.
-    OtaStatus: u8 = "u8", "err" {
-        /// The update starts.
-        Accepted = 0, "accepted";
-        /// An unknown error.
-        Failed = 1, "failed";
-        /// Not allowed.
-        Forbidden = 2, "forbidden";
-    }
-}
-
-code! {
-    /// State of the host's network, shown by the robot's lamp (ruling U8).
-    ///
-    /// A host sends one byte; some send four, hence the wide `Other`.
-    NetworkState: u32 = "u32", "state" {
-        /// Not known yet: the state after power-on.
-        Unknown = 0, "unknown";
-        /// No SIM card.
-        SimAbsent = 1, "SIM absent";
-        /// No network.
-        Disconnected = 2, "disconnected";
-        /// Connected.
-        Connected = 3, "connected";
-        /// Firmware update in progress; not in the protocol document.
-        Ota = 4, "firmware update";
-    }
-}
+catalogue_of_codes! { codes }

@@ -1,13 +1,15 @@
-//! Messages as text for people: names, units, and codes in words.
+//! Messages as text for people: names, units, and codes in words. Plain bodies print themselves.
 
 use core::fmt;
 
 use super::{
-    body::Biases,
+    body::{Biases, SetNetworkState, SetNetworkStateWide},
     frame::{Frame, RawFrame},
     message::Message,
     motor::RawMotorControl,
     report::{Report, Telemetry},
+    update::RawOtaRequest,
+    value::{List, Print, Value},
 };
 use crate::text::{Hex, Line};
 
@@ -42,7 +44,7 @@ impl<'a> Message<'a> {
 impl fmt::Display for Contents<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut line = Line::new(f);
-        contents(&mut line, &self.0);
+        self.0.print(&mut line, "");
         line.end()
     }
 }
@@ -52,7 +54,7 @@ impl fmt::Display for Message<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut line = Line::new(f);
         line.text(self.name());
-        behind_name(&mut line, self);
+        self.print(&mut line, ": ");
         line.end()
     }
 }
@@ -65,152 +67,129 @@ impl fmt::Display for Frame {
         line.text(message.name());
         line.text(", index ");
         line.integer(self.index().into(), 0);
-        behind_name(&mut line, &message);
+        message.print(&mut line, ": ");
         line.end()
     }
 }
 
-fn behind_name(line: &mut Line<'_>, message: &Message<'_>) {
-    if !matches!(message, Message::Ping(_) | Message::BiasRequest(_)) {
-        line.text(": ");
-        contents(line, message);
+impl Print for RawFrame<'_> {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        line.text(before);
+        line.text("id ");
+        line.integer(self.id.into(), 0);
+        line.text(", body ");
+        Hex(self.body).print(line);
     }
 }
 
-fn contents(line: &mut Line<'_>, message: &Message<'_>) {
-    match message {
-        Message::Ping(_) | Message::BiasRequest(_) => {}
-        Message::Pong(body) => body.err().print(line),
-        Message::MotorControl(body) => motor_control(line, body),
-        Message::CalibrationStart(body) => body.kind().print(line),
-        Message::CalibrationEnd(body) => body.kind().print(line),
-        Message::CalibrationStartAck(body) => {
-            body.kind().print(line);
-            line.text(", ");
-            body.err().print(line);
-        }
-        Message::CalibrationEndAck(body) => {
-            body.kind().print(line);
-            line.text(", ");
-            body.err().print(line);
-        }
-        Message::Report(body) => report(line, *body),
-        Message::ImuBias(body) => imu(line, body.acc(), body.gyro()),
-        Message::MagBias(body) => mag(line, body.mag()),
-        Message::ImuBiasAck(body) => body.err().print(line),
-        Message::MagBiasAck(body) => body.err().print(line),
-        Message::Biases(body) => biases(line, body),
-        Message::OtaRequest(body) => {
-            line.text("version ");
-            line.integer(body.version().into(), 0);
-        }
-        Message::OtaAck(body) => body.status().print(line),
-        Message::SetNetworkState(body) => {
-            body.state().print(line);
-            line.text(", in 1 byte");
-        }
-        Message::SetNetworkStateWide(body) => {
-            body.state().print(line);
-            line.text(", in 4 bytes");
-        }
-        Message::Unknown(RawFrame { id, body, .. }) => {
-            line.text("id ");
-            line.integer((*id).into(), 0);
-            line.text(", body ");
-            Hex(body).print(line);
-        }
+impl Print for RawOtaRequest {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        List::new(line, before).value("version", self.version(), "");
+    }
+}
+
+impl Print for SetNetworkState {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        line.text(before);
+        self.state().print(line);
+        line.text(", in 1 byte");
+    }
+}
+
+impl Print for SetNetworkStateWide {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        line.text(before);
+        self.state().print(line);
+        line.text(", in 4 bytes");
+    }
+}
+
+impl Print for Biases {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        let (imu, mag) = (self.imu(), self.mag());
+        List::new(line, before)
+            .value("err", self.err(), "")
+            .value("acc", imu.acc(), "")
+            .value("gyro", imu.gyro(), "")
+            .value("mag", mag.mag(), "");
     }
 }
 
 /// Always prints speed, turn and lamp; the other fields, 0 in an ordinary command, only if nonzero.
-fn motor_control(line: &mut Line<'_>, body: &RawMotorControl) {
-    line.text("speed ");
-    line.integer(body.speed().into(), 4);
-    line.text(" %  angular ");
-    line.integer(body.angular().into(), 4);
-    line.text(" %  front led ");
-    match body.front_led() {
-        0 => line.text("off"),
-        100 => line.text("on"),
-        other => line.integer(other.into(), 0),
-    }
-    if body.back_led() != 0 {
-        line.text("  back led ");
-        line.integer(body.back_led().into(), 0);
-    }
-    let rest: [(&str, u32); 3] = [
-        ("  version ", body.version().into()),
-        ("  reserve1 ", body.reserve1().into()),
-        ("  reserve2 ", body.reserve2()),
-    ];
-    for (name, value) in rest {
-        if value != 0 {
-            line.text(name);
-            line.fixed::<0>(false, value, 0);
+impl Print for RawMotorControl {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        line.text(before);
+        line.text("speed ");
+        line.integer(self.speed().into(), 4);
+        line.text(" %  angular ");
+        line.integer(self.angular().into(), 4);
+        line.text(" %  front led ");
+        match self.front_led() {
+            0 => line.text("off"),
+            100 => line.text("on"),
+            other => line.integer(other.into(), 0),
         }
-    }
-    if body.starts_update() {
-        line.text("  (starts a firmware update)");
+        if self.back_led() != 0 {
+            line.text("  back led ");
+            line.integer(self.back_led().into(), 0);
+        }
+        let rest: [(&str, u32); 3] = [
+            ("  version ", self.version().into()),
+            ("  reserve1 ", self.reserve1().into()),
+            ("  reserve2 ", self.reserve2()),
+        ];
+        for (name, value) in rest {
+            if value != 0 {
+                line.text(name);
+                line.fixed::<0>(false, value, 0);
+            }
+        }
+        if self.starts_update() {
+            line.text("  (starts a firmware update)");
+        }
     }
 }
 
-fn report(line: &mut Line<'_>, report: Report<'_>) {
-    let values = report.telemetry();
-    line.text("battery ");
-    match values.battery() {
-        Some(percent) => {
-            line.integer(percent.into(), 3);
-            line.text(" %");
+impl Print for Report<'_> {
+    fn print(&self, line: &mut Line<'_>, before: &'static str) {
+        line.text(before);
+        let values = self.telemetry();
+        line.text("battery ");
+        match values.battery() {
+            Some(percent) => {
+                line.integer(percent.into(), 3);
+                line.text(" %");
+            }
+            None => {
+                line.integer(values.battery_pct.into(), 0);
+                line.text(" (no percentage)");
+            }
         }
-        None => {
-            line.integer(values.battery_pct.into(), 0);
-            line.text(" (no percentage)");
+        line.text("  ");
+        line.fixed::<1>(false, values.voltage_dv.into(), 4);
+        line.text(" V  ");
+        line.fixed::<2>(false, values.current_ca.into(), 5);
+        line.text(" A  ");
+        line.integer(values.power_w.into(), 3);
+        line.text(" W  rpm ");
+        line.spaced(values.rpm, |line, rpm| line.integer(rpm.into(), 4));
+        line.text("  acc ");
+        line.spaced(values.acc, acceleration);
+        line.text(" g  gyro ");
+        line.spaced(values.gyro, angular_velocity);
+        line.text(" deg/s  mag ");
+        line.spaced(values.mag, |line, mag| line.integer(mag.into(), 5));
+        line.text("  heading ");
+        line.integer(values.heading_deg.into(), 3);
+        line.text(" deg");
+        match self.version() {
+            Some(version) => {
+                line.text("  firmware ");
+                line.integer(version.into(), 0);
+            }
+            None => line.text("  (document layout)"),
         }
     }
-    line.text("  ");
-    line.fixed::<1>(false, values.voltage_dv.into(), 4);
-    line.text(" V  ");
-    line.fixed::<2>(false, values.current_ca.into(), 5);
-    line.text(" A  ");
-    line.integer(values.power_w.into(), 3);
-    line.text(" W  rpm ");
-    line.spaced(values.rpm, |line, rpm| line.integer(rpm.into(), 4));
-    line.text("  acc ");
-    line.spaced(values.acc, acceleration);
-    line.text(" g  gyro ");
-    line.spaced(values.gyro, angular_velocity);
-    line.text(" deg/s  mag ");
-    line.spaced(values.mag, |line, mag| line.integer(mag.into(), 5));
-    line.text("  heading ");
-    line.integer(values.heading_deg.into(), 3);
-    line.text(" deg");
-    match report.version() {
-        Some(version) => {
-            line.text("  firmware ");
-            line.integer(version.into(), 0);
-        }
-        None => line.text("  (document layout)"),
-    }
-}
-
-fn imu(line: &mut Line<'_>, acc: [i16; 3], gyro: [i16; 3]) {
-    line.text("acc ");
-    line.spaced(acc, |line, acc| line.integer(acc.into(), 0));
-    line.text(", gyro ");
-    line.spaced(gyro, |line, gyro| line.integer(gyro.into(), 0));
-}
-
-fn mag(line: &mut Line<'_>, mag: [i16; 3]) {
-    line.text("mag ");
-    line.spaced(mag, |line, mag| line.integer(mag.into(), 0));
-}
-
-fn biases(line: &mut Line<'_>, body: &Biases) {
-    body.err().print(line);
-    line.text(", ");
-    imu(line, body.imu().acc(), body.imu().gyro());
-    line.text(", ");
-    mag(line, body.mag().mag());
 }
 
 /// Raw acceleration in hundredths of g, rounded half to even as core rounds

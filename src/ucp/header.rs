@@ -4,6 +4,8 @@ use core::fmt;
 
 use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
+use super::catalogue::catalogue;
+
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 115_200;
 
@@ -101,49 +103,31 @@ impl fmt::Debug for Header {
     }
 }
 
-/// The ids of the known messages (ruling U4).
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum MessageId {
-    /// Ping to the robot, pong to the host.
-    Ping = 1,
-    /// Motor and lamp command to the robot.
-    MotorControl = 2,
-    /// Calibration start to the robot, its acknowledgement to the host.
-    CalibrationStart = 3,
-    /// Calibration end to the robot, its acknowledgement to the host.
-    CalibrationEnd = 4,
-    /// Telemetry to the host.
-    Report = 5,
-    /// Accelerometer and gyroscope biases to the host, their acknowledgement to the robot.
-    ImuBias = 6,
-    /// Magnetometer biases to the host, their acknowledgement to the robot.
-    MagBias = 7,
-    /// Request for the stored biases to the host, the biases to the robot.
-    Biases = 8,
-    /// Firmware update request to the robot, its acknowledgement to the host.
-    Ota = 9,
-    /// State of the host's network to the robot, shown by its lamp.
-    NetworkState = 0x0A,
+/// Makes the ids of the table of messages.
+macro_rules! message_ids {
+    ($(
+        $(#[$doc:meta])*
+        $id:ident = $number:literal { $($messages:tt)+ }
+    )+) => {
+        /// The ids of the known messages (ruling U4).
+        #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[repr(u8)]
+        pub enum MessageId {
+            $($(#[$doc])* $id = $number,)+
+        }
+
+        impl MessageId {
+            /// The known message with this id, if there is one.
+            #[must_use]
+            pub const fn from_u8(id: u8) -> Option<Self> {
+                Some(match id {
+                    $($number => Self::$id,)+
+                    _ => return None,
+                })
+            }
+        }
+    };
 }
 
-impl MessageId {
-    /// The known message with this id, if there is one.
-    #[must_use]
-    pub const fn from_u8(id: u8) -> Option<Self> {
-        Some(match id {
-            1 => Self::Ping,
-            2 => Self::MotorControl,
-            3 => Self::CalibrationStart,
-            4 => Self::CalibrationEnd,
-            5 => Self::Report,
-            6 => Self::ImuBias,
-            7 => Self::MagBias,
-            8 => Self::Biases,
-            9 => Self::Ota,
-            0x0A => Self::NetworkState,
-            _ => return None,
-        })
-    }
-}
+catalogue! { message_ids }

@@ -8,48 +8,19 @@ use core::fmt;
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
 pub use super::{
-    body::{
-        BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationStart,
-        CalibrationStartAck, ImuBias, ImuBiasAck, MagBias, MagBiasAck, OtaAck, Ping, Pong,
-        SetNetworkState, SetNetworkStateWide,
-    },
-    codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+    body::*,
+    codes::*,
     motor::RawMotorControl,
     report::{DocumentReport, FirmwareReport, Report},
     update::{OtaRequest, RawOtaRequest},
 };
 use super::{
+    catalogue::catalogue,
     frame::{Frame, RawFrame},
-    header::MessageId,
+    header::{MAX_BODY_LEN, MessageId},
+    value::Print,
 };
-
-/// The message in a frame, borrowed from its body.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[expect(missing_docs, reason = "each variant is named after the body it holds")]
-#[non_exhaustive]
-pub enum Message<'a> {
-    Ping(&'a Ping),
-    Pong(&'a Pong),
-    MotorControl(&'a RawMotorControl),
-    CalibrationStart(&'a CalibrationStart),
-    CalibrationStartAck(&'a CalibrationStartAck),
-    CalibrationEnd(&'a CalibrationEnd),
-    CalibrationEndAck(&'a CalibrationEndAck),
-    Report(Report<'a>),
-    ImuBias(&'a ImuBias),
-    ImuBiasAck(&'a ImuBiasAck),
-    MagBias(&'a MagBias),
-    MagBiasAck(&'a MagBiasAck),
-    BiasRequest(&'a BiasRequest),
-    Biases(&'a Biases),
-    OtaRequest(&'a RawOtaRequest),
-    OtaAck(&'a OtaAck),
-    SetNetworkState(&'a SetNetworkState),
-    SetNetworkStateWide(&'a SetNetworkStateWide),
-    /// An unknown id, or a known one with a body length that no message has (ruling U3).
-    Unknown(RawFrame<'a>),
-}
+use crate::text::Line;
 
 impl Frame {
     /// The message in this frame.
@@ -76,123 +47,183 @@ impl defmt::Format for Frame {
     }
 }
 
-impl<'a> Message<'a> {
-    /// The name in snake case, as in the JSON of `axle decode`: `ping`, `motor_control`. The two
-    /// widths of a network state have one name, and so have the two layouts of a report.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Ping(_) => "ping",
-            Self::Pong(_) => "pong",
-            Self::MotorControl(_) => "motor_control",
-            Self::CalibrationStart(_) => "calibration_start",
-            Self::CalibrationStartAck(_) => "calibration_start_ack",
-            Self::CalibrationEnd(_) => "calibration_end",
-            Self::CalibrationEndAck(_) => "calibration_end_ack",
-            Self::Report(_) => "report",
-            Self::ImuBias(_) => "imu_bias",
-            Self::ImuBiasAck(_) => "imu_bias_ack",
-            Self::MagBias(_) => "mag_bias",
-            Self::MagBiasAck(_) => "mag_bias_ack",
-            Self::BiasRequest(_) => "bias_request",
-            Self::Biases(_) => "biases",
-            Self::OtaRequest(_) => "ota_request",
-            Self::OtaAck(_) => "ota_ack",
-            Self::SetNetworkState(_) | Self::SetNetworkStateWide(_) => "network_state",
-            Self::Unknown(_) => "unknown",
-        }
-    }
+/// What a variant of [`Message`] holds.
+trait Held<'a>: Sized {
+    /// Lengths of the bodies that it can be, bytes.
+    const LENGTHS: &'static [usize];
 
-    /// The id on the wire (ruling U4).
-    #[must_use]
-    pub const fn id(&self) -> u8 {
-        let id = match self {
-            Self::Ping(_) | Self::Pong(_) => MessageId::Ping,
-            Self::MotorControl(_) => MessageId::MotorControl,
-            Self::CalibrationStart(_) | Self::CalibrationStartAck(_) => MessageId::CalibrationStart,
-            Self::CalibrationEnd(_) | Self::CalibrationEndAck(_) => MessageId::CalibrationEnd,
-            Self::Report(_) => MessageId::Report,
-            Self::ImuBias(_) | Self::ImuBiasAck(_) => MessageId::ImuBias,
-            Self::MagBias(_) | Self::MagBiasAck(_) => MessageId::MagBias,
-            Self::BiasRequest(_) | Self::Biases(_) => MessageId::Biases,
-            Self::OtaRequest(_) | Self::OtaAck(_) => MessageId::Ota,
-            Self::SetNetworkState(_) | Self::SetNetworkStateWide(_) => MessageId::NetworkState,
-            Self::Unknown(frame) => return frame.id,
-        };
-        id as u8
-    }
+    /// Borrows it from a body, if that has the right length.
+    fn of(body: &'a [u8]) -> Option<Self>;
+}
 
-    /// Whether only a host sends it, `Some(false)` if only a robot does (ruling U4). `None` for
-    /// [`Unknown`](Self::Unknown), which either side may send.
-    ///
-    /// ```
-    /// use axlewire::ucp::{Message, message::Ping};
-    ///
-    /// assert_eq!(Message::Ping(&Ping {}).is_from_host(), Some(true));
-    /// ```
-    #[must_use]
-    pub const fn is_from_host(&self) -> Option<bool> {
-        Some(match self {
-            Self::Ping(_)
-            | Self::MotorControl(_)
-            | Self::CalibrationStart(_)
-            | Self::CalibrationEnd(_)
-            | Self::ImuBiasAck(_)
-            | Self::MagBiasAck(_)
-            | Self::Biases(_)
-            | Self::OtaRequest(_)
-            | Self::SetNetworkState(_)
-            | Self::SetNetworkStateWide(_) => true,
-            Self::Pong(_)
-            | Self::CalibrationStartAck(_)
-            | Self::CalibrationEndAck(_)
-            | Self::Report(_)
-            | Self::ImuBias(_)
-            | Self::MagBias(_)
-            | Self::BiasRequest(_)
-            | Self::OtaAck(_) => false,
-            Self::Unknown(_) => return None,
-        })
-    }
+impl<'a, B: FromBytes + Immutable + KnownLayout> Held<'a> for &'a B {
+    const LENGTHS: &'static [usize] = &[size_of::<B>()];
 
-    /// Determines the message from the id and the length of the body; the first match is the only
-    /// one.
-    fn of(frame: &'a Frame) -> Self {
-        let body = frame.body();
-        let unknown = Self::Unknown(RawFrame { id: frame.id(), index: frame.index(), body });
-        let Some(id) = MessageId::from_u8(frame.id()) else { return unknown };
-        match id {
-            MessageId::Ping => cast(body, Self::Ping).or_else(|| cast(body, Self::Pong)),
-            MessageId::MotorControl => cast(body, Self::MotorControl),
-            MessageId::CalibrationStart => {
-                cast(body, Self::CalibrationStart).or_else(|| cast(body, Self::CalibrationStartAck))
-            }
-            MessageId::CalibrationEnd => {
-                cast(body, Self::CalibrationEnd).or_else(|| cast(body, Self::CalibrationEndAck))
-            }
-            MessageId::Report => cast(body, Report::Firmware)
-                .or_else(|| cast(body, Report::Document))
-                .map(Self::Report),
-            MessageId::ImuBias => {
-                cast(body, Self::ImuBias).or_else(|| cast(body, Self::ImuBiasAck))
-            }
-            MessageId::MagBias => {
-                cast(body, Self::MagBias).or_else(|| cast(body, Self::MagBiasAck))
-            }
-            MessageId::Biases => cast(body, Self::BiasRequest).or_else(|| cast(body, Self::Biases)),
-            MessageId::Ota => cast(body, Self::OtaRequest).or_else(|| cast(body, Self::OtaAck)),
-            MessageId::NetworkState => {
-                cast(body, Self::SetNetworkState).or_else(|| cast(body, Self::SetNetworkStateWide))
-            }
-        }
-        .unwrap_or(unknown)
+    fn of(body: &'a [u8]) -> Option<Self> {
+        B::ref_from_bytes(body).ok()
     }
 }
 
-/// The body as a `B`, if it has the right length.
-fn cast<'a, B, T>(body: &'a [u8], variant: impl FnOnce(&'a B) -> T) -> Option<T>
-where
-    B: FromBytes + Immutable + KnownLayout + 'a,
-{
-    B::ref_from_bytes(body).ok().map(variant)
+impl<'a> Held<'a> for Report<'a> {
+    const LENGTHS: &'static [usize] = &[size_of::<FirmwareReport>(), size_of::<DocumentReport>()];
+
+    fn of(body: &'a [u8]) -> Option<Self> {
+        let firmware = Held::of(body).map(Self::Firmware);
+        firmware.or_else(|| Held::of(body).map(Self::Document))
+    }
+}
+
+/// Whether the bodies of one id can be told apart by their lengths, and none is too long.
+const fn are_distinct(messages: &[&[usize]]) -> bool {
+    // A bit for each length that has occurred.
+    let mut occurred = 0_u64;
+    let mut rest = messages;
+    while let [lengths, behind @ ..] = rest {
+        let mut rest_of_lengths = *lengths;
+        while let [length, behind @ ..] = rest_of_lengths {
+            if *length > MAX_BODY_LEN || occurred & (1 << *length) != 0 {
+                return false;
+            }
+            occurred |= 1 << *length;
+            rest_of_lengths = behind;
+        }
+        rest = behind;
+    }
+    true
+}
+
+/// Makes [`Message`] of the table of messages.
+macro_rules! messages {
+    ($(
+        $(#[$id_doc:meta])*
+        $id:ident = $number:literal {$(
+            $(#[$doc:meta])*
+            $direction:ident $name:literal $variant:ident($held:ty) $body:tt
+        )+}
+    )+) => {
+        /// The message in a frame, borrowed from its body.
+        #[derive(Clone, Copy, Debug, Eq, PartialEq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[expect(missing_docs, reason = "each variant is named after the body it holds")]
+        #[non_exhaustive]
+        pub enum Message<'a> {
+            $($($variant($held),)+)+
+            /// An unknown id, or a known one with a body length that no message has (ruling U3).
+            Unknown(RawFrame<'a>),
+        }
+
+        impl<'a> Message<'a> {
+            /// Fails to compile if id and length do not determine the message.
+            const LENGTHS_ARE_DISTINCT: () = {
+                $(assert!(
+                    are_distinct(&[$(<$held as Held<'a>>::LENGTHS),+]),
+                    concat!(stringify!($id), ": two bodies have one length, or one is too long")
+                );)+
+            };
+
+            /// The name in snake case, as in the JSON of `axle decode`: `ping`, `motor_control`.
+            /// The two widths of a network state have one name, and so have the two layouts of a
+            /// report.
+            #[must_use]
+            pub const fn name(&self) -> &'static str {
+                match self {
+                    $($(Self::$variant(_) => $name,)+)+
+                    Self::Unknown(_) => "unknown",
+                }
+            }
+
+            /// The id on the wire (ruling U4).
+            #[must_use]
+            pub const fn id(&self) -> u8 {
+                match self {
+                    $($(Self::$variant(_) => MessageId::$id as u8,)+)+
+                    Self::Unknown(frame) => frame.id,
+                }
+            }
+
+            /// Whether only a host sends it, `Some(false)` if only a robot does (ruling U4). `None`
+            /// for [`Unknown`](Self::Unknown), which either side may send.
+            ///
+            /// ```
+            /// use axlewire::ucp::{Message, message::Ping};
+            ///
+            /// assert_eq!(Message::Ping(&Ping {}).is_from_host(), Some(true));
+            /// ```
+            #[must_use]
+            pub const fn is_from_host(&self) -> Option<bool> {
+                match self {
+                    $($(Self::$variant(_) => Some(is_from_host!($direction)),)+)+
+                    Self::Unknown(_) => None,
+                }
+            }
+
+            /// Determines the message from the id and the length of the body; the first match is
+            /// the only one.
+            fn of(frame: &'a Frame) -> Self {
+                let body = frame.body();
+                match MessageId::from_u8(frame.id()) {
+                    $(Some(MessageId::$id) => {
+                        $(if let Some(held) = Held::of(body) {
+                            return Self::$variant(held);
+                        })+
+                    })+
+                    None => {}
+                }
+                Self::Unknown(RawFrame { id: frame.id(), index: frame.index(), body })
+            }
+
+            /// Puts the fields of the message alone into `map`.
+            #[cfg(feature = "serde")]
+            pub(super) fn put_fields<M: serde::ser::SerializeMap>(
+                &self,
+                map: &mut M,
+            ) -> Result<(), M::Error> {
+                use crate::map::Fields;
+
+                match self {
+                    $($(Self::$variant(body) => body.put(map),)+)+
+                    Self::Unknown(frame) => frame.put(map),
+                }
+            }
+        }
+
+        impl Print for Message<'_> {
+            fn print(&self, line: &mut Line<'_>, before: &'static str) {
+                match self {
+                    $($(Self::$variant(body) => body.print(line, before),)+)+
+                    Self::Unknown(frame) => frame.print(line, before),
+                }
+            }
+        }
+    };
+}
+
+/// Whether a message in this direction comes from a host.
+macro_rules! is_from_host {
+    (to_robot) => {
+        true
+    };
+    (to_host) => {
+        false
+    };
+}
+
+catalogue! { messages }
+
+const _: () = Message::LENGTHS_ARE_DISTINCT;
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_BODY_LEN, are_distinct};
+
+    #[test]
+    fn messages_of_an_id_need_different_lengths_that_can_be_sent() {
+        assert!(are_distinct(&[]) && are_distinct(&[&[0]]));
+        assert!(are_distinct(&[&[0], &[1], &[36, 34], &[MAX_BODY_LEN]]));
+        assert!(!are_distinct(&[&[0], &[0]]));
+        assert!(!are_distinct(&[&[1], &[36, 34], &[7, 36]]));
+        assert!(!are_distinct(&[&[34, 34]]));
+        assert!(!are_distinct(&[&[1], &[MAX_BODY_LEN + 1]]));
+        assert!(!are_distinct(&[&[256]]));
+    }
 }

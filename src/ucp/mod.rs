@@ -144,6 +144,7 @@
 
 mod batch;
 mod body;
+mod catalogue;
 mod codes;
 mod contents;
 mod frame;
@@ -153,12 +154,14 @@ pub mod host;
 mod inbox;
 pub mod message;
 mod motor;
+mod plain;
 mod report;
 pub mod robot;
 mod role;
 #[cfg(feature = "serde")]
 mod serialize;
 mod update;
+mod value;
 
 pub use contents::Contents;
 pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};

@@ -1,14 +1,17 @@
 //! Frames and messages as data for `serde`: flat maps with the fields of `axle decode --json`.
 //!
-//! Written by hand: a derive would need a second set of types, and flattening copies every field.
+//! Plain bodies have theirs from the table of messages. The others are written by hand: a derive
+//! would need a second set of types, and flattening copies every field.
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{
+    body::{Biases, SetNetworkState, SetNetworkStateWide},
     frame::{Frame, RawFrame},
     message::Message,
     motor::RawMotorControl,
     report::Report,
+    update::RawOtaRequest,
 };
 use crate::{map::Fields, text::Hex};
 
@@ -28,7 +31,7 @@ impl Fields for Frame {
         map.serialize_entry("message", message.name())?;
         map.serialize_entry("id", &self.id())?;
         map.serialize_entry("index", &self.index())?;
-        fields(&message, map)?;
+        message.put_fields(map)?;
         map.serialize_entry("bytes", &Hex(bytes))
     }
 }
@@ -44,81 +47,77 @@ impl Fields for Message<'_> {
     fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
         map.serialize_entry("message", self.name())?;
         map.serialize_entry("id", &self.id())?;
-        fields(self, map)
+        self.put_fields(map)
     }
 }
 
-fn fields<M: SerializeMap>(message: &Message<'_>, map: &mut M) -> Result<(), M::Error> {
-    match message {
-        Message::Ping(_) | Message::BiasRequest(_) => Ok(()),
-        Message::Pong(body) => map.serialize_entry("err", &body.err()),
-        Message::MotorControl(body) => motor_control(body, map),
-        Message::CalibrationStart(body) => map.serialize_entry("type", &body.kind()),
-        Message::CalibrationEnd(body) => map.serialize_entry("type", &body.kind()),
-        Message::CalibrationStartAck(body) => {
-            map.serialize_entry("type", &body.kind())?;
-            map.serialize_entry("err", &body.err())
-        }
-        Message::CalibrationEndAck(body) => {
-            map.serialize_entry("type", &body.kind())?;
-            map.serialize_entry("err", &body.err())
-        }
-        Message::Report(body) => report(*body, map),
-        Message::ImuBias(body) => {
-            map.serialize_entry("acc_bias", &body.acc())?;
-            map.serialize_entry("gyro_bias", &body.gyro())
-        }
-        Message::MagBias(body) => map.serialize_entry("mag_bias", &body.mag()),
-        Message::ImuBiasAck(body) => map.serialize_entry("err", &body.err()),
-        Message::MagBiasAck(body) => map.serialize_entry("err", &body.err()),
-        Message::Biases(body) => {
-            map.serialize_entry("err", &body.err())?;
-            map.serialize_entry("acc_bias", &body.imu().acc())?;
-            map.serialize_entry("gyro_bias", &body.imu().gyro())?;
-            map.serialize_entry("mag_bias", &body.mag().mag())
-        }
-        Message::OtaRequest(body) => map.serialize_entry("version", &body.version()),
-        Message::OtaAck(body) => map.serialize_entry("err", &body.status()),
-        Message::SetNetworkState(body) => {
-            map.serialize_entry("state", &body.state())?;
-            map.serialize_entry("state_width", &1)
-        }
-        Message::SetNetworkStateWide(body) => {
-            map.serialize_entry("state", &body.state())?;
-            map.serialize_entry("state_width", &4)
-        }
-        Message::Unknown(RawFrame { body, .. }) => map.serialize_entry("body", &Hex(body)),
+impl Fields for RawFrame<'_> {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("body", &Hex(self.body))
     }
 }
 
-fn motor_control<M: SerializeMap>(body: &RawMotorControl, map: &mut M) -> Result<(), M::Error> {
-    map.serialize_entry("speed", &body.speed())?;
-    map.serialize_entry("angular", &body.angular())?;
-    map.serialize_entry("front_led", &body.front_led())?;
-    map.serialize_entry("back_led", &body.back_led())?;
-    map.serialize_entry("version", &body.version())?;
-    map.serialize_entry("reserve1", &body.reserve1())?;
-    map.serialize_entry("reserve2", &body.reserve2())
+impl Fields for RawMotorControl {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("speed", &self.speed())?;
+        map.serialize_entry("angular", &self.angular())?;
+        map.serialize_entry("front_led", &self.front_led())?;
+        map.serialize_entry("back_led", &self.back_led())?;
+        map.serialize_entry("version", &self.version())?;
+        map.serialize_entry("reserve1", &self.reserve1())?;
+        map.serialize_entry("reserve2", &self.reserve2())
+    }
 }
 
-fn report<M: SerializeMap>(report: Report<'_>, map: &mut M) -> Result<(), M::Error> {
-    let layout = match report {
-        Report::Firmware(_) => "firmware",
-        Report::Document(_) => "document",
-    };
-    let values = report.telemetry();
-    map.serialize_entry("layout", layout)?;
-    map.serialize_entry("battery_pct", &values.battery_pct)?;
-    map.serialize_entry("rpm", &values.rpm)?;
-    map.serialize_entry("acc", &values.acc)?;
-    map.serialize_entry("gyro", &values.gyro)?;
-    map.serialize_entry("mag", &values.mag)?;
-    map.serialize_entry("heading", &values.heading_deg)?;
-    map.serialize_entry("power_w", &values.power_w)?;
-    map.serialize_entry("voltage_dv", &values.voltage_dv)?;
-    map.serialize_entry("current_ca", &values.current_ca)?;
-    match report.version() {
-        Some(version) => map.serialize_entry("version", &version),
-        None => Ok(()),
+impl Fields for Report<'_> {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        let layout = match self {
+            Self::Firmware(_) => "firmware",
+            Self::Document(_) => "document",
+        };
+        let values = self.telemetry();
+        map.serialize_entry("layout", layout)?;
+        map.serialize_entry("battery_pct", &values.battery_pct)?;
+        map.serialize_entry("rpm", &values.rpm)?;
+        map.serialize_entry("acc", &values.acc)?;
+        map.serialize_entry("gyro", &values.gyro)?;
+        map.serialize_entry("mag", &values.mag)?;
+        map.serialize_entry("heading", &values.heading_deg)?;
+        map.serialize_entry("power_w", &values.power_w)?;
+        map.serialize_entry("voltage_dv", &values.voltage_dv)?;
+        map.serialize_entry("current_ca", &values.current_ca)?;
+        match self.version() {
+            Some(version) => map.serialize_entry("version", &version),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Fields for Biases {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("err", &self.err())?;
+        map.serialize_entry("acc_bias", &self.imu().acc())?;
+        map.serialize_entry("gyro_bias", &self.imu().gyro())?;
+        map.serialize_entry("mag_bias", &self.mag().mag())
+    }
+}
+
+impl Fields for RawOtaRequest {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("version", &self.version())
+    }
+}
+
+impl Fields for SetNetworkState {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("state", &self.state())?;
+        map.serialize_entry("state_width", &1)
+    }
+}
+
+impl Fields for SetNetworkStateWide {
+    fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        map.serialize_entry("state", &self.state())?;
+        map.serialize_entry("state_width", &4)
     }
 }

@@ -11,6 +11,7 @@ mod calibrate;
 mod decode;
 mod drive;
 mod export;
+mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
@@ -28,6 +29,7 @@ mod ping;
 mod play;
 #[cfg(all(test, unix))]
 mod played;
+mod plot;
 mod ports;
 #[cfg(test)]
 #[path = "../../../tests/support/quiet.rs"]
@@ -98,6 +100,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Decode(decode::Args),
+    Plot(plot::Args),
     Export(export::Args),
     Scan(scan::Args),
     Spin(spin::Args),
@@ -109,6 +112,7 @@ enum Command {
     Network(network::Args),
     Watch(watch::Args),
     Record(record::Args),
+    Extcap(extcap::Args),
     Replay(replay::Args),
     Send(send::Args),
     #[cfg(unix)]
@@ -158,6 +162,7 @@ fn with_negative_numbers(command: Description) -> Description {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Decode(args) => decode::run(args),
+        Command::Plot(args) => plot::run(args),
         Command::Export(args) => export::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),
@@ -169,6 +174,7 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Network(args) => network::run(args),
         Command::Watch(args) => watch::run(args),
         Command::Record(args) => record::run(args),
+        Command::Extcap(args) => extcap::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Send(args) => send::run(args),
         #[cfg(unix)]

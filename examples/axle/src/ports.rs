@@ -100,15 +100,21 @@ impl fmt::Display for Record {
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let mut ports = serialport::available_ports()
-        .map_err(|error| Failure::Failed(format!("cannot list the ports: {error}")))?;
-    ports.sort_by(|a, b| a.port_name.cmp(&b.port_name));
+    let ports = available()?;
     let summary = Record::Summary { ports: ports.len() };
     let (form, mut out) = (Form::of(args.json), io::stdout().lock());
     for record in ports.into_iter().map(Record::from).chain([summary]) {
         writeln!(out, "{}", form.plain(&record)).map_err(Failure::Write)?;
     }
     out.flush().map_err(Failure::Write)
+}
+
+/// The ports of this machine, by name.
+pub(crate) fn available() -> Result<Vec<SerialPortInfo>, Failure> {
+    let mut ports = serialport::available_ports()
+        .map_err(|error| Failure::Failed(format!("cannot list the ports: {error}")))?;
+    ports.sort_by(|a, b| a.port_name.cmp(&b.port_name));
+    Ok(ports)
 }
 
 #[cfg(test)]

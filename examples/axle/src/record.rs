@@ -77,11 +77,30 @@ where
 {
     let signals = Signals::listen()?;
     let baud = args.baud.unwrap_or(args.protocol.default_baud());
-    let mut line = Line::connect(&args.port, baud)?;
+    let line = Line::connect(&args.port, baud)?;
     let file = Recording::create(&args.output, args.force, args.protocol, line.path(), baud)?;
+    let end = args.micros.map(|micros| Instant::now() + Duration::from_micros(micros));
+    let (account, recorded) = record_line::<F>(line, file, end, &signals);
+    if args.output != Path::new("-") {
+        let mut out = io::stdout().lock();
+        let told = listing::print_summary(&mut out, &account, false);
+        told.and_then(|()| out.flush()).map_err(Failure::Write)?;
+    }
+    recorded
+}
+
+/// Records a line until `end`, a signal, or a failure of the file or the port.
+pub(crate) fn record_line<F>(
+    mut line: Line,
+    file: Recording,
+    end: Option<Instant>,
+    signals: &Signals,
+) -> (Counters, Result<(), Failure>)
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
     let mut frames = Frames::<F>::new(file);
-    let start = Instant::now();
-    let end = args.micros.map(|micros| start + Duration::from_micros(micros));
     let mut buffer = [0; 4096];
     let mut recorded = Ok(());
     let broken = loop {
@@ -99,12 +118,7 @@ where
         Ok(()) => frames.finish(),
         failed => (frames.account(), failed),
     };
-    if args.output != Path::new("-") {
-        let mut out = io::stdout().lock();
-        let told = listing::print_summary(&mut out, &account, false);
-        told.and_then(|()| out.flush()).map_err(Failure::Write)?;
-    }
-    recorded.and(broken)
+    (account, recorded.and(broken))
 }
 
 /// Cuts what is received into frames and the bytes between them, a packet each.

@@ -230,9 +230,8 @@ impl<S: BiasStore> State<S> {
             Message::MagBias(bias) => self.mag_result(*bias, at),
             Message::BiasRequest(_) => self.bias_request(at),
             Message::OtaAck(ack) => self.update_answer(ack.status(), at),
-            Message::Unknown(raw) => self.unknown(&raw),
-            // Commands of a host, which have been refused above.
-            _ => {}
+            // Unknown, or a message that a host has no use for. Commands were refused above.
+            _ => self.unknown(frame),
         }
     }
 
@@ -383,9 +382,10 @@ impl<S: BiasStore> State<S> {
         self.events.push_latest(HostEvent::UpdateAnswered(status), is_answer);
     }
 
-    fn unknown(&mut self, frame: &RawFrame<'_>) {
+    fn unknown(&mut self, frame: &Frame) {
         count(&mut self.stats.unknown);
-        if let Some(frame) = UnknownFrame::copy(frame) {
+        let raw = RawFrame { id: frame.id(), index: frame.index(), body: frame.body() };
+        if let Some(frame) = UnknownFrame::copy(&raw) {
             self.events.push_frequent(HostEvent::Unknown(frame));
         }
     }

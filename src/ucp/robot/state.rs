@@ -134,9 +134,8 @@ impl State {
             Message::OtaRequest(request) => self.update_request(request),
             Message::SetNetworkState(body) => self.network_state(body.state()),
             Message::SetNetworkStateWide(body) => self.network_state(body.state()),
-            Message::Unknown(_) => count(&mut self.stats.unknown),
-            // Frames of a robot, which have been refused above.
-            _ => {}
+            // Unknown, or a message that a robot has no use for. Reports were refused above.
+            _ => count(&mut self.stats.unknown),
         }
     }
 

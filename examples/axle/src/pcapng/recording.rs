@@ -22,41 +22,43 @@ pub(crate) struct Recording {
 
 /// The time on a clock that never goes backwards: the system's may be set while we record.
 #[derive(Clone, Copy)]
-pub(super) struct Stamp {
+pub(crate) struct Stamp {
     start: Instant,
     /// The same moment on the system's clock.
     is_then: SystemTime,
 }
 
 impl Stamp {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { start: Instant::now(), is_then: SystemTime::now() }
     }
 
     /// Microseconds since 1970.
-    pub(super) fn micros(self) -> u64 {
+    pub(crate) fn micros(self) -> u64 {
         let time = self.is_then + self.start.elapsed();
         time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
     }
 }
 
-/// A file or standard output.
+/// A file, or a pipe with a reader.
 enum Output {
     File(File),
+    /// A named pipe.
+    Pipe(File),
     Stdout(io::Stdout),
 }
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::File(file) => file.write(bytes),
+            Self::File(file) | Self::Pipe(file) => file.write(bytes),
             Self::Stdout(stdout) => stdout.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match self {
-            Self::File(file) => file.flush(),
+            Self::File(file) | Self::Pipe(file) => file.flush(),
             Self::Stdout(stdout) => stdout.flush(),
         }
     }
@@ -94,6 +96,19 @@ impl Recording {
             Output::File(options.open(path).map_err(cannot)?)
         };
         Self::begin(output, path, protocol, port, baud).map_err(cannot)
+    }
+
+    /// Writes to a named pipe that is there, once it has a reader. It is no failure if the reader
+    /// closes it.
+    pub(crate) fn to_pipe(
+        path: &Path,
+        protocol: Protocol,
+        port: &str,
+        baud: u32,
+    ) -> Result<Self, Failure> {
+        let opened = File::options().write(true).open(path);
+        let pipe = opened.map_err(|error| Failure::Open { path: path.to_owned(), error })?;
+        Self::begin(Output::Pipe(pipe), path, protocol, port, baud).map_err(Failure::Write)
     }
 
     fn begin(
@@ -141,7 +156,7 @@ impl Recording {
         }
         let good = match self.writer.get_mut() {
             Output::File(file) => file.stream_position().ok(),
-            Output::Stdout(_) => None,
+            Output::Pipe(_) | Output::Stdout(_) => None,
         };
         match self.writer.packet(micros, direction, bytes) {
             Ok(()) => self.packets += 1,
@@ -169,11 +184,11 @@ impl Recording {
 
     fn fail(&mut self, error: io::Error) {
         let (path, packets) = (&self.path, self.packets);
-        let failure = match path == Path::new("-") {
-            true => Failure::Write(error),
-            false => Failure::Failed(format!(
+        let failure = match self.writer.get_mut() {
+            Output::File(_) => Failure::Failed(format!(
                 "cannot write {path:?}: {error}; the {packets} packets in it are complete"
             )),
+            Output::Pipe(_) | Output::Stdout(_) => Failure::Write(error),
         };
         self.failure.get_or_insert(failure);
     }

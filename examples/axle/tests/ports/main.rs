@@ -6,6 +6,7 @@
 mod support;
 
 mod drive;
+mod extcap;
 mod faults;
 mod gone;
 mod input;

@@ -1,0 +1,167 @@
+//! `axle extcap`: live capture for Wireshark, in the protocol that it speaks with such programs.
+//!
+//! Wireshark asks for the interfaces, for the link types and the settings of one, and then runs the
+//! capture, which writes pcapng to a pipe until it is stopped by a signal or the pipe is closed.
+//! What is asked is in the arguments, and the answers are lines on standard output.
+
+mod say;
+
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use axlewire::{
+    ikeya::{self, three},
+    stream::Framing,
+    ucp,
+};
+
+use crate::{
+    EXIT_CODES, args::Protocol, failure::Failure, line::Line, listing::Shown, pcapng::Recording,
+    ports, record::record_line, signals::Signals,
+};
+use say::{ANY_PORT, PREFIX};
+
+/// Live capture for Wireshark, which runs this itself
+///
+/// examples/wireshark/install.sh makes the serial ports of this machine interfaces of Wireshark and
+/// tshark. One more interface, `axle`, has the port as a setting, for pseudo-terminals and tcp:. A
+/// capture is that of `axle record`, and sends nothing. Its times are those at which this program
+/// got the bytes from the system; behind a USB adapter, that can be 16 ms after they were on the
+/// line.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Args {
+    /// List the interfaces
+    #[arg(long)]
+    extcap_interfaces: bool,
+
+    /// The interface that the other options are about
+    #[arg(long, value_name = "NAME")]
+    extcap_interface: Option<String>,
+
+    /// List the link types of an interface
+    #[arg(long)]
+    extcap_dlts: bool,
+
+    /// List the settings of an interface
+    #[arg(long)]
+    extcap_config: bool,
+
+    /// Capture
+    #[arg(long)]
+    capture: bool,
+
+    /// The pipe to write to
+    #[arg(long, value_name = "PATH")]
+    fifo: Option<PathBuf>,
+
+    /// Version of Wireshark; all are served alike
+    #[arg(long, value_name = "VERSION")]
+    extcap_version: Option<String>,
+
+    /// A capture filter: there are none, display filters do it
+    #[arg(long, value_name = "FILTER")]
+    extcap_capture_filter: Option<String>,
+
+    /// The port, for the interface `axle`: such as /dev/ttyUSB0 or COM3; or tcp:HOST:PORT
+    #[arg(short, long, value_name = "PATH")]
+    port: Option<String>,
+
+    /// Line speed, bit/s; 0 is that of the protocol
+    #[arg(short, long, default_value_t = 0)]
+    baud: u32,
+
+    /// Protocol of the line
+    #[arg(short = 'P', long, value_enum)]
+    protocol: Option<Protocol>,
+}
+
+/// Runs the subcommand.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let mut text = String::new();
+    if args.extcap_interfaces {
+        // Without a list, the interface for any port is left.
+        say::interfaces(&mut text, &ports::available().unwrap_or_default());
+    } else if args.extcap_dlts {
+        args.interface()?;
+        say::link_types(&mut text);
+    } else if args.extcap_config {
+        say::settings(&mut text, args.interface()? == ANY_PORT);
+    } else if args.capture {
+        return capture(args);
+    } else if args.filter().is_some() {
+        // Wireshark asks whether it is valid, and takes any answer for a no.
+        say::no_filter(&mut text);
+    } else {
+        let line = "one of --extcap-interfaces, --extcap-dlts, --extcap-config and --capture is \
+                    needed: Wireshark runs this subcommand itself";
+        return Err(Failure::Usage(line.to_owned()));
+    }
+    let mut out = io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(Failure::Write)
+}
+
+impl Args {
+    fn interface(&self) -> Result<&str, Failure> {
+        self.extcap_interface.as_deref().ok_or_else(|| needs("--extcap-interface"))
+    }
+
+    fn filter(&self) -> Option<&str> {
+        self.extcap_capture_filter.as_deref().filter(|filter| !filter.trim().is_empty())
+    }
+
+    /// The port of the interface.
+    fn port(&self) -> Result<&str, Failure> {
+        let interface = self.interface()?;
+        let none = || {
+            let line = format!("there is no interface {interface:?}: see --extcap-interfaces");
+            Failure::Usage(line)
+        };
+        match interface {
+            ANY_PORT => self
+                .port
+                .as_deref()
+                .filter(|port| !port.is_empty())
+                .ok_or_else(|| needs("the setting Port (--port)")),
+            named => named.strip_prefix(PREFIX).filter(|port| !port.is_empty()).ok_or_else(none),
+        }
+    }
+}
+
+fn needs(what: &str) -> Failure {
+    Failure::Usage(format!("{what} is needed"))
+}
+
+fn capture(args: &Args) -> Result<(), Failure> {
+    let port = args.port()?;
+    let fifo = args.fifo.as_deref().ok_or_else(|| needs("--fifo"))?;
+    let protocol = args.protocol.ok_or_else(|| needs("the setting Protocol (--protocol)"))?;
+    if let Some(filter) = args.filter() {
+        let line = format!("no capture filters, such as {filter:?}: use a display filter");
+        return Err(Failure::Usage(line));
+    }
+    let baud = if args.baud == 0 { protocol.default_baud() } else { args.baud };
+    match protocol {
+        Protocol::Ucp => capture_line::<ucp::Ucp>(port, baud, protocol, fifo),
+        Protocol::Ikeya => capture_line::<ikeya::BothDirections>(port, baud, protocol, fifo),
+        Protocol::Ikeya3 => capture_line::<three::BothDirections>(port, baud, protocol, fifo),
+    }
+}
+
+fn capture_line<F>(port: &str, baud: u32, protocol: Protocol, fifo: &Path) -> Result<(), Failure>
+where
+    F: Framing,
+    for<'a> F::Frame<'a>: Shown,
+{
+    let line = Line::connect(port, baud)?;
+    // Waits for a reader; a signal ends the process then, because nothing listens yet.
+    let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
+    let signals = Signals::listen()?;
+    let (_, recorded) = record_line::<F>(line, file, None, &signals);
+    recorded
+}
+
+#[cfg(test)]
+mod tests;
