@@ -221,9 +221,9 @@ fn put<T: DataType>(
     Ok(())
 }
 
-/// A column of bytes, encoded as pages. The writer of the crate takes a reference-counted buffer per
-/// value, and counting takes longer than all the rest. All bytes columns are required, so that a
-/// page has the values alone.
+/// A column of bytes, encoded as pages. The writer of the crate takes a reference-counted buffer
+/// per value, and counting takes longer than all the rest. Here all columns of bytes are required,
+/// so that a page has the values alone.
 fn bytes(
     description: ColumnDescPtr,
     ends: &[u32],
