@@ -85,7 +85,7 @@ drawn=$(command_with pulseview)
 expect PulseView "$("${here[@]}" sigrok-cli -i drive.sr -P uart:rx=RX:baudrate=115200,axle_ucp \
     -A axle_ucp=packets | grep -c ': report')" "$reports"
 
-"${here[@]}" $(command_with '.mcap') 2>/dev/null
+"${here[@]}" $(command_with '.mcap') >/dev/null 2>&1
 expect Foxglove "$("${here[@]}" "$python" -c "
 from mcap.reader import make_reader
 with open('drive.mcap', 'rb') as file:
@@ -93,13 +93,13 @@ with open('drive.mcap', 'rb') as file:
         channel.topic == 'ucp.report' for _, channel, _ in make_reader(file).iter_messages()))
 ")" "$reports"
 
-"${here[@]}" $(command_with '.parquet') 2>/dev/null
+"${here[@]}" $(command_with '.parquet') >/dev/null 2>&1
 expect Parquet "$("${here[@]}" "$python" -c "
 import pyarrow.parquet
 print(pyarrow.parquet.read_table('drive.parquet/ucp.report.parquet').num_rows)
 ")" "$reports"
 
-"${here[@]}" $(command_with 'axle plot') 2>/dev/null
+"${here[@]}" $(command_with 'axle plot') >/dev/null 2>&1
 frames=$("${here[@]}" axle decode -s drive.pcapng | sed -n 's/.* in \([0-9]*\) frames.*/\1/p')
 grep -qF "$frames frames" "$work/drive.html" || {
     echo "plot: the page does not say $frames frames" >&2
