@@ -128,9 +128,10 @@ HIDING = re.compile(
 IDLE = re.compile(r"(?<!<)<<(?!<)|(^|\s)--?(no-run|list|skip|help|version|dry-run|[hV])\b")
 # How a line may begin: with what runs a check, or with what prepares or compares something.
 PLAIN = re.compile(
-    r"cargo (fmt|clippy|test|build|run|doc|check|hack) ?|cargo \"\+\$msrv\" check |python3 (\.ci|tests|benches)/\w"
+    r"cargo (fmt|clippy|test|build|run|doc|check|hack) ?|cargo \"\+\$msrv\" check |python3 (\.ci|tests|benches|examples/axle/tests)/\w"
     r"|bash (\.ci|examples/\w+|benches)/\w|\.ci/\w|\$venv/bin/(pip|zizmor|check-jsonschema) |\$command --quiet <"
     r"|RUSTDOCFLAGS=\"-D warnings\" cargo doc |AXLE_HOUR_MINUTES=0\.33 cargo test |local -x RUSTFLAGS=\"-D warnings\"$"
+    r"|AXLE=target/debug/axle PYTHON=[\w/]+ bash examples/\w|examples/architecture\.py --"
     r"|local [a-z]|grep -|sed -?[\w ]*['\"]|\[ \S+ -\w+ \d+ \]$|echo (\"[^\"]*\"|'[^']*')$"
     r"|no_std_features=|sleep [\d.]+$|kill \$sim$|rm \"\$told\"$|(done|\)|\})$")
 # Forms that hide nothing; the strings in quotes are left out.

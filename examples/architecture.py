@@ -43,7 +43,7 @@ def box(left, top, width, text, fill, dashed=False):
     """A box with a line of text in its middle."""
     dashes = ' stroke-dasharray="5 4"' if dashed else ""
     return [
-        f'<rect x="{left}" y="{top}" width="{width}" height="{FLOOR_HEIGHT - 14}" rx="6" '
+        f'<rect x="{left}" y="{top}" width="{width:.1f}" height="{FLOOR_HEIGHT - 14}" rx="6" '
         f'fill="{fill}" stroke="{PALE}"{dashes}/>',
         f'<text x="{left + width / 2:g}" y="{top + 27}" text-anchor="middle">{escape(text)}</text>',
     ]
@@ -56,12 +56,12 @@ def row_of_boxes(top, texts, fills, dashed=False):
     return [
         line
         for at, (text, fill) in enumerate(zip(texts, fills))
-        for line in box(round(BOX_LEFT + at * (width + gap), 1), top, round(width, 1), text, fill, dashed)
+        for line in box(round(BOX_LEFT + at * (width + gap), 1), top, width, text, fill, dashed)
     ]
 
 
 def merged(rows):
-    """`drive` and `io`, which do not know each other, beside each other: floors with their texts."""
+    """The floors with their texts; `drive` and `io`, which do not know each other, share one."""
     out = []
     for name, what, modules in rows:
         if name == "io" and out and out[-1][0] == ["drive"]:

@@ -9,7 +9,7 @@
 # one of them is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-root=$PWD python=${PYTHON:-python3} axle=$(realpath "${AXLE:?is not set: a build of axle}")
+python=$(realpath -s "$(command -v "${PYTHON:-python3}")") axle=$(realpath "${AXLE:?is not set: a build of axle}")
 
 for tool in tshark sigrok-cli; do
     command -v $tool >/dev/null || {
@@ -24,24 +24,25 @@ for module in mcap pyarrow; do
     }
 done
 
-# Wireshark loads no script of root: everything runs as an ordinary user, with a home of its own.
+# Everything runs in a folder of its own, which is the home, too.
 work=$(mktemp -d)
-user=()
+mkdir "$work/bin" "$work/examples"
+cp "$axle" "$work/bin/axle"
+cp -r examples/wireshark examples/sigrok "$work/examples"
+here=(env -C "$work" HOME="$work" PATH="$work/bin:$PATH" LC_ALL=C.UTF-8 PYTHONDONTWRITEBYTECODE=1
+    WIRESHARK_EXTCAP_DIR="$work/.local/lib/wireshark/extcap")
+
+# Wireshark loads no script if it runs as root: it and the simulator are those of an ordinary user.
+as_user=("${here[@]}")
 if [ "$(id -u)" = 0 ]; then
-    chown nobody "$work"
-    user=(setpriv --reuid nobody --regid "$(id -g nobody)" --clear-groups)
+    as_user+=(setpriv --reuid nobody --regid "$(id -g nobody)" --clear-groups)
 fi
-mkdir -m 755 "$work/bin" && cp "$axle" "$work/bin/axle"
-as_user() {
-    (cd "$work" && exec "${user[@]}" env HOME="$work" PATH="$work/bin:$PATH" LC_ALL=C.UTF-8 \
-        WIRESHARK_EXTCAP_DIR="$work/.local/lib/wireshark/extcap" PYTHONDONTWRITEBYTECODE=1 "$@")
-}
 
 # The one command of the section that contains this, without its comment, on the line of this run.
 command_with() {
     local found
     found=$(awk '/^## /{on = /Look at it in other tools/} /^```/{code = !code; next} on && code' \
-        README.md | grep -F -- "$1" | sed "s/ *#.*//; s|/tmp/rover|$work/rover|; s|examples/|$root/examples/|")
+        README.md | grep -F -- "$1" | sed "s/ *#.*//; s|/tmp/rover|$work/rover|")
     [ "$(wc -l <<<"$found")" = 1 ] && [ -n "$found" ] || {
         echo "README.md: '$1' is in $(grep -c . <<<"$found" || true) lines, expected 1" >&2
         return 1
@@ -55,11 +56,11 @@ expect() {
     echo "$1: $2 reports"
 }
 
-chmod 755 "$work"
-cp -r examples/sigrok "$work/sigrok"
-as_user "$(command_with install.sh)" --axle "$work/bin/axle" >/dev/null
+"${here[@]}" "$(command_with wireshark/install.sh)" --axle "$work/bin/axle" >/dev/null
+# The simulator makes its link there.
+chmod 777 "$work"
 simulator=$(command_with 'axle sim')
-as_user ${simulator% &} >"$work/log" &
+"${as_user[@]}" ${simulator% &} >"$work/log" &
 sim=$!
 trap 'kill $sim 2>/dev/null || true; wait $sim 2>/dev/null || true; rm -rf "$work"' EXIT
 for _ in $(seq 100); do
@@ -68,38 +69,38 @@ for _ in $(seq 100); do
 done
 
 live=$(command_with 'wireshark -k')
-seen=$(as_user ${live/wireshark -k/tshark -c 60 -a duration:30 -T fields -e axle_ucp.message} \
+seen=$("${as_user[@]}" ${live/wireshark -k/tshark -c 60 -a duration:30 -T fields -e axle_ucp.message} \
     2>/dev/null | grep -c report || true)
 [ "$seen" -ge 50 ] || { echo "Wireshark: $seen reports in 60 packets" >&2; exit 1; }
 echo "Wireshark: $seen reports in 60 packets"
 
-as_user $(command_with 'axle record') >/dev/null
-reports=$(as_user axle decode --json drive.pcapng | grep -c '"message":"report"')
+"${here[@]}" $(command_with 'axle record') >/dev/null
+reports=$("${here[@]}" axle decode --json drive.pcapng | grep -c '"message":"report"')
 [ "$reports" -ge 100 ] || { echo "record: only $reports reports" >&2; exit 1; }
 
 drawn=$(command_with pulseview)
-as_user ${drawn% && pulseview *} >/dev/null
-as_user mkdir -p .local/share/libsigrokdecode
-as_user cp -r sigrok .local/share/libsigrokdecode/decoders
-expect PulseView "$(as_user sigrok-cli -i drive.sr -P uart:rx=RX:baudrate=115200,axle_ucp \
+"${here[@]}" ${drawn% && pulseview *} >/dev/null
+"${here[@]}" mkdir -p .local/share/libsigrokdecode
+"${here[@]}" cp -r examples/sigrok .local/share/libsigrokdecode/decoders
+expect PulseView "$("${here[@]}" sigrok-cli -i drive.sr -P uart:rx=RX:baudrate=115200,axle_ucp \
     -A axle_ucp=packets | grep -c ': report')" "$reports"
 
-as_user $(command_with '.mcap') 2>/dev/null
-expect Foxglove "$(as_user "$python" -c "
+"${here[@]}" $(command_with '.mcap') >/dev/null 2>&1
+expect Foxglove "$("${here[@]}" "$python" -c "
 from mcap.reader import make_reader
 with open('drive.mcap', 'rb') as file:
     print(make_reader(file).get_summary().statistics.message_count and sum(
         channel.topic == 'ucp.report' for _, channel, _ in make_reader(file).iter_messages()))
 ")" "$reports"
 
-as_user $(command_with '.parquet') 2>/dev/null
-expect Parquet "$(as_user "$python" -c "
+"${here[@]}" $(command_with '.parquet') >/dev/null 2>&1
+expect Parquet "$("${here[@]}" "$python" -c "
 import pyarrow.parquet
 print(pyarrow.parquet.read_table('drive.parquet/ucp.report.parquet').num_rows)
 ")" "$reports"
 
-as_user $(command_with 'axle plot') 2>/dev/null
-frames=$(as_user axle decode -s drive.pcapng | sed -n 's/.* in \([0-9]*\) frames.*/\1/p')
+"${here[@]}" $(command_with 'axle plot') >/dev/null 2>&1
+frames=$("${here[@]}" axle decode -s drive.pcapng | sed -n 's/.* in \([0-9]*\) frames.*/\1/p')
 grep -qF "$frames frames" "$work/drive.html" || {
     echo "plot: the page does not say $frames frames" >&2
     exit 1

@@ -1,7 +1,12 @@
 #!/usr/bin/env bash
-# Draws the pictures of the README anew, from simulated lines: screenshots/bus.svg, rover.svg.
+# Draws the pictures of the README anew: the page of `axle watch` from simulated lines, bus.svg and
+# rover.svg, and those of `axle plot` from our captures, motors.svg and drive.svg.
 set -euo pipefail
 cd "$(dirname "$0")"
 mkdir -p screenshots
 cargo test --quiet -p axle --bin axle -- --ignored --exact \
     watch::page::shots::write_the_pictures
+for name in motors drive; do
+    cargo run --quiet -p axle --features plot -- \
+        plot "../captures/$name.pcapng" --force -o "screenshots/$name.svg"
+done

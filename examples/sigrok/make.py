@@ -225,14 +225,15 @@ def recording(path, out, begin, end):
     begin, end = begin or 0.0, last + 0.001 if end is None else end
     if end - begin > MOST_SECONDS:
         raise Unusable("longer than %d s: choose a part by FROM and TO, seconds" % MOST_SECONDS)
+    chosen = [((time - start) / 1e6 - begin, is_sent, chunk) for time, is_sent, chunk in packets
+              if begin <= (time - start) / 1e6 <= end]
+    # Each chunk ends at its time. Room for all of the first, and an idle line in front of it.
+    times = [(seconds, len(chunk) * BITS / baud) for seconds, _, chunk in chosen]
+    lead = max([0.002] + [duration - seconds + 2 * BITS / baud for seconds, duration in times])
     lines, free = {True: Line(baud), False: Line(baud)}, {True: 0.0, False: 0.0}
-    # Room for the first chunk, which ends at its time.
-    lead = 0.002 - begin
-    for time, is_sent, chunk in packets:
-        seconds = (time - start) / 1e6
-        if begin <= seconds <= end:
-            at = (seconds + lead) * SAMPLE_RATE - len(chunk) * BITS * SAMPLE_RATE / baud
-            free[is_sent] = lines[is_sent].send(chunk, max(at, free[is_sent], 0.0))
+    for (seconds, is_sent, chunk), (_, duration) in zip(chosen, times):
+        at = (seconds + lead - duration) * SAMPLE_RATE
+        free[is_sent] = lines[is_sent].send(chunk, max(at, free[is_sent]))
     if not any(line.places for line in lines.values()):
         raise Unusable("nothing is in this part")
     decoder, options = PROTOCOLS[name]

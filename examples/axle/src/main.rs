@@ -29,6 +29,7 @@ mod ping;
 mod play;
 #[cfg(all(test, unix))]
 mod played;
+mod plot;
 mod ports;
 #[cfg(test)]
 #[path = "../../../tests/support/quiet.rs"]
@@ -99,6 +100,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Decode(decode::Args),
+    Plot(plot::Args),
     Export(export::Args),
     Scan(scan::Args),
     Spin(spin::Args),
@@ -160,6 +162,7 @@ fn with_negative_numbers(command: Description) -> Description {
 fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Decode(args) => decode::run(args),
+        Command::Plot(args) => plot::run(args),
         Command::Export(args) => export::run(args),
         Command::Scan(args) => scan::run(args),
         Command::Spin(args) => spin::run(args),

@@ -12,7 +12,9 @@ use crate::{
     failure::Failure,
     listing::{Modes, Place, REASONS, Shown, SkippedBytes},
 };
-pub(crate) use column::{Cell, Column, Values};
+#[cfg(feature = "parquet")]
+pub(crate) use column::Values;
+pub(crate) use column::{Cell, Column};
 pub(crate) use described::Type;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;
@@ -92,7 +94,7 @@ impl Tables {
         self.add(self.last, at, |table, from| {
             let (slots, columns) = (&*table.slots, &mut *table.columns);
             let columns = columns.get_mut(from..).unwrap_or_default();
-            frame.serialize(Row { slots, columns, mode })
+            frame.serialize(Row { slots, columns, whole: frame.bytes(), mode })
         });
     }
 
@@ -195,17 +197,13 @@ impl Table {
             if is_place {
                 place = columns.len();
             } else if name != "event" {
-                slots.push(Slot { name, first, width: columns.len() - place - first });
+                let (width, is_whole) = (columns.len() - place - first, name == "bytes");
+                slots.push(Slot { name, first, width, is_whole });
             }
         }
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
         Self { name, protocol, message, columns, numbers, slots }
-    }
-
-    /// A column by its name.
-    pub(crate) fn column(&self, name: &str) -> Option<&Column> {
-        self.columns.iter().find(|column| column.name == name)
     }
 
     /// Fills the columns of a place, and returns their number.

@@ -15,7 +15,7 @@ use axlewire::{
     ikeya::{NodeId, ReadRequest},
     ucp::{Body, message::Ping},
 };
-use support::{axle, file, pcapng::PcapNg};
+use support::{axle, bytes, file, pcapng::PcapNg};
 
 /// Total number of bytes fed in.
 const FED: usize = 200 * 1024 * 1024;
@@ -91,6 +91,42 @@ fn memory_does_not_grow_with_the_packets_of_a_capture() {
             reader.join().unwrap().unwrap();
             assert!(peak < PEAK_LIMIT_KIB, "{what}, {args:?}: the tool held {peak} KiB");
         }
+    }
+}
+
+/// Limit while rows are collected for a file: those of a table with 64 Ki rows, and more of others.
+const EXPORT_LIMIT_KIB: usize = 48 * 1024;
+
+#[test]
+fn an_export_holds_a_batch_of_rows_at_most() {
+    let mut forms = vec!["jsonl", "csv"];
+    forms.extend(cfg!(feature = "mcap").then_some("mcap"));
+    forms.extend(cfg!(feature = "parquet").then_some("parquet"));
+    let report = bytes(
+        "fdff2800050000000000000000000000000000000000000000000000000000000000000000000000\
+         2600d16a",
+    );
+    let block = [&report[..], Ping {}.frame(0).as_bytes(), &[0; 3]].concat().repeat(1000);
+    for form in forms {
+        let path = file(&format!("long.{form}"), &[]);
+        fs::remove_file(&path).unwrap();
+        let to = path.to_str().unwrap();
+        let mut child = start(&["export", "-P", "ucp", "-", "-o", to]);
+        let mut stdin = child.stdin.take().unwrap();
+        // Twice as much at the end as in the middle.
+        let mut peaks = Vec::new();
+        for _ in 0..2 {
+            for _ in 0..300 {
+                stdin.write_all(&block).unwrap();
+            }
+            peaks.push(peak(&child).unwrap());
+        }
+        drop(stdin);
+        assert!(child.wait().unwrap().success());
+        assert!(peaks[1] < EXPORT_LIMIT_KIB, "{form}: the tool held {peaks:?} KiB");
+        assert!(peaks[1] < peaks[0] + 2048, "{form}: {peaks:?} KiB");
+        let remove = if path.is_dir() { fs::remove_dir_all } else { fs::remove_file };
+        remove(path).unwrap();
     }
 }
 

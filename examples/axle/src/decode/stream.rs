@@ -40,6 +40,7 @@ pub(crate) struct Sheet {
 
 /// What a line of a sheet is about.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "mcap"), expect(dead_code, reason = "only MCAP has topics"))]
 pub(crate) struct Mark {
     /// Where the line ends in [`Sheet::out`].
     pub(crate) end: usize,

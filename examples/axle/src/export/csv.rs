@@ -118,6 +118,12 @@ fn print(out: &mut Out, cell: Cell<'_>) {
         // Writing to memory does not fail.
         Cell::Float(value) => drop(serde_json::to_writer(&mut out.0, &value)),
         Cell::Time(micros) => crate::listing::seconds(out, micros),
-        Cell::Text(text) => out.text(text),
+        Cell::Name(name) => out.text(name),
+        Cell::Bytes(bytes) => {
+            let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 0x0F]);
+            out.0.extend(
+                digits.map(|digit| b"0123456789abcdef".get(usize::from(digit)).unwrap_or(&0)),
+            );
+        }
     }
 }

@@ -8,16 +8,23 @@ use std::{
     sync::Arc,
 };
 
+use bytes::Bytes;
 use parquet::{
     basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physical},
+    column::{
+        page::{CompressedPage, Page, PageWriter},
+        writer::ColumnCloseResult,
+    },
     data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type},
     errors::ParquetError,
     file::{
-        metadata::KeyValue,
+        metadata::{ColumnChunkMetaData, KeyValue},
         properties::{EnabledStatistics, WriterProperties, WriterVersion},
-        writer::{SerializedColumnWriter, SerializedFileWriter},
+        writer::{
+            SerializedColumnWriter, SerializedFileWriter, SerializedPageWriter, TrackedWrite,
+        },
     },
-    schema::types::{ColumnPath, Type as Field},
+    schema::types::{ColumnDescPtr, ColumnPath, Type as Field},
 };
 
 use super::{
@@ -106,7 +113,8 @@ fn field(column: &Column) -> Result<Field, ParquetError> {
         Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
         Type::F32 => (Physical::FLOAT, None),
         Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
-        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Name(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Bytes => (Physical::BYTE_ARRAY, None),
     };
     let repetition = match column.present {
         Some(_) => Repetition::OPTIONAL,
@@ -120,8 +128,14 @@ fn field(column: &Column) -> Result<Field, ParquetError> {
 
 /// Writes the rows as one row group.
 fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), ParquetError> {
+    let descriptions = file.schema_descr().columns().to_vec();
     let mut group = file.next_row_group()?;
-    for column in &table.columns {
+    for (column, description) in table.columns.iter().zip(descriptions) {
+        if let (Values::Bytes(ends, all), None) = (&column.values, &column.present) {
+            let (pages, close) = bytes(description, ends, all)?;
+            group.append_column(&pages, close)?;
+            continue;
+        }
         let Some(mut to) = group.next_column()? else { break };
         let names = match &column.kind {
             Type::Name(names) => names.iter().map(|name| ByteArray::from(*name)).collect(),
@@ -138,6 +152,9 @@ fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), Par
 
 /// Rows that are converted at once: their values stay in a processor's own cache.
 const PIECE: usize = 2048;
+
+/// Values of a page of bytes.
+const PAGE: usize = 16 * 1024;
 
 /// Some rows of a column.
 struct Piece {
@@ -186,25 +203,8 @@ fn write(
             let values: Vec<_> = part(values, range).iter().map(name).collect();
             put::<ByteArrayType>(to, &values, piece)
         }
-        Values::Text(ends, all) => {
-            let before = range.start.checked_sub(1).and_then(|at| ends.get(at));
-            let first = before.map_or(0, |end| *end as usize);
-            let ends = part(ends, range);
-            let last = ends.last().map_or(first, |end| *end as usize);
-            // One buffer for all of them.
-            let all = ByteArray::from(all.get(first..last).unwrap_or_default());
-            let mut begin = 0;
-            let values: Vec<_> = ends
-                .iter()
-                .map(|end| {
-                    let end = *end as usize - first;
-                    let text = all.slice(begin, end - begin);
-                    begin = end;
-                    text
-                })
-                .collect();
-            put::<ByteArrayType>(to, &values, piece)
-        }
+        // Those without nulls have gone to `bytes`, and the schema has no others.
+        Values::Bytes(..) => Err(ParquetError::General("a column of bytes has nulls".to_owned())),
     }
 }
 
@@ -219,4 +219,52 @@ fn put<T: DataType>(
 ) -> Result<(), ParquetError> {
     to.typed::<T>().write_batch(values, piece.levels.as_deref(), None)?;
     Ok(())
+}
+
+/// A column of bytes, encoded as pages. The writer of the crate takes a reference-counted buffer
+/// per value, and counting takes longer than all the rest. Here all columns of bytes are required,
+/// so that a page has the values alone.
+fn bytes(
+    description: ColumnDescPtr,
+    ends: &[u32],
+    all: &[u8],
+) -> Result<(Bytes, ColumnCloseResult), ParquetError> {
+    let mut pages = TrackedWrite::new(Vec::with_capacity(all.len() + 5 * ends.len()));
+    let (mut begin, mut total) = (0, 0);
+    for ends in ends.chunks(PAGE) {
+        let mut page = Vec::with_capacity(all.len() / 4);
+        for end in ends {
+            let value = all.get(begin as usize..*end as usize).unwrap_or_default();
+            page.extend_from_slice(&(*end - begin).to_le_bytes());
+            page.extend_from_slice(value);
+            begin = *end;
+        }
+        let len = page.len();
+        let page = Page::DataPage {
+            buf: page.into(),
+            num_values: ends.len() as u32,
+            encoding: Encoding::PLAIN,
+            def_level_encoding: Encoding::RLE,
+            rep_level_encoding: Encoding::RLE,
+            statistics: None,
+        };
+        let page = CompressedPage::new(page, len);
+        total += SerializedPageWriter::new(&mut pages).write_page(page)?.bytes_written;
+    }
+    let metadata = ColumnChunkMetaData::builder(description)
+        .set_encodings(vec![Encoding::PLAIN, Encoding::RLE])
+        .set_num_values(ends.len() as i64)
+        .set_total_compressed_size(total as i64)
+        .set_total_uncompressed_size(total as i64)
+        .set_data_page_offset(0)
+        .build()?;
+    let close = ColumnCloseResult {
+        bytes_written: total,
+        rows_written: ends.len() as u64,
+        metadata,
+        bloom_filter: None,
+        column_index: None,
+        offset_index: None,
+    };
+    Ok((pages.into_inner()?.into(), close))
 }

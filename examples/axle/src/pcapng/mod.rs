@@ -16,7 +16,7 @@ mod write;
 
 pub(crate) use background::Background;
 pub(crate) use read::{Packet, Reader};
-pub(crate) use recording::Recording;
+pub(crate) use recording::{Recording, Stamp};
 pub(crate) use write::Writer;
 
 use crate::args::Protocol;

@@ -22,19 +22,19 @@ pub(crate) struct Recording {
 
 /// The time on a clock that never goes backwards: the system's may be set while we record.
 #[derive(Clone, Copy)]
-pub(super) struct Stamp {
+pub(crate) struct Stamp {
     start: Instant,
     /// The same moment on the system's clock.
     is_then: SystemTime,
 }
 
 impl Stamp {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { start: Instant::now(), is_then: SystemTime::now() }
     }
 
     /// Microseconds since 1970.
-    pub(super) fn micros(self) -> u64 {
+    pub(crate) fn micros(self) -> u64 {
         let time = self.is_then + self.start.elapsed();
         time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
     }

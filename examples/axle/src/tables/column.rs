@@ -24,8 +24,8 @@ pub(crate) enum Values {
     Float(Vec<f32>),
     /// Places in the list of names.
     Name(Vec<u8>),
-    /// The end of each text, and all texts in one.
-    Text(Vec<u32>, String),
+    /// The end of each run of bytes, and all runs in one.
+    Bytes(Vec<u32>, Vec<u8>),
 }
 
 /// One value.
@@ -36,8 +36,9 @@ pub(crate) enum Cell<'a> {
     Float(f32),
     /// Microseconds since 1970.
     Time(u64),
-    /// A name or hex digits.
-    Text(&'a str),
+    Name(&'a str),
+    /// Hex digits in JSON.
+    Bytes(&'a [u8]),
 }
 
 impl Column {
@@ -47,7 +48,7 @@ impl Column {
             Type::U64 | Type::Time => Values::Large(Vec::new()),
             Type::F32 => Values::Float(Vec::new()),
             Type::Name(_) => Values::Name(Vec::new()),
-            Type::Text => Values::Text(Vec::new(), String::new()),
+            Type::Bytes => Values::Bytes(Vec::new(), Vec::new()),
         };
         let present = is_optional.then(Vec::new);
         Self { name, kind, unit, values, present }
@@ -77,12 +78,12 @@ impl Column {
             (Values::Large(values), _) => Cell::Unsigned(*values.get(at)?),
             (Values::Float(values), _) => Cell::Float(*values.get(at)?),
             (Values::Name(values), Type::Name(names)) => {
-                Cell::Text(names.get(usize::from(*values.get(at)?))?)
+                Cell::Name(names.get(usize::from(*values.get(at)?))?)
             }
             (Values::Name(_), _) => return None,
-            (Values::Text(ends, text), _) => {
+            (Values::Bytes(ends, bytes), _) => {
                 let begin = at.checked_sub(1).and_then(|before| ends.get(before)).unwrap_or(&0);
-                Cell::Text(text.get(*begin as usize..*ends.get(at)? as usize)?)
+                Cell::Bytes(bytes.get(*begin as usize..*ends.get(at)? as usize)?)
             }
         })
     }
@@ -94,9 +95,9 @@ impl Column {
             Values::Large(values) => values.clear(),
             Values::Float(values) => values.clear(),
             Values::Name(values) => values.clear(),
-            Values::Text(ends, text) => {
+            Values::Bytes(ends, bytes) => {
                 ends.clear();
-                text.clear();
+                bytes.clear();
             }
         }
     }
@@ -145,14 +146,26 @@ impl Column {
         Ok(())
     }
 
+    #[inline]
+    pub(super) fn bytes(&mut self, value: &[u8]) -> Result<(), Unfit> {
+        self.is_present();
+        let Values::Bytes(ends, bytes) = &mut self.values else { return Err(Unfit) };
+        bytes.extend_from_slice(value);
+        ends.push(u32::try_from(bytes.len()).map_err(|_| Unfit)?);
+        Ok(())
+    }
+
     /// A name, hex digits, or a speed that JSON has no number for.
     #[inline]
     pub(super) fn text(&mut self, value: &str) -> Result<(), Unfit> {
         self.is_present();
         match (&mut self.values, &self.kind) {
-            (Values::Text(ends, text), _) => {
-                text.push_str(value);
-                ends.push(u32::try_from(text.len()).map_err(|_| Unfit)?);
+            (Values::Bytes(ends, bytes), _) => {
+                for pair in value.as_bytes().chunks(2) {
+                    let [high, low] = pair else { return Err(Unfit) };
+                    bytes.push(digit(*high)? << 4 | digit(*low)?);
+                }
+                ends.push(u32::try_from(bytes.len()).map_err(|_| Unfit)?);
             }
             (Values::Name(values), Type::Name(names)) => {
                 let place = names.iter().position(|name| *name == value).ok_or(Unfit)?;
@@ -177,7 +190,17 @@ impl Values {
             Self::Large(values) => values.len(),
             Self::Float(values) => values.len(),
             Self::Name(values) => values.len(),
-            Self::Text(ends, _) => ends.len(),
+            Self::Bytes(ends, _) => ends.len(),
         }
+    }
+}
+
+/// The value of a lower-case hex digit.
+#[inline]
+const fn digit(digit: u8) -> Result<u8, Unfit> {
+    match digit {
+        b'0'..=b'9' => Ok(digit - b'0'),
+        b'a'..=b'f' => Ok(digit - b'a' + 10),
+        _ => Err(Unfit),
     }
 }

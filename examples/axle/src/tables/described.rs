@@ -33,8 +33,8 @@ pub(crate) enum Type {
     Time,
     /// One of these.
     Name(Vec<&'static str>),
-    /// Hex digits.
-    Text,
+    /// Hex digits in JSON.
+    Bytes,
 }
 
 /// A field of a message, as in a line of `decode --json`.
@@ -78,7 +78,7 @@ impl Type {
             Self::F32 => "f32",
             Self::Time => "time",
             Self::Name(_) => "name",
-            Self::Text => "hex",
+            Self::Bytes => "bytes",
         }
     }
 }
@@ -91,7 +91,7 @@ pub(crate) fn json_schema(protocol: Option<Protocol>, message: &str) -> Option<S
 
     let value = |of: &Type| match of {
         Type::F32 | Type::Time => json!({"type": "number"}),
-        Type::Name(_) | Type::Text => json!({"type": "string"}),
+        Type::Name(_) | Type::Bytes => json!({"type": "string"}),
         _ => json!({"type": "integer"}),
     };
     let described =
@@ -270,7 +270,7 @@ impl Schema<'static> {
         let shape = match shape.reference {
             Some("#/$defs/time") => return Some(Kind::One(Type::Time)),
             Some("#/$defs/rps") => return Some(Kind::One(Type::F32)),
-            Some("#/$defs/hex") => return Some(Kind::One(Type::Text)),
+            Some("#/$defs/hex") => return Some(Kind::One(Type::Bytes)),
             Some(reference) => self.definition(reference)?,
             None => shape,
         };

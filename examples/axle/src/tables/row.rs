@@ -19,6 +19,8 @@ pub(super) struct Slot {
     pub(super) first: usize,
     /// Number of its columns; 0 for a field that is the same in the whole table.
     pub(super) width: usize,
+    /// Whether it is the whole frame, which is at hand without hex digits.
+    pub(super) is_whole: bool,
 }
 
 /// A frame does not fit the columns: its fields are not those of the schema.
@@ -47,6 +49,8 @@ pub(super) struct Row<'a> {
     /// Those that have not come yet.
     pub(super) slots: &'a [Slot],
     pub(super) columns: &'a mut [Column],
+    /// The bytes of the frame.
+    pub(super) whole: &'a [u8],
     /// The mode of the node, which is told behind the fields of the frame.
     pub(super) mode: Option<Mode>,
 }
@@ -85,8 +89,10 @@ impl SerializeMap for Row<'_> {
             let (slot, rest) = self.slots.split_first().ok_or(Unfit)?;
             self.slots = rest;
             if key.serialize(IsName(slot.name))? {
+                let whole = self.whole;
                 return match slot.width {
                     0 => Ok(()),
+                    _ if slot.is_whole => Cells(self.columns_of(slot)?).one()?.bytes(whole),
                     _ => value.serialize(Cells(self.columns_of(slot)?)),
                 };
             }

@@ -42,7 +42,10 @@ fn line(table: &Table, row: usize) -> Value {
             }
             Some(Cell::Float(value)) => json!(value.to_string().to_lowercase()),
             Some(Cell::Time(value)) => json!(value as f64 / 1e6),
-            Some(Cell::Text(value)) => json!(value),
+            Some(Cell::Name(value)) => json!(value),
+            Some(Cell::Bytes(value)) => {
+                json!(value.iter().map(|byte| format!("{byte:02x}")).collect::<String>())
+            }
         };
         match column.name.split_once("reasons_") {
             Some((_, name)) => line.entry("reasons").or_insert(json!({}))[name] = value,

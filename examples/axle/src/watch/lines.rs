@@ -8,7 +8,7 @@ use axlewire::{
     time::Duration,
 };
 
-use super::{Watched, recorder::Recorder};
+use super::{Watched, recorder::Recorder, udp::Udp};
 use crate::{
     decode::BUFFER_LEN,
     failure::Failure,
@@ -27,6 +27,7 @@ where
 {
     let signals = Signals::listen()?;
     let mut line = Line::connect(watched.port, watched.baud)?;
+    let mut udp = Udp::new(watched)?;
     let mut recorder = Recorder::<F>::new(watched)?;
     let mut clock = line.clock();
     let mut buffer = [0; 4096];
@@ -58,6 +59,7 @@ where
             recorder.drop_it();
             lost = Err(failure);
         }
+        udp.take(received);
         table.take(&mut decoder, received);
         if now >= print_at {
             print_at = now + PRINT_PERIOD;
@@ -71,6 +73,7 @@ where
         }
     };
     let recorded = recorder.finish();
+    let sent = udp.finish();
     let (counters, now) = (decoder.counters(), clock.now());
     let told = if watched.args.json {
         table.measure_all(now);
@@ -80,5 +83,5 @@ where
     };
     told.map_err(Failure::Write)?;
     broken?;
-    lost.and(recorded)
+    lost.and(recorded).and(sent)
 }

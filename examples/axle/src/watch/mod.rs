@@ -18,6 +18,7 @@ mod page;
 mod recorder;
 #[cfg(all(unix, feature = "dashboard"))]
 mod screen;
+mod udp;
 
 use std::path::PathBuf;
 
@@ -80,6 +81,11 @@ pub(crate) struct Args {
     /// option, r records to a file of its own name
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
     record: Option<PathBuf>,
+
+    /// Send each frame and gap to this host, as a datagram with the object of axle decode --json;
+    /// for PlotJuggler: UDP server, JSON, timestamp t
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "file")]
+    udp: Option<String>,
 }
 
 /// What is watched.

@@ -12,6 +12,7 @@ use super::{
     page::View,
     recorder::Recorder,
     screen::{self, Sink},
+    udp::Udp,
 };
 use crate::{
     failure::Failure,
@@ -31,6 +32,7 @@ where
     // All of them: none may end the tool with the page still on the terminal.
     let signals = Signals::listen_to_all()?;
     let mut line = Line::connect(watched.port, watched.baud)?;
+    let udp = Udp::new(watched)?;
     let recorder = Recorder::<F>::new(watched)?;
     let mut clock = line.clock();
     let start = clock.now();
@@ -43,11 +45,12 @@ where
         ..View::default()
     };
     let dashboard = Dashboard::open(feed, view, Sink::default())?;
-    let mut watch = Watch { watched, dashboard, recorder, start, failed: None };
+    let mut watch = Watch { watched, dashboard, recorder, udp, start, failed: None };
     watch.show_recording();
     let broken = watch.run(&mut line, &mut clock, &signals);
 
     let recorded = watch.recorder.finish();
+    let sent = watch.udp.finish();
     let feed = watch.dashboard.leave();
     let counters = feed.counters();
     let mut out = io::stdout().lock();
@@ -55,7 +58,7 @@ where
         table.finish(&mut out, &counters, clock.now()).map_err(Failure::Write)?;
     }
     broken?;
-    watch.failed.map_or(recorded, Err)
+    watch.failed.map_or(recorded, Err).and(sent)
 }
 
 /// Suspends the tool until the terminal listens to it again: not yet after `bg`. Returns `false` if
@@ -80,6 +83,7 @@ struct Watch<'a, F> {
     watched: &'a Watched<'a>,
     dashboard: Dashboard<F>,
     recorder: Recorder<F>,
+    udp: Udp,
     start: Instant,
     /// Why a recording has failed.
     failed: Option<Failure>,
@@ -108,6 +112,7 @@ where
             }
             let received = line.receive(&mut buffer, PATIENCE)?;
             let now = clock.now().as_micros();
+            self.udp.take(received);
             self.dashboard.feed.take(Source::Received, received, now);
             if let Err(failure) = self.recorder.take(received) {
                 self.give_up_recording(failure, now);

@@ -1,6 +1,9 @@
 //! `axle watch`: shows the traffic on a line, without sending anything.
 
-use std::time::{Duration, Instant};
+use std::{
+    net::UdpSocket,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
 
 use serde_json::Value;
 
@@ -170,5 +173,109 @@ fn plain_lines_and_json_are_lines_on_a_terminal_too() {
             watch.row(expected);
             assert!(!watch.has_had_page(), "{option} shows the page");
         }
+    });
+}
+
+/// A line of JSON without its place: sender and recording begin at different moments.
+fn contents(line: &str) -> Value {
+    let mut line: Value = serde_json::from_str(line).unwrap();
+    let fields = line.as_object_mut().unwrap();
+    for place in ["offset", "t", "interface", "direction"] {
+        fields.remove(place);
+    }
+    line
+}
+
+#[test]
+fn watch_sends_what_decode_says_of_the_recording() {
+    undisturbed(|| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
+        let to = socket.local_addr().unwrap();
+        let path = std::env::temp_dir().join(format!("axle-udp-{}.pcapng", std::process::id()));
+        let (_sim, port) = sim("ucp --noise 0.001");
+        let from = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs_f64();
+        let args = format!("watch -p {port} -P ucp --plain --for 1 --udp {to} --record");
+        let watch = Process::start(&format!("{args} {}", path.display()));
+        let (mut sent, mut buffer) = (vec![], [0; 4096]);
+        while let Ok(len) = socket.recv(&mut buffer) {
+            sent.push(String::from_utf8(buffer[..len].to_vec()).unwrap());
+        }
+        watch.success();
+        let listing = stdout(axle(&["decode", "--json", path.to_str().unwrap()]).output().unwrap());
+        std::fs::remove_file(path).unwrap();
+        let mut said: Vec<_> = listing.lines().map(contents).collect();
+        assert_eq!(said.pop().unwrap()["event"], "summary");
+        assert!(said.len() > 30, "{said:?}");
+        let of_sent: Vec<_> = sent.iter().map(|line| contents(line)).collect();
+        // A pause ends a gap when watched; a recording does not know how long it was.
+        let frames = |of: &[Value]| -> Vec<Value> {
+            of.iter().filter(|line| line["event"] == "frame").cloned().collect()
+        };
+        assert_eq!(frames(&of_sent), frames(&said));
+        let skipped = |of: &[Value]| -> u64 {
+            let gaps = of.iter().filter(|line| line["event"] == "skipped");
+            gaps.map(|gap| gap["length"].as_u64().unwrap()).sum()
+        };
+        assert_eq!(skipped(&of_sent), skipped(&said));
+        let times = sent.iter().map(|line| {
+            let line: Value = serde_json::from_str(line).unwrap();
+            line["t"].as_f64().unwrap() - from
+        });
+        assert!(times.clone().is_sorted() && times.clone().all(|t| (0.0..20.0).contains(&t)));
+    });
+}
+
+#[test]
+fn watch_goes_on_although_nobody_listens_to_its_datagrams() {
+    undisturbed(|| {
+        let unheard = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let (_sim, port) = sim("ucp");
+        let args = format!("watch -p {port} -P ucp --json --for 0.6 --udp {unheard}");
+        let summary: Value =
+            serde_json::from_str(Process::start(&args).success().last().unwrap()).unwrap();
+        assert!(summary["frames"].as_u64().unwrap() > 10, "{summary}");
+        let kept = UdpSocket::bind("127.0.0.1:0").unwrap();
+        // And although nobody takes them.
+        let args =
+            format!("watch -p {port} -P ucp --json --for 0.6 --udp {}", kept.local_addr().unwrap());
+        let summary: Value =
+            serde_json::from_str(Process::start(&args).success().last().unwrap()).unwrap();
+        assert!(summary["frames"].as_u64().unwrap() > 10, "{summary}");
+    });
+}
+
+#[test]
+fn a_host_that_cannot_be_found_is_told_before_the_watch_begins() {
+    let line = parrot(&[]);
+    for host in ["host.invalid:9870", "127.0.0.1", "127.0.0.1:port"] {
+        let args = ["watch", "-p", &line.path, "-P", "ucp", "--plain", "--udp", host];
+        let output = run(&args, &[]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.lines().count()), (Some(1), 1), "{said}");
+        assert!(said.starts_with(&format!("axle: cannot send to {host:?}: ")), "{said}");
+        assert!(output.stdout.is_empty());
+    }
+    let output = run(&["watch", "-", "-P", "ucp", "--udp", "127.0.0.1:9870"], &[]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn the_page_sends_datagrams_too() {
+    undisturbed(|| {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+        let (_sim, port) = sim("ucp");
+        let to = socket.local_addr().unwrap();
+        let args = format!("watch --port {port} --protocol ucp --for 1 --udp {to}");
+        let mut watch = Terminal::start(&args, (80, 24));
+        let mut buffer = [0; 4096];
+        for _ in 0..10 {
+            let len = socket.recv(&mut buffer).unwrap();
+            let line: Value = serde_json::from_slice(&buffer[..len]).unwrap();
+            assert!(line["event"] == "frame" && line["t"].as_f64().unwrap() > 1e9, "{line}");
+        }
+        assert_eq!(watch.code(), Some(0));
+        assert!(watch.has_had_page());
     });
 }

@@ -20,6 +20,7 @@ fn a_second_recording_is_another_file() {
     let named = std::env::temp_dir().join(format!("axle-second-{}.pcapng", std::process::id()));
     let (port, protocol, baud) = ("port", Protocol::Ucp, 115_200);
     let args = Args {
+        udp: None,
         from: From { port: Some(port.to_owned()), file: None },
         baud: None,
         protocol: Some(protocol),
