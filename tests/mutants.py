@@ -54,9 +54,9 @@ MOST_LEFT, NOT_TRIED = 40, "(not tried)"
 # Fewer words are no reason.
 LEAST_WORDS = 3
 
-# Files, and the tests that concern them most; the first match counts.
 # The features of the tool that bring libraries along.
 FORMATS = "--features mcap,parquet,plot"
+# Files, and the tests that concern them most; the first match counts.
 CONCERNED = [
     ("src/crc16/*", "--lib --test crc16 --test vectors"),
     ("src/ikeya/master/*", "--lib --test ikeya_roles --test drivers --test motion"),
