@@ -54,6 +54,8 @@ MOST_LEFT, NOT_TRIED = 40, "(not tried)"
 # Fewer words are no reason.
 LEAST_WORDS = 3
 
+# The features of the tool that bring libraries along.
+FORMATS = "--features mcap,parquet,plot"
 # Files, and the tests that concern them most; the first match counts.
 CONCERNED = [
     ("src/crc16/*", "--lib --test crc16 --test vectors"),
@@ -90,6 +92,11 @@ CONCERNED = [
     ("examples/axle/src/sim/*", "--bins --test ports rover"),
     ("examples/axle/src/play/*", "--bins --test ports replay"),
     ("examples/axle/src/watch/*", "--bins --test ports page"),
+    ("examples/axle/src/export/*", f"{FORMATS} --bins --test export"),
+    ("examples/axle/src/tables*", f"{FORMATS} --bins --test export"),
+    ("examples/axle/src/beside.rs", f"{FORMATS} --bins --test export"),
+    ("examples/axle/src/plot/*", f"{FORMATS} --bins --test plot"),
+    ("examples/axle/src/extcap/*", "--bins --test ports extcap"),
     ("examples/axle/src/*", "--bins"),
     ("examples/firmware/src/*", "--test firmware"),
 ]
@@ -106,10 +113,10 @@ FOLDERS = ("src", "examples/axle/src", "examples/firmware/src")
 ALL = {
     "axlewire": "--lib --tests --features tokio",
     # Those that `--tests` leaves out, too.
-    "axle": "--bins --test *",
+    "axle": f"{FORMATS} --bins --test *",
     FIRMWARE: "--test firmware",
 }
-UNIT_TESTS = {"axlewire": ALL["axlewire"], "axle": "--tests"}
+UNIT_TESTS = {"axlewire": ALL["axlewire"], "axle": f"{FORMATS} --tests"}
 
 
 class Mutant:
