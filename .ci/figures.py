@@ -16,6 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = {
     "ratios": "benches/ratios.txt", "printing": "benches/printing.txt", "tool": "benches/tool.txt",
+    "export": "benches/export.txt",
     "counts": "benches/instructions.txt", "m4": "examples/firmware/figures.txt",
     "costs": "examples/firmware/costs.txt",
 }
@@ -166,6 +167,10 @@ def tables(records):
              "tool_two_processes_over_one_json", "tool_summary_gb_per_s", "tool_peak_memory_mb"]
     yield doc, "| figure | UCP |", [
         [f"`{n}`", *(fixed(tool[f"{n}_{p}"], 1 if "memory" in n else 2) for p in ("ucp", "ikeya")), None] for n in shown]
+    export = records["export"]
+    yield doc, "| export | UCP |", [
+        [f"`{n}`", *(export[f"{n}_{p}"] for p in ("ucp", "ikeya")), goals]
+        for n, goals in [("export_parquet_mb_per_s", "150 and 60"), ("export_parquet_peak_memory_mb", "")]]
     yield doc, "| | 6 bytes |", [
         [title, *(fixed(ratios[f"crc{n}_over_{name}"]) for n in (6, 42))] for title, name in CRATES.items()]
     hostile = [n for n in ratios if n.startswith("hostile_") and n.endswith("_over_c") and "worst" not in n]

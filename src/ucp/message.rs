@@ -218,7 +218,8 @@ mod tests {
 
     #[test]
     fn messages_of_an_id_need_different_lengths_that_can_be_sent() {
-        assert!(are_distinct(&[]) && are_distinct(&[&[0]]));
+        assert!(are_distinct(&[]));
+        assert!(are_distinct(&[&[0]]));
         assert!(are_distinct(&[&[0], &[1], &[36, 34], &[MAX_BODY_LEN]]));
         assert!(!are_distinct(&[&[0], &[0]]));
         assert!(!are_distinct(&[&[1], &[36, 34], &[7, 36]]));

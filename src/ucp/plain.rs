@@ -138,6 +138,8 @@ mod tests {
         for key in ["event", "offset", "t", "interface", "direction"] {
             assert!(!is_free(key), "{key}");
         }
-        assert!(is_free("err") && is_free("acc_bias") && is_free("time"));
+        for key in ["err", "acc_bias", "time"] {
+            assert!(is_free(key), "{key}");
+        }
     }
 }
