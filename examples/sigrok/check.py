@@ -44,7 +44,9 @@ def main():
     if not Path(sys.argv[1]).is_file():
         sys.exit("check.py: no such program: " + sys.argv[1])
     if not shutil.which("sigrok-cli"):
-        sys.exit("sigrok-cli is missing: install the Debian packages sigrok-cli and libsigrokdecode4")
+        print("sigrok-cli is missing: install the Debian packages sigrok-cli and libsigrokdecode4",
+              file=sys.stderr)
+        sys.exit(3)
     with tempfile.TemporaryDirectory(prefix="axle-sigrok-") as scratch:
         cases = Cases(Path(sys.argv[1]).resolve(), Path(scratch))
         decoders = copied(Path(scratch) / "decoders")
