@@ -254,12 +254,14 @@ def recording(path, out, begin, end):
     times = [(seconds, len(chunk) * BITS / baud) for seconds, _, chunk in chosen]
     lead = max([0.002] + [duration - seconds + 2 * BITS / baud for seconds, duration in times])
     lines, free = {True: Line(baud), False: Line(baud)}, {True: 0.0, False: 0.0}
-    for (seconds, is_sent, chunk), (_, duration) in zip(chosen, times):
-        at = max(seconds + lead - duration, free[is_sent])
-        free[is_sent] = at + duration
-        # The bytes may take longer than the time in which a program gave or got them.
-        if free[is_sent] > MOST_SECONDS + 1:
-            raise Unusable(TOO_LONG)
+    begins = []
+    for (seconds, is_sent, _), (_, duration) in zip(chosen, times):
+        begins.append(max(seconds + lead - duration, free[is_sent]))
+        free[is_sent] = begins[-1] + duration
+    # The bytes may take longer than the time in which a program gave or got them.
+    if max(free.values()) > MOST_SECONDS + 1:
+        raise Unusable(TOO_LONG)
+    for (_, is_sent, chunk), at in zip(chosen, begins):
         lines[is_sent].send(chunk, at * SAMPLE_RATE)
     if not any(line.places for line in lines.values()):
         raise Unusable("nothing is in this part")
