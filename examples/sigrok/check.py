@@ -27,6 +27,8 @@ from make import micros, read, sealed, ucp
 
 HERE = Path(__file__).resolve().parent
 DECODERS = ("axle_ikeya", "axle_ucp")
+# By their names: an annotation whose class is in no row is then missing.
+ROW_NAMES = "bytes:packets:values:gaps:responses:warnings"
 
 Note = collections.namedtuple("Note", "kind ss es texts")
 
@@ -44,7 +46,9 @@ def main():
     if not Path(sys.argv[1]).is_file():
         sys.exit("check.py: no such program: " + sys.argv[1])
     if not shutil.which("sigrok-cli"):
-        sys.exit("sigrok-cli is missing: install the Debian packages sigrok-cli and libsigrokdecode4")
+        print("sigrok-cli is missing: install the Debian packages sigrok-cli and libsigrokdecode4",
+              file=sys.stderr)
+        sys.exit(3)
     with tempfile.TemporaryDirectory(prefix="axle-sigrok-") as scratch:
         cases = Cases(Path(sys.argv[1]).resolve(), Path(scratch))
         decoders = copied(Path(scratch) / "decoders")
@@ -62,10 +66,11 @@ def main():
 
 
 def copied(target):
-    """The decoders alone in a folder, as a user installs them."""
+    """The decoders alone in a folder, as a user installs them, and make.py beside it."""
     shutil.rmtree(target, ignore_errors=True)
     for name in DECODERS:
         shutil.copytree(HERE / name, target / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(HERE / "make.py", target.parent)
     return target
 
 
@@ -108,7 +113,8 @@ class Capture:
         wires = ":".join("%s=%s" % pair for pair in [("rx", "RX"), ("tx", "TX")][:self.wires])
         stack = "uart:%s:baudrate=%d,%s%s" % (wires, self.baud, name, self.options)
         status, out, err = run_sigrok(decoders, "-l", "4", "-i", str(self.path), "-P", stack,
-                                      "-A", name, "--protocol-decoder-samplenum")
+                                      "-A", "%s=%s" % (name, ROW_NAMES),
+                                      "--protocol-decoder-samplenum")
         said = re.search("^srd: .*(?:Error|[Ff]ail).*$", err, re.MULTILINE)
         if status or said:
             said = said.group() if said else "exit status %d" % status
@@ -119,6 +125,8 @@ class Capture:
             if not head:
                 raise Wrong("%s: not a line of sigrok-cli: %s" % (self.path.stem, line))
             ss, es, kind, texts = head.groups()
+            if int(es) <= int(ss):
+                raise Wrong("%s: nothing of it can be seen: %s" % (self.path.stem, line))
             notes.append(Note(kind, int(ss), int(es), texts[1:-1].split('" "')))
         return notes
 
@@ -129,12 +137,13 @@ class Cases:
     def __init__(self, axle, scratch):
         self.axle, self.scratch = axle, scratch
         # The short ones first: a planted damage is then found sooner.
-        self.all = [("both", self.loads), ("both", self.alone), ("both", self.ends)]
-        self.all += [("ikeya", case) for case in (
-            self.hazards("ikeya"), self.broken(), self.silence(), self.never(),
-            *(self.times(count) for count in (1, 2)))]
+        self.all = [("ikeya", case) for case in (
+            self.hazards("ikeya"), self.texts("ikeya"), self.broken(), self.silence(), self.never(),
+            *(self.times(count) for count in (1, 2)), *self.exchanges())]
         self.all += [("ucp", case) for case in (
-            self.hazards("ucp"), self.wires(), self.rover_times())]
+            self.hazards("ucp"), self.texts("ucp"), self.wires(), self.rover_times())]
+        self.all += [("both", self.shown), ("both", self.ends), ("both", self.alone),
+                     ("both", self.loads), ("once", self.tools), ("make", self.recordings)]
         self.all += [("ikeya", self.recorded("motors", 0.0, 1.0)),
                      ("ucp", self.recorded("drive", 0.0, 0.5))]
         for name, protocol, data, options in streams():
@@ -142,9 +151,11 @@ class Cases:
             self.all.append(("ucp" if protocol == "ucp" else "ikeya", case))
 
     def of(self, name):
-        """The cases that a file of a decoder matters to."""
-        other = {"axle_ucp/pd.py": "ikeya", "axle_ikeya/pd.py": "ucp"}.get(name)
-        return [case for protocol, case in self.all if protocol != other]
+        """The cases that a file matters to."""
+        if name == MAKE:
+            return [case for group, case in self.all if group == "make"]
+        others = ("once", "make", {ROVER: "ikeya", NODE: "ucp"}.get(name))
+        return [case for group, case in self.all if group not in others]
 
     def capture(self, name, protocol, lines, options=""):
         return Capture(self.scratch / (name + ".sr"), protocol, lines, options)
@@ -204,6 +215,62 @@ class Cases:
         if "axle_ucp needs the folder axle_ikeya beside it" not in err:
             raise Wrong("axle_ucp alone does not say what it needs: %s" % err)
 
+    def shown(self, decoders, counts):
+        """The options with their values and defaults, and the classes of each row."""
+        for name, want in SHOWN.items():
+            _, out, _ = run_sigrok(decoders, "-P", name, "--show")
+            rows = out.partition("Annotation rows:")[2].partition("Binary")[0]
+            options = out.partition("\nOptions:")[2].partition("Documentation:")[0]
+            found = re.findall(r"^- (.*)$", rows, re.MULTILINE)
+            found += [" ".join(pair) for pair in
+                      re.findall(r"^- (\w+): .* (\([^()]*\))$", options, re.MULTILINE)]
+            differs("what %s shows" % name, found, want.strip().splitlines())
+
+    def tools(self, decoders, counts):
+        """Without sigrok-cli the exit code is 3."""
+        for command in ([sys.executable, HERE / "check.py", self.axle],
+                        [shutil.which("bash"), HERE / "check.sh"]):
+            tools = self.scratch / "tools"
+            tools.mkdir(exist_ok=True)
+            if not (tools / "dirname").exists():
+                (tools / "dirname").symlink_to(shutil.which("dirname"))
+            ran = subprocess.run(command, env={"PATH": str(tools)}, stderr=subprocess.PIPE)
+            if ran.returncode != 3 or not ran.stderr.startswith(b"sigrok-cli is missing"):
+                raise Wrong("%s: without sigrok-cli: %d, %r" %
+                            (command[1].name, ran.returncode, ran.stderr))
+
+    def recordings(self, decoders, counts):
+        """What make.py draws of recordings that are not as usual, and what it says."""
+        folder = self.scratch / "recordings"
+        for name, data, said, want in RECORDINGS:
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            source, out = folder / "in.pcapng", folder / "out.sr"
+            source.write_bytes(data)
+            # Files of the user.
+            for other in ("out.sr.part", "out.part"):
+                (folder / other).write_text("mine")
+            if said.startswith("/"):
+                out = Path(said.split(": ")[0])
+            command = [sys.executable, decoders.parent / "make.py", source, out]
+            # Enough for 20 s, and no more.
+            ran = subprocess.run(["bash", "-c", 'ulimit -v 2000000; exec "$@"', "-", *command],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=60)
+            line = "make.py: %s%s\n" % ("" if said.startswith("/") else "%s: " % source, said)
+            differs("%s: make.py says" % name, ran.stderr.decode()[-200:], line if said else "")
+            differs("%s: exit status" % name, ran.returncode, 0 if want else 1)
+            files = sorted(path.name for path in folder.iterdir())
+            differs("%s: files" % name, files, ["in.pcapng", "out.part"] +
+                    ["out.pvs", "out.sr"] * bool(want) + ["out.sr.part"])
+            if any((folder / other).read_text() != "mine" for other in ("out.sr.part", "out.part")):
+                raise Wrong("%s: a file of the user is overwritten" % name)
+            if want:
+                capture = Capture(out, "ikeya", [])
+                capture.wires = 2
+                found = [note.texts[0] for note in capture.notes(decoders)
+                         if ROWS.get(note.kind) in (None, "packets")]
+                differs(name, found, want)
+
     def ends(self, decoders, counts):
         """Newer versions of libsigrokdecode tell the end of a capture."""
         for protocol, data in (("ikeya", b"\xaa" + read(1) + b"\x55"),
@@ -240,52 +307,160 @@ class Cases:
             if count == 2 or time >= 0:
                 story.asks(read(node)).answers(sealed("55%02x" % node + speed.hex()), time)
                 story.says(judged(node, time))
-        story.asks(read(2)).asks(read(3)).says(("missing", None, "node 2: no answer"))
+        # Until the next request, or until the master's timeout.
+        story.asks(read(2)).lacks("node 2", 300).asks(read(3)).lacks("node 3", 500)
         # Nothing follows but silence.
-        story.says(("missing", None, "node 3: no answer"))
         return story.case(self, "times-%d" % count, "ikeya")
+
+    def exchanges(self):
+        """What is taken for an answer, for a strike and for an echo."""
+        story = Story(make.IKEYA_BAUD, 2)
+        story.asks(read(1)).answers(answer(2, 1.0), 20)
+        story.warns(8, "node 2 answers, node 1 was asked (I7)")
+        # It is still open: 20, 160 of the other answer, 20.
+        story.answers(answer(1, 1.0), 20).says(judged(1, 200))
+        # The other wire has long been silent.
+        story.pause(30_000).asks(read(1)).answers(answer(1, 1.0), 400).says(judged(1, 400))
+        # In two sets of three, late answers; those after the timeout count as strikes.
+        for time in (400, 600):
+            for _ in range(3):
+                story.asks(read(3)).answers(answer(3, 1.0), time).says(judged(3, time))
+        story.warns(8, STRUCK % 3)
+        # The next request begins before the last one has ended.
+        story.asks(read(4)).lacks("node 4", 0).answers(read(5), -60).lacks("node 5", 500)
+        yield story.case(self, "exchanges", "ikeya")
+
+        story = Story(make.IKEYA_BAUD, 2)
+        for number, time in enumerate((8, 11, 60, 99, 150, 299, 350, 700)):
+            story.asks(read(1 + number)).answers(answer(1 + number, 1.0), time)
+            story.says(judged(1 + number, time, 10, 100, 300))
+        story.asks(read(1)).lacks("node 1", 300).pause(400)
+        story.asks(read(2)).answers(answer(2, 1.0), 11).says(judged(2, 11, 10, 100, 300))
+        limits = ":turnaround_us=10:budget_us=100:timeout_us=300"
+        yield story.case(self, "limits", "ikeya", limits)
+
+        # Three motors: a WRITE is answered (I10).
+        story, speeds = Story(make.IKEYA_BAUD, 1), struct.pack("<3f", 1, 2, 3).hex()
+        for node, header in ((1, "bb"), (2, "aa"), (1, "bb")):
+            story.asks(sealed("%s%02x%s" % (header, node, speeds * (header == "bb"))))
+            story.answers(sealed("55%02x%s" % (node, speeds)), 30).says(judged(node, 30))
+        story.asks(sealed("bb03" + speeds)).lacks("node 3", 500)
+        yield story.case(self, "three-exchanges", "ikeya", ":boards=three")
+
+        # With one direction alone, no exchange is whole.
+        for direction in ("to-slave", "to-master"):
+            story = Story(make.IKEYA_BAUD, 1)
+            for _ in range(4):
+                story.asks(read(1)).answers(answer(1, 1.0), 30)
+            story.answers(sealed("560100000000"), 300)
+            if direction == "to-master":
+                story.warns(8, "node 1 answers in position mode, before in velocity mode: in doubt"
+                               " (I11)")
+            yield story.case(self, "half-" + direction, "ikeya", ":direction=" + direction)
+        yield self.echoes()
+
+    def echoes(self):
+        """A receiver that hears its own sender, on the wire or as a program has recorded it."""
+        story = Story(make.IKEYA_BAUD, 2)
+        write, wrong = sealed("bb010000803f"), sealed("bb010000c07f")
+        for _ in range(4):
+            story.asks(read(1)).answers(read(1), -80).answers(answer(1, 1.0), 30)
+            story.says(judged(1, 30))
+        story.asks(write).answers(write, -160)
+        story.asks(wrong).warns(8, "node 1: NaN rps: a slave refuses it (I4)").answers(wrong, -160)
+        # Both echoes come behind both packets, in one piece; then the echo comes first.
+        story.asks(write).asks(read(1)).answers(write + read(1), 40).answers(answer(1, 1.0), 0)
+        story.says(judged(1, 280))
+        story.asks(read(2)).answers(read(2), -100).answers(answer(2, 1.0), 30)
+        story.says(judged(2, 50))
+        # The echo of the first is damaged.
+        story.asks(read(3)).lacks("node 3", 300).asks(read(4)).answers(read(4), -80)
+        story.answers(answer(4, 1.0), 30).says(judged(4, 30))
+        # Three requests without an answer are three.
+        for wait in (300, 300, 500):
+            story.asks(read(5)).answers(read(5), -80).lacks("node 5", wait)
+        story.warns((0, 500), STRUCK % 5).pause(600)
+        # An answer has an echo, too, where a slave's own wires are.
+        story.asks(read(6)).answers(answer(6, 1.0), 30).answers(answer(6, 1.0), -160, True)
+        story.says(judged(6, 30))
+        # Much later it is no echo.
+        story.asks(read(7)).lacks("node 7", 500).pause(25_000)
+        story.answers(read(7), 0).lacks("node 7", 500)
+        return story.case(self, "echoes", "ikeya")
 
     def rover_times(self):
         story = Story(make.UCP_BAUD, 2)
         for name, ask, answer, from_host in EXCHANGES:
-            for time in (0.5, 41.3, 873.6, 15_000.25):
+            for time in (0.0, 0.5, 41.3, 873.6, 5000.0, 15_000.25):
                 story.asks(ask, from_host).answers(answer, time, not from_host)
                 story.says(("answer", time, "%s answered after " % name))
-        story.asks(ucp(1, b"")).pause(200_000).asks(ucp(1, b""))
-        story.says(("missing", None, "ping: no answer"))
+        story.asks(ucp(1, b"")).lacks("ping", 200_300).pause(200_000).asks(ucp(1, b""))
         story.answers(ucp(1, b"\0"), 100.0).says(("answer", 100.0, "ping answered after "))
+        # An answer that begins 13 ms before its request has ended, and pauses.
+        begin, pong = story.at + micros(2000), ucp(1, b"\0")
+        story.lines[0].send(pong[:3], begin)
+        story.pause(2000 + 12_000).asks(ucp(1, b""))
+        time = (begin - story.at) * 1e6 / make.SAMPLE_RATE
+        story.answers(pong[3:], 100.0).says(("answer", time, "ping answered after "))
         return story.case(self, "rover-times", "ucp")
 
     def hazards(self, protocol):
-        """Each frame has its warnings, in this order, and no other."""
-        line, at, want = make.Line(make.UCP_BAUD if protocol == "ucp" else make.IKEYA_BAUD), 500, []
-        for data, texts in HAZARDS[protocol]:
-            at = line.send(data, at) + micros(700)
+        """Each frame has its warnings, in this order, and no other. Each is in its place."""
+        line, want, places = make.Line(make.UCP_BAUD if protocol == "ucp" else make.IKEYA_BAUD), [], []
+        end = 500
+        for data, texts, *place in HAZARDS[protocol]:
+            before, begin = end, len(line.places)
+            end = line.send(data, end + micros(700))
+            # A row of HAZARDS is a frame; of the motor bus, an answer may be its last eight bytes.
+            first, last = 0 if protocol == "ucp" else max(0, len(data) - 8), len(data) - 1
+            if place == ["first byte"]:
+                last = 0
+            place = ((before, before + micros(500)) if place == ["timeout before"] else
+                     (line.places[begin + first][0], line.places[begin + last][1]))
             want += texts
+            places += [place] * len(texts)
         capture = self.capture("hazards-" + protocol, protocol, [line])
 
         def check(decoders, counts):
-            found = [note.texts[0] for note in capture.notes(decoders) if note.kind == "warning"]
-            differs("the warnings of " + protocol, found, want)
+            notes = [note for note in capture.notes(decoders) if note.kind == "warning"]
+            differs("the warnings of " + protocol, [note.texts[0] for note in notes], want)
+            for note, place in zip(notes, places):
+                in_place(capture, note, *place)
             counts["warnings"] += len(want)
+        return check
+
+    def texts(self, protocol):
+        """All texts of each class of annotations, from the longest to the shortest."""
+        line, at = make.Line(make.UCP_BAUD if protocol == "ucp" else make.IKEYA_BAUD), 500
+        data, want = TEXTS[protocol]
+        for piece in data:
+            at = line.send(piece, at + micros(30))
+        capture = self.capture("texts-" + protocol, protocol, [line])
+
+        def check(decoders, counts):
+            found = [(note.kind, " | ".join(note.texts)) for note in capture.notes(decoders)
+                     if ROWS.get(note.kind) != "bytes"]
+            differs("the texts of " + protocol, found, want)
+            counts["texts"] += len(want)
         return check
 
     def wires(self):
         """What only the host may not send is told by the wire."""
         lines = [make.Line(make.UCP_BAUD) for _ in range(2)]
         report, request = ucp(5, bytes(36)), ucp(8, b"")
-        bad = b"\xfd\xff\x50\x00"
+        bad, inside = b"\xfd\xff\x50\x00", ucp(0x20, b"\xfd\xff")
         at = 500
         for line in lines:
-            for data in (report, request, bad, ucp(5, b"\0")):
+            for data in (report, request, bad, ucp(5, b"\0"), ucp(2, b"\0"), inside):
                 at = line.send(data, at) + micros(100)
         captures = [self.capture("wires-" + host, "ucp", lines, ":host=" + host)
                     for host in ("rx", "tx", "unknown")]
         both = ["id 5 from a host hangs shipped robots (U13)",
                 "a body of 0 bytes, not 19: shipped robots read what lies behind (U13)"]
-        length = "length below 4 or above 60: hangs or corrupts shipped robots (U2, U13)"
-        known = both + [length, both[0]]
-        wants = [known, known, 2 * [length, both[0]]]
+        short = "a body of 1 bytes, not 16: " + LIES
+        either = [LENGTH, both[0], short, INSIDE]
+        known = both + either
+        wants = [known, known, 2 * [text + IF_HOST for text in either]]
 
         def check(decoders, counts):
             for capture, want in zip(captures, wants):
@@ -390,32 +565,45 @@ class Story:
         self.at += micros(time)
         return self
 
+    def lacks(self, name, time):
+        """What has just been sent is not answered: this is shown for so long."""
+        return self.says(("missing", (self.at, self.at + micros(time)), name + ": no answer"))
+
+    def warns(self, place, text):
+        """A warning of as many bytes, which have just been sent, or from and until these times."""
+        begin, end = place if isinstance(place, tuple) else (-place * make.BITS * 1e6 / self.baud, 0)
+        return self.says(("warning", (self.at + micros(begin), self.at + micros(end)), text))
+
     def says(self, *expected):
         self.want += expected
         return self
 
-    def case(self, cases, name, protocol):
-        capture = cases.capture(name, protocol, self.lines)
-        kinds = ("in-time", "too-fast", "late", "missing", "answer")
+    def case(self, cases, name, protocol, options=""):
+        capture = cases.capture(name, protocol, self.lines, options)
+        kinds = ("in-time", "too-fast", "late", "missing", "answer", "warning")
 
         def check(decoders, counts):
             notes = [note for note in capture.notes(decoders) if note.kind in kinds]
             differs(name + ": kinds of answers", [note.kind for note in notes],
                     [kind for kind, _, _ in self.want])
             for note, (_, time, text) in zip(notes, self.want):
-                self.one(name, note, time, text)
+                self.one(capture, note, time, text)
                 counts["response times"] += 1
         return check
 
-    def one(self, name, note, time, text):
+    def one(self, capture, note, time, text):
+        """`time` is from request to answer, or the place of a note without time."""
+        name = capture.path.stem
         found = re.match(r"(.*?)(-?[\d.]+) (µs|ms)(.*)$", note.texts[0])
-        if time is None:
+        if isinstance(time, tuple):
             differs(name, note.texts[0], text)
+            in_place(capture, note, *time)
             return
         if not found:
             raise Wrong("%s: no time in %s" % (name, note.texts[0]))
         head, number, unit, tail = found.groups()
         differs(name, (head + tail).strip(), text.strip())
+        differs("%s: the unit of %s" % (name, note.texts[0]), unit, "µs" if abs(time) < 1e4 else "ms")
         bit = 1e6 / self.baud
         shown = float(number) * (1000 if unit == "ms" else 1)
         # Hundredths of a millisecond are the last digit of a long time.
@@ -426,17 +614,26 @@ class Story:
             raise Wrong("%s: %s spans %s µs" % (name, note.texts[0], span))
 
 
-# µs from request to answer, both sides of each limit: 2, 50 and 500.
-TIMES = (10, 0, 1.2, 2.6, 23.4, 49.4, 50, 50.6, 71.8, 499.2, 500.8, 812.5, 1500.4, 12_345.6, -30.0,
-         -2.0, 5)
+def in_place(capture, note, begin, end):
+    """Whether a note is in its place, to within a bit."""
+    bit = make.SAMPLE_RATE / capture.baud
+    if abs(note.ss - begin) > bit or abs(note.es - end) > bit:
+        raise Wrong("%s: %s is at %d to %d, not %d to %d" %
+                    (capture.path.stem, note.texts[0], note.ss, note.es, begin, end))
 
 
-def judged(node, time):
+# µs from request to answer, both sides of each limit: 2, 50 and 500. A sample, 0.2, is allowed.
+TIMES = (10, 0, 1.2, 1.8, 2.6, 23.4, 49.4, 50, 50.2, 50.6, 71.8, 499.2, 500.2, 500.8, 812.5, 1500.4,
+         12_345.6, -30.0, -2.0, 5)
+
+
+def judged(node, time, fastest=2, budget=50, timeout=500):
     """Class and text of a response time."""
-    for limit, kind, text in ((2, "too-fast", "too fast: less than 2 µs to turn the line round"),
-                              (50.2, "in-time", "in time: at most 50 µs (I9)"),
-                              (500.2, "late", "late: more than 50 µs (I9)"),
-                              (1e9, "late", "after the master's timeout of 500 µs (I7)")):
+    too_fast = "too fast: less than %d µs to turn the line round" % fastest
+    for limit, kind, text in ((fastest - 0.3, "too-fast", too_fast),
+                              (budget + 0.3, "in-time", "in time: at most %d µs (I9)" % budget),
+                              (timeout + 0.3, "late", "late: more than %d µs (I9)" % budget),
+                              (1e9, "late", "after the master's timeout of %d µs (I7)" % timeout)):
         if time < limit:
             return kind, float(time), "node %d: , %s" % (node, text)
 
@@ -468,7 +665,11 @@ def answer(node, speed):
 STARTS = "starts a firmware update (U7)"
 LENGTH = "length below 4 or above 60: hangs or corrupts shipped robots (U2, U13)"
 LIES = "shipped robots read what lies behind (U13)"
+INSIDE = "another FD FF inside: robots may take it for a frame (U13)"
+IF_HOST = ", if the host sent it"
 UNASKED = "node %d answers without a request (I9)"
+STRUCK = "node %d: 3 requests in a row without an answer in time: abnormal (I7)"
+# Bytes, their warnings, and their place if that is not the frame.
 HAZARDS = {
     "ucp": (
         (motor(100, -100, 100), []),
@@ -485,6 +686,7 @@ HAZARDS = {
         (ucp(9, b"\x26\0"), []),
         (ucp(9, b"\x27\0"), ["version 39 " + STARTS]),
         (ucp(9, b"\xff\xff"), []),
+        (ucp(9, b"\xd9\xff"), []),
         (ucp(9, b"\2"), ["the robot refuses the update"]),
         (report(7), []),
         (report(8, 100), []),
@@ -492,23 +694,24 @@ HAZARDS = {
         (report(11), ["report 11 after 9: reports are missing (U9)"]),
         (report(255), ["report 255 after 11: reports are missing (U9)"]),
         (report(0), []),
-        (ucp(5, bytes(3)), ["id 5 from a host hangs shipped robots (U13)"]),
-        (ucp(2, bytes(15)), ["a body of 15 bytes, not 16: " + LIES]),
+        (ucp(5, bytes(3)), ["id 5 from a host hangs shipped robots (U13)" + IF_HOST]),
+        (ucp(2, bytes(15)), ["a body of 15 bytes, not 16: " + LIES + IF_HOST]),
         (ucp(2, bytes(17)), []),
-        (ucp(8, bytes(18)), ["a body of 18 bytes, not 19: " + LIES]),
+        (ucp(8, bytes(18)), ["a body of 18 bytes, not 19: " + LIES + IF_HOST]),
         (ucp(10, bytes(1)), []),
-        (ucp(10, bytes(0)), ["a body of 0 bytes, not 1: " + LIES]),
+        (ucp(10, bytes(0)), ["a body of 0 bytes, not 1: " + LIES + IF_HOST]),
         (ucp(10, bytes([9, 0, 0, 0])), ["state 9 is unknown (U8)"]),
         (ucp(10, b"\4"), []),
+        (ucp(10, b"\5"), ["state 5 is unknown (U8)"]),
         (ucp(1, b"\1"), ["err 1: ping was damaged (U12)"]),
         (ucp(7, b"\1"), ["err 1: mag_bias was damaged (U12)"]),
         (ucp(8, b"\1" + bytes(18)), []),
         (ucp(0x20, b"\1\2"), []),
-        (ucp(0x20, b"\1\xfd\xff\2"), ["another FD FF inside: robots may take it for a frame (U13)"]),
-        (b"\xfd\xff\x3d\0" + bytes(6), [LENGTH]),
-        (b"\xfd\xff\0\0", [LENGTH]),
-        (b"\xfd\xff\3\0" + bytes(6), [LENGTH]),
-        (b"\xfd\xff\4\1", [LENGTH]),
+        (ucp(0x20, b"\1\xfd\xff\2"), [INSIDE + IF_HOST]),
+        (b"\xfd\xff\x3d\0" + bytes(6), [LENGTH + IF_HOST], "first byte"),
+        (b"\xfd\xff\0\0", [LENGTH + IF_HOST], "first byte"),
+        (b"\xfd\xff\3\0" + bytes(6), [LENGTH + IF_HOST], "first byte"),
+        (b"\xfd\xff\4\1", [LENGTH + IF_HOST], "first byte"),
         (b"\xfd\0", []),
     ),
     "ikeya": (
@@ -529,7 +732,7 @@ HAZARDS = {
          ["node 1 answers in velocity mode, before in position mode: in doubt (I11)"]),
         (read(5) + read(5), []),
         (read(5), []),
-        (read(6), ["node 5: 3 requests in a row without an answer in time: abnormal (I7)"]),
+        (read(6), [STRUCK % 5], "timeout before"),
         (read(5) + answer(5, 0.0), []),
         (read(5) + read(5) + read(5) + answer(5, 0.0), []),
         (sealed("bb050000803f") + answer(5, 0.0), [UNASKED % 5]),
@@ -537,6 +740,146 @@ HAZARDS = {
         (2 * read(7) + answer(7, 0.0), []),
     ),
 }
+
+SHOWN = {
+    "axle_ikeya": """
+bytes (Bytes): byte, skipped-byte
+packets (Packets): read, write, velocity, position
+values (Values): value
+gaps (Gaps): gap
+responses (Response times): in-time, too-fast, late, missing
+warnings (Warnings): warning
+boards ('one', 'three', default 'one')
+direction ('both', 'to-slave', 'to-master', default 'both')
+turnaround_us (default 2)
+budget_us (default 50)
+timeout_us (default 500)
+silence_ms (default 20)
+""",
+    "axle_ucp": """
+bytes (Bytes): byte, skipped-byte
+packets (Packets): to-robot, to-host, unknown
+values (Values): value
+gaps (Gaps): gap
+responses (Response times): answer, missing
+warnings (Warnings): warning
+host ('unknown', 'rx', 'tx', default 'unknown')
+silence_ms (default 20)
+""",
+}
+
+# Pieces of bytes, 30 µs apart, and the notes in their order: class, texts.
+TEXTS = {
+    "ikeya": ((b"\x01", read(1), answer(1, 0.5), read(2), sealed("bb010000c07f"),
+               sealed("5603f0ff0100"), sealed("5601f0ff0100"), sealed("aa09")), [
+        ("gap", "1 byte skipped: header, no frame starts here | 1 byte skipped: header | 1 "
+                "header | h"),
+        ("value", "node 1 | 1"),
+        ("read", "read_request, node 1 | read_request, node 1 | read 1 | R"),
+        ("value", "node 1 | 1"),
+        ("velocity", "velocity_response, node 1: 0.5 rps | velocity_response, node 1 | velocity "
+                     "1 | V"),
+        ("value", "speed 0.5 rps | 0.5 rps | 0.5"),
+        ("in-time", "node 1: 30.0 µs, in time: at most 50 µs (I9) | node 1: 30.0 µs | 30.0 µs | "
+                    "30"),
+        ("value", "node 2 | 2"),
+        ("read", "read_request, node 2 | read_request, node 2 | read 2 | R"),
+        ("value", "node 1 | 1"),
+        ("write", "write, node 1: NaN rps | write, node 1 | write 1 | W"),
+        ("value", "speed NaN rps | NaN rps | NaN"),
+        ("missing", "node 2: no answer | no answer | none | -"),
+        ("warning", "node 1: NaN rps: a slave refuses it (I4) | not finite | !"),
+        ("value", "node 3 | 3"),
+        ("position", "position_response, node 3: 0.9980 turns (rotation 1, count -16) | "
+                     "position_response, node 3 | position 3 | P"),
+        ("value", "count -16 counts | -16 counts | -16"),
+        ("value", "rotation 1 turns | 1 turns | 1"),
+        ("warning", "node 3 answers without a request (I9) | unasked | ?"),
+        ("value", "node 1 | 1"),
+        ("position", "position_response, node 1: 0.9980 turns (rotation 1, count -16) | "
+                     "position_response, node 1 | position 1 | P"),
+        ("value", "count -16 counts | -16 counts | -16"),
+        ("value", "rotation 1 turns | 1 turns | 1"),
+        ("warning", "node 1 answers in position mode, before in velocity mode: in doubt (I11) | "
+                    "mode | M"),
+        ("warning", "node 1 answers without a request (I9) | unasked | ?"),
+        ("warning", "node 9 with a good CRC: not 1 to 8 (I1) | node 9"),
+        ("gap", "4 bytes skipped: id, invalid node id | 4 bytes skipped: id | 4 id | i"),
+    ]),
+    "ucp": ((b"\xfd\x01", ucp(1, b"", 7), ucp(1, b"", 8), ucp(1, b"\1", 9), ucp(0x20, b"\1\2"),
+             ucp(9, b"\x27\0"), ucp(10, b"\5"), b"\xfd\xff\0\0"), [
+        ("gap", "2 bytes skipped: header, no frame starts here | 2 bytes skipped: header | 2 "
+                "header | h"),
+        ("value", "index 7 | 7"),
+        ("to-robot", "ping, index 7 | ping, index 7 | ping | 1"),
+        ("value", "index 8 | 8"),
+        ("to-robot", "ping, index 8 | ping, index 8 | ping | 1"),
+        ("missing", "ping: no answer | no answer | -"),
+        ("value", "index 9 | 9"),
+        ("value", "err damaged (1) | damaged (1) | 1"),
+        ("to-host", "pong, index 9: damaged | pong, index 9 | pong | 1"),
+        ("warning", "err 1: ping was damaged (U12) | err"),
+        ("answer", "ping answered after 30.0 µs | ping 30.0 µs | 30.0 µs"),
+        ("value", "index 0 | 0"),
+        ("unknown", "unknown, index 0: id 32, body 0102 | unknown, index 0 | id 32 | ?"),
+        ("value", "body 0102 | body"),
+        ("value", "index 0 | 0"),
+        ("value", "version 39 | 39 | 39"),
+        ("to-robot", "ota_request, index 0: version 39 | ota_request, index 0 | ota_request | 9"),
+        ("warning", "version 39 starts a firmware update (U7) | hazard | !"),
+        ("value", "index 0 | 0"),
+        ("value", "state ? (5) | ? (5) | 5"),
+        ("to-robot", "network_state, index 0: state 5, in 1 byte | network_state, index 0 | "
+                     "network_state | 10"),
+        ("warning", "state 5 is unknown (U8) | state"),
+        ("warning", "length below 4 or above 60: hangs or corrupts shipped robots (U2, U13), if "
+                    "the host sent it | length | !"),
+        ("gap", "4 bytes skipped: length, invalid length (header 3, length 1) | 4 bytes "
+                "skipped: length | 4 length | l"),
+    ]),
+}
+
+
+def block(kind, body):
+    """A block of a pcapng file."""
+    body += bytes(-len(body) % 4)
+    length = struct.pack("<I", len(body) + 12)
+    return struct.pack("<I", kind) + length + body + length
+
+
+def pcapng(packets, name=b"ikeya", baud=make.IKEYA_BAUD):
+    """A recording: the time of each packet in µs, its option of flags, and its bytes."""
+    option = lambda code, value: struct.pack("<HH", code, len(value)) + value + bytes(-len(value) % 4)
+    out = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
+    out += block(1, struct.pack("<HHI", 147, 0, 0) + option(3, name) +
+                 option(8, struct.pack("<Q", baud)) + option(9, b"\6") + bytes(4))
+    for time, flags, data in packets:
+        time += 1_700_000_000_000_000
+        head = struct.pack("<5I", 0, time >> 32, time & 0xFFFFFFFF, len(data), len(data))
+        out += block(6, head + data + bytes(-len(data) % 4) + option(2, flags) + bytes(4))
+    return out
+
+
+SENT, GOT = b"\2\0\0\0", b"\1\0\0\0"
+ASKED, GAVE = "read_request, node %d", "velocity_response, node %d: 1.0 rps"
+PAIR = [(0, SENT, read(1)), (200, GOT, answer(1, 1.0))]
+IN_TIME = [ASKED % 1, GAVE % 1, "node 1: 40.0 µs, in time: at most 50 µs (I9)"]
+# Name, file, what make.py says of it, and the packets, times and warnings that are then seen.
+RECORDINGS = (
+    ("one pair", pcapng(PAIR), "", IN_TIME),
+    ("slow bytes", pcapng([(0, SENT, bytes(60_000))], baud=300), make.TOO_LONG, []),
+    ("many bytes at once", pcapng([(time, SENT, bytes(60_000)) for time in range(20)]),
+     make.TOO_LONG, []),
+    ("a long first chunk", pcapng([(0, SENT, 60 * read(0) + read(1)), PAIR[1]]), "",
+     60 * ["node 0 with a good CRC: not 1 to 8 (I1)"] + IN_TIME),
+    ("no flags", pcapng([(0, b"", read(1)), (100, b"\2", read(2))]), "",
+     [ASKED % 1, ASKED % 2, "node 1: no answer", "node 2: no answer"]),
+    ("a clock set back", pcapng([(1000, SENT, read(2)), (1200, GOT, answer(2, 1.0))] + PAIR), "",
+     IN_TIME + [text.replace("node 1", "node 2") for text in IN_TIME]),
+    ("two sections", pcapng(PAIR) + pcapng([(1000, SENT, ucp(1, b""))], b"ucp", make.UCP_BAUD),
+     "only the first of its sections is drawn", IN_TIME),
+    ("no folder", pcapng(PAIR), "/no such folder/out.sr: No such file or directory", []),
+)
 
 
 def streams():
@@ -864,11 +1207,11 @@ def planted(cases, target):
         missed.append("%s: %s" % (name, text))
     if missed:
         sys.exit("planted, and not found: " + "; ".join(missed))
-    print("%d damages to the decoders, each found" % len(DAMAGES))
+    print("%d damages to the decoders and make.py, each found" % len(DAMAGES))
 
 
-WIRE, TEXT, NODE, ROVER = ("axle_ikeya/axle_wire.py", "axle_ikeya/axle_text.py",
-                           "axle_ikeya/pd.py", "axle_ucp/pd.py")
+WIRE, TEXT, NODE, ROVER, MAKE = ("axle_ikeya/axle_wire.py", "axle_ikeya/axle_text.py",
+                                 "axle_ikeya/pd.py", "axle_ucp/pd.py", "../make.py")
 DAMAGES = (
     # The search for frames.
     (WIRE, "0xA001", "0x8005"),
@@ -964,6 +1307,69 @@ DAMAGES = (
     (ROVER, "frame.ss - request.es\n", "frame.es - request.es\n"),
     (ROVER, "if number == REPORT and", "if False and"),
     (ROVER, "bytes(SYNC) in bytes(body)", "False"),
+    # Found by an attack on this check: texts, rows, options, places, strikes.
+    (WIRE, 'return [text, head, "%d %s" % (length, self.reason), self.reason[0]]', 'return [text, head, "%d" % length, ""]'),
+    (WIRE, "if abs(micros) < 1e4:", "if abs(micros) < 1e3:"),
+    (WIRE, "if abs(micros) < 1e4:", "if micros < 1e4:"),
+    (WIRE, "self.silent(search.end)", "self.silent(until)"),
+    (WIRE, '"default": 20,', '"default": 16,'),
+    (NODE, "self.open.es <= since", "self.open.es <= since + 1000000"),
+    (NODE, "slack = self.micros(1)", "slack = 0"),
+    (NODE, "micros < fastest - slack", "micros < fastest"),
+    (NODE, "micros <= timeout + slack", "micros <= timeout"),
+    (NODE, 'time, "%d" % round(micros)]', 'time, "%d" % round(samples)]'),
+    (NODE, "            in_time = False\n", "            pass\n"),
+    (NODE, "            self.strike(node, frame.ss, frame.es)\n", "            pass\n"),
+    (NODE, "in_time = True", "in_time = micros <= budget + slack"),
+    (NODE, "self.note(kind, ss, max(es, ss + 1),", "self.note(kind, ss, es,"),
+    (NODE, "max(request.es + 1, min(until, limit))", "min(until, limit)"),
+    (NODE, "max(request.es + 1, min(until, limit))", "max(request.es + 1, until)"),
+    (NODE, "self.samplerate // 1_000_000)", "self.samplerate // 2_000_000)"),
+    (NODE, 'header == READ or self.options["boards"] == "three"', "header == READ"),
+    (NODE, '            self.warn(frame.ss, frame.es, text, "foreign"', '            self.open = None\n            self.warn(frame.ss, frame.es, text, "foreign"'),
+    (NODE, 'self.options["budget_us"], self.options["timeout_us"]', 'self.options["budget_us"], 500'),
+    (NODE, 'self.options["budget_us"], self.options["timeout_us"]', '50, self.options["timeout_us"]'),
+    (NODE, 'fastest = self.options["turnaround_us"]', "fastest = 2"),
+    (NODE, '"Packets", (2, 3, 4, 5)', '"Packets", (2, 3, 4)'),
+    (NODE, '"Gaps", (7,)', '"Gaps", ()'),
+    (NODE, '"Response times", (8, 9, 10, 11)', '"Response times", (8, 9, 10)'),
+    (NODE, '"Warnings", (12,)', '"Warnings", ()'),
+    (NODE, 'self.warn(frame.ss, frame.es, text, "not finite"', 'self.warn(frame.ss, frame.ss + 1, text, "not finite"'),
+    (NODE, "self.warn(skipped[0].ss, skipped[-1].es, text", "self.warn(skipped[0].ss, skipped[0].es, text"),
+    (NODE, 'self.note("missing", request.es, until,', 'self.note("missing", 0, until,'),
+    (NODE, '"three")},', '"two")},'),
+    (ROVER, 'self.warn(skipped[0].ss, skipped[0].es, text, "length"', 'self.warn(0, skipped[0].es, text, "length"'),
+    (ROVER, 'self.warn(frame.ss, frame.es, text, "hazard"', 'self.warn(0, frame.es, text, "hazard"'),
+    (ROVER, '("unknown",) + WIRES', '("unknown", "rx")'),
+    (ROVER, '"Packets", (2, 3, 4)', '"Packets", (2, 3)'),
+    (ROVER, '"Response times", (7, 8)', '"Response times", (7,)'),
+    (ROVER, '"Warnings", (9,)', '"Warnings", ()'),
+    (ROVER, "max(es, ss + 1), [text,", "es, [text,"),
+    (ROVER, "ss, es = min(request.es, frame.ss), max(request.es, frame.ss)", "ss, es = request.es, frame.ss"),
+    (ROVER, "request.es, max(until, request.es + 1),", "request.es, request.es + 1,"),
+    (ROVER, 'of["version"][0] > LAST', 'abs(of["version"][0]) > LAST'),
+    (ROVER, 'of["state"][0] not in STATES', 'of["state"][0] > 5'),
+    (ROVER, 'message.name, "%d" % number]', 'message.name, "%d" % index]'),
+    (ROVER, '== "unknown" else ""', '== "both" else ""'),
+    (ROVER, "in bytes(body) and self.may_be_host(wire):", "in bytes(body):"),
+    # One direction, and echoes.
+    (NODE, 'if self.options["direction"] == "both":', "if True:"),
+    (NODE, "if self.is_echo(wire, frame):", "if False:"),
+    (NODE, "frame.ss - carried[0].es > limit", "False"),
+    (NODE, "if sent.values == frame.values:", "if place == 0 and sent.values == frame.values:"),
+    (NODE, "self.carried[1 - wire]", "self.carried[wire]"),
+    (NODE, "ECHO_MS = 20", "ECHO_MS = 26"),
+    (NODE, "if header in TO_MASTER:", "if False:"),
+    # Recordings that are drawn.
+    (MAKE, "    packets.sort(key=lambda packet: packet[0])\n", ""),
+    (MAKE, "if max(free.values()) > MOST_SECONDS + 1:", "if False:"),
+    (MAKE, 'int.from_bytes(flags, "little")', "flags[0]"),
+    (MAKE, '"%s.%d.part" % (path, os.getpid())', '"%s.part" % path'),
+    (MAKE, "if kind == 0x0A0D0D0A and at > 0:", "if False:"),
+    (MAKE, "    if not is_all:\n", "    if False:\n"),
+    (MAKE, "duration - seconds + 2 * BITS / baud", "0"),
+    (MAKE, "        raise Unwritable(", "        raise ValueError("),
+    # The folders.
     ("axle_ucp/__init__.py", '"axle_ucp needs', '"x needs'),
     ("axle_ikeya/__init__.py", "from .pd import Decoder", ""),
 )

@@ -14,6 +14,7 @@ wire: each chunk is drawn so that it ends at its time, or later if its wire is s
 times are then those of the program, its machine and its adapter.
 """
 
+import contextlib
 import json
 import os
 import struct
@@ -67,13 +68,33 @@ def write(path, names, lines, length):
                 "total probes=%d" % len(lines), "samplerate=5 MHz", "total analog=0"]
     metadata += ["probe%d=%s" % (number, name) for number, name in enumerate(names, 1)]
     metadata += ["unitsize=1", ""]
-    beside = Path("%s.part" % path)
-    with zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED) as archive:
+    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in [("version", b"2"), ("metadata", "\n".join(metadata).encode()),
                            ("logic-1-1", samples)]:
             # A fixed date: the same capture gives the same file.
             archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
-    os.replace(beside, path)
+
+
+class Unwritable(Exception):
+    """A file that cannot be written, with the reason."""
+
+
+@contextlib.contextmanager
+def replacing(path):
+    """A new file that gets this path once it is whole."""
+    beside = Path("%s.%d.part" % (path, os.getpid()))
+    try:
+        # One that is there is somebody else's.
+        with open(beside, "xb") as file:
+            try:
+                yield file
+                file.flush()
+                os.replace(beside, path)
+            except BaseException:
+                beside.unlink(missing_ok=True)
+                raise
+    except OSError as problem:
+        raise Unwritable("%s: %s" % (path, problem.strerror or problem)) from None
 
 
 def micros(number):
@@ -188,9 +209,8 @@ def put(path, lines, text):
     path = Path(path)
     end = max(line.places[-1][1] for line in lines if line.places)
     write(path, ["TX", "RX"], lines, int(end + micros(25_000)))
-    beside = path.with_suffix(".part")
-    beside.write_text(text)
-    os.replace(beside, path.with_suffix(".pvs"))
+    with replacing(path.with_suffix(".pvs")) as file:
+        file.write(text.encode())
 
 
 class Unusable(Exception):
@@ -199,6 +219,7 @@ class Unusable(Exception):
 
 # Longest part of a recording that is drawn, seconds: five million samples each.
 MOST_SECONDS = 20
+TOO_LONG = "longer than %d s on the wire: choose a part by FROM and TO, seconds" % MOST_SECONDS
 
 # By the description that `axle record` gives an interface: decoder and its options.
 PROTOCOLS = {
@@ -211,7 +232,7 @@ PROTOCOLS = {
 def recording(path, out, begin, end):
     """Draws the first line of a pcapng file."""
     data = Path(path).read_bytes()
-    interface, packets = first_line(data)
+    interface, packets, is_all = first_line(data)
     name = interface.get(3, b"").decode(errors="replace")
     if name not in PROTOCOLS or len(interface.get(8, b"")) != 8:
         raise Unusable("not a line that axle has recorded: " + (name or "no protocol"))
@@ -220,36 +241,50 @@ def recording(path, out, begin, end):
         raise Unusable("%d bit/s cannot be drawn at 5 MHz" % baud)
     if not packets:
         raise Unusable("no packet")
+    # A clock that was set back leaves packets that are earlier than the first.
+    packets.sort(key=lambda packet: packet[0])
     start = packets[0][0]
-    last = (max(time for time, _, _ in packets) - start) / 1e6
+    last = (packets[-1][0] - start) / 1e6
     begin, end = begin or 0.0, last + 0.001 if end is None else end
     if end - begin > MOST_SECONDS:
-        raise Unusable("longer than %d s: choose a part by FROM and TO, seconds" % MOST_SECONDS)
+        raise Unusable(TOO_LONG)
     chosen = [((time - start) / 1e6 - begin, is_sent, chunk) for time, is_sent, chunk in packets
               if begin <= (time - start) / 1e6 <= end]
     # Each chunk ends at its time. Room for all of the first, and an idle line in front of it.
     times = [(seconds, len(chunk) * BITS / baud) for seconds, _, chunk in chosen]
     lead = max([0.002] + [duration - seconds + 2 * BITS / baud for seconds, duration in times])
     lines, free = {True: Line(baud), False: Line(baud)}, {True: 0.0, False: 0.0}
-    for (seconds, is_sent, chunk), (_, duration) in zip(chosen, times):
-        at = (seconds + lead - duration) * SAMPLE_RATE
-        free[is_sent] = lines[is_sent].send(chunk, max(at, free[is_sent]))
+    begins = []
+    for (seconds, is_sent, _), (_, duration) in zip(chosen, times):
+        begins.append(max(seconds + lead - duration, free[is_sent]))
+        free[is_sent] = begins[-1] + duration
+    # The bytes may take longer than the time in which a program gave or got them.
+    if max(free.values()) > MOST_SECONDS + 1:
+        raise Unusable(TOO_LONG)
+    for (_, is_sent, chunk), at in zip(chosen, begins):
+        lines[is_sent].send(chunk, at * SAMPLE_RATE)
     if not any(line.places for line in lines.values()):
         raise Unusable("nothing is in this part")
     decoder, options = PROTOCOLS[name]
     put(out, [lines[True], lines[False]], setup(decoder, baud, 2000, options))
+    if not is_all:
+        print("make.py: %s: only the first of its sections is drawn" % path, file=sys.stderr)
 
 
 def first_line(data):
-    """The options of the first interface, and its packets: time, whether sent, bytes."""
+    """The options of the first interface, its packets (time, whether sent, bytes), and whether the
+    file has one section only: each has a first interface of its own."""
     if data[:4] != b"\x0a\x0d\x0d\x0a" or data[8:12] != b"\x4d\x3c\x2b\x1a":
         raise Unusable("not pcapng as axle writes it")
-    at, interface, packets = 0, None, []
+    at, interface, packets, is_all = 0, None, [], True
     while at + 12 <= len(data):
         kind, length = struct.unpack_from("<II", data, at)
         body = data[at + 8:at + length - 4]
         if length < 12 or at + length > len(data):
             # Cut off: what is before counts.
+            break
+        if kind == 0x0A0D0D0A and at > 0:
+            is_all = False
             break
         if kind == 1 and interface is None:
             interface = options_of(body[8:])
@@ -257,13 +292,14 @@ def first_line(data):
                 raise Unusable("its times are not in microseconds")
         elif kind == 6 and len(body) >= 20:
             number, high, low, held = struct.unpack_from("<IIII", body)
-            flags = options_of(body[20 + (held + 3) // 4 * 4:]).get(2, b"\0")
+            flags = options_of(body[20 + (held + 3) // 4 * 4:]).get(2, b"")
+            is_sent = int.from_bytes(flags, "little") & 3 == 2
             if number == 0:
-                packets.append((high << 32 | low, flags[0] & 3 == 2, body[20:20 + held]))
+                packets.append((high << 32 | low, is_sent, body[20:20 + held]))
         at += length
     if interface is None:
         raise Unusable("no interface")
-    return interface, packets
+    return interface, packets, is_all
 
 
 def options_of(data):
@@ -314,6 +350,8 @@ def main():
                       *([] if arguments[2:] else [None]))
         else:
             sys.exit(__doc__.strip())
+    except Unwritable as problem:
+        sys.exit("make.py: %s" % problem)
     except (OSError, Unusable, ValueError) as problem:
         sys.exit("make.py: %s: %s" % (arguments[0], getattr(problem, "strerror", None) or problem))
 

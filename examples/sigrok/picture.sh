@@ -3,7 +3,7 @@
 #
 #   examples/sigrok/picture.sh [OUT.png]
 #
-# Needs the Debian packages pulseview, xvfb and imagemagick.
+# Needs the Debian packages pulseview, xvfb and imagemagick. Exit code 3: one is missing.
 set -euo pipefail
 cd "$(dirname "$0")"
 out=$(realpath "${1:-pulseview.png}")
@@ -11,7 +11,7 @@ if [ "${2:-}" != inside ]; then
     for tool in pulseview:pulseview Xvfb:xvfb import:imagemagick; do
         command -v "${tool%:*}" >/dev/null || {
             echo "${tool%:*} is missing: install the Debian package ${tool#*:}" >&2
-            exit 1
+            exit 3
         }
     done
     exec xvfb-run -a -s "-screen 0 1500x500x24" bash ./picture.sh "$out" inside

@@ -1,6 +1,7 @@
 """The Ikeya MD bus: packets, framing and rulings I1 to I11 as far as a listener sees them."""
 
 import struct
+from collections import deque
 
 from .axle_wire import Request, WireDecoder, crc_fits, i16
 from .axle_text import position_text, shortest
@@ -21,6 +22,9 @@ LONG = {"one": 8, "three": 16}
 
 # Unanswered requests in a row after which a master takes a node for abnormal (ruling I7).
 STRIKES = 3
+
+# An echo begins within this time: a USB adapter that has recorded it may be as late (ruling I7).
+ECHO_MS = 20
 
 
 class Decoder(WireDecoder):
@@ -66,6 +70,8 @@ class Decoder(WireDecoder):
         self.modes = {}
         self.open = None
         self.strikes = {}
+        # What each wire has carried lately, and may still come as an echo on the other.
+        self.carried = {0: deque(), 1: deque()}
 
     def judge(self, values):
         """The rule of `src/ikeya/judge.rs`."""
@@ -99,10 +105,13 @@ class Decoder(WireDecoder):
         short = "%s %d" % (CLASSES[header], node)
         self.note(CLASSES[header], frame.ss, frame.es, [text, head, short, short[0].upper()])
         self.values(frame, header, payload, mode)
-        if header in TO_SLAVE:
-            self.request(frame, header, node)
-        else:
-            self.response(frame, header, node)
+        if self.is_echo(wire, frame):
+            return
+        if header in TO_MASTER:
+            self.learn(frame, header, node)
+        # With one direction alone, no exchange is whole.
+        if self.options["direction"] == "both":
+            self.exchange(frame, header, node)
         if header == VELOCITY or (header == WRITE and mode == VELOCITY):
             self.check_speeds(frame, header, node, payload)
 
@@ -143,6 +152,28 @@ class Decoder(WireDecoder):
                 text = "node %d: %s rps: %s (I4)" % (node, shortest(speed), does)
                 self.warn(frame.ss, frame.es, text, "not finite", "!")
 
+    def is_echo(self, wire, frame):
+        """Whether the other wire has just carried the same: a receiver hears its own sender. Echoes
+        come in order."""
+        limit = ECHO_MS * self.samplerate // 1000
+        for carried in self.carried.values():
+            while carried and frame.ss - carried[0].es > limit:
+                carried.popleft()
+        other = self.carried[1 - wire]
+        for place, sent in enumerate(other):
+            if sent.values == frame.values:
+                for _ in range(place + 1):
+                    other.popleft()
+                return True
+        self.carried[wire].append(frame)
+        return False
+
+    def exchange(self, frame, header, node):
+        if header in TO_SLAVE:
+            self.request(frame, header, node)
+        else:
+            self.response(frame, node)
+
     def request(self, frame, header, node):
         """The master has given up what was open (ruling I7)."""
         self.give_up(frame.ss)
@@ -172,8 +203,7 @@ class Decoder(WireDecoder):
             text = "node %d: %d requests in a row without an answer in time: abnormal (I7)"
             self.warn(ss, es, text % (node, STRIKES), "node %d abnormal" % node, "abnormal")
 
-    def response(self, frame, header, node):
-        self.learn(frame, header, node)
+    def response(self, frame, node):
         request = self.open
         if request is None:
             self.warn(frame.ss, frame.es,

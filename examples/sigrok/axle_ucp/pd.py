@@ -244,10 +244,15 @@ class Decoder(WireDecoder):
     def refused(self, wire, skipped, reason, values):
         if reason == "length" and self.may_be_host(wire):
             text = "length below 4 or above 60: hangs or corrupts shipped robots (U2, U13)"
+            text += self.condition()
             self.warn(skipped[0].ss, skipped[0].es, text, "length", "!")
 
     def may_be_host(self, wire):
         return self.options["host"] in ("unknown", WIRES[wire])
+
+    def condition(self):
+        """What is a hazard from the host may be none from the robot."""
+        return ", if the host sent it" if self.options["host"] == "unknown" else ""
 
     def is_host(self, wire):
         return self.options["host"] == WIRES[wire]
@@ -281,14 +286,15 @@ class Decoder(WireDecoder):
         if body:
             self.value(frame, HEADER_LEN, len(body), "body " + digits, "body")
         if number == REPORT and self.may_be_host(wire):
-            self.hazard(frame, "id 5 from a host hangs shipped robots (U13)")
+            self.hazard(frame, "id 5 from a host hangs shipped robots (U13)" + self.condition())
         elif number in MESSAGES and self.may_be_host(wire):
             lengths = [message.length() for message in MESSAGES[number] if message.is_from_host]
             if len(body) < min(lengths):
                 text = "a body of %d bytes, not %d: shipped robots read what lies behind (U13)"
-                self.hazard(frame, text % (len(body), min(lengths)))
-        elif SYNC[0] in body and bytes(SYNC) in bytes(body):
-            self.hazard(frame, "another FD FF inside: robots may take it for a frame (U13)")
+                self.hazard(frame, text % (len(body), min(lengths)) + self.condition())
+        elif bytes(SYNC) in bytes(body) and self.may_be_host(wire):
+            text = "another FD FF inside: robots may take it for a frame (U13)"
+            self.hazard(frame, text + self.condition())
 
     def fields(self, frame, message, body):
         """Shows the values of a message, and returns the numbers of each field."""
