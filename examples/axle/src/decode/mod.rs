@@ -31,6 +31,8 @@ use detect::{Guess, Share};
 pub(crate) use framing::Choice;
 use framing::for_framing;
 use printer::Printer;
+#[cfg(all(test, feature = "mcap"))]
+pub(crate) use stream::Mark;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 pub(crate) use walk::{Next, Walked, walk};

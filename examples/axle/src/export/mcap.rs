@@ -67,9 +67,9 @@ impl Topics {
     fn write(&mut self, sheet: &mut Sheet) -> Result<(), Trouble> {
         let mut begin = 0;
         for mark in sheet.marks.iter_mut().flat_map(|marks| marks.drain(..)) {
-            let channel_id = self.topic(mark.protocol, mark.message)?;
             let line = sheet.out.0.get(begin..mark.end).unwrap_or_default();
             begin = mark.end;
+            let channel_id = self.topic(mark.protocol, mark.message, line)?;
             // Raw bytes have no times: a nanosecond per byte keeps their order.
             let nanos = match mark.at.micros {
                 Some(micros) => micros.checked_mul(1000).ok_or(Trouble::Late)?,
@@ -89,16 +89,60 @@ impl Topics {
         &mut self,
         protocol: Option<Protocol>,
         message: &'static str,
+        line: &[u8],
     ) -> Result<u16, mcap::McapError> {
         let key = (protocol.map(Protocol::name), message);
         if let Some(known) = self.known.get(&key) {
             return Ok(*known);
         }
         let name = tables::name(protocol, message);
-        let schema = tables::json_schema(protocol, message).unwrap_or_default();
+        let schema = tables::json_schema(protocol, message, line).unwrap_or_default();
         let schema = self.writer.add_schema(&name, "jsonschema", schema.as_bytes())?;
         let id = self.writer.add_channel(schema, &name, "json", &BTreeMap::new())?;
         self.known.insert(key, id);
         Ok(id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        decode::Mark,
+        listing::{Modes, Place, Shown},
+        tables::tests::{Added, lamp},
+    };
+
+    #[test]
+    fn a_message_that_the_schema_has_not_has_a_schema_of_its_first_line() {
+        let path = std::env::temp_dir().join(format!("axle-{}-lamp.mcap", std::process::id()));
+        let file = BufWriter::new(std::fs::File::create(&path).unwrap());
+        let writer = WriteOptions::new().compression(None).create(file).unwrap();
+        let mut topics = Topics { writer, known: BTreeMap::new(), count: 0 };
+        let (style, lamp) = (Style::Json, lamp());
+        let added = Added("set_lamp", &lamp);
+        let mut sheet = Sheet::new(Some(style));
+        let (at, mut clock) = (Place::default(), Default::default());
+        style.frame(&mut sheet.out, &mut clock, at, &added, &Modes::default());
+        let (end, protocol) = (sheet.out.0.len(), Some(Added::PROTOCOL));
+        sheet.marks = Some(vec![Mark { end, at, protocol, message: "set_lamp" }]);
+        assert!(topics.write(&mut sheet).is_ok());
+        topics.writer.finish().unwrap();
+        drop(topics);
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_file(path).unwrap();
+        let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().collect();
+        let message = messages[0].as_ref().unwrap();
+        assert_eq!((messages.len(), &*message.channel.topic), (1, "ucp.set_lamp"));
+        let schema = message.channel.schema.as_ref().unwrap();
+        let schema: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+        let property = |name: &str| schema["properties"][name].clone();
+        let types =
+            ["index", "colour", "is_on", "name", "bytes"].map(|it| property(it)["type"].clone());
+        assert_eq!(types, ["integer", "integer", "boolean", "string", "string"]);
+        assert_eq!(property("t_c")["items"]["type"], "integer");
+        assert_eq!(property("by")["properties"]["left"], property("watts")["oneOf"]);
+        assert_eq!(property("index")["unit"], "frame");
+        assert_eq!(property("colour")["unit"], "unknown");
     }
 }
