@@ -59,6 +59,12 @@ impl Chosen {
             (_, false, Some(protocol)) => {
                 no_frame(protocol, account, &detect::shares(input.first()))
             }
+            (received, true, Some(protocol)) => {
+                let name = protocol.name();
+                format!(
+                    "no {name} frame in {received} bytes: without --protocol, it is the capture's"
+                )
+            }
             (received, ..) => {
                 format!("no frame in {received} bytes: use --protocol if it is another one")
             }

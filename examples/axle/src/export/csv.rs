@@ -9,7 +9,7 @@ use std::{
 
 use super::{Job, cannot_write};
 use crate::{
-    beside::Beside,
+    beside::{Beside, COLUMNS, LIST},
     decode::{self, Walked},
     failure::Failure,
     listing::Out,
@@ -17,7 +17,7 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "csv")?;
+    let (beside, path) = Beside::folder(job.output, job.force, "csv", &job.input)?;
     beside.end_on(&job.signals);
     let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
     let mut list = List::default();
@@ -49,8 +49,8 @@ pub(super) struct List(BTreeMap<String, String>);
 
 impl List {
     pub(super) fn write(&self, folder: &Path) -> io::Result<()> {
-        let mut file = File::create(folder.join("columns.csv"))?;
-        file.write_all(b"table,column,unit,type\n")?;
+        let mut file = File::create(folder.join(LIST))?;
+        file.write_all(format!("{COLUMNS}\n").as_bytes())?;
         self.0.values().try_for_each(|lines| file.write_all(lines.as_bytes()))
     }
 }

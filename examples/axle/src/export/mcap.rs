@@ -15,12 +15,16 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, file) = Beside::file(job.output, job.force)?;
+    let (beside, file) = Beside::file(job.output, job.force, &job.input)?;
     beside.end_on(&job.signals);
-    let cannot = |error| cannot_write(job.output, &error);
+    let cannot = |error: mcap::McapError| match error {
+        // What the system says, such as that the disk is full.
+        mcap::McapError::Io(error) => cannot_write(job.output, &error),
+        error => cannot_write(job.output, &error),
+    };
     let options = WriteOptions::new().compression(None).library("axle");
     let writer = options.create(BufWriter::new(file)).map_err(cannot)?;
-    let mut topics = Topics { writer, known: BTreeMap::new(), count: 0 };
+    let mut topics = Topics { writer, known: BTreeMap::new(), count: 0, latest: None };
     let mut sheet = Sheet::new(Some(Style::Json));
     sheet.marks = Some(Vec::new());
     let write = |topics: &mut Topics, sheet: &mut Sheet| match topics.write(sheet) {
@@ -48,6 +52,8 @@ struct Topics {
     writer: Writer<BufWriter<std::fs::File>>,
     known: BTreeMap<(Option<&'static str>, &'static str), u16>,
     count: u32,
+    /// The last time so far, nanoseconds.
+    latest: Option<u64>,
 }
 
 enum Trouble {
@@ -70,11 +76,12 @@ impl Topics {
             let line = sheet.out.0.get(begin..mark.end).unwrap_or_default();
             begin = mark.end;
             let channel_id = self.topic(mark.protocol, mark.message, line)?;
-            // Raw bytes have no times: a nanosecond per byte keeps their order.
-            let nanos = match mark.at.micros {
-                Some(micros) => micros.checked_mul(1000).ok_or(Trouble::Late)?,
-                None => mark.at.offset,
-            };
+            if let Some(micros) = mark.at.micros {
+                self.latest = Some(micros.checked_mul(1000).ok_or(Trouble::Late)?);
+            }
+            // A packet without a time has that of the line before it. Raw bytes have none at all: a
+            // nanosecond per byte keeps their order.
+            let nanos = self.latest.unwrap_or(mark.at.offset);
             let sequence = self.count;
             self.count = self.count.wrapping_add(1);
             let header =
@@ -118,7 +125,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("axle-{}-lamp.mcap", std::process::id()));
         let file = BufWriter::new(std::fs::File::create(&path).unwrap());
         let writer = WriteOptions::new().compression(None).create(file).unwrap();
-        let mut topics = Topics { writer, known: BTreeMap::new(), count: 0 };
+        let mut topics = Topics { writer, known: BTreeMap::new(), count: 0, latest: None };
         let (style, lamp) = (Style::Json, lamp());
         let added = Added("set_lamp", &lamp);
         let mut sheet = Sheet::new(Some(style));
@@ -141,7 +148,9 @@ mod tests {
             ["index", "colour", "is_on", "name", "bytes"].map(|it| property(it)["type"].clone());
         assert_eq!(types, ["integer", "integer", "boolean", "string", "string"]);
         assert_eq!(property("t_c")["items"]["type"], "integer");
-        assert_eq!(property("by")["properties"]["left"], property("watts")["oneOf"]);
+        let speed = serde_json::json!([{"type": "number"}, {"enum": ["nan", "inf", "-inf"]}]);
+        assert_eq!(property("watts")["oneOf"], speed);
+        assert_eq!(property("by")["properties"]["left"]["oneOf"], speed);
         assert_eq!(property("index")["unit"], "frame");
         assert_eq!(property("colour")["unit"], "unknown");
     }

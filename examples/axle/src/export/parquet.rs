@@ -41,7 +41,7 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "parquet")?;
+    let (beside, path) = Beside::folder(job.output, job.force, "parquet", &job.input)?;
     beside.end_on(&job.signals);
     let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
     let mut list = List::default();

@@ -108,15 +108,14 @@ pub(crate) fn json_schema(
     let value = |of: &Type| match of {
         Type::F32 | Type::F64 => speed.clone(),
         Type::Time => json!({"type": "number"}),
-        Type::Name(_) | Type::Bytes => json!({"type": "string"}),
+        Type::Name(_) | Type::Bytes | Type::Text => json!({"type": "string"}),
         Type::Bool => json!({"type": "boolean"}),
-        // The text of a value that may be anything.
-        Type::Text => json!({}),
         _ => json!({"type": "integer"}),
     };
     let all = all()?;
     let known = all.iter().find(|it| (it.protocol, it.message) == (protocol, message));
-    let of_line = super::own::describe(&all, protocol, message, &super::own::Line::read(line)?)?;
+    let line = super::own::Line::read(line)?;
+    let of_line = super::own::describe(&all, protocol, message, &line)?;
     let mut fields = known.map_or_else(Vec::new, |known| known.fields.clone());
     for field in of_line.fields {
         if fields.iter().all(|known| known.name != field.name) {
@@ -126,6 +125,8 @@ pub(crate) fn json_schema(
     let mut properties = Map::new();
     for field in &fields {
         let mut property = match &field.kind {
+            // In a table it is the text of something else, and that has no type.
+            Kind::One(Type::Text) if !line.has_text(&field.name) => json!({}),
             Kind::One(of) => value(of),
             Kind::Array(of, len) => {
                 json!({"type": "array", "items": value(of), "minItems": len, "maxItems": len})

@@ -25,6 +25,12 @@ impl Line {
         Some(Self(pairs))
     }
 
+    /// Whether a value is a text in JSON, too.
+    #[cfg(feature = "mcap")]
+    pub(super) fn has_text(&self, name: &str) -> bool {
+        self.get(name).is_some_and(Value::is_string)
+    }
+
     fn get(&self, name: &str) -> Option<&Value> {
         self.0.iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
