@@ -193,8 +193,8 @@ impl Beside {
     }
 }
 
-/// What in a folder is not of an export with this extension: it has a list of its columns, and files
-/// of the tables in that list.
+/// What in a folder is not of an export with this extension, which has a list of its columns and
+/// files of the tables in that list.
 fn not_of_export(folder: &Path, extension: &str) -> io::Result<Option<String>> {
     let list = match fs::read_to_string(folder.join(LIST)) {
         Ok(list) if list.lines().next() == Some(COLUMNS) => list,

@@ -14,6 +14,7 @@ CSV by Python and `duckdb`; JSON lines are compared byte by byte. The snippets o
 import argparse
 import copy
 import csv
+import datetime
 import functools
 import importlib
 import json
@@ -511,6 +512,13 @@ def run_page(axle):
             said = "\n".join(line.rstrip() for line in said.rstrip().splitlines())
             if kind != "sh" and said != wanted.rstrip():
                 faults.append(f"export.md: {code.strip()}\nsays:\n{said}\nnot:\n{wanted}")
+        table = next(iter(sorted(Path(folder).glob("motors.csv/ikeya.*.csv"))))
+        titles = table.read_text().splitlines()[0].split(",")
+    # The formula for spreadsheets: the column of the time, and the days from their first one to 1970.
+    formula = re.search(r"`=([A-Z])2/86400\+(\d+)`", page)
+    if not formula or titles[ord(formula[1]) - ord("A")] != "t" or (
+            datetime.date(1899, 12, 30) + datetime.timedelta(int(formula[2])) != datetime.date(1970, 1, 1)):
+        faults.append(f"export.md: {formula and formula[0]} is not the time")
     if count < 6:
         faults.append(f"export.md: only {count} snippets")
     return faults

@@ -36,8 +36,8 @@ use crate::{
 /// interface and direction, and MCAP has the offset instead, a nanosecond per byte.
 ///
 /// The output is written under another name first, so that it is there as a whole or not at all.
-/// Memory use does not grow with the input, except for the index that MCAP and Parquet files have at
-/// their end: less than a thousandth of the file.
+/// Memory use does not grow with the input, except for the index that MCAP and Parquet files have
+/// at their end: less than a thousandth of the file.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES, verbatim_doc_comment)]
 pub(crate) struct Args {

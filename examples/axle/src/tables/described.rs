@@ -93,7 +93,7 @@ impl Type {
 }
 
 /// A JSON Schema of the lines of one message, without references and with units: what viewers of
-/// MCAP read. `line` is the first of them: what the schema of `decode --json` has not is from there.
+/// MCAP read. `line` is the first of them: what the schema of `decode --json` has not, it has.
 #[cfg(feature = "mcap")]
 pub(crate) fn json_schema(
     protocol: Option<Protocol>,
