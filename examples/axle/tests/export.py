@@ -514,7 +514,7 @@ def run_page(axle):
                 faults.append(f"export.md: {code.strip()}\nsays:\n{said}\nnot:\n{wanted}")
         table = next(iter(sorted(Path(folder).glob("motors.csv/ikeya.*.csv"))))
         titles = table.read_text().splitlines()[0].split(",")
-    # The formula for spreadsheets: the column of the time, and the days from their first one to 1970.
+    # The formula for spreadsheets: the column of the time, and days from their first one to 1970.
     formula = re.search(r"`=([A-Z])2/86400\+(\d+)`", page)
     if not formula or titles[ord(formula[1]) - ord("A")] != "t" or (
             datetime.date(1899, 12, 30) + datetime.timedelta(int(formula[2])) != datetime.date(1970, 1, 1)):
