@@ -207,7 +207,7 @@ fn a_protocol_that_was_named_and_is_not_that_of_the_capture_is_told() {
     let to = folder.join("out.jsonl");
     let noise = PcapNg::new(147, &[(1, 1, &[7; 60])]).0;
     let line = complaint(&export("-", &noise, &to, &["-P", "ucp"]), 1);
-    assert_eq!(line, "no ucp frame in 60 bytes: without --protocol, it is the capture's");
+    assert_eq!(line, "no frame in 60 bytes as ucp: without --protocol, the capture says it");
 }
 
 /// One line, exit code 1, and no file or folder is left.

@@ -192,6 +192,18 @@ fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> Stri
     }
 }
 
+/// The same for a capture that says its protocols; `named` is on the command line instead.
+fn no_frame_with_times(named: Option<Protocol>, received: u64) -> String {
+    match named.map(|protocol| protocol.name()) {
+        Some(name) => {
+            format!(
+                "no frame in {received} bytes as {name}: without --protocol, the capture says it"
+            )
+        }
+        None => format!("no frame in {received} bytes: use --protocol if it is another one"),
+    }
+}
+
 /// Finds out the protocol of raw bytes, and says how sure it is.
 fn detected(args: &Args, choice: Choice, input: &mut Input) -> Result<Protocol, Failure> {
     let guess = guess(choice, input)?;
