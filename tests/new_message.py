@@ -42,6 +42,10 @@ DATA = [
     {"event": "frame", "offset": 12, "length": 13, "protocol": "ucp", "message": "lamp_state", "id": 66,
      "index": 2, "temperature_c": [25, -3], "err": 0},
 ]
+# Its tables, with the columns of the first line and those that all messages have.
+TABLES = {"ucp.set_lamp.csv": ["offset,length,id,index,brightness_pct,colour,time_ms,bytes", "0,12,66,7,80,1,1500,"],
+          "ucp.lamp_state.csv": ["offset,length,id,index,temperature_c_0,temperature_c_1,err,bytes", "12,13,66,2,25,-3,0,"]}
+COLUMNS = ["ucp.set_lamp,length,byte,u8", "ucp.set_lamp,time_ms,unknown,i64", "ucp.lamp_state,temperature_c_1,unknown,i64"]
 TEXT = ["12 set_lamp 7 brightness 80 %, red, time 1500 ms", "13 lamp_state 2 temperature 25 -3 C, fine"]
 
 # What is spoilt, the text in the patch, its replacement, and what is then said.
@@ -189,7 +193,7 @@ def rulings_notice():
 
 
 def tool_tells():
-    """The tool decodes the message by its name, as data and as text."""
+    """The tool decodes the message by its name, as data and as text, and exports it."""
     cargo("build", "-p", "axle", "--no-default-features", "--bin", "axle")
     frames = [bytes.fromhex(frame) for frame in FRAMES]
     frames = [frame + crc(frame).to_bytes(2, "little") for frame in frames]
@@ -203,6 +207,24 @@ def tool_tells():
     text = " ".join(ran([*axle, str(capture)]).split())
     if missing := [words for words in TEXT if words not in text]:
         raise Wrong(f"axle decode does not say {missing[0]!r}:\n{text}")
+    tool_exports(axle[0], capture, frames)
+
+
+def tool_exports(axle, capture, frames):
+    """The tool exports the message, although its schema does not have it."""
+    table, lines = COPY.parent / "lamp.csv", COPY.parent / "lamp.jsonl"
+    shutil.rmtree(table, ignore_errors=True)
+    lines.unlink(missing_ok=True)
+    for output in (table, lines):
+        ran([axle, "export", "--protocol", "ucp", str(capture), "-o", str(output)])
+    if lines.read_text() != ran([axle, "decode", "--protocol", "ucp", "--json", str(capture)]):
+        raise Wrong(f"axle export to JSON lines says {lines.read_text()}")
+    for (name, (titles, row)), frame in zip(TABLES.items(), frames):
+        if (told := (table / name).read_text()) != (expected := f"{titles}\n{row}{frame.hex()}\n"):
+            raise Wrong(f"axle export to {name} says {told}, expected {expected}")
+    told = (table / "columns.csv").read_text()
+    if missing := [column for column in COLUMNS if column not in told.splitlines()]:
+        raise Wrong(f"axle export does not list {missing[0]}:\n{told}")
 
 
 def crc(frame):

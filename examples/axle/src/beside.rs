@@ -2,16 +2,17 @@
 //! another name, and renamed at the end.
 
 use std::{
+    collections::BTreeSet,
     fs::{self, File},
     io,
-    path::{Path, PathBuf},
+    path::{Path, PathBuf, is_separator},
     process,
     sync::{Arc, Mutex, PoisonError},
     thread,
     time::Duration,
 };
 
-use crate::{failure::Failure, signals::Signals};
+use crate::{failure::Failure, input::Input, signals::Signals};
 
 /// What is being written. Dropped before [`keep`](Self::keep), it is removed.
 #[derive(Debug)]
@@ -26,9 +27,16 @@ pub(crate) struct Beside {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Kind {
     File,
-    /// With files of these extensions only.
+    /// With files of this extension only, and the list of their columns.
     Folder(&'static str),
 }
+
+/// The file of a folder that lists its tables and their columns, and its first line.
+pub(crate) const LIST: &str = "columns.csv";
+pub(crate) const COLUMNS: &str = "table,column,unit,type";
+
+/// The most names that are tried for what is to be renamed.
+const ATTEMPTS: u32 = 100;
 
 /// How often a signal is looked for.
 const PERIOD: Duration = Duration::from_millis(50);
@@ -37,35 +45,76 @@ const PERIOD: Duration = Duration::from_millis(50);
 const GRACE: Duration = Duration::from_millis(500);
 
 impl Beside {
-    /// A file for `path`, which is not overwritten unless `force` is set.
-    pub(crate) fn file(path: &Path, force: bool) -> Result<(Self, File), Failure> {
+    /// A file for `path`, made from `input`. One that is there is not overwritten unless `force` is
+    /// set, and the input never.
+    pub(crate) fn file(path: &Path, force: bool, input: &Input) -> Result<(Self, File), Failure> {
+        if path
+            .as_os_str()
+            .as_encoded_bytes()
+            .last()
+            .is_some_and(|last| is_separator(*last as char))
+        {
+            return Err(Failure::Usage(format!("{path:?} is the name of a folder, not of a file")));
+        }
         // Through links, so that the file behind them is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let (beside, temporary) = Self::new(path, Kind::File, force)?;
-        let file = File::options().write(true).create_new(true).open(&temporary);
-        let file = file.map_err(|error| cannot_create(&beside.path, &error))?;
-        beside.will_remove(temporary);
+        let beside = Self::new(path, Kind::File, force, input)?;
+        let file = beside.create(|to| File::options().write(true).create_new(true).open(to))?;
         Ok((beside, file))
     }
 
-    /// A folder for `path`. One that is there is not replaced unless `force` is set and all that is
-    /// in it are files with this extension or `csv`. Returns where to write the files.
+    /// A folder for `path`, made from `input`. One that is there is not replaced unless `force` is
+    /// set and it is an export with this extension, and nothing else. Returns where to write the
+    /// files.
     pub(crate) fn folder(
         path: &Path,
         force: bool,
         extension: &'static str,
+        input: &Input,
     ) -> Result<(Self, PathBuf), Failure> {
-        let (beside, temporary) = Self::new(path.to_owned(), Kind::Folder(extension), force)?;
-        fs::create_dir(&temporary).map_err(|error| cannot_create(&beside.path, &error))?;
-        beside.will_remove(temporary.clone());
+        let beside = Self::new(path.to_owned(), Kind::Folder(extension), force, input)?;
+        let temporary = beside.create(|to| fs::create_dir(to).map(|()| to.to_owned()))?;
         Ok((beside, temporary))
     }
 
-    fn new(path: PathBuf, kind: Kind, force: bool) -> Result<(Self, PathBuf), Failure> {
-        let temporary = beside(&path, "part")?;
+    fn new(path: PathBuf, kind: Kind, force: bool, input: &Input) -> Result<Self, Failure> {
+        if input.is_at(&path) && (kind != Kind::File || !path.is_dir()) {
+            let what =
+                if path.is_dir() { "has the capture in it" } else { "is the capture itself" };
+            return Err(Failure::Usage(format!("{path:?} {what}: choose another name")));
+        }
         let beside = Self { path, kind, force, temporary: Arc::default() };
         beside.check()?;
-        Ok((beside, temporary))
+        Ok(beside)
+    }
+
+    /// Makes what is to be renamed, under the first name that nothing has: after a `kill -9`
+    /// something may be left of another process that had the same number.
+    fn create<T>(&self, make: impl Fn(&Path) -> io::Result<T>) -> Result<T, Failure> {
+        for attempt in 0..ATTEMPTS {
+            let temporary = beside(&self.path, "part", attempt)?;
+            match make(&temporary) {
+                Ok(made) => {
+                    self.take_mode(&temporary);
+                    self.will_remove(temporary);
+                    return Ok(made);
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(cannot_create(&self.path, &error)),
+            }
+        }
+        let line = "all names for a part of it are taken: remove the hidden .part files beside it";
+        Err(Failure::Failed(format!("cannot create {:?}: {line}", self.path)))
+    }
+
+    /// Whoever may not read what is replaced may not read the new one either.
+    fn take_mode(&self, temporary: &Path) {
+        if let Ok(known) = fs::metadata(&self.path)
+            && (self.kind == Kind::File || !known.permissions().readonly())
+        {
+            // Some file systems have none.
+            let _ = fs::set_permissions(temporary, known.permissions());
+        }
     }
 
     fn will_remove(&self, temporary: PathBuf) {
@@ -101,17 +150,23 @@ impl Beside {
         let Some(from) = temporary.as_deref() else { return Err(interrupted()) };
         let cannot = |error: io::Error| cannot_create(&self.path, &error);
         if matches!(self.kind, Kind::Folder(_)) && self.path.exists() {
-            let old = beside(&self.path, "old")?;
+            let mut names = (0..ATTEMPTS).map(|attempt| beside(&self.path, "old", attempt));
+            let free = names.find(|name| name.as_ref().is_ok_and(|name| !name.exists()));
+            let old = free.unwrap_or_else(|| beside(&self.path, "old", 0))?;
             fs::rename(&self.path, &old).map_err(cannot)?;
             if let Err(error) = fs::rename(from, &self.path) {
                 // Back to what was there.
                 let _ = fs::rename(&old, &self.path);
                 return Err(cannot(error));
             }
-            remove(&old);
-        } else {
-            fs::rename(from, &self.path).map_err(cannot)?;
+            *temporary = None;
+            return fs::remove_dir_all(&old).map_err(|error| {
+                let path = &self.path;
+                let line = format!("{path:?} is written, but what was there is left as {old:?}");
+                Failure::Failed(format!("{line}: {error}"))
+            });
         }
+        fs::rename(from, &self.path).map_err(cannot)?;
         *temporary = None;
         Ok(())
     }
@@ -129,24 +184,38 @@ impl Beside {
             Kind::Folder(_) if !known.is_dir() => {
                 Err(cannot("there is something else than a folder"))
             }
-            Kind::Folder(extension) => {
-                let files = fs::read_dir(&self.path);
-                let files = files.map_err(|error| cannot_create(&self.path, &error))?;
-                for file in files {
-                    let Ok(file) = file else { continue };
-                    let path = file.path();
-                    let is_ours = [extension, "csv"]
-                        .iter()
-                        .any(|known| path.extension().is_some_and(|found| found == *known));
-                    if !is_ours || !file.file_type().is_ok_and(|kind| kind.is_file()) {
-                        let name = file.file_name();
-                        return Err(cannot(&format!("{name:?} in it is not of an export")));
-                    }
-                }
-                Ok(())
-            }
+            Kind::Folder(extension) => match not_of_export(&self.path, extension) {
+                Ok(None) => Ok(()),
+                Ok(Some(why)) => Err(cannot(&why)),
+                Err(error) => Err(cannot_create(&self.path, &error)),
+            },
         }
     }
+}
+
+/// What in a folder is not of an export with this extension, which has a list of its columns and
+/// files of the tables in that list.
+fn not_of_export(folder: &Path, extension: &str) -> io::Result<Option<String>> {
+    let list = match fs::read_to_string(folder.join(LIST)) {
+        Ok(list) if list.lines().next() == Some(COLUMNS) => list,
+        Ok(_) => return Ok(Some(format!("{LIST} in it is not of an export"))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok(Some(format!("it has no {LIST}, so it is no export")));
+        }
+        Err(error) => return Err(error),
+    };
+    let tables: BTreeSet<_> =
+        list.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    for file in fs::read_dir(folder)? {
+        let file = file?;
+        let (name, kind) = (file.file_name(), file.file_type()?);
+        let table = name.to_str().and_then(|it| it.strip_suffix(extension)?.strip_suffix('.'));
+        let is_ours = name == LIST || table.is_some_and(|table| tables.contains(table));
+        if !is_ours || !kind.is_file() {
+            return Ok(Some(format!("{name:?} in it is not of an export")));
+        }
+    }
+    Ok(None)
 }
 
 impl Drop for Beside {
@@ -170,18 +239,56 @@ fn cannot_create(path: &Path, error: &io::Error) -> Failure {
     Failure::Failed(format!("cannot create {path:?}: {error}{hint}"))
 }
 
-/// A hidden name in the same folder, so that it can be renamed.
-fn beside(path: &Path, what: &str) -> Result<PathBuf, Failure> {
+/// A hidden name in the same folder, so that it can be renamed; another one for each attempt.
+fn beside(path: &Path, what: &str, attempt: u32) -> Result<PathBuf, Failure> {
     let Some(name) = path.file_name() else {
         return Err(Failure::Usage(format!("{path:?} is not the name of a file")));
     };
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
-    hidden.push(format!(".{}.{what}", process::id()));
+    hidden.push(match attempt {
+        0 => format!(".{}.{what}", process::id()),
+        _ => format!(".{}-{attempt}.{what}", process::id()),
+    });
     Ok(path.with_file_name(hidden))
 }
 
 fn remove(path: &Path) {
     // If that is not allowed any more, nothing else would help.
     let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_another_process_of_the_same_number_has_left_is_no_obstacle() {
+        let path = std::env::temp_dir().join(format!("axle-{}-beside.jsonl", process::id()));
+        let input = Input::open(None).unwrap();
+        let left = beside(&path, "part", 0).unwrap();
+        fs::write(&left, "left").unwrap();
+        let (second, file) = Beside::file(&path, false, &input).unwrap();
+        drop(file);
+        second.keep().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"");
+        assert_eq!(fs::read(&left).unwrap(), b"left");
+        for path in [path, left] {
+            fs::remove_file(path).unwrap();
+        }
+    }
+
+    #[test]
+    fn if_all_names_are_taken_that_is_said() {
+        let folder = std::env::temp_dir().join(format!("axle-{}-taken", process::id()));
+        fs::create_dir(&folder).unwrap();
+        let path = folder.join("out.csv");
+        for attempt in 0..ATTEMPTS {
+            fs::create_dir(beside(&path, "part", attempt).unwrap()).unwrap();
+        }
+        let input = Input::open(None).unwrap();
+        let failure = Beside::folder(&path, false, "csv", &input).unwrap_err();
+        assert!(failure.to_string().contains("remove the hidden .part files"), "{failure}");
+        fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -83,6 +83,38 @@ impl Input {
         self.path.as_deref()
     }
 
+    /// Whether it is the file of this name, or in the folder of this name, so that replacing that
+    /// would lose it. Standard input may be a file, too.
+    pub(crate) fn is_at(&self, other: &Path) -> bool {
+        let path = self.path.as_deref().and_then(|path| path.canonicalize().ok());
+        let is_below = path
+            .zip(other.canonicalize().ok())
+            .is_some_and(|(path, other)| path.starts_with(other));
+        is_below || self.is_same(other)
+    }
+
+    /// Whether it is the same file under any name.
+    #[cfg(unix)]
+    fn is_same(&self, other: &Path) -> bool {
+        use std::os::{fd::AsFd, unix::fs::MetadataExt};
+
+        let file = match (&self.file, &self.path) {
+            (Some((file, _)), _) => file.try_clone(),
+            (None, None) => io::stdin().as_fd().try_clone_to_owned().map(File::from),
+            (None, Some(_)) => return false,
+        };
+        let known = file.and_then(|file| file.metadata());
+        known
+            .ok()
+            .zip(other.metadata().ok())
+            .is_some_and(|(known, other)| (known.dev(), known.ino()) == (other.dev(), other.ino()))
+    }
+
+    #[cfg(not(unix))]
+    const fn is_same(&self, _: &Path) -> bool {
+        false
+    }
+
     /// Whether the input is a capture with times.
     pub(crate) fn is_pcapng(&mut self) -> Result<bool, Failure> {
         let front = self.peek(MAGIC.len(), |front| !MAGIC.starts_with(front))?;

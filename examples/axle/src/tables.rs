@@ -2,15 +2,17 @@
 //!
 //! Tables and columns are known before the first byte is read, from the schema of `decode --json`.
 //! So a batch of rows is all that is held, and a [`Sink`] takes it in: a file format, or a plot.
+//! A message that the schema has not, or a layout of one, gets a table of its own when it comes.
 
 mod column;
 mod described;
+mod own;
 mod row;
 
 use crate::{
     args::Protocol,
     failure::Failure,
-    listing::{Modes, Place, REASONS, Shown, SkippedBytes},
+    listing::{LineClock, Modes, Out, Place, REASONS, Shown, SkippedBytes, Style},
 };
 #[cfg(feature = "parquet")]
 pub(crate) use column::Values;
@@ -18,7 +20,8 @@ pub(crate) use column::{Cell, Column};
 pub(crate) use described::Type;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;
-use described::{Described, Kind};
+use described::{Described, Field, Kind};
+use own::Line;
 use row::{Row, Slot, Unfit};
 
 /// Rows of a table after which they go to the sink.
@@ -45,12 +48,15 @@ pub(crate) struct Table {
     pub(crate) numbers: Vec<u64>,
     /// Where each field of a frame goes, behind the columns of its place.
     slots: Vec<Slot>,
+    /// Of a table that the schema does not have: its fields, and their first columns behind those
+    /// of the place.
+    own: Vec<(Field, usize)>,
 }
 
 /// All tables.
 #[derive(Debug)]
 pub(crate) struct Tables {
-    /// By protocol; the gaps are the last.
+    /// By protocol; then the gaps, and last those that the schema does not have.
     all: Vec<Table>,
     /// The first of each protocol.
     first: [usize; 3],
@@ -83,25 +89,59 @@ impl Tables {
 
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
-        let mode = frame.commands().and_then(|node| modes.of(node));
         let name = frame.name();
-        let is_its = |table: &Table| table.protocol == Some(S::PROTOCOL) && table.message == name;
+        let is_its = |table: &Table| table.is_of(S::PROTOCOL, name) && table.own.is_empty();
         if !self.all.get(self.last).is_some_and(is_its) {
             let first = self.first.get(S::PROTOCOL as usize).copied().unwrap_or_default();
             let its = self.all.iter().skip(first).position(is_its);
             self.last = its.map_or(usize::MAX, |at| first + at);
         }
-        self.add(self.last, at, |table, from| {
+        let mode = frame.commands().and_then(|node| modes.of(node));
+        let added = self.add(self.last, at, |table, from| {
             let (slots, columns) = (&*table.slots, &mut *table.columns);
             let columns = columns.get_mut(from..).unwrap_or_default();
             frame.serialize(Row { slots, columns, whole: frame.bytes(), mode })
         });
+        if added.is_err()
+            && let Err(unfit) = self.line(at, frame, modes)
+        {
+            self.unfit = Some(unfit);
+        }
+    }
+
+    /// Adds a frame that is not as the schema says, as its line: to a table of such lines, which is
+    /// made if there is none.
+    #[cold]
+    fn line<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) -> Result<(), Unfit> {
+        let mut out = Out::default();
+        Style::Json.frame(&mut out, &mut LineClock::default(), at, frame, modes);
+        let line = Line::read(&out.0).ok_or(Unfit)?;
+        let name = frame.name();
+        let mut layouts = 0;
+        for table in 0..self.all.len() {
+            let Some(known) = self.all.get(table) else { break };
+            if known.is_of(S::PROTOCOL, name) {
+                layouts += 1;
+                let is_own = !known.own.is_empty();
+                if is_own && self.add(table, at, |table, from| table.line(from, &line)).is_ok() {
+                    return Ok(());
+                }
+            }
+        }
+        let all = described::all().ok_or(Unfit)?;
+        let new = own::describe(&all, Some(S::PROTOCOL), name, &line).ok_or(Unfit)?;
+        let mut table = Table::of_lines(new, self.has_times);
+        if layouts > 0 {
+            table.name = format!("{}-{}", table.name, layouts + 1);
+        }
+        self.all.push(table);
+        self.add(self.all.len() - 1, at, |table, from| table.line(from, &line))
     }
 
     /// Adds a gap.
     pub(crate) fn gap(&mut self, at: Place, gap: &SkippedBytes) {
         let Some(last) = self.all.iter().position(|table| table.protocol.is_none()) else { return };
-        self.add(last, at, |table, from| {
+        let added = self.add(last, at, |table, from| {
             let mut columns = table.columns.iter_mut().skip(from);
             let mut next = || columns.next().ok_or(Unfit);
             next()?.unsigned(gap.length)?;
@@ -116,28 +156,32 @@ impl Tables {
             }
             Ok(())
         });
+        if let Err(unfit) = added {
+            self.unfit = Some(unfit);
+        }
     }
 
-    /// Adds a row to a table; `rest` fills the columns from its second argument on.
+    /// Adds a row to a table; `rest` fills the columns from its second argument on. If the row does
+    /// not fit, the table is as before.
     #[inline]
     fn add(
         &mut self,
         table: usize,
         at: Place,
         rest: impl FnOnce(&mut Table, usize) -> Result<(), Unfit>,
-    ) {
+    ) -> Result<(), Unfit> {
         let number = self.count;
-        self.count += 1;
-        let Some(table) = self.all.get_mut(table) else {
-            self.unfit = Some(Unfit);
-            return;
-        };
-        table.numbers.push(number);
-        self.is_full |= table.numbers.len() >= BATCH;
+        let table = self.all.get_mut(table).ok_or(Unfit)?;
+        let rows = table.numbers.len();
         let added = table.place(at, self.has_times).and_then(|from| rest(table, from));
-        if let Err(unfit) = added {
-            self.unfit = Some(unfit);
+        if added.is_err() {
+            table.columns.iter_mut().for_each(|column| column.take_back(rows));
+            return added;
         }
+        table.numbers.push(number);
+        self.count += 1;
+        self.is_full |= rows + 1 >= BATCH;
+        Ok(())
     }
 
     /// Hands every table that has a batch to `sink`.
@@ -168,20 +212,35 @@ impl Tables {
 }
 
 impl Table {
+    fn is_of(&self, protocol: Protocol, message: &str) -> bool {
+        self.protocol == Some(protocol) && self.message == message
+    }
+
+    /// A table whose rows are added as lines.
+    fn of_lines(of: Described, has_times: bool) -> Self {
+        let fields = of.fields.clone();
+        let mut table = Self::new(of, has_times);
+        for slot in core::mem::take(&mut table.slots) {
+            let field = fields.iter().find(|field| field.name == slot.name && slot.width > 0);
+            table.own.extend(field.map(|field| (field.clone(), slot.first)));
+        }
+        table
+    }
+
     fn new(of: Described, has_times: bool) -> Self {
         let (mut columns, mut slots, mut place) = (Vec::new(), Vec::new(), 0);
         for field in of.fields {
             let (name, unit, is_optional) = (field.name, field.unit, field.is_optional);
-            let is_place = PLACE.contains(&name);
+            let is_place = PLACE.contains(&&*name);
             let first = columns.len() - place;
-            if IN_THE_NAME.contains(&name) {
+            if IN_THE_NAME.contains(&&*name) {
                 // No line of a table would differ from another.
             } else if !is_place || has_times || name == "offset" {
                 let mut column = |name: String, kind, is_optional| {
                     columns.push(Column::new(name, kind, unit, is_optional));
                 };
                 match field.kind {
-                    Kind::One(kind) => column(name.to_owned(), kind, is_optional),
+                    Kind::One(kind) => column(name.to_string(), kind, is_optional),
                     Kind::Array(kind, len) => {
                         for at in 0..len {
                             column(format!("{name}_{at}"), kind.clone(), is_optional);
@@ -203,7 +262,7 @@ impl Table {
         }
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
-        Self { name, protocol, message, columns, numbers, slots }
+        Self { name, protocol, message, columns, numbers, slots, own: Vec::new() }
     }
 
     /// Fills the columns of a place, and returns their number.
@@ -246,4 +305,4 @@ fn bug() -> Failure {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -14,6 +14,7 @@ CSV by Python and `duckdb`; JSON lines are compared byte by byte. The snippets o
 import argparse
 import copy
 import csv
+import datetime
 import functools
 import importlib
 import json
@@ -141,7 +142,8 @@ class Export:
         self.expected, self.times = {}, {}
         for number, line in enumerate(self.lines):
             self.expected.setdefault(table_of(line), []).append(flat(line))
-            self.times[number] = nanos(line)
+            # A packet without a time has that of the line before it; of raw bytes none has one.
+            self.times[number] = nanos(line, self.times.get(number - 1) if self.has_times else None)
         self.out = {}
         for form in ["jsonl", "mcap", "csv", "parquet"]:
             self.out[form] = folder / f"{name}.{form}"
@@ -225,6 +227,14 @@ class Export:
                     yield f"{message['topic']}: {name} {value} is not of {schema['properties'].get(name)}"
 
 
+class Number(str):
+    """A number with a fraction, with the digits of the file."""
+
+
+# What schemas of topics have.
+KEYWORDS = {"type", "items", "minItems", "maxItems", "properties", "oneOf", "enum", "unit", "description"}
+
+
 def table_of(line):
     return f"{line['protocol']}.{line['message']}" if line["event"] == "frame" else "skipped"
 
@@ -234,9 +244,11 @@ def micros_of(text):
     return int(seconds) * 1_000_000 + int(fraction.ljust(6, "0"))
 
 
-def nanos(line):
-    """Log time of MCAP: that of the line, or a nanosecond per byte."""
-    return micros_of(line["t"]) * 1000 if "t" in line else line["offset"]
+def nanos(line, before):
+    """Log time of MCAP: that of the line, or of the one before, or a nanosecond per byte."""
+    if "t" in line:
+        return micros_of(line["t"]) * 1000
+    return line["offset"] if before is None else before
 
 
 def bits(number):
@@ -279,16 +291,25 @@ def unit_of(table, column):
 
 
 def fits(value, schema):
-    """Whether a value has the type of the schema. A number with a fraction is a text here."""
-    kind = (schema or {}).get("type")
+    """Whether a value is of the schema, which is checked with the few words that ours use. A number
+    with a fraction is of the class Number here, so that no text is taken for one."""
+    if schema is None or not set(schema) <= KEYWORDS:
+        return False
+    if "oneOf" in schema and sum(fits(value, one) for one in schema["oneOf"]) != 1:
+        return False
+    if "enum" in schema and value not in schema["enum"]:
+        return False
+    kind = schema.get("type")
+    if kind is None:
+        return bool({"oneOf", "enum"} & set(schema))
     if kind == "array":
         return (isinstance(value, list) and schema["minItems"] == len(value) == schema["maxItems"]
                 and all(fits(it, schema["items"]) for it in value))
     if kind == "object":
         return isinstance(value, dict) and all(fits(it, schema["properties"].get(name)) for name, it in value.items())
     if kind == "number":
-        return isinstance(value, int) or re.fullmatch(r"-?[0-9.]+(e[+-]?[0-9]+)?|nan|-?inf", value) is not None
-    return isinstance(value, {"integer": int, "string": str}.get(kind, ()))
+        return type(value) in (int, Number)
+    return type(value) is {"integer": int, "string": str}.get(kind)
 
 
 def read_mcap(path):
@@ -302,7 +323,7 @@ def read_mcap(path):
             schemas[channel.topic] = json.loads(schema.data)
             messages.append({"topic": channel.topic, "sequence": message.sequence,
                              "times": [message.log_time, message.publish_time],
-                             "line": json.loads(message.data, parse_float=str)})
+                             "line": json.loads(message.data, parse_float=Number)})
         count = reader.get_summary().statistics.message_count
         assert count == len(messages), count
     return {"messages": messages, "schemas": schemas}
@@ -491,6 +512,13 @@ def run_page(axle):
             said = "\n".join(line.rstrip() for line in said.rstrip().splitlines())
             if kind != "sh" and said != wanted.rstrip():
                 faults.append(f"export.md: {code.strip()}\nsays:\n{said}\nnot:\n{wanted}")
+        table = next(iter(sorted(Path(folder).glob("motors.csv/ikeya.*.csv"))))
+        titles = table.read_text().splitlines()[0].split(",")
+    # The formula for spreadsheets: the column of the time, and days from their first one to 1970.
+    formula = re.search(r"`=([A-Z])2/86400\+(\d+)`", page)
+    if not formula or titles[ord(formula[1]) - ord("A")] != "t" or (
+            datetime.date(1899, 12, 30) + datetime.timedelta(int(formula[2])) != datetime.date(1970, 1, 1)):
+        faults.append(f"export.md: {formula and formula[0]} is not the time")
     if count < 6:
         faults.append(f"export.md: only {count} snippets")
     return faults

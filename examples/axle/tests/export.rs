@@ -165,7 +165,49 @@ fn another_extension_is_a_usage_error() {
         let line = complaint(&export(&capture("ucp.bin"), &[], &to, &[]), 2);
         assert_eq!(line, format!("{to:?} does not end in .csv, .jsonl, .mcap or .parquet"));
     }
+    for name in [".csv", ".JSONL"] {
+        let line = complaint(&export(&capture("ucp.bin"), &[], Path::new(name), &[]), 2);
+        assert_eq!(line, format!("{name:?} is an extension without a name: use out{name}"));
+    }
+    let to = folder.join("out.jsonl/");
+    let line = complaint(&export(&capture("ucp.bin"), &[], &to, &[]), 2);
+    assert_eq!(line, format!("{to:?} is the name of a folder, not of a file"));
     assert!(names(&folder).is_empty());
+}
+
+#[test]
+fn the_capture_itself_is_never_replaced() {
+    let folder = folder("itself");
+    let bytes = fs::read(capture("ucp.bin")).unwrap();
+    let mut pictures = vec![];
+    pictures.extend(cfg!(feature = "plot").then_some("svg"));
+    for form in forms().into_iter().chain(pictures) {
+        let to = folder.join(format!("in.{form}"));
+        let is_folder = ["csv", "parquet"].contains(&form);
+        let from = if is_folder { to.join("in.bin") } else { to.clone() };
+        if is_folder {
+            support::stdout(export(&capture("ucp.bin"), &[], &to, &[]));
+        }
+        fs::write(&from, &bytes).unwrap();
+        let command = if form == "svg" { "plot" } else { "export" };
+        let [from_text, to_text] = [&from, &to].map(|path| path.to_str().unwrap());
+        let what = if is_folder { "has the capture in it" } else { "is the capture itself" };
+        let says = format!("{:?} {what}: choose another name", to);
+        for more in [&[][..], &["--force"]] {
+            let args = [&[command, from_text, "-o", to_text], more].concat();
+            assert_eq!(complaint(&run(&args, &[]), 2), says);
+        }
+        assert_eq!(fs::read(&from).unwrap(), bytes);
+    }
+}
+
+#[test]
+fn a_protocol_that_was_named_and_is_not_that_of_the_capture_is_told() {
+    let folder = folder("named");
+    let to = folder.join("out.jsonl");
+    let noise = PcapNg::new(147, &[(1, 1, &[7; 60])]).0;
+    let line = complaint(&export("-", &noise, &to, &["-P", "ucp"]), 1);
+    assert_eq!(line, "no frame in 60 bytes as ucp: without --protocol, the capture says it");
 }
 
 /// One line, exit code 1, and no file or folder is left.
@@ -254,8 +296,21 @@ fn with_force_no_other_kind_of_thing_is_replaced() {
             fs::remove_file(&to).unwrap();
             fs::create_dir(&to).unwrap();
             fs::write(to.join("thesis.odt"), "years of work").unwrap();
-            force("\"thesis.odt\" in it is not of an export");
+            force("it has no columns.csv, so it is no export");
             assert_eq!(names(&to), ["thesis.odt"]);
+            fs::write(to.join("columns.csv"), "name,value\n").unwrap();
+            force("columns.csv in it is not of an export");
+            fs::write(to.join("columns.csv"), "table,column,unit,type\nucp.ping,id,none,u8\n")
+                .unwrap();
+            force("\"thesis.odt\" in it is not of an export");
+            fs::remove_file(to.join("thesis.odt")).unwrap();
+            for name in ["results", "ucp.pong", "ucp.ping.csv"] {
+                fs::write(to.join(format!("{name}.{form}")), "years of work").unwrap();
+                force(&format!("\"{name}.{form}\" in it is not of an export"));
+                fs::remove_file(to.join(format!("{name}.{form}"))).unwrap();
+            }
+            fs::create_dir(to.join(format!("ucp.ping.{form}"))).unwrap();
+            force(&format!("\"ucp.ping.{form}\" in it is not of an export"));
         } else {
             fs::create_dir(&to).unwrap();
             force("there is something else than a file");
@@ -314,6 +369,7 @@ mod unix {
             let output = limited.arg(&input).arg("-o").arg(&to).output().unwrap();
             let line = complaint(&output, 1);
             assert!(line.starts_with(&format!("cannot write {to:?}: ")), "{line}");
+            assert!(line.contains("File too large"), "{line}");
             assert!(line.ends_with("; nothing was kept"), "{line}");
             assert_eq!(names(&folder), ["long.bin"], "{form}");
         }
@@ -359,5 +415,38 @@ mod unix {
         support::stdout(export(&capture("ucp.bin"), &[], &link, &["--force"]));
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert!(fs::read_to_string(&file).unwrap().starts_with("{\"event\":\"protocol\""));
+    }
+
+    #[test]
+    fn a_capture_under_another_name_is_not_replaced_either() {
+        let folder = folder("other-name");
+        let (from, link) = (folder.join("in.bin"), folder.join("in.jsonl"));
+        let hard = folder.join("hard.jsonl");
+        fs::copy(capture("ucp.bin"), &from).unwrap();
+        std::os::unix::fs::symlink(&from, &link).unwrap();
+        fs::hard_link(&from, &hard).unwrap();
+        for to in [&link, &hard] {
+            let line = complaint(&export(from.to_str().unwrap(), &[], to, &["--force"]), 2);
+            assert!(line.ends_with(" is the capture itself: choose another name"), "{line}");
+            let mut stdin = axle(&["export", "-", "--force", "-o", to.to_str().unwrap()]);
+            let line = complaint(&stdin.stdin(fs::File::open(&from).unwrap()).output().unwrap(), 2);
+            assert!(line.ends_with(" is the capture itself: choose another name"), "{line}");
+        }
+        assert_eq!(fs::read(from).unwrap(), fs::read(capture("ucp.bin")).unwrap());
+    }
+
+    #[test]
+    fn what_is_replaced_keeps_its_mode() {
+        use std::os::unix::fs::PermissionsExt;
+
+        let folder = folder("mode");
+        for form in forms() {
+            let to = folder.join(format!("out.{form}"));
+            support::stdout(export(&capture("ucp.bin"), &[], &to, &[]));
+            let private = if to.is_dir() { 0o700 } else { 0o600 };
+            fs::set_permissions(&to, PermissionsExt::from_mode(private)).unwrap();
+            support::stdout(export(&capture("ikeya.bin"), &[], &to, &["--force"]));
+            assert_eq!(fs::metadata(&to).unwrap().permissions().mode() & 0o777, private, "{form}");
+        }
     }
 }

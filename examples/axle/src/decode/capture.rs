@@ -1,6 +1,6 @@
 //! Lists a capture with times: pcapng.
 
-use super::{Args, Choice, Printer, Sheet, style, walk};
+use super::{Args, Choice, Printer, Sheet, no_frame_with_times, style, walk};
 use crate::{failure::Failure, input::Input};
 
 /// Length of the lines that are printed at once.
@@ -29,8 +29,7 @@ pub(super) fn run(args: &Args, mut input: Input, choice: Choice) -> Result<(), F
     }
     printer.finish(&account, walked.times_back)?;
     if account.frames == 0 && account.received > 0 {
-        let received = account.received;
-        let line = format!("no frame in {received} bytes: use --protocol if it is another one");
+        let line = no_frame_with_times(choice.protocol, account.received);
         return Err(Failure::Failed(line));
     }
     Ok(())

@@ -31,6 +31,8 @@ use detect::{Guess, Share};
 pub(crate) use framing::Choice;
 use framing::for_framing;
 use printer::Printer;
+#[cfg(all(test, feature = "mcap"))]
+pub(crate) use stream::Mark;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 pub(crate) use walk::{Next, Walked, walk};
@@ -187,6 +189,18 @@ fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> Stri
             format!("{plain}, but {frames} of {found}: use --protocol {found}")
         }
         _ => format!("{plain}: the wrong protocol, the wrong baud rate, or noise"),
+    }
+}
+
+/// The same for a capture that says its protocols; `named` is on the command line instead.
+fn no_frame_with_times(named: Option<Protocol>, received: u64) -> String {
+    match named.map(|protocol| protocol.name()) {
+        Some(name) => {
+            format!(
+                "no frame in {received} bytes as {name}: without --protocol, the capture says it"
+            )
+        }
+        None => format!("no frame in {received} bytes: use --protocol if it is another one"),
     }
 }
 

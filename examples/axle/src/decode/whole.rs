@@ -1,6 +1,8 @@
 //! A whole capture into something else than a listing: tables, files, plots.
 
-use super::{Choice, Guess, Next, Sheet, Walked, detect, guess, no_frame, walk};
+use super::{
+    Choice, Guess, Next, Sheet, Walked, detect, guess, no_frame, no_frame_with_times, walk,
+};
 use crate::{
     args::Protocol,
     failure::Failure,
@@ -59,9 +61,7 @@ impl Chosen {
             (_, false, Some(protocol)) => {
                 no_frame(protocol, account, &detect::shares(input.first()))
             }
-            (received, ..) => {
-                format!("no frame in {received} bytes: use --protocol if it is another one")
-            }
+            (received, _, protocol) => no_frame_with_times(protocol, received),
         }))
     }
 }

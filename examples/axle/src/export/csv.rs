@@ -9,7 +9,7 @@ use std::{
 
 use super::{Job, cannot_write};
 use crate::{
-    beside::Beside,
+    beside::{Beside, COLUMNS, LIST},
     decode::{self, Walked},
     failure::Failure,
     listing::Out,
@@ -17,7 +17,7 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "csv")?;
+    let (beside, path) = Beside::folder(job.output, job.force, "csv", &job.input)?;
     beside.end_on(&job.signals);
     let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
     let mut list = List::default();
@@ -49,8 +49,8 @@ pub(super) struct List(BTreeMap<String, String>);
 
 impl List {
     pub(super) fn write(&self, folder: &Path) -> io::Result<()> {
-        let mut file = File::create(folder.join("columns.csv"))?;
-        file.write_all(b"table,column,unit,type\n")?;
+        let mut file = File::create(folder.join(LIST))?;
+        file.write_all(format!("{COLUMNS}\n").as_bytes())?;
         self.0.values().try_for_each(|lines| file.write_all(lines.as_bytes()))
     }
 }
@@ -107,7 +107,7 @@ impl Sink for Folder<'_> {
     }
 }
 
-/// As in JSON, without quotes: no value has a comma.
+/// As in JSON, without quotes: only a text may have a comma, and then it has those of CSV.
 fn print(out: &mut Out, cell: Cell<'_>) {
     match cell {
         Cell::Integer(value) => out.text(itoa::Buffer::new().format(value)),
@@ -117,6 +117,17 @@ fn print(out: &mut Out, cell: Cell<'_>) {
         Cell::Float(f32::NEG_INFINITY) => out.text("-inf"),
         // Writing to memory does not fail.
         Cell::Float(value) => drop(serde_json::to_writer(&mut out.0, &value)),
+        Cell::Double(value) if value.is_nan() => out.text("nan"),
+        Cell::Double(f64::INFINITY) => out.text("inf"),
+        Cell::Double(f64::NEG_INFINITY) => out.text("-inf"),
+        Cell::Double(value) => drop(serde_json::to_writer(&mut out.0, &value)),
+        Cell::Flag(value) => out.text(if value { "true" } else { "false" }),
+        Cell::Text(text) if text.is_empty() || text.contains([',', '"', '\n', '\r']) => {
+            out.text("\"");
+            out.text(&text.replace('"', "\"\""));
+            out.text("\"");
+        }
+        Cell::Text(text) => out.text(text),
         Cell::Time(micros) => crate::listing::seconds(out, micros),
         Cell::Name(name) => out.text(name),
         Cell::Bytes(bytes) => {

@@ -11,7 +11,7 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, file) = Beside::file(job.output, job.force)?;
+    let (beside, file) = Beside::file(job.output, job.force, &job.input)?;
     beside.end_on(&job.signals);
     let mut file = BufWriter::new(file);
     let cannot = |error| cannot_write(job.output, &error);

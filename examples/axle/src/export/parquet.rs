@@ -15,7 +15,9 @@ use parquet::{
         page::{CompressedPage, Page, PageWriter},
         writer::ColumnCloseResult,
     },
-    data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type},
+    data_type::{
+        BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
+    },
     errors::ParquetError,
     file::{
         metadata::{ColumnChunkMetaData, KeyValue},
@@ -39,7 +41,7 @@ use crate::{
 };
 
 pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "parquet")?;
+    let (beside, path) = Beside::folder(job.output, job.force, "parquet", &job.input)?;
     beside.end_on(&job.signals);
     let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
     let mut list = List::default();
@@ -111,9 +113,12 @@ fn field(column: &Column) -> Result<Field, ParquetError> {
         Type::U16 => (Physical::INT32, Some(LogicalType::integer(16, false))),
         Type::U32 => (Physical::INT32, Some(LogicalType::integer(32, false))),
         Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
+        Type::I64 => (Physical::INT64, Some(LogicalType::integer(64, true))),
         Type::F32 => (Physical::FLOAT, None),
+        Type::F64 => (Physical::DOUBLE, None),
+        Type::Bool => (Physical::BOOLEAN, None),
         Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
-        Type::Name(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         Type::Bytes => (Physical::BYTE_ARRAY, None),
     };
     let repetition = match column.present {
@@ -190,6 +195,13 @@ fn write(
     match &column.values {
         Values::Small(values) => put::<Int32Type>(to, part(values, range), piece),
         Values::Float(values) => put::<FloatType>(to, part(values, range), piece),
+        Values::Double(values) => put::<DoubleType>(to, part(values, range), piece),
+        Values::Flag(values) => put::<BoolType>(to, part(values, range), piece),
+        Values::Large(values) if column.kind != Type::Time => {
+            // The same 64 bits, whether they have a sign or not.
+            let values: Vec<_> = part(values, range).iter().map(|value| *value as i64).collect();
+            put::<Int64Type>(to, &values, piece)
+        }
         Values::Large(values) => {
             let values = part(values, range).iter().map(|value| i64::try_from(*value));
             let values = values.collect::<Result<Vec<_>, _>>().map_err(|_| {
@@ -203,8 +215,18 @@ fn write(
             let values: Vec<_> = part(values, range).iter().map(name).collect();
             put::<ByteArrayType>(to, &values, piece)
         }
-        // Those without nulls have gone to `bytes`, and the schema has no others.
-        Values::Bytes(..) => Err(ParquetError::General("a column of bytes has nulls".to_owned())),
+        // Those without nulls have gone to `bytes`.
+        Values::Bytes(ends, all) => {
+            let begin = range.start.checked_sub(1).and_then(|before| ends.get(before));
+            let mut begin = begin.copied().unwrap_or_default() as usize;
+            let value = |end: &u32| {
+                let value = all.get(begin..*end as usize).unwrap_or_default();
+                begin = *end as usize;
+                ByteArray::from(value.to_vec())
+            };
+            let values: Vec<_> = part(ends, range).iter().map(value).collect();
+            put::<ByteArrayType>(to, &values, piece)
+        }
     }
 }
 
@@ -267,4 +289,45 @@ fn bytes(
         offset_index: None,
     };
     Ok((pages.into_inner()?.into(), close))
+}
+
+#[cfg(test)]
+mod tests {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+
+    use super::*;
+    use crate::tables::tests::{Added, lamp, tables_of};
+
+    #[test]
+    fn a_message_that_the_schema_has_not_has_the_columns_of_its_first_line() {
+        let path = std::env::temp_dir().join(format!("axle-{}-lamp.parquet", std::process::id()));
+        std::fs::create_dir(&path).unwrap();
+        let (lamp, less) = (lamp(), serde_json::json!({"colour": 2, "name": "c"}));
+        let mut tables = tables_of(&[Added("set_lamp", &lamp), Added("set_lamp", &less)]);
+        let mut folder = Folder { path: path.clone(), output: &path, files: BTreeMap::new() };
+        tables.give_rest(&mut folder).unwrap();
+        for mut file in folder.files.into_values() {
+            file.finish().unwrap();
+        }
+        let file = File::open(path.join("ucp.set_lamp.parquet")).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+        std::fs::remove_dir_all(path).unwrap();
+        let told = |row: usize, name: &str| {
+            let value = rows[row].get_column_iter().find(|(known, _)| *known == name);
+            value.unwrap().1.to_string()
+        };
+        for (name, first, second) in [
+            ("index", "7", "7"),
+            ("colour", "1", "2"),
+            ("cold", "-3", "null"),
+            ("watts", "0.1", "null"),
+            ("is_on", "true", "null"),
+            ("name", "\"a, \"b\"\"", "\"c\""),
+            ("t_c_1", "-3", "null"),
+            ("huge", "18446744073709551615", "null"),
+        ] {
+            assert_eq!([told(0, name), told(1, name)], [first, second], "{name}");
+        }
+    }
 }

@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
     let signals = Signals::listen()?;
     let input = Input::open(Some(&args.file))?;
-    let output = output::Output::create(&args.output, args.force, &signals)?;
+    let output = output::Output::create(&args.output, args.force, &input, &signals)?;
     let picture = read::picture(args, input, &signals)?;
     let bytes = match format {
         output::Format::Svg => draw::to_svg(&picture)?.into_bytes(),

@@ -2,7 +2,7 @@
 
 use std::{fs::File, io::Write, path::Path};
 
-use crate::{beside::Beside, failure::Failure, signals::Signals};
+use crate::{beside::Beside, failure::Failure, input::Input, signals::Signals};
 
 /// What a picture is made as.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -34,8 +34,13 @@ pub(super) struct Output<'a> {
 
 impl<'a> Output<'a> {
     /// Fails at once if the file cannot be written, not after a long capture.
-    pub(super) fn create(path: &'a Path, force: bool, signals: &Signals) -> Result<Self, Failure> {
-        let (beside, file) = Beside::file(path, force)?;
+    pub(super) fn create(
+        path: &'a Path,
+        force: bool,
+        input: &Input,
+        signals: &Signals,
+    ) -> Result<Self, Failure> {
+        let (beside, file) = Beside::file(path, force, input)?;
         beside.end_on(signals);
         Ok(Self { path, beside, file })
     }

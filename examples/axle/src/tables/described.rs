@@ -1,7 +1,7 @@
 //! What the columns of each table are: read from the JSON Schema of `axle decode --json` and from
 //! the page of its fields, so that there is no second list of them.
 
-use std::fmt;
+use std::{borrow::Cow, fmt, marker::PhantomData};
 
 use serde::{
     Deserialize, Deserializer,
@@ -27,6 +27,11 @@ pub(crate) enum Type {
     U16,
     U32,
     U64,
+    /// Integers of a message that the schema has not; so are the next three.
+    I64,
+    F64,
+    Bool,
+    Text,
     /// NaN and infinities, which are strings in JSON, are values here.
     F32,
     /// Microseconds since 1970; seconds in JSON.
@@ -40,7 +45,7 @@ pub(crate) enum Type {
 /// A field of a message, as in a line of `decode --json`.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
-    pub(super) name: &'static str,
+    pub(super) name: Cow<'static, str>,
     pub(super) kind: Kind,
     /// Whether a line may be without it.
     pub(super) is_optional: bool,
@@ -52,7 +57,7 @@ pub(super) struct Field {
 pub(super) enum Kind {
     One(Type),
     Array(Type, usize),
-    Object(Type, Vec<&'static str>),
+    Object(Type, Vec<Cow<'static, str>>),
 }
 
 /// A message, or the gaps.
@@ -75,6 +80,10 @@ impl Type {
             Self::U16 => "u16",
             Self::U32 => "u32",
             Self::U64 => "u64",
+            Self::I64 => "i64",
+            Self::F64 => "f64",
+            Self::Bool => "bool",
+            Self::Text => "text",
             Self::F32 => "f32",
             Self::Time => "time",
             Self::Name(_) => "name",
@@ -84,28 +93,47 @@ impl Type {
 }
 
 /// A JSON Schema of the lines of one message, without references and with units: what viewers of
-/// MCAP read.
+/// MCAP read. `line` is the first of them: what the schema of `decode --json` has not, it has.
 #[cfg(feature = "mcap")]
-pub(crate) fn json_schema(protocol: Option<Protocol>, message: &str) -> Option<String> {
+pub(crate) fn json_schema(
+    protocol: Option<Protocol>,
+    message: &'static str,
+    line: &[u8],
+) -> Option<String> {
     use serde_json::{Map, Value, json};
 
+    let whole: Value = serde_json::from_str(SCHEMA).ok()?;
+    // A number, or one of the names of what is none.
+    let speed = whole.get("$defs")?.get("rps")?;
     let value = |of: &Type| match of {
-        Type::F32 | Type::Time => json!({"type": "number"}),
-        Type::Name(_) | Type::Bytes => json!({"type": "string"}),
+        Type::F32 | Type::F64 => speed.clone(),
+        Type::Time => json!({"type": "number"}),
+        Type::Name(_) | Type::Bytes | Type::Text => json!({"type": "string"}),
+        Type::Bool => json!({"type": "boolean"}),
         _ => json!({"type": "integer"}),
     };
-    let described =
-        all()?.into_iter().find(|it| (it.protocol, it.message) == (protocol, message))?;
+    let all = all()?;
+    let known = all.iter().find(|it| (it.protocol, it.message) == (protocol, message));
+    let line = super::own::Line::read(line)?;
+    let of_line = super::own::describe(&all, protocol, message, &line)?;
+    let mut fields = known.map_or_else(Vec::new, |known| known.fields.clone());
+    for field in of_line.fields {
+        if fields.iter().all(|known| known.name != field.name) {
+            fields.push(field);
+        }
+    }
     let mut properties = Map::new();
-    for field in &described.fields {
+    for field in &fields {
         let mut property = match &field.kind {
+            // In a table it is the text of something else, and that has no type.
+            Kind::One(Type::Text) if !line.has_text(&field.name) => json!({}),
             Kind::One(of) => value(of),
             Kind::Array(of, len) => {
                 json!({"type": "array", "items": value(of), "minItems": len, "maxItems": len})
             }
             Kind::Object(of, names) => {
                 let all: Map<String, Value> =
-                    names.iter().map(|name| ((*name).to_owned(), value(of))).collect();
+                    names.iter().map(|name| (name.to_string(), value(of))).collect();
                 json!({"type": "object", "properties": all})
             }
         };
@@ -113,7 +141,7 @@ pub(crate) fn json_schema(protocol: Option<Protocol>, message: &str) -> Option<S
             object.insert("unit".to_owned(), field.unit.into());
             object.insert("description".to_owned(), format!("unit: {}", field.unit).into());
         }
-        properties.insert(field.name.to_owned(), property);
+        properties.insert(field.name.to_string(), property);
     }
     let title = super::name(protocol, message);
     let schema = json!({"title": title, "type": "object", "properties": properties});
@@ -152,7 +180,7 @@ struct Schema<'a> {
     #[serde(borrow, rename = "oneOf")]
     one_of: Vec<Shape<'a>>,
     #[serde(borrow, rename = "$defs")]
-    definitions: Pairs<'a>,
+    definitions: Pairs<&'a str, Shape<'a>>,
 }
 
 /// A type, a field or a line.
@@ -172,7 +200,7 @@ struct Shape<'a> {
     #[serde(rename = "minItems")]
     len: Option<usize>,
     #[serde(borrow)]
-    properties: Option<Pairs<'a>>,
+    properties: Option<Pairs<&'a str, Shape<'a>>>,
     #[serde(borrow)]
     required: Vec<&'a str>,
 }
@@ -185,22 +213,22 @@ enum Constant<'a> {
     Name(&'a str),
 }
 
-/// An object in the order of the file.
+/// An object in the order of the text.
 #[derive(Debug)]
-struct Pairs<'a>(Vec<(&'a str, Shape<'a>)>);
+pub(super) struct Pairs<K, V>(pub(super) Vec<(K, V)>);
 
-impl<'de: 'a, 'a> Deserialize<'de> for Pairs<'a> {
+impl<'de, K: Deserialize<'de>, V: Deserialize<'de>> Deserialize<'de> for Pairs<K, V> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct InOrder;
+        struct InOrder<K, V>(PhantomData<(K, V)>);
 
-        impl<'de> Visitor<'de> for InOrder {
-            type Value = Pairs<'de>;
+        impl<'de, K: Deserialize<'de>, V: Deserialize<'de>> Visitor<'de> for InOrder<K, V> {
+            type Value = Pairs<K, V>;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("an object")
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs<'de>, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
                 let mut pairs = Vec::new();
                 while let Some(pair) = map.next_entry()? {
                     pairs.push(pair);
@@ -209,7 +237,7 @@ impl<'de: 'a, 'a> Deserialize<'de> for Pairs<'a> {
             }
         }
 
-        deserializer.deserialize_map(InOrder)
+        deserializer.deserialize_map(InOrder(PhantomData))
     }
 }
 
@@ -248,7 +276,7 @@ impl Schema<'static> {
             let kind = self.kind(property)?;
             let is_optional = !shape.required.contains(name);
             let unit = unit(name, protocol, message)?;
-            fields.push(Field { name, kind, is_optional, unit });
+            fields.push(Field { name: Cow::Borrowed(*name), kind, is_optional, unit });
         }
         let known = all.iter_mut().find(|it| it.protocol == protocol && it.message == message);
         let Some(known) = known else {
@@ -283,7 +311,7 @@ impl Schema<'static> {
         }
         if let Some(Pairs(properties)) = &shape.properties {
             let (_, first) = properties.first()?;
-            let names = properties.iter().map(|(name, _)| *name).collect();
+            let names = properties.iter().map(|(name, _)| Cow::Borrowed(*name)).collect();
             return Some(Kind::Object(one(first)?, names));
         }
         let of = match &shape.constant {
@@ -330,7 +358,7 @@ fn integer(minimum: i64, maximum: Option<i64>) -> Type {
 }
 
 /// The unit of a field, from the page.
-fn unit(field: &str, protocol: Option<Protocol>, message: &str) -> Option<&'static str> {
+pub(super) fn unit(field: &str, protocol: Option<Protocol>, message: &str) -> Option<&'static str> {
     let group = match protocol {
         Some(Protocol::Ucp) => "UCP",
         Some(Protocol::Ikeya | Protocol::Ikeya3) => "Ikeya",

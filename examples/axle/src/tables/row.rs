@@ -2,6 +2,7 @@
 //! straight to its column.
 
 use core::fmt;
+use std::borrow::Cow;
 
 use axlewire::ikeya::Mode;
 use serde::{
@@ -14,7 +15,7 @@ use super::column::Column;
 /// Where a field of a line goes.
 #[derive(Debug)]
 pub(super) struct Slot {
-    pub(super) name: &'static str,
+    pub(super) name: Cow<'static, str>,
     /// Its first column.
     pub(super) first: usize,
     /// Number of its columns; 0 for a field that is the same in the whole table.
@@ -88,7 +89,7 @@ impl SerializeMap for Row<'_> {
         loop {
             let (slot, rest) = self.slots.split_first().ok_or(Unfit)?;
             self.slots = rest;
-            if key.serialize(IsName(slot.name))? {
+            if key.serialize(IsName(&slot.name))? {
                 let whole = self.whole;
                 return match slot.width {
                     0 => Ok(()),
