@@ -614,3 +614,48 @@ fn memory_does_not_grow_with_the_capture_and_no_peak_is_lost() {
         }
     }
 }
+
+/// Names of the series of the errors of a capture of raw bytes, with their number of points.
+#[cfg(feature = "plot")]
+fn errors_of(name: &str, bytes: &[u8]) -> Vec<(String, u64)> {
+    let folder = Folder::new(name);
+    let capture = folder.path("a.bin");
+    fs::write(&capture, bytes).unwrap();
+    let page = page(&capture, &[]);
+    let panels = page["panels"].as_array().unwrap();
+    let Some(errors) = panels.iter().find(|panel| panel["title"] == "Errors") else {
+        return Vec::new();
+    };
+    let series = errors["series"].as_array().unwrap().iter();
+    series
+        .map(|it| (it["name"].as_str().unwrap().to_owned(), it["count"].as_u64().unwrap()))
+        .collect()
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn a_second_answer_to_one_request_is_an_error_and_one_before_any_request_is_not() {
+    let answer = |node| VelocityResponse::new(node, Rps::new(1.0).unwrap());
+    let (one, two) = (answer(NodeId::N1), answer(NodeId::N2));
+    let read = ReadRequest::new(NodeId::N1);
+    let (one, two, read) =
+        (one.as_bytes().as_slice(), two.as_bytes().as_slice(), read.as_bytes().as_slice());
+    let found = errors_of("unasked", &[one, read, one, one, two].concat());
+    assert_eq!(found, [("node 1 unasked".to_owned(), 1), ("node 2 unasked".to_owned(), 1)]);
+    assert_eq!(errors_of("asked", &[one, two, read, one].concat()), []);
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn a_rover_that_starts_again_has_lost_no_report() {
+    use axlewire::ucp::{Body, Telemetry, message::FirmwareReport};
+    let report = |index| {
+        let sent = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
+        sent.as_bytes().to_vec()
+    };
+    let bytes =
+        |indices: &[u8]| indices.iter().flat_map(|index| report(*index)).collect::<Vec<_>>();
+    assert_eq!(errors_of("again", &bytes(&[10, 11, 11, 12, 0, 1, 2])), []);
+    let lost = [("report lost".to_owned(), 3)];
+    assert_eq!(errors_of("lost", &bytes(&[254, 255, 0, 4, 5])), lost);
+}

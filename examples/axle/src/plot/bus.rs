@@ -33,6 +33,8 @@ pub(super) struct Bus {
     nodes: BTreeMap<u8, Node>,
     /// The node whose answer is due, and since when.
     asked: Option<(u8, u64)>,
+    /// Whether there was one.
+    has_requests: bool,
     /// Commands whose meaning is not known: in front of the first answer of their node (ruling I3).
     ambiguous: u64,
 }
@@ -97,6 +99,7 @@ impl Bus {
     fn ask(&mut self, node: u8, x: u64) {
         self.miss();
         self.asked = Some((node, x));
+        self.has_requests = true;
     }
 
     /// Books a poll whose answer has not come before the next request.
@@ -124,6 +127,8 @@ impl Bus {
             // Behind the next request (ruling I7).
             _ if known.missing > 0 => self.errors.late(node, x),
             Some(_) => self.errors.stray(node, x),
+            // A second answer to one request.
+            None if self.has_requests => self.errors.stray(node, x),
             // The requests are not in the capture.
             None => {}
         }

@@ -385,21 +385,27 @@ fn text(size: f64, weight: FontStyle, colour: &'static RGBColor, side: HPos) -> 
     TextStyle::from(font).color(colour).pos(Pos::new(side, VPos::Center))
 }
 
-/// A number with as many decimals as an axis over this span needs.
+/// A number with as many digits as an axis over this span needs; with an exponent where that is
+/// shorter.
 fn number(value: f64, span: f64) -> String {
-    let decimals = match span {
-        span if span >= 20.0 => 0,
-        span if span >= 2.0 => 1,
-        span if span >= 0.2 => 2,
-        span if span >= 0.02 => 3,
-        _ => 6,
-    };
-    let text = format!("{value:.decimals$}");
-    let text = match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.'),
-        false => &text,
+    // A twentieth of the span is told apart. Below 0: so many digits in front of the point are 0.
+    let decimals = (20.0 / span).log10().ceil().clamp(-320.0, 320.0) as i32;
+    let digits = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 + decimals };
+    let is_long = decimals > 5 || value.abs() >= 1e7;
+    let text = if is_long && digits <= 4 && value != 0.0 {
+        let text = format!("{value:.*e}", digits.max(0) as usize);
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        format!("{}e{exponent}", without_zeros(mantissa))
+    } else {
+        let text = format!("{value:.*}", decimals.clamp(0, 12) as usize);
+        without_zeros(&text).to_owned()
     };
     if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
+}
+
+/// Without zeros at the end of the decimals.
+fn without_zeros(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
 #[cfg(test)]
@@ -427,5 +433,20 @@ mod tests {
         let shown = [(-5.0, 20.0), (0.25, 1.0), (1500.0, 4000.0), (-0.01, 30.0)];
         let texts = shown.map(|(value, span)| number(value, span));
         assert_eq!(texts, ["\u{2212}5", "0.25", "1500", "0"]);
+    }
+
+    #[test]
+    fn the_numbers_of_an_axis_differ_and_are_right() {
+        for span in [6.8e38, 3e9, 4000.0, 30.0, 0.3, 0.01, 3e-6, 2e-7, 1e-30] {
+            let values = [-0.5, -0.25, 0.0, 0.25, 0.5].map(|part| part * span);
+            let texts = values.map(|value| number(value, span));
+            for (at, (text, value)) in texts.iter().zip(values).enumerate() {
+                assert!(!texts[..at].contains(text) && text.chars().count() <= 8, "{texts:?}");
+                let read: f64 = text.replace('\u{2212}', "-").parse().unwrap();
+                assert!((read - value).abs() <= span / 20.0, "{text} for {value}");
+            }
+        }
+        // A second at the end of a capture of days.
+        assert_eq!(number(172_800.25, 1.0), "172800.25");
     }
 }

@@ -19,6 +19,8 @@ const AMPERE: f64 = 100.0;
 
 /// Time without a report after which the curves are interrupted (ruling U10), microseconds.
 const LINK_TIMEOUT: u64 = 500_000;
+/// Microseconds from one report to the next.
+const REPORT_PERIOD: u64 = 20_000;
 
 /// A larger step of the heading is one over north, degrees.
 const HALF_TURN: f64 = 180.0;
@@ -136,7 +138,13 @@ impl Rover {
         let last = line.index.and_then(|index| self.last.replace((index, x)));
         if let (Some(index), Some((before, since))) = (line.index, last) {
             // The same one again: none is missing.
-            self.errors.lost(index.wrapping_sub(before).saturating_sub(1), x);
+            let lost = index.wrapping_sub(before).saturating_sub(1);
+            // The robot has started again if there was no time for so many.
+            let is_plausible = match has_times {
+                true => x.saturating_sub(since) >= u64::from(lost) * REPORT_PERIOD / 2,
+                false => lost < 128,
+            };
+            self.errors.lost(if is_plausible { lost } else { 0 }, x);
             if has_times && x.saturating_sub(since) > LINK_TIMEOUT {
                 self.measured().for_each(Group::cut);
             }
