@@ -647,6 +647,20 @@ fn a_second_answer_to_one_request_is_an_error_and_one_before_any_request_is_not(
 
 #[cfg(feature = "plot")]
 #[test]
+fn an_option_that_does_not_fit_the_capture_is_an_error() {
+    let folder = Folder::new("options");
+    let [raw, timed] =
+        ["ucp.bin", "drive.pcapng"].map(|it| Path::new(CAPTURES).join(it).display().to_string());
+    let output = folder.path("a.svg");
+    let said = complaint(&[&raw, "-o", &output, "--interface", "5"], 1);
+    assert!(said.ends_with("has raw bytes and no interfaces"), "{said}");
+    let said = complaint(&[&timed, "-o", &output, "--baud", "9600"], 1);
+    assert!(said.ends_with("has times: --baud is for raw bytes"), "{said}");
+    assert!(folder.names().is_empty());
+}
+
+#[cfg(feature = "plot")]
+#[test]
 fn a_rover_that_starts_again_has_lost_no_report() {
     use axlewire::ucp::{Body, Telemetry, message::FirmwareReport};
     let report = |index| {

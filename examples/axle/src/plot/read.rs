@@ -126,10 +126,17 @@ impl<'a> Reading<'a> {
     fn finish(self) -> Result<Picture, Failure> {
         let file = &self.args.file;
         let failed = |line| Err(Failure::Failed(line));
-        let (Some((protocol, _)), Some(curves), Some(reach)) = (self.line, self.curves, self.reach)
+        let (Some((protocol, interface)), Some(curves), Some(reach)) =
+            (self.line, self.curves, self.reach)
         else {
             return failed(format!("{file:?} has nothing on that interface"));
         };
+        if interface.is_none() && self.args.interface.is_some() {
+            return failed(format!("{file:?} has raw bytes and no interfaces"));
+        }
+        if self.has_times == Some(true) && self.args.baud.is_some() {
+            return failed(format!("{file:?} has times: --baud is for raw bytes"));
+        }
         let name = protocol.name();
         let axis = axis(self.has_times == Some(true), self.args.baud, reach);
         let mut notes = match &curves {
