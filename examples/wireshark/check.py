@@ -25,6 +25,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree as xml
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import corpora
@@ -398,13 +399,17 @@ def planted(user, captures, folder):
     if check_captures(user, captures, whole).differences:
         print("there are differences without a damage")
         return 1
-    for number, (old, new) in enumerate(damages.DAMAGES, 1):
+    def plant(numbered):
+        number, (old, new) = numbered
+        if text.count(old) != 1:
+            return f"its text is there {text.count(old)} times"
         script = folder / f"damage-{number}.lua"
         script.write_text(text.replace(old, new))
-        if text.count(old) != 1:
-            problem = f"its text is there {text.count(old)} times"
-        else:
-            problem = problem_with(user, captures, script)
+        return problem_with(user, captures, script)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        problems = list(pool.map(plant, enumerate(damages.DAMAGES, 1)))
+    for (old, new), problem in zip(damages.DAMAGES, problems, strict=True):
         if problem:
             missed += 1
             print(f"{old!r} as {new!r}: {problem}")
@@ -458,6 +463,8 @@ def check_filters(user, captures, comparison):
 def check_live(user, comparison):
     """Captures live lines, and compares what was captured. Returns the number of packets."""
     axle = user.home / "axle"
+    for command in live.of_failures(user, axle):
+        comparison.differ("live", f"it does not end: {command}")
     count = 0
     for name, run in (("rover", live.of_rover), ("bus", live.of_bus)):
         path = user.home / f"{name}.pcapng"

@@ -353,6 +353,9 @@ def of_times():
     for step in (900, 3 * 3600 * 1_000_000, 4_294_967_296 + 1000, -500_000):
         file.packet(line, bus(read, 1), OUT)
         file.packet(line, rps(speed, 1, 1.5), IN, step)
+    # An echo that is found at the end only.
+    file.packet(line, bus(read, 1), OUT)
+    file.packet(line, b"\xBB\1" + bus(read, 1), IN)
     three = file.interface("ikeya-3", "/dev/ttyAMA0")
     for request, wire_time in ((bus(read, 1), 400), (rps(write, 1, 1.0, 2.0, -3.5), 640)):
         for step in (20_000 + wire_time, 20_001 + wire_time):
@@ -393,15 +396,16 @@ def of_words():
 
 
 # What the first of two passes shows: bytes that may become a frame, and skipped bytes so far.
-ONE_PASS = [("10", ""), ("", ""), ("", "3"), ("1", ""), ("", ""), ("7", ""), ("", "")]
+ONE_PASS = [("10", ""), ("", ""), ("", "3"), ("1", ""), ("", ""), ("7", ""), ("", ""),
+            ("6", ""), ("5", ""), ("", "")]
 
 
 def of_one_pass():
-    """A frame in two packets, a gap in two, and a frame in two behind a whole one."""
+    """A frame in two packets, a gap, a frame in two behind a whole one, and a frame in three."""
     file, frame = PcapNg(), ucp(0x42, b"hello")
     line = file.interface("ucp")
     for bytes in (frame[:10], frame[10:], b"\0\1\2", b"\xFD", b"\1" + frame, frame + frame[:7],
-                  frame[7:]):
+                  frame[7:], frame[:6], frame[6:11], frame[11:]):
         file.packet(line, bytes, IN)
     return file
 
