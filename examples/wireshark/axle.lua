@@ -95,9 +95,6 @@ local MEANINGS = {
 
 -- Streams: the bytes of one interface in one direction.
 
--- How many of the first bytes of a gap are kept: they may tell what it was.
-local KEPT = 1024
-
 local function new_stream(kind, direction)
     return {
         kind = kind,
@@ -117,7 +114,7 @@ end
 local function skip(stream, count, reason)
     local gap = stream.gap
     if not gap then
-        gap = { begin = stream.offset, reason = reason, by = {}, bytes = "" }
+        gap = { begin = stream.offset, reason = reason, by = {} }
         stream.gap = gap
     end
     gap.by[reason] = (gap.by[reason] or 0) + count
@@ -162,10 +159,6 @@ local function search(stream, is_over, meet)
             meet(frame)
         elseif verdict == "reject" then
             skip(stream, count, reason)
-            local gap = stream.gap
-            if #gap.bytes < KEPT then
-                gap.bytes = gap.bytes .. held:sub(at, at + math.min(count, KEPT) - 1)
-            end
         else
             break
         end
@@ -183,7 +176,6 @@ local function copy_of(stream)
     local gap = stream.gap
     if gap then
         copy.gap = { begin = gap.begin, finish = gap.finish, reason = gap.reason, by = {} }
-        copy.gap.bytes = gap.bytes
         for reason, count in pairs(gap.by) do copy.gap.by[reason] = count end
     end
     return copy
@@ -218,10 +210,31 @@ local IKEYA_NAMES = {
 
 local ucp_message -- defined with the fields
 
--- The request of an answer, and how long the answer took.
+-- The request of an answer, and how long the answer took: nothing is known of that if a packet has
+-- no time, or if the clock was set back.
 local function match(answer, asked)
     answer.request = asked
-    answer.took = math.max(answer.micros - asked.micros, 0)
+    if answer.micros and asked.micros and answer.micros >= asked.micros then
+        answer.took = answer.micros - asked.micros
+    end
+end
+
+-- Whether the adapter hears what it has sent: a frame of the master that came from the
+-- other side before, and whose echo has not come yet. Echoes come in the order in which the frames
+-- were sent; those of damaged ones never come. The last few are enough.
+local MOST_ECHOES = 16
+
+local function is_echo(state, frame)
+    local sent = state.sent
+    for at, earlier in ipairs(sent) do
+        if earlier.bytes == frame.bytes and earlier.direction ~= frame.direction then
+            for _ = 1, at do table.remove(sent, 1) end
+            return true
+        end
+    end
+    sent[#sent + 1] = frame
+    if #sent > MOST_ECHOES then table.remove(sent, 1) end
+    return false
 end
 
 -- A frame of the bus, in the order in which frames are decided.
@@ -231,12 +244,11 @@ local function meet_ikeya(line, frame)
     frame.name, frame.node = IKEYA_NAMES[header], node
     if header == READ or header == WRITE then
         if header == WRITE then frame.mode = state.modes[node] end
-        local asked = state.asked
-        if asked and asked.bytes == frame.bytes and asked.direction ~= frame.direction then
-            -- The adapter hears what it sends.
+        if is_echo(state, frame) then
             frame.is_echo = true
             return
         end
+        local asked = state.asked
         if asked then state.unanswered[asked] = true end
         state.has_requests = true
         -- Boards with three motors answer a WRITE too (ruling I10).
@@ -254,7 +266,7 @@ local function meet_ikeya(line, frame)
         state.answers[asked] = frame
         state.asked = nil
         local wire_time = IKEYA_BYTE * (#asked.bytes + #frame.bytes)
-        frame.is_late = frame.took > reply_window.ikeya + wire_time
+        frame.is_late = frame.took and frame.took > reply_window.ikeya + wire_time
     elseif asked then
         frame.is_foreign, frame.asked = true, asked
     elseif state.has_requests then
@@ -278,14 +290,26 @@ local function meet_ucp(line, frame)
     end
 end
 
+-- Once that has passed without an answer, none is expected any more, microseconds. On the rover's
+-- link, whose requests are repeated every second at the most, it is no ruling.
+local UCP_PATIENCE = 1000000
+local function patience_for(kind, asked)
+    if kind.name == "ucp" then return UCP_PATIENCE end
+    return reply_window.ikeya + IKEYA_BYTE * (#asked.bytes + kind.longest)
+end
+
 -- `answers` and `unanswered` are of requests; those of a copy are for what is behind the original.
 local function new_state()
-    return { modes = {}, open = {}, answers = {}, unanswered = {} }
+    return { modes = {}, sent = {}, open = {}, answers = {}, unanswered = {} }
 end
 
 local KINDS = {
-    [wtap.USER0] = { name = "ikeya", motors = 1, judge = judge_ikeya(8), meet = meet_ikeya },
-    [wtap.USER1] = { name = "ikeya-3", motors = 3, judge = judge_ikeya(16), meet = meet_ikeya },
+    [wtap.USER0] = {
+        name = "ikeya", motors = 1, longest = 8, judge = judge_ikeya(8), meet = meet_ikeya,
+    },
+    [wtap.USER1] = {
+        name = "ikeya-3", motors = 3, longest = 16, judge = judge_ikeya(16), meet = meet_ikeya,
+    },
     [wtap.USER3] = { name = "ucp", judge = judge_ucp, meet = meet_ucp },
 }
 
@@ -305,6 +329,7 @@ local function ending_of(line)
     local state = new_state()
     state.has_requests, state.asked = line.state.has_requests, line.state.asked
     for name, frame in pairs(line.state.open) do state.open[name] = frame end
+    for at, frame in ipairs(line.state.sent) do state.sent[at] = frame end
     local copy = { kind = line.kind, state = state }
     local ending = { received = line.received, state = state, events = {} }
     for _, direction in ipairs(DIRECTIONS) do
@@ -315,6 +340,13 @@ local function ending_of(line)
             ending.events[direction] = last.events
         end
     end
+    local function give_up(asked)
+        if asked.micros and line.last_micros - asked.micros > patience_for(line.kind, asked) then
+            state.unanswered[asked] = true
+        end
+    end
+    if state.asked then give_up(state.asked) end
+    for _, asked in pairs(state.open) do give_up(asked) end
     line.ending = ending
     return ending
 end
@@ -323,7 +355,7 @@ end
 local function take(key, kind, direction, bytes, number, micros)
     local line = lines[key]
     if not line then
-        line = { kind = kind, state = new_state(), streams = {}, received = 0 }
+        line = { kind = kind, state = new_state(), streams = {}, received = 0, last_micros = 0 }
         lines[key] = line
     end
     local stream = line.streams[direction]
@@ -334,6 +366,7 @@ local function take(key, kind, direction, bytes, number, micros)
     local begin = stream.received
     local finish = begin + #bytes
     stream.received, line.received = finish, line.received + #bytes
+    if #bytes > 0 then line.last_micros = math.max(line.last_micros, micros or 0) end
     stream.chunks[#stream.chunks + 1] = { finish = finish, number = number, micros = micros }
     stream.held = stream.held .. bytes
     search(stream, false, function(frame) kind.meet(line, frame) end)
@@ -393,7 +426,7 @@ local function common_fields(abbr)
         pending = ProtoField.uint32(
             name("pending"), "May still become a frame", base.UNIT_STRING, BYTES),
         ends_in = ProtoField.framenum(name("ends_in"), "Goes on, and ends in packet"),
-        took = ProtoField.uint32(
+        took = ProtoField.uint64(
             name("response_time_us"), "Response time", base.UNIT_STRING, { " µs" }),
         clock = ProtoField.string(name("response_time_of"), "Response time as seen by"),
         request = ProtoField.framenum(
@@ -648,21 +681,67 @@ local function show_ikeya(frame, range, item, kind)
     return ("%s, node %d%s"):format(frame.name, frame.node, values_text)
 end
 
--- What harms a shipped robot, if this frame went to one (rulings U7, U13); nil if nothing does.
-local function hazard_of(frame, message, body)
-    if message.name == "motor_control" then
-        local speed, angular = body(0, 2):le_int(), body(2, 2):le_int()
-        if body(8, 2):le_int() > 38 then
-            return "Starts a firmware update in a shipped robot (ruling U7)"
-        elseif math.abs(speed) > 100 or math.abs(angular) > 100 then
-            return "Speed or steering beyond 100 % (ruling U7)"
+-- What harms a shipped robot, if the host sent this frame (rulings U7, U13): a list of reasons.
+
+-- A motor command or an offer of a version above it starts a firmware update.
+local HARMLESS_VERSION = 38
+
+local function motor_hazards(body)
+    local reasons = {}
+    local function add(...) reasons[#reasons + 1] = string.format(...) end
+    for at, name in ipairs({ "speed", "angular" }) do
+        local value = body(2 * (at - 1), 2):le_int()
+        if math.abs(value) > 100 then
+            add("%s %d is beyond 100 %% (ruling U7)", name, value)
         end
-    elseif message.name == "report" and frame.direction == "out" then
-        return "A report that is sent to a shipped robot hangs it (ruling U13)"
-    elseif message == UNKNOWN and MESSAGES[frame.bytes:byte(5)] then
-        return ("Id %d with a body of %d bytes, which shipped robots misread (ruling U13)")
-            :format(frame.bytes:byte(5), #frame.bytes - 8)
     end
+    local lamp = body(4, 2):le_int()
+    if lamp ~= 0 and lamp ~= 100 then
+        add("front_led %d is neither 0 nor 100 (ruling U7)", lamp)
+    end
+    local version = body(8, 2):le_int()
+    if version > HARMLESS_VERSION then
+        add("version %d starts a firmware update (ruling U7)", version)
+    elseif version ~= 0 then
+        add("version %d is not 0 (ruling U7)", version)
+    end
+    for _, reserved in ipairs({
+        { "back_led", body(6, 2):le_int() },
+        { "reserve1", body(10, 2):le_uint() },
+        { "reserve2", body(12, 4):le_uint() },
+    }) do
+        if reserved[2] ~= 0 then add("%s %d is not 0 (ruling U7)", reserved[1], reserved[2]) end
+    end
+    return reasons
+end
+
+-- The least length of a body with which the host sends this id; nil if it never does.
+local function least_of_host(id)
+    local least
+    for len, message in pairs(MESSAGES[id] or {}) do
+        if message.from == "host" then least = math.min(least or len, len) end
+    end
+    return least
+end
+
+local function hazards_of(frame, message, body)
+    local id, len = frame.bytes:byte(5), #frame.bytes - 8
+    -- Without a direction, the message tells the sender.
+    if frame.direction == "in" or frame.direction ~= "out" and message.from == "robot" then
+        return {}
+    end
+    local least = least_of_host(id)
+    if MESSAGES[id] and not least then
+        return { ("id %d from a host hangs shipped robots (ruling U13)"):format(id) }
+    elseif least and len < least then
+        local form = "a body of %d bytes, not %d: shipped robots read what lies behind (ruling U13)"
+        return { form:format(len, least) }
+    elseif message.name == "motor_control" then
+        return motor_hazards(body)
+    elseif message.name == "ota_request" and body(0, 2):le_int() > HARMLESS_VERSION then
+        return { ("version %d starts a firmware update (ruling U7)"):format(body(0, 2):le_int()) }
+    end
+    return {}
 end
 
 local function show_ucp(frame, range, item)
@@ -700,8 +779,10 @@ local function show_ucp(frame, range, item)
         item:add(UCP["unknown.body"], body or empty)
         texts = { ("id %d, body %s"):format(frame.bytes:byte(5), hex(frame.bytes:sub(7, -3))) }
     end
-    local hazard = hazard_of(frame, message, body)
-    if hazard then item:add_proto_expert_info(UCP_EXPERTS.hazard, hazard) end
+    local hazards = hazards_of(frame, message, body)
+    if #hazards > 0 then
+        item:add_proto_expert_info(UCP_EXPERTS.hazard, table.concat(hazards, "; "))
+    end
     local contents = #texts > 0 and ": " .. table.concat(texts, ", ") or ""
     return ("%s, index %d%s"):format(frame.name, frame.bytes:byte(6), contents)
 end
@@ -753,32 +834,22 @@ local function show_frame(event, packet, tvb, tree, view)
     local answer = state.answers[event] or (ending and ending.answers[event])
     if event.request then
         item:add(fields.request, event.request.number):set_generated()
-        item:add(fields.took, event.took):set_generated()
-        local port = interface_name()
-        item:add(fields.clock, clock_of(port and port.value)):set_generated()
-        text = text .. (" (%d µs)"):format(event.took)
+        if event.took then
+            item:add(fields.took, u64(event.took)):set_generated()
+            local port = interface_name()
+            item:add(fields.clock, clock_of(port and port.value)):set_generated()
+            text = text .. (" (%d µs)"):format(event.took)
+        end
     elseif answer then
         item:add(fields.answer, answer.number):set_generated()
-    elseif state.unanswered[event] or (ending and ending.unanswered[event]) then
+    elseif state.unanswered[event] then
         warn(item, experts.unanswered, "Not answered before the next request")
+    elseif ending and ending.unanswered[event] then
+        warn(item, experts.unanswered, "Not answered until the end")
     end
     if event.is_echo then text = text .. " (echo)" end
     item:append_text(", " .. text)
     return text
-end
-
--- A frame that the length cap refuses, and that a shipped robot takes (ruling U13).
-local function too_long_frame(bytes)
-    local at = 1
-    while true do
-        at = bytes:find("\253\255", at, true)
-        if not at or #bytes < at + 3 then return end
-        local len = bytes:byte(at + 2) + 256 * bytes:byte(at + 3)
-        if len > MOST_LEN and #bytes >= at + len + 3 and is_intact(bytes, at, at + len + 3) then
-            return len
-        end
-        at = at + 1
-    end
 end
 
 local function warn_of_gap(gap, item, view, text)
@@ -814,10 +885,10 @@ local function show_gap(gap, packet, tvb, tree, view, is_open)
         end
     end
     warn_of_gap(gap, item, view, text)
-    local len = packet.line.kind.name == "ucp" and gap.by.length and too_long_frame(gap.bytes)
-    if len then
-        warn(item, experts.hazard,
-            "A frame of length %d: above 60 it overruns shipped robots (ruling U13)", len)
+    -- Robots trust a length before they know the checksum, and whether all of the frame comes.
+    if gap.by.length and packet.line.kind.name == "ucp" and packet.stream.direction ~= "in" then
+        item:add_proto_expert_info(experts.hazard,
+            "A length below 4 or above 60 hangs or overruns shipped robots (rulings U2, U13)")
     end
     return text
 end
@@ -876,7 +947,8 @@ local function dissect(tvb, pinfo, tree)
         local key = ("%s:%s:%s"):format(kind.name, section and section.value or "",
             interface and interface.value or "")
         local direction = ({ [P2P_DIR_RECV] = "in", [P2P_DIR_SENT] = "out" })[pinfo.p2p_dir]
-        local micros = math.floor(pinfo.abs_ts * 1e6 + 0.5)
+        -- A packet without a time has the time 0.
+        local micros = pinfo.abs_ts > 0 and math.floor(pinfo.abs_ts * 1e6 + 0.5) or nil
         packet = take(key, kind, direction or "unknown", tvb:raw(), pinfo.number, micros)
         packet.is_blind = not interface
     end

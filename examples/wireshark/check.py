@@ -14,6 +14,7 @@ tshark runs as an ordinary user with a home of its own, into which install.sh in
 that is the user `nobody`, because tshark ignores folders of plugins that are root's choice.
 """
 import argparse
+import bisect
 import json
 import os
 import pwd
@@ -24,6 +25,7 @@ import sys
 import tempfile
 import xml.etree.ElementTree as xml
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import corpora
@@ -35,10 +37,13 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 AXLE = Path(os.environ.get("AXLE") or ROOT / "target/debug/axle")
 MISSING = 3
+SHORT_WINDOW_US = 500
 # Fewer values mean that hardly anything was compared.
 LEAST_VALUES = 40_000
 # Names of fields that say more than a line of JSON does, and are checked as facts.
 FACTS = {"request_in", "answer_in", "response_time_us", "response_time_of"}
+# That it is of a frame or gap that ends later, in one that is shown there.
+PART = "ends_in"
 WARNINGS = {"bad_crc", "gap", "unanswered", "late", "foreign", "mode_changed", "not_a_number",
             "hazard", "battery"}
 
@@ -69,6 +74,11 @@ class User:
         return out
 
 
+def mentions(wanted, found):
+    return found.endswith(f"({wanted})") or found.endswith(f": {wanted}") \
+        or f": {wanted} (" in found
+
+
 def decoded(path):
     """The frames and gaps of a capture, as the tool lists them."""
     out = subprocess.run([AXLE, "decode", "--json", path], stdout=subprocess.PIPE, check=True).stdout
@@ -81,7 +91,8 @@ class Shown:
 
     def __init__(self, packet, element):
         self.packet, self.protocol = packet, element.get("name")
-        self.fields, self.warnings = {}, Counter()
+        self.fields, self.warnings, self.names = {}, Counter(), {}
+        self.text = element.get("showname").partition(", ")[2]
         for field in element:
             name = field.get("name")
             if name == "_ws.expert":
@@ -90,6 +101,7 @@ class Shown:
                 continue
             name = name.removeprefix(self.protocol + ".")
             self.fields.setdefault(name, []).append((field.get("show"), field.get("value", "")))
+            self.names[name] = field.get("showname", "")
 
     def number(self, name):
         return int(self.fields[name][0][0])
@@ -102,20 +114,22 @@ class Packet:
         frame = next(proto for proto in element if proto.get("name") == "frame")
         shown = {field.get("name"): field.get("show") for field in frame.iter("field")}
         self.number = int(shown["frame.number"])
-        seconds, _, fraction = shown["frame.time_epoch"].partition(".")
+        # A packet without a time has none of these.
+        seconds, _, fraction = shown.get("frame.time_epoch", "0.0").partition(".")
         self.micros = 1_000_000 * int(seconds) + int(fraction[:6].ljust(6, "0"))
         flags = int(shown.get("frame.packet_flags_direction", "0"), 0)
+        self.port = shown.get("frame.interface_name", "")
         self.direction = {1: "in", 2: "out"}.get(flags)
         self.line = (int(shown.get("frame.section_number", "1")), int(shown["frame.interface_id"]))
 
 
 def shown_by_tshark(user, path, script=None, options=("-2", "-R", "frame")):
-    """What tshark shows: the frames and gaps in order, and the number of parts of such."""
+    """What tshark shows: the frames and gaps in order, and the parts of such."""
     command = ["tshark", "-r", path, *options, "-T", "pdml"]
     if script:
         command += ["-X", f"lua_script:{script}"]
     process = user.popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    whole, parts = [], 0
+    whole, parts = [], []
     try:
         for _, element in xml.iterparse(process.stdout):
             if element.tag != "packet":
@@ -130,7 +144,7 @@ def shown_by_tshark(user, path, script=None, options=("-2", "-R", "frame")):
                     if {"message", "skipped.length"} & shown.fields.keys():
                         whole.append(shown)
                     else:
-                        parts += 1
+                        parts.append(shown)
                 elif proto.get("name") not in ("geninfo", "frame", "fake-field-wrapper"):
                     whole.append(Shown(packet, proto))
             element.clear()
@@ -157,16 +171,20 @@ class Comparison:
     def differ(self, where, text):
         self.differences.append(f"{where}: {text}")
 
-    def compare(self, name, capture, rows, shown, parts):
+    def compare(self, name, capture, rows, shown, parts, columns,
+                window=expected.REPLY_WINDOW_US):
         """Compares a capture."""
         # The tool counts interfaces through all sections, Wireshark in each.
-        first, self.streams, ends = corpora.read(capture)
-        wanted_parts = sum(
-            row["offset"] < end < row["offset"] + row["length"]
-            for row in rows for end in ends[row.get("interface"), row.get("direction")])
-        if parts != wanted_parts:
-            self.differ(name, f"{parts} parts of frames and gaps, not {wanted_parts}")
-        facts = expected.exchanges(rows)
+        read = corpora.Read(capture)
+        first = read.first
+        places = [places_of(row, read) for row in rows]
+        self.parts(name, rows, places, parts)
+        complete(shown, columns)
+        if window == expected.REPLY_WINDOW_US:
+            self.columns(name, rows, places, read, shown + parts, columns)
+        facts = expected.exchanges(rows, read.last, window)
+        if window == expected.REPLY_WINDOW_US:
+            self.told(name, rows, facts)
         wanted = {}
         for number, row in enumerate(rows):
             key = (row.get("interface"), row.get("direction"), row["offset"])
@@ -190,6 +208,47 @@ class Comparison:
                 continue
             self.row(where, row, pairs[number])
             self.exchange(where, row, facts[number], pairs, number)
+            if not expected.is_text(row, facts[number], pairs[number].text):
+                self.differ(where, f"its text is {pairs[number].text!r}")
+
+    def told(self, name, rows, facts):
+        """The facts of the rules against those that are written by hand."""
+        for number, told in enumerate(corpora.TOLD.get(name, [])):
+            row, found = rows[number], facts[number]
+            if row["event"] == "skipped":
+                found = set(expected.gap_warnings(row, "ucp" if name == "hazards" else "ikeya"))
+            if told not in (found, "hazard" in found):
+                self.differ(name, f"line {number + 1}: {found}, and by hand {told}")
+        if name in corpora.TOLD and len(rows) != len(corpora.TOLD[name]):
+            self.differ(name, f"{len(rows)} lines, and by hand {len(corpora.TOLD[name])}")
+
+    def parts(self, name, rows, places, parts):
+        """The beginnings of frames and gaps in earlier packets."""
+        wanted = Counter()
+        for row, at in zip(rows, places, strict=True):
+            what = "frame" if row["event"] == "frame" else "gap"
+            for packet, length in at[:-1]:
+                text = f"{length} of {row['length']} bytes of a {what}"
+                wanted[packet, str(at[-1][0]), text] += 1
+        found = Counter((part.packet.number, part.fields.get(PART, [("", "")])[0][0], part.text)
+                        for part in parts)
+        for part in (wanted - found).keys() | (found - wanted).keys():
+            self.differ(name, f"part {part}: {found[part]} instead of {wanted[part]}")
+
+    def columns(self, name, rows, places, read, shown, columns):
+        """Sender, receiver, protocol, and the texts of the frames and gaps of each packet."""
+        wanted = {number: ["", "", "UCP" if protocol == "ucp" else "Ikeya MD", Counter()]
+                  for number, protocol in enumerate(read.protocols, 1)}
+        for row, at in zip(rows, places, strict=True):
+            known = row["event"] == "frame" and expected.addresses(row)
+            for packet, _ in at if known else []:
+                wanted[packet][:2] = known
+        for item in shown:
+            wanted[item.packet.number][3].update(item.text.split("; "))
+        for number, row in wanted.items():
+            *found, info = columns.get(number, ["", "", "", ""])
+            if [*found, Counter(info.split("; ") if info else [])] != row:
+                self.differ(name, f"packet {number}: columns {found} {info!r}, not {row}")
 
     def row(self, where, row, item):
         """All fields of a frame or gap, and no other."""
@@ -202,6 +261,9 @@ class Comparison:
             if len(found) != 1 or not expected.is_equal(value, *found[0]):
                 self.differ(where, f"{name} is {value!r}, shown as {found}")
             self.values += 1
+        for name, word in expected.words(row).items():
+            if not mentions(word, item.names.get(name, "")):
+                self.differ(where, f"{name} is {word!r}, shown as {item.names.get(name)!r}")
         for name in item.fields.keys() - wanted.keys() - FACTS:
             self.differ(where, f"{name} is shown, and not in the line: {item.fields[name]}")
         for name, value, found in (("t", expected.micros(row), item.packet.micros),
@@ -212,16 +274,14 @@ class Comparison:
         self.frames += row["event"] == "frame"
         self.gaps += row["event"] == "skipped"
 
-    def bytes_of(self, row):
-        stream = self.streams[row.get("interface"), row.get("direction")]
-        return stream[row["offset"]:row["offset"] + row["length"]]
-
     def exchange(self, where, row, facts, pairs, number):
         """Response time, request and answer, and the warnings."""
         values = {}
         for fact in facts:
             if isinstance(fact, tuple):
                 kind, value = fact
+                if kind == "echo":
+                    continue
                 if kind != "took":
                     value = pairs[value].packet.number if value in pairs else None
                 values[{"took": "response_time_us", "request": "request_in",
@@ -232,15 +292,60 @@ class Comparison:
         if shown != values:
             self.differ(where, f"exchange {values}, shown as {shown}")
         clock = item.fields.get("response_time_of", [("", "")])[0][0]
-        if ("took" in dict(fact for fact in facts if isinstance(fact, tuple))) != bool(clock):
+        port = item.packet.port
+        if "response_time_us" not in values:
+            is_right = clock == ""
+        else:
+            is_right = expected.whose_time(port) in clock
+        if not is_right:
             self.differ(where, f"whose time: {clock!r}")
         warnings = Counter(fact for fact in facts if isinstance(fact, str))
         if row["event"] == "skipped":
-            warnings = expected.gap_warnings(
-                row | {"of": item.protocol.removeprefix("axle_")}, self.bytes_of(row))
+            warnings = expected.gap_warnings(row, item.protocol.removeprefix("axle_"))
         if +item.warnings != warnings:
             self.differ(where, f"warnings {dict(warnings)}, shown as {dict(item.warnings)}")
         self.facts += len(values) + sum(warnings.values())
+
+
+def complete(shown, columns):
+    """Wireshark cuts long texts of the tree; those of the packet list are whole."""
+    texts = {number: row[-1].split("; ") for number, row in columns.items()}
+    for item in shown:
+        listed = texts.get(item.packet.number, [])
+        if len(item.text.encode()) > 190:
+            begin = item.text[:150]
+            whole = next((text for text in listed if text.startswith(begin)), item.text)
+            if whole in listed:
+                listed.remove(whole)
+            item.text = whole
+
+
+def places_of(row, read):
+    """The packets in which a frame or gap is, with the number of its bytes in each."""
+    places, begin = [], 0
+    ends = read.ends[row.get("interface"), row.get("direction")]
+    at = bisect.bisect_right(ends, (row["offset"], float("inf")))
+    begin = ends[at - 1][0] if at > 0 else 0
+    for end, packet in ends[at:]:
+        if begin >= row["offset"] + row["length"]:
+            break
+        length = min(end, row["offset"] + row["length"]) - max(begin, row["offset"])
+        if length > 0:
+            places.append((packet, length))
+        begin = end
+    return places
+
+
+def columns_of(user, path, script=None):
+    """Source, destination, protocol and text of each packet in the packet list."""
+    command = ["tshark", "-2", "-R", "frame", "-r", path, "-T", "psml"]
+    if script:
+        command += ["-X", f"lua_script:{script}"]
+    found = {}
+    for packet in xml.fromstring(user.run(command)).iter("packet"):
+        number, _, *ends, protocol, _, info = [cell.text or "" for cell in packet]
+        found[int(number)] = [*ends, protocol, info]
+    return found
 
 
 def check_captures(user, captures, script=None):
@@ -248,8 +353,32 @@ def check_captures(user, captures, script=None):
     comparison = Comparison()
     for name, (path, bytes, rows) in captures.items():
         shown, parts = shown_by_tshark(user, path, script)
-        comparison.compare(name, bytes, rows, shown, parts)
+        columns = columns_of(user, path, script)
+        comparison.compare(name, bytes, rows, shown, parts, columns)
+        if name == "one-pass":
+            check_first_pass(user, path, comparison, script)
+        if name == "times":
+            options = ("-2", "-R", "frame", "-o", f"axle_ikeya.reply_window_us:{SHORT_WINDOW_US}")
+            shown, parts = shown_by_tshark(user, path, script, options)
+            comparison.compare("a short reply window", bytes, rows, shown, parts, columns,
+                               window=SHORT_WINDOW_US)
     return comparison
+
+
+def check_first_pass(user, path, comparison, script):
+    """What is not decided yet, as far as one pass shows it."""
+    command = ["tshark", "-r", path, "-T", "fields", "-e", "axle_ucp.pending",
+               "-e", "axle_ucp.skipped_so_far", "-e", "_ws.col.Info"]
+    if script:
+        command += ["-X", f"lua_script:{script}"]
+    lines = [line.split("\t") for line in user.run(command).decode().splitlines()]
+    for number, (line, wanted) in enumerate(zip(lines, corpora.ONE_PASS, strict=True), 1):
+        pending, so_far = wanted
+        texts = [text for text in (so_far and f"{so_far} bytes skipped so far: header",
+                                   pending and f"{pending} bytes that may still") if text]
+        if tuple(line[:2]) != wanted or not all(text in line[2] for text in texts) \
+                or line[2].count("so far") != bool(so_far):
+            comparison.differ("first pass", f"packet {number} is {line}, not {wanted}")
 
 
 def write_captures(folder):
@@ -270,13 +399,17 @@ def planted(user, captures, folder):
     if check_captures(user, captures, whole).differences:
         print("there are differences without a damage")
         return 1
-    for number, (old, new) in enumerate(damages.DAMAGES, 1):
+    def plant(numbered):
+        number, (old, new) = numbered
+        if text.count(old) != 1:
+            return f"its text is there {text.count(old)} times"
         script = folder / f"damage-{number}.lua"
         script.write_text(text.replace(old, new))
-        if text.count(old) != 1:
-            problem = f"its text is there {text.count(old)} times"
-        else:
-            problem = problem_with(user, captures, script)
+        return problem_with(user, captures, script)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        problems = list(pool.map(plant, enumerate(damages.DAMAGES, 1)))
+    for (old, new), problem in zip(damages.DAMAGES, problems, strict=True):
         if problem:
             missed += 1
             print(f"{old!r} as {new!r}: {problem}")
@@ -330,6 +463,8 @@ def check_filters(user, captures, comparison):
 def check_live(user, comparison):
     """Captures live lines, and compares what was captured. Returns the number of packets."""
     axle = user.home / "axle"
+    for command in live.of_failures(user, axle):
+        comparison.differ("live", f"it does not end: {command}")
     count = 0
     for name, run in (("rover", live.of_rover), ("bus", live.of_bus)):
         path = user.home / f"{name}.pcapng"
@@ -341,7 +476,8 @@ def check_live(user, comparison):
         if not all(line[0].startswith("/dev/") for line in lines):
             comparison.differ(f"live {name}", f"no name of the port: {lines[:5]}")
         shown, parts = shown_by_tshark(user, path)
-        comparison.compare(f"live {name}", path.read_bytes(), decoded(path), shown, parts)
+        comparison.compare(f"live {name}", path.read_bytes(), decoded(path), shown, parts,
+                           columns_of(user, path))
         count += len(lines)
     return count
 

@@ -10,6 +10,8 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 
 usage() { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+# In quotes that every shell knows; bash's own %q writes $'...', which sh may not know.
+quoted() { printf "'%s'" "${1//\'/\'\\\'\'}"; }
 home=$HOME axle=$(command -v axle || true)
 while [ $# -gt 0 ]; do
     case $1 in
@@ -21,6 +23,7 @@ while [ $# -gt 0 ]; do
     shift 2
 done
 [ -d "$home" ] || { echo "there is no folder $home" >&2; exit 1; }
+home=$(cd -- "$home" && pwd)
 
 base=$home/.local/lib/wireshark
 mkdir -p "$base/plugins" "$base/extcap"
@@ -33,9 +36,9 @@ if [ -z "$axle" ]; then
     echo "no live capture: axle is not in PATH (cargo install --path examples/axle, or --axle PATH)"
     exit 0
 fi
-axle=$(realpath "$axle")
-[ -x "$axle" ] || { echo "$axle is not a program" >&2; exit 1; }
-printf '#!/bin/sh\nexec %q extcap "$@"\n' "$axle" >"$base/extcap/axle.new"
+axle=$(realpath -- "$axle")
+[ -f "$axle" ] && [ -x "$axle" ] || { echo "$axle is not a program" >&2; exit 1; }
+printf '#!/bin/sh\nexec %s extcap "$@"\n' "$(quoted "$axle")" >"$base/extcap/axle.new"
 chmod 755 "$base/extcap/axle.new"
 mv "$base/extcap/axle.new" "$base/extcap/axle"
 echo "live capture: $base/extcap/axle"
@@ -49,7 +52,7 @@ case $folders in
 *Extcap*)
     global=$(sed -n 's/^Extcap path:[[:space:]]*//p' <<<"$folders")
     echo "This Wireshark looks for live captures in one folder only. Either link it there, as root:"
-    echo "    ln -s $base/extcap/axle $global/axle"
-    echo "or start it with WIRESHARK_EXTCAP_DIR=$base/extcap"
+    echo "    ln -s $(quoted "$base/extcap/axle") $(quoted "$global/axle")"
+    echo "or start it with WIRESHARK_EXTCAP_DIR=$(quoted "$base/extcap")"
     ;;
 esac

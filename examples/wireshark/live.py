@@ -1,6 +1,7 @@
 """Live capture: tshark, through `axle extcap`, on lines that speak while it listens."""
 import os
 import random
+import signal
 import subprocess
 import threading
 import time
@@ -61,3 +62,29 @@ def of_bus(user, axle, path):
         is_over.set()
         speaker.join()
         os.close(master)
+
+
+# A capture that does not end would last as long as this.
+MOST_FAILING_S = 20
+
+
+def of_failures(user, axle):
+    """Captures that cannot begin must end by themselves: those that did not, in words."""
+    extcap = user.home / ".local/lib/wireshark/extcap"
+    hanging = []
+    for settings, options in (({"port": "/dev/no-such-port", "protocol": "ucp"}, []),
+                              ({"port": "/dev/null", "protocol": "ucp"}, ["-f", "tcp"]),
+                              ({"port": "/dev/null", "protocol": "modbus"}, [])):
+        command = ["tshark", "-q", "-i", "axle", "-a", "duration:3", *options]
+        for name, value in settings.items():
+            command += ["-o", f"extcap.axle.{name}:{value}"]
+        tshark = user.popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                            env={"WIRESHARK_EXTCAP_DIR": str(extcap)}, start_new_session=True)
+        try:
+            tshark.wait(timeout=MOST_FAILING_S)
+        except subprocess.TimeoutExpired:
+            # With the programs that it has started: they would wait for ever.
+            os.killpg(tshark.pid, signal.SIGKILL)
+            tshark.wait()
+            hanging.append(" ".join(map(str, command)))
+    return hanging

@@ -158,7 +158,8 @@ where
                 self.decoder.idle();
                 return self.write(&[]);
             }
-            return Ok(());
+            self.file.check_reader();
+            return self.file.check();
         }
         self.heard_at = Instant::now();
         let end = self.decoder.received() + bytes.len() as u64;

@@ -7,7 +7,9 @@
 mod say;
 
 use std::{
+    fs::File,
     io::{self, Write},
+    mem,
     path::{Path, PathBuf},
 };
 
@@ -16,6 +18,7 @@ use axlewire::{
     stream::Framing,
     ucp,
 };
+use clap::ValueEnum;
 
 use crate::{
     EXIT_CODES, args::Protocol, failure::Failure, line::Line, listing::Shown, pcapng::Recording,
@@ -70,12 +73,13 @@ pub(crate) struct Args {
     port: Option<String>,
 
     /// Line speed, bit/s; 0 is that of the protocol
-    #[arg(short, long, default_value_t = 0)]
-    baud: u32,
+    // Text, as the protocol is: a bad one is a failure like others, of which the pipe must know.
+    #[arg(short, long, value_name = "BAUD", default_value = "0")]
+    baud: String,
 
-    /// Protocol of the line
-    #[arg(short = 'P', long, value_enum)]
-    protocol: Option<Protocol>,
+    /// Protocol of the line: ucp, ikeya or ikeya-3
+    #[arg(short = 'P', long, value_name = "PROTOCOL")]
+    protocol: Option<String>,
 }
 
 /// Runs the subcommand.
@@ -85,10 +89,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         // Without a list, the interface for any port is left.
         say::interfaces(&mut text, &ports::available().unwrap_or_default());
     } else if args.extcap_dlts {
-        args.interface()?;
+        args.known_interface()?;
         say::link_types(&mut text);
     } else if args.extcap_config {
-        say::settings(&mut text, args.interface()? == ANY_PORT);
+        say::settings(&mut text, args.known_interface()? == ANY_PORT);
     } else if args.capture {
         return capture(args);
     } else if args.filter().is_some() {
@@ -112,20 +116,48 @@ impl Args {
         self.extcap_capture_filter.as_deref().filter(|filter| !filter.trim().is_empty())
     }
 
+    /// The interface, if its name is one of ours.
+    fn known_interface(&self) -> Result<&str, Failure> {
+        let interface = self.interface()?;
+        if interface == ANY_PORT || interface.strip_prefix(PREFIX).is_some_and(|it| !it.is_empty())
+        {
+            return Ok(interface);
+        }
+        let line = format!("there is no interface {interface:?}: see --extcap-interfaces");
+        Err(Failure::Usage(line))
+    }
+
     /// The port of the interface.
     fn port(&self) -> Result<&str, Failure> {
-        let interface = self.interface()?;
-        let none = || {
-            let line = format!("there is no interface {interface:?}: see --extcap-interfaces");
-            Failure::Usage(line)
-        };
-        match interface {
-            ANY_PORT => self
+        match self.known_interface()?.strip_prefix(PREFIX) {
+            Some(port) => Ok(port),
+            None => self
                 .port
                 .as_deref()
                 .filter(|port| !port.is_empty())
                 .ok_or_else(|| needs("the setting Port (--port)")),
-            named => named.strip_prefix(PREFIX).filter(|port| !port.is_empty()).ok_or_else(none),
+        }
+    }
+
+    /// The setting of the protocol.
+    fn protocol(&self) -> Result<Protocol, Failure> {
+        let name =
+            self.protocol.as_deref().ok_or_else(|| needs("the setting Protocol (--protocol)"))?;
+        Protocol::from_str(name, false).map_err(|_| {
+            let line = format!("there is no protocol {name:?}: ucp, ikeya or ikeya-3");
+            Failure::Usage(line)
+        })
+    }
+
+    /// The setting of the speed, bit/s.
+    fn baud(&self, protocol: Protocol) -> Result<u32, Failure> {
+        match self.baud.parse() {
+            Ok(0) => Ok(protocol.default_baud()),
+            Ok(baud) => Ok(baud),
+            Err(error) => {
+                let line = format!("the line speed {:?}: {error}", self.baud);
+                Err(Failure::Usage(line))
+            }
         }
     }
 }
@@ -135,27 +167,38 @@ fn needs(what: &str) -> Failure {
 }
 
 fn capture(args: &Args) -> Result<(), Failure> {
+    let prepared = prepare(args);
+    if let (Err(_), Some(fifo)) = (&prepared, &args.fifo) {
+        // Wireshark waits until something has opened the pipe and closed it again. It is closed
+        // with the process, once the failure is told.
+        mem::forget(File::options().write(true).open(fifo));
+    }
+    let (line, fifo, protocol, baud) = prepared?;
+    match protocol {
+        Protocol::Ucp => capture_line::<ucp::Ucp>(line, fifo, protocol, baud),
+        Protocol::Ikeya => capture_line::<ikeya::BothDirections>(line, fifo, protocol, baud),
+        Protocol::Ikeya3 => capture_line::<three::BothDirections>(line, fifo, protocol, baud),
+    }
+}
+
+/// The open line, the pipe, the protocol and the speed.
+fn prepare(args: &Args) -> Result<(Line, &Path, Protocol, u32), Failure> {
     let port = args.port()?;
     let fifo = args.fifo.as_deref().ok_or_else(|| needs("--fifo"))?;
-    let protocol = args.protocol.ok_or_else(|| needs("the setting Protocol (--protocol)"))?;
+    let protocol = args.protocol()?;
     if let Some(filter) = args.filter() {
         let line = format!("no capture filters, such as {filter:?}: use a display filter");
         return Err(Failure::Usage(line));
     }
-    let baud = if args.baud == 0 { protocol.default_baud() } else { args.baud };
-    match protocol {
-        Protocol::Ucp => capture_line::<ucp::Ucp>(port, baud, protocol, fifo),
-        Protocol::Ikeya => capture_line::<ikeya::BothDirections>(port, baud, protocol, fifo),
-        Protocol::Ikeya3 => capture_line::<three::BothDirections>(port, baud, protocol, fifo),
-    }
+    let baud = args.baud(protocol)?;
+    Ok((Line::connect(port, baud)?, fifo, protocol, baud))
 }
 
-fn capture_line<F>(port: &str, baud: u32, protocol: Protocol, fifo: &Path) -> Result<(), Failure>
+fn capture_line<F>(line: Line, fifo: &Path, protocol: Protocol, baud: u32) -> Result<(), Failure>
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
 {
-    let line = Line::connect(port, baud)?;
     // Waits for a reader; a signal ends the process then, because nothing listens yet.
     let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
     let signals = Signals::listen()?;

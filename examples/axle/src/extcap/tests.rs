@@ -99,11 +99,19 @@ fn the_port_of_an_interface_is_in_its_name_or_in_the_setting() {
 fn what_is_missing_for_a_capture_is_named() {
     assert_eq!(refusal("--extcap-dlts"), "--extcap-interface is needed");
     assert_eq!(refusal("--extcap-config"), "--extcap-interface is needed");
+    for question in ["--extcap-config", "--extcap-dlts"] {
+        let expected = "there is no interface \"eth0\": see --extcap-interfaces";
+        assert_eq!(refusal(&format!("{question} --extcap-interface eth0")), expected);
+    }
     assert_eq!(refusal("--capture"), "--extcap-interface is needed");
     let interface = "--capture --extcap-interface axle-X";
     assert_eq!(refusal(interface), "--fifo is needed");
     let fifo = format!("{interface} --fifo /nowhere/pipe");
     assert_eq!(refusal(&fifo), "the setting Protocol (--protocol) is needed");
+    let other = format!("{fifo} --protocol modbus");
+    assert_eq!(refusal(&other), "there is no protocol \"modbus\": ucp, ikeya or ikeya-3");
+    let fast = format!("{fifo} --protocol ucp --baud fast");
+    assert_eq!(refusal(&fast), "the line speed \"fast\": invalid digit found in string");
     let filtered = format!("{fifo} --protocol ucp --extcap-capture-filter tcp");
     assert_eq!(refusal(&filtered), "no capture filters, such as \"tcp\": use a display filter");
     assert!(refusal("").starts_with("one of --extcap-interfaces, "));

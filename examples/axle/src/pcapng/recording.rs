@@ -177,6 +177,13 @@ impl Recording {
         }
     }
 
+    /// Notices that the reader of a named pipe has gone, while there is nothing to write.
+    pub(crate) fn check_reader(&mut self) {
+        if matches!(self.writer.get_mut(), Output::Pipe(_)) && has_no_reader(&self.path) {
+            self.fail(io::ErrorKind::BrokenPipe.into());
+        }
+    }
+
     /// The failure, if there was one.
     pub(crate) fn check(&mut self) -> Result<(), Failure> {
         self.failure.take().map_or(Ok(()), Err)
@@ -192,4 +199,31 @@ impl Recording {
         };
         self.failure.get_or_insert(failure);
     }
+}
+
+/// Whether nothing reads from a named pipe: it cannot be opened once more without waiting then.
+/// Only where the flag for that is known; elsewhere, the next write notices.
+#[cfg(any(
+    all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")),
+    target_os = "macos",
+))]
+fn has_no_reader(path: &Path) -> bool {
+    use std::os::unix::fs::OpenOptionsExt;
+
+    const O_NONBLOCK: i32 = if cfg!(target_os = "macos") { 0x4 } else { 0o4000 };
+    /// No such device or address.
+    const ENXIO: i32 = 6;
+    let opened = File::options().write(true).custom_flags(O_NONBLOCK).open(path);
+    // Wireshark removes the pipe when it ends.
+    opened.is_err_and(|error| {
+        error.raw_os_error() == Some(ENXIO) || error.kind() == io::ErrorKind::NotFound
+    })
+}
+
+#[cfg(not(any(
+    all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")),
+    target_os = "macos",
+)))]
+fn has_no_reader(_: &Path) -> bool {
+    false
 }

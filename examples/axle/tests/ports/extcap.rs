@@ -87,6 +87,35 @@ fn a_silent_line_has_the_head_of_its_capture_at_once() {
 }
 
 #[test]
+fn a_capture_of_a_silent_line_ends_when_wireshark_closes_the_pipe() {
+    let (_sim, port) = sim(TWO_NODES);
+    let fifo = fifo();
+    let capture = capture(&port, "ikeya", &fifo);
+    let mut head = [0; 28];
+    File::open(&fifo).unwrap().read_exact(&mut head).unwrap();
+    assert_eq!(capture.success(), Vec::<String>::new());
+}
+
+#[test]
+fn the_pipe_of_a_capture_that_fails_is_opened_and_closed() {
+    let (_sim, port) = sim("ucp");
+    for (settings, code) in [
+        ("--extcap-interface eth0 --protocol ucp".to_owned(), 2),
+        ("--extcap-interface axle-/dev/no-such-port --protocol ucp".to_owned(), 1),
+        (format!("--extcap-interface axle-{port}"), 2),
+        (format!("--extcap-interface axle-{port} --protocol modbus"), 2),
+        (format!("--extcap-interface axle-{port} --protocol ucp --baud fast"), 2),
+        (format!("--extcap-interface axle-{port} --protocol ucp --extcap-capture-filter tcp"), 2),
+    ] {
+        let fifo = fifo();
+        let reader = drained(&fifo);
+        let ended = Process::start(&format!("extcap --capture --fifo {fifo} {settings}")).end();
+        assert_eq!((ended.code, ended.stderr.len()), (Some(code), 1), "{settings}: {ended:?}");
+        assert_eq!(fs::read(reader.join().unwrap()).unwrap(), b"", "{settings}");
+    }
+}
+
+#[test]
 fn a_port_that_is_not_there_and_a_pipe_that_is_not_there_are_told() {
     let ended = capture("/dev/no-such-port", "ucp", "/no/such/pipe").end();
     assert_eq!(ended.code, Some(1));
