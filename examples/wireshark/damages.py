@@ -100,7 +100,7 @@ DAMAGES = [
     ("item:add(view.fields.ends_in, range, event.number):set_generated()", ""),
     ("item:add(fields.so_far, range, length):set_generated()", ""),
     ("is_open and \" so far\" or \"\"", "\"\""),
-    ("item:add(view.fields.pending, range, range:len())", "item:add(view.fields.pending, range, #packet.stream.held)"),
+    ("item:add(view.fields.pending, range, range:len())", "item:add(view.fields.pending, range,#packet.stream.held)"),
     ("name:find(\"usb\") or name:find(\"acm\")", "name:find(\"usb\")"),
     ("name:find(\"usb\") or name:find(\"acm\")", "name:find(\"acm\")"),
     ("name:find(\"^tcp:\")", "name:find(\"^udp:\")"),
