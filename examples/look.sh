@@ -60,6 +60,7 @@ expect() {
 }
 
 "${here[@]}" "$(command_with wireshark/install.sh)" --axle "$work/bin/axle" >/dev/null
+"${here[@]}" bash -c "$(command_with sigrok/axle_)"
 # The simulator makes its link there.
 chmod 777 "$work"
 simulator=$(command_with 'axle sim')
@@ -84,8 +85,6 @@ reports=$("${here[@]}" axle decode --json drive.pcapng |
 
 drawn=$(command_with pulseview)
 "${here[@]}" ${drawn% && pulseview *} >/dev/null
-"${here[@]}" mkdir -p .local/share/libsigrokdecode
-"${here[@]}" cp -r examples/sigrok .local/share/libsigrokdecode/decoders
 expect PulseView "$("${here[@]}" sigrok-cli -i drive.sr -P uart:rx=RX:baudrate=115200,axle_ucp \
     -A axle_ucp=packets | sed -n 's/.*: report, index \([0-9]*\):.*/\1/p' | sum)" "$reports"
 
