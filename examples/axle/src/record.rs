@@ -151,6 +151,11 @@ where
 
     /// Takes in what has just been received, possibly nothing, and writes all that is decided.
     pub(crate) fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        self.take_at(bytes, self.file.micros())
+    }
+
+    /// The same, with the time: microseconds since 1970, never less than before.
+    pub(crate) fn take_at(&mut self, bytes: &[u8], micros: u64) -> Result<(), Failure> {
         if bytes.is_empty() {
             if self.heard_at.elapsed().as_micros() >= QUIET.as_micros().into()
                 && self.decoder.pending() > 0
@@ -163,7 +168,7 @@ where
         }
         self.heard_at = Instant::now();
         let end = self.decoder.received() + bytes.len() as u64;
-        self.chunks.push_back((end, self.file.micros()));
+        self.chunks.push_back((end, micros));
         self.unwritten.extend(bytes);
         self.write(bytes)
     }

@@ -396,6 +396,120 @@ fn an_svg_has_each_point_at_its_place() {
     }
 }
 
+/// The labels of an SVG with this anchor, and the place of each.
+#[cfg(feature = "plot")]
+fn labels(svg: &str, anchor: &str) -> Vec<(f64, String)> {
+    let middle = format!("fill=\"#6a727c\" text-anchor=\"{anchor}\">");
+    let lines = svg.lines().filter_map(|line| line.split_once(&middle));
+    let labels = lines.map(|(place, text)| {
+        let x = place.strip_prefix("<text x=\"").unwrap().split('"').next().unwrap();
+        (x.parse().unwrap(), text.strip_suffix("</text>").unwrap().to_owned())
+    });
+    labels.collect()
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn the_numbers_of_an_axis_are_right_and_fit_in_front_of_it() {
+    let folder = Folder::new("labels");
+    let path = folder.path("made.pcapng");
+    let drawn = |places: &[u64], speeds: &[f32]| {
+        let mut capture = PcapNg::new(147, &[]);
+        for (at, speed) in places.iter().zip(speeds) {
+            let answer = VelocityResponse::new(NodeId::N1, Rps::new(*speed).unwrap());
+            capture.packet(0, (1_000_000 + at, 1, answer.as_bytes()));
+        }
+        fs::write(&path, &capture.0).unwrap();
+        let svg = String::from_utf8(plot(&path, &[], &folder.path("a.svg"))).unwrap();
+        let texts = |anchor| -> Vec<String> {
+            labels(&svg, anchor)
+                .into_iter()
+                .map(|(_, text)| text.replace('\u{2212}', "-"))
+                .collect()
+        };
+        for (x, text) in labels(&svg, "end") {
+            // A digit of ten pixels is less than 6.5 wide.
+            assert!(x >= 6.5 * text.chars().count() as f64, "{text} begins left of the picture");
+        }
+        (texts("end"), texts("middle"))
+    };
+    let (up, across) = drawn(&[0, 1, 2, 3], &[3.4e38, -3.4e38, 1e-45, 0.0]);
+    assert_eq!(up, ["-3e38", "-2e38", "-1e38", "0", "1e38", "2e38", "3e38"]);
+    let across = &across[..across.len() - 1];
+    assert_eq!(across, ["0", "5e-7", "1e-6", "1.5e-6", "2e-6", "2.5e-6", "3e-6"]);
+    let (up, _) = drawn(&[0, 100, 200], &[1e-7, -1e-7, 0.0]);
+    assert_eq!(up, ["-1e-7", "-5e-8", "0", "5e-8", "1e-7"]);
+    let (up, across) = drawn(&[0, 1_000_000], &[12_345_678.0, 12_345_680.0]);
+    assert_eq!(up, ["12345678", "12345678.5", "12345679", "12345679.5", "12345680"]);
+    assert_eq!(across.first().map(String::as_str), Some("0"));
+    for value in [1e-45, 3.402_823_5e38, -16_777_216.0] {
+        let (up, _) = drawn(&[0, 1], &[value, value]);
+        assert!(!up.is_empty(), "{value}");
+    }
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn a_set_point_ends_with_the_mode_and_no_value_is_invented() {
+    use axlewire::ikeya::{Position, PositionResponse, WriteRequest};
+    let folder = Folder::new("mode");
+    let path = folder.path("made.pcapng");
+    let velocity = VelocityResponse::new(NodeId::N1, Rps::new(1.0).unwrap());
+    let position = PositionResponse::new(NodeId::N1, Position::from_counts(8192).unwrap());
+    let write = WriteRequest::velocity(NodeId::N1, Rps::new(2.5).unwrap());
+    let mut capture = PcapNg::new(147, &[(0, 1, velocity.as_bytes()), (10, 1, write.as_bytes())]);
+    capture.packet(0, (20, 1, position.as_bytes()));
+    capture.packet(0, (30, 1, velocity.as_bytes()));
+    fs::write(&path, &capture.0).unwrap();
+    let page = page(&path, &[]);
+    let set_point = &page["panels"][0]["series"][0];
+    assert_eq!(set_point["name"], "node 1, set-point");
+    assert_eq!((&set_point["count"], &set_point["open"]), (&1.into(), &false.into()));
+    assert_eq!(set_point["x"], serde_json::json!([1e-5, 2e-5]));
+    assert_eq!(set_point["y"], serde_json::json!([2.5, null]));
+    // The picture has it until the change.
+    let svg = String::from_utf8(plot(&path, &[], &folder.path("a.svg"))).unwrap();
+    let [(from, _), (to, _)] = path_of(&svg, "#0072b2", "4")[..] else { panic!("{svg}") };
+    let span = 960.0 - 2.0 * 14.0 - 34.0 - 48.0;
+    assert!((to - from - span / 3.0).abs() < 2.0, "{from} to {to}");
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn a_packet_without_a_time_does_not_take_the_times_of_the_others() {
+    let folder = Folder::new("timeless");
+    let path = folder.path("made.pcapng");
+    let answer = |speed| *VelocityResponse::new(NodeId::N1, Rps::new(speed).unwrap()).as_bytes();
+    let mut capture = PcapNg::new(147, &[]);
+    let untimed = answer(9.0);
+    capture.block(3, &[&(untimed.len() as u32).to_le_bytes(), &untimed[..]].concat());
+    capture.packet(0, (1_000_000, 1, &answer(1.0)));
+    capture.packet(0, (3_000_000, 1, &answer(2.0)));
+    fs::write(&path, &capture.0).unwrap();
+    let page = page(&path, &[]);
+    assert_eq!(page["axis"], "time, s, from 1970-01-01 00:00:01.000 UTC");
+    assert_eq!(page["notes"], serde_json::json!(["1 frame or gap without a time: not drawn"]));
+    let velocity = ("Velocity".to_owned(), "node 1".to_owned());
+    assert_eq!(curves(&page), [(velocity, vec![(0.0, 1.0), (2.0, 2.0)])].into());
+}
+
+#[cfg(feature = "plot")]
+#[test]
+fn each_direction_has_its_count_of_reports() {
+    use axlewire::ucp::{Body, Telemetry, message::FirmwareReport};
+    let folder = Folder::new("counts");
+    let path = folder.path("made.pcapng");
+    let mut capture = PcapNg::new(150, &[]);
+    let indices = [(1, 10), (2, 20), (1, 11), (2, 21), (1, 13), (2, 22), (1, 14), (2, 24)];
+    for (at, (direction, index)) in (0..).zip(indices) {
+        let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
+        capture.packet(0, (at * 20_000, direction, report.as_bytes()));
+    }
+    fs::write(&path, &capture.0).unwrap();
+    let lost = ("Errors".to_owned(), "report lost".to_owned());
+    assert_eq!(count_of(&page(&path, &[]), &lost), 2);
+}
+
 #[cfg(feature = "plot")]
 #[test]
 fn the_pictures_of_the_readme_are_up_to_date() {
@@ -469,6 +583,13 @@ fn the_page_needs_no_network_and_a_file_name_cannot_end_its_script() {
     assert!(!page.contains('\u{7}') && !page.contains("<!--"));
     let svg = String::from_utf8(plot(&capture, &[], &folder.path("a.svg"))).unwrap();
     assert!(svg.contains("a&lt;script&gt;alert(1)&amp;{{data}}") && !svg.contains('\u{7}'));
+    // XML has no place for these at all.
+    let capture = folder.path("b\u{FFFE}\u{FFFF}.bin");
+    fs::copy(Path::new(CAPTURES).join("ucp.bin"), &capture).unwrap();
+    let svg = String::from_utf8(plot(&capture, &[], &folder.path("a.svg"))).unwrap();
+    assert!(
+        svg.contains("<title>b\u{FFFD}\u{FFFD}.bin") && !svg.contains(['\u{FFFE}', '\u{FFFF}'])
+    );
 }
 
 #[cfg(feature = "plot")]
@@ -652,10 +773,10 @@ fn an_option_that_does_not_fit_the_capture_is_an_error() {
     let [raw, timed] =
         ["ucp.bin", "drive.pcapng"].map(|it| Path::new(CAPTURES).join(it).display().to_string());
     let output = folder.path("a.svg");
-    let said = complaint(&[&raw, "-o", &output, "--interface", "5"], 1);
-    assert!(said.ends_with("has raw bytes and no interfaces"), "{said}");
-    let said = complaint(&[&timed, "-o", &output, "--baud", "9600"], 1);
-    assert!(said.ends_with("has times: --baud is for raw bytes"), "{said}");
+    let said = complaint(&[&raw, "-o", &output, "--interface", "5"], 2);
+    assert_eq!(said, "--interface is for pcapng files: raw bytes are one line");
+    let said = complaint(&[&timed, "-o", &output, "--baud", "9600"], 2);
+    assert_eq!(said, "--baud is for raw bytes: a pcapng file has times");
     assert!(folder.names().is_empty());
 }
 

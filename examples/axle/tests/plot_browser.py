@@ -351,6 +351,29 @@ class Page:
         check(papers == ["rgb(255, 255, 255)", "rgb(21, 24, 28)"], f"paper: {papers}")
         browser.call("Emulation.setEmulatedMedia", features=[])
 
+    def axes(self):
+        """The numbers beside each axis are right, differ, and fit; of values of any size too."""
+        self.browser.value("document.getElementById('all').click()")
+        number = self.browser.value("panels.findIndex(it => it.panel.least === null && it.panel.size !== 'rows')")
+        for factor, offset in ((1, 0), (1e-9, 0), (1.7e34, 0), (1e-3, 3e8), (1, 0)):
+            self.browser.value(
+                f"panels[{number}].panel.series.forEach(it => {{ it.was ??= it.y;"
+                f" it.y = it.was.map(y => y === null ? y : y * {factor} + {offset}) }}); draw()")
+            axes = self.browser.value(
+                "panels.filter(it => it.up).map(it => [it.panel.title, it.up.ticks, it.up.texts, it.left - 7,"
+                " it.up.texts.map(text => it.canvas.getContext('2d').measureText(text).width)])")
+            axes.append(["time", *self.browser.value("(it => [it.ticks, it.texts])(ticksOf(0, 3e-6 * %r, 8))" % factor),
+                         1, [0]])
+            for title, ticks, texts, room, widths in axes:
+                step = min((b - a for a, b in zip(ticks, ticks[1:])), default=1)
+                for tick, text in zip(ticks, texts, strict=True):
+                    check(abs(float(text.replace(MINUS, "-")) - tick) < step / 100,
+                          f"{title}: the label {text} is beside {tick}")
+                check(max(widths) <= room, f"{title}: the labels {texts} are wider than {room}")
+            shown = self.browser.value(f"panels[{number}].up.texts")
+            is_far = factor in (1e-9, 1.7e34)
+            check(any("e" in text for text in shown) == is_far, f"a factor of {factor}: {shown}")
+
     def alone(self):
         """It has asked for nothing else, and its script has not failed."""
         for event in self.browser.events:
@@ -382,6 +405,7 @@ def check_page(browser, page_path, lines, panel, series, rgb, keep=None, per_cur
         for at in chance.sample(range(len(points)), min(per_curve, len(points))):
             page.values(of_panel, of_series, at)
             values += 1
+    page.axes()
     page.zooming(panel)
     page.hiding(panel, series)
     page.colours(panel, rgb, keep)
@@ -416,6 +440,9 @@ FAULTS = [
     ('hidden.delete(other) : hidden.add(other)', 'hidden.delete(other) : hidden.delete(other)', "is not hidden"),
     ('  pen.stroke();\n  pen.globalAlpha = 1;\n}', '  pen.globalAlpha = 1;\n}', "in the colour of a curve"),
     ('--paper: #15181c', '--paper: #ffffff', "paper"),
+    ('Math.max(0, -least)', 'Math.max(0, -least - 1)', "is beside"),
+    ('powerOf(Math.abs(tick)) - least)', '0)', "is beside"),
+    ('Math.max(left[of], Math.ceil(width))', 'left[of]', "are wider than"),
     ('<footer>', '<img src="http://127.0.0.1:9/x.png"><footer>', "the page asks for"),
     ('fromAddress();\n', 'fromAddress();\nnothing();\n', "the script fails"),
     ('history.replaceState', 'void', "in the address is"),

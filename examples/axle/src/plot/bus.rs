@@ -72,7 +72,7 @@ impl Bus {
             "write" => {
                 self.miss();
                 if self.is_of_three {
-                    self.asked = Some((node, x));
+                    (self.asked, self.has_requests) = (Some((node, x)), true);
                 }
                 match line.mode {
                     Some(Mode::Velocity) => put(&mut self.velocity.set_point, node, x, &line.rps),
@@ -204,10 +204,7 @@ impl Curves {
     fn end_set_point(&mut self, node: u8, x: u64) {
         let of_node = self.set_point.range_mut((node, 0)..=(node, usize::MAX));
         for (_, columns) in of_node {
-            if let Some(last) = columns.last() {
-                columns.push(x, last.y);
-                columns.cut();
-            }
+            columns.end(x);
         }
         self.measured_of(node).for_each(Columns::cut);
     }

@@ -24,6 +24,8 @@ struct Column {
     count: u64,
     /// The curve is interrupted in front of this column.
     is_cut: bool,
+    /// How far the last value holds, if it has ended.
+    end: Option<u64>,
 }
 
 /// A curve.
@@ -38,7 +40,8 @@ pub(super) struct Columns {
 
 impl Column {
     const fn of(key: u64, point: Point, is_cut: bool) -> Self {
-        Self { key, first: point, low: point, high: point, last: point, count: 1, is_cut }
+        let [first, low, high, last] = [point; 4];
+        Self { key, first, low, high, last, count: 1, is_cut, end: None }
     }
 
     /// Takes in a column beside it, or the same one again. Of values at the same place, those of
@@ -48,7 +51,7 @@ impl Column {
             self.first = later.first;
         }
         if later.last.x >= self.last.x {
-            self.last = later.last;
+            (self.last, self.end) = (later.last, later.end);
         }
         if later.low.y < self.low.y {
             self.low = later.low;
@@ -91,6 +94,14 @@ impl Columns {
     /// The curve is interrupted here.
     pub(super) const fn cut(&mut self) {
         self.is_cut = !self.columns.is_empty();
+    }
+
+    /// The last value holds until here, and no longer.
+    pub(super) fn end(&mut self, x: u64) {
+        if let Some(last) = self.columns.last_mut().filter(|_| !self.is_cut) {
+            last.end = Some(x);
+        }
+        self.cut();
     }
 
     /// A value of a time before that of the last: the clock of the capture was set back.
@@ -150,13 +161,19 @@ impl Columns {
 
     /// The points of the curve, in pieces without an interruption.
     pub(super) fn pieces(&self) -> impl Iterator<Item = Vec<Point>> {
+        self.pieces_and_ends().map(|(piece, _)| piece)
+    }
+
+    /// The same, and how far the last value of each holds, if it has ended.
+    pub(super) fn pieces_and_ends(&self) -> impl Iterator<Item = (Vec<Point>, Option<u64>)> {
         let mut rest = &*self.columns;
         core::iter::from_fn(move || {
             let (first, others) = rest.split_first()?;
             let len = others.iter().take_while(|column| !column.is_cut).count();
             let (piece, behind) = others.split_at_checked(len)?;
             rest = behind;
-            Some([first].into_iter().chain(piece).flat_map(Column::points).collect())
+            let end = piece.last().unwrap_or(first).end;
+            Some(([first].into_iter().chain(piece).flat_map(Column::points).collect(), end))
         })
     }
 
@@ -226,6 +243,20 @@ mod tests {
         let pieces: Vec<Vec<u64>> =
             columns.pieces().map(|piece| piece.iter().map(|point| point.x).collect()).collect();
         assert_eq!(pieces, [vec![1, 2], vec![4], vec![6]]);
+    }
+
+    #[test]
+    fn what_ends_a_held_value_is_no_value() {
+        let mut columns = Columns::default();
+        columns.end(1);
+        columns.push(2, 7.0);
+        columns.end(5);
+        columns.end(6);
+        columns.push(8, 9.0);
+        let pieces: Vec<_> = columns.pieces_and_ends().collect();
+        let piece = |x, y| vec![Point { x, y }];
+        assert_eq!(pieces, [(piece(2, 7.0), Some(5)), (piece(8, 9.0), None)]);
+        assert_eq!(columns.count(), 2);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use core::{convert::Infallible, ops::Range};
 
 use plotters::{
-    coord::{Shift, types::RangedCoordf64},
+    coord::{Shift, ranged1d::Ranged, types::RangedCoordf64},
     prelude::{
         Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DrawingArea, FontStyle,
         IntoDrawingArea, IntoFont, PathElement, RGBAColor, RGBColor, TRANSPARENT, TextStyle,
@@ -13,6 +13,7 @@ use plotters::{
 
 use super::{
     canvas::{Canvas, FINE, Pen},
+    labels::Labels,
     letters::Letters,
     picture::{Axis, Look, PALETTE, Panel, Picture, Series, Size},
     png::Png,
@@ -36,8 +37,10 @@ const ROW: i32 = 17;
 const BETWEEN: i32 = 8;
 /// At the left and the right edge.
 const EDGE: i32 = 14;
-/// For the labels of an axis.
+/// For the labels of an axis, at least.
 const LEFT: i32 = 48;
+/// Between such a label and the axis.
+const GAP: i32 = 8;
 /// For how many ticks a row has.
 const RIGHT: i32 = 34;
 
@@ -56,17 +59,19 @@ const TOLERANCE: f64 = 0.3;
 
 /// Draws as SVG.
 pub(super) fn to_svg(picture: &Picture) -> Result<String, Failure> {
-    let layout = Layout::of(picture);
+    let letters = Letters::new()?;
+    let layout = Layout::of(picture, &letters);
     let mut svg = Svg::new(layout.size(), &picture.title);
-    layout.draw(picture, &mut svg)?;
+    layout.draw(picture, &letters, &mut svg)?;
     Ok(svg.finish())
 }
 
 /// Draws as PNG.
 pub(super) fn to_png(picture: &Picture) -> Result<Vec<u8>, Failure> {
-    let layout = Layout::of(picture);
+    let letters = Letters::new()?;
+    let layout = Layout::of(picture, &letters);
     let mut png = Png::new(layout.size())?;
-    layout.draw(picture, &mut png)?;
+    layout.draw(picture, &letters, &mut png)?;
     png.finish()
 }
 
@@ -75,16 +80,37 @@ struct Layout {
     /// For each panel: left, top, width, height, and whether its axis has labels.
     places: Vec<(i32, i32, i32, i32, bool)>,
     height: i32,
-    /// Room for the labels of full-width panels.
+    /// Room for the labels of full-width panels, and of the others.
     left: i32,
+    left_of_half: i32,
+    /// At the right of a panel of half the width, for the last label below it.
+    right_of_half: i32,
 }
 
 impl Layout {
-    fn of(picture: &Picture) -> Self {
+    fn of(picture: &Picture, letters: &Letters) -> Self {
         let full = WIDTH as i32 - 2 * EDGE;
         let has_rows = picture.panels.iter().any(|panel| panel.size == Size::Rows);
-        let left = if has_rows { 2 * LEFT } else { LEFT };
-        let mut layout = Self { places: vec![], height: TITLE, left };
+        let widest = |ticks: &[f64]| {
+            let labels = Labels::of(ticks);
+            let width = |tick: &f64| letters.width(&labels.text(*tick), SMALL as f32, false);
+            ticks.iter().map(width).fold(0.0, f32::max).ceil() as i32
+        };
+        // Panels above each other begin at the same place.
+        let left_of = |is_half: bool| {
+            let panels = picture.panels.iter();
+            let panels = panels.filter(|panel| (panel.size == Size::Half) == is_half);
+            panels.map(|panel| widest(&panel.ticks()) + GAP).fold(LEFT, i32::max)
+        };
+        let left = left_of(false).max(if has_rows { 2 * LEFT } else { LEFT });
+        let below = widest(&ticks(0.0..picture.axis.span(), LABELS_OF_HALF));
+        let mut layout = Self {
+            places: vec![],
+            height: TITLE,
+            left,
+            left_of_half: left_of(true),
+            right_of_half: (below / 2 - EDGE).max(0),
+        };
         let mut rest = &*picture.panels;
         while let Some((panel, others)) = rest.split_first() {
             let pair = others.first().filter(|_| panel.size == Size::Half);
@@ -95,12 +121,7 @@ impl Layout {
                 .first()
                 .is_none_or(|next| (next.size == Size::Half) != (panel.size == Size::Half));
             let labels = if is_last { LABELS } else { 0 };
-            let plot = match panel.size {
-                Size::Tall => 190,
-                Size::Low => 96,
-                Size::Half => 84,
-                Size::Rows => ROW * panel.series.len() as i32,
-            };
+            let plot = panel.height();
             let (top, height) = (layout.height, HEADER + plot + labels);
             let half = (full - 2 * EDGE) / 2;
             if is_pair {
@@ -119,9 +140,13 @@ impl Layout {
         (WIDTH, self.height.unsigned_abs())
     }
 
-    fn draw<P: Pen>(&self, picture: &Picture, pen: &mut P) -> Result<(), Failure> {
-        let letters = Letters::new()?;
-        let canvas = Canvas { pen, letters: &letters, size: self.size() };
+    fn draw<P: Pen>(
+        &self,
+        picture: &Picture,
+        letters: &Letters,
+        pen: &mut P,
+    ) -> Result<(), Failure> {
+        let canvas = Canvas { pen, letters, size: self.size() };
         let area = canvas.into_drawing_area();
         let drawn = self.draw_all(picture, &area);
         drawn.map_err(|problem| Failure::Failed(format!("cannot draw: {problem}")))
@@ -159,30 +184,32 @@ impl Layout {
         );
         header(panel, width, &area)?;
         let is_half = panel.size == Size::Half;
-        let begin = if is_half { LEFT } else { self.left };
-        let end = if is_half { 0 } else { RIGHT };
+        let begin = if is_half { self.left_of_half } else { self.left };
+        let end = if is_half { self.right_of_half } else { RIGHT };
         let below = if has_labels { LABELS } else { 0 };
         let (low, high) = panel.range();
         let rows = panel.series.len() as f64;
         let y = if panel.size == Size::Rows { rows..0.0 } else { low..high };
-        let x = 0.0..axis.of(axis.end).max(1e-6);
+        let x = 0.0..axis.span();
         let mut chart = ChartBuilder::on(&area)
             .margin_top(fine(HEADER))
             .margin_right(fine(end))
             .x_label_area_size(fine(below))
             .y_label_area_size(fine(begin))
             .build_cartesian_2d(x.clone(), y.clone())?;
-        let step = (y.end - y.start).abs();
-        let (x_span, is_rows) = (x.end, panel.size == Size::Rows);
+        let is_rows = panel.size == Size::Rows;
+        let labels_below = if is_half { LABELS_OF_HALF } else { 12 };
+        let across = Labels::of(&ticks(x.clone(), labels_below));
+        let up = Labels::of(&panel.ticks());
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
             .bold_line_style(GRID.stroke_width(thick(0.8)))
             .axis_style(FRAME.stroke_width(thick(0.8)))
-            .x_labels(if is_half { 6 } else { 12 })
-            .y_labels(if is_rows { 0 } else { (height - HEADER) as usize / 28 + 1 })
-            .x_label_formatter(&|x| number(*x, x_span))
-            .y_label_formatter(&|y| if is_rows { String::new() } else { number(*y, step) })
+            .x_labels(labels_below)
+            .y_labels(panel.labels())
+            .x_label_formatter(&|x| across.text(*x))
+            .y_label_formatter(&|y| up.text(*y))
             .label_style(text(SMALL, FontStyle::Normal, &SOFT, HPos::Left))
             .set_all_tick_mark_size(fine(3))
             .draw()?;
@@ -195,6 +222,40 @@ impl Layout {
             curve(series, axis, scale, &x, &mut chart)?;
         }
         Ok(())
+    }
+}
+
+/// Labels below a panel of half the width, at most.
+const LABELS_OF_HALF: usize = 6;
+
+/// Where the labels of an axis are.
+fn ticks(range: Range<f64>, most: usize) -> Vec<f64> {
+    RangedCoordf64::from(range).key_points(most)
+}
+
+impl Panel {
+    /// Height of the part with the curves.
+    fn height(&self) -> i32 {
+        match self.size {
+            Size::Tall => 190,
+            Size::Low => 96,
+            Size::Half => 84,
+            Size::Rows => ROW * self.series.len() as i32,
+        }
+    }
+
+    /// Number of labels at the left, at most.
+    fn labels(&self) -> usize {
+        match self.size {
+            Size::Rows => 0,
+            _ => self.height().unsigned_abs() as usize / 28 + 1,
+        }
+    }
+
+    /// Where they are.
+    fn ticks(&self) -> Vec<f64> {
+        let (low, high) = self.range();
+        ticks(low..high, self.labels())
     }
 }
 
@@ -240,11 +301,14 @@ fn curve<P: Pen>(
         Look::Held | Look::Wide => colour(series.colour).mix(0.28).stroke_width(thick(4.0)),
         _ => colour(series.colour).mix(1.0).stroke_width(thick(1.2)),
     };
-    let mut pieces = columns.pieces().peekable();
-    while let Some(piece) = pieces.next() {
+    let mut pieces = columns.pieces_and_ends().peekable();
+    while let Some((piece, end)) = pieces.next() {
         let mut points: Vec<_> = piece.iter().map(|point| (axis.of(point.x), point.y)).collect();
         if matches!(series.look, Look::Held | Look::Step) {
             points = stairs(&points);
+            if let (Some(end), Some((_, y))) = (end, points.last().copied()) {
+                points.push((axis.of(end), y));
+            }
             // It holds until somebody says otherwise.
             let is_open = series.look == Look::Held && !columns.is_ended();
             if let Some((_, y)) = points.last().copied().filter(|_| is_open)
@@ -301,7 +365,7 @@ fn rows_of_ticks<P: Pen>(
         let style = colour(series.colour).mix(0.85).stroke_width(thick(1.2));
         let (top, bottom) = (row as f64 + 0.18, row as f64 + 0.82);
         let mut last = f64::NEG_INFINITY;
-        let scale = pixels(chart.plotting_area().dim_in_pixel().0) / axis.of(axis.end).max(1e-6);
+        let scale = pixels(chart.plotting_area().dim_in_pixel().0) / axis.span();
         let seen = series.columns.counts().map(|(x, _)| axis.of(x)).filter(|x| {
             let is_seen = (x - last) * scale > 0.8;
             if is_seen {
@@ -385,29 +449,6 @@ fn text(size: f64, weight: FontStyle, colour: &'static RGBColor, side: HPos) -> 
     TextStyle::from(font).color(colour).pos(Pos::new(side, VPos::Center))
 }
 
-/// A number with as many digits as an axis over this span needs; with an exponent where that is
-/// shorter.
-fn number(value: f64, span: f64) -> String {
-    // A twentieth of the span is told apart. Below 0: so many digits in front of the point are 0.
-    let decimals = (20.0 / span).log10().ceil().clamp(-320.0, 320.0) as i32;
-    let digits = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 + decimals };
-    let is_long = decimals > 5 || value.abs() >= 1e7;
-    let text = if is_long && digits <= 4 && value != 0.0 {
-        let text = format!("{value:.*e}", digits.max(0) as usize);
-        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        format!("{}e{exponent}", without_zeros(mantissa))
-    } else {
-        let text = format!("{value:.*}", decimals.clamp(0, 12) as usize);
-        without_zeros(&text).to_owned()
-    };
-    if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
-}
-
-/// Without zeros at the end of the decimals.
-fn without_zeros(text: &str) -> &str {
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -426,27 +467,5 @@ mod tests {
     fn a_held_value_makes_stairs() {
         let stairs = stairs(&[(0.0, 1.0), (1.0, 1.0), (2.0, 3.0)]);
         assert_eq!(stairs, [(0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (2.0, 3.0)]);
-    }
-
-    #[test]
-    fn the_numbers_of_an_axis_are_short() {
-        let shown = [(-5.0, 20.0), (0.25, 1.0), (1500.0, 4000.0), (-0.01, 30.0)];
-        let texts = shown.map(|(value, span)| number(value, span));
-        assert_eq!(texts, ["\u{2212}5", "0.25", "1500", "0"]);
-    }
-
-    #[test]
-    fn the_numbers_of_an_axis_differ_and_are_right() {
-        for span in [6.8e38, 3e9, 4000.0, 30.0, 0.3, 0.01, 3e-6, 2e-7, 1e-30] {
-            let values = [-0.5, -0.25, 0.0, 0.25, 0.5].map(|part| part * span);
-            let texts = values.map(|value| number(value, span));
-            for (at, (text, value)) in texts.iter().zip(values).enumerate() {
-                assert!(!texts[..at].contains(text) && text.chars().count() <= 8, "{texts:?}");
-                let read: f64 = text.replace('\u{2212}', "-").parse().unwrap();
-                assert!((read - value).abs() <= span / 20.0, "{text} for {value}");
-            }
-        }
-        // A second at the end of a capture of days.
-        assert_eq!(number(172_800.25, 1.0), "172800.25");
     }
 }

@@ -43,7 +43,8 @@ struct SeriesData<'a> {
     open: bool,
     /// Places in units of the axis.
     x: Vec<f64>,
-    /// Values; of a tick, how many it stands for. Nothing where the curve is interrupted.
+    /// Values; of a tick, how many it stands for. Nothing where the curve is interrupted; a held
+    /// value ends there.
     y: Vec<Option<f64>>,
 }
 
@@ -107,14 +108,17 @@ fn series_data<'a>(series: &'a Series, picture: &Picture) -> SeriesData<'a> {
             y.push(Some(count as f64));
         }
     } else {
-        for piece in columns.pieces() {
-            if let Some(end) = x.last().copied() {
-                x.push(end);
-                y.push(None);
-            }
+        let mut pieces = columns.pieces_and_ends().peekable();
+        while let Some((piece, end)) = pieces.next() {
             for point in piece {
                 x.push(picture.axis.of(point.x));
                 y.push(Some(point.y));
+            }
+            let end = end.map(|end| picture.axis.of(end));
+            let end = end.or_else(|| pieces.peek().and(x.last().copied()));
+            if let Some(end) = end {
+                x.push(end);
+                y.push(None);
             }
         }
     }

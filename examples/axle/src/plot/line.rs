@@ -18,6 +18,8 @@ pub(super) struct Line<'a> {
     /// Seconds since 1970.
     pub(super) t: Option<f64>,
     pub(super) interface: Option<usize>,
+    /// That of the bytes, if the capture says it.
+    pub(super) direction: Option<&'a str>,
     /// The name of the message; a gap has none.
     #[serde(default)]
     pub(super) message: &'a str,

@@ -13,6 +13,8 @@ mod errors;
 #[cfg(feature = "plot")]
 mod html;
 #[cfg(feature = "plot")]
+mod labels;
+#[cfg(feature = "plot")]
 mod letters;
 #[cfg(feature = "plot")]
 mod line;
@@ -75,12 +77,26 @@ pub(crate) struct Args {
     file: PathBuf,
 }
 
+#[cfg(feature = "plot")]
+impl Args {
+    /// Refuses an option that says nothing about this kind of capture.
+    fn fit(&self, is_pcapng: bool) -> Result<(), Failure> {
+        let line = match (is_pcapng, self.interface, self.baud) {
+            (true, _, Some(_)) => "--baud is for raw bytes: a pcapng file has times",
+            (false, Some(_), _) => "--interface is for pcapng files: raw bytes are one line",
+            _ => return Ok(()),
+        };
+        Err(Failure::Usage(line.to_owned()))
+    }
+}
+
 /// Runs the subcommand.
 #[cfg(feature = "plot")]
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
     let signals = Signals::listen()?;
-    let input = Input::open(Some(&args.file))?;
+    let mut input = Input::open(Some(&args.file))?;
+    args.fit(input.is_pcapng()?)?;
     let output = output::Output::create(&args.output, args.force, &input, &signals)?;
     let picture = read::picture(args, input, &signals)?;
     let bytes = match format {

@@ -8,6 +8,8 @@ const view = { from: 0, to: end };
 const hidden = new Set();
 const HEIGHTS = { tall: 230, low: 130, half: 120 };
 const ROW = 19, LEFT = 52, ROWS_LEFT = 104, RIGHT = 40, LABELS = 20, NEAR = 24;
+const FONT = "11px Inter, system-ui, 'Helvetica Neue', Arial, sans-serif";
+const left = { half: LEFT, full: LEFT };
 const hasRows = data.panels.some(panel => panel.size === "rows");
 
 const panels = data.panels.map(panel => {
@@ -91,14 +93,25 @@ const ticksOf = (low, high, count) => {
   const step = power * [1, 2, 5, 10].find(times => times * power >= rough);
   const ticks = [];
   for (let tick = Math.ceil(low / step); tick * step <= high; tick++) ticks.push(tick * step);
-  const decimals = Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
-  return { ticks, decimals };
+  return { ticks, texts: textsOf(ticks, step) };
 };
 
-const text = (value, decimals) => {
-  const shown = value.toFixed(decimals);
-  return (Number(shown) === 0 ? (0).toFixed(decimals) : shown).replace("-", "−");
-};
+// The numbers of ticks with this step between them: each is right and unlike its neighbours. Below
+// 0.001 and from a million on they have exponents, if this makes them shorter.
+function textsOf(ticks, step) {
+  const powerOf = number => Math.floor(Math.log10(number) + 1e-9);
+  const least = powerOf(step);
+  const all = write => ticks.map(tick => Math.abs(tick) < step / 2 ? "0" : write(tick).replace(/-/g, "−"));
+  const plain = all(tick => tick.toFixed(Math.min(100, Math.max(0, -least))));
+  const most = Math.max(...ticks.map(Math.abs));
+  if (most >= 1e-3 && most < 1e6) return plain;
+  const short = all(tick => {
+    const decimals = Math.min(20, Math.max(0, powerOf(Math.abs(tick)) - least));
+    return tick.toExponential(decimals).replace(/\.?0+e/, "e").replace("+", "");
+  });
+  const width = texts => Math.max(...texts.map(text => text.length));
+  return width(plain) <= width(short) ? plain : short;
+}
 
 // The values of a series that are shown, and one beyond each end.
 function range(series) {
@@ -122,12 +135,29 @@ function scale(shown) {
   const [least, most] = panel.least ?? [Infinity, -Infinity];
   [low, high] = [Math.min(low, least), Math.max(high, most)];
   if (low > high) [low, high] = [0, 1];
-  const room = high > low ? (high - low) * .06 : Math.max(Math.abs(high) * .1, 1);
+  // A smaller difference is none: a double has no numbers for ticks in between.
+  const isFlat = high - low < 1e-12 * Math.max(1, Math.abs(low), Math.abs(high));
+  const room = isFlat ? Math.max(Math.abs(high) * .1, 1) : (high - low) * .06;
   shown.low = panel.least && low === least && high > low ? low : low - room;
   shown.high = high + room;
 }
 
+// Where panels begin: behind their labels, and above each other at the same place.
+function measure() {
+  [left.half, left.full] = [LEFT, hasRows ? ROWS_LEFT : LEFT];
+  for (const shown of panels.filter(shown => shown.panel.size !== "rows")) {
+    scale(shown);
+    const pen = shown.canvas.getContext("2d");
+    pen.font = FONT;
+    shown.up = ticksOf(shown.low, shown.high, (HEIGHTS[shown.panel.size] - shown.top) / 28);
+    const width = Math.max(...shown.up.texts.map(text => pen.measureText(text).width)) + 10;
+    const of = shown.panel.size === "half" ? "half" : "full";
+    left[of] = Math.max(left[of], Math.ceil(width));
+  }
+}
+
 function draw() {
+  measure();
   for (const shown of panels) paint(shown);
   const root = document.documentElement;
   [root.dataset.from, root.dataset.to] = [view.from, view.to];
@@ -143,14 +173,14 @@ function paint(shown) {
   [canvas.width, canvas.height] = [Math.round(width * dots), Math.round(height * dots)];
   const pen = canvas.getContext("2d");
   pen.scale(dots, dots);
-  shown.left = isHalf || !hasRows ? LEFT : ROWS_LEFT;
+  shown.left = isHalf ? left.half : left.full;
   shown.right = width - (isHalf ? 4 : RIGHT);
   shown.bottom = height - LABELS;
-  scale(shown);
+  if (isRows) scale(shown);
   const px = x => shown.left + (x - view.from) / (view.to - view.from) * (shown.right - shown.left);
   const py = y => shown.bottom - (y - shown.low) / (shown.high - shown.low) * (shown.bottom - shown.top);
   Object.assign(shown, { px, py });
-  pen.font = "11px Inter, system-ui, 'Helvetica Neue', Arial, sans-serif";
+  pen.font = FONT;
   pen.lineWidth = 1;
   const line = (x0, y0, x1, y1, ink) => {
     pen.strokeStyle = ink;
@@ -163,17 +193,16 @@ function paint(shown) {
   const across = ticksOf(view.from, view.to, (shown.right - shown.left) / 95);
   pen.fillStyle = style("--soft");
   pen.textAlign = "center";
-  for (const tick of across.ticks) {
+  across.ticks.forEach((tick, at) => {
     line(crisp(px(tick)), shown.top, crisp(px(tick)), shown.bottom + 4, style("--grid"));
-    pen.fillText(text(tick, across.decimals), px(tick), height - 4);
-  }
+    pen.fillText(across.texts[at], px(tick), height - 4);
+  });
   if (!isRows) {
-    const up = ticksOf(shown.low, shown.high, (shown.bottom - shown.top) / 28);
     pen.textAlign = "right";
-    for (const tick of up.ticks) {
+    shown.up.ticks.forEach((tick, at) => {
       line(shown.left, crisp(py(tick)), shown.right, crisp(py(tick)), style("--grid"));
-      pen.fillText(text(tick, up.decimals), shown.left - 7, py(tick) + 4);
-    }
+      pen.fillText(shown.up.texts[at], shown.left - 7, py(tick) + 4);
+    });
   }
   line(shown.left + .5, shown.top, shown.left + .5, shown.bottom, style("--frame"));
   line(shown.left, shown.bottom + .5, shown.right, shown.bottom + .5, style("--frame"));
@@ -230,7 +259,12 @@ function curve(pen, series, row, px, py) {
   let before = null;
   for (let at = first; at < last; at++) {
     const y = series.y[at];
-    if (y === null) { before = null; continue; }
+    if (y === null) {
+      // A held value holds until here.
+      if (before !== null && isHeld(series)) pen.lineTo(px(series.x[at]), py(before));
+      before = null;
+      continue;
+    }
     if (before === null) pen.moveTo(px(series.x[at]), py(y));
     else {
       if (isHeld(series)) pen.lineTo(px(series.x[at]), py(before));

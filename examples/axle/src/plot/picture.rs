@@ -30,6 +30,11 @@ impl Axis {
     pub(super) fn of(&self, place: u64) -> f64 {
         place.saturating_sub(self.origin) as f64 / self.per_unit
     }
+
+    /// Its length in units.
+    pub(super) fn span(&self) -> f64 {
+        self.of(self.end).max(1e-6)
+    }
 }
 
 /// Curves with one unit.
@@ -114,6 +119,9 @@ pub(super) const PALETTE: [(u8, u8, u8); 9] = [
 /// The colour of errors.
 pub(super) const ERROR: usize = 8;
 
+/// A smaller difference, as a part of the values or of 1, is drawn as none.
+const LEAST: f64 = 1e-12;
+
 impl Panel {
     /// Lowest and highest value to be shown, with some room.
     pub(super) fn range(&self) -> (f64, f64) {
@@ -122,8 +130,9 @@ impl Panel {
             .chain(self.least)
             .reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)));
         let (low, high) = all.unwrap_or((0.0, 1.0));
+        let least = high.abs().max(low.abs()).max(1.0) * LEAST;
         let room = match high - low {
-            0.0 => (high.abs() * 0.1).max(1.0),
+            span if span < least => (high.abs() * 0.1).max(1.0),
             span => span * 0.06,
         };
         let is_end =

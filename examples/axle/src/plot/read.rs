@@ -48,12 +48,14 @@ struct Reading<'a> {
     args: &'a Args,
     /// The line that is drawn: protocol and interface.
     line: Option<(Protocol, Option<usize>)>,
-    /// Whether the capture has times; known from the first frame or gap.
+    /// Whether the capture has times: any frame or gap so far.
     has_times: Option<bool>,
     curves: Option<Curves>,
     frames: u64,
     /// First and last place.
     reach: Option<(u64, u64)>,
+    /// All frames and gaps.
+    taken: u64,
     /// Frames and gaps without a time in a capture with times.
     timeless: u64,
 }
@@ -63,10 +65,20 @@ enum Curves {
     Rover(Box<Rover>),
 }
 
+impl Curves {
+    fn of(protocol: Protocol) -> Self {
+        match protocol {
+            Protocol::Ucp => Self::Rover(Box::default()),
+            Protocol::Ikeya => Self::Bus(Box::new(Bus::new(false))),
+            Protocol::Ikeya3 => Self::Bus(Box::new(Bus::new(true))),
+        }
+    }
+}
+
 impl<'a> Reading<'a> {
     const fn new(args: &'a Args) -> Self {
         let (line, has_times, curves, reach) = (None, None, None, None);
-        Self { args, line, has_times, curves, frames: 0, reach, timeless: 0 }
+        Self { args, line, has_times, curves, frames: 0, reach, taken: 0, timeless: 0 }
     }
 
     /// What follows is of this line.
@@ -78,12 +90,15 @@ impl<'a> Reading<'a> {
             let line = "the capture has more than one line: choose one with --interface";
             return Err(Failure::Failed(line.to_owned()));
         }
-        self.curves.get_or_insert_with(|| match protocol {
-            Protocol::Ucp => Curves::Rover(Box::default()),
-            Protocol::Ikeya => Curves::Bus(Box::new(Bus::new(false))),
-            Protocol::Ikeya3 => Curves::Bus(Box::new(Bus::new(true))),
-        });
+        self.curves.get_or_insert_with(|| Curves::of(protocol));
         Ok(())
+    }
+
+    /// With times, and without what was drawn without them.
+    fn begin_anew(&mut self) {
+        self.timeless = self.taken - 1;
+        (self.has_times, self.frames, self.reach) = (Some(true), 0, None);
+        self.curves = self.line.map(|(protocol, _)| Curves::of(protocol));
     }
 
     /// Takes in the lines of a sheet, and empties it.
@@ -102,6 +117,11 @@ impl<'a> Reading<'a> {
         let Some((_, interface)) = self.line else { return };
         if line.interface != interface {
             return;
+        }
+        self.taken += 1;
+        if self.has_times == Some(false) && line.t.is_some() {
+            // Those in front of it have none.
+            self.begin_anew();
         }
         let has_times = *self.has_times.get_or_insert(line.t.is_some());
         let x = match (has_times, line.t) {
@@ -126,25 +146,20 @@ impl<'a> Reading<'a> {
     fn finish(self) -> Result<Picture, Failure> {
         let file = &self.args.file;
         let failed = |line| Err(Failure::Failed(line));
-        let (Some((protocol, interface)), Some(curves), Some(reach)) =
-            (self.line, self.curves, self.reach)
+        let (Some((protocol, _)), Some(curves), Some(reach)) = (self.line, self.curves, self.reach)
         else {
             return failed(format!("{file:?} has nothing on that interface"));
         };
-        if interface.is_none() && self.args.interface.is_some() {
-            return failed(format!("{file:?} has raw bytes and no interfaces"));
-        }
-        if self.has_times == Some(true) && self.args.baud.is_some() {
-            return failed(format!("{file:?} has times: --baud is for raw bytes"));
-        }
         let name = protocol.name();
         let axis = axis(self.has_times == Some(true), self.args.baud, reach);
         let mut notes = match &curves {
             Curves::Bus(bus) => bus.notes(),
             Curves::Rover(_) => vec![],
         };
-        if self.timeless > 0 {
-            notes.push(format!("{} frames and gaps without a time: not drawn", self.timeless));
+        match self.timeless {
+            0 => {}
+            1 => notes.push("1 frame or gap without a time: not drawn".to_owned()),
+            count => notes.push(format!("{count} frames and gaps without a time: not drawn")),
         }
         let panels = match curves {
             Curves::Bus(bus) => bus.panels(),
@@ -198,7 +213,8 @@ fn reduced(panels: &[Panel], axis: &Axis) -> Option<String> {
     Some(format!("first, lowest, highest and last value of each {width} at most"))
 }
 
-/// Text without control characters.
+/// Text without control characters, and without those that XML has no place for.
 fn printable(text: &str) -> String {
-    text.chars().map(|char| if char.is_control() { '\u{FFFD}' } else { char }).collect()
+    let is_bad = |char: char| char.is_control() || matches!(char, '\u{FFFE}' | '\u{FFFF}');
+    text.chars().map(|char| if is_bad(char) { '\u{FFFD}' } else { char }).collect()
 }

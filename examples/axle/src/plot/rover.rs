@@ -42,8 +42,9 @@ pub(super) struct Rover {
     current: Group,
     power: Group,
     errors: Errors,
-    /// Index and place of the last report.
-    last: Option<(u8, u64)>,
+    /// Index and place of the last report, of those sent and of the others: a sender has its own
+    /// count (ruling U9).
+    last: [Option<(u8, u64)>; 2],
 }
 
 /// A panel that fills.
@@ -109,7 +110,7 @@ impl Default for Rover {
             current: Group::new(("Current", "A", Half), Line, with_zero, &[""]),
             power: Group::new(("Power", "W", Half), Line, with_zero, &[""]),
             errors: Errors::default(),
-            last: None,
+            last: [None; 2],
         }
     }
 }
@@ -135,7 +136,9 @@ impl Rover {
     }
 
     fn report(&mut self, line: &Line<'_>, x: u64, has_times: bool) {
-        let last = line.index.and_then(|index| self.last.replace((index, x)));
+        let [received, sent] = &mut self.last;
+        let of_sender = if line.direction == Some("out") { sent } else { received };
+        let last = line.index.and_then(|index| of_sender.replace((index, x)));
         if let (Some(index), Some((before, since))) = (line.index, last) {
             // The same one again: none is missing.
             let lost = index.wrapping_sub(before).saturating_sub(1);

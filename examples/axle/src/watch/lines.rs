@@ -14,6 +14,7 @@ use crate::{
     failure::Failure,
     line::{Line, PATIENCE, QUIET},
     listing::{Shown, Table},
+    pcapng::Stamp,
     signals::Signals,
 };
 
@@ -29,6 +30,8 @@ where
     let mut line = Line::connect(watched.port, watched.baud)?;
     let mut udp = Udp::new(watched)?;
     let mut recorder = Recorder::<F>::new(watched)?;
+    // A recording and a datagram have the same time.
+    let stamp = Stamp::new();
     let mut clock = line.clock();
     let mut buffer = [0; 4096];
     let mut out = io::stdout().lock();
@@ -55,11 +58,12 @@ where
             decoder.idle();
         }
         // A recording that fails does not end the watch; it decides the exit code.
-        if let Err(failure) = recorder.take(received) {
+        let micros = stamp.micros();
+        if let Err(failure) = recorder.take(received, micros) {
             recorder.drop_it();
             lost = Err(failure);
         }
-        udp.take(received);
+        udp.take(received, micros);
         table.take(&mut decoder, received);
         if now >= print_at {
             print_at = now + PRINT_PERIOD;

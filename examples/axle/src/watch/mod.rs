@@ -82,8 +82,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
     record: Option<PathBuf>,
 
-    /// Send each frame and gap to this host, as a datagram with the object of axle decode --json;
-    /// for PlotJuggler: UDP server, JSON, timestamp t
+    /// Send each frame and gap to this host, as a datagram with the object of axle decode --json,
+    /// without interface, as a line that is watched has no number; t is that of --record. Of a name
+    /// with several addresses, to each. For PlotJuggler: UDP server, JSON, timestamp t
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "file")]
     udp: Option<String>,
 }

@@ -18,6 +18,7 @@ use crate::{
     failure::Failure,
     line::{Line, PATIENCE},
     listing::Table,
+    pcapng::Stamp,
     signals::{self, Signals},
 };
 
@@ -45,7 +46,8 @@ where
         ..View::default()
     };
     let dashboard = Dashboard::open(feed, view, Sink::default())?;
-    let mut watch = Watch { watched, dashboard, recorder, udp, start, failed: None };
+    let stamp = Stamp::new();
+    let mut watch = Watch { watched, dashboard, recorder, udp, stamp, start, failed: None };
     watch.show_recording();
     let broken = watch.run(&mut line, &mut clock, &signals);
 
@@ -84,6 +86,8 @@ struct Watch<'a, F> {
     dashboard: Dashboard<F>,
     recorder: Recorder<F>,
     udp: Udp,
+    /// A recording and a datagram have the same time.
+    stamp: Stamp,
     start: Instant,
     /// Why a recording has failed.
     failed: Option<Failure>,
@@ -112,9 +116,10 @@ where
             }
             let received = line.receive(&mut buffer, PATIENCE)?;
             let now = clock.now().as_micros();
-            self.udp.take(received);
+            let micros = self.stamp.micros();
+            self.udp.take(received, micros);
             self.dashboard.feed.take(Source::Received, received, now);
-            if let Err(failure) = self.recorder.take(received) {
+            if let Err(failure) = self.recorder.take(received, micros) {
                 self.give_up_recording(failure, now);
             }
             while let Some(key) = self.dashboard.key() {

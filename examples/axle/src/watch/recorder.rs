@@ -62,10 +62,10 @@ where
         }
     }
 
-    /// Takes in what has just been received.
-    pub(super) fn take(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+    /// Takes in what has just been received, and when: microseconds since 1970.
+    pub(super) fn take(&mut self, bytes: &[u8], micros: u64) -> Result<(), Failure> {
         match &mut self.running {
-            Some((_, frames)) => frames.take(bytes),
+            Some((_, frames)) => frames.take_at(bytes, micros),
             None => Ok(()),
         }
     }

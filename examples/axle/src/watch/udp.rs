@@ -13,7 +13,7 @@ use crate::{
     failure::Failure,
     line::QUIET,
     listing::Style,
-    pcapng::{Direction, Stamp},
+    pcapng::Direction,
 };
 
 /// The sender, if there is one.
@@ -27,7 +27,6 @@ struct Sender {
     to: Vec<(UdpSocket, SocketAddr)>,
     stream: Box<dyn Stream>,
     sheet: Sheet,
-    stamp: Stamp,
     heard_at: Instant,
     /// Whether bytes have come since the line was quiet.
     is_open: bool,
@@ -48,7 +47,6 @@ impl Udp {
             to,
             stream: decode::stream_of(watched.protocol, Direction::In),
             sheet: Sheet::new(Some(Style::Json)),
-            stamp: Stamp::new(),
             heard_at: Instant::now(),
             is_open: false,
             sent: 0,
@@ -56,12 +54,11 @@ impl Udp {
         })))
     }
 
-    /// Takes in what has just been received, possibly nothing.
-    pub(super) fn take(&mut self, bytes: &[u8]) {
+    /// Takes in what has just been received, possibly nothing, and when: microseconds since 1970.
+    pub(super) fn take(&mut self, bytes: &[u8], micros: u64) {
         let Some(sender) = &mut self.0 else { return };
         if !bytes.is_empty() {
             (sender.heard_at, sender.is_open) = (Instant::now(), true);
-            let micros = sender.stamp.micros();
             sender.stream.feed(bytes, Some(micros), &mut sender.sheet);
         } else if sender.is_open
             && sender.heard_at.elapsed().as_micros() >= QUIET.as_micros().into()

@@ -218,6 +218,16 @@ fn watch_sends_what_decode_says_of_the_recording() {
             gaps.map(|gap| gap["length"].as_u64().unwrap()).sum()
         };
         assert_eq!(skipped(&of_sent), skipped(&said));
+        // One moment is taken for both.
+        let times_of_frames = |of: &mut dyn Iterator<Item = &str>| -> Vec<f64> {
+            let lines = of.map(|line| serde_json::from_str::<Value>(line).unwrap());
+            let frames = lines.filter(|line| line["event"] == "frame");
+            frames.map(|line| line["t"].as_f64().unwrap()).collect()
+        };
+        let of_datagrams = times_of_frames(&mut sent.iter().map(String::as_str));
+        assert_eq!(of_datagrams, times_of_frames(&mut listing.lines()));
+        let first: Value = serde_json::from_str(&sent[0]).unwrap();
+        assert!(first["direction"] == "in" && first["interface"].is_null(), "{first}");
         let times = sent.iter().map(|line| {
             let line: Value = serde_json::from_str(line).unwrap();
             line["t"].as_f64().unwrap() - from

@@ -32,7 +32,7 @@ fn a_second_recording_is_another_file() {
     };
     let mut recorder =
         Recorder::<Ucp>::new(&Watched { port, protocol, baud, args: &args }).unwrap();
-    recorder.take(&[0xFD, 0xFF, 4]).unwrap();
+    recorder.take(&[0xFD, 0xFF, 4], 1).unwrap();
     recorder.finish().unwrap();
     let recorded = std::fs::read(&named).unwrap();
     let has_all = recorded.windows(3).any(|part| part == [0xFD, 0xFF, 4]);
