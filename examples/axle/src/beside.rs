@@ -3,6 +3,7 @@
 
 use std::{
     collections::BTreeSet,
+    fmt::Display,
     fs::{self, File},
     io,
     path::{Path, PathBuf, is_separator},
@@ -229,6 +230,11 @@ impl Drop for Beside {
 /// What is said after a signal.
 pub(crate) fn interrupted() -> Failure {
     Failure::Failed("interrupted: nothing was written".to_owned())
+}
+
+/// The failure to write what was to get this name.
+pub(crate) fn cannot_write(path: &Path, error: &dyn Display) -> Failure {
+    Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
 }
 
 fn cannot_create(path: &Path, error: &io::Error) -> Failure {

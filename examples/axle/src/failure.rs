@@ -36,6 +36,13 @@ pub(crate) enum Failure {
 }
 
 impl Failure {
+    /// This build cannot do it.
+    #[cfg_attr(all(feature = "mcap", feature = "parquet", feature = "plot"), allow(dead_code))]
+    pub(crate) fn without_feature(feature: &str) -> Self {
+        let line = "this axle was built without the feature";
+        Self::Usage(format!("{line} {feature}: build it with --features {feature}"))
+    }
+
     /// The first paragraph of clap's message on one line, with what was probably meant; --help
     /// shows usage and tips.
     pub(crate) fn usage(error: &clap::Error) -> Self {

@@ -1,94 +1,33 @@
-//! CSV: a folder with a file per table, and one that lists all columns.
+//! CSV: a folder with a file per table.
 
 use std::{
-    collections::BTreeMap,
     fs::File,
     io::{self, BufWriter, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
-use super::{Job, cannot_write};
+use super::folder::TableFile;
 use crate::{
-    beside::{Beside, COLUMNS, LIST},
-    decode::{self, Walked},
-    failure::Failure,
     listing::Out,
-    tables::{Cell, Sink, Table},
+    tables::{Cell, Table},
 };
 
-pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "csv", &job.input)?;
-    beside.end_on(&job.signals);
-    let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
-    let mut list = List::default();
-    let mut sink = Both(&mut folder, &mut list);
-    let go_on = || Job::go_on(&job.signals);
-    let walked = decode::walk_into(&mut job.input, &job.chosen, &mut sink, go_on)?;
-    let cannot = |error| cannot_write(job.output, &error);
-    for mut file in folder.files.into_values() {
-        file.flush().map_err(cannot)?;
+pub(super) struct Csv(BufWriter<File>);
+
+impl TableFile for Csv {
+    const EXTENSION: &'static str = "csv";
+
+    type Error = io::Error;
+
+    fn create(path: &Path, table: &Table) -> io::Result<Self> {
+        let mut file = BufWriter::new(File::create(path)?);
+        let names: Vec<_> = table.columns.iter().map(|column| &*column.name).collect();
+        writeln!(file, "{}", names.join(","))?;
+        Ok(Self(file))
     }
-    list.write(&folder.path).map_err(cannot)?;
-    beside.keep()?;
-    Ok(walked)
-}
 
-/// Rows for two sinks.
-pub(super) struct Both<'a>(pub(super) &'a mut dyn Sink, pub(super) &'a mut List);
-
-impl Sink for Both<'_> {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
-        self.1.rows(table)?;
-        self.0.rows(table)
-    }
-}
-
-/// The columns of all tables with rows: `columns.csv`, which both kinds of folders have.
-#[derive(Default)]
-pub(super) struct List(BTreeMap<String, String>);
-
-impl List {
-    pub(super) fn write(&self, folder: &Path) -> io::Result<()> {
-        let mut file = File::create(folder.join(LIST))?;
-        file.write_all(format!("{COLUMNS}\n").as_bytes())?;
-        self.0.values().try_for_each(|lines| file.write_all(lines.as_bytes()))
-    }
-}
-
-impl Sink for List {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
-        if !self.0.contains_key(&table.name) {
-            let line = |column: &crate::tables::Column| {
-                let (name, unit, kind) = (&column.name, column.unit, column.kind.name());
-                format!("{},{name},{unit},{kind}\n", table.name)
-            };
-            self.0.insert(table.name.clone(), table.columns.iter().map(line).collect());
-        }
-        Ok(())
-    }
-}
-
-/// A file per table.
-struct Folder<'a> {
-    path: PathBuf,
-    /// The name that it will have.
-    output: &'a Path,
-    files: BTreeMap<String, BufWriter<File>>,
-}
-
-impl Sink for Folder<'_> {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
-        let cannot = |error| cannot_write(self.output, &error);
+    fn add(&mut self, table: &Table) -> io::Result<()> {
         let mut out = Out::default();
-        if !self.files.contains_key(&table.name) {
-            let file = File::create(self.path.join(format!("{}.csv", table.name)));
-            let file = BufWriter::new(file.map_err(cannot)?);
-            self.files.insert(table.name.clone(), file);
-            let names: Vec<_> = table.columns.iter().map(|column| &*column.name).collect();
-            out.text(&names.join(","));
-            out.text("\n");
-        }
-        let Some(file) = self.files.get_mut(&table.name) else { return Ok(()) };
         let mut columns: Vec<_> = table.columns.iter().map(|column| column.cells()).collect();
         for _ in &table.numbers {
             let mut before = "";
@@ -100,10 +39,14 @@ impl Sink for Folder<'_> {
                 }
             }
             out.text("\n");
-            file.write_all(&out.0).map_err(cannot)?;
+            self.0.write_all(&out.0)?;
             out.0.clear();
         }
         Ok(())
+    }
+
+    fn finish(mut self) -> io::Result<()> {
+        self.0.flush()
     }
 }
 

@@ -2,9 +2,9 @@
 
 use std::io::{BufWriter, Write};
 
-use super::{Job, cannot_write};
+use super::Job;
 use crate::{
-    beside::Beside,
+    beside::{Beside, cannot_write},
     decode::{Sheet, Walked},
     failure::Failure,
     listing::{self, Out, Style},

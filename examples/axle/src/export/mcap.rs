@@ -4,10 +4,10 @@ use std::{collections::BTreeMap, io::BufWriter};
 
 use mcap::{WriteOptions, Writer, records::MessageHeader};
 
-use super::{Job, cannot_write};
+use super::Job;
 use crate::{
     args::Protocol,
-    beside::Beside,
+    beside::{Beside, cannot_write},
     decode::{Sheet, Walked},
     failure::Failure,
     listing::Style,

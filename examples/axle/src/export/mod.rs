@@ -1,6 +1,7 @@
 //! `axle export`: a capture as a file for other tools.
 
 mod csv;
+mod folder;
 mod lines;
 #[cfg(feature = "mcap")]
 mod mcap;
@@ -92,12 +93,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (output, force) = (&*args.output, args.force);
     let job = Job { input, chosen, output, force, signals };
     let walked = match format {
-        Format::Csv => csv::export(job),
+        Format::Csv => folder::export::<csv::Csv>(job),
         Format::Lines => lines::export(job),
         #[cfg(feature = "mcap")]
         Format::Mcap => mcap::export(job),
         #[cfg(feature = "parquet")]
-        Format::Parquet => parquet::export(job),
+        Format::Parquet => folder::export::<parquet::Parquet>(job),
         #[allow(unreachable_patterns, reason = "with all features")]
         Format::Mcap | Format::Parquet => return Ok(()),
     }?;
@@ -132,13 +133,6 @@ fn format_of(output: &Path) -> Result<Format, Failure> {
     };
     match feature {
         None => Ok(format),
-        Some(feature) => Err(Failure::Usage(format!(
-            "this axle was built without the feature {feature}: build it with --features {feature}"
-        ))),
+        Some(feature) => Err(Failure::without_feature(feature)),
     }
-}
-
-/// The failure to write this file.
-fn cannot_write(path: &Path, error: &dyn std::fmt::Display) -> Failure {
-    Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
 }

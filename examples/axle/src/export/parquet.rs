@@ -1,12 +1,6 @@
 //! Parquet: a folder with a file per table.
 
-use std::{
-    collections::BTreeMap,
-    fs::File,
-    ops::Range,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fs::File, ops::Range, path::Path, sync::Arc};
 
 use bytes::Bytes;
 use parquet::{
@@ -29,54 +23,30 @@ use parquet::{
     schema::types::{ColumnDescPtr, ColumnPath, Type as Field},
 };
 
-use super::{
-    Job, cannot_write,
-    csv::{Both, List},
-};
-use crate::{
-    beside::Beside,
-    decode::{self, Walked},
-    failure::Failure,
-    tables::{Column, Sink, Table, Type, Values},
-};
+use super::folder::TableFile;
+use crate::tables::{Column, Table, Type, Values};
 
-pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
-    let (beside, path) = Beside::folder(job.output, job.force, "parquet", &job.input)?;
-    beside.end_on(&job.signals);
-    let mut folder = Folder { path, output: job.output, files: BTreeMap::new() };
-    let mut list = List::default();
-    let mut sink = Both(&mut folder, &mut list);
-    let go_on = || Job::go_on(&job.signals);
-    let walked = decode::walk_into(&mut job.input, &job.chosen, &mut sink, go_on)?;
-    for mut file in folder.files.into_values() {
-        file.finish().map_err(|error| cannot_write(job.output, &error))?;
+pub(super) struct Parquet(SerializedFileWriter<File>);
+
+impl TableFile for Parquet {
+    const EXTENSION: &'static str = "parquet";
+
+    type Error = ParquetError;
+
+    fn create(path: &Path, table: &Table) -> Result<Self, ParquetError> {
+        create(path, table).map(Self)
     }
-    list.write(&folder.path).map_err(|error| cannot_write(job.output, &error))?;
-    beside.keep()?;
-    Ok(walked)
-}
 
-/// A file per table.
-struct Folder<'a> {
-    path: PathBuf,
-    /// The name that it will have.
-    output: &'a Path,
-    files: BTreeMap<String, SerializedFileWriter<File>>,
-}
+    fn add(&mut self, table: &Table) -> Result<(), ParquetError> {
+        group(&mut self.0, table)
+    }
 
-impl Sink for Folder<'_> {
-    fn rows(&mut self, table: &Table) -> Result<(), Failure> {
-        let cannot = |error: ParquetError| cannot_write(self.output, &error);
-        if !self.files.contains_key(&table.name) {
-            let file = create(&self.path, table).map_err(cannot)?;
-            self.files.insert(table.name.clone(), file);
-        }
-        let Some(file) = self.files.get_mut(&table.name) else { return Ok(()) };
-        group(file, table).map_err(cannot)
+    fn finish(mut self) -> Result<(), ParquetError> {
+        self.0.finish().map(drop)
     }
 }
 
-fn create(folder: &Path, table: &Table) -> Result<SerializedFileWriter<File>, ParquetError> {
+fn create(path: &Path, table: &Table) -> Result<SerializedFileWriter<File>, ParquetError> {
     let fields = table.columns.iter().map(|column| field(column).map(Arc::new));
     let fields = fields.collect::<Result<_, _>>()?;
     let schema = Field::group_type_builder(&table.name).with_fields(fields).build()?;
@@ -102,7 +72,7 @@ fn create(folder: &Path, table: &Table) -> Result<SerializedFileWriter<File>, Pa
             properties = properties.set_column_statistics_enabled(path, EnabledStatistics::Chunk);
         }
     }
-    let file = File::create(folder.join(format!("{}.parquet", table.name)))?;
+    let file = File::create(path)?;
     SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))
 }
 
@@ -295,7 +265,7 @@ fn bytes(
 mod tests {
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
-    use super::*;
+    use super::{super::folder::Folder, *};
     use crate::tables::tests::{Added, lamp, tables_of};
 
     #[test]
@@ -304,11 +274,9 @@ mod tests {
         std::fs::create_dir(&path).unwrap();
         let (lamp, less) = (lamp(), serde_json::json!({"colour": 2, "name": "c"}));
         let mut tables = tables_of(&[Added("set_lamp", &lamp), Added("set_lamp", &less)]);
-        let mut folder = Folder { path: path.clone(), output: &path, files: BTreeMap::new() };
+        let mut folder = Folder::<Parquet>::new(path.clone(), &path);
         tables.give_rest(&mut folder).unwrap();
-        for mut file in folder.files.into_values() {
-            file.finish().unwrap();
-        }
+        folder.finish().unwrap();
         let file = File::open(path.join("ucp.set_lamp.parquet")).unwrap();
         let reader = SerializedFileReader::new(file).unwrap();
         let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();

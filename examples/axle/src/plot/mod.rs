@@ -111,6 +111,5 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 #[cfg(not(feature = "plot"))]
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let Args { protocol: Named(_), interface: _, baud: _, output: _, force: _, file: _ } = args;
-    let line = "this axle was built without the feature plot: build it with --features plot";
-    Err(Failure::Usage(line.to_owned()))
+    Err(Failure::without_feature("plot"))
 }

@@ -2,7 +2,12 @@
 
 use std::{fs::File, io::Write, path::Path};
 
-use crate::{beside::Beside, failure::Failure, input::Input, signals::Signals};
+use crate::{
+    beside::{Beside, cannot_write},
+    failure::Failure,
+    input::Input,
+    signals::Signals,
+};
 
 /// What a picture is made as.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -50,9 +55,7 @@ impl<'a> Output<'a> {
         let Self { path, beside, mut file } = self;
         // A full disk may tell it no earlier than at the end.
         let written = file.write_all(bytes).and_then(|()| file.sync_all());
-        written.map_err(|error| {
-            Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
-        })?;
+        written.map_err(|error| cannot_write(path, &error))?;
         beside.keep()
     }
 }
