@@ -1,13 +1,9 @@
 #!/usr/bin/env bash
-# The host tool on Windows, as far as wine goes: builds axle.exe with mingw and runs it.
-#
-#   .ci/windows          builds, decodes, then runs on a COM port; several attempts at the latter
-#   .ci/windows ports    one attempt, after a build, in the folder $FOLDER
-#
-# The COM port is a pseudo-terminal, with motors simulated by the native tool. It has no line speed,
-# hence --instant.
+# The host tool on Windows, as far as wine goes: builds axle.exe with mingw, decodes captures with it,
+# and runs it on a COM port. That is a pseudo-terminal, with motors simulated by the native tool. It
+# has no line speed, hence --instant.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../../../.."
 CARGO_TARGET_DIR=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 export CARGO_TARGET_DIR CARGO_TERM_COLOR=never CARGO_INCREMENTAL=0
 here=$CARGO_TARGET_DIR/debug/axle
@@ -71,10 +67,7 @@ started=()
 end() { [ ${#started[@]} = 0 ] || kill -9 "${started[@]}" 2>/dev/null || true; }
 
 ports() {
-    trap end EXIT
     cd "$FOLDER"
-    # Of an earlier attempt.
-    rm -f sim rover talk spin.pcapng
     # Where it is allowed, other processes do not delay the answers.
     local soon=
     if chrt -f 10 true 2>/dev/null; then soon='chrt -f 10'; fi
@@ -138,7 +131,7 @@ ports() {
     expect '^\[[1-9].* rpm, [0-9.]* V$' out
     expect '^told to stop$' out
 
-    python3 "$OLDPWD/.ci/wine/talk.py" "$OLDPWD/examples/captures/ikeya.bin" >talk &
+    python3 "$OLDPWD/examples/axle/tests/windows/talk.py" "$OLDPWD/examples/captures/ikeya.bin" >talk &
     started+=($!)
     await '^/dev/' talk
     plug 8 "$(cat talk)"
@@ -155,11 +148,6 @@ same_decoding() {
     axle decode "$1" | cmp - decoded
 }
 
-if [ "${1:-}" = ports ]; then
-    ports
-    exit
-fi
-
 bash .ci/need gcc-mingw-w64-x86-64-win32 wine64
 target=x86_64-pc-windows-gnu
 # Debian's compiler uses its own target folder, see .ci/cross.
@@ -174,24 +162,19 @@ FOLDER=$(mktemp -d)
 # A prefix of its own, so that no other program under wine is ended.
 export FOLDER WINEPREFIX=$FOLDER/prefix WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml=
 clean() {
+    end
     timeout 20 "$(find_wine wineserver)" -k >/dev/null 2>&1 || true
     rm -rf "$FOLDER"
 }
 trap clean EXIT
 for program in "${programs[@]}"; do [ ! -e "$program" ] || cp "$program" "$FOLDER"; done
-x86_64-w64-mingw32-gcc -shared -o "$FOLDER/bcryptprimitives.dll" .ci/wine/random.c -ladvapi32
-x86_64-w64-mingw32-gcc -o "$FOLDER/press.exe" .ci/wine/press.c
+x86_64-w64-mingw32-gcc -shared -o "$FOLDER/bcryptprimitives.dll" examples/axle/tests/windows/random.c -ladvapi32
+x86_64-w64-mingw32-gcc -o "$FOLDER/press.exe" examples/axle/tests/windows/press.c
 mkdir "$WINEPREFIX"
 timeout 120 "$(find_wine wineserver)" -p >/dev/null 2>&1
 wine "$FOLDER/axle.exe" --version >/dev/null 2>&1
 
 decode
 echo "axle.exe decodes as axle does"
-# A busy machine can delay three answers in a row; the node is then abnormal, as it should be.
-for attempt in 1 2 3 4 5 6; do
-    bash .ci/windows ports && break
-    echo "attempt $attempt: the ports of Windows did not work"
-    [ "$attempt" -lt 6 ]
-    sleep 5
-done
+ports
 echo "axle.exe scans, turns and stops motors and records on a COM port"
