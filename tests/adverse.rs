@@ -21,7 +21,7 @@ mod motor;
 /// Ports that take a packet in parts, with pauses.
 #[path = "adverse/paused_packets.rs"]
 mod paused_packets;
-#[path = "support/port.rs"]
+#[path = "harness/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
 /// Random masters on random buses, against the rulings.

@@ -1,12 +1,12 @@
 //! Dense headers, where candidates are rejected in batches, against the slow oracle.
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
-#[path = "support/checked_line.rs"]
+#[path = "harness/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod checked_line;
-#[path = "support/known_framings.rs"]
+#[path = "harness/known_framings.rs"]
 mod known_framings;
-#[path = "support/oracle.rs"]
+#[path = "harness/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
 

@@ -13,7 +13,7 @@ mod bus_rig;
 /// Clocks and delays.
 #[path = "drivers/clocks.rs"]
 mod clocks;
-#[path = "support/dice.rs"]
+#[path = "harness/dice.rs"]
 #[allow(dead_code, reason = "others use more of it")]
 mod dice;
 /// The driver-enable pin of a port alone.
@@ -54,7 +54,7 @@ mod held_up;
 /// Parts, and the defaults of traits.
 #[path = "drivers/parts.rs"]
 mod parts;
-#[path = "support/port.rs"]
+#[path = "harness/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
 /// A role that records every call.
@@ -76,7 +76,7 @@ mod stops;
 /// Frames that did not leave.
 #[path = "drivers/unsent_frames.rs"]
 mod unsent_frames;
-#[path = "support/virtual_time.rs"]
+#[path = "harness/virtual_time.rs"]
 mod virtual_time;
 /// Waiting for events.
 #[path = "drivers/waiting.rs"]

@@ -15,7 +15,7 @@ mod chance;
 /// Both forms of the CRC against a CRC computed bit by bit.
 #[path = "exhaustive/checksum.rs"]
 mod checksum;
-#[path = "support/dice.rs"]
+#[path = "harness/dice.rs"]
 #[allow(dead_code, reason = "only bytes are random here")]
 mod dice;
 /// Errors of up to three bits, and bursts.
@@ -24,7 +24,7 @@ mod errors;
 /// Damage that makes a frame look longer or shorter than it is.
 #[path = "exhaustive/lengths.rs"]
 mod lengths;
-#[path = "support/oracle.rs"]
+#[path = "harness/oracle.rs"]
 #[allow(dead_code, reason = "only its CRC matters here")]
 mod oracle;
 /// All payloads of a bus packet.

@@ -34,7 +34,7 @@ mod programs;
 /// A board in QEMU.
 #[path = "firmware/qemu.rs"]
 mod qemu;
-#[path = "support/quiet.rs"]
+#[path = "harness/quiet.rs"]
 mod quiet;
 /// What a line of text tells of a role: the file of the firmware.
 #[path = "../examples/firmware/src/report.rs"]

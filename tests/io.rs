@@ -3,7 +3,7 @@
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
 
-#[path = "support/port.rs"]
+#[path = "harness/port.rs"]
 #[allow(dead_code, reason = "the drivers use more of it")]
 mod port;
 

@@ -20,7 +20,7 @@ mod lying_framing;
 /// The master.
 #[path = "motion/master.rs"]
 mod master;
-#[path = "support/port.rs"]
+#[path = "harness/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
 /// Frames that must not be sent.
@@ -37,6 +37,6 @@ mod slave;
 /// The master of three-motor boards.
 #[path = "motion/three_motors.rs"]
 mod three_motors;
-#[path = "support/virtual_time.rs"]
+#[path = "harness/virtual_time.rs"]
 #[allow(dead_code, reason = "drivers.rs uses more of it")]
 mod virtual_time;

@@ -9,18 +9,18 @@
 //! lines and shows them for every way to decode.
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
-#[path = "support/dice.rs"]
+#[path = "harness/dice.rs"]
 #[allow(dead_code, reason = "a part is enough here")]
 mod dice;
-#[path = "support/known_framings.rs"]
+#[path = "harness/known_framings.rs"]
 #[allow(dead_code, reason = "only the bytes of frames matter here")]
 mod known_framings;
-#[path = "support/noisy_line.rs"]
+#[path = "harness/noisy_line.rs"]
 mod noisy_line;
-#[path = "support/oracle.rs"]
+#[path = "harness/oracle.rs"]
 #[allow(dead_code, reason = "only frames matter here")]
 mod oracle;
-#[path = "support/traffic.rs"]
+#[path = "harness/traffic.rs"]
 #[allow(dead_code, reason = "each kind has a test here")]
 mod traffic;
 

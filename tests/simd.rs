@@ -2,15 +2,15 @@
 //! oracle: streams long enough for lanes, damaged everywhere.
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
-#[path = "support/checked_line.rs"]
+#[path = "harness/checked_line.rs"]
 #[allow(dead_code, reason = "stream.rs uses more of it")]
 mod checked_line;
-#[path = "support/hostile_streams.rs"]
+#[path = "harness/hostile_streams.rs"]
 #[allow(dead_code, reason = "stream.rs uses more of it")]
 mod hostile_streams;
-#[path = "support/known_framings.rs"]
+#[path = "harness/known_framings.rs"]
 mod known_framings;
-#[path = "support/oracle.rs"]
+#[path = "harness/oracle.rs"]
 #[allow(dead_code, reason = "stream.rs uses more of it")]
 mod oracle;
 

@@ -4,7 +4,7 @@
 /// The buffer of a decoder.
 #[path = "stream/buffer.rs"]
 mod buffer;
-#[path = "support/checked_line.rs"]
+#[path = "harness/checked_line.rs"]
 mod checked_line;
 /// False headers, damage and nested frames.
 #[path = "stream/false_starts.rs"]
@@ -12,13 +12,13 @@ mod false_starts;
 /// Framings from outside this crate.
 #[path = "stream/foreign_framings.rs"]
 mod foreign_framings;
-#[path = "support/hostile_streams.rs"]
+#[path = "harness/hostile_streams.rs"]
 mod hostile_streams;
-#[path = "support/judged_work.rs"]
+#[path = "harness/judged_work.rs"]
 mod judged_work;
-#[path = "support/known_framings.rs"]
+#[path = "harness/known_framings.rs"]
 mod known_framings;
-#[path = "support/oracle.rs"]
+#[path = "harness/oracle.rs"]
 mod oracle;
 /// Properties of every framing.
 #[path = "stream/properties.rs"]

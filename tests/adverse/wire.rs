@@ -1,6 +1,6 @@
 //! A line in virtual time, with a port and a clock that follow the test's instructions.
 //!
-//! Unlike the scripted port of `support/port.rs`, bytes take time, motors answer what has reached
+//! Unlike the scripted port of `harness/port.rs`, bytes take time, motors answer what has reached
 //! them, and a write may depend on its bytes and on the time.
 
 use std::{

@@ -5,7 +5,7 @@ use axlewire::ikeya::{
     board::{OneMotor, ThreeMotors},
 };
 
-#[path = "../support/board_packets.rs"]
+#[path = "../harness/board_packets.rs"]
 #[allow(dead_code, reason = "not every user of this kit writes and answers")]
 mod board_packets;
 

@@ -32,7 +32,7 @@ mod played;
 mod plot;
 mod ports;
 #[cfg(test)]
-#[path = "../../../tests/support/quiet.rs"]
+#[path = "../../../tests/harness/quiet.rs"]
 mod quiet;
 mod record;
 mod replay;

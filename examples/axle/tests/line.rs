@@ -2,7 +2,7 @@
 //! and takes minutes.
 #![cfg(unix)]
 
-#[path = "../../../tests/support/quiet.rs"]
+#[path = "../../../tests/harness/quiet.rs"]
 mod quiet;
 mod support;
 

@@ -1,7 +1,7 @@
 //! Each program as a user runs it, against `axle sim` on a pseudo-terminal.
 #![cfg(unix)]
 
-#[path = "../../../tests/support/quiet.rs"]
+#[path = "../../../tests/harness/quiet.rs"]
 mod quiet;
 
 mod support;

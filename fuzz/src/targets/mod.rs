@@ -13,15 +13,15 @@ mod streams;
 mod text;
 mod times;
 
-#[path = "../../../tests/support/checked_line.rs"]
+#[path = "../../../tests/harness/checked_line.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod checked_line;
-#[path = "../../../tests/support/judged_work.rs"]
+#[path = "../../../tests/harness/judged_work.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod judged_work;
-#[path = "../../../tests/support/known_framings.rs"]
+#[path = "../../../tests/harness/known_framings.rs"]
 mod known_framings;
-#[path = "../../../tests/support/oracle.rs"]
+#[path = "../../../tests/harness/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream.rs uses more of it")]
 mod oracle;
 

@@ -1,6 +1,6 @@
 //! The port, the pin and the clock of a driver, all of them handles of a line.
 //!
-//! Unlike the scripted port of `support/port.rs` it has a line behind it: the search chooses the
+//! Unlike the scripted port of `harness/port.rs` it has a line behind it: the search chooses the
 //! faults, calls take time, and contract violations of the driver are detected.
 
 use std::cell::RefMut;

@@ -1,18 +1,18 @@
 //! `axle noise`: what is left of the traffic on noisy lines, by each way to decode it.
 
 // The line and the oracle of the library's tests: the oracle shares no code with the library.
-#[path = "../../../../tests/support/dice.rs"]
+#[path = "../../../../tests/harness/dice.rs"]
 #[allow(dead_code, reason = "the tests of the library use all of it")]
 mod dice;
-#[path = "../../../../tests/support/noisy_line.rs"]
+#[path = "../../../../tests/harness/noisy_line.rs"]
 #[allow(dead_code, reason = "the tests of the library use all of it")]
 mod noisy_line;
-#[path = "../../../../tests/support/oracle.rs"]
+#[path = "../../../../tests/harness/oracle.rs"]
 #[allow(dead_code, reason = "the tests of the library use all of it")]
 mod oracle;
 mod print;
 mod receiver;
-#[path = "../../../../tests/support/traffic.rs"]
+#[path = "../../../../tests/harness/traffic.rs"]
 mod traffic;
 
 use std::io::{self, Write};

@@ -14,7 +14,7 @@ mod input;
 mod page;
 mod played;
 mod progress;
-#[path = "../../../../tests/support/quiet.rs"]
+#[path = "../../../../tests/harness/quiet.rs"]
 mod quiet;
 mod record;
 mod replay;
