@@ -17,6 +17,7 @@ times are then those of the program, its machine and its adapter.
 import contextlib
 import json
 import os
+import random
 import struct
 import sys
 import zipfile
@@ -103,9 +104,26 @@ def micros(number):
 
 
 def vectors(protocol):
-    """The recorded frames."""
-    lines = (ROOT / "tests" / "vectors" / (protocol + ".jsonl")).read_text().splitlines()
-    return [bytes.fromhex(json.loads(line)["hex"]) for line in lines]
+    """The recorded frames of a protocol, by the name that `axle` has for it."""
+    name = {"ikeya": "ikeya-md", "ikeya-3": "ikeya-md-3motor"}.get(protocol, protocol)
+    path = ROOT / "tests" / "vectors" / (protocol.removesuffix("-3") + ".jsonl")
+    lines = map(json.loads, path.read_text().splitlines())
+    return [bytes.fromhex(line["hex"]) for line in lines if line["protocol"] == name]
+
+
+def noisy(frames, seed, count=160):
+    """Frames of which half are damaged, cut, lengthened or noise, for the checks."""
+    dice, starts = random.Random(seed), bytes.fromhex("aabb5556fdff")
+    for _ in range(count):
+        frame, kind = dice.choice(frames), dice.randrange(10)
+        at = dice.randrange(len(frame))
+        yield (frame[:at] + bytes([frame[at] ^ 1 << dice.randrange(8)]) + frame[at + 1:],
+               frame[:at] + bytes([dice.choice(starts)]) + frame[at:],
+               frame[:at] + frame[at + 1:],
+               frame[:at],
+               dice.randbytes(dice.randint(3, 40)),
+               bytes(dice.choices(starts, k=dice.randint(1, 6))) + frame,
+               frame)[min(kind, 6)]
 
 
 def crc(data):
