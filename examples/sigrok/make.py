@@ -14,9 +14,8 @@ wire: each chunk is drawn so that it ends at its time, or later if its wire is s
 times are then those of the program, its machine and its adapter.
 """
 
-import contextlib
+import io
 import json
-import os
 import random
 import struct
 import sys
@@ -40,12 +39,10 @@ class Line:
         self.places = []
         self.bytes = bytearray()
 
-    def send(self, data, at, is_broken=False):
-        """Sends bytes from sample `at` on; returns the end of the last. Broken bytes have a stop
-        bit of the wrong level."""
+    def send(self, data, at):
+        """Sends bytes from sample `at` on; returns the end of the last."""
         for byte in data:
-            bits = [0, *(byte >> bit & 1 for bit in range(8)), 0 if is_broken else 1]
-            for number, level in enumerate(bits):
+            for number, level in enumerate([0, *(byte >> bit & 1 for bit in range(8))]):
                 if level == 0:
                     self.spans.append((round(at + number * self.bit),
                                        round(at + (number + 1) * self.bit)))
@@ -64,38 +61,17 @@ def write(path, names, lines, length):
             end = min(end, length)
             levels[begin:end] = bytes(end - begin)
         total |= int.from_bytes(levels, "little") << bit
-    samples = total.to_bytes(length, "little")
     metadata = ["[global]", "sigrok version=0.5.2", "", "[device 1]", "capturefile=logic-1",
                 "total probes=%d" % len(lines), "samplerate=5 MHz", "total analog=0"]
     metadata += ["probe%d=%s" % (number, name) for number, name in enumerate(names, 1)]
     metadata += ["unitsize=1", ""]
-    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in [("version", b"2"), ("metadata", "\n".join(metadata).encode()),
-                           ("logic-1-1", samples)]:
-            # A fixed date: the same capture gives the same file.
-            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
-
-
-class Unwritable(Exception):
-    """A file that cannot be written, with the reason."""
-
-
-@contextlib.contextmanager
-def replacing(path):
-    """A new file that gets this path once it is whole."""
-    beside = Path("%s.%d.part" % (path, os.getpid()))
-    try:
-        # One that is there is somebody else's.
-        with open(beside, "xb") as file:
-            try:
-                yield file
-                file.flush()
-                os.replace(beside, path)
-            except BaseException:
-                beside.unlink(missing_ok=True)
-                raise
-    except OSError as problem:
-        raise Unwritable("%s: %s" % (path, problem.strerror or problem)) from None
+    with io.BytesIO() as file:
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in [("version", b"2"), ("metadata", "\n".join(metadata).encode()),
+                               ("logic-1-1", total.to_bytes(length, "little"))]:
+                # A fixed date: the same capture gives the same file.
+                archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
+        Path(path).write_bytes(file.getvalue())
 
 
 def micros(number):
@@ -206,29 +182,18 @@ def rover():
 # Width of a window.
 PIXELS = 1300
 
-# What `demo` makes: the lines, the decoder and the time to be seen first, µs.
+# By name: the lines, the decoder, the bit rate, and the time to be seen first, µs.
 DEMOS = {
-    "demo": (motors, "axle_ikeya", IKEYA_BAUD, 1750),
-    "rover": (rover, "axle_ucp", UCP_BAUD, 14_000),
+    "demo.sr": (motors, "axle_ikeya", IKEYA_BAUD, 1750),
+    "rover.sr": (rover, "axle_ucp", UCP_BAUD, 14_000),
 }
 
 
-def demo(path):
-    """Writes a capture to look at, and a set-up for PulseView beside it."""
-    path = Path(path)
-    if path.suffix != ".sr" or path.stem not in DEMOS:
-        sys.exit("make.py: not one of " + ", ".join(name + ".sr" for name in DEMOS))
-    lines, decoder, baud, seen = DEMOS[path.stem]
-    put(path, lines(), setup(decoder, baud, seen, {}))
-
-
-def put(path, lines, text):
-    """Writes the capture, and the set-up beside it."""
-    path = Path(path)
+def put(path, lines, decoder, baud, seen, options):
+    """Writes the capture, and the set-up of PulseView beside it."""
     end = max(line.places[-1][1] for line in lines if line.places)
     write(path, ["TX", "RX"], lines, int(end + micros(25_000)))
-    with replacing(path.with_suffix(".pvs")) as file:
-        file.write(text.encode())
+    Path(path).with_suffix(".pvs").write_text(setup(decoder, baud, seen, options))
 
 
 class Unusable(Exception):
@@ -237,7 +202,6 @@ class Unusable(Exception):
 
 # Longest part of a recording that is drawn, seconds: five million samples each.
 MOST_SECONDS = 20
-TOO_LONG = "longer than %d s on the wire: choose a part by FROM and TO, seconds" % MOST_SECONDS
 
 # By the description that `axle record` gives an interface: decoder and its options.
 PROTOCOLS = {
@@ -248,61 +212,54 @@ PROTOCOLS = {
 
 
 def recording(path, out, begin, end):
-    """Draws the first line of a pcapng file."""
-    data = Path(path).read_bytes()
-    interface, packets, is_all = first_line(data)
+    """Draws the first line of a pcapng file, from and until these seconds."""
+    interface, packets = first_line(Path(path).read_bytes(), path)
     name = interface.get(3, b"").decode(errors="replace")
     if name not in PROTOCOLS or len(interface.get(8, b"")) != 8:
         raise Unusable("not a line that axle has recorded: " + (name or "no protocol"))
     baud = int.from_bytes(interface[8], "little")
     if not 300 <= baud <= SAMPLE_RATE // 5:
         raise Unusable("%d bit/s cannot be drawn at 5 MHz" % baud)
-    if not packets:
-        raise Unusable("no packet")
     # A clock that was set back leaves packets that are earlier than the first.
     packets.sort(key=lambda packet: packet[0])
-    start = packets[0][0]
-    last = (packets[-1][0] - start) / 1e6
-    begin, end = begin or 0.0, last + 0.001 if end is None else end
-    if end - begin > MOST_SECONDS:
-        raise Unusable(TOO_LONG)
-    chosen = [((time - start) / 1e6 - begin, is_sent, chunk) for time, is_sent, chunk in packets
-              if begin <= (time - start) / 1e6 <= end]
+    chosen = [((time - packets[0][0]) / 1e6 - begin, is_sent, chunk)
+              for time, is_sent, chunk in packets
+              if chunk and begin <= (time - packets[0][0]) / 1e6 <= end]
+    if not chosen:
+        raise Unusable("no bytes are in this part")
     # Each chunk ends at its time. Room for all of the first, and an idle line in front of it.
-    times = [(seconds, len(chunk) * BITS / baud) for seconds, _, chunk in chosen]
-    lead = max([0.002] + [duration - seconds + 2 * BITS / baud for seconds, duration in times])
-    lines, free = {True: Line(baud), False: Line(baud)}, {True: 0.0, False: 0.0}
-    begins = []
-    for (seconds, is_sent, _), (_, duration) in zip(chosen, times):
+    lead = max(0.002, *(len(chunk) * BITS / baud - seconds + 2 * BITS / baud
+                        for seconds, _, chunk in chosen))
+    free, begins = {True: 0.0, False: 0.0}, []
+    for seconds, is_sent, chunk in chosen:
+        duration = len(chunk) * BITS / baud
         begins.append(max(seconds + lead - duration, free[is_sent]))
         free[is_sent] = begins[-1] + duration
     # The bytes may take longer than the time in which a program gave or got them.
     if max(free.values()) > MOST_SECONDS + 1:
-        raise Unusable(TOO_LONG)
+        raise Unusable("longer than %d s on the wire: choose a part by FROM and TO, seconds"
+                       % MOST_SECONDS)
+    lines = {True: Line(baud), False: Line(baud)}
     for (_, is_sent, chunk), at in zip(chosen, begins):
         lines[is_sent].send(chunk, at * SAMPLE_RATE)
-    if not any(line.places for line in lines.values()):
-        raise Unusable("nothing is in this part")
     decoder, options = PROTOCOLS[name]
-    put(out, [lines[True], lines[False]], setup(decoder, baud, 2000, options))
-    if not is_all:
-        print("make.py: %s: only the first of its sections is drawn" % path, file=sys.stderr)
+    put(out, [lines[True], lines[False]], decoder, baud, 2000, options)
 
 
-def first_line(data):
-    """The options of the first interface, its packets (time, whether sent, bytes), and whether the
-    file has one section only: each has a first interface of its own."""
+def first_line(data, path):
+    """The options of the first interface, and its packets: time, whether sent, bytes."""
     if data[:4] != b"\x0a\x0d\x0d\x0a" or data[8:12] != b"\x4d\x3c\x2b\x1a":
         raise Unusable("not pcapng as axle writes it")
-    at, interface, packets, is_all = 0, None, [], True
+    at, interface, packets = 0, None, []
     while at + 12 <= len(data):
         kind, length = struct.unpack_from("<II", data, at)
-        body = data[at + 8:at + length - 4]
         if length < 12 or at + length > len(data):
             # Cut off: what is before counts.
             break
+        body = data[at + 8:at + length - 4]
         if kind == 0x0A0D0D0A and at > 0:
-            is_all = False
+            # Each section has a first interface of its own.
+            print("make.py: %s: only the first of its sections is drawn" % path, file=sys.stderr)
             break
         if kind == 1 and interface is None:
             interface = options_of(body[8:])
@@ -317,7 +274,7 @@ def first_line(data):
         at += length
     if interface is None:
         raise Unusable("no interface")
-    return interface, packets, is_all
+    return interface, packets
 
 
 def options_of(data):
@@ -361,17 +318,17 @@ def setup(decoder, baud, seen, options):
 def main():
     arguments = sys.argv[1:]
     try:
-        if len(arguments) == 1:
-            demo(arguments[0])
+        if len(arguments) == 1 and Path(arguments[0]).name in DEMOS:
+            lines, *settings = DEMOS[Path(arguments[0]).name]
+            put(arguments[0], lines(), *settings, {})
         elif len(arguments) in (2, 4) and arguments[1].endswith(".sr"):
-            recording(arguments[0], arguments[1], *map(float, arguments[2:] or (0,)),
-                      *([] if arguments[2:] else [None]))
+            recording(*arguments[:2], *map(float, arguments[2:] or (0, "inf")))
         else:
             sys.exit(__doc__.strip())
-    except Unwritable as problem:
-        sys.exit("make.py: %s" % problem)
-    except (OSError, Unusable, ValueError) as problem:
-        sys.exit("make.py: %s: %s" % (arguments[0], getattr(problem, "strerror", None) or problem))
+    except OSError as problem:
+        sys.exit("make.py: %s: %s" % (problem.filename, problem.strerror))
+    except (Unusable, ValueError) as problem:
+        sys.exit("make.py: %s: %s" % (arguments[0], problem))
 
 
 if __name__ == "__main__":
