@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reads what `axle export` writes with the libraries that people use, and compares each value with
 `axle decode --json`: of the captures of examples/captures, the frames of tests/vectors, and noise.
-JSON lines are compared byte by byte. The snippets of export.md are run. .ci/export installs the
+JSON lines are compared byte by byte. The snippets of export.md are run. export.sh installs the
 modules, and runs it. AXLE is the program, by default that of target/debug. Exit code 1 if anything
 differs.
 """

@@ -3,10 +3,8 @@
 with what `axle decode --json` says. Wheel, keys, drag, double click and legend do what they should,
 dark pages have dark paper, and no page asks for anything but itself.
 
-    .ci/export --install && target/export/bin/python examples/axle/tests/plot_browser.py
-
-Needs the Debian package chromium; .ci/export installs playwright. AXLE is the program, by default
-that of target/debug. Exit code 1 at the first difference.
+Needs the Debian package chromium; without playwright it starts again through export.sh, which
+installs it. AXLE is the program, by default that of target/debug. Exit code 1 at a difference.
 """
 import json
 import math
@@ -18,12 +16,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
-
 ROOT = Path(__file__).resolve().parents[3]
+try:
+    from playwright.sync_api import sync_playwright
+except ImportError:
+    os.execvp("bash", ["bash", Path(__file__).with_name("export.sh"), "plot_browser.py"])
+
 AXLE = os.environ.get("AXLE") or ROOT / "target/debug/axle"
 PER_CURVE, LEAST_VALUES = 6, 250
-MINUS = "\N{MINUS SIGN}"
 HELD = (", set-point", "speed", "steering")
 UNITS = {"Velocity": "1/s", "Position": "turns", "Command": "%", "Wheel speed": "1/min",
          "Acceleration": "g", "Angular velocity": "°/s", "Magnetic field": "counts",
@@ -119,7 +119,7 @@ class Page:
             same = [y for other, y in points if abs(other - x) <= most]
             if name.endswith(HELD):
                 same = [y for other, y in points if other <= x][-1:]
-            number, unit = text.replace(MINUS, "-").split(" ")
+            number, unit = text.replace("\N{MINUS SIGN}", "-").split(" ")
             is_there = any(math.isclose(float(number), y, abs_tol=1e-12) for y in same)
             check(is_there and unit == UNITS[panel], f"{panel}, {name}, {told}: {text}, not {same}")
 
@@ -190,8 +190,8 @@ def main():
             page.zooming(panel)
             page.hiding(panel, series, rgb)
             page.paper()
-            asked_for, errors = [it.url for it in page.page.requests()], page.page.page_errors()
-            check(asked_for == [path.as_uri()] and not errors, f"{name}: {asked_for}, {errors}")
+            odd = [it.url for it in page.page.requests()][1:] + page.page.page_errors()
+            check(not odd, f"{name} asks for, or fails with: {odd}")
     check(values >= LEAST_VALUES, f"only {values} values were compared")
     print(f"{values} values of {len(PAGES)} pages: 0 differences")
 
