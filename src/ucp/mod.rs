@@ -154,6 +154,8 @@ pub mod host;
 mod inbox;
 pub mod message;
 mod motor;
+#[cfg(test)]
+mod new_message;
 mod plain;
 mod report;
 pub mod robot;

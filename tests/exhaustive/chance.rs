@@ -53,7 +53,7 @@ fn random_damage_seldom_passes() {
 }
 
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn random_damage_passes_once_in_65536_times() {
     every_kind(1 << 28);
 }

@@ -65,7 +65,7 @@ fn both_forms_equal_the_oracle_up_to_26_bytes_and_on_some_longer_ones() {
 }
 
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn both_forms_equal_the_oracle_for_all_lengths_up_to_300_and_all_alignments() {
     let messages = |lens: std::ops::Range<u64>| -> usize {
         lens.map(|len| check_length(len as usize, 2000)).sum()

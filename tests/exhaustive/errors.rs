@@ -169,7 +169,7 @@ fn every_error_of_three_bits_in_other_packets_of_the_bus_is_refused() {
 }
 
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn every_error_of_three_bits_and_every_burst_is_refused_from_4_to_64_bytes() {
     let work =
         |lens: Range<u64>| -> u64 { lens.map(|len| refuse_every_error(len as usize + 4)).sum() };

@@ -146,7 +146,7 @@ fn all_damage_that_turns_a_packet_of_the_bus_into_one_of_another_length_is_known
 }
 
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn all_damage_that_turns_a_read_and_half_a_write_into_a_write_is_known() {
     println!("{:44}{1:>12}{2:>8}{1:>12}{2:>8}", "", "damage", "pass");
     // For each WRITE exactly one of the 65,536 halves of its payload passes, if the id stays legal:
@@ -214,7 +214,7 @@ fn damage_to_the_length_field_of_short_ucp_frames_passes_as_seldom_as_recorded()
 }
 
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn damage_to_the_length_field_of_all_ucp_frames_passes_as_seldom_as_recorded() {
     check_lengths_of_ucp(8..65);
 }

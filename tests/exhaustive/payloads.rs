@@ -120,7 +120,7 @@ fn payloads_with_every_second_half_and_every_node_survive_the_wire() {
 }
 
 #[test]
-#[ignore = "takes minutes: see the top of tests/exhaustive.rs"]
+#[ignore = "takes minutes: see the top of main.rs"]
 fn all_payloads_of_a_write_and_of_both_responses_survive_the_wire() {
     let crcs = Crcs::new();
     // Each payload goes to one node, each node gets one payload in eight, in no simple order.

@@ -120,7 +120,7 @@ fn all_crcs_behind_four_ids_make_a_read_of_the_legal_ones_only() {
 }
 
 #[test]
-#[ignore = "takes minutes: see the top of tests/exhaustive.rs"]
+#[ignore = "takes minutes: see the top of main.rs"]
 fn of_all_strings_of_four_bytes_exactly_the_eight_legal_reads_are_accepted() {
     for (name, way) in WAYS {
         let mut found = on_all_cores(1 << 32, way).concat();
@@ -173,7 +173,7 @@ fn a_batch_accepts_a_read_only_if_it_is_legal() {
 /// Strings with another header are left out: `judge` has refused them above, and a batch judges no
 /// packet whose header it does not know.
 #[test]
-#[ignore = "takes a minute: see the top of tests/exhaustive.rs"]
+#[ignore = "takes a minute: see the top of main.rs"]
 fn of_all_strings_that_begin_like_a_read_a_batch_accepts_the_eight_legal_ones() {
     for (name, way) in [
         ("Frames::each in a run", accepted_in_a_run::<ikeya::ToSlave> as Way),

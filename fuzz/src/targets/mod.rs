@@ -14,15 +14,15 @@ mod text;
 mod times;
 
 #[path = "../../../tests/harness/checked_line.rs"]
-#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
+#[allow(dead_code, reason = "tests/stream uses more of it")]
 mod checked_line;
 #[path = "../../../tests/harness/judged_work.rs"]
-#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
+#[allow(dead_code, reason = "tests/stream uses more of it")]
 mod judged_work;
 #[path = "../../../tests/harness/known_framings.rs"]
 mod known_framings;
 #[path = "../../../tests/harness/oracle.rs"]
-#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
+#[allow(dead_code, reason = "tests/stream uses more of it")]
 mod oracle;
 
 /// What a body has really done, so that a hollow one is found.

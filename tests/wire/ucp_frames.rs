@@ -1,4 +1,5 @@
 //! Frames: what is parsed, what is encoded, and what is refused with which error.
+#![cfg(feature = "ucp")]
 
 use std::collections::BTreeSet;
 
@@ -13,11 +14,11 @@ use axlewire::{
     },
 };
 
-use crate::by_hand::frame;
+use crate::rig::frame;
 
 #[test]
 fn parsing_one_frame_says_what_is_wrong_with_it() {
-    let good = frame(1, &[0]);
+    let good = frame(1, 0, &[0]);
     assert_eq!(Frame::parse(&good).unwrap().as_bytes(), good);
     for length in 0..8 {
         let error = ParseError::Length { expected: 8, found: length };
@@ -64,7 +65,7 @@ fn every_length_field_is_judged_by_the_cap() {
 #[test]
 fn a_frame_behind_a_repeated_sync_byte_is_found() {
     let mut line = vec![0xFD, 0xFD, 0xFD, 0xFF];
-    line.extend(frame(1, &[]));
+    line.extend(frame(1, 0, &[]));
     let mut decoder = axlewire::ucp::Decoder::new();
     let mut input = &line[..];
     let Some(Event::Skipped(gap)) = decoder.decode(&mut input) else { panic!() };
@@ -77,7 +78,7 @@ fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
     use zerocopy::TryFromBytes;
     let mut buffer = [0xEE; 64];
     for id in 0..=u8::MAX {
-        let bytes = frame(id, &[]);
+        let bytes = frame(id, 0, &[]);
         let ping = FrameOf::<Ping>::try_read_from_bytes(&bytes).unwrap();
         if id == 1 {
             assert_eq!(ping.encode(&mut buffer), Ok(&bytes[..]));
@@ -88,7 +89,7 @@ fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
         }
     }
     // The same for a length field that makes shipped robots overflow.
-    let mut long = frame(1, &[]);
+    let mut long = frame(1, 0, &[]);
     long[2] = 253;
     let ping = FrameOf::<Ping>::try_read_from_bytes(&long).unwrap();
     let error = EncodeError::Header { id: 1, len: 253 };
@@ -163,13 +164,15 @@ fn taken_by_a_shipped_robot(stream: &[u8]) -> Vec<&[u8]> {
 fn a_raw_frame_hides_no_other_frame_from_shipped_robots() {
     let mut update = [0; 16];
     update[8] = 39; // the version
-    for inner in [frame(2, &[60; 16]), frame(2, &update), frame(9, &[40, 0]), frame(1, &[])] {
+    for inner in
+        [frame(2, 0, &[60; 16]), frame(2, 0, &update), frame(9, 0, &[40, 0]), frame(1, 0, &[])]
+    {
         assert_eq!(taken_by_a_shipped_robot(&inner), [&inner[..]], "the model takes it alone");
         let mut is_dangerous = false;
         for pad in 0..=20 {
             let body = [&[0; 20][..pad], &inner].concat();
             let raw = RawFrame { id: 0x2B, index: 3, body: &body };
-            is_dangerous |= !taken_by_a_shipped_robot(&frame(0x2B, &body)).is_empty();
+            is_dangerous |= !taken_by_a_shipped_robot(&frame(0x2B, 0, &body)).is_empty();
             let mut buffer = [0xEE; 64];
             assert_eq!(raw.encode(&mut buffer), Err(EncodeError::NestedHeader { at: 6 + pad }));
             assert_eq!(buffer, [0xEE; 64]);
@@ -218,7 +221,7 @@ fn fd_ff_anywhere_behind_the_header_of_a_raw_frame_is_refused() {
         encoded(0x20, 0, harmless).unwrap();
     }
     // In the CRC: another index makes another one.
-    let has_it_in_crc = |body: &[u8; 2]| frame(0x20, body)[8..] == [0xFD, 0xFF];
+    let has_it_in_crc = |body: &[u8; 2]| frame(0x20, 0, body)[8..] == [0xFD, 0xFF];
     let body = (0..=u16::MAX).map(u16::to_le_bytes).find(has_it_in_crc).unwrap();
     assert_eq!(encoded(0x20, 0, &body), Err(EncodeError::NestedHeader { at: 8 }));
     encoded(0x20, 1, &body).unwrap();

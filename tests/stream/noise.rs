@@ -5,34 +5,21 @@
 //! with one accepted before (ruling B2), as when a frame that has lost its last byte is completed
 //! by the identical first byte of the next.
 //!
-//! `cargo test --test noise -- --nocapture` prints the figures. `axle noise` sends over the same
-//! lines and shows them for every way to decode.
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
-
-#[path = "harness/dice.rs"]
-#[allow(dead_code, reason = "a part is enough here")]
-mod dice;
-#[path = "harness/known_framings.rs"]
-#[allow(dead_code, reason = "only the bytes of frames matter here")]
-mod known_framings;
-#[path = "harness/noisy_line.rs"]
-mod noisy_line;
-#[path = "harness/oracle.rs"]
-#[allow(dead_code, reason = "only frames matter here")]
-mod oracle;
-#[path = "harness/traffic.rs"]
-#[allow(dead_code, reason = "each kind has a test here")]
-mod traffic;
+//! `cargo test --test stream noise -- --nocapture` prints the figures.
 
 use axlewire::{
     ikeya::{self, three},
     stream::{Decoder, Event, Frames},
     ucp::Ucp,
 };
-use dice::Dice;
-use known_framings::Known;
-use noisy_line::{Arrival, Noise, Place, Tally, transmit};
-use traffic::Traffic;
+
+use crate::{
+    dice::Dice,
+    known_framings::Known,
+    noisy_line::{Arrival, Noise, Place, Tally, transmit},
+    oracle,
+    traffic::Traffic,
+};
 
 const FRAMES: usize = 10_000;
 

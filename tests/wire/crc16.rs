@@ -1,5 +1,5 @@
 //! The checksum against the `crc` crate (ruling B1). The errors that it detects are in
-//! `exhaustive.rs`.
+//! `tests/exhaustive`.
 
 use axlewire::crc16::{check, compute};
 use crc::{CRC_16_MODBUS, Crc, Table};

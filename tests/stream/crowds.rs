@@ -1,23 +1,16 @@
 //! Dense headers, where candidates are rejected in batches, against the slow oracle.
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
-
-#[path = "harness/checked_line.rs"]
-#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
-mod checked_line;
-#[path = "harness/known_framings.rs"]
-mod known_framings;
-#[path = "harness/oracle.rs"]
-#[allow(dead_code, reason = "tests/stream.rs uses more of it")]
-mod oracle;
 
 use axlewire::{
     ikeya::{BothDirections, ToMaster, ToSlave, three},
     ucp::Ucp,
 };
-use checked_line::{CheckedLine, Op};
-use known_framings::Known;
-use oracle::Rules;
 use proptest::{collection::vec, prelude::*, sample::select};
+
+use crate::{
+    checked_line::{self, CheckedLine, Op},
+    known_framings::Known,
+    oracle::{self, Rules},
+};
 
 /// `x^15 + x + 1`: added to a good CRC, it leaves a multiple of itself, of odd parity.
 const TRINOMIAL: u16 = 0xC001;

@@ -1,18 +1,5 @@
 //! Frames judged together, and bytes rejected together, with and without SIMD, against the slow
 //! oracle: streams long enough for lanes, damaged everywhere.
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
-
-#[path = "harness/checked_line.rs"]
-#[allow(dead_code, reason = "stream.rs uses more of it")]
-mod checked_line;
-#[path = "harness/hostile_streams.rs"]
-#[allow(dead_code, reason = "stream.rs uses more of it")]
-mod hostile_streams;
-#[path = "harness/known_framings.rs"]
-mod known_framings;
-#[path = "harness/oracle.rs"]
-#[allow(dead_code, reason = "stream.rs uses more of it")]
-mod oracle;
 
 use axlewire::{
     ikeya::{
@@ -22,8 +9,9 @@ use axlewire::{
     stream::{Counters, Decoder, Event, Portable, Reason},
     ucp::{self, Body, Ucp},
 };
-use known_framings::Known;
 use proptest::{collection::vec, prelude::*};
+
+use crate::{checked_line, hostile_streams, known_framings::Known, oracle};
 
 /// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {

@@ -11,20 +11,11 @@ use axlewire::ucp::{
 };
 use proptest::prelude::*;
 
-/// A frame of this id and body, as from a line.
-pub(crate) fn frame(id: u8, index: u8, body: &[u8]) -> Vec<u8> {
-    let mut frame = vec![0xFD, 0xFF, body.len() as u8 + 4, 0, id, index];
-    frame.extend(body);
-    frame.extend(axlewire::crc16::compute(&frame).to_le_bytes());
-    frame
-}
+use super::spaced;
+use crate::rig::{frame, hex};
 
 fn contents(frame: &[u8]) -> String {
     Frame::parse(frame).unwrap().message().contents().to_string()
-}
-
-fn spaced<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
-    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
 }
 
 /// The text of a report, from core's formatting of the values in SI units.
@@ -149,7 +140,7 @@ fn biases_and_versions_have_the_numbers_that_core_prints() {
 fn unknown_frames_show_their_id_and_body_in_hex_up_to_the_longest() {
     for len in [0, 1, 15, 16, 17, 100, 248] {
         let body: Vec<u8> = (0..len).collect();
-        let hex: String = body.iter().map(|byte| format!("{byte:02x}")).collect();
+        let hex = hex(&body);
         let bytes = frame(0x20, 3, &body);
         assert_eq!(contents(&bytes), format!("id 32, body {hex}"));
         assert_eq!(

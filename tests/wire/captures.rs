@@ -51,7 +51,7 @@ fn all_recorded(file: &str, bytes: &[u8], spans: &[Span]) {
 
 #[test]
 fn the_motor_bus_capture_has_eleven_frames_and_five_gaps() {
-    let bytes = include_bytes!("../examples/captures/ikeya.bin");
+    let bytes = include_bytes!("../../examples/captures/ikeya.bin");
     let spans = spans::<BothDirections>(bytes);
     all_recorded("ikeya.jsonl", bytes, &spans);
     assert_eq!((bytes.len(), spans.len()), (90, 16));
@@ -67,7 +67,7 @@ fn the_motor_bus_capture_has_eleven_frames_and_five_gaps() {
 
 #[test]
 fn the_rover_capture_has_fifteen_frames_and_five_gaps() {
-    let bytes = include_bytes!("../examples/captures/ucp.bin");
+    let bytes = include_bytes!("../../examples/captures/ucp.bin");
     let spans = spans::<Ucp>(bytes);
     all_recorded("ucp.jsonl", bytes, &spans);
     assert_eq!((bytes.len(), spans.len()), (405, 20));

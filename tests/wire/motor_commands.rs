@@ -1,5 +1,6 @@
 //! Motor commands: their range, the resulting wheel speeds, and that none starts an update by
 //! accident.
+#![cfg(feature = "ucp")]
 
 use axlewire::{
     encode::Encode,
@@ -7,7 +8,7 @@ use axlewire::{
     ucp::{Body, Frame, Message, MotorControl, message::RawMotorControl},
 };
 
-use crate::by_hand::frame;
+use crate::rig::frame;
 
 #[test]
 fn a_speed_or_turn_out_of_range_is_an_error_with_the_value_and_the_limits() {
@@ -65,7 +66,7 @@ fn a_received_command_that_starts_an_update_says_so() {
     {
         let mut body = [0; 16];
         body[8..10].copy_from_slice(&version.to_le_bytes());
-        let bytes = frame(2, &body);
+        let bytes = frame(2, 0, &body);
         let Message::MotorControl(command) = Frame::parse(&bytes).unwrap().message() else {
             panic!()
         };
@@ -109,7 +110,7 @@ fn a_received_command_can_be_sent_only_if_it_is_in_range_and_starts_no_update() 
 
 #[test]
 fn foreign_bytes_are_relayed_only_by_an_explicit_call() {
-    let bytes = frame(2, zerocopy::IntoBytes::as_bytes(&received(130, -500, 7, 99)));
+    let bytes = frame(2, 0, zerocopy::IntoBytes::as_bytes(&received(130, -500, 7, 99)));
     let mut buffer = [0; 64];
     let view = Frame::parse(&bytes).unwrap();
     assert_eq!(view.relay_unchecked().encoded_len(), 24);

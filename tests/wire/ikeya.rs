@@ -3,7 +3,6 @@
 #![cfg(feature = "ikeya")]
 
 use axlewire::{
-    crc16,
     encode::Encode,
     error::{EncodeError, ParseError},
     ikeya::{
@@ -15,17 +14,13 @@ use axlewire::{
     stream::Frames,
 };
 
-fn with_crc(body: &[u8]) -> Vec<u8> {
-    let mut frame = body.to_vec();
-    frame.extend(crc16::compute(body).to_le_bytes());
-    frame
-}
+use crate::rig::sealed;
 
 #[test]
 fn a_velocity_response_received_with_nan_or_infinity_is_not_encoded_again() {
     let mut buffer = [0xEE; 20];
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let bytes = with_crc(&[&[0x55, 3][..], &bad.to_le_bytes()].concat());
+        let bytes = sealed(&[&[0x55, 3][..], &bad.to_le_bytes()].concat());
         let received = VelocityResponse::parse(bytes[..].try_into().unwrap()).unwrap();
         let error = received.encode(&mut buffer).unwrap_err();
         assert!(matches!(error, EncodeError::NotFinite { .. }), "{error}");
@@ -33,7 +28,7 @@ fn a_velocity_response_received_with_nan_or_infinity_is_not_encoded_again() {
             let mut speeds = [1.0; 3];
             speeds[motor] = bad;
             let speeds = speeds.map(f32::to_le_bytes).concat();
-            let bytes = with_crc(&[&[0x55, 3][..], &speeds].concat());
+            let bytes = sealed(&[&[0x55, 3][..], &speeds].concat());
             let received = three::VelocityResponse::parse(bytes[..].try_into().unwrap()).unwrap();
             let error = received.encode(&mut buffer).unwrap_err();
             assert!(matches!(error, EncodeError::NotFinite { .. }), "{error}");
@@ -64,8 +59,8 @@ fn every_header_and_id_is_parsed_or_refused_by_each_packet() {
     for header in 0..=u8::MAX {
         for id in 0..=u8::MAX {
             let good = |expected: u8| header == expected && (1..=8).contains(&id);
-            let short: [u8; 4] = with_crc(&[header, id]).try_into().unwrap();
-            let long: [u8; 8] = with_crc(&[header, id, 1, 2, 3, 4]).try_into().unwrap();
+            let short: [u8; 4] = sealed(&[header, id]).try_into().unwrap();
+            let long: [u8; 8] = sealed(&[header, id, 1, 2, 3, 4]).try_into().unwrap();
             let refused = ParseError::Field;
             let read = ReadRequest::parse(&short).map(|it| (it.id().get(), it.as_bytes()));
             assert_eq!(read, if good(0xAA) { Ok((id, &short)) } else { Err(refused) });
@@ -126,7 +121,7 @@ fn unusual_floats_decode_and_only_finite_ones_encode() {
     for bits in floats {
         let [a, b, c, d] = bits.to_le_bytes();
         for header in [0x55, 0xBB] {
-            let bytes = with_crc(&[header, 3, a, b, c, d]);
+            let bytes = sealed(&[header, 3, a, b, c, d]);
             let packet = Frames::<BothDirections>::new(&bytes).next().expect("any f32 decodes");
             let rps = match packet {
                 Packet::Response(Response::Velocity(response)) => response.rps(),

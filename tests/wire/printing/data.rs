@@ -14,7 +14,8 @@ use axlewire::{
 };
 use serde_json::{Value, json, to_string, to_value};
 
-use super::ucp::{each_kind, frame};
+use super::ucp::each_kind;
+use crate::rig::{frame, hex, sealed};
 
 #[test]
 fn a_frame_has_its_fields_in_order_and_its_bytes() {
@@ -30,11 +31,10 @@ fn a_frame_has_its_fields_in_order_and_its_bytes() {
         current_ca: 55,
     };
     let sent = FirmwareReport::new(&telemetry, 38).frame(3);
-    let hex: String = sent.as_bytes().iter().map(|byte| format!("{byte:02x}")).collect();
     let expected = r#"{"length":44,"protocol":"ucp","message":"report","id":5,"index":3,"layout":"firmware","battery_pct":87,"rpm":[1,-2,3,-4],"acc":[5,6,7],"gyro":[8,9,10],"mag":[11,12,13],"heading":180,"power_w":6,"voltage_dv":119,"current_ca":55,"version":38,"bytes":"HEX"}"#;
     assert_eq!(
         to_string(Frame::parse(sent.as_bytes()).unwrap()).unwrap(),
-        expected.replace("HEX", &hex)
+        expected.replace("HEX", &hex(sent.as_bytes()))
     );
 }
 
@@ -99,7 +99,7 @@ fn each_message_has_its_own_fields_with_the_values_of_its_body() {
         let received = Frame::parse(&bytes).unwrap();
         let mut expected = json!({
             "length": len + 8, "protocol": "ucp", "message": name, "id": id, "index": 9,
-            "bytes": bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>(),
+            "bytes": hex(&bytes),
         });
         let mut rest = &body[..];
         for field in fields {
@@ -133,7 +133,6 @@ fn the_longest_frame_has_all_its_bytes() {
     let body: Vec<u8> = (0..248).collect();
     let bytes = frame(0x20, 1, &body);
     let data = to_value(Frame::parse(&bytes).unwrap()).unwrap();
-    let hex = |bytes: &[u8]| -> String { bytes.iter().map(|byte| format!("{byte:02x}")).collect() };
     assert_eq!((&data["body"], &data["bytes"]), (&json!(hex(&body)), &json!(hex(&bytes))));
     assert_eq!(data["length"], 256);
 }
@@ -180,10 +179,8 @@ fn three_motors_have_three_values() {
 #[test]
 fn a_speed_that_is_no_number_is_a_string() {
     let speed = |bits: [u8; 4]| -> Value {
-        let mut packet = [0x55, 1, bits[0], bits[1], bits[2], bits[3], 0, 0];
-        let crc = axlewire::crc16::compute(&packet[..6]).to_le_bytes();
-        packet[6..].copy_from_slice(&crc);
-        let response = VelocityResponse::parse(&packet).unwrap();
+        let packet = sealed(&[&[0x55, 1][..], &bits].concat());
+        let response = VelocityResponse::parse(packet[..].try_into().unwrap()).unwrap();
         to_value(Response::Velocity(response)).unwrap()["rps"].clone()
     };
     assert_eq!(speed(f32::NAN.to_le_bytes()), "nan");

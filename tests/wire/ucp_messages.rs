@@ -1,4 +1,5 @@
 //! Messages: which ids and bodies are known, and the meaning of their values.
+#![cfg(feature = "ucp")]
 
 use axlewire::{
     encode::Encode,
@@ -11,13 +12,13 @@ use axlewire::{
     },
 };
 
-use crate::by_hand::frame;
+use crate::rig::frame;
 
 #[test]
 fn every_id_and_body_length_is_its_message_or_unknown_and_never_misread() {
     for id in 0..=u8::MAX {
         for length in 0..=56 {
-            let bytes = frame(id, &vec![0; length]);
+            let bytes = frame(id, 0, &vec![0; length]);
             let parsed = Frame::parse(&bytes).unwrap();
             let name = match parsed.message() {
                 Message::Ping(_) => (1, 0),

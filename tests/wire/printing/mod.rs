@@ -1,18 +1,17 @@
 //! Packets and messages print and serialise themselves.
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-#[path = "printing/data.rs"]
 mod data;
-#[path = "printing/debug.rs"]
 mod debug;
-#[path = "printing/errors.rs"]
 mod errors;
-#[path = "printing/ikeya.rs"]
 mod ikeya;
-#[path = "printing/ucp.rs"]
 mod ucp;
 
 use axlewire::stream::{Event, Gap, Reason};
+
+fn spaced<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
+    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
+}
 
 #[test]
 fn a_gap_tells_its_length_and_its_reason() {

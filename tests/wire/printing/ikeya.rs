@@ -7,6 +7,9 @@ use axlewire::ikeya::{
 };
 use proptest::prelude::*;
 
+use super::spaced;
+use crate::rig::sealed;
+
 #[test]
 fn a_set_of_nodes_is_printed_as_a_list() {
     for (nodes, text) in [
@@ -20,10 +23,6 @@ fn a_set_of_nodes_is_printed_as_a_list() {
     }
 }
 
-fn spaced<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
-    values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(" ")
-}
-
 fn place(positions: &[Position]) -> String {
     format!(
         "{} turns (rotation {}, count {})",
@@ -35,12 +34,7 @@ fn place(positions: &[Position]) -> String {
 
 /// A packet of this header and payload, as from a line.
 fn packet<const N: usize>(header: u8, payload: &[u8]) -> [u8; N] {
-    let mut packet = [0; N];
-    packet[..2].copy_from_slice(&[header, 3]);
-    packet[2..N - 2].copy_from_slice(payload);
-    let crc = axlewire::crc16::compute(&packet[..N - 2]);
-    packet[N - 2..].copy_from_slice(&crc.to_le_bytes());
-    packet
+    sealed(&[&[header, 3], payload].concat()).try_into().unwrap()
 }
 
 #[test]

@@ -1,37 +1,30 @@
 //! Proofs by trying everything, where everything is little enough.
 //!
-//! A small part of each runs with the other tests. All of it, with the time of each proof:
+//! A small part of each runs with the other tests. All of it, with its figures:
 //!
 //! ```sh
-//! bash tests/exhaustive.sh
-//! cargo test --release --test exhaustive -- --ignored     # the same without times
+//! cargo test --release --test exhaustive -- --ignored --nocapture
 //! ```
 
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
 
 /// Random damage: how often the CRC misses it.
-#[path = "exhaustive/chance.rs"]
 mod chance;
 /// Both forms of the CRC against a CRC computed bit by bit.
-#[path = "exhaustive/checksum.rs"]
 mod checksum;
-#[path = "harness/dice.rs"]
+#[path = "../harness/dice.rs"]
 #[allow(dead_code, reason = "only bytes are random here")]
 mod dice;
 /// Errors of up to three bits, and bursts.
-#[path = "exhaustive/errors.rs"]
 mod errors;
 /// Damage that makes a frame look longer or shorter than it is.
-#[path = "exhaustive/lengths.rs"]
 mod lengths;
-#[path = "harness/oracle.rs"]
+#[path = "../harness/oracle.rs"]
 #[allow(dead_code, reason = "only its CRC matters here")]
 mod oracle;
 /// All payloads of a bus packet.
-#[path = "exhaustive/payloads.rs"]
 mod payloads;
 /// All strings of four bytes.
-#[path = "exhaustive/reads.rs"]
 mod reads;
 
 use std::{

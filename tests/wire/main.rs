@@ -1,0 +1,15 @@
+//! Packets, messages and values: what is parsed, built and refused, as bytes, text and data.
+
+mod captures;
+mod crc16;
+mod ikeya;
+mod layout;
+mod motor_commands;
+mod printing;
+/// Packets made by hand.
+mod rig;
+mod time;
+mod ucp_frames;
+mod ucp_messages;
+mod vectors;
+mod vocabulary;
