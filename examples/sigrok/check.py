@@ -214,20 +214,21 @@ class Check:
     def row(self, where, row, held, packets, gaps, values):
         """What is shown of a frame or gap, and of each of its bytes."""
         words = [note.texts[0][3:] for note in held]
+        place = row["offset"], row["offset"] + row["length"]
         if row["event"] == "skipped":
             reasons = row.get("reasons", {row["reason"]: row["length"]})
             text = "%d byte%s skipped: %s" % (row["length"], "s" * (row["length"] != 1),
                                               row["text"].replace(": ", ", "))
             if "reasons" in row:
                 text += " (%s)" % ", ".join("%s %d" % item for item in reasons.items())
-            self.expect(where, [note.texts[0] for _, _, note in gaps], [text])
+            self.expect(where, [(*at, note.texts[0]) for *at, note in gaps], [(*place, text)])
             self.expect(where, collections.Counter(words), reasons)
             self.expect(where, (packets, values), ([], []))
             self.expect(where, {it.kind for it in held}, {"skipped-byte"})
             return
         self.packets += 1
-        self.expect(where, [(it.kind, it.texts[0]) for *_, it in packets],
-                    [(class_of(row), head_of(row))])
+        self.expect(where, [(*at, it.kind, it.texts[0]) for *at, it in packets],
+                    [(*place, class_of(row), head_of(row))])
         self.expect(where, words, parts_of(row))
         self.expect(where, {it.kind for it in held}, {"byte"})
         self.expect(where, gaps, [])
@@ -235,7 +236,7 @@ class Check:
         begin = row["offset"] + (5 if row["protocol"] == "ucp" else 1)
         edges = [begin] + [end for _, end, _ in values]
         self.expect(where, [at for at, _, _ in values], edges[:-1])
-        self.expect(where, edges[-1], row["offset"] + row["length"] - 2)
+        self.expect(where, edges[-1], place[1] - 2)
         found = []
         for at, end, note in values:
             text, last = note.texts[1], note.texts[-1]

@@ -15,6 +15,7 @@ import pwd
 import random
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -272,6 +273,33 @@ class Comparison:
                 told = whose[item.port] in item.show("response_time_of")
                 self.expect(f"story: packet {item.packet}: whose time", told, True)
 
+    def settings(self, user, story, vectors):
+        """A reply window of 500 µs, and a first pass, which knows no interfaces yet."""
+        answers = ("-Y", "axle_ikeya.response_time_us > 1000 and not axle_ikeya.late")
+        window = ("-o", "axle_ikeya.reply_window_us:500")
+        for options, is_there in (((), True), (window, False)):
+            found = bool(user.tshark(story, *answers, *options))
+            self.expect(f"slow answers in time with {options}", found, is_there)
+        frames = ("-Y", "axle_ucp.message or axle_ikeya.message")
+        once = user.run("tshark", "-r", vectors, *frames).count(b"\n")
+        self.expect("frames in one pass", once, user.tshark(vectors, *frames).count(b"\n"))
+        told = user.run("tshark", "-2", "-r", vectors, "-T", "fields", "-e", "_ws.col.Info")
+        hint = b"as if there were one interface only"
+        self.expect("without -R frame, it is told", hint in told, True)
+
+    def hanging(self, user):
+        """Captures that cannot begin end by themselves."""
+        for port, protocol, *more in (("/dev/no-such-port", "ucp"), ("/dev/null", "modbus"),
+                                      ("/dev/null", "ucp", "-f", "tcp")):
+            tshark = user.start("tshark", "-q", "-i", "axle", "-o", f"extcap.axle.port:{port}",
+                                "-o", f"extcap.axle.protocol:{protocol}", *more,
+                                stderr=subprocess.DEVNULL, start_new_session=True)
+            try:
+                tshark.communicate(timeout=20)
+            except subprocess.TimeoutExpired:
+                os.killpg(tshark.pid, signal.SIGKILL)
+                self.expect(f"a capture of {port} as {protocol}", "does not end", "ends")
+
     def filters(self, user, paths):
         """Each filter of README.md and of the colours finds something in one of the captures."""
         filters = re.findall(r"^\| `(.*?)` \|", (HERE / "README.md").read_text(), re.MULTILINE)
@@ -311,6 +339,8 @@ def main():
         frames = sum(row["event"] == "frame" for row in rows)
         found.expect("live: enough frames", frames > LIVE_PACKETS * 2 // 3, True)
         found.filters(user, paths)
+        found.settings(user, paths[0], Path(folder) / "vectors.pcapng")
+        found.hanging(user)
     print(f"{found.values} values of {found.rows} frames and gaps in {len(paths)} captures: "
           f"{len(found.differences)} differences")
     print(*found.differences[:20], sep="\n", end="\n" if found.differences else "")
