@@ -22,6 +22,7 @@ use crate::{
 pub(crate) use crate::boards::Boards;
 
 mod wait;
+pub(crate) use wait::Halt;
 use wait::{RUN_OUT, Wait};
 
 /// Period at which each node is read and its set-point repeated: short enough for every motor, and
@@ -64,23 +65,6 @@ pub(crate) struct Bus<B: Boards = OneMotor> {
     pub(crate) baud: u32,
     /// The master's dead-man has stopped the nodes.
     pub(crate) has_dead_man_fired: bool,
-}
-
-/// Outcome of a stop for one node.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(crate) enum Halt {
-    /// The stop is confirmed, and the motor was measured at rest (ruling I12).
-    Still,
-    /// The stop is confirmed, but the motor was not measured at rest.
-    Moving,
-    /// The stop is not confirmed.
-    Owed,
-    /// The stop is not confirmed, because the mode of the node is in doubt (ruling I11).
-    Doubtful,
-    /// The id has only ever given damaged answers.
-    Damaged,
-    /// The id has never answered.
-    Silent,
 }
 
 impl MasterArgs {

@@ -9,9 +9,9 @@ use axlewire::{
 use serde::Serialize;
 
 use crate::{
-    MOTION_HELP,
     args::{self, Protocol},
     failure::{Failure, guarded},
+    help::MOTION_HELP,
     line::Line,
     report::{Form, Outcome},
     rover::{self, CALL_PERIOD, Rover},

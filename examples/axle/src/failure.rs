@@ -11,7 +11,7 @@ use std::{
 use anstyle::{AnsiColor, Effects, Style};
 use clap::error::{ContextKind, ContextValue};
 
-use crate::signals;
+use crate::freely::freely;
 
 const ERROR: Style = AnsiColor::Red.on_default().effects(Effects::BOLD);
 
@@ -100,9 +100,7 @@ impl Failure {
                 return ExitCode::SUCCESS;
             }
             // If standard error is closed, there is nowhere left to report.
-            _ => drop(signals::freely(|| {
-                writeln!(anstream::stderr(), "{ERROR}axle:{ERROR:#} {self}")
-            })),
+            _ => drop(freely(|| writeln!(anstream::stderr(), "{ERROR}axle:{ERROR:#} {self}"))),
         }
         match self {
             Self::Usage(_) => ExitCode::from(2),

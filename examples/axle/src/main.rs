@@ -15,6 +15,8 @@ mod extcap;
 mod failure;
 #[cfg(all(test, unix))]
 mod flaky;
+mod freely;
+mod help;
 mod input;
 mod lamp;
 mod line;
@@ -57,36 +59,7 @@ use clap::{
 };
 
 use failure::Failure;
-
-/// A macro, so that `concat!` accepts it.
-macro_rules! exit_codes {
-    () => {
-        "\
-Exit codes:
-  0  done, or the reader of the output closed it
-  1  the input, the output or the port failed, or a device on the line did not do as commanded
-  2  the command line is wrong"
-    };
-}
-
-const EXIT_CODES: &str = exit_codes!();
-
-/// For subcommands on lines where something may be moving.
-const MOTION_HELP: &str = concat!(
-    exit_codes!(),
-    "
-
-After a kill -9, a SIGSTOP or a power cut of this machine (no program can prevent it):
-  motor bus  keeps turning indefinitely, unless its slaves have watchdogs: the last command holds
-  rover      a vendor robot stops 500 ms after the last byte on its line; any byte counts,
-             including noise and bytes from other programs
-  After a SIGSTOP and SIGCONT the tool stops what it moved. Otherwise run axle stop. A machine that
-  can injure people needs an emergency stop that cuts power.
-
-On Windows the tool stops what it moves on Ctrl-C, Ctrl-Break and when its window is closed. Windows
-gives it about 5 seconds for that after the window is closed and at logoff and shutdown, at which
-some programs are not told at all. It gives none after `End task` and taskkill /F."
-);
+use help::EXIT_CODES;
 
 /// Host tool for Ikeya MD and UCP lines
 #[derive(Debug, Parser)]
@@ -181,8 +154,8 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Sim(args) => sim::run(args),
         Command::Noise(args) => noise::run(args),
         Command::Ports(args) => ports::run(args),
-        Command::Completions(args) => manual::print_completions(args),
-        Command::Man(args) => manual::write_pages(args),
+        Command::Completions(args) => manual::print_completions(args, description()),
+        Command::Man(args) => manual::write_pages(args, description()),
         #[cfg(not(unix))]
         Command::Sim(_) => no_sim::run(),
     }

@@ -9,7 +9,7 @@ use std::{
 
 use clap_complete::Shell;
 
-use crate::{EXIT_CODES, description, failure::Failure};
+use crate::{failure::Failure, help::EXIT_CODES};
 
 /// Print the completions for a shell
 ///
@@ -34,18 +34,21 @@ pub(crate) struct ManArgs {
 }
 
 /// Runs `completions`.
-pub(crate) fn print_completions(args: &CompletionsArgs) -> Result<(), Failure> {
+pub(crate) fn print_completions(
+    args: &CompletionsArgs,
+    mut tool: clap::Command,
+) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut description(), "axle", &mut script);
+    clap_complete::generate(args.shell, &mut tool, "axle", &mut script);
     let mut out = io::stdout().lock();
     out.write_all(&script).and_then(|()| out.flush()).map_err(Failure::Write)
 }
 
 /// Runs `man`.
-pub(crate) fn write_pages(args: &ManArgs) -> Result<(), Failure> {
+pub(crate) fn write_pages(args: &ManArgs, tool: clap::Command) -> Result<(), Failure> {
     let directory = &args.directory;
-    let written = fs::create_dir_all(directory)
-        .and_then(|()| clap_mangen::generate_to(description(), directory));
+    let written =
+        fs::create_dir_all(directory).and_then(|()| clap_mangen::generate_to(tool, directory));
     written.map_err(|error| {
         Failure::Failed(format!("cannot write the man pages to {directory:?}: {error}"))
     })

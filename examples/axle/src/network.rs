@@ -3,8 +3,9 @@
 use axlewire::time::Duration;
 
 use crate::{
-    EXIT_CODES, args,
+    args,
     failure::Failure,
+    help::EXIT_CODES,
     rover::{CALL_PERIOD, Rover},
     send::Network,
     signals::Signals,

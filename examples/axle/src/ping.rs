@@ -12,8 +12,9 @@ use axlewire::{
 use serde::Serialize;
 
 use crate::{
-    EXIT_CODES, args,
+    args,
     failure::Failure,
+    help::EXIT_CODES,
     report::Form,
     rover::{CALL_PERIOD, Rover},
     signals::Signals,

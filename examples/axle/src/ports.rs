@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 use serialport::{SerialPortInfo, SerialPortType};
 
-use crate::{EXIT_CODES, failure::Failure, report::Form};
+use crate::{failure::Failure, help::EXIT_CODES, report::Form};
 
 /// List the serial ports of this machine
 ///

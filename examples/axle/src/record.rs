@@ -14,10 +14,10 @@ use axlewire::{
 };
 
 use crate::{
-    EXIT_CODES,
     args::{self, Protocol},
     decode::BUFFER_LEN,
     failure::Failure,
+    help::EXIT_CODES,
     line::{Line, PATIENCE, QUIET},
     listing::{self, Shown},
     pcapng::{Direction, Recording},

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use crate::{
-    MOTION_HELP,
     args::{self, Protocol},
     bus,
     decode::{self, Taken},
     failure::Failure,
+    help::MOTION_HELP,
     pcapng::Direction,
     play::{self, Due, Limits, Plan, Side},
 };

@@ -11,11 +11,11 @@ use axlewire::ikeya::{
 use serde::Serialize;
 
 use crate::{
-    EXIT_CODES,
     args::BusProtocol,
     boards::{Boards, Data},
     bus::{self, Bus},
     failure::Failure,
+    help::EXIT_CODES,
     signals::Signals,
 };
 

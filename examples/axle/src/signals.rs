@@ -11,7 +11,7 @@ use std::{
     },
 };
 #[cfg(unix)]
-use std::{io::Read, os::unix::net::UnixStream, sync::LazyLock, thread};
+use std::{io::Read, os::unix::net::UnixStream, thread};
 
 use axlewire::time::{Duration, Instant};
 #[cfg(unix)]
@@ -22,6 +22,8 @@ use signal_hook::{
 };
 
 use crate::failure::Failure;
+#[cfg(unix)]
+use crate::freely::free;
 
 /// Ctrl-C, Ctrl-\, SIGTERM and a closed terminal end every subcommand.
 #[cfg(unix)]
@@ -208,17 +210,6 @@ pub(crate) fn suspend() {
     let _ = signal_hook::low_level::raise(signal_hook::consts::SIGSTOP);
 }
 
-/// Does what may take forever, such as printing, while nothing moves: Ctrl-C and similar signals
-/// then end the tool at once.
-pub(crate) fn freely<T>(run: impl FnOnce() -> T) -> T {
-    #[cfg(unix)]
-    let before = free().swap(true, Ordering::SeqCst);
-    let done = run();
-    #[cfg(unix)]
-    free().store(before, Ordering::SeqCst);
-    done
-}
-
 /// Time for an orderly end. Some programs send a signal twice, such as `timeout`, to a process and
 /// to its group.
 #[cfg(unix)]
@@ -238,13 +229,6 @@ fn free_later() -> io::Result<()> {
         }
     });
     Ok(())
-}
-
-/// Whether a signal of [`ENDS`] ends the tool at once.
-#[cfg(unix)]
-fn free() -> &'static Arc<AtomicBool> {
-    static FREE: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
-    &FREE
 }
 
 #[cfg(unix)]

@@ -10,11 +10,11 @@ use axlewire::ikeya::{
 use serde::Serialize;
 
 use crate::{
-    MOTION_HELP,
     args::{self, PortArgs, Protocol},
     boards::{Boards, Data},
     bus::{self, Bus, Halt},
     failure::Failure,
+    help::MOTION_HELP,
     line::{Line, SharedRecording},
     report::{Form, Outcome},
     rover::Rover,

@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use crate::{failure::Failure, signals};
+use crate::{failure::Failure, freely::freely};
 
 /// Number of pieces of output that may wait for the reader: seconds of a full bus. Further ones are
 /// lost.
@@ -125,7 +125,7 @@ impl Teller {
 
 /// Prints a line at once, however long the reader takes; for use while nothing moves.
 pub(crate) fn print(line: &str) -> io::Result<()> {
-    signals::freely(|| write_line(line))
+    freely(|| write_line(line))
 }
 
 fn write_line(line: &str) -> io::Result<()> {

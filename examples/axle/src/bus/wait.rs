@@ -2,8 +2,24 @@
 
 use axlewire::time::{Duration, Instant};
 
-use super::Halt;
 use crate::signals::Awake;
+
+/// Outcome of a stop for one node.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Halt {
+    /// The stop is confirmed, and the motor was measured at rest (ruling I12).
+    Still,
+    /// The stop is confirmed, but the motor was not measured at rest.
+    Moving,
+    /// The stop is not confirmed.
+    Owed,
+    /// The stop is not confirmed, because the mode of the node is in doubt (ruling I11).
+    Doubtful,
+    /// The id has only ever given damaged answers.
+    Damaged,
+    /// The id has never answered.
+    Silent,
+}
 
 /// Time for which an id must be asked without ever answering before it counts as silent.
 const SILENCE: Duration = Duration::from_millis(1000);

@@ -1,6 +1,11 @@
 //! Lists a capture with times: pcapng.
 
-use super::{Args, Choice, Printer, Sheet, no_frame_with_times, style, walk};
+use super::{
+    Choice, Printer, Sheet,
+    args::{Args, style},
+    detect::no_frame_with_times,
+    walk,
+};
 use crate::{failure::Failure, input::Input};
 
 /// Length of the lines that are printed at once.

@@ -4,12 +4,12 @@ use core::fmt;
 
 use axlewire::{
     ikeya::{self, three},
-    stream::Framing,
+    stream::{Counters, Framing},
     ucp,
 };
 
-use super::account;
-use crate::args::Protocol;
+use super::{account, framing::Choice};
+use crate::{args::Protocol, failure::Failure, input::Input};
 
 /// How many of some bytes belong to frames of a protocol.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -87,6 +87,45 @@ pub(super) fn is_sure(shares: &[Share; 3], sample_len: usize) -> bool {
 fn share<F: Framing>(protocol: Protocol, sample: &[u8]) -> Share {
     let counters = account::of_bytes::<F>(sample);
     Share { protocol, framed: counters.framed, frames: counters.frames }
+}
+
+/// What to say if there was no frame of `protocol`.
+pub(super) fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> String {
+    let (name, received) = (protocol.name(), account.received);
+    let plain = format!("no {name} frame in {received} bytes");
+    match shares.first() {
+        Some(best) if best.framed > 0 => {
+            let (found, frames) = (best.protocol.name(), best.frames);
+            format!("{plain}, but {frames} of {found}: use --protocol {found}")
+        }
+        _ => format!("{plain}: the wrong protocol, the wrong baud rate, or noise"),
+    }
+}
+
+/// The same for a capture that says its protocols; `named` is on the command line instead.
+pub(super) fn no_frame_with_times(named: Option<Protocol>, received: u64) -> String {
+    match named.map(|protocol| protocol.name()) {
+        Some(name) => {
+            format!(
+                "no frame in {received} bytes as {name}: without --protocol, the capture says it"
+            )
+        }
+        None => format!("no frame in {received} bytes: use --protocol if it is another one"),
+    }
+}
+
+/// Finds out the protocol of raw bytes.
+pub(super) fn guess(choice: Choice, input: &mut Input) -> Result<Guess, Failure> {
+    let sample = input.peek(SAMPLE_LEN, |sample| is_sure(&shares(sample), sample.len()))?;
+    let guess = Guess { shares: shares(sample), len: sample.len() };
+    let [best, ..] = guess.shares;
+    if best.framed == 0 && guess.len > 0 {
+        let line = format!("no frame of any protocol in the first {} bytes", guess.len);
+        let hint = if guess.len < SAMPLE_LEN { "" } else { ": use --protocol to decode them all" };
+        return Err(Failure::Failed(line + hint));
+    }
+    choice.permits(best.protocol)?;
+    Ok(guess)
 }
 
 #[cfg(test)]

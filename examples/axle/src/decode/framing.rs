@@ -2,7 +2,7 @@
 
 use axlewire::stream::Framing;
 
-use super::{Direction, Stream, StreamOf};
+use super::{Stream, StreamOf, args::Direction};
 use crate::{args::Protocol, failure::Failure, listing::Shown, pcapng};
 
 /// A generic function for the framing of this protocol, in one direction or in both. UCP frames

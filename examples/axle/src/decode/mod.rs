@@ -1,6 +1,7 @@
 //! `axle decode`: reads a capture, prints one line per frame and per gap.
 
 mod account;
+mod args;
 mod capture;
 mod detect;
 mod framing;
@@ -12,22 +13,22 @@ mod whole;
 
 use std::{
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
     thread,
 };
 
 use axlewire::stream::{Counters, Framing};
-use clap::{ValueEnum, builder::PossibleValue};
 
 use crate::{
-    EXIT_CODES,
     args::Protocol,
     failure::Failure,
     input::{self, Input},
-    listing::{Modes, Shown, Style, TimeColumn},
+    listing::{Modes, Shown},
     pcapng,
 };
-use detect::{Guess, Share};
+use args::style;
+pub(crate) use args::{Args, Direction, Named};
+use detect::{guess, no_frame};
 pub(crate) use framing::Choice;
 use framing::for_framing;
 use printer::Printer;
@@ -41,79 +42,6 @@ pub(crate) use whole::{Chosen, choose, walk_into};
 /// The most threads that are used: each has its own buffers, and the more there are, the shorter
 /// are the parts of the file.
 const MOST_JOBS: usize = 16;
-
-/// List the frames of a capture, and the gaps between them
-///
-/// Reads raw bytes, or pcapng as `axle record` writes it; standard input too. Every byte appears in
-/// exactly one line: a frame, or a gap with the reason why no frame starts there. The end of the
-/// input, or of a section of pcapng, counts as a quiet line: a truncated frame becomes a gap. Times
-/// do not: how long a line was quiet cannot be told from the moments at which its bytes were read.
-/// Memory use does not grow with the input.
-///
-/// The time of a frame is that of its last byte: of the moment when the recording program got it
-/// from the system, with all bytes of the same chunk. Behind a USB adapter, that can be 16 ms after
-/// it was on the line. Raw bytes have no times.
-#[derive(Debug, clap::Args)]
-#[command(after_help = EXIT_CODES)]
-pub(crate) struct Args {
-    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
-    /// most bytes at the beginning of raw bytes
-    #[arg(short = 'P', long, value_enum, default_value = "auto")]
-    protocol: Named,
-
-    /// Ikeya: decode packets of one direction only; by default, of both
-    #[arg(short, long, value_enum)]
-    direction: Option<Direction>,
-
-    /// Print one JSON object per line; t is in seconds since 1970
-    #[arg(short, long)]
-    json: bool,
-
-    /// Print the byte counts only
-    #[arg(short, long)]
-    summary: bool,
-
-    /// Time column, if the capture has times
-    #[arg(short, long, value_enum, default_value = "relative")]
-    time: TimeColumn,
-
-    /// Threads for a file of raw bytes, at most 16 of which are used; by default, as many as there
-    /// are cores
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
-    jobs: Option<u16>,
-
-    /// The capture; if omitted or -, standard input
-    file: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Direction {
-    /// Sent by the master
-    ToSlave,
-    /// Sent by the slaves
-    ToMaster,
-}
-
-/// What `--protocol` accepts: a protocol, or `None` for auto.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(crate) struct Named(pub(crate) Option<Protocol>);
-
-impl ValueEnum for Named {
-    fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [Named; 4] = [
-            Named(None),
-            Named(Some(Protocol::Ucp)),
-            Named(Some(Protocol::Ikeya)),
-            Named(Some(Protocol::Ikeya3)),
-        ];
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let auto = || Some(PossibleValue::new("auto").help("Find it out"));
-        self.0.as_ref().map_or_else(auto, Protocol::to_possible_value)
-    }
-}
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -179,31 +107,6 @@ pub(crate) fn frames_of(
     Ok((protocol, taken, walked.modes))
 }
 
-/// What to say if there was no frame of `protocol`.
-fn no_frame(protocol: Protocol, account: &Counters, shares: &[Share; 3]) -> String {
-    let (name, received) = (protocol.name(), account.received);
-    let plain = format!("no {name} frame in {received} bytes");
-    match shares.first() {
-        Some(best) if best.framed > 0 => {
-            let (found, frames) = (best.protocol.name(), best.frames);
-            format!("{plain}, but {frames} of {found}: use --protocol {found}")
-        }
-        _ => format!("{plain}: the wrong protocol, the wrong baud rate, or noise"),
-    }
-}
-
-/// The same for a capture that says its protocols; `named` is on the command line instead.
-fn no_frame_with_times(named: Option<Protocol>, received: u64) -> String {
-    match named.map(|protocol| protocol.name()) {
-        Some(name) => {
-            format!(
-                "no frame in {received} bytes as {name}: without --protocol, the capture says it"
-            )
-        }
-        None => format!("no frame in {received} bytes: use --protocol if it is another one"),
-    }
-}
-
 /// Finds out the protocol of raw bytes, and says how sure it is.
 fn detected(args: &Args, choice: Choice, input: &mut Input) -> Result<Protocol, Failure> {
     let guess = guess(choice, input)?;
@@ -214,33 +117,6 @@ fn detected(args: &Args, choice: Choice, input: &mut Input) -> Result<Protocol, 
     };
     told.map_err(Failure::Write)?;
     Ok(guess.protocol())
-}
-
-/// Finds out the protocol of raw bytes.
-fn guess(choice: Choice, input: &mut Input) -> Result<Guess, Failure> {
-    let sample = input.peek(detect::SAMPLE_LEN, |sample| {
-        detect::is_sure(&detect::shares(sample), sample.len())
-    })?;
-    let guess = Guess { shares: detect::shares(sample), len: sample.len() };
-    let [best, ..] = guess.shares;
-    if best.framed == 0 && guess.len > 0 {
-        let line = format!("no frame of any protocol in the first {} bytes", guess.len);
-        let hint =
-            if guess.len < detect::SAMPLE_LEN { "" } else { ": use --protocol to decode them all" };
-        return Err(Failure::Failed(line + hint));
-    }
-    choice.permits(best.protocol)?;
-    Ok(guess)
-}
-
-/// The form of the lines; `None` for the summary alone.
-fn style(args: &Args, protocol: Protocol, has_times: bool) -> Option<Style> {
-    let time = if has_times { args.time } else { TimeColumn::None };
-    match (args.summary, args.json) {
-        (true, _) => None,
-        (false, true) => Some(Style::Json),
-        (false, false) => Some(Style::text(protocol.number(), time)),
-    }
 }
 
 fn decode<F>(args: &Args, protocol: Protocol, input: &mut Input) -> Result<Counters, Failure>

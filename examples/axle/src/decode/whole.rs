@@ -1,7 +1,9 @@
 //! A whole capture into something else than a listing: tables, files, plots.
 
 use super::{
-    Choice, Guess, Next, Sheet, Walked, detect, guess, no_frame, no_frame_with_times, walk,
+    Choice, Next, Sheet, Walked,
+    detect::{self, Guess, guess, no_frame, no_frame_with_times},
+    walk,
 };
 use crate::{
     args::Protocol,

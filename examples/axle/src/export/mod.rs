@@ -14,9 +14,10 @@ use std::{
 };
 
 use crate::{
-    EXIT_CODES, beside,
+    beside,
     decode::{self, Chosen, Named, Walked},
     failure::Failure,
+    help::EXIT_CODES,
     input::Input,
     listing,
     signals::Signals,

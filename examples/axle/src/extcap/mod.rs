@@ -21,8 +21,8 @@ use axlewire::{
 use clap::ValueEnum;
 
 use crate::{
-    EXIT_CODES, args::Protocol, failure::Failure, line::Line, listing::Shown, pcapng::Recording,
-    ports, record::record_line, signals::Signals,
+    args::Protocol, failure::Failure, help::EXIT_CODES, line::Line, listing::Shown,
+    pcapng::Recording, ports, record::record_line, signals::Signals,
 };
 use say::{ANY_PORT, PREFIX};
 

@@ -1,6 +1,7 @@
 //! An open line: the port of a driver, and the clock that waits for its bytes.
 
 mod tcp;
+mod wire;
 
 use std::{
     cell::RefCell,
@@ -21,24 +22,13 @@ use crate::{
     pcapng::{Background, Direction, Recording},
 };
 use tcp::TcpPort;
+pub(crate) use wire::Wire;
 
 /// Longest wait for bytes, so that signals and keys are noticed in time.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
 pub(crate) const QUIET: time::Duration = time::Duration::from_millis(30);
-
-/// What may be at the other end of a path.
-pub(crate) trait Wire: Read + ReadReady + Write + ErrorType<Error = io::Error> {
-    /// Waits for bytes, at most for `patience`; returns whether there are some.
-    fn wait(&mut self, patience: Duration) -> io::Result<bool>;
-}
-
-impl Wire for SerialPort {
-    fn wait(&mut self, patience: Duration) -> io::Result<bool> {
-        SerialPort::wait(self, patience)
-    }
-}
 
 /// A port for a driver. Its clones are the same port.
 #[derive(Clone)]

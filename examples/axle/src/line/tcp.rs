@@ -9,7 +9,7 @@ use std::{
 
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
-use super::Wire;
+use super::wire::Wire;
 
 /// Longest time for a server to accept a connection.
 const CONNECT_PATIENCE: Duration = Duration::from_secs(3);

@@ -1,51 +1,18 @@
 //! Frames and gaps as lines: for people, or as JSON.
 
+mod event;
 mod json;
+mod out;
 mod row;
 mod shown;
 mod table;
 
-use std::fmt;
-
-use axlewire::stream::{Counters, Reason};
-
-use crate::pcapng::Direction;
+pub(crate) use event::{LineClock, Place, REASONS, SkippedBytes, pending};
 pub(crate) use json::{seconds, summary as json_summary};
+pub(crate) use out::Out;
 pub(crate) use row::{TimeColumn, print_summary};
 pub(crate) use shown::{Modes, Shown};
 pub(crate) use table::Table;
-
-/// Where and when an event was on the line.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Place {
-    /// Offset of its first byte in the bytes of its interface and direction.
-    pub(crate) offset: u64,
-    /// When its last byte had been received, microseconds since 1970; `None` if the capture has no
-    /// times.
-    pub(crate) micros: Option<u64>,
-    pub(crate) direction: Option<Direction>,
-    /// The interface, if the capture has such.
-    pub(crate) interface: Option<usize>,
-}
-
-/// A run of bytes that belong to no frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SkippedBytes {
-    pub(crate) length: u64,
-    /// Why its first byte was skipped.
-    pub(crate) reason: Reason,
-    /// The account of all its bytes.
-    pub(crate) account: Counters,
-}
-
-/// All reasons, in the order in which they are printed.
-pub(crate) const REASONS: [Reason; 5] =
-    [Reason::Header, Reason::Length, Reason::Id, Reason::Crc, Reason::Idle];
-
-/// Number of bytes that are in no other count: they may still become a frame (ruling B2).
-const fn pending(counters: &Counters) -> u64 {
-    counters.received - counters.framed - counters.skipped()
-}
 
 /// The form of the lines.
 #[derive(Clone, Copy, Debug)]
@@ -88,45 +55,5 @@ impl Style {
             Self::Json => json::gap(out, at, gap),
             Self::Text(columns) => columns.gap(out, clock, at, gap),
         }
-    }
-}
-
-/// What the time column counts from.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct LineClock {
-    first: Option<u64>,
-    last: Option<u64>,
-}
-
-/// Lines that are collected before they are written.
-#[derive(Debug, Default)]
-pub(crate) struct Out(pub(crate) Vec<u8>);
-
-impl Out {
-    pub(crate) fn text(&mut self, text: &str) {
-        self.0.extend_from_slice(text.as_bytes());
-    }
-
-    pub(crate) fn number(&mut self, number: u64) {
-        self.text(itoa::Buffer::new().format(number));
-    }
-
-    /// A number, right-aligned.
-    pub(crate) fn padded(&mut self, number: u64, width: usize) {
-        let mut buffer = itoa::Buffer::new();
-        let digits = buffer.format(number);
-        self.pad(width.saturating_sub(digits.len()));
-        self.text(digits);
-    }
-
-    pub(crate) fn pad(&mut self, count: usize) {
-        self.0.resize(self.0.len() + count, b' ');
-    }
-}
-
-impl fmt::Write for Out {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.text(text);
-        Ok(())
     }
 }

@@ -17,7 +17,7 @@ mod traffic;
 
 use std::io::{self, Write};
 
-use crate::{EXIT_CODES, args::Protocol, failure::Failure};
+use crate::{args::Protocol, failure::Failure, help::EXIT_CODES};
 use noisy_line::{Noise, transmit};
 use print::{Row, Table};
 use receiver::Receiver;

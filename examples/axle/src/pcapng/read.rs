@@ -7,7 +7,7 @@ use std::{
     path::PathBuf,
 };
 
-use super::{BYTE_ORDER, Direction, MAGIC, block, option};
+use super::format::{BYTE_ORDER, Direction, MAGIC, block, option};
 use crate::failure::Failure;
 
 /// Longest accepted block. Those of `axle record` are much shorter; other programs describe their

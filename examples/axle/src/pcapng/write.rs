@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
+use super::format::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
 use crate::args::Protocol;
 
 /// Writes blocks, each with a single call: a full disk cuts off no more than one.

@@ -1,11 +1,15 @@
 //! The nodes of a bus that are commanded: their modes are read before, and they are stopped.
 
 use axlewire::ikeya::{
-    Mode, NodeId,
+    NodeId,
     master::{MasterConfig, NodeSet},
 };
 
-use super::{Due, Effect, Plan, play};
+use super::{
+    effect::Effect,
+    player::Due,
+    playing::{Plan, play, turned},
+};
 use crate::{
     bus::{self, Boards, Bus, Halt},
     failure::Failure,
@@ -127,13 +131,6 @@ fn complaint<B: Boards>(bus: &Bus<B>, node: NodeId) -> Option<String> {
         )),
         _ => bus.complaint(node),
     }
-}
-
-/// A node that may have taken its commands for something else.
-pub(super) fn turned(node: NodeId, now: Mode, meant: Mode) -> Failure {
-    Failure::Failed(format!(
-        "node {node} has changed to {now} mode: it may have taken commands for {meant} mode"
-    ))
 }
 
 #[cfg(all(test, unix))]

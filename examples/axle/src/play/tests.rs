@@ -8,6 +8,7 @@ use axlewire::{
 use super::*;
 use crate::{
     args::PortArgs,
+    bus::MasterArgs,
     played::{self, Played, RoverState},
     quiet::undisturbed,
 };

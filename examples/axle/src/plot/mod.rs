@@ -33,7 +33,7 @@ mod svg;
 
 use std::path::PathBuf;
 
-use crate::{EXIT_CODES, args, decode::Named, failure::Failure};
+use crate::{args, decode::Named, failure::Failure, help::EXIT_CODES};
 #[cfg(feature = "plot")]
 use crate::{input::Input, signals::Signals};
 

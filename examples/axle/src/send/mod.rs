@@ -7,8 +7,9 @@ use std::collections::VecDeque;
 use axlewire::ikeya;
 
 use crate::{
-    MOTION_HELP, args, bus,
+    args, bus,
     failure::Failure,
+    help::MOTION_HELP,
     play::{self, Due, Effect, Limits, Plan, Side},
 };
 use message::Message;

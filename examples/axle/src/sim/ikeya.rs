@@ -16,9 +16,10 @@ use serde::Serialize;
 
 use super::stage::{Stage, StageArgs};
 use crate::{
-    EXIT_CODES, args,
+    args,
     boards::{Boards, Data, Values},
     failure::Failure,
+    help::EXIT_CODES,
     session::Session,
 };
 

@@ -9,7 +9,7 @@ mod ucp;
 
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 
-use crate::{EXIT_CODES, failure::Failure};
+use crate::{failure::Failure, help::EXIT_CODES};
 
 /// Simulate motors or a rover on a pseudo-terminal
 ///

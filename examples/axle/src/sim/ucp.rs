@@ -15,7 +15,7 @@ use axlewire::{
 use serde::Serialize;
 
 use super::stage::{Stage, StageArgs};
-use crate::{EXIT_CODES, failure::Failure, session::Session};
+use crate::{failure::Failure, help::EXIT_CODES, session::Session};
 
 /// Simulate a rover, which reports, drives as commanded, and stops without commands
 #[derive(Debug, clap::Args)]

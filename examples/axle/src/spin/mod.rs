@@ -9,11 +9,11 @@ use axlewire::ikeya::{
 };
 
 use crate::{
-    MOTION_HELP,
     args::{self, BusProtocol},
     boards::Boards,
     bus::{self, Bus},
     failure::Failure,
+    help::MOTION_HELP,
     line::Line,
     report::Form,
     signals::Signals,

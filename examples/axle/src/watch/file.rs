@@ -4,7 +4,7 @@ use std::io;
 
 use axlewire::time::Instant;
 
-use super::Args;
+use super::args::Args;
 use crate::{
     args::Protocol,
     decode::{self, Choice, Sheet},

@@ -8,7 +8,7 @@ use axlewire::{
     time::Duration,
 };
 
-use super::{Watched, recorder::Recorder, udp::Udp};
+use super::{args::Watched, recorder::Recorder, udp::Udp};
 use crate::{
     decode::BUFFER_LEN,
     failure::Failure,

@@ -10,6 +10,11 @@ use axlewire::{
 use super::live::Live;
 use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals};
 
+/// Message of a build without the page.
+#[cfg(not(all(unix, feature = "dashboard")))]
+pub(super) const NO_PAGE: &str =
+    "this build has no page; on Unix, build it with --features dashboard";
+
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct PageArgs {
     /// Show the page of axle watch meanwhile; space, s, q and Esc stop at once, as Ctrl-C does
@@ -64,7 +69,7 @@ impl PageArgs {
     #[cfg(not(all(unix, feature = "dashboard")))]
     pub(crate) fn open(self, line: Line, _: &About, _: &Signals) -> Result<(Page, Line), Failure> {
         if self.page {
-            return Err(Failure::Usage(super::NO_PAGE.to_owned()));
+            return Err(Failure::Usage(NO_PAGE.to_owned()));
         }
         Ok((Page::default(), line))
     }

@@ -5,7 +5,7 @@ use std::io;
 use axlewire::{drive::Clock, stream::Framing, time::Instant};
 
 use super::{
-    Watched,
+    args::Watched,
     dashboard::Dashboard,
     feed::{Feed, Source},
     model::{Heard, Model},

@@ -7,7 +7,7 @@ use std::{
 
 use axlewire::stream::Framing;
 
-use super::Watched;
+use super::args::Watched;
 use crate::{args::Protocol, failure::Failure, listing::Shown, pcapng::Recording, record::Frames};
 
 /// The recording of a line, if there is one at present.

@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 
-use super::Watched;
+use super::args::Watched;
 use crate::{
     decode::{self, Sheet, Stream},
     failure::Failure,

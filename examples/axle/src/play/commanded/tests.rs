@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use axlewire::ikeya::{Position, Rps, WriteRequest, board::OneMotor};
+use axlewire::ikeya::{Mode, Position, Rps, WriteRequest, board::OneMotor};
 
 use super::{
     super::{Limits, Side, effect},

@@ -4,8 +4,8 @@ use axlewire::ikeya::{Mode, NodeId};
 use ratatui_core::{buffer::Buffer, layout::Rect, style::Style};
 
 use super::{
-    ALARM, DOUBT, FAINT, GOOD, PLAIN, View,
     text::{cut, millis, put, sparkline, values},
+    view::{ALARM, DOUBT, FAINT, GOOD, PLAIN, View},
 };
 use crate::watch::model::{Bus, Health, Node, PER_SECOND};
 

@@ -2,7 +2,10 @@
 
 use ratatui_core::{buffer::Buffer, layout::Rect};
 
-use super::{DOUBT, FAINT, Filter, PLAIN, View, text::cut, text::put};
+use super::{
+    text::{cut, put},
+    view::{DOUBT, FAINT, Filter, PLAIN, View},
+};
 use crate::watch::model::{Entry, Kind, Model};
 
 /// Narrower pages have no times.

@@ -9,62 +9,21 @@ mod shots;
 #[cfg(test)]
 mod tests;
 mod text;
+mod view;
 
-use axlewire::ikeya::NodeId;
 use ratatui_core::{
     buffer::Buffer,
     layout::Rect,
-    style::{Color, Modifier, Style},
+    style::{Modifier, Style},
 };
 
 use super::model::{Model, OfLine};
 use crate::listing::REASONS;
 use text::put;
-
-/// What the user has chosen to see, and what the tool does meanwhile.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct View {
-    /// Command, port, protocol and speed.
-    pub(crate) title: String,
-    pub(crate) baud: u32,
-    pub(crate) filter: Filter,
-    pub(crate) is_paused: bool,
-    pub(crate) has_help: bool,
-    /// The file of the running recording.
-    pub(crate) recording: Option<String>,
-    pub(crate) role: Role,
-    /// Only ASCII, for terminals without UTF-8.
-    pub(crate) is_ascii: bool,
-}
-
-/// What the keys do.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-pub(crate) enum Role {
-    /// Nothing is sent.
-    #[default]
-    Watching,
-    /// Something moves: every key that ends stops it first.
-    Moving,
-    /// It was told to stop.
-    Stopping,
-}
-
-/// Which entries of the log are shown.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
-pub(crate) enum Filter {
-    #[default]
-    All,
-    Gaps,
-    Node(NodeId),
-}
+use view::{ALARM, DOUBT, FAINT, PLAIN};
+pub(crate) use view::{Filter, Role, View};
 
 const TITLE: Style = Style::new().add_modifier(Modifier::REVERSED);
-const ALARM: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
-const GOOD: Style = Style::new().fg(Color::Green);
-const DOUBT: Style = Style::new().fg(Color::Yellow);
-const FAINT: Style = Style::new().fg(Color::DarkGray);
-const PLAIN: Style = Style::new();
-
 /// Draws the page.
 pub(crate) fn draw(view: &View, model: &Model, buffer: &mut Buffer) {
     let area = *buffer.area();

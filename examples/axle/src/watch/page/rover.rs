@@ -7,8 +7,8 @@ use ratatui_core::{
 };
 
 use super::{
-    ALARM, DOUBT, FAINT, GOOD, PLAIN, View,
     text::{fitting, millis, put, sparkline},
+    view::{ALARM, DOUBT, FAINT, GOOD, PLAIN, View},
 };
 use crate::watch::model::{Link, Rover};
 

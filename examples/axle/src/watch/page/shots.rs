@@ -18,7 +18,7 @@ use axlewire::{
         robot::RobotConfig,
     },
 };
-use ratatui_core::{backend::TestBackend, terminal::Terminal};
+use ratatui_core::{backend::TestBackend, style::Color, terminal::Terminal};
 
 use super::*;
 use crate::{

@@ -8,7 +8,7 @@ use axlewire::{
     },
     ucp::{self, Body, MotorControl, RawFrame, Telemetry},
 };
-use ratatui_core::{backend::TestBackend, terminal::Terminal};
+use ratatui_core::{backend::TestBackend, style::Color, terminal::Terminal};
 
 use super::*;
 use crate::{

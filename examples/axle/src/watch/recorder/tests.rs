@@ -5,7 +5,7 @@ use std::time::Duration;
 use axlewire::ucp::Ucp;
 
 use super::{super::Args, *};
-use crate::watch::From;
+use crate::watch::args::From;
 
 #[test]
 fn recordings_have_names_of_their_own() {

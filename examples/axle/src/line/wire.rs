@@ -1,0 +1,18 @@
+//! What may be at the other end of a path.
+
+use std::{io, time::Duration};
+
+use axlewire::drive::SerialPort;
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+
+/// What may be at the other end of a path.
+pub(crate) trait Wire: Read + ReadReady + Write + ErrorType<Error = io::Error> {
+    /// Waits for bytes, at most for `patience`; returns whether there are some.
+    fn wait(&mut self, patience: Duration) -> io::Result<bool>;
+}
+
+impl Wire for SerialPort {
+    fn wait(&mut self, patience: Duration) -> io::Result<bool> {
+        SerialPort::wait(self, patience)
+    }
+}
