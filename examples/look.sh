@@ -44,8 +44,8 @@ live=$(grep -c report live.txt)
 echo "$live reports in 60 packets of Wireshark, $reports in the recording"
 [ "$live" -ge 50 ]
 [ "$reports" -ge 100 ]
-# Name, and number of reports.
-expect() { echo "$1: $2 reports"; [ "$2" = "$reports" ]; }
+# Name, number of reports, and how many it must be.
+expect() { echo "$1: $2 reports"; [ "$2" = "${3:-$reports}" ]; }
 expect PulseView "$("${here[@]}" sigrok-cli -i drive.sr -A axle_ucp=packets \
     -P uart:rx=RX:baudrate=115200,axle_ucp | grep -c ': report, index')"
 expect Foxglove "$("$python" -c "from mcap.reader import make_reader
@@ -53,5 +53,8 @@ file = make_reader(open('drive.mcap', 'rb'))
 print(sum(1 for _ in file.iter_messages(topics=['ucp.report'])))")"
 expect Parquet "$("$python" -c "import pyarrow.parquet
 print(len(pyarrow.parquet.read_table('drive.parquet/ucp.report.parquet')))")"
+# Of reports that came at once, a page has one.
+times=$("${here[@]}" axle decode --json drive.pcapng | grep '"message":"report"' |
+    grep -o '"t":[0-9.]*' | sort -u | wc -l)
 expect plot "$(grep -o '"name":"front left"[^]]*' drive.html | sed 's/.*"x":.//' | tr , '\n' |
-    wc -l)"
+    wc -l)" "$times"

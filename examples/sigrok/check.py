@@ -189,6 +189,8 @@ class Check:
             for begin in range(0, len(data), 16):
                 at = line.send(data[begin:begin + 16], at)
                 at += make.micros(dice.choice((0, 0, 0.7, 33, 190)))
+            # A spike shorter than half a bit is no byte.
+            line.spans.append((int(at + 100), int(at + 103)))
             at += make.micros(20_500)
         notes = notes_of(self.render(name, [line]), protocol, 1, options)
         bytes_shown = sorted((it for it in notes if it.kind in ("byte", "skipped-byte")),
@@ -287,6 +289,9 @@ def streams():
     """Name, protocol, parts, and options of the decoder."""
     dice = random.Random(1)
     speeds = [dice.randbytes(4).hex() for _ in range(300)]
+    # Zeros, powers of two, and positions whose last digit is a half, which rounds to even.
+    speeds += [struct.pack("<I", exponent << 23).hex() for exponent in range(0, 511, 3)]
+    speeds += ["00010000", "00030000", "00ff0000"]
     bodies = [make.ucp(number, dice.randbytes(length), number)
               for number in [*range(12), 0x20, 0xFF]
               for length in (0, 1, 2, 3, 4, 6, 12, 16, 18, 19, 20, 34, 36, 56)]

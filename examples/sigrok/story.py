@@ -65,6 +65,8 @@ BUS = [
     reply(1, 20, UNASKED % 1),
     (RX, 20, POSITION, MODE % ("position", "velocity"), UNASKED % 1),
     reply(1, 20, MODE % ("velocity", "position"), UNASKED % 1),
+    # The other wire has long been silent.
+    (TX, 30_000, read(1)), reply(1, 400, LATE % (1, 400)),
     # Broken rules of the bus.
     (TX, 300, sealed("aa09"), "node 9 with a good CRC: not 1 to 8 (I1)"),
     (TX, 300, sealed("bb000000803f"), "node 0 with a good CRC: not 1 to 8 (I1)"),
