@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs the commands of the README's section "Look at it in other tools", as they are written there,
+# Runs the commands of the README's section "Pictures", as they are written there,
 # on a simulated rover, and counts the reports in what each of them gives. No window is opened:
 # tshark captures in place of Wireshark, and sigrok-cli reads what PulseView would show.
 #
@@ -33,7 +33,7 @@ if [ "$(id -u)" = 0 ]; then
     chown -R nobody "$work"
     here+=(setpriv --reuid nobody --regid "$(id -g nobody)" --clear-groups)
 fi
-commands=$(awk '/^## /{on = /Look at it in other tools/} /^```/{code = !code; next} on && code' \
+commands=$(awk '/^## /{on = /Pictures/} /^```/{code = !code; next} on && code' \
     README.md)
 commands="trap 'kill %1' EXIT; ${commands//\/tmp\/rover/$work/rover}"
 "${here[@]}" bash -ec "$commands" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }

@@ -19,8 +19,8 @@
 //! | run a role in your own loop, without a port and a clock | [`endpoint::Endpoint`] |
 //! | decode a capture or a stream, build a packet | the pages `ikeya` and `ucp` |
 //! | decode another protocol with the same resync | [`stream::Framing`] |
-//! | bring it to a board | the page `porting` |
-//! | use a serial port or a USB adapter of a PC | the page `on_a_pc` |
+//! | bring it to a board | `guide::start_on_a_board` |
+//! | use a serial port or a USB adapter of a PC | `guide::start_on_a_pc` |
 //! | read packets as JSON, or elsewhere with `serde` | the page `fields` |
 //! | test an application without hardware | `sim` |
 //!
@@ -83,18 +83,12 @@ mod machine;
 mod map;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
-// Pages, not code. The examples of two of them use one more feature than their links.
+// Pages, not code.
 #[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("fields.md")]
 pub mod fields {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 pub mod guide;
-#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
-#[cfg_attr(any(not(doctest), feature = "serialport"), doc = include_str!("on_a_pc.md"))]
-pub mod on_a_pc {}
-#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
-#[cfg_attr(any(not(doctest), feature = "embedded-hal"), doc = include_str!("porting.md"))]
-pub mod porting {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("safety.md")]
 pub mod safety {}

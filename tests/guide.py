@@ -37,12 +37,12 @@ SPIN = "examples/host/src/bin/spin.rs"
 NOT_RUN = {
     ("start_on_a_pc", "cargo install --path examples/axle"): "installs for the user; it is built here",
     ("adding_a_message", "python3 tests/new_message.py"): "takes minutes; the step `message` of the gate is this command",
-    ("recording_and_looking", "cargo install --path examples/axle --features mcap,parquet,plot"): "heavy features; the tests of axle use them",
-    ("recording_and_looking", "axle plot examples/captures/motors.pcapng -o motors.svg"): "a heavy feature; the tests of axle use it",
-    ("recording_and_looking", "examples/wireshark/install.sh"): "needs tshark; examples/wireshark checks it",
-    ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ucp --udp 127.0.0.1:9870"):
+    ("recording", "cargo install --path examples/axle --features mcap,parquet,plot"): "heavy features; the tests of axle use them",
+    ("recording", "axle plot examples/captures/motors.pcapng -o motors.svg"): "a heavy feature; the tests of axle use it",
+    ("recording", "examples/wireshark/install.sh"): "needs tshark; examples/wireshark checks it",
+    ("recording", "axle watch --port /dev/ttyUSB0 --protocol ucp --udp 127.0.0.1:9870"):
         "an adapter, and a program that listens; the tests of axle send to one",
-    ("recording_and_looking", "axle watch --port /dev/ttyUSB0 --protocol ikeya"): "a page on a terminal, on an adapter",
+    ("recording", "axle watch --port /dev/ttyUSB0 --protocol ikeya"): "a page on a terminal, on an adapter",
     ("start_on_a_pc", "cargo new turn && cd turn"): "makes a project; the gate builds the same program",
     ("start_on_a_pc", "use axlewire::drive::{Driver, SerialPort, StdClock};"):
         f"opens a port; it is the text of {SPIN}, which the next block runs",
@@ -290,7 +290,7 @@ def rewritten(text, printed):
 
 def planted(texts, index):
     """Plants faults, each of which must be found where the sound guide has none."""
-    name = "ikeya_in_ten_minutes"
+    name = "ikeya"
     block = lambda info, line: f"\n```{info}\n{line}\n```\n"
     changed = lambda chapter, old, new: {**texts, chapter: texts[chapter].replace(old, new, 1)}
     footer = lambda chapter, added: changed(chapter, "\n# ", f"{added}\n# ")
@@ -313,7 +313,7 @@ def planted(texts, index):
         "a chapter that is not listed": faults_of_text(texts, re.sub(rf"//! \d+\. \[[^\]]*\]\({name}\).*\n", "", index)),
         "a chapter that is no module": faults_of_text(texts, index.replace(f"    {name}\n", "")),
         "two chapters swapped": faults_of_text(texts, index.replace("    timing\n    staying_safe\n", "    staying_safe\n    timing\n")),
-        "a wrong link to the next": faults_of_text(changed(name, "(crate::guide::ucp_in_ten_minutes) →", "(crate::guide::timing) →"), index),
+        "a wrong link to the next": faults_of_text(changed(name, "(crate::guide::ucp) →", "(crate::guide::timing) →"), index),
         "no links at the end": faults_of_text({**texts, name: texts[name].rpartition("\n\n")[0] + "\n"}, index),
         "another title": faults_of_text(changed(name, "Ikeya in ten", "Ikeya in nine"), index),
         "a doc test that did not run": faults_of_tests(texts, passes.partition("\n")[2]),

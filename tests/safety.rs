@@ -1,27 +1,29 @@
 //! Every hazard of the safety page has a test, unless nothing can be done about it: every test that
-//! it names exists.
+//! it names exists, and is run.
 
 #![cfg(not(target_os = "none"))]
 
-use std::{
-    collections::HashSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::HashSet, fs, path::Path};
 
 const PAGE: &str = include_str!("../src/safety.md");
 const SECURITY: &str = include_str!("../SECURITY.md");
 
-/// All functions below a folder that are tests, and are run.
-fn tests_below(folder: &Path, found: &mut HashSet<String>) {
-    let entries: Vec<PathBuf> = match fs::read_dir(folder) {
-        Ok(entries) => entries.map(|entry| entry.unwrap().path()).collect(),
-        // A published crate does not include the tool and the firmware.
-        Err(_) => return,
-    };
-    for path in entries {
+/// All functions below these folders that are tests, and are run.
+fn tests_below(folders: &[&str]) -> HashSet<String> {
+    let mut found = HashSet::new();
+    for folder in folders {
+        add_tests_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut found);
+    }
+    assert!(found.contains("every_hazard_has_tests_that_are_run"), "the search is blind");
+    found
+}
+
+fn add_tests_below(folder: &Path, found: &mut HashSet<String>) {
+    // A published crate does not include the tool and the firmware.
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.map(|entry| entry.unwrap().path()) {
         if path.is_dir() && !path.ends_with("target") {
-            tests_below(&path, found);
+            add_tests_below(&path, found);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let source = fs::read_to_string(&path).unwrap();
             let (mut is_test, mut is_ignored) = (false, false);
@@ -43,71 +45,66 @@ fn tests_below(folder: &Path, found: &mut HashSet<String>) {
     }
 }
 
-/// The rows of the tables of hazards, cell by cell; no text may contain the bar between two cells.
-fn rows() -> impl Iterator<Item = Vec<&'static str>> {
-    let mut is_table = false;
-    let rows = PAGE.lines().filter(move |line| {
-        let is_row = is_table && line.starts_with("| ");
-        is_table = line.starts_with("| hazard") || is_table && line.starts_with('|');
-        is_row
-    });
-    rows.map(|line| {
-        let cells: Vec<_> = line.trim_matches('|').split('|').map(str::trim).collect();
-        assert_eq!(cells.len(), 5, "{line}");
-        cells
-    })
+/// The numbered items of the sections with this title: number and text, on one line.
+fn items(title: &str) -> Vec<(usize, String)> {
+    let sections = PAGE.split("\n# ").filter(|section| section.starts_with(title));
+    let mut items: Vec<(usize, String)> = Vec::new();
+    for line in sections.flat_map(str::lines) {
+        let numbered = line.split_once(". ").and_then(|(number, text)| {
+            Some((number.parse().ok()?, text.to_string())) // a line of a text does not begin so
+        });
+        if let Some(item) = numbered {
+            items.push(item);
+        } else if let (true, Some((_, text))) = (line.starts_with("   "), items.last_mut()) {
+            *text += " ";
+            *text += line.trim_start();
+        }
+    }
+    items
 }
 
 #[test]
-fn every_test_that_the_safety_page_names_exists() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut tests = HashSet::new();
-    tests_below(&root.join("tests"), &mut tests);
-    tests_below(&root.join("src"), &mut tests);
-    assert!(tests.contains("every_test_that_the_safety_page_names_exists"), "the search is blind");
-    let mut named = 0;
-    for row in rows() {
-        if row[3] == "-" {
-            continue;
-        }
-        for name in row[3].split("<br>") {
+fn every_hazard_has_a_number_and_says_what_remains() {
+    let hazards = items("Hazards");
+    assert!(hazards.len() >= 25, "{} hazards", hazards.len());
+    for (place, (number, text)) in hazards.iter().enumerate() {
+        assert_eq!(*number, place + 1, "{text}");
+        let (what, remains) = text.split_once(" *Remains:* ").expect(text);
+        assert!(what.starts_with("**") && !remains.is_empty(), "{text}");
+    }
+}
+
+#[test]
+fn every_hazard_has_tests_that_are_run() {
+    let (hazards, shown) = (items("Hazards"), items("Shown by"));
+    assert_eq!(hazards.len(), shown.len());
+    let tests = tests_below(&["tests", "src"]);
+    for ((number, hazard), (shown_number, names)) in hazards.iter().zip(&shown) {
+        assert_eq!(number, shown_number);
+        let is_beyond_us = hazard.contains(" Nothing can be done");
+        assert_eq!(is_beyond_us, names == "Nothing can be done.", "hazard {number}: {names}");
+        for name in names.split(", ").filter(|_| !is_beyond_us) {
             let bare = name.strip_prefix('`').and_then(|name| name.strip_suffix('`'));
             assert!(bare.is_some_and(|bare| tests.contains(bare)), "no test is called {name}");
-            named += 1;
         }
     }
-    assert!(named > 30, "only {named} tests are named");
 }
 
 #[test]
-fn every_test_that_the_threat_model_names_exists() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut tests = HashSet::new();
-    for folder in ["tests", "src", "examples/axle"] {
-        tests_below(&root.join(folder), &mut tests);
+fn every_promise_of_the_threat_model_is_shown_by_something_that_exists() {
+    // The tool's tests are not in the package.
+    if !Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/axle").exists() {
+        return;
     }
-    let names =
-        SECURITY.split('`').skip(1).step_by(2).filter(|name| name.matches('_').count() >= 2);
-    let mut named = 0;
-    for name in names.filter(|name| !name.contains(['/', ' ', '.'])) {
-        // The tool's tests are not in the package.
-        assert!(
-            tests.contains(name) || !root.join("examples/axle").exists(),
-            "no test is called {name}"
-        );
-        named += 1;
+    let tests = tests_below(&["tests", "src", "examples/axle"]);
+    let (_, table) = SECURITY.split_once("\n|---|---|---|\n").expect("a table");
+    for row in table.lines() {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let [_, promise, shown] = cells[..] else { panic!("{row}") };
+        assert_eq!(promise.contains("**no promise**"), shown.is_empty(), "{row}");
+        let names = shown.split('`').skip(1).step_by(2);
+        for name in names.filter(|name| !name.contains([' ', '/'])) {
+            assert!(tests.contains(name), "no test is called {name}");
+        }
     }
-    assert!(named >= 8, "only {named} tests are named");
-}
-
-#[test]
-fn every_hazard_has_a_test_and_says_what_remains() {
-    let mut count = 0;
-    for row in rows() {
-        let is_beyond_us = row[2].starts_with("nothing can be done");
-        assert_eq!(is_beyond_us, row[3] == "-", "no test: {}", row[0]);
-        assert!(row.iter().all(|cell| !cell.is_empty()), "{row:?}");
-        count += 1;
-    }
-    assert!(count >= 25, "{count} hazards");
 }

@@ -112,7 +112,7 @@
 //! # On a PC
 //!
 //! `SerialPort` (feature `serialport`) with `StdClock`, or `TokioSerialPort` with `TokioClock`
-//! (feature `tokio`): see the page `on_a_pc`.
+//! (feature `tokio`): see `guide::start_on_a_pc`.
 //!
 //! # With embassy
 //!

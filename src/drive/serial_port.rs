@@ -26,8 +26,8 @@ const PIECE_LEN: usize = 256;
 /// Pause between two looks at bytes that are being sent.
 const NAP: Duration = Duration::from_micros(200);
 
-/// A serial port of a PC, for the blocking calls of a [`Driver`](super::Driver). See the page
-/// `on_a_pc` for permissions, adapters and their delays.
+/// A serial port of a PC, for the blocking calls of a [`Driver`](super::Driver). See
+/// `guide::start_on_a_pc` for permissions, adapters and their delays.
 ///
 /// ```no_run
 /// # #[cfg(feature = "ikeya")] {

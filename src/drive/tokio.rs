@@ -18,7 +18,7 @@ use crate::time::Instant;
 const NAP: Duration = Duration::from_millis(1);
 
 /// A serial port of a PC, for the async calls of a [`Driver`](super::Driver) in a tokio runtime.
-/// See the page `on_a_pc` for permissions, adapters and their delays.
+/// See `guide::start_on_a_pc` for permissions, adapters and their delays.
 ///
 /// ```no_run
 /// # #[cfg(feature = "ikeya")]

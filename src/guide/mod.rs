@@ -1,45 +1,36 @@
-//! The guide: eleven short chapters, from the first motor to a protocol of your own.
+//! The guide: from the first motor to a protocol of your own, in eight pages.
 //!
-//! Read it in order, or jump to what you need. Every example runs: the Rust code as tests of this
-//! crate, the commands by `tests/guide.py`, which compares what they print.
+//! Every example is run: the Rust code as tests of this crate, the `console` blocks by the tests of
+//! the tool, which compare what is printed.
 //!
-//! 1. [Start on a PC](start_on_a_pc): turn a motor without hardware.
-//! 2. [Start on a board](start_on_a_board): a motor node in twenty lines of firmware.
-//! 3. [Ikeya in ten minutes](ikeya_in_ten_minutes): four packets, a master, a loose plug.
-//! 4. [UCP in ten minutes](ucp_in_ten_minutes): frames, a host, a robot, two watchdogs.
-//! 5. [Streams and resync](streams_and_resync): what a stray byte costs, and how to count it.
+//! 1. [Start on a PC](start_on_a_pc): the tool, a program, ports, permissions, latency.
+//! 2. [Start on a board](start_on_a_board): twenty lines of firmware, interrupts, DMA, RS485.
+//! 3. [Ikeya](ikeya): four packets, a master, a loose plug.
+//! 4. [UCP](ucp): frames, a host, a robot, two watchdogs, adding a message.
+//! 5. [Streams and resync](streams): what a stray byte costs; the same for another protocol.
 //! 6. [Timing](timing): how fast a bus can be, computed and then measured.
-//! 7. [Staying safe](staying_safe): what a stop is worth, and how to test that it works.
-//! 8. [Recording and looking](recording_and_looking): captures, and the tools that open them.
-//! 9. [Your own framing](your_own_framing): the same resync for another protocol.
-//! 10. [Adding a UCP message](adding_a_message): what you write, and what follows from it.
-//! 11. [Moving from C](moving_from_c): their function, ours.
+//! 7. [Recording and looking](recording): captures, and the tools that open them.
+//! 8. [Safety](crate::safety): which hazards there are, and what is left to you.
 //!
-//! The other pages are for looking things up: `porting` says what a board has to provide,
-//! `on_a_pc` how serial ports and USB adapters behave, `safety` which hazards there are, `fields`
-//! what each field means.
+//! The page `fields` says what each field of the JSON means.
 
-/// A chapter: a page without code. Its examples need the feature `sim`; its links do not.
-macro_rules! chapters {
-    ($($name:ident)*) => {$(
+/// A page without code. Its examples need these features; its links do not.
+macro_rules! pages {
+    ($($name:ident: $feature:literal)*) => {$(
         #[cfg_attr(
-            any(not(doctest), feature = "sim"),
+            any(not(doctest), all(feature = "sim", feature = $feature)),
             doc = include_str!(concat!(stringify!($name), ".md"))
         )]
         pub mod $name {}
     )*};
 }
 
-chapters! {
-    start_on_a_pc
-    start_on_a_board
-    ikeya_in_ten_minutes
-    ucp_in_ten_minutes
-    streams_and_resync
-    timing
-    staying_safe
-    recording_and_looking
-    your_own_framing
-    adding_a_message
-    moving_from_c
+pages! {
+    start_on_a_pc: "serialport"
+    start_on_a_board: "embedded-io"
+    ikeya: "sim"
+    ucp: "sim"
+    streams: "sim"
+    timing: "sim"
+    recording: "sim"
 }
