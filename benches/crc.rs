@@ -6,12 +6,12 @@
 use std::hint::black_box;
 
 use axlewire::crc16;
-use axlewire_benches::{reference, streams::Rng};
+use axlewire_contenders::{reference, streams::Rng};
 use crc::{CRC_16_MODBUS, Crc, NoTable, Table};
 use criterion::{Criterion, Throughput};
 
 mod measure;
-use measure::measure;
+use measure::{criterion, measure};
 
 const LENGTHS: [usize; 7] = [2, 6, 14, 22, 42, 256, 4096];
 
@@ -36,7 +36,7 @@ const COMPUTE: [(&str, Compute); 6] = [
 ];
 
 fn main() {
-    let mut criterion = Criterion::default().configure_from_args();
+    let mut criterion = criterion();
     for len in LENGTHS {
         length(&mut criterion, len);
     }

@@ -1,8 +1,19 @@
 //! A measurement that checks every answer and cannot be empty.
 
-use std::fmt::Debug;
+use std::{fmt::Debug, time::Duration};
 
-use criterion::{BenchmarkGroup, measurement::WallTime};
+use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
+
+/// About a second for each benchmark, so that all of them take minutes. The command line can change
+/// it: `-- --measurement-time 5`.
+pub(crate) fn criterion() -> Criterion {
+    Criterion::default()
+        .warm_up_time(Duration::from_millis(200))
+        .measurement_time(Duration::from_millis(600))
+        .sample_size(20)
+        .nresamples(10_000)
+        .configure_from_args()
+}
 
 /// Measures `work`, whose every answer must be `expected`; returns how often it ran, which is never
 /// if the command line leaves it out.

@@ -4,7 +4,7 @@
 //! wrong two contenders. With these times every figure is known. The names are read anew here: a
 //! figure `X_over_Y` is the time of Y over the time of X, and more is better.
 
-use axlewire_benches::{Protocol, Tally, UCP};
+use axlewire_contenders::{Protocol, Tally, UCP};
 
 /// Decoders that each give another answer.
 pub(crate) const PROTOCOL: Protocol = Protocol {

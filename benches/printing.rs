@@ -1,19 +1,19 @@
 //! Speed of printing: frames as text for people, over the same frames as JSON; one line per figure,
 //! `name value goal`, higher is better.
 //!
-//! `cargo bench -p axlewire-benches --bench printing` takes a few seconds once it is built. It
-//! fails if an output is wrong, never because a figure is low. With `-- --test` the contenders
+//! `cargo bench --bench printing` takes a few seconds once it is built. It fails if an output is
+//! wrong, and with `-- --goals` if a figure is below its goal. With `-- --test` the contenders
 //! pretend to take known times, and every figure must be the one of these times.
 
-use std::{env, fmt::Display, io::Write};
+use std::{env, fmt::Display, io::Write, process::ExitCode};
 
 use axlewire::{
     ikeya,
     stream::{Frames, Framing},
     ucp,
 };
-use axlewire_benches::{
-    Tally,
+use axlewire_contenders::{
+    Tally, figures,
     race::{Contender, Stopwatch, race},
     streams::{self, Stream},
 };
@@ -31,7 +31,7 @@ struct Effort {
     stopwatch: Stopwatch,
 }
 
-fn main() {
+fn main() -> ExitCode {
     // As with criterion: `cargo bench` passes `--bench`; without it, the run should be short.
     let given = |wanted: &str| env::args().any(|argument| argument == wanted);
     let effort = if given("--bench") && !given("--test") {
@@ -48,6 +48,7 @@ fn main() {
     measure::<ikeya::BothDirections>("ikeya_mixed_1e-3", &mixed.with_bit_errors(1000), effort);
     measure::<ucp::Ucp>("ucp44", &reports, effort);
     measure::<ucp::Ucp>("ucp44_1e-3", &reports.with_bit_errors(1000), effort);
+    figures::outcome()
 }
 
 /// Prints every frame of a stream both ways.
@@ -76,18 +77,18 @@ where
         ],
     );
 
-    let figure = |figure: &str, value: f64, digits: usize, goal: &str, due: f64| {
-        println!("{figure}_{name} {value:.digits$} {goal}");
+    let figure = |figure: &str, value: f64, digits: usize, goal: Option<f64>, due: f64| {
+        figures::print(&format!("{figure}_{name}"), value, digits, goal);
         if let Stopwatch::Pretended(_) = stopwatch {
             assert!((value / due - 1.0).abs() < 1e-9, "{figure} is {value}, and should be {due}");
         }
     };
     let (mb, ns) = (bytes.len() as f64 / 1e6, 1e9 / texts.frames as f64);
-    figure("text_over_json", json_time / text_time, 3, "1", 4.0);
-    figure("mb_per_s_text", mb / text_time, 0, "-", mb / TEXT);
-    figure("ns_per_frame_text", ns * text_time, 0, "-", ns * TEXT);
-    figure("mb_per_s_json", mb / json_time, 0, "-", mb / JSON);
-    figure("ns_per_frame_json", ns * json_time, 0, "-", ns * JSON);
+    figure("text_over_json", json_time / text_time, 3, Some(1.0), 4.0);
+    figure("mb_per_s_text", mb / text_time, 0, None, mb / TEXT);
+    figure("ns_per_frame_text", ns * text_time, 0, None, ns * TEXT);
+    figure("mb_per_s_json", mb / json_time, 0, None, mb / JSON);
+    figure("ns_per_frame_json", ns * json_time, 0, None, ns * JSON);
 }
 
 /// Number of frames and length of what is printed of them. Each is printed once in both ways, which

@@ -1,18 +1,18 @@
 //! Speed of axlewire relative to C and to other crates: one line per figure, `name value goal`;
 //! higher is better.
 //!
-//! `cargo bench -p axlewire-benches --bench ratios` takes less than 50 seconds once it is built.
-//! Contenders take turns, and a value is the ratio of their medians, so other load on the machine
-//! affects both sides alike. It fails if an answer is wrong, never because a figure is low.
+//! `cargo bench --bench ratios` takes less than 50 seconds once it is built. Contenders take turns,
+//! and a value is the ratio of their medians, so other load on the machine affects both sides alike.
+//! It fails if an answer is wrong, and with `-- --goals` if a figure is below its goal.
 //!
 //! With `-- --test` the contenders pretend to take known times (`pretended.rs`), and every figure
 //! must be the one of these times.
 
-use std::{env, hint::black_box};
+use std::{env, hint::black_box, process::ExitCode};
 
 use axlewire::{crc16, stream::Portable, ucp::Ucp};
-use axlewire_benches::{
-    Protocol, Tally, ours, peers,
+use axlewire_contenders::{
+    Protocol, Tally, figures, ours, peers,
     peers::Peer,
     race::{Contender, Stopwatch, race},
     reference,
@@ -63,7 +63,7 @@ const TINY: Effort = Effort {
     stopwatch: Stopwatch::Pretended(pretended::seconds),
 };
 
-fn main() {
+fn main() -> ExitCode {
     // As with criterion: `cargo bench` passes `--bench`; without it, the run should be short.
     let given = |wanted: &str| env::args().any(|argument| argument == wanted);
     let effort = if given("--bench") && !given("--test") { FULL } else { TINY };
@@ -133,6 +133,7 @@ fn main() {
     for (name, make) in STREAMS {
         with_bit_errors(name, &make(effort.damaged_len), &effort);
     }
+    figures::outcome()
 }
 
 /// Makes a stream of this many bytes.
@@ -146,14 +147,13 @@ const STREAMS: [(&str, Make); 3] = [
 ];
 
 impl Effort {
-    /// Prints one line, with a dash for a missing goal.
+    /// Prints one line.
     fn print(&self, name: &str, value: f64, goal: impl Into<Option<f64>>) {
         self.print_rounded(name, value, 3, goal);
     }
 
     fn print_rounded(&self, name: &str, value: f64, digits: usize, goal: impl Into<Option<f64>>) {
-        let goal = goal.into().map_or("-".into(), |goal| goal.to_string());
-        println!("{name} {value:.digits$} {goal}");
+        figures::print(name, value, digits, goal.into());
         if let Stopwatch::Pretended(_) = self.stopwatch
             && let Some(due) = pretended::figure(name, self.clean_len, self.crc_calls)
         {

@@ -10,10 +10,10 @@ use axlewire::{
     },
     time::{Duration, Instant},
 };
-use criterion::{Criterion, Throughput};
+use criterion::Throughput;
 
 mod measure;
-use measure::measure;
+use measure::{criterion, measure};
 
 const EXCHANGES: u32 = 1000;
 
@@ -84,7 +84,7 @@ impl Bus {
 }
 
 fn main() {
-    let mut criterion = Criterion::default().configure_from_args();
+    let mut criterion = criterion();
     let mut group = criterion.benchmark_group("Ikeya roles");
     group.throughput(Throughput::Elements(EXCHANGES.into()));
     let mut bus = Bus::new();

@@ -1,6 +1,6 @@
 //! A noisy line: what is sent, what noise makes of it, and how much of it is left to be found.
 //!
-//! `axle noise` and the test `noise` of the library use the same lines.
+//! The bench `noise` and the test `noise` use the same lines.
 
 use std::collections::HashSet;
 

@@ -5,7 +5,8 @@
 //! with one accepted before (ruling B2), as when a frame that has lost its last byte is completed
 //! by the identical first byte of the next.
 //!
-//! `cargo test --test stream noise -- --nocapture` prints the figures.
+//! `cargo test --test stream noise -- --nocapture` prints the figures. `cargo bench --bench noise`
+//! sends over the same lines and shows them for every way to decode.
 
 use axlewire::{
     ikeya::{self, three},

@@ -25,7 +25,6 @@ mod manual;
 mod network;
 #[cfg(not(unix))]
 mod no_sim;
-mod noise;
 mod pcapng;
 mod ping;
 mod play;
@@ -90,7 +89,6 @@ enum Command {
     Send(send::Args),
     #[cfg(unix)]
     Sim(sim::Args),
-    Noise(noise::Args),
     Ports(ports::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::ManArgs),
@@ -152,7 +150,6 @@ fn run(command: &Command) -> Result<(), Failure> {
         Command::Send(args) => send::run(args),
         #[cfg(unix)]
         Command::Sim(args) => sim::run(args),
-        Command::Noise(args) => noise::run(args),
         Command::Ports(args) => ports::run(args),
         Command::Completions(args) => manual::print_completions(args, description()),
         Command::Man(args) => manual::write_pages(args, description()),

@@ -7,7 +7,7 @@
 use std::{env, hint::black_box, process::ExitCode};
 
 use axlewire::crc16;
-use axlewire_benches::{
+use axlewire_contenders::{
     IKEYA, Tally, UCP, reference,
     streams::{self, Stream},
 };

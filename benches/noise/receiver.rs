@@ -2,16 +2,16 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{Decoder, Event, Frames, Framing, Portable},
+    stream::{Decoder, Event, Frames, Portable},
     ucp::{self, Ucp},
 };
 
 use super::{
+    known_framings::Known,
     noisy_line::Place,
     oracle::{self, Rules},
     traffic::Traffic,
 };
-use crate::listing::Shown;
 
 /// A way to find the frames of a stream.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -28,12 +28,6 @@ pub(super) enum Receiver {
     Pushed,
     /// Not of the library: the usual receiver of firmware.
     Plain,
-    /// A decoder with a fault, for tests: it loses one frame.
-    #[cfg(test)]
-    Forgetful,
-    /// The same: it delivers one twice.
-    #[cfg(test)]
-    Stuttering,
 }
 
 impl Receiver {
@@ -49,18 +43,15 @@ impl Receiver {
         Self::Plain,
     ];
 
-    pub(super) fn name(self) -> String {
+    /// The title of its column.
+    pub(super) fn title(self) -> String {
         match self {
-            Self::Frames => "frames".to_owned(),
-            Self::EachSimd => "each-simd".to_owned(),
-            Self::EachPortable => "each-portable".to_owned(),
-            Self::Decoder(chunk) => format!("decoder-{chunk}"),
-            Self::Pushed => "decoder-pushed".to_owned(),
+            Self::Frames => "Frames".to_owned(),
+            Self::EachSimd => "each".to_owned(),
+            Self::EachPortable => "portable".to_owned(),
+            Self::Decoder(chunk) => format!("by {chunk}"),
+            Self::Pushed => "pushed".to_owned(),
             Self::Plain => "plain".to_owned(),
-            #[cfg(test)]
-            Self::Forgetful => "forgetful".to_owned(),
-            #[cfg(test)]
-            Self::Stuttering => "stuttering".to_owned(),
         }
     }
 
@@ -84,11 +75,7 @@ impl Receiver {
         }
     }
 
-    fn decode<F, const N: usize>(self, traffic: Traffic, bytes: &[u8]) -> Vec<Place>
-    where
-        F: Framing,
-        for<'a> F::Frame<'a>: Shown,
-    {
+    fn decode<F: Known, const N: usize>(self, traffic: Traffic, bytes: &[u8]) -> Vec<Place> {
         let mut found = Found { bytes, at: 0, places: Vec::new() };
         match self {
             Self::Frames => iterate::<F>(&mut found),
@@ -97,15 +84,6 @@ impl Receiver {
             Self::Decoder(chunk) => decode_chunks::<F, N>(chunk, &mut found),
             Self::Pushed => push::<F, N>(&mut found),
             Self::Plain => receive_plainly(traffic.rules(), &mut found),
-            #[cfg(test)]
-            Self::Forgetful | Self::Stuttering => {
-                iterate::<F>(&mut found);
-                let middle = found.places.len() / 2;
-                let frame = found.places.remove(middle);
-                if self == Self::Stuttering {
-                    found.places.extend([frame; 2]);
-                }
-            }
         }
         found.places
     }
@@ -114,7 +92,7 @@ impl Receiver {
 /// What was delivered.
 struct Found<'i> {
     bytes: &'i [u8],
-    /// End of what a decoder has told about: frames and gaps.
+    /// End of the last frame or gap of a decoder.
     at: usize,
     places: Vec<Place>,
 }
@@ -123,19 +101,19 @@ struct Found<'i> {
 const NOWHERE: usize = usize::MAX;
 
 impl Found<'_> {
-    /// A frame borrowed from the stream: its address tells where.
+    /// A frame borrowed from the stream, at its address.
     fn borrowed(&mut self, frame: &[u8]) {
         let at = frame.as_ptr().addr().wrapping_sub(self.bytes.as_ptr().addr());
         self.add(at, frame);
     }
 
-    /// A frame or gap of a decoder: by its account, the next bytes.
-    fn next(&mut self, event: Event<impl Shown>) {
+    /// A frame or gap of a decoder: the next bytes of the stream.
+    fn next<F: Known>(&mut self, event: Event<F::Frame<'_>>) {
         match event {
             Event::Skipped(gap) => self.at += gap.len as usize,
             Event::Frame(frame) => {
-                self.add(self.at, frame.bytes());
-                self.at += frame.bytes().len();
+                self.add(self.at, F::bytes(&frame));
+                self.at += F::bytes(&frame).len();
             }
         }
     }
@@ -146,15 +124,11 @@ impl Found<'_> {
     }
 }
 
-fn iterate<F>(found: &mut Found)
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
+fn iterate<F: Known>(found: &mut Found) {
     let mut frames = Frames::<F>::new(found.bytes);
     loop {
         for frame in frames.by_ref() {
-            found.borrowed(frame.bytes());
+            found.borrowed(F::bytes(&frame));
         }
         if frames.rest().is_empty() {
             return;
@@ -163,14 +137,10 @@ where
     }
 }
 
-fn take_each<F>(found: &mut Found)
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
+fn take_each<F: Known>(found: &mut Found) {
     let mut frames = Frames::<F>::new(found.bytes);
     loop {
-        frames.each(|frame| found.borrowed(frame.bytes()));
+        frames.each(|frame| found.borrowed(F::bytes(&frame)));
         if frames.rest().is_empty() {
             return;
         }
@@ -178,30 +148,22 @@ where
     }
 }
 
-fn decode_chunks<F, const N: usize>(chunk: usize, found: &mut Found)
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
+fn decode_chunks<F: Known, const N: usize>(chunk: usize, found: &mut Found) {
     let mut decoder = Decoder::<F, N>::new();
     for mut input in found.bytes.chunks(chunk) {
         while let Some(event) = decoder.decode(&mut input) {
-            found.next(event);
+            found.next::<F>(event);
         }
     }
     quiet(&mut decoder, found);
 }
 
-fn push<F, const N: usize>(found: &mut Found)
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
+fn push<F: Known, const N: usize>(found: &mut Found) {
     let mut decoder = Decoder::<F, N>::new();
     for &byte in found.bytes {
         if decoder.push(byte) {
             while let Some(event) = decoder.poll() {
-                found.next(event);
+                found.next::<F>(event);
             }
         }
     }
@@ -209,22 +171,18 @@ where
 }
 
 /// The line goes quiet, and remains so.
-fn quiet<F, const N: usize>(decoder: &mut Decoder<F, N>, found: &mut Found)
-where
-    F: Framing,
-    for<'a> F::Frame<'a>: Shown,
-{
+fn quiet<F: Known, const N: usize>(decoder: &mut Decoder<F, N>, found: &mut Found) {
     while decoder.pending() > 0 {
         decoder.idle();
         while let Some(event) = decoder.poll() {
-            found.next(event);
+            found.next::<F>(event);
         }
     }
 }
 
-/// A state machine fed one byte at a time, as firmware often has it: it waits for a header,
-/// collects as many bytes as the header announces and checks them. A frame that is bad is dropped
-/// whole, and the wait for a header begins anew; so is the start of one that cannot be.
+/// A state machine for one byte at a time, as firmware often has it: it waits for a header,
+/// collects as many bytes as the header announces and checks them. It drops a bad frame whole, and
+/// likewise the start of an impossible one, and waits for the next header.
 fn receive_plainly(rules: Rules, found: &mut Found) {
     let (mut frame, mut announced, bytes) = (Vec::new(), None, found.bytes);
     for (at, &byte) in bytes.iter().enumerate() {
