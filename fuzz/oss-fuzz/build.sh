@@ -9,7 +9,7 @@ sanitizer=${SANITIZER:-address}
 [ "$sanitizer" != coverage ] || sanitizer=none
 toolchain=${FUZZ_TOOLCHAIN-}
 
-targets=$(python3 fuzz/campaign --list)
+targets=$(cargo fuzz list)
 [ -n "$targets" ] || { echo "no fuzz targets" >&2; exit 1; }
 
 # shellcheck disable=SC2086 # no word for the default toolchain
