@@ -5,9 +5,8 @@
 #   examples/firmware/response.sh ikeya_slave   READ, answered by a velocity response
 #   examples/firmware/response.sh ucp_robot     ping, answered by a pong
 #
-# Runs the image as shipped in QEMU, which executes one instruction at a time and logs each, along
-# with every interrupt and every register access. The maximum is larger than on a board: QEMU's
-# USART takes a whole line of text at once, in one interrupt. Fails if requests stay unanswered.
+# QEMU executes one instruction at a time and logs each, with every interrupt and every register
+# access. Its USART takes a line of text in one interrupt, so the maximum is larger than on a board.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -20,9 +19,8 @@ ucp_robot) request='\xFD \xFF \x04 \x00 \x01 \x00 \x01 \x42' answer=fdff050001 ;
 esac
 read -ra request <<<"$request"
 image=$(./run.sh --build "$1")
-version=$(qemu-system-arm --version | grep -o '[0-9]*' | head -1)
-one_by_one=(-singlestep)
-[ "$version" -lt 8 ] || one_by_one=(-accel tcg,one-insn-per-tb=on)
+one_by_one=(-accel tcg,one-insn-per-tb=on)
+qemu-system-arm --version | grep -q 'version [1-7]\.' && one_by_one=(-singlestep)
 
 folder=$(mktemp -d)
 qemu= counter=
@@ -55,9 +53,7 @@ stty -F "$port" raw -echo
 cat <&"$bus" >"$folder/answers" 2>/dev/null &
 
 # The first line shows that it runs; QEMU sees the open port after a second, and then another comes.
-for _ in 1 2 3; do
-    read -r -t 20 -u "$lines" line || { echo "the firmware prints nothing" >&2; exit 1; }
-done
+for _ in 1 2 3; do read -r -t 20 -u "$lines" line; done
 answered() { od -An -v -tx1 "$folder/answers" | tr -d ' \n' | { grep -o "$answer" || true; } | wc -l; }
 have=0
 # A request delayed too long by this machine does not count, so up to twice as many are sent.
@@ -75,7 +71,4 @@ done
 [ "$have" -ge "$count" ] || { echo "$have of $i requests were answered" >&2; exit 1; }
 kill -KILL "$qemu"
 wait "$counter"
-sort -n "$folder/counts" | awk '
-    { all[NR] = $1 }
-    END { if (!NR) exit 1; print all[1], all[int((NR + 1) / 2)], all[NR] }
-' || { echo "nothing was counted" >&2; exit 1; }
+sort -n "$folder/counts" | awk '{ all[NR] = $1 } END { print all[1], all[int((NR + 1) / 2)], all[NR]; exit !NR }'

@@ -1,38 +1,26 @@
 #!/usr/bin/env bash
-# Runs firmware in QEMU.
+# Runs firmware in QEMU. PROGRAM is ikeya_slave, ikeya_master or ucp_robot.
 #
 #   examples/firmware/run.sh PROGRAM                 runs until Ctrl-C; prints the port and the text
 #   examples/firmware/run.sh PROGRAM -- COMMAND ...  runs while COMMAND does; replaces PORT in it
 #   examples/firmware/run.sh --build PROGRAM ...     only builds; prints the image paths
 #
-# PROGRAM is ikeya_slave, ikeya_master or ucp_robot. To turn a motor in one command:
-#
-#   examples/firmware/run.sh ikeya_slave -- cargo run -p axle -- spin --port PORT --node 1 --rps 2
-#
 # The port is a pseudo-terminal; its speed does not matter. Lines from the firmware begin with
 # "firmware: ". The compiler and QEMU come from Debian if they are missing.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-
-usage() { sed -n '2,14s/^# \?//p' "$0" >&2; exit 2; }
+usage() { sed -n '2,6s/^# \?//p' "$0" >&2; exit 2; }
 
 # In a subshell: variables set by the build must not reach the command.
 build() (
     cd "$here"
     . ./toolchain.sh
-    local program bins=()
-    for program in "$@"; do bins+=(--bin "$program"); done
-    "${cargo[@]}" --quiet --locked --release --features board "${bins[@]}" >&2
-    for program in "$@"; do echo "$out/$target/release/$program"; done
+    "${cargo[@]}" --quiet --locked --release --features board $(printf -- '--bin %s ' "$@") >&2
+    printf "$out/$target/release/%s\n" "$@"
 )
 
 case ${1:-} in
---build)
-    shift
-    [ $# -gt 0 ] || usage
-    build "$@"
-    exit
-    ;;
+--build) [ $# -gt 1 ] || usage; shift; build "$@"; exit ;;
 ikeya_slave | ikeya_master | ucp_robot) program=$1 ;;
 *) usage ;;
 esac

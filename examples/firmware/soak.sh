@@ -10,19 +10,15 @@
 # explain every request without its answer.
 set -euo pipefail
 cd "$(dirname "$0")"
-minutes=${1:-2}
-seconds=$(awk -v m="$minutes" 'BEGIN { if (m !~ /^[0-9.]+$/ || m <= 0) exit 1; printf "%d", m * 60 }') ||
-    { sed -n '5p' "$0" >&2; exit 2; }
-
-./run.sh --build soak_master ikeya_slave >/dev/null
-images=$(dirname "$(./run.sh --build ikeya_slave)")
+seconds=$((60 * ${1:-2}))
+images=$(dirname "$(./run.sh --build soak_master ikeya_slave | head -1)")
 folder=$(mktemp -d)
 ids=
 # With KILL, because QEMU prints a message for other signals.
 trap 'for id in $ids; do kill -KILL "$id"; done 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 
-# board NAME IMAGE LINE: runs it; its text goes to NAME.text, and a byte into NAME.ask asks for it.
+# board NAME IMAGE LINE: runs it; its text goes to NAME.text, and a byte into NAME.in asks for it.
 board() {
     mkfifo "$folder/$1.in" "$folder/$1.out"
     cat "$folder/$1.out" >"$folder/$1.text" &
@@ -51,11 +47,6 @@ exec {ask_slave}>"$folder/slave.in" {ask_master}>"$folder/master.in"
 ) >"$folder/late" &
 ids="$ids $!"
 
-# last NAME: the last whole line of a role.
-last() { grep -a "^\(master\|slave\) .* ms [0-9]*.$" "$folder/$1.text" | tail -1 | tr -d '\r'; }
-# value NAME COUNT: the number after this word in the line that was kept.
-value() { awk -v n="$2" '{ for (i = 1; i < NF; i++) if ($i == n) print $(i + 1) }' "$folder/$1.last"; }
-
 sleep "$seconds"
 for id in "${pids[@]}"; do
     kill -0 "$id" 2>/dev/null || { echo "QEMU has ended: $(cat "$folder"/*.errors)" >&2; exit 1; }
@@ -64,55 +55,42 @@ done
 printf '?' >&"$ask_master"
 printf '?' >&"$ask_slave"
 sleep 0.3
-last master >"$folder/master.last"
-last slave >"$folder/slave.last"
 
-m_reads=$(value master reads) m_writes=$(value master writes) m_ms=$(value master ms)
-requests=$(value master requests) replies=$(value master replies) strikes=$(value master strikes)
-exchanges=$(value master exchanges) abnormal=$(value master abnormal)
-s_reads=$(value slave reads) s_writes=$(value slave writes) answers=$(value slave replies)
-overtaken=$(value slave overtaken) expired=$(value slave expired) foreign=$(value slave foreign)
+# The counts of the last whole line of each role, as variables: m_reads, s_reads and so on.
+for role in master slave; do
+    eval "$(grep -a "^$role .* ms [0-9]*.$" "$folder/$role.text" | tail -1 | tr -d '\r' |
+        awk -v role="${role:0:1}" '{ for (i = 2; i < NF; i += 2) print role "_" $i "=" $(i + 1) }')"
+done
 late=$(sort -n "$folder/late" | tail -1)
-awk -v n="$replies" -v ms="$m_ms" -v s="$strikes" -v late="$late" 'BEGIN {
-    rate = n * 1000 / ms
-    printf "%d exchanges in %.1f minutes, %.0f a second; %d strikes; ten million would take %.0f minutes; ", n, ms / 60000, rate, s, 1e7 / rate / 60
+awk -v n="$m_replies" -v ms="$m_ms" -v s="$m_strikes" -v late="$late" 'BEGIN {
+    printf "%d exchanges in %.1f minutes, %.0f a second; %d strikes; ", n, ms / 60000, n * 1000 / ms, s
     printf "a nap beside them was late by up to %d ms\n", late
 }'
-echo "master: $m_reads READ, $m_writes WRITE, $requests requests, $replies answers, $strikes strikes, $abnormal times abnormal"
-echo "slave:  $s_reads READ, $s_writes WRITE, $answers answers, $overtaken overtaken, $expired expired"
 
 failed=0
-check() { local what=$1; shift; [ "$@" ] || { echo "FAILED: $what ($*)" >&2; failed=1; }; }
+# check WHAT CONDITION: an arithmetic expression.
+check() { (($2)) || { echo "FAILED: $1 ($2)" >&2; failed=1; }; }
 # Both lines are from about the same moment: half a second apart on a busy machine.
-near() { local apart=$(($2 - $3)); check "$1" "${apart#-}" -le $((50 + replies * 500 / m_ms)); }
-check "hardly anything was said" "$replies" -ge $((seconds * 20))
-check "the requests of the master" $((requests - replies - strikes)) -ge 0
-check "the requests of the master" $((requests - replies - strikes)) -le 1
-check "readings that were not told" "$exchanges" = "$replies"
-check "the READs of the master" "$m_reads" = "$requests"
-check "the requests of the slave" $((s_reads - answers - overtaken - expired)) -ge 0
-check "the requests of the slave" $((s_reads - answers - overtaken - expired)) -le 1
-check "no node but this one" "$foreign" = 0
+apart=$((50 + m_replies * 500 / m_ms))
+near() { check "$1" "$2 - $3 <= $apart && $3 - $2 <= $apart"; }
+unanswered=$((m_requests - m_replies - m_strikes)) unsaid=$((s_reads - s_replies - s_overtaken - s_expired))
+# The master sends WRITE and READ in turn, so that one that is lost shows at any moment.
+unheard=$((m_writes - m_reads - s_writes + s_reads))
+check "hardly anything was said" "$m_replies >= $seconds * 20"
+check "the requests of the master" "$unanswered == 0 || $unanswered == 1"
+check "readings that were not told" "$m_exchanges == $m_replies"
+check "the READs of the master" "$m_reads == $m_requests"
+check "the requests of the slave" "$unsaid == 0 || $unsaid == 1"
+check "no node but this one" "$s_foreign == 0"
 near "READs sent and heard" "$m_reads" "$s_reads"
-# The master sends them in turn, so that one that is lost shows at any moment.
-unheard=$((m_writes - m_reads - (s_writes - s_reads)))
-check "WRITEs sent and heard" "${unheard#-}" -le 1
-near "answers sent and heard" "$replies" "$answers"
-for board in master slave; do
-    for name in overruns lost damaged; do
-        check "$name of the $board" "$(value $board $name)" = 0
-    done
-done
-check "bytes outside packets at the slave" "$(value slave skipped)" = 0
-check "events that were not told" "$(value master lost_events)" = 0
+check "WRITEs sent and heard" "-1 <= $unheard && $unheard <= 1"
+near "answers sent and heard" "$m_replies" "$s_replies"
+check "bytes that the master lost" "$m_overruns + $m_lost + $m_damaged + $m_lost_events == 0"
+check "bytes that the slave lost" "$s_overruns + $s_lost + $s_damaged + $s_skipped == 0"
 # Of an answer that a halt has cut in two, the rest comes too late.
-for name in late early crc_errors; do
-    check "$name of the master" "$(value master $name)" -le "$strikes"
-done
-for name in skipped stale; do
-    check "$name of the master" "$(value master $name)" -le $((8 * strikes))
-done
-check "every byte is in a frame" "$(value master received)" -le $(($(value master framed) + 8))
+check "bad answers" "$m_late <= $m_strikes && $m_early <= $m_strikes && $m_crc_errors <= $m_strikes"
+check "bytes outside packets" "$m_skipped <= 8 * $m_strikes && $m_stale <= 8 * $m_strikes"
+check "every byte is in a frame" "$m_received <= $m_framed + 8"
 # 100 ms without an answer.
-[ "$strikes" = 0 ] || check "strikes on a machine that was not busy" "$late" -ge 50
+check "strikes on a machine that was not busy" "$m_strikes == 0 || $late >= 50"
 exit $failed

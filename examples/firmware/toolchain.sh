@@ -5,15 +5,13 @@
 #
 # Sets `out` to the target folder, `target` to the target's name, `cargo` to the build command, and
 # `compiler` to its name and version.
-
 target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}
 export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
 
 need() { bash ../../.ci/need "$@" || exit 77; }
 
-# What the caller's build has set is not meant for this one: its flags, its compiler and the path of
-# that compiler's libraries, or a wrapper that measures coverage.
+# Flags, compiler, libraries and wrappers of the caller's build are not meant for this one.
 for name in $(compgen -e | grep -E '^(RUSTC|RUSTFLAGS|RUSTDOC|CARGO_(BUILD|ENCODED|LLVM|PROFILE)_|LLVM_PROFILE|__CARGO)'); do
     unset "$name"
 done
@@ -29,3 +27,11 @@ else
     cargo=("$(dpkg -L cargo-web | grep -m1 'bin/cargo$')" build -Zbuild-std=core)
     compiler=$("$RUSTC" --version)
 fi
+
+# Number of bytes in the sections of image $1 whose names match $2. Fails if there is none.
+bytes() {
+    local sizes
+    sizes=$(readelf -SW "$1" | sed 's/^ *\[ *[0-9]*\] *//' | awk -v s="^($2)\$" '$1 ~ s { print "+ 0x" $5 }')
+    [ -n "$sizes" ] || { echo "no section of $1 matches $2" >&2; return 1; }
+    echo $((0 $sizes))
+}
