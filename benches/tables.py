@@ -106,7 +106,7 @@ def main():
 
         def replaced(found):
             used.append(found[1])
-            return f"<!-- figures:{found[1]} -->\n\n{filled(found[2], figures[found[1]])}\n\n<!-- end -->"
+            return f"<!-- figures:{found[1]} -->\n{filled(found[2], figures[found[1]])}\n<!-- end -->"
 
         new = re.sub(r"<!-- figures:([\w-]+) -->\n(.*?)<!-- end -->", replaced, text, flags=re.DOTALL)
         (ROOT / name).write_text(new)
