@@ -135,7 +135,7 @@ ROVER = [
         ({"front": 1}, "front led 1, neither 0 nor 100 (U7)"))),
     (TX, 300, ucp(10, b"\4")), (TX, 300, ucp(10, b"\5"), "state 5 is unknown (U8)"),
     (TX, 300, ucp(10, b"\x09\0\0\0"), "state 9 is unknown (U8)"),
-    (TX, 300, ucp(9, b"\xff\xff")),
+    (TX, 300, ucp(9, b"\xd9\xff")),
     (TX, 300, ucp(9, b"\x27\0"), START % 39, "ota_request: no answer"),
     (TX, 300, ucp(2, bytes(17))), (TX, 300, ucp(10, bytes(1))), (TX, 300, ucp(0x20, b"\1\2")),
 ]
