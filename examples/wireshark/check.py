@@ -261,8 +261,11 @@ class Comparison:
 
     def story(self, user, path, shown):
         """The texts, response times and warnings that are written by hand."""
-        lines = user.tshark(path, "-T", "fields", "-e", "_ws.col.Info").decode().splitlines()
-        told = [packet for _, packets in STORY.values() for packet in packets]
+        lines = user.tshark(path, "-T", "fields", "-e", "_ws.col.Info", "-e", "_ws.col.Protocol")
+        lines = lines.decode().splitlines()
+        told = [(*packet[:3], f"{packet[3]}\t{'UCP' if protocol == 'ucp' else 'Ikeya MD'}",
+                 *packet[4:]) for (protocol, _), (_, packets) in STORY.items()
+                for packet in packets]
         for number, (packet, line) in enumerate(zip(told, lines, strict=True), 1):
             _, _, _, text, *warnings = packet
             found = set().union(*(it.warnings for it in shown if it.packet == number))
