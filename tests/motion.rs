@@ -7,9 +7,6 @@
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
-/// Drivers whose ports fail.
-#[path = "motion/failing_ports.rs"]
-mod failing_ports;
 /// The host of a rover.
 #[cfg(feature = "ucp")]
 #[path = "motion/host.rs"]
@@ -37,6 +34,3 @@ mod slave;
 /// The master of three-motor boards.
 #[path = "motion/three_motors.rs"]
 mod three_motors;
-#[path = "harness/virtual_time.rs"]
-#[allow(dead_code, reason = "drivers.rs uses more of it")]
-mod virtual_time;

@@ -18,10 +18,7 @@ use axlewire::{
     },
 };
 
-use crate::{
-    port::{Script, Step},
-    virtual_time::{End, VirtualClock, World},
-};
+use crate::port::{Port, Step, World};
 
 // The calls under test.
 
@@ -32,10 +29,10 @@ fn host<S: BiasStore>(store: S, now: Instant) -> Host<S> {
 }
 
 /// A host behind a driver whose port is controlled by the test.
-fn scripted() -> (World, Driver<Host, Script, VirtualClock>) {
+fn scripted() -> (World, Driver<Host, Port, World>) {
     let world = World::default();
-    let clock = VirtualClock(world.clone());
-    (world.clone(), Driver::new(host(NoStore, world.now()), Script::default(), clock))
+    let port = Port::new(&world, 0);
+    (world.clone(), Driver::new(host(NoStore, world.now()), port, world))
 }
 
 // What the far end sends and receives.
@@ -176,8 +173,8 @@ fn the_biases_that_are_sent_are_those_in_the_store() {
 fn the_answer_to_a_start_is_not_taken_for_the_answer_to_an_end() {
     for is_async in [false, true] {
         let (world, kind) = (World::default(), CalibrationKind::Imu);
-        let (near, mut far) = End::pair(&world, 87);
-        let clock = VirtualClock(world.clone());
+        let (near, mut far) = Port::pair(&world, 87);
+        let clock = world.clone();
         let mut rover = Driver::new(host(NoStore, world.now()), near, clock);
         let deadline = world.now() + Duration::from_millis(10);
         let started = rover.start_calibration(kind, deadline);
@@ -201,9 +198,9 @@ fn the_answer_to_a_start_is_not_taken_for_the_answer_to_an_end() {
 #[test]
 fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
     let world = World::default();
-    let (near, far) = End::pair(&world, 87);
+    let (near, far) = Port::pair(&world, 87);
     let robot = Robot::new(RobotConfig::default(), world.now());
-    let robot = Rc::new(RefCell::new(Driver::new(robot, far, VirtualClock(world.clone()))));
+    let robot = Rc::new(RefCell::new(Driver::new(robot, far, world.clone())));
     let time = world.clone();
     world.add(move || {
         // The heading encodes the measurement time, in hundredths of a second.
@@ -213,7 +210,7 @@ fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
         robot.role_mut().set_telemetry(&telemetry, time.now());
         robot.service().unwrap();
     });
-    let clock = VirtualClock(world.clone());
+    let clock = world.clone();
     let mut rover = Driver::new(host(NoStore, world.now()), near, clock);
     let mut age_ms = 0;
     for _ in 0..40 {

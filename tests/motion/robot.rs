@@ -15,7 +15,7 @@ use axlewire::{
 };
 use embedded_io::Write;
 
-use crate::virtual_time::{End, VirtualClock, World};
+use crate::port::{Port, World};
 
 // The calls under test.
 
@@ -51,10 +51,10 @@ fn events(robot: &mut Robot) -> Vec<RobotEvent> {
 
 /// A robot whose application drives at 50 and was then held up for 400 ms, during which twenty
 /// commands arrived, then this one.
-fn held_up(last: i16) -> (World, Driver<Robot, End, VirtualClock>, End) {
+fn held_up(last: i16) -> (World, Driver<Robot, Port, World>, Port) {
     let world = World::default();
-    let (near, mut far) = End::pair(&world, 87);
-    let mut robot = Driver::new(robot(world.now()), near, VirtualClock(world.clone()));
+    let (near, mut far) = Port::pair(&world, 87);
+    let mut robot = Driver::new(robot(world.now()), near, world.clone());
     far.write(&go(50)).unwrap();
     let command = robot.next_command(ms(100)).unwrap();
     assert_eq!(command.map(|command| command.speed()), Some(50));

@@ -3,8 +3,8 @@
 mod captures;
 mod checksum;
 mod drive;
+mod fault;
 mod frame_io;
-mod port;
 mod roles;
 mod roundtrip;
 mod session;
@@ -24,6 +24,9 @@ mod known_framings;
 #[path = "../../../tests/harness/oracle.rs"]
 #[allow(dead_code, reason = "tests/stream uses more of it")]
 mod oracle;
+#[path = "../../../tests/harness/port.rs"]
+#[allow(dead_code, reason = "tests/drive uses more of it")]
+mod port;
 
 /// What a body has really done, so that a hollow one is found.
 #[derive(Clone, Copy, Debug, Default)]

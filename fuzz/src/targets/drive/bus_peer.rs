@@ -28,9 +28,15 @@ pub(super) struct Nodes {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bus(pub(super) Rc<RefCell<Nodes>>);
 
-impl Peer for Bus {
+impl Bus {
+    /// It, as the peer of a port.
+    pub(super) fn peer(&self) -> Option<Peer> {
+        let far = self.clone();
+        Some(Box::new(move |byte, at_us| far.hear(byte, at_us)))
+    }
+
     /// Finds requests as a receiver on a UART does: a pause ends a packet.
-    fn hear(&mut self, byte: u8, at_us: u64) -> Vec<(u64, u8)> {
+    fn hear(&self, byte: u8, at_us: u64) -> Vec<(u64, u8)> {
         let mut nodes = self.0.borrow_mut();
         if at_us - nodes.last_us > 120 {
             nodes.tail.clear();

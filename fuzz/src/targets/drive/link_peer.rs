@@ -51,8 +51,14 @@ impl Far {
     }
 }
 
-impl Peer for Link {
-    fn hear(&mut self, byte: u8, at_us: u64) -> Vec<(u64, u8)> {
+impl Link {
+    /// It, as the peer of a port.
+    pub(super) fn peer(&self) -> Option<Peer> {
+        let far = self.clone();
+        Some(Box::new(move |byte, at_us| far.hear(byte, at_us)))
+    }
+
+    fn hear(&self, byte: u8, at_us: u64) -> Vec<(u64, u8)> {
         let mut far = self.0.borrow_mut();
         let Some(heard) = far.next(byte, at_us) else { return Vec::new() };
         far.heard.push((at_us, heard.clone()));

@@ -10,4 +10,4 @@ mod rig;
 pub(super) use bus::bus;
 pub(super) use link::link;
 
-use super::{Tally, oracle, port};
+use super::{Tally, fault, oracle, port};

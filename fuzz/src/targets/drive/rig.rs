@@ -1,5 +1,7 @@
 //! What all drivers have in common: their ports, the account of a call, and its bounds.
 
+use std::rc::Rc;
+
 use arbitrary::Arbitrary;
 use axlewire::{
     drive::{DriveError, Driver, Rs485},
@@ -7,7 +9,10 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use super::port::{Call, Fault, Peer, Port};
+use super::{
+    fault::{Call, Fault, Pin},
+    port::{Offer, Peer, Port, World},
+};
 
 /// Calls of the port after which a life ends: a fuzzer learns more from many short ones.
 pub(super) const ENOUGH: u64 = 10_000;
@@ -20,9 +25,9 @@ pub(super) struct How {
 }
 
 impl How {
-    pub(super) fn polls(self) -> Option<u8> {
+    pub(super) fn polls(self) -> Option<usize> {
         // A future that was never polled has done nothing, and is no call.
-        self.polls.map(|polls| 1 + polls % 32)
+        self.polls.map(|polls| usize::from(1 + polls % 32))
     }
 }
 
@@ -36,24 +41,36 @@ pub(super) trait Wired:
 {
     const HAS_PIN: bool;
 
-    fn plug(port: &Port) -> Self;
+    fn plug(port: Port, pin: &Pin) -> Self;
+    fn port(&mut self) -> &mut Port;
 }
 
 impl Wired for Port {
     const HAS_PIN: bool = false;
 
-    fn plug(port: &Port) -> Self {
-        port.clone()
+    fn plug(port: Port, _: &Pin) -> Self {
+        port
+    }
+
+    fn port(&mut self) -> &mut Port {
+        self
     }
 }
 
-impl Wired for Rs485<Port, Port, Port> {
+/// A port with a pin.
+pub(super) type Pinned = Rs485<Port, Pin, World>;
+
+impl Wired for Pinned {
     const HAS_PIN: bool = true;
 
-    fn plug(port: &Port) -> Self {
+    fn plug(port: Port, pin: &Pin) -> Self {
         let [before, after] = [30, 10].map(Duration::from_micros);
-        Self::with_delays(port.clone(), port.clone(), port.clone(), before, after)
-            .expect("a pin that works")
+        let delay = port.world.clone();
+        Self::with_delays(port, pin.clone(), delay, before, after).expect("a pin that works")
+    }
+
+    fn port(&mut self) -> &mut Port {
+        self.port_mut()
     }
 }
 
@@ -73,8 +90,9 @@ pub(super) struct Before {
 }
 
 pub(super) struct Rig<R, P> {
-    pub(super) port: Port,
-    pub(super) driver: Driver<R, P, Port>,
+    pub(super) world: World,
+    pub(super) driver: Driver<R, P, World>,
+    pin: Pin,
     /// The frame that has been begun and not ended.
     open: Vec<u8>,
 }
@@ -83,42 +101,70 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
     pub(super) fn new(
         begin_us: u64,
         byte_us: u64,
-        peer: impl Peer + 'static,
+        peer: Option<Peer>,
         role: impl FnOnce(Instant) -> R,
     ) -> Self {
-        let port = Port::new(begin_us, byte_us, peer);
-        let driver = Driver::with(role, P::plug(&port), port.clone());
-        Self { port, driver, open: Vec::new() }
+        let world = World::starting_at(begin_us);
+        let port = Port { drains: true, peer, ..Port::new(&world, byte_us) };
+        let pin = Pin { world: world.clone(), state: Rc::default() };
+        let driver = Driver::with(role, P::plug(port, &pin), world.clone());
+        Self { world, driver, pin, open: Vec::new() }
     }
 
-    pub(super) fn fault(&self, call: Call, fault: Fault) {
-        self.port.fault(call, fault);
+    pub(super) fn port(&mut self) -> &mut Port {
+        self.driver.port_mut().port()
+    }
+
+    pub(super) fn fault(&mut self, call: Call, fault: Fault) {
+        match call {
+            Call::Read => self.port().reads.push_back(fault.step()),
+            Call::Write => self.port().writes.push_back(fault.step()),
+            Call::Flush => self.port().flushes.push_back(fault.step()),
+            Call::Pin => self.pin.state.borrow_mut().1.push_back(fault == Fault::Error),
+        }
+    }
+
+    pub(super) fn heal(&mut self) {
+        let port = self.port();
+        for steps in [&mut port.reads, &mut port.writes, &mut port.flushes] {
+            steps.clear();
+        }
+        self.pin.state.borrow_mut().1.clear();
     }
 
     /// When the last of the bytes under way arrives.
     pub(super) fn last_arrival(&mut self) -> Instant {
-        self.driver.now() + Duration::from_micros(self.port.under_way_us() as u32)
+        let under_way_us = self.port().last_arrival_us().saturating_sub(self.world.now_us());
+        self.driver.now() + Duration::from_micros(under_way_us as u32)
     }
 
-    pub(super) fn begin(&self) -> Before {
-        let world = self.port.world();
+    /// Number of faults that are still to come.
+    fn faults(&mut self) -> usize {
+        let pin = self.pin.state.borrow().1.len();
+        let port = self.port();
+        port.reads.len() + port.writes.len() + port.flushes.len() + pin
+    }
+
+    pub(super) fn begin(&mut self) -> Before {
+        let (world, faults) = (self.world.clone(), self.faults());
+        let port = self.port();
         Before {
-            now_us: world.now_us,
-            taken: world.taken.len(),
-            offers: world.offers.len(),
-            calls: world.calls,
-            given: world.given,
-            flushes: world.flushes,
-            idles: world.idles,
-            stalled_us: world.stalled_us,
-            backlog_us: world.backlog_us(),
-            faults: world.faults(),
+            now_us: world.now_us(),
+            taken: port.written.len(),
+            offers: port.offers.len(),
+            calls: world.calls(),
+            given: port.given,
+            flushes: port.flush_calls,
+            idles: world.naps(),
+            stalled_us: port.stalled_us,
+            backlog_us: port.free_us.saturating_sub(world.now_us()),
+            faults,
         }
     }
 
     /// Whether no fault is planned, so that nothing excuses a failure.
-    pub(super) fn is_clean(&self) -> bool {
-        self.port.world().faults() == 0
+    pub(super) fn is_clean(&mut self) -> bool {
+        self.faults() == 0
     }
 
     /// Bounds of any call: of its work, and of its time, which is given without stalls and without
@@ -129,36 +175,35 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         longest: Duration,
         result: Option<&Result<T, DriveError<E>>>,
     ) {
-        {
-            let world = self.port.world();
-            let offers = (world.offers.len() - before.offers) as u64;
-            let faults = before.faults.saturating_sub(world.faults()) as u64;
-            let (idles, flushes) = (world.idles - before.idles, world.flushes - before.flushes);
-            let elapsed = world.now_us - before.now_us;
-            let moved = world.given - before.given + offers + flushes + idles + faults;
-            let calls = world.calls - before.calls;
-            // A round for each of up to 16 events that wait, even if nothing moves.
-            assert!(calls <= 200 + 30 * moved, "{calls} calls of the port to move {moved}");
-            // A driver that spins takes a step of a microsecond each time.
-            let most =
-                200 + elapsed / 10 + 4 * (world.given - before.given) + 4 * offers + 4 * faults;
-            assert!(idles <= most, "{idles} naps in {elapsed} us: it spins");
-            let stalled = world.stalled_us - before.stalled_us;
-            // A frame on the line, and a second for a port that an async call gives up.
-            let slack = 20_000 + 1_100_000 * faults.min(20);
-            let limit = u64::from(longest.as_micros()) + before.backlog_us + stalled + slack;
-            assert!(elapsed <= limit, "it took {elapsed} us instead of {limit}");
-            if let Some(Ok(_)) = result {
-                assert!(!P::HAS_PIN || !world.pin, "the driver-enable pin stays on");
-            }
+        let (world, faults, is_on) =
+            (self.world.clone(), self.faults() as u64, self.pin.state.borrow().0);
+        let port = self.port();
+        let offers = (port.offers.len() - before.offers) as u64;
+        let faults = (before.faults as u64).saturating_sub(faults);
+        let (idles, flushes) = (world.naps() - before.idles, port.flush_calls - before.flushes);
+        let (elapsed, given) = (world.now_us() - before.now_us, port.given - before.given);
+        let moved = given + offers + flushes + idles + faults;
+        let calls = world.calls() - before.calls;
+        // A round for each of up to 16 events that wait, even if nothing moves.
+        assert!(calls <= 200 + 30 * moved, "{calls} calls of the port to move {moved}");
+        // A driver that spins takes a step of a microsecond each time.
+        let most = 200 + elapsed / 10 + 4 * given + 4 * offers + 4 * faults;
+        assert!(idles <= most, "{idles} naps in {elapsed} us: it spins");
+        let stalled = port.stalled_us - before.stalled_us;
+        // A frame on the line, and a second for a port that an async call gives up.
+        let slack = 20_000 + 1_100_000 * faults.min(20);
+        let limit = u64::from(longest.as_micros()) + before.backlog_us + stalled + slack;
+        assert!(elapsed <= limit, "it took {elapsed} us instead of {limit}");
+        if let Some(Ok(_)) = result {
+            assert!(!P::HAS_PIN || !is_on, "the driver-enable pin stays on");
         }
         self.check_offers(before);
     }
 
     /// A write offers a whole frame, or exactly the rest of the one that has begun.
     fn check_offers(&mut self, before: &Before) {
-        let world = self.port.world();
-        for (bytes, taken) in &world.offers[before.offers..] {
+        let port = self.driver.port_mut().port();
+        for Offer { bytes, taken, .. } in &port.offers[before.offers..] {
             let is_rest = !self.open.is_empty() && *bytes == self.open;
             assert!(is_rest || is_frame(bytes), "offered {bytes:02x?}, rest {:02x?}", self.open);
             self.open = bytes[*taken..].to_vec();
@@ -184,10 +229,7 @@ fn is_frame(bytes: &[u8]) -> bool {
 macro_rules! call {
     ($rig:expr, $how:expr, $name:ident, $name_async:ident ($($argument:expr),*)) => {
         match $how.is_async {
-            true => {
-                let port = $rig.port.clone();
-                port.block_on($how.polls(), $rig.driver.$name_async($($argument),*))
-            }
+            true => $rig.world.run($how.polls(), $rig.driver.$name_async($($argument),*)),
             false => Some($rig.driver.$name($($argument),*)),
         }
     };

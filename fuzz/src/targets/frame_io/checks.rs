@@ -7,15 +7,15 @@ use super::{
 
 impl<F: Known, const N: usize> Life<F, N> {
     /// What has left and what is unsent is what was promised, in order.
-    pub(super) fn check(&self) {
-        let world = self.port.world();
-        let (taken, rest) = (&world.taken, self.writer.unsent());
+    pub(super) fn check(&mut self) {
+        let given = self.reader.port_mut().given;
+        let (taken, rest) = (self.writer.port_mut().written.clone(), self.writer.unsent());
         assert_eq!(taken.len() + rest.len(), self.promised.len());
         assert_eq!(self.promised[..taken.len()], taken[..]);
         assert_eq!(self.promised[taken.len()..], *rest);
         let counters = self.reader.decoder().counters();
         let booked = counters.framed + counters.skipped() + self.reader.pending() as u64;
-        assert_eq!((counters.received, booked), (world.given, world.given));
+        assert_eq!((counters.received, booked), (given, given));
     }
 
     /// The same frames and gaps as the oracle's.

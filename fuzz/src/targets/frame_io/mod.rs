@@ -15,9 +15,10 @@ use axlewire::{
 
 use super::{
     Tally,
+    fault::{Call, Fault},
     known_framings::Known,
     oracle,
-    port::{Call, Fault, Peer, Port},
+    port::{Empty, Port, Step, World},
     streams::Repair,
 };
 
@@ -27,11 +28,11 @@ struct Plan<'a> {
     is_file: bool,
     repair: u8,
     bytes: &'a [u8],
-    steps: Vec<Step>,
+    steps: Vec<Action>,
 }
 
 #[derive(Arbitrary, Debug)]
-struct Step {
+struct Action {
     what: What,
     /// Async; dropped after this many polls.
     is_async: bool,
@@ -50,15 +51,6 @@ enum What {
     Discard,
 }
 
-/// Nobody answers.
-pub(super) struct Nobody;
-
-impl Peer for Nobody {
-    fn hear(&mut self, _: u8, _: u64) -> Vec<(u64, u8)> {
-        Vec::new()
-    }
-}
-
 pub(super) fn frame_io(data: &[u8], tally: &mut Tally) {
     let _ = play(&mut Unstructured::new(data), tally);
 }
@@ -73,7 +65,7 @@ fn play(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
 }
 
 struct Life<F, const N: usize> {
-    port: Port,
+    world: World,
     reader: FrameReader<Port, F, N>,
     writer: FrameWriter<Port, 70>,
     /// Bytes that the line brings.
@@ -87,14 +79,14 @@ struct Life<F, const N: usize> {
 fn run<F: Known, const N: usize>(plan: &Plan<'_>, tally: &mut Tally) {
     let mut stream = plan.bytes.to_vec();
     Repair::of(plan.repair).repair::<F>(&mut stream);
-    let port = Port::new(0, 20, Nobody);
-    port.receive(&stream);
-    port.world().is_file = plan.is_file;
-    port.world().is_short = true;
+    let world = World::default();
+    let mut reading = Port::new(&world, 20);
+    reading.receive(&stream);
+    reading.empty = if plan.is_file { Empty::Ends } else { Empty::Fails };
     let mut life = Life::<F, N> {
-        reader: FrameReader::new(port.clone()),
-        writer: FrameWriter::new(port.clone()),
-        port,
+        reader: FrameReader::new(reading),
+        writer: FrameWriter::new(Port { drains: true, ..Port::new(&world, 20) }),
+        world,
         stream,
         events: Vec::new(),
         idles: Vec::new(),
@@ -106,20 +98,23 @@ fn run<F: Known, const N: usize>(plan: &Plan<'_>, tally: &mut Tally) {
         tally.did(kind);
     }
     // The rest arrives and leaves.
-    life.port.heal();
-    life.port.world().is_file = true;
-    life.port.pass(1 << 20);
+    life.reader.port_mut().reads.clear();
+    life.reader.port_mut().empty = Empty::Ends;
+    life.writer.port_mut().writes.clear();
+    life.writer.port_mut().flushes.clear();
+    life.world.step(1 << 20);
     while life.read(false, None) {}
     assert_eq!(life.writer.flush(), Ok(()));
-    assert_eq!(life.port.world().taken.len(), life.promised.len());
+    assert_eq!(life.writer.port_mut().written.len(), life.promised.len());
     life.check();
     life.check_events();
     tally.did_many(12, life.events.len());
 }
 
 impl<F: Known, const N: usize> Life<F, N> {
-    fn perform(&mut self, step: &Step) -> u8 {
-        let polls = if step.is_async { step.polls.map(|polls| polls % 8) } else { None };
+    fn perform(&mut self, step: &Action) -> u8 {
+        let polls =
+            if step.is_async { step.polls.map(|polls| usize::from(polls % 8)) } else { None };
         match step.what {
             What::Read => {
                 self.read(step.is_async, polls);
@@ -129,16 +124,22 @@ impl<F: Known, const N: usize> Life<F, N> {
                 // The oracle counts a silence when all bytes before it have been judged.
                 self.drain();
                 self.reader.idle();
-                self.idles.push(self.port.world().given as usize);
+                self.idles.push(self.reader.port_mut().given as usize);
                 self.drain();
                 2
             }
             What::Fault(call, fault) => {
-                self.port.fault(call, fault);
+                let (reading, writing) = (self.reader.port_mut(), self.writer.port_mut());
+                match call {
+                    Call::Read => reading.reads.push_back(fault.step()),
+                    Call::Write => writing.writes.push_back(fault.step()),
+                    Call::Flush => writing.flushes.push_back(fault.step()),
+                    Call::Pin => {}
+                }
                 3
             }
             What::Pass(units) => {
-                self.port.pass(u64::from(units));
+                self.world.step(units.into());
                 4
             }
             What::Queue { len } => {
@@ -160,13 +161,13 @@ impl<F: Known, const N: usize> Life<F, N> {
             }
             What::Flush => {
                 let done = match step.is_async {
-                    true => self.port.clone().block_on(polls, self.writer.flush_async()),
+                    true => self.world.run(polls, self.writer.flush_async()),
                     false => Some(self.writer.flush()),
                 };
                 if done == Some(Ok(())) {
                     assert_eq!(self.writer.unsent(), []);
-                    let world = self.port.world();
-                    assert_eq!(world.flushed, world.taken.len());
+                    let port = self.writer.port_mut();
+                    assert_eq!(port.flushed_bytes, port.written.len());
                 }
                 10
             }
@@ -182,33 +183,44 @@ impl<F: Known, const N: usize> Life<F, N> {
 
     /// Takes out events without the port: it is made to fail.
     fn drain(&mut self) {
-        let before = self.port.world().given;
+        let before = self.reader.port_mut().given;
         loop {
-            self.port.world().fail_next_read();
+            self.fail_next_read();
             if !self.read(false, None) {
                 break;
             }
         }
-        self.port.world().forget_read_failure();
-        assert_eq!(self.port.world().given, before);
+        let port = self.reader.port_mut();
+        if let Some(Step::Error) = port.reads.front() {
+            port.reads.pop_front();
+        }
+        assert_eq!(port.given, before);
+    }
+
+    /// The next read fails, whatever was planned.
+    fn fail_next_read(&mut self) {
+        let port = self.reader.port_mut();
+        if !matches!(port.reads.front(), Some(Step::Error)) {
+            port.reads.push_front(Step::Error);
+        }
     }
 
     /// Returns whether there was an event.
-    fn read(&mut self, is_async: bool, polls: Option<u8>) -> bool {
-        let is_ready = self.port.world().is_readable();
+    fn read(&mut self, is_async: bool, polls: Option<usize>) -> bool {
+        let is_ready = self.reader.port_mut().is_readable();
         if !is_async && !is_ready && self.reader.pending() == 0 {
             // A blocking read would wait forever.
             return false;
         }
         if !is_async && !is_ready {
-            self.port.world().fail_next_read();
+            self.fail_next_read();
         }
         // An async read waits for the rest of a frame, perhaps forever.
         let polls = if is_async { polls.or(Some(8)) } else { polls };
-        let begun = self.port.world().calls;
+        let begun = self.world.calls();
         let found = {
             let event = match is_async {
-                true => self.port.clone().block_on(polls, self.reader.read_event_async()),
+                true => self.world.run(polls, self.reader.read_event_async()),
                 false => Some(self.reader.read_event()),
             };
             match event {
@@ -221,7 +233,7 @@ impl<F: Known, const N: usize> Life<F, N> {
             }
         };
         // At most a read for each byte, and one that gives nothing.
-        let calls = self.port.world().calls - begun;
+        let calls = self.world.calls() - begun;
         assert!(calls <= 2 * self.stream.len() as u64 + 16, "{calls} calls of the port");
         let Some((len, what)) = found else { return false };
         let counters = self.reader.decoder().counters();
@@ -237,14 +249,14 @@ impl<F: Known, const N: usize> Life<F, N> {
         true
     }
 
-    fn write(&mut self, frame: &impl Encode, bytes: &[u8], is_async: bool, polls: Option<u8>) {
+    fn write(&mut self, frame: &impl Encode, bytes: &[u8], is_async: bool, polls: Option<usize>) {
         let before = self.writer.unsent().len();
-        let taken = self.port.world().taken.len();
+        let taken = self.writer.port_mut().written.len();
         let done = match is_async {
-            true => self.port.clone().block_on(polls, self.writer.write_async(frame)),
+            true => self.world.run(polls, self.writer.write_async(frame)),
             false => Some(self.writer.write(frame)),
         };
-        let moved = self.port.world().taken.len() - taken;
+        let moved = self.writer.port_mut().written.len() - taken;
         let rest = self.writer.unsent().len();
         // It is queued only once all bytes before it have left.
         let is_queued = moved + rest > before;

@@ -35,15 +35,16 @@ where
 
     /// `Ok` means that the WRITE is on the line.
     pub(super) fn check_set<E>(
-        &self,
+        &mut self,
         done: Option<Result<(), DriveError<E>>>,
         write: &[u8],
         before: &Before,
     ) {
-        let world = self.rig.port.world();
         match done {
             Some(Ok(())) => {
-                let taken = &world.taken[before.taken.saturating_sub(write.len())..world.flushed];
+                let port = self.rig.port();
+                let begin = before.taken.saturating_sub(write.len());
+                let taken = &port.written[begin..port.flushed_bytes];
                 let is_out = taken.windows(write.len()).any(|window| window == write);
                 assert!(is_out, "Ok, but the set-point was not sent and flushed");
             }

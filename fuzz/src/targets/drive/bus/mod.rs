@@ -5,7 +5,6 @@ mod slave;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use axlewire::{
-    drive::Rs485,
     ikeya::{
         Master, NodeId, Position, Rps, WriteRequest,
         master::{MasterConfig, NodeSet, Polling},
@@ -16,8 +15,9 @@ use axlewire::{
 use super::{
     Tally,
     bus_peer::{Bus, Heard},
-    port::{Call, Fault, Port},
-    rig::{ENOUGH, How, Rig, Wired, call},
+    fault::{Call, Fault},
+    port::Port,
+    rig::{ENOUGH, How, Pinned, Rig, Wired, call},
 };
 
 #[derive(Arbitrary, Debug)]
@@ -61,7 +61,7 @@ pub(crate) fn bus(data: &[u8], tally: &mut Tally) {
 fn play(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
     let setup: Setup = u.arbitrary()?;
     match setup.has_pin {
-        true => with_port::<Rs485<Port, Port, Port>>(u, &setup, tally),
+        true => with_port::<Pinned>(u, &setup, tally),
         false => with_port::<Port>(u, &setup, tally),
     }
 }
@@ -86,11 +86,11 @@ where
         let is_there = |id: &NodeId| setup.is_there >> (id.get() - 1) & 1 == 1;
         config.nodes = NodeId::ALL.into_iter().filter(is_there).collect();
     }
-    let rig = Rig::new(begin_us, 20, peer.clone(), |now| Master::new(config, now));
+    let rig = Rig::new(begin_us, 20, peer.peer(), |now| Master::new(config, now));
     let mut life =
         BusLife::<P> { rig, peer, was_position: bits(setup.is_position), owed_from: [None; 8] };
     for _ in 0..40 {
-        if u.is_empty() || life.rig.port.world().calls > ENOUGH {
+        if u.is_empty() || life.rig.world.calls() > ENOUGH {
             break;
         }
         let (what, how) = (u.arbitrary()?, u.arbitrary()?);
@@ -225,15 +225,15 @@ where
                 12
             }
             Do::Heal => {
-                self.rig.port.heal();
+                self.rig.heal();
                 13
             }
             Do::Pass { units } => {
-                self.rig.port.pass(u64::from(units) * 16);
+                self.rig.world.step(u64::from(units) * 16);
                 14
             }
             Do::Noise { bytes } => {
-                self.rig.port.receive(&bytes);
+                self.rig.port().receive(&bytes);
                 15
             }
             Do::Switch { node, is_there, is_position } => {

@@ -8,7 +8,6 @@ use axlewire::{
 
 use super::{
     super::{
-        super::frame_io::Nobody,
         Tally,
         rig::{ENOUGH, How, Rig, Wired, call},
     },
@@ -27,20 +26,22 @@ where
     config.watchdog = Some(Duration::from_millis(50));
     let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
     let role = |now| -> Slave { Slave::new(NodeId::N1, mode, config, now) };
-    let mut rig = Rig::<Slave, P>::new(begin_us, 20, Nobody, role);
+    let mut rig = Rig::<Slave, P>::new(begin_us, 20, None, role);
     // When each WRITE arrived.
     let mut written: Vec<(Instant, WriteRequest)> = Vec::new();
     for _ in 0..40 {
-        if u.is_empty() || rig.port.world().calls > ENOUGH {
+        if u.is_empty() || rig.world.calls() > ENOUGH {
             break;
         }
         let (what, how): (Do, How) = (u.arbitrary()?, u.arbitrary()?);
         let before = rig.begin();
         match what {
-            Do::Request { node, rps: None } => rig.port.receive(ReadRequest::new(node).as_bytes()),
+            Do::Request { node, rps: None } => {
+                rig.port().receive(ReadRequest::new(node).as_bytes())
+            }
             Do::Request { node, rps: Some(to) } => {
                 let write = WriteRequest::velocity(node, rps(to));
-                rig.port.receive(write.as_bytes());
+                rig.port().receive(write.as_bytes());
                 let at = rig.last_arrival();
                 written.extend((node == NodeId::N1).then_some((at, write)));
             }
@@ -61,9 +62,9 @@ where
                 rig.driver.role_mut().set_position(Position::new(1, turns.into()));
             }
             Do::Fault { call, fault } => rig.fault(call, fault),
-            Do::Heal => rig.port.heal(),
-            Do::Pass { units } => rig.port.pass(u64::from(units) * 16),
-            Do::Noise { bytes } => rig.port.receive(&bytes[..1]),
+            Do::Heal => rig.heal(),
+            Do::Pass { units } => rig.world.step(u64::from(units) * 16),
+            Do::Noise { bytes } => rig.port().receive(&bytes[..1]),
             _ => continue,
         }
         let now = rig.driver.now();
@@ -75,7 +76,7 @@ where
             assert!(written.iter().rev().any(|it| is_recent(&it)), "{target:?} is out of date");
         }
         let counters = rig.driver.role().counters();
-        assert_eq!(counters.received, rig.port.world().given);
+        assert_eq!(counters.received, rig.port().given);
         tally.did(18);
     }
     tally.did(19);

@@ -4,7 +4,6 @@ mod robot;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use axlewire::{
-    drive::Rs485,
     time::Duration,
     ucp::{
         Host,
@@ -15,9 +14,10 @@ use axlewire::{
 
 use super::{
     Tally,
+    fault::{Call, Fault},
     link_peer::{Link, frame, motion},
-    port::{Call, Fault, Port},
-    rig::{ENOUGH, How, Rig, Wired, call},
+    port::Port,
+    rig::{ENOUGH, How, Pinned, Rig, Wired, call},
 };
 
 #[derive(Arbitrary, Debug)]
@@ -90,9 +90,9 @@ pub(crate) fn link(data: &[u8], tally: &mut Tally) {
 fn play(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
     let setup: Setup = u.arbitrary()?;
     match (setup.has_pin, setup.is_robot) {
-        (true, false) => host::<Rs485<Port, Port, Port>>(u, &setup, tally),
+        (true, false) => host::<Pinned>(u, &setup, tally),
         (false, false) => host::<Port>(u, &setup, tally),
-        (true, true) => robot::robot::<Rs485<Port, Port, Port>>(u, &setup, tally),
+        (true, true) => robot::robot::<Pinned>(u, &setup, tally),
         (false, true) => robot::robot::<Port>(u, &setup, tally),
     }
 }
@@ -110,10 +110,10 @@ where
     let config = if setup.is_direct { HostConfig::direct() } else { HostConfig::usb_adapter() };
     let peer = Link::default();
     let role = |now| Host::with_store(config, MemoryStore::default(), now);
-    let rig = Rig::new(begin_us(setup), 87, peer.clone(), role);
+    let rig = Rig::new(begin_us(setup), 87, peer.peer(), role);
     let mut life = HostLife::<P> { rig, peer, asked: vec![(0, 0)] };
     for _ in 0..40 {
-        if u.is_empty() || life.rig.port.world().calls > ENOUGH {
+        if u.is_empty() || life.rig.world.calls() > ENOUGH {
             break;
         }
         let (what, how) = (u.arbitrary()?, u.arbitrary()?);
@@ -229,15 +229,15 @@ where
                 10
             }
             Do::Heal => {
-                self.rig.port.heal();
+                self.rig.heal();
                 11
             }
             Do::Pass { units } => {
-                self.rig.port.pass(u64::from(units) * 64);
+                self.rig.world.step(u64::from(units) * 64);
                 12
             }
             Do::Noise { bytes } => {
-                self.rig.port.receive(&bytes);
+                self.rig.port().receive(&bytes);
                 13
             }
             Do::Mute { is_mute } => {
@@ -245,26 +245,26 @@ where
                 14
             }
             Do::Frame { speed, .. } => {
-                self.rig.port.receive(&frame(5, &[speed as u8; 36]));
+                self.rig.port().receive(&frame(5, &[speed as u8; 36]));
                 15
             }
             Do::Bias { is_imu } => {
                 let result = if is_imu { frame(6, &[1; 12]) } else { frame(7, &[2; 6]) };
-                self.rig.port.receive(&result);
+                self.rig.port().receive(&result);
                 16
             }
         }
     }
 
     /// `Ok` means that the last motor frame on the line is a stop, and flushed (U16).
-    fn check_stopped(&self) {
-        let world = self.rig.port.world();
-        let last = world.taken.windows(24).rev().find_map(|window| {
+    fn check_stopped(&mut self) {
+        let port = self.rig.port();
+        let last = port.written.windows(24).rev().find_map(|window| {
             let is_good = super::oracle::crc(&window[..22]).to_le_bytes() == window[22..];
             motion(window).filter(|_| window[..4] == [0xFD, 0xFF, 20, 0] && is_good)
         });
         assert_eq!(last, Some((0, 0)), "Ok, but the stop has not left");
-        assert_eq!(world.flushed, world.taken.len(), "Ok, but not flushed");
+        assert_eq!(port.flushed_bytes, port.written.len(), "Ok, but not flushed");
     }
 
     /// What the robot hears was asked for since the last stop, or is a stop.

@@ -33,11 +33,11 @@ where
     }
     let peer = Link::default();
     let mut rig =
-        Rig::<Robot, P>::new(begin_us(setup), 87, peer.clone(), |now| Robot::new(config, now));
+        Rig::<Robot, P>::new(begin_us(setup), 87, peer.peer(), |now| Robot::new(config, now));
     // When each motion arrived.
     let mut told: Vec<(Instant, (i16, i16))> = Vec::new();
     for _ in 0..40 {
-        if u.is_empty() || rig.port.world().calls > ENOUGH {
+        if u.is_empty() || rig.world.calls() > ENOUGH {
             break;
         }
         let (what, how): (Do, How) = (u.arbitrary()?, u.arbitrary()?);
@@ -47,7 +47,7 @@ where
                 let mut body = [0; 16];
                 body[..2].copy_from_slice(&i16::from(speed).to_le_bytes());
                 body[2..4].copy_from_slice(&i16::from(angular).to_le_bytes());
-                rig.port.receive(&frame(2, &body));
+                rig.port().receive(&frame(2, &body));
                 let motion =
                     (i16::from(speed).clamp(-100, 100), i16::from(angular).clamp(-100, 100));
                 told.push((rig.last_arrival(), motion));
@@ -71,24 +71,24 @@ where
             }
             Do::Calibrate { is_imu, is_end, .. } => {
                 let id = if is_end { 4 } else { 3 };
-                rig.port.receive(&frame(id, &[if is_imu { 2 } else { 1 }]));
+                rig.port().receive(&frame(id, &[if is_imu { 2 } else { 1 }]));
             }
-            Do::Bias { .. } => rig.port.receive(&frame(8, &[0; 19])),
+            Do::Bias { .. } => rig.port().receive(&frame(8, &[0; 19])),
             Do::Stop => {
                 let now = rig.driver.now();
                 rig.driver.role_mut().set_telemetry(&Telemetry::default(), now);
             }
             Do::Fault { call, fault } => rig.fault(call, fault),
-            Do::Heal => rig.port.heal(),
-            Do::Pass { units } => rig.port.pass(u64::from(units) * 64),
-            Do::Noise { bytes } => rig.port.receive(&bytes),
+            Do::Heal => rig.heal(),
+            Do::Pass { units } => rig.world.step(u64::from(units) * 64),
+            Do::Noise { bytes } => rig.port().receive(&bytes),
             Do::Discard => drop(rig.driver.discard()),
-            Do::Mute { .. } | Do::DriveFor { .. } => rig.port.receive(&frame(1, &[])),
+            Do::Mute { .. } | Do::DriveFor { .. } => rig.port().receive(&frame(1, &[])),
         }
         let now = rig.driver.now();
         let doing = rig.driver.role().command(now);
         check_motion(&told, (doing.speed(), doing.angular()), now);
-        assert_eq!(rig.driver.role().counters().received, rig.port.world().given);
+        assert_eq!(rig.driver.role().counters().received, rig.port().given);
         for (_, frame) in peer.0.borrow_mut().heard.drain(..) {
             let is_report = frame[4] == 5;
             let len = if setup.is_document { 42 } else { 44 };

@@ -1,0 +1,112 @@
+//! Every high-level call, blocking and async: a failing port and a refusal come back as they are.
+
+use axlewire::{
+    drive::DriveError,
+    ikeya::{
+        Mode, NodeId, Position, Target,
+        master::{CommandError, NodeSet, StopProgress},
+        slave::SlaveConfig,
+    },
+};
+
+use crate::rig::{BOTH, GONE, Story, at_ms, both, ms, only, only_two_and_five, rps, slave};
+
+const PLACE: Position = Position::new(1, 2);
+
+fn story() -> Story {
+    Story::new(only_two_and_five()).discovered()
+}
+
+fn unplugged() -> Story {
+    let story = story();
+    story.bus.port().unplugged.set(true);
+    story
+}
+
+#[test]
+fn a_port_that_has_gone_is_the_error_of_every_call_of_a_master() {
+    let (two, five, span, turn) = (NodeId::N2, NodeId::N5, ms(5), rps(1.0));
+    let soon = story().world.now() + span;
+    /// The result of both forms of a call.
+    macro_rules! gone {
+        ($name:ident, $name_async:ident($($argument:expr),*)) => {
+            both(|is_async| call!(is_async, unplugged().bus, $name, $name_async($($argument),*)))
+        };
+    }
+    assert_eq!(gone!(discover, discover_async()), Err(GONE));
+    assert_eq!(gone!(read, read_async(five)), Err(GONE));
+    assert_eq!(gone!(set_velocity, set_velocity_async(two, turn)), Err(GONE));
+    assert_eq!(gone!(set_position, set_position_async(five, PLACE)), Err(GONE));
+    let owed = |node| Err(DriveError::StopsOwed(only(node)));
+    assert_eq!(gone!(drive_for, drive_for_async(two, turn, span)), owed(two));
+    assert_eq!(gone!(stop, stop_async(five)), owed(five));
+    let still = gone!(await_standstill, await_standstill_async(NodeSet::ALL, soon));
+    assert_eq!(still, Err(GONE));
+    assert_eq!(gone!(next_event, next_event_async(soon)), Err(GONE));
+    assert_eq!(gone!(run_until, run_until_async(soon, |_, _, _| {})), Err(GONE));
+}
+
+#[test]
+fn a_refusal_of_the_master_is_the_error_of_its_call_and_sends_nothing() {
+    let (two, five) = (NodeId::N2, NodeId::N5);
+    let written = |story: &Story| story.bus.port().written.len();
+    let before = written(&story());
+    let absent = DriveError::Bus(CommandError::NotOnline { node: NodeId::N7 });
+    let is_position = DriveError::Bus(CommandError::WrongMode { node: five, mode: Mode::Position });
+    let is_velocity = DriveError::Bus(CommandError::WrongMode { node: two, mode: Mode::Velocity });
+    for is_async in BOTH {
+        let mut story = story();
+        let bus = &mut story.bus;
+        let read = call!(is_async, *bus, read, read_async(NodeId::N7)).map(drop);
+        let aimed = call!(is_async, *bus, set_velocity, set_velocity_async(five, rps(1.0)));
+        let placed = call!(is_async, *bus, set_position, set_position_async(two, PLACE));
+        let driven = call!(is_async, *bus, drive_for, drive_for_async(five, rps(1.0), ms(5)));
+        assert_eq!((read, aimed), (Err(absent), Err(is_position)));
+        assert_eq!((placed, driven), (Err(is_velocity), Err(is_position)));
+        assert_eq!((written(&story), story.bus.role().stops_owed()), (before, NodeSet::NONE));
+    }
+}
+
+#[test]
+fn a_port_that_has_gone_is_the_error_of_a_slave_that_waits_for_a_command() {
+    for is_async in BOTH {
+        let (mut slave, _far) = slave(SlaveConfig::direct());
+        slave.port().unplugged.set(true);
+        let command = call!(is_async, slave, next_command, next_command_async(at_ms(5)));
+        assert_eq!(command, Err(GONE));
+    }
+}
+
+/// A bus whose settings name node 2 only; node 5 is heard because it is stopped.
+fn five_is_not_named() -> Story {
+    let mut config = only_two_and_five();
+    config.nodes = NodeId::N2.into();
+    let mut story = Story::new(config);
+    assert_eq!(story.bus.discover().unwrap().len(), 1);
+    story.bus.stop(NodeId::N5).unwrap();
+    story
+}
+
+#[test]
+fn a_stop_of_all_stops_a_node_that_has_answered_although_the_settings_do_not_name_it() {
+    for is_async in BOTH {
+        let mut story = five_is_not_named();
+        story.bus.set_position(NodeId::N5, PLACE).unwrap();
+        call!(is_async, story.bus, stop_all, stop_all_async()).unwrap();
+        let role = story.bus.role();
+        for node in [NodeId::N2, NodeId::N5] {
+            assert_ne!(role.stop_progress(node), StopProgress::NotAsked, "{node}");
+        }
+        assert_ne!(role.set_point(NodeId::N5), Some(Target::Position(PLACE)));
+    }
+}
+
+#[test]
+fn a_stop_of_all_lists_a_silent_node_although_the_settings_do_not_name_it() {
+    for is_async in BOTH {
+        let mut story = five_is_not_named();
+        story.five.borrow().port().unplugged.set(true);
+        let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
+        assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N5.into())));
+    }
+}

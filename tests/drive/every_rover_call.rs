@@ -1,0 +1,128 @@
+//! Every high-level call of a host and of a robot, blocking and async: a failing port, a refusal
+//! and a silent robot come back as they are.
+
+use axlewire::{
+    drive::{DriveError, Operation},
+    time::Duration,
+    ucp::{MotorControl, host::CommandError, message::CalibrationKind},
+};
+
+use crate::{
+    port::{Port, Step, Unplugged},
+    rig::{BOTH, GONE, Rover, at_ms, both, host, ms, robot},
+};
+
+const IMU: CalibrationKind = CalibrationKind::Imu;
+const NOBODY: CalibrationKind = CalibrationKind::Other(9);
+
+fn unplugged() -> Rover {
+    let rover = host();
+    rover.port().unplugged.set(true);
+    rover
+}
+
+/// The result of both forms of a call, each with a host of its own.
+macro_rules! result {
+    ($host:ident, $name:ident, $name_async:ident($($argument:expr),*)) => {
+        both(|is_async| call!(is_async, $host(), $name, $name_async($($argument),*)))
+    };
+}
+
+#[test]
+fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
+    let (soon, span) = (at_ms(5), ms(5));
+    assert_eq!(result!(unplugged, ping, ping_async(soon)), Err(GONE));
+    assert_eq!(result!(unplugged, drive, drive_async(5, 5)), Err(GONE));
+    assert_eq!(result!(unplugged, drive_for, drive_for_async(5, 5, span)), Err(GONE));
+    assert_eq!(result!(unplugged, stop, stop_async()), Err(GONE));
+    assert_eq!(result!(unplugged, next_report, next_report_async(soon)), Err(GONE));
+    let begun = result!(unplugged, start_calibration, start_calibration_async(IMU, soon));
+    assert_eq!(begun, Err(GONE));
+    let ended = result!(unplugged, end_calibration, end_calibration_async(IMU, soon));
+    assert_eq!(ended, Err(GONE));
+}
+
+#[test]
+fn a_robot_that_is_silent_is_a_timeout_at_the_deadline_of_the_call() {
+    let soon = at_ms(5);
+    let timeout = |operation| Err(DriveError::Timeout(operation));
+    let ping = result!(host, ping, ping_async(soon));
+    assert_eq!(ping, timeout(Operation::Ping).map(|()| Duration::ZERO));
+    let begun = result!(host, start_calibration, start_calibration_async(IMU, soon));
+    assert_eq!(begun, timeout(Operation::Calibration));
+    let ended = result!(host, end_calibration, end_calibration_async(IMU, soon));
+    assert_eq!(ended, timeout(Operation::Calibration));
+    assert_eq!(result!(host, next_report, next_report_async(soon)), Ok(None));
+}
+
+#[test]
+fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
+    let (soon, span) = (at_ms(5), ms(5));
+    let refused = |error| Err(DriveError::<Unplugged>::Rover(error));
+    let unknown = refused(CommandError::CalibrationKind { kind: 9 });
+    let begun = result!(host, start_calibration, start_calibration_async(NOBODY, soon));
+    assert_eq!(begun, unknown);
+    let ended = result!(host, end_calibration, end_calibration_async(NOBODY, soon));
+    assert_eq!(ended, unknown);
+
+    /// A host that updates its robot.
+    fn updating() -> Rover {
+        let mut rover = host();
+        rover.service().unwrap();
+        let now = rover.now();
+        rover.role_mut().start_firmware_update(50, now).unwrap();
+        rover.service().unwrap();
+        rover
+    }
+    let updating_now = refused(CommandError::Updating);
+    assert_eq!(result!(updating, drive, drive_async(5, 5)), updating_now);
+    assert_eq!(result!(updating, drive_for, drive_for_async(5, 5, span)), updating_now);
+    let begun = result!(updating, start_calibration, start_calibration_async(IMU, soon));
+    assert_eq!(begun, updating_now);
+    for (speed, angular) in [(101, 0), (0, -101)] {
+        let value = MotorControl::new(speed, angular).unwrap_err();
+        let out = refused(CommandError::Value(value));
+        for is_async in BOTH {
+            let mut rover = host();
+            assert_eq!(call!(is_async, rover, drive, drive_async(speed, angular)), out);
+            let driven = call!(is_async, rover, drive_for, drive_for_async(speed, angular, span));
+            assert_eq!(driven, out);
+            assert_eq!(rover.port().written, [], "not even a round");
+        }
+    }
+}
+
+#[test]
+fn a_drive_whose_port_fails_on_the_way_ends_with_a_stop_and_returns_the_error() {
+    type Fault = fn(&mut Port);
+    let faults: [Fault; 3] = [
+        |port| port.reads.push_back(Step::Error),
+        |port| port.flushes.push_back(Step::Error),
+        |port| port.writes.extend([Step::Few(10), Step::Error]),
+    ];
+    for fault in faults {
+        for is_async in BOTH {
+            let mut rover = host();
+            rover.service().unwrap();
+            fault(rover.port_mut());
+            let driven = call!(is_async, rover, drive_for, drive_for_async(50, 0, ms(50)));
+            assert_eq!(driven, Err(GONE));
+            assert!(rover.role().is_stop_sent());
+            assert_eq!(rover.role().command().map(|it| it.speed()), Some(0));
+            // The last motor command on the line.
+            let written = &rover.port().written;
+            let last = written.windows(8).rposition(|it| it[..5] == [0xFD, 0xFF, 20, 0, 2]);
+            assert_eq!(written[last.unwrap() + 6], 0);
+        }
+    }
+}
+
+#[test]
+fn a_port_that_has_gone_is_the_error_of_a_robot_that_waits_for_a_command() {
+    for is_async in BOTH {
+        let (mut robot, _far) = robot();
+        robot.port().unplugged.set(true);
+        let command = call!(is_async, robot, next_command, next_command_async(at_ms(5)));
+        assert_eq!(command, Err(GONE));
+    }
+}

@@ -1,0 +1,296 @@
+//! A master, a slave and a host behind drivers whose ports fail: what still stops.
+
+use std::{
+    pin::pin,
+    sync::Arc,
+    task::{Context, Waker},
+};
+
+use axlewire::{
+    drive::{DriveError, Driver, Rs485},
+    ikeya::{
+        Master, Mode, NodeId, Position, ReadRequest, Rps, Slave, WriteRequest,
+        master::{Health, MasterConfig, Polling},
+        slave::SlaveConfig,
+    },
+    sim::MotorNode,
+};
+
+use crate::{
+    pin::{Pin, is_on},
+    port::{Port, Step, Unplugged, Wakes, World},
+    rig::{BOTH, Bus, Running, at_ms, host, ms, on, run},
+};
+
+// The calls under test.
+
+fn set_velocity(bus: &mut Bus, value: f32) -> Result<(), DriveError<Unplugged>> {
+    bus.set_velocity(NodeId::N1, Rps::new(value).unwrap())
+}
+
+fn stop(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> {
+    call!(is_async, story.bus, stop, stop_async(NodeId::N1))
+}
+
+// The bus.
+
+/// A master and node 1 with its motor, which runs whenever virtual time passes.
+struct Story {
+    world: World,
+    bus: Bus,
+    node: Running<MotorNode>,
+}
+
+impl Story {
+    fn new(config: MasterConfig, mode: Mode) -> Self {
+        let world = World::default();
+        let (near, far) = Port::pair(&world, 20);
+        let node = run(MotorNode::new(NodeId::N1, mode), far);
+        Self { bus: on(Master::new(config, world.now()), near), world, node }
+    }
+
+    /// A story whose velocity node has been found and turns at 10 rps.
+    fn at_10_rps(config: MasterConfig) -> Self {
+        let mut story = Self::new(config, Mode::Velocity);
+        story.bus.discover().unwrap();
+        set_velocity(&mut story.bus, 10.0).unwrap();
+        story.pass(500);
+        assert!(story.rps() > 9.9);
+        story
+    }
+
+    /// Lets the motor run without calling the driver.
+    fn pass(&self, millis: u32) {
+        (0..millis).for_each(|_| self.world.step(1000));
+    }
+
+    /// Runs the driver, ignoring its errors.
+    fn run(&mut self, millis: u32) {
+        let end = self.world.now() + ms(millis);
+        while self.world.now() < end {
+            let _ = self.bus.run_until(end, |_, _, _| ());
+            self.world.step(20);
+        }
+    }
+
+    /// The node no longer takes part in anything; it continues its last command.
+    fn unplug_node(&self) {
+        self.node.borrow().port().unplugged.set(true);
+    }
+
+    fn rps(&self) -> f32 {
+        self.node.borrow().role().motor().velocity().get()
+    }
+
+    fn revolutions(&self) -> f64 {
+        self.node.borrow().role().motor().position().revolutions()
+    }
+}
+
+// Stops that are reported as done
+
+#[test]
+fn a_stop_after_a_pause_of_the_driver_leaves_a_position_node_where_it_is() {
+    let mut story = Story::new(MasterConfig::usb_adapter(), Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
+    story.pass(2000);
+    let before = story.revolutions();
+    assert!(before > 9.0, "it is not moving");
+    stop(&mut story, false).unwrap();
+    story.run(3000);
+    let way = story.revolutions() - before;
+    assert!(way.abs() < 1.0, "the shaft returned to an old position: {way} turns");
+}
+
+/// Turns by which a position node is wrong after a stop that was reported as done. Before it, the
+/// driver paused with an answer on its way, and then this happened to its port.
+fn turns_off(config: MasterConfig, is_async: bool, spoil: &dyn Fn(&mut Port)) -> f64 {
+    let mut story = Story::new(config, Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
+    let written = story.bus.port().written.len();
+    while story.bus.port().written.len() < written + ReadRequest::LEN {
+        story.bus.service().unwrap();
+        story.world.step(10);
+    }
+    story.pass(2000);
+    spoil(story.bus.port_mut());
+    let before = story.revolutions();
+    assert!(before > 9.0, "it is not moving");
+    stop(&mut story, is_async).unwrap();
+    story.run(500);
+    (story.revolutions() - before).abs()
+}
+
+#[test]
+fn an_answer_behind_a_failing_receiver_is_not_taken_for_a_later_one() {
+    for config in [MasterConfig::direct(), MasterConfig::usb_adapter()] {
+        for (reads, is_async) in (0..9).flat_map(|reads| [(reads, false), (reads, true)]) {
+            let turns =
+                turns_off(config, is_async, &|port| port.reads = vec![Step::Error; reads].into());
+            assert!(turns < 1.0, "{reads} failing reads, async {is_async}: {turns} turns");
+        }
+    }
+}
+
+#[test]
+fn an_answer_behind_more_bytes_than_a_round_reads_is_not_taken_for_a_later_one() {
+    for config in [MasterConfig::direct(), MasterConfig::usb_adapter()] {
+        for (count, is_async) in
+            [0, 4000, 50_000, 60_000].map(|n| [(n, false), (n, true)]).as_flattened()
+        {
+            let turns = turns_off(config, *is_async, &|port| {
+                (0..*count).for_each(|_| port.inbox.borrow_mut().push_front((0, 0x55)));
+            });
+            assert!(turns < 1.0, "{count} bytes of noise, async {is_async}: {turns} turns");
+        }
+    }
+}
+
+#[test]
+fn a_stop_of_an_abnormal_node_is_no_success() {
+    for is_async in BOTH {
+        let mut story = Story::at_10_rps(MasterConfig::direct());
+        story.unplug_node();
+        story.run(200);
+        assert_eq!(story.bus.role().health(NodeId::N1), Some(Health::Abnormal));
+        let stopped = stop(&mut story, is_async);
+        assert!(stopped.is_err(), "an abnormal node is reported as stopped");
+    }
+}
+
+#[test]
+fn a_stop_of_all_on_a_fresh_master_is_no_success() {
+    let mut story = Story::new(MasterConfig::direct(), Mode::Velocity);
+    let stopped = story.bus.stop_all();
+    assert!(stopped.is_err(), "no node was asked, but all are reported as stopped");
+}
+
+#[test]
+fn a_stop_of_all_on_a_fresh_master_stops_whatever_answers() {
+    let mut story = Story::at_10_rps(MasterConfig::direct());
+    *story.bus.role_mut() = Master::new(MasterConfig::direct(), story.world.now());
+    let _ = story.bus.stop_all();
+    story.run(1000);
+    let is_still = story.rps().abs() < 0.05;
+    assert!(is_still, "a motor left turning by the last master keeps turning");
+}
+
+// Failing receivers
+
+#[test]
+fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_motor() {
+    for is_async in BOTH {
+        let mut story = Story::at_10_rps(MasterConfig::direct());
+        story.bus.port_mut().is_deaf = true;
+        for _ in 0..20 {
+            assert!(stop(&mut story, is_async).is_err(), "nothing can be received");
+            story.world.step(500);
+        }
+        story.pass(1000);
+        assert!(story.rps().abs() < 0.05, "twenty stops, but the motor keeps running");
+    }
+}
+
+#[test]
+#[cfg(feature = "ucp")]
+fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
+    for is_async in BOTH {
+        let mut rover = host();
+        rover.port_mut().is_deaf = true;
+        let world = rover.port().world.clone();
+        for _ in 0..1000 {
+            let stopped = call!(is_async, rover, stop, stop_async());
+            assert_eq!(stopped, Ok(()), "nothing can be received, but the stop has left");
+            world.step(100);
+        }
+        // The first frame is a motor command.
+        let id = rover.port().written.get(4);
+        assert_eq!(id, Some(&2), "a thousand stops, but not a byte");
+    }
+}
+
+#[test]
+fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
+    for is_async in BOTH {
+        let (world, pin) = (World::default(), Pin::default());
+        let (mut port, mut far) = Port::pair(&world, 20);
+        port.is_deafened = true;
+        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
+        let port = Rs485::new(port, pin.clone()).unwrap();
+        let mut node = Driver::new(slave, port, world.clone());
+        let read = ReadRequest::new(NodeId::N2);
+        embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();
+        world.step(100);
+        for _ in 0..1000 {
+            let _ = match is_async {
+                true => world.block_on(node.service_async()),
+                false => node.service(),
+            };
+            world.step(10);
+        }
+        assert_eq!(node.role().statistics().replies, 1);
+        assert!(!is_on(&pin.log), "the driver stays enabled and blocks the bus");
+    }
+}
+
+#[test]
+fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
+    let port = Port { is_deaf: true, is_mute: true, ..Port::default() };
+    let world = port.world.clone();
+    let mut bus: Bus = on(Master::new(MasterConfig::direct(), at_ms(0)), port);
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
+    let mut careless = pin!(async {
+        for _ in 0..100 {
+            let _ = bus.next_event_async(at_ms(60_000)).await;
+        }
+    });
+    let wakes = Arc::new(Wakes::default());
+    let waker = Waker::from(wakes.clone());
+    let (mut pauses, mut woken) = (0, 0);
+    while careless.as_mut().poll(&mut Context::from_waker(&waker)).is_pending() {
+        pauses += 1;
+        assert!(pauses < 1_000_000, "it never wakes up");
+        if wakes.count() == woken {
+            // It waits for time to pass.
+            world.step(20);
+        }
+        woken = wakes.count();
+    }
+    assert!(pauses >= 100, "a loop that ignores errors lets no other task run");
+}
+
+// Failing senders
+
+#[test]
+fn a_set_point_of_which_no_byte_has_left_is_not_sent_late() {
+    let mut story = Story::new(MasterConfig::direct(), Mode::Velocity);
+    story.bus.discover().unwrap();
+    story.bus.port_mut().is_mute = true;
+    assert!(set_velocity(&mut story.bus, 10.0).is_err());
+    story.pass(10_000);
+    story.bus.port_mut().is_mute = false;
+    stop(&mut story, false).unwrap();
+    let old = WriteRequest::velocity(NodeId::N1, Rps::new(10.0).unwrap());
+    let mut written = story.bus.port().written.windows(WriteRequest::LEN);
+    let is_sent = written.any(|packet| packet == old.as_bytes());
+    assert!(!is_sent, "a ten-second-old set-point is sent before the stop");
+}
+
+#[test]
+fn a_stop_whose_packet_was_discarded_is_written_again() {
+    let mut story = Story::at_10_rps({
+        let mut config = MasterConfig::direct();
+        config.polling = Polling::Manual;
+        config
+    });
+    story.bus.port_mut().is_mute = true;
+    assert!(stop(&mut story, false).is_err());
+    story.bus.discard();
+    story.bus.port_mut().is_mute = false;
+    story.run(1000);
+    let is_still = story.rps().abs() < 0.05;
+    assert!(is_still, "the stop is discarded for good, and the motor keeps running");
+}

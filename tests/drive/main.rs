@@ -1,0 +1,51 @@
+//! Drivers, readers and writers over ports that fail, end, stall and stutter, in virtual time:
+//! nothing is lost, nothing hangs, every error is specific, and everything that is told to stop
+//! does stop.
+
+#![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
+#![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
+
+#[path = "../harness/dice.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod dice;
+#[path = "../harness/port.rs"]
+#[allow(dead_code, reason = "others use more of it")]
+mod port;
+#[cfg(all(unix, feature = "serialport"))]
+#[path = "../harness/tty.rs"]
+#[allow(dead_code, reason = "ptys uses more of it")]
+mod tty;
+
+#[macro_use]
+mod rig;
+mod pin;
+mod recorder;
+
+mod bus;
+mod clocks;
+mod errors;
+mod every_call;
+#[cfg(feature = "ucp")]
+mod every_rover_call;
+mod exact_waits;
+mod failed_and_dropped_calls;
+mod failing_ports;
+mod half_ports;
+mod held_requests;
+mod held_up;
+#[cfg(feature = "ucp")]
+mod io;
+mod parts;
+mod pin_alone;
+mod pin_in_a_driver;
+mod rounds;
+#[cfg(feature = "ucp")]
+mod rover;
+#[cfg(all(unix, feature = "serialport"))]
+mod serial_port;
+mod slow_port;
+mod stops;
+mod unsent_frames;
+mod waiting;
+mod waking;
+mod withdrawn;

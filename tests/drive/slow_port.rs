@@ -1,0 +1,88 @@
+//! How long an async port may take for a frame.
+
+use axlewire::{
+    drive::DriveError,
+    endpoint::{Endpoint, Unsent},
+};
+
+use crate::{
+    exact_waits::Pausing,
+    port::{Port, Step, World},
+    recorder::Recorder,
+    rig::{On, on},
+};
+
+/// A port that takes this time for each write and for each flush, microseconds.
+fn slow<R: Endpoint>(role: R, write_us: u64, flush_us: u64) -> On<R> {
+    let mut port = Port::writing(vec![Step::Late(write_us); 8]);
+    port.flushes.extend(vec![Step::Late(flush_us); 8]);
+    on(role, port)
+}
+
+#[test]
+fn a_port_has_stalled_after_a_second_in_a_write_or_in_a_flush() {
+    for (write_ms, flush_ms, expected) in
+        [(999, 0, Ok(())), (1001, 0, Err(())), (0, 999, Ok(())), (0, 1001, Err(()))]
+    {
+        let role = Recorder::sending(&[b"123"]);
+        let mut driver = slow(role, write_ms * 1000, flush_ms * 1000);
+        let world = driver.port().world.clone();
+        let sent = world.block_on(driver.service_async());
+        assert_eq!(sent, expected.map_err(|()| DriveError::Stalled), "{write_ms}, {flush_ms}");
+        let took = world.now().as_micros();
+        assert!((999_000..=1_000_040).contains(&took), "{took} us: {write_ms}, {flush_ms}");
+        // A frame that the port has not taken is back at its role.
+        assert_eq!(driver.unsent(), b"");
+        let told = match (expected, write_ms) {
+            (Ok(()), _) => vec![],
+            (_, 0) => vec![Unsent::Unflushed],
+            _ => vec![Unsent::Untouched, Unsent::Unflushed],
+        };
+        assert_eq!(driver.role().unsent(), told);
+    }
+}
+
+#[test]
+fn each_frame_has_a_second_of_its_own() {
+    for (write_ms, flush_ms) in [(600, 0), (0, 600), (600, 600)] {
+        let role = Recorder::sending(&[b"123"]);
+        let mut driver = slow(role, write_ms * 1000, flush_ms * 1000);
+        let world = driver.port().world.clone();
+        for frame in 1..4 {
+            assert_eq!(world.block_on(driver.service_async()), Ok(()), "{write_ms}, {flush_ms}");
+            assert_eq!(driver.port().written, b"123".repeat(frame));
+            driver.role_mut().frames.push_back(b"123".into());
+            world.step(5_000_000);
+        }
+    }
+}
+
+#[test]
+fn a_port_that_was_not_asked_for_seconds_has_the_time_of_a_frame_to_take_it() {
+    for is_flush in [false, true] {
+        let world = World::default();
+        let mut role = Recorder::sending(&[b"123"]);
+        role.repeats = true;
+        let mut driver = on(role, Port::new(&world, 20));
+        driver.port_mut().stutters = true;
+        // A call that is dropped while it waits for the write, or for the flush.
+        assert_eq!(world.poll_times(if is_flush { 2 } else { 1 }, driver.service_async()), None);
+        world.step(5_000_000);
+        // The port needs a moment, as before.
+        assert_eq!(world.block_on(driver.service_async()), Ok(()), "flush {is_flush}");
+        assert_eq!(driver.port().written, b"123");
+    }
+}
+
+#[test]
+fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
+    // 64 bytes take 1280 us.
+    for (write_us, expected) in [(3559, Ok(())), (3561, Err(DriveError::Stalled))] {
+        let role = Pausing { repeats: true, ..Pausing::default() };
+        let mut driver = slow(role, write_us, 0);
+        let world = driver.port().world.clone();
+        assert_eq!(world.poll_times(1, driver.service_async()), None);
+        world.step(5_000_000);
+        assert_eq!(world.block_on(driver.service_async()), expected, "{write_us} us");
+    }
+}
