@@ -22,8 +22,7 @@ flash='\\.text|\\.rodata|\\.data'
 
 figures=$(
     echo "# $compiler"
-    timeout 120 qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 \
-        -semihosting-config enable=on,target=native -kernel "$out/$target/release/bench" </dev/null
+    bench_in_qemu "$out/$target/release/bench"
     over_empty flash_crc release/size_crc "$flash" 350
     over_empty flash_ikeya8_slice release/size_ikeya8 "$flash" 230
     over_empty flash_ucp44_slice release/size_ucp44 "$flash" 370

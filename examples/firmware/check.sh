@@ -30,9 +30,7 @@ echo "no panic is reachable"
 # The largest value of any test; each test compares it with its limit. The benchmark prints its own.
 stack() {
     if [ "$1" = bench ]; then
-        timeout 120 qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 \
-            -semihosting-config enable=on,target=native -kernel "$images/bench" </dev/null |
-            awk '$1 == "stack" { print $2 }'
+        bench_in_qemu "$images/bench" | awk '$1 == "stack" { print $2 }'
     else
         grep -o "stack $1 [0-9]*" "$folder/tests" | sort -n -k3 | tail -1 | cut -d' ' -f3
     fi | grep .

@@ -3,8 +3,8 @@
 #
 #   examples/firmware/no_panic.sh PROGRAM ...   builds each so that it links only without panics
 #
-# PROGRAM is ikeya_slave, ikeya_master, ucp_robot, or no_panic, which calls everything in the crate.
-# Optimized as shipped: whatever the compiler cannot rule out counts as reachable.
+# Optimized as shipped: whatever the compiler cannot rule out counts as reachable. The program
+# no_panic calls everything in the crate.
 set -euo pipefail
 cd "$(dirname "$0")"
 [ $# -gt 0 ] || { sed -n '4p' "$0" >&2; exit 2; }

@@ -5,8 +5,8 @@
 #   examples/firmware/response.sh ikeya_slave   READ, answered by a velocity response
 #   examples/firmware/response.sh ucp_robot     ping, answered by a pong
 #
-# QEMU executes one instruction at a time and logs each, with every interrupt and every register
-# access. Its USART takes a line of text in one interrupt, so the maximum is larger than on a board.
+# QEMU executes and logs single instructions, interrupts and register accesses. Its USART takes a
+# line of text in one interrupt, so the maximum is larger than on a board.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -24,8 +24,7 @@ qemu-system-arm --version | grep -q 'version [1-7]\.' && one_by_one=(-singlestep
 
 folder=$(mktemp -d)
 qemu= counter=
-# Ending QEMU also ends its log and port, and thus their readers; but the log may not have begun.
-trap 'for id in $qemu $counter; do kill -KILL "$id" || true; done 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
+trap 'kill -KILL $qemu $counter 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 mkfifo "$folder/log"
 

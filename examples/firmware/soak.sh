@@ -4,10 +4,9 @@
 #
 #   examples/firmware/soak.sh [MINUTES]      2 by default
 #
-# `soak_master` reads and commands `ikeya_slave` as fast as the line allows. Both count for
-# themselves, and no other program touches the bytes between them. A strike (an answer that did not
-# come within 100 ms) is a fault, unless the machine halted QEMU meanwhile: then the strikes must
-# explain every request without its answer.
+# `soak_master` reads and commands `ikeya_slave` as fast as the line allows, and both count. A strike
+# (no answer within 100 ms) is a fault, unless the machine halted QEMU meanwhile: then the strikes
+# must explain every request without its answer.
 set -euo pipefail
 cd "$(dirname "$0")"
 seconds=$((60 * ${1:-2}))
@@ -35,25 +34,20 @@ pids=()
 board slave ikeya_slave server=on,wait=off
 for _ in $(seq 500); do [ -s "$folder/slave.text" ] && break; sleep 0.02; done
 board master soak_master server=off
-exec {ask_slave}>"$folder/slave.in" {ask_master}>"$folder/master.in"
 
 # Lateness of naps beside QEMU, ms: what the machine does to it.
-(
-    while :; do
-        begin=${EPOCHREALTIME/./}
-        sleep 0.05
-        echo $(((${EPOCHREALTIME/./} - begin) / 1000 - 50))
-    done
-) >"$folder/late" &
+while begin=${EPOCHREALTIME/./}; do
+    sleep 0.05
+    echo $(((${EPOCHREALTIME/./} - begin) / 1000 - 50))
+done >"$folder/late" &
 ids="$ids $!"
 
 sleep "$seconds"
 for id in "${pids[@]}"; do
-    kill -0 "$id" 2>/dev/null || { echo "QEMU has ended: $(cat "$folder"/*.errors)" >&2; exit 1; }
+    kill -0 "$id" || { echo "QEMU has ended: $(cat "$folder"/*.errors)" >&2; exit 1; }
 done
 # Both at once: they may be a few exchanges apart.
-printf '?' >&"$ask_master"
-printf '?' >&"$ask_slave"
+printf '?' | tee "$folder/master.in" >"$folder/slave.in"
 sleep 0.3
 
 # The counts of the last whole line of each role, as variables: m_reads, s_reads and so on.
@@ -72,7 +66,7 @@ failed=0
 check() { (($2)) || { echo "FAILED: $1 ($2)" >&2; failed=1; }; }
 # Both lines are from about the same moment: half a second apart on a busy machine.
 apart=$((50 + m_replies * 500 / m_ms))
-near() { check "$1" "$2 - $3 <= $apart && $3 - $2 <= $apart"; }
+near() { check "$1" "$2 - $3 <= apart && $3 - $2 <= apart"; }
 unanswered=$((m_requests - m_replies - m_strikes)) unsaid=$((s_reads - s_replies - s_overtaken - s_expired))
 # The master sends WRITE and READ in turn, so that one that is lost shows at any moment.
 unheard=$((m_writes - m_reads - s_writes + s_reads))

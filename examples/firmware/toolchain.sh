@@ -1,10 +1,6 @@
-# Builds for thumbv7em; sourced by the other scripts in this folder.
-#
-# Uses the rustup target if it is installed, otherwise Debian's compiler. QEMU and lld come from
-# Debian if they are missing; with INSTALL=no that is an error, with status 77.
-#
-# Sets `out` to the target folder, `target` to the target's name, `cargo` to the build command, and
-# `compiler` to its name and version.
+# Builds for thumbv7em, with the rustup target if it is installed, otherwise with Debian's compiler;
+# sourced by the other scripts. Sets `out`, the target folder; `target`, the target's name; `cargo`,
+# the build command; `compiler`, its name and version. With INSTALL=no, status 77 if one is missing.
 target=thumbv7em-none-eabihf
 out=${CARGO_TARGET_DIR:-$PWD/target}
 export CARGO_TARGET_DIR=$out CARGO_TERM_COLOR=never
@@ -27,6 +23,12 @@ else
     cargo=("$(dpkg -L cargo-web | grep -m1 'bin/cargo$')" build -Zbuild-std=core)
     compiler=$("$RUSTC" --version)
 fi
+
+# Runs the benchmark image: `name value goal` per figure.
+bench_in_qemu() {
+    timeout 120 qemu-system-arm -M netduinoplus2 -nographic -icount shift=0 \
+        -semihosting-config enable=on,target=native -kernel "$1" </dev/null
+}
 
 # Number of bytes in the sections of image $1 whose names match $2. Fails if there is none.
 bytes() {
