@@ -24,7 +24,7 @@ qemu-system-arm --version | grep -q 'version [1-7]\.' && one_by_one=(-singlestep
 
 folder=$(mktemp -d)
 qemu= counter=
-trap 'kill -KILL $qemu $counter 2>/dev/null; wait 2>/dev/null; rm -rf "$folder"' EXIT
+trap 'kill -KILL $qemu $counter 2>/dev/null || true; wait 2>/dev/null; rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 mkfifo "$folder/log"
 
