@@ -28,6 +28,10 @@ mod refused_frames;
 #[cfg(feature = "ucp")]
 #[path = "motion/robot.rs"]
 mod robot;
+#[cfg(feature = "ucp")]
+#[path = "harness/rover_rig.rs"]
+#[allow(dead_code, unused_imports, reason = "host and robot use more of it")]
+mod rover_rig;
 /// The slave.
 #[path = "motion/slave.rs"]
 mod slave;

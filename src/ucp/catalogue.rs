@@ -37,16 +37,16 @@
 //! the tool describe the messages of the ruling to people.
 
 /// Hands a table to the macro that expands it.
-#[cfg(not(test))]
+#[cfg(not(all(test, feature = "serde")))]
 macro_rules! expand_table {
     ($expand:ident $($table:tt)+) => {
         $expand! { $($table)+ }
     };
 }
-#[cfg(not(test))]
+#[cfg(not(all(test, feature = "serde")))]
 pub(super) use expand_table;
 
-#[cfg(test)]
+#[cfg(all(test, feature = "serde"))]
 pub(super) use super::new_message::expand_table;
 
 /// The messages, by id.

@@ -154,7 +154,7 @@ pub mod host;
 mod inbox;
 pub mod message;
 mod motor;
-#[cfg(test)]
+#[cfg(all(test, feature = "serde"))]
 mod new_message;
 mod plain;
 mod report;

@@ -58,10 +58,6 @@ fn driving() -> Host {
     host
 }
 
-fn ids(frames: &[Vec<u8>]) -> Vec<u8> {
-    frames.iter().map(|frame| frame[4]).collect()
-}
-
 #[test]
 fn an_update_is_refused_until_the_stop_has_been_sent() {
     let mut host = fresh_host();
@@ -119,36 +115,26 @@ fn an_update_request_waits_for_a_stop_that_did_not_leave() {
 }
 
 #[test]
-fn an_update_never_starts_by_itself() {
-    let mut robot = quiet_robot();
-    robot.handle_input(&bytes(go(10)), ms(0));
-    robot.handle_input(&careless(90, 0, 0, 39), ms(10));
-    assert_eq!(robot.command(ms(10)).speed(), 10, "its speed is ignored");
-    assert_eq!(robot.command(ms(500)).speed(), 0, "and it does not feed the watchdog");
-    assert!(!robot.answer_update(OtaStatus::Accepted, ms(10)), "nothing to answer");
-    robot.handle_input(&bytes(OtaRequest::start_firmware_update(41)), ms(20));
-    let by_motor = RobotEvent::UpdateRequested { version: 39, by: UpdateSource::MotorCommand };
-    let by_request = RobotEvent::UpdateRequested { version: 41, by: UpdateSource::Request };
-    assert_eq!(events(&mut robot)[1..], [by_motor, by_request]);
-    assert_eq!(sent(&mut robot, ms(20)), [] as [Vec<u8>; 0], "the application decides");
-    assert!(robot.answer_update(OtaStatus::Forbidden, ms(30)));
-    assert_eq!(sent(&mut robot, ms(30)), [bytes(OtaAck::new(OtaStatus::Forbidden))]);
-    assert!(!robot.answer_update(OtaStatus::Forbidden, ms(30)), "once");
-}
-
-#[test]
-fn a_command_that_a_false_header_held_back_is_as_old_as_its_bytes() {
-    let mut robot = Robot::new(RobotConfig::default(), ms(0));
-    // The start of a 64-byte frame that never comes, a command after it, and a late driver.
-    let held = [&[0xFD, 0xFF, 60, 0][..], go(60).frame(0).as_bytes()].concat();
-    robot.handle_input(&held, ms(10));
-    assert_eq!(robot.command(ms(11)).speed(), 0, "not visible yet");
-    robot.handle_input(&[0; 36], ms(400));
-    assert_eq!(robot.command(ms(400)).speed(), 60, "it holds for 500 ms ...");
-    assert_eq!(robot.command(ms(510)).speed(), 0, "... from when it had arrived");
-
-    let mut robot = Robot::new(RobotConfig::default(), ms(0));
-    robot.handle_input(&held, ms(10));
-    robot.handle_input(&[0; 36], ms(2000));
-    assert_eq!(robot.command(ms(2000)).speed(), 0, "it is no longer wanted");
+fn whatever_was_asked_for_during_an_update_is_due_when_it_ends() {
+    type Ask = fn(&mut Host<MemoryStore>);
+    let asks: [(u8, Ask); 4] = [
+        (6, |host| host.handle_input(&bytes(imu_bias()), ms(5))),
+        (7, |host| host.handle_input(&bytes(mag_bias()), ms(5))),
+        (8, |host| host.handle_input(&bytes(BiasRequest {}), ms(5))),
+        (10, |host| host.set_network_state(NetworkState::Connected, ms(5)).unwrap()),
+    ];
+    for (id, ask) in asks {
+        let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
+        let mut config = quiet_config();
+        config.ping_period = Some(Duration::from_millis(2));
+        let mut host = Host::with_store(config, store, ms(0));
+        sent(&mut host, ms(0));
+        host.start_firmware_update(50, ms(1)).unwrap();
+        assert_eq!(sent(&mut host, ms(1)).last().unwrap()[4], 9);
+        ask(&mut host);
+        assert_eq!(sent(&mut host, ms(7)), [] as [Vec<u8>; 0], "the line is silent");
+        host.end_firmware_update(ms(9));
+        assert_eq!(host.poll_timeout(), Some(ms(9)), "id {id}");
+        assert!(sent(&mut host, ms(9)).iter().any(|frame| frame[4] == id));
+    }
 }

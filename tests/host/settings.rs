@@ -80,24 +80,6 @@ fn a_robot_is_held_up_after_20_ms_and_a_host_never() {
 }
 
 #[test]
-fn reports_of_both_layouts_are_counted_by_their_index() {
-    for layout in [ReportLayout::Document, ReportLayout::Firmware { version: 40 }] {
-        let mut config = RobotConfig::default();
-        (config.layout, config.bias_request_period) = (layout, None);
-        let mut robot = Robot::new(config, ms(0));
-        robot.set_telemetry(&Telemetry { power_w: 9, ..Telemetry::default() }, ms(0));
-        for index in 0..=256 {
-            let frames = sent(&mut robot, ms(20 * index));
-            let frame = Frame::parse(&frames[0]).unwrap();
-            let Message::Report(report) = frame.message() else { panic!("{frames:?}") };
-            assert_eq!((frame.index(), report.telemetry().power_w), (index as u8, 9));
-            let version = if layout == ReportLayout::Document { None } else { Some(40) };
-            assert_eq!(report.version(), version);
-        }
-    }
-}
-
-#[test]
 fn each_time_of_a_host_has_a_setting_of_its_own() {
     let after = Duration::from_millis;
     let mut config = HostConfig::default();
@@ -148,29 +130,36 @@ fn each_time_of_a_host_has_a_setting_of_its_own() {
 }
 
 #[test]
-fn each_time_of_a_robot_has_a_setting_of_its_own() {
-    let after = Duration::from_millis;
-    let mut config = RobotConfig::default();
-    (config.watchdog, config.report_period) = (after(450), after(250));
-    (config.result_period, config.bias_request_period) = (after(300), Some(after(350)));
-    let mut robot = Robot::new(config, ms(0));
-    robot.set_telemetry(&Telemetry::default(), ms(0));
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(0));
-    robot.handle_input(&bytes(go(5)), ms(0));
-    let frames = wait(&mut robot, ms(1000));
-    for (id, expected) in [
-        (5, &[0, 250, 500, 750, 1000][..]),
-        (6, &[0, 300, 600, 900]),
-        (7, &[0, 300, 600, 900]),
-        (8, &[0, 350, 700]),
-    ] {
-        let found = frames.iter().filter(|(_, frame)| frame[4] == id);
-        assert_eq!(found.map(|(at, _)| at.as_micros() / 1000).collect::<Vec<_>>(), expected);
+fn a_host_with_zero_periods_pings_and_requests_once_a_millisecond() {
+    let mut config = quiet_config();
+    (config.ping_period, config.ack_timeout) = (Some(Duration::ZERO), Duration::ZERO);
+    let mut host = Host::new(config, ms(0));
+    assert!(is_ping(&sent(&mut host, ms(0))[0]));
+    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(0));
+    assert_eq!(sent(&mut host, ms(0)), [[0; 0]; 0]);
+    let next = wait(&mut host, ms(1));
+    assert_eq!(next.iter().map(|it| it.0).collect::<Vec<_>>(), [ms(1)]);
+
+    config.ping_period = None;
+    for attempts in [0, 1, 3] {
+        config.attempts = attempts;
+        let mut host = Host::new(config, ms(0));
+        host.start_calibration(IMU, ms(0)).unwrap();
+        let asked = sent(&mut host, ms(0)).len() + wait(&mut host, ms(100)).len();
+        assert_eq!(asked, usize::from(attempts.max(1)));
+        let bound = config.calibration_bound().as_micros();
+        // Its 9 bytes, and a millisecond for the answer.
+        assert_eq!(bound, (9 * 10_000_000 / BAUD + 1 + 1000) * u32::from(attempts.max(1)));
     }
-    assert_eq!((robot.command(us(449_999)).speed(), robot.statistics().watchdog), (0, 1));
-    let mut robot = Robot::new(config, ms(0));
-    robot.handle_input(&bytes(go(5)), ms(0));
-    assert_eq!(robot.command(us(449_999)).speed(), 5);
-    assert_eq!(robot.command(ms(450)).speed(), 0);
+}
+
+/// The frame of a start request, from which the bound is computed.
+#[test]
+fn the_calibration_bound_is_that_of_the_frames_that_are_sent() {
+    assert_eq!(FrameOf::<CalibrationStart>::LEN, FrameOf::<CalibrationEnd>::LEN);
+    let mut config = HostConfig::default();
+    config.attempts = 5;
+    config.ack_timeout = Duration::from_millis(50);
+    let one = wire_time(FrameOf::<CalibrationStart>::LEN, BAUD) + Duration::from_millis(50);
+    assert_eq!(config.calibration_bound(), one.saturating_mul(5));
 }

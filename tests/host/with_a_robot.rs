@@ -1,24 +1,7 @@
-//! Properties common to host and robot: floods, full queues, unplugging, time that wraps, deadlines
-//! and memory.
+//! A host and a robot on one line: floods, full queues, unplugging, time that wraps, deadlines and
+//! memory.
 
 use crate::rig::*;
-
-#[test]
-fn a_flooding_host_gets_one_answer_of_each_kind_at_a_time() {
-    let mut robot = quiet_robot();
-    let mut flood = Vec::new();
-    for version in 0..1000 {
-        flood.extend(bytes(Ping {}));
-        flood.extend(bytes(CalibrationStart::new(IMU)));
-        flood.extend(bytes(OtaRequest::start_firmware_update(version)));
-    }
-    robot.handle_input(&flood, ms(0));
-    assert_eq!(sent(&mut robot, ms(0)).len(), 2);
-    assert_eq!((robot.statistics().pings, robot.statistics().pongs), (1000, 1));
-    assert_eq!(events(&mut robot).len(), 16);
-    // A repeated start is already queued; a request without room is not lost unnoticed.
-    assert_eq!((robot.lost_events(), robot.statistics().without_room), (0, 1000 - 15));
-}
 
 #[test]
 fn a_queue_that_fills_keeps_the_oldest_and_counts_the_rest() {
@@ -171,45 +154,6 @@ fn zero_periods_do_not_make_a_driver_spin() {
 }
 
 #[test]
-fn zero_durations_in_the_settings_mean_a_millisecond() {
-    let mut config = quiet_config();
-    (config.command_gap, config.dead_man) = (Duration::ZERO, Duration::ZERO);
-    let mut host = Host::new(config, ms(0));
-    host.drive(go(1), ms(0)).unwrap();
-    let at_once = sent(&mut host, ms(0));
-    assert_eq!(at_once.iter().map(|it| speed(it)).collect::<Vec<_>>(), [Some(1)], "no stop yet");
-    host.drive(go(2), ms(0)).unwrap();
-    assert_eq!(wait(&mut host, us(999)), [], "not two at one time");
-    host.drive(go(2), us(999)).unwrap();
-    assert_eq!(speeds(&wait(&mut host, ms(1))), [(1000, 2)]);
-    assert_eq!(speeds(&wait(&mut host, us(1999))), [(1999, 0)], "the dead-man");
-}
-
-#[test]
-fn a_host_with_zero_periods_pings_and_requests_once_a_millisecond() {
-    let mut config = quiet_config();
-    (config.ping_period, config.ack_timeout) = (Some(Duration::ZERO), Duration::ZERO);
-    let mut host = Host::new(config, ms(0));
-    assert!(is_ping(&sent(&mut host, ms(0))[0]));
-    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(0));
-    assert_eq!(sent(&mut host, ms(0)), [[0; 0]; 0]);
-    let next = wait(&mut host, ms(1));
-    assert_eq!(next.iter().map(|it| it.0).collect::<Vec<_>>(), [ms(1)]);
-
-    config.ping_period = None;
-    for attempts in [0, 1, 3] {
-        config.attempts = attempts;
-        let mut host = Host::new(config, ms(0));
-        host.start_calibration(IMU, ms(0)).unwrap();
-        let asked = sent(&mut host, ms(0)).len() + wait(&mut host, ms(100)).len();
-        assert_eq!(asked, usize::from(attempts.max(1)));
-        let bound = config.calibration_bound().as_micros();
-        // Its 9 bytes, and a millisecond for the answer.
-        assert_eq!(bound, (9 * 10_000_000 / BAUD + 1 + 1000) * u32::from(attempts.max(1)));
-    }
-}
-
-#[test]
 fn both_roles_say_how_long_a_frame_may_pause_and_takes_on_the_line() {
     fn answers(role: &impl Endpoint) -> (Duration, Duration) {
         (role.frame_pause(), role.wire_time(64))
@@ -237,13 +181,47 @@ fn the_roles_fit_into_small_memories() {
     assert!(robot_event <= 24, "{robot_event}");
 }
 
-/// The frame of a start request, from which the bound is computed.
 #[test]
-fn the_calibration_bound_is_that_of_the_frames_that_are_sent() {
-    assert_eq!(FrameOf::<CalibrationStart>::LEN, FrameOf::<CalibrationEnd>::LEN);
-    let mut config = HostConfig::default();
-    config.attempts = 5;
-    config.ack_timeout = Duration::from_millis(50);
-    let one = wire_time(FrameOf::<CalibrationStart>::LEN, BAUD) + Duration::from_millis(50);
-    assert_eq!(config.calibration_bound(), one.saturating_mul(5));
+fn cloned_roles_behave_alike() {
+    let mut rig = Rig::new(ms(0));
+    rig.robot.set_telemetry(&Telemetry::default(), ms(0));
+    rig.host.drive(go(10), ms(0)).unwrap();
+    rig.run_for(333);
+    let (mut host, mut robot) = (rig.host.clone(), rig.robot.clone());
+    assert_eq!(wait(&mut host, ms(2000)), wait(&mut rig.host, ms(2000)));
+    assert_eq!(wait(&mut robot, ms(2000)), wait(&mut rig.robot, ms(2000)));
+    assert_eq!(format!("{host:?} {robot:?}"), format!("{:?} {:?}", rig.host, rig.robot));
+}
+
+#[test]
+fn everything_that_is_due_goes_in_the_stated_order_and_is_in_the_deadline() {
+    type Act = fn(&mut Host<MemoryStore>);
+    let acts: [(u8, Act); 7] = [
+        (2, |host| host.drive(go(9), ms(7)).unwrap()),
+        (6, |host| host.handle_input(&bytes(imu_bias()), ms(7))),
+        (7, |host| host.handle_input(&bytes(mag_bias()), ms(7))),
+        (8, |host| host.handle_input(&bytes(BiasRequest {}), ms(7))),
+        (3, |host| host.start_calibration(MAG, ms(7)).unwrap()),
+        (4, |host| host.end_calibration(MAG, ms(7)).unwrap()),
+        (10, |host| host.set_network_state(NetworkState::Ota, ms(7)).unwrap()),
+    ];
+    let fresh = |ping_period| {
+        let mut config = quiet_config();
+        config.ping_period = ping_period;
+        let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
+        Host::with_store(config, store, ms(0))
+    };
+    let ids = |host: &mut Host<MemoryStore>| {
+        sent(host, ms(7)).iter().map(|frame| frame[4]).collect::<Vec<_>>()
+    };
+    for (id, act) in acts {
+        let mut host = fresh(None);
+        act(&mut host);
+        assert_eq!(host.poll_timeout(), Some(ms(7)), "id {id}");
+        assert_eq!(ids(&mut host), [id]);
+    }
+    // All at once, asked for in another order.
+    let mut host = fresh(Some(Duration::from_millis(200)));
+    acts.iter().rev().filter(|(id, _)| *id != 4).for_each(|(_, act)| act(&mut host));
+    assert_eq!(ids(&mut host), [2, 6, 7, 8, 3, 10, 1]);
 }

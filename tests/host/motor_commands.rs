@@ -59,16 +59,6 @@ fn a_stop_goes_out_at_once_and_before_everything_else() {
 }
 
 #[test]
-fn a_stop_does_not_change_the_lamp() {
-    let mut host = quiet_host();
-    host.drive(go(40).with_front_led(true), ms(0)).unwrap();
-    host.stop(ms(1));
-    let frames = sent(&mut host, ms(1));
-    assert_eq!(frames.len(), 1, "the latest wins");
-    assert_eq!(frames[0], MotorControl::STOP.with_front_led(true).frame(0).as_bytes());
-}
-
-#[test]
 fn stop_called_endlessly_does_not_flood_the_line() {
     let mut host = quiet_host();
     let mut count = 0;
@@ -171,13 +161,6 @@ fn the_first_frame_of_a_host_is_a_zero_motor_command_before_any_ping_or_answer()
     let frames = sent(&mut host, ms(1));
     assert_eq!(frames[0], MotorControl::STOP.frame(0).as_bytes());
     assert_eq!(frames.len(), 6, "the others follow");
-}
-
-#[test]
-fn the_first_frame_is_zero_even_if_the_application_drives_at_once() {
-    let mut host = fresh_host();
-    host.drive(go(40), ms(0)).unwrap();
-    assert_eq!(speeds(&wait(&mut host, ms(50))), [(0, 0), (0, 40)]);
 }
 
 #[test]
@@ -296,4 +279,90 @@ fn the_times_of_ruling_u10_are_the_defaults() {
     assert_eq!((millis(robot.result_period), millis(robot.idle_margin)), (1000, 5));
     assert_eq!((robot.bias_request_period.map(millis), robot.baud), (Some(1000), 115_200));
     assert_eq!(robot.layout, ReportLayout::Firmware { version: 38 });
+}
+
+#[test]
+fn the_command_period_and_the_gap_are_kept_to_the_microsecond_from_when_a_command_was_sent() {
+    let mut host = begun();
+    let at = ms(50);
+    host.drive(go(1), ms(45)).unwrap();
+    assert_eq!(sent(&mut host, at).len(), 1);
+    // Given 3 ms later, and due 20 ms after the one before was handed out.
+    host.drive(go(2), at + Duration::from_millis(3)).unwrap();
+    let due = at + Duration::from_millis(20);
+    assert_eq!(host.poll_timeout(), Some(due));
+    assert_eq!(sent(&mut host, us(due.as_micros() - 1)), [] as [Vec<u8>; 0]);
+    assert_eq!(speed(&sent(&mut host, due)[0]), Some(2));
+    assert_eq!(host.poll_timeout(), Some(due + Duration::from_millis(100)));
+    // A driver that is late shifts the next repetition.
+    let late = due + Duration::from_millis(130);
+    assert_eq!(speed(&sent(&mut host, late)[0]), Some(2));
+    assert_eq!(host.poll_timeout(), Some(late + Duration::from_millis(100)));
+}
+
+#[test]
+fn a_stop_of_any_origin_ends_speed_and_turn_and_keeps_the_lamp() {
+    for (speed, angular) in [(50, 0), (0, 50), (-50, -30), (3, -100)] {
+        for lamp in [true, false] {
+            let command = MotorControl::new(speed, angular).unwrap().with_front_led(lamp);
+            let still = MotorControl::STOP.with_front_led(lamp);
+            // By the application, and by the dead-man.
+            for is_asked in [true, false] {
+                let mut host = begun();
+                host.drive(command, ms(0)).unwrap();
+                wait(&mut host, ms(400));
+                if is_asked {
+                    host.stop(ms(500));
+                }
+                let told = wait(&mut host, ms(500)).pop().unwrap().1;
+                assert_eq!(told[6..22], bytes(still)[6..22]);
+                assert_eq!(host.command(), Some(still));
+            }
+            // By the watchdog of the robot.
+            let mut robot = quiet_robot();
+            robot.handle_input(&bytes(command), ms(0));
+            assert_eq!(robot.command(us(499_999)), command);
+            assert_eq!(robot.command(ms(500)), still);
+            robot.handle_timeout(ms(500));
+            assert_eq!(robot.command(ms(0)), still);
+            // The first frame of a host that drives at once.
+            let mut host = fresh_host();
+            host.drive(command, ms(0)).unwrap();
+            assert_eq!(sent(&mut host, ms(0))[0], bytes(still));
+        }
+    }
+}
+
+#[test]
+fn only_a_command_that_moves_the_robot_can_be_outdated_and_only_by_another() {
+    let mut host = begun();
+    assert!(!host.is_outdated());
+    host.drive(go(50), ms(100)).unwrap();
+    assert_eq!(speed(host.poll_transmit(ms(100)).unwrap()), Some(50));
+    assert!(!host.is_outdated());
+    host.drive(go(50), ms(101)).unwrap();
+    assert!(!host.is_outdated(), "the same again");
+    host.drive(go(51), ms(102)).unwrap();
+    assert!(host.is_outdated());
+    host.stop(ms(103));
+    assert!(host.is_outdated());
+    // A stop is right whatever comes after it.
+    assert_eq!(speed(host.poll_transmit(ms(103)).unwrap()), Some(0));
+    host.drive(go(50), ms(104)).unwrap();
+    assert!(!host.is_outdated());
+    // Nothing else moves.
+    host.set_network_state(NetworkState::Connected, ms(104)).unwrap();
+    assert_eq!(host.poll_transmit(ms(104)).unwrap()[4], 10);
+    host.stop(ms(105));
+    assert!(!host.is_outdated());
+}
+
+#[test]
+fn a_command_that_the_dead_man_has_ended_is_outdated() {
+    let mut host = begun();
+    host.drive(go(50), ms(0)).unwrap();
+    wait(&mut host, ms(499));
+    assert!(!host.is_outdated());
+    host.handle_timeout(ms(500));
+    assert!(host.is_outdated());
 }

@@ -255,3 +255,20 @@ fn the_rest_of_a_command_is_outdated_by_a_stop_although_a_flush_has_failed_meanw
     let indices: Vec<_> = frames.iter().map(|frame| frame[5]).collect();
     assert_eq!(indices, [1, 2], "the index of the command is used again");
 }
+
+#[test]
+fn the_first_of_two_copies_that_the_port_did_not_touch_goes_twice_again() {
+    for unsent in EVERY {
+        let mut host = begun();
+        host.drive(go(40), ms(30)).unwrap();
+        sent(&mut host, ms(30));
+        host.stop(ms(31));
+        host.handle_unsent(Unsent::CutOff, ms(32));
+        assert_eq!(speed(host.poll_transmit(ms(32)).unwrap()), Some(0));
+        assert!(!host.is_stop_sent(), "one of two");
+        host.handle_unsent(unsent, ms(33));
+        let frames = sent(&mut host, ms(33));
+        assert_eq!(frames.iter().filter_map(|it| speed(it)).collect::<Vec<_>>(), [0, 0]);
+        assert!(host.is_stop_sent());
+    }
+}

@@ -4,118 +4,14 @@
 use std::collections::HashSet;
 
 use crc::{CRC_16_MODBUS, Crc};
-use proptest::{collection::vec, prelude::*, sample::Index};
+use proptest::{collection::vec, prelude::*};
 
-use crate::rig::*;
-
-/// A single action on a role.
-#[derive(Clone, Debug)]
-enum Call {
-    /// Time passes, microseconds, without checking the deadline.
-    Sleep(u32),
-    /// A driver runs up to this time, microseconds.
-    Drive(u32),
-    Noise(Vec<u8>),
-    /// A good frame: which one, and its content.
-    Frame(Index, u8),
-    /// The same, cut off.
-    Cut(Index, usize),
-    Timeout,
-    Transmit,
-    Events,
-    Command(u8, i16),
-}
-
-fn call() -> impl Strategy<Value = Call> {
-    prop_oneof![
-        (0..2_000_000_u32).prop_map(Call::Sleep),
-        (0..2_000_000_u32).prop_map(Call::Drive),
-        vec(prop_oneof![any::<u8>(), Just(0xFD), Just(0xFF), Just(4)], 0..100)
-            .prop_map(Call::Noise),
-        (any::<Index>(), any::<u8>()).prop_map(|(which, salt)| Call::Frame(which, salt)),
-        (any::<Index>(), 0..44_usize).prop_map(|(which, len)| Call::Cut(which, len)),
-        Just(Call::Timeout),
-        Just(Call::Transmit),
-        Just(Call::Events),
-        (any::<u8>(), any::<i16>()).prop_map(|(which, value)| Call::Command(which, value)),
-    ]
-}
-
-/// A frame of any message, both directions.
-fn any_frame(which: &Index, salt: u8) -> Vec<u8> {
-    let err = ErrorCode::from(salt % 3);
-    let kind = CalibrationKind::from(salt % 4);
-    let value = i16::from(salt) * 3 - 300;
-    let mut buffer = [0; 64];
-    let raw = RawFrame { id: 0x20, index: salt, body: &[salt; 56][..usize::from(salt % 57)] };
-    let frames = [
-        bytes(Ping {}),
-        bytes(Pong::new(err)),
-        (careless(value, -value, value, if salt == 7 { 39 } else { 0 })),
-        bytes(CalibrationStart::new(kind)),
-        bytes(CalibrationStartAck::new(kind, err)),
-        bytes(CalibrationEnd::new(kind)),
-        bytes(CalibrationEndAck::new(kind, err)),
-        FirmwareReport::new(&Telemetry::default(), 38).frame(salt).as_bytes().to_vec(),
-        bytes(ImuBias::new([value; 3], [0; 3])),
-        bytes(ImuBiasAck::new(err)),
-        bytes(MagBias::new([value; 3])),
-        bytes(MagBiasAck::new(err)),
-        bytes(BiasRequest {}),
-        bytes(Biases::new(imu_bias(), mag_bias())),
-        bytes(OtaRequest::start_firmware_update(value)),
-        bytes(OtaAck::new(OtaStatus::from(salt % 4))),
-        bytes(SetNetworkState::new(NetworkState::from(u32::from(salt))).unwrap()),
-        // A few have FD FF in them, and are not sent.
-        raw.encode(&mut buffer).map_or_else(|_| bytes(Ping {}), <[u8]>::to_vec),
-    ];
-    which.get(&frames).clone()
-}
-
-/// Runs a call; `command` is the role's own command.
-fn perform<R: Endpoint>(
-    role: &mut R,
-    call: &Call,
-    now: &mut Instant,
-    command: impl Fn(&mut R, u8, i16, Instant),
-) {
-    match call {
-        Call::Sleep(micros) => *now += Duration::from_micros(*micros),
-        Call::Drive(micros) => {
-            role.handle_timeout(*now);
-            sent(role, *now);
-            let end = *now + Duration::from_micros(*micros);
-            let frames = wait(role, end);
-            // Motor commands, pings, reports, results, requests: nothing is sent without a reason.
-            let most = 30 + *micros / 5_000;
-            assert!(frames.len() <= most as usize, "{} frames in {micros} us", frames.len());
-            *now = end;
-        }
-        Call::Noise(noise) => role.handle_input(noise, *now),
-        Call::Frame(which, salt) => role.handle_input(&any_frame(which, *salt), *now),
-        Call::Cut(which, len) => {
-            let frame = any_frame(which, 0);
-            role.handle_input(&frame[..(*len).min(frame.len())], *now);
-        }
-        Call::Timeout => role.handle_timeout(*now),
-        Call::Transmit => {
-            let _ = role.poll_transmit(*now);
-        }
-        Call::Events => assert!(events(role).len() <= 16, "events are bounded"),
-        Call::Command(which, value) => command(role, *which, *value, *now),
-    }
-    // A handled deadline is no longer in the past.
-    role.handle_timeout(*now);
-    sent(role, *now);
-}
-
-fn start() -> impl Strategy<Value = u64> {
-    prop_oneof![Just(0), any::<u64>(), (0..20_000_000_u64).prop_map(|before| u64::MAX - before)]
-}
+use crate::{
+    calls::{call, perform, start},
+    rig::*,
+};
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
-
     #[test]
     fn a_host_survives_any_calls_bytes_and_times(
         calls in vec(call(), 0..60),
@@ -140,29 +36,6 @@ proptest! {
             });
             let line = host.counters();
             prop_assert!(line.received - line.framed - line.skipped() < 64);
-        }
-    }
-
-    #[test]
-    fn a_robot_survives_any_calls_bytes_and_times(
-        calls in vec(call(), 0..60),
-        start in start(),
-    ) {
-        let mut now = us(start);
-        let mut robot = Robot::new(RobotConfig::default(), now);
-        for call in &calls {
-            perform(&mut robot, call, &mut now, |robot, which, value, now| {
-                match which % 4 {
-                    0 => robot.set_telemetry(&Telemetry::default(), now),
-                    1 => robot.calibration_result_imu(ImuBias::new([value; 3], [0; 3]), now),
-                    2 => robot.calibration_result_mag(MagBias::new([value; 3]), now),
-                    _ => { robot.answer_update(OtaStatus::Accepted, now); }
-                }
-            });
-            let command = robot.command(now);
-            prop_assert!(command.speed().abs() <= 100 && command.angular().abs() <= 100);
-            prop_assert!(matches!(command.front_led(), 0 | 100));
-            prop_assert_eq!(RawMotorControl::from(command).version(), 0);
         }
     }
 }
@@ -329,36 +202,5 @@ proptest! {
         prop_assert_eq!(failed.count(), rig.host.statistics().calibration_failures as usize);
         // The events of a rig are taken out at every step.
         prop_assert_eq!((rig.host.lost_events(), rig.robot.lost_events()), (0, 0));
-    }
-
-    #[test]
-    fn the_robot_stops_within_500_ms_of_the_last_valid_command(
-        pauses in vec(0..900_u32, 1..40),
-        noise in vec(any::<u8>(), 0..64),
-        start in start(),
-    ) {
-        let mut now = us(start);
-        let mut robot = quiet_robot_at(now);
-        for (turn, pause) in pauses.into_iter().enumerate() {
-            if turn % 3 == 0 {
-                robot.handle_input(&noise, now);
-                // A pause ends any frame that the noise has begun.
-                now += Duration::from_millis(20);
-                robot.handle_timeout(now);
-                events(&mut robot);
-            }
-            robot.handle_input(&bytes(go(50)), now);
-            let last = now;
-            let end = now + Duration::from_millis(pause);
-            while let Some(at) = robot.poll_timeout().filter(|&at| at <= end) {
-                robot.handle_timeout(at);
-                sent(&mut robot, at);
-            }
-            now = end;
-            let moves = now < last + Duration::from_millis(500);
-            prop_assert_eq!(robot.command(now).speed(), if moves { 50 } else { 0 });
-            let stops = events(&mut robot).into_iter().filter(|e| *e == RobotEvent::Watchdog);
-            prop_assert_eq!(stops.count(), usize::from(!moves));
-        }
     }
 }

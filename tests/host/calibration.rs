@@ -26,40 +26,6 @@ fn a_calibration_ends_with_biases_in_the_store() {
 }
 
 #[test]
-fn calibration_requests_are_acknowledged_at_once() {
-    let mut robot = quiet_robot();
-    robot.handle_input(&bytes(CalibrationStart::new(MAG)), ms(1));
-    let ack = CalibrationStartAck::new(MAG, ErrorCode::Fine);
-    assert_eq!(sent(&mut robot, ms(1)), [bytes(ack)]);
-    robot.handle_input(&bytes(CalibrationEnd::new(MAG)), ms(2));
-    let ack = CalibrationEndAck::new(MAG, ErrorCode::Fine);
-    assert_eq!(sent(&mut robot, ms(2)), [bytes(ack)]);
-    let both = [begins(MAG), RobotEvent::CalibrationEnd(MAG)];
-    assert_eq!(events(&mut robot), both);
-}
-
-#[test]
-fn a_repeated_calibration_request_is_acknowledged_without_an_event() {
-    let mut robot = quiet_robot();
-    for (at, request) in [
-        (1, bytes(CalibrationStart::new(MAG))),
-        (2, bytes(CalibrationStart::new(MAG))),
-        (3, bytes(CalibrationEnd::new(MAG))),
-        (4, bytes(CalibrationEnd::new(MAG))),
-        (5, bytes(CalibrationStart::new(CalibrationKind::Other(0)))),
-    ] {
-        robot.handle_input(&request, ms(at));
-        assert_eq!(sent(&mut robot, ms(at)).len(), 1);
-    }
-    assert_eq!(events(&mut robot).len(), 2);
-    assert_eq!(
-        (robot.statistics().calibration_repeats, robot.statistics().calibration_refused),
-        (1, 2)
-    );
-    assert_eq!(robot.calibrating(), None);
-}
-
-#[test]
 fn a_lost_acknowledgement_is_requested_again() {
     let mut rig = Rig::new(ms(0));
     let mut lost = 0;
@@ -76,23 +42,6 @@ fn a_lost_acknowledgement_is_requested_again() {
     assert_eq!(rig.host_has_seen(&HostEvent::CalibrationStarted(MAG)), 1);
     assert_eq!(rig.robot_has_seen(&begins(MAG)), 1);
     assert_eq!(rig.host.statistics().calibration_retries, 2);
-}
-
-#[test]
-fn an_unanswered_calibration_request_fails_within_its_bound() {
-    let mut host = quiet_host();
-    host.start_calibration(IMU, ms(0)).unwrap();
-    sent(&mut host, ms(0));
-    let bound = HostConfig::default().calibration_bound();
-    assert_eq!(bound.as_micros(), 3 * (200_000 + 782));
-    let retries = wait(&mut host, ms(0) + bound);
-    assert_eq!(retries.len(), 2);
-    let event = events(&mut host).pop().unwrap();
-    let HostEvent::CalibrationFailed(failure) = event else { panic!("{event:?}") };
-    assert_eq!((failure.step, failure.kind), (CalibrationStep::Start, IMU));
-    assert_eq!((failure.cause, failure.attempts), (FailureCause::NoAnswer, 3));
-    assert_eq!(host.statistics().calibration_failures, 1);
-    host.start_calibration(IMU, ms(5000)).unwrap();
 }
 
 #[test]
@@ -136,19 +85,26 @@ fn an_end_is_acknowledged_with_any_kind_as_long_as_the_robots_last_start_is_not_
     assert_eq!(events(&mut host).pop(), Some(HostEvent::CalibrationEnded(IMU)));
 }
 
+/// A host whose robot has begun a calibration.
+fn calibrating(kind: CalibrationKind) -> Host {
+    let mut host = quiet_host();
+    host.start_calibration(kind, ms(0)).unwrap();
+    sent(&mut host, ms(0));
+    let ack = CalibrationStartAck::new(kind, ErrorCode::Fine);
+    host.handle_input(&bytes(ack), ms(1));
+    events(&mut host);
+    host
+}
+
 /// A host whose calibration of the IMU was begun, and whose next request was not answered.
 fn host_after(failed: CalibrationStep) -> Host {
-    let mut host = quiet_host();
-    host.start_calibration(IMU, ms(0)).unwrap();
-    sent(&mut host, ms(0));
-    host.handle_input(&bytes(CalibrationStartAck::new(IMU, ErrorCode::Fine)), ms(1));
+    let mut host = calibrating(IMU);
     match failed {
         CalibrationStep::Start => host.start_calibration(MAG, ms(2)).unwrap(),
         CalibrationStep::End => host.end_calibration(IMU, ms(2)).unwrap(),
     }
     wait(&mut host, ms(2000));
-    let failures = host.statistics().calibration_failures;
-    assert_eq!((failures, events(&mut host).len() > 1), (1, true));
+    assert_eq!(host.statistics().calibration_failures, 1);
     host.end_calibration(IMU, ms(2001)).unwrap();
     sent(&mut host, ms(2001));
     host
@@ -193,43 +149,8 @@ fn a_calibration_of_unknown_kind_is_refused() {
 }
 
 #[test]
-fn results_are_repeated_every_1000_ms_until_acknowledged() {
-    let mut robot = quiet_robot();
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(300));
-    assert_eq!(sent(&mut robot, ms(300)), [bytes(imu_bias()), bytes(mag_bias())]);
-    let times: Vec<_> = wait(&mut robot, ms(3400)).iter().map(|(at, _)| at.as_micros()).collect();
-    assert_eq!(times, [1_300_000, 1_300_000, 2_300_000, 2_300_000, 3_300_000, 3_300_000]);
-    // An acknowledgement with `Damaged` does not end it.
-    robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Damaged)), ms(3500));
-    robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Damaged)), ms(3500));
-    assert_eq!(events(&mut robot), []);
-    robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(3500));
-    assert_eq!(events(&mut robot), [RobotEvent::MagBiasTaken]);
-    assert_eq!(wait(&mut robot, ms(5000)).len(), 1);
-    robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(5000));
-    assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken]);
-    assert_eq!(robot.poll_timeout(), None, "nothing more is due");
-    assert_eq!(robot.statistics().acks_refused, 2);
-}
-
-#[test]
 fn a_repeated_result_is_acknowledged_again_and_stored_once() {
-    struct Counting(MemoryStore, u32);
-    impl BiasStore for Counting {
-        fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
-            self.0.load()
-        }
-        fn store_imu(&mut self, bias: ImuBias) -> Result<(), NotStored> {
-            self.1 += 1;
-            self.0.store_imu(bias)
-        }
-        fn store_mag(&mut self, bias: MagBias) -> Result<(), NotStored> {
-            self.1 += 1;
-            self.0.store_mag(bias)
-        }
-    }
-    let mut store = Counting(MemoryStore::default(), 0);
+    let mut store = Picky::new(|_| false);
     let mut host = Host::with_store(quiet_config(), &mut store, ms(0));
     for at in [0, 1000, 2000] {
         host.handle_input(&bytes(mag_bias()), ms(at));
@@ -248,7 +169,7 @@ fn a_repeated_result_is_acknowledged_again_and_stored_once() {
     host.start_calibration(IMU, ms(4001)).unwrap();
     host.handle_input(&bytes(imu_bias()), ms(4002));
     assert_eq!(host.statistics().results_repeated, 2);
-    assert_eq!(store.1, 4);
+    assert_eq!(store.asked, [2, 2]);
 }
 
 #[test]
@@ -287,17 +208,6 @@ fn a_result_is_reported_once_even_if_the_end_is_requested_before_it_is_repeated(
     }
 }
 
-/// A host whose robot has begun a calibration.
-fn calibrating(kind: CalibrationKind) -> Host {
-    let mut host = quiet_host();
-    host.start_calibration(kind, ms(0)).unwrap();
-    sent(&mut host, ms(0));
-    let ack = CalibrationStartAck::new(kind, ErrorCode::Fine);
-    host.handle_input(&bytes(ack), ms(1));
-    events(&mut host);
-    host
-}
-
 #[test]
 fn the_acknowledgement_of_an_end_names_the_requested_kind_or_that_of_the_last_start() {
     for (asked, told, counts) in [
@@ -322,53 +232,14 @@ fn the_acknowledgement_of_an_end_names_the_requested_kind_or_that_of_the_last_st
 }
 
 #[test]
-fn after_a_start_that_may_have_arrived_any_kind_acknowledges_an_end() {
-    let mut host = calibrating(MAG);
-    host.start_calibration(IMU, ms(2)).unwrap();
-    sent(&mut host, ms(2));
-    wait(&mut host, ms(1000));
-    assert!(matches!(host.calibration_outcome(), Some(Err(_))));
-    events(&mut host);
-    host.end_calibration(IMU, ms(1000)).unwrap();
-    sent(&mut host, ms(1000));
-    host.handle_input(&bytes(CalibrationEndAck::new(MAG, ErrorCode::Fine)), ms(1001));
-    assert_eq!(events(&mut host).pop(), Some(HostEvent::CalibrationEnded(IMU)));
-}
-
-#[test]
 fn a_result_that_is_not_stored_is_not_acknowledged() {
-    struct Full;
-    impl BiasStore for Full {
-        fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
-            (None, None)
-        }
-        fn store_imu(&mut self, _: ImuBias) -> Result<(), NotStored> {
-            Err(NotStored)
-        }
-        fn store_mag(&mut self, _: MagBias) -> Result<(), NotStored> {
-            Err(NotStored)
-        }
-    }
-    let mut host = Host::with_store(quiet_config(), Full, ms(0));
+    let mut host = Host::with_store(quiet_config(), Picky::new(|_| true), ms(0));
     host.handle_input(&bytes(imu_bias()), ms(1));
     host.handle_input(&bytes(mag_bias()), ms(2));
     assert_eq!(sent(&mut host, ms(2)), [] as [Vec<u8>; 0]);
     let seen = events(&mut host);
     assert_eq!(seen[1..], [HostEvent::BiasNotStored(IMU), HostEvent::BiasNotStored(MAG)]);
     assert_eq!(host.statistics().results_not_stored, 2);
-}
-
-#[test]
-fn biases_are_requested_every_1000_ms_from_boot_until_answered() {
-    let mut robot = Robot::new(RobotConfig::default(), ms(0));
-    assert_eq!(sent(&mut robot, ms(0)), [bytes(BiasRequest {})]);
-    let times: Vec<_> = wait(&mut robot, ms(3500)).iter().map(|(at, _)| at.as_micros()).collect();
-    assert_eq!(times, [1_000_000, 2_000_000, 3_000_000]);
-    let biases = Biases::new(imu_bias(), mag_bias());
-    robot.handle_input(&bytes(biases), ms(3600));
-    assert_eq!(events(&mut robot), [RobotEvent::Biases(biases)]);
-    assert_eq!(robot.poll_timeout(), None);
-    assert_eq!(sent(&mut quiet_robot(), ms(0)), [] as [Vec<u8>; 0], "can be switched off");
 }
 
 #[test]
@@ -395,4 +266,102 @@ fn a_host_without_a_store_passes_results_on_as_events() {
     assert_eq!(rig.host_has_seen(&HostEvent::MagBias(mag_bias())), 1);
     assert_eq!(rig.robot_has_seen(&RobotEvent::MagBiasTaken), 1);
     assert_eq!(*rig.host.store(), NoStore);
+}
+
+#[test]
+fn an_acknowledgement_is_awaited_from_the_end_of_the_request_on_the_wire_to_the_microsecond() {
+    // 9 bytes at 115,200 bit/s, then 200 ms.
+    let wait_us = 782 + 200_000;
+    for step in [CalibrationStep::Start, CalibrationStep::End] {
+        let mut host = quiet_host();
+        match step {
+            CalibrationStep::Start => host.start_calibration(IMU, ms(3)).unwrap(),
+            CalibrationStep::End => host.end_calibration(IMU, ms(3)).unwrap(),
+        }
+        let begin = ms(10);
+        assert_eq!(sent(&mut host, begin).len(), 1);
+        for attempt in 1..=3 {
+            let end = begin + Duration::from_micros(wait_us * attempt);
+            let just_before = us(end.as_micros() - 1);
+            host.handle_timeout(just_before);
+            assert_eq!(sent(&mut host, just_before), [] as [Vec<u8>; 0]);
+            host.handle_timeout(end);
+            assert_eq!(sent(&mut host, end).len(), usize::from(attempt < 3));
+        }
+        let failure = host.calibration_outcome().unwrap().unwrap_err();
+        assert_eq!((failure.step, failure.attempts, failure.kind), (step, 3, IMU));
+        assert_eq!(failure.cause, FailureCause::NoAnswer);
+        assert_eq!(events(&mut host).pop(), Some(HostEvent::CalibrationFailed(failure)));
+        host.start_calibration(IMU, ms(5000)).unwrap();
+        assert_eq!(host.config().calibration_bound().as_micros(), 3 * wait_us);
+    }
+}
+
+#[test]
+fn each_boot_of_a_robot_is_reported_once_however_often_its_biases_are_sent() {
+    let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
+    let mut host = Host::with_store(quiet_config(), store, ms(0));
+    for boot in 1..4_u32 {
+        let at = ms(u64::from(boot) * 100);
+        host.handle_input(&bytes(BiasRequest {}), at);
+        events(&mut host);
+        assert_eq!(host.poll_transmit(at).unwrap()[4], 8);
+        host.handle_unsent(Unsent::Untouched, at);
+        assert_eq!(host.poll_transmit(at).unwrap()[4], 8);
+        assert_eq!(events(&mut host), [HostEvent::BiasesSent]);
+        assert_eq!((host.statistics().biases, host.statistics().bias_requests), (boot, boot));
+    }
+}
+
+#[test]
+fn the_kind_in_a_bad_acknowledgement_of_a_start_is_ignored() {
+    // The vendor firmware returns the kind of the previous start there.
+    for kind in [IMU, MAG, CalibrationKind::Other(0)] {
+        let mut host = quiet_host();
+        host.start_calibration(IMU, ms(0)).unwrap();
+        sent(&mut host, ms(0));
+        let bad = CalibrationStartAck::new(kind, ErrorCode::Damaged);
+        host.handle_input(&bytes(bad), ms(5));
+        assert_eq!(sent(&mut host, ms(5)), [CalibrationStart::new(IMU).frame(1).as_bytes()]);
+        assert_eq!(host.statistics().acks_unasked, 0);
+    }
+    // That of a good one is not.
+    let mut host = quiet_host();
+    host.start_calibration(IMU, ms(0)).unwrap();
+    sent(&mut host, ms(0));
+    host.handle_input(&bytes(CalibrationStartAck::new(MAG, ErrorCode::Fine)), ms(5));
+    assert_eq!((host.statistics().acks_unasked, host.calibration_outcome()), (1, None));
+}
+
+#[test]
+fn a_newer_result_replaces_the_stored_one() {
+    let mut host = Host::with_store(quiet_config(), MemoryStore::default(), ms(0));
+    let (imu, mag) = (ImuBias::new([9; 3], [8; 3]), MagBias::new([7; 3]));
+    for (at, (imu, mag)) in [(0, (imu_bias(), mag_bias())), (1, (imu, mag))] {
+        host.handle_input(&bytes(imu), ms(at));
+        host.handle_input(&bytes(mag), ms(at));
+        assert_eq!(*host.store(), MemoryStore { imu: Some(imu), mag: Some(mag) });
+    }
+    sent(&mut host, ms(2));
+    host.handle_input(&bytes(BiasRequest {}), ms(3));
+    let answer = sent(&mut host, ms(3));
+    let Message::Biases(biases) = message(&answer[0]) else { panic!("{answer:?}") };
+    assert_eq!((biases.imu(), biases.mag(), biases.err()), (imu, mag, ErrorCode::Fine));
+}
+
+#[test]
+fn the_outcome_of_a_calibration_request_is_unknown_while_it_is_unanswered() {
+    let mut host = quiet_host();
+    for err in [ErrorCode::Damaged, ErrorCode::Fine, ErrorCode::Damaged] {
+        host.start_calibration(IMU, ms(0)).unwrap();
+        let answers = if err == ErrorCode::Fine { 1 } else { 3 };
+        for _ in 0..answers {
+            assert_eq!(host.calibration_outcome(), None);
+            sent(&mut host, ms(0));
+            host.handle_input(&bytes(CalibrationStartAck::new(IMU, err)), ms(0));
+        }
+        let outcome = host.calibration_outcome().unwrap();
+        assert_eq!(outcome.is_ok(), err == ErrorCode::Fine);
+        events(&mut host);
+    }
 }

@@ -86,31 +86,21 @@ fn an_echoing_line_is_not_a_robot() {
 #[test]
 fn a_pong_gives_the_round_trip_time() {
     let mut host = Host::new(HostConfig::default(), ms(0));
-    for (turn, micros) in [(0, 3000), (1, 1000), (2, 2000)] {
+    let (fine, damaged) = (ErrorCode::Fine, ErrorCode::Damaged);
+    for (turn, micros, err) in [(0, 3000, fine), (1, 1000, damaged), (2, 2000, fine)] {
         let at = ms(turn * 200);
         host.handle_timeout(at);
         assert!(sent(&mut host, at).iter().any(|frame| is_ping(frame)));
         let back = at + Duration::from_micros(micros);
-        host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), back);
+        host.handle_input(&bytes(Pong::new(err)), back);
         let round_trip = Duration::from_micros(micros);
-        assert!(events(&mut host).contains(&HostEvent::Pong { round_trip, err: ErrorCode::Fine }));
+        assert!(events(&mut host).contains(&HostEvent::Pong { round_trip, err }));
     }
     let trip = host.statistics().round_trip;
     let micros = |span: Option<Duration>| span.unwrap().as_micros();
     assert_eq!((trip.count(), micros(trip.min()), micros(trip.max())), (3, 1000, 3000));
     assert_eq!(micros(trip.mean()), 2000);
     assert_eq!(HostStatistics::default().round_trip.mean(), None);
-}
-
-#[test]
-fn a_pong_that_says_damaged_reaches_the_application() {
-    let mut host = Host::new(HostConfig::default(), ms(0));
-    sent(&mut host, ms(0));
-    host.handle_input(&bytes(Pong::new(ErrorCode::Damaged)), ms(2));
-    let round_trip = Duration::from_millis(2);
-    let pong = HostEvent::Pong { round_trip, err: ErrorCode::Damaged };
-    assert!(events(&mut host).contains(&pong));
-    assert_eq!(host.statistics().pings_damaged, 1);
 }
 
 #[test]
@@ -169,16 +159,6 @@ fn a_false_header_holds_a_report_back_no_longer_than_the_idle_margin() {
 }
 
 #[test]
-fn a_frame_in_two_pieces_is_whole() {
-    let mut robot = quiet_robot();
-    let command = bytes(go(60));
-    robot.handle_input(&command[..7], ms(0));
-    robot.handle_timeout(ms(4)); // within the margin
-    robot.handle_input(&command[7..], ms(4));
-    assert_eq!(robot.command(ms(4)).speed(), 60);
-}
-
-#[test]
 fn unknown_frames_pass_through_raw() {
     let mut host = quiet_host();
     let mut buffer = [0; 64];
@@ -225,4 +205,44 @@ fn the_network_state_is_sent_on_change_and_when_the_robot_may_have_forgotten_it(
     assert_eq!(state(&mut host, ms(2100)), Some(NetworkState::Disconnected));
     let refused = host.set_network_state(NetworkState::Other(256), ms(2200));
     assert_eq!(refused, Err(CommandError::Value(EncodeError::NetworkState { value: 256 })));
+}
+
+#[test]
+fn a_round_trip_and_a_report_can_be_taken_once_each() {
+    let mut config = quiet_config();
+    config.ping_period = Some(Duration::from_millis(200));
+    let mut host = Host::new(config, ms(0));
+    assert_eq!((host.take_round_trip(), host.take_report()), (None, None));
+    sent(&mut host, ms(0));
+    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(7));
+    assert_eq!(host.take_round_trip(), Some(Duration::from_millis(7)));
+    assert_eq!(host.take_round_trip(), None);
+    let report = FirmwareReport::new(&Telemetry { battery_pct: 55, ..Telemetry::default() }, 40);
+    host.handle_input(report.frame(3).as_bytes(), ms(8));
+    let taken = host.take_report().unwrap();
+    assert_eq!((taken.telemetry.battery_pct, taken.version), (55, Some(40)));
+    assert_eq!((taken.index, taken.lost, host.take_report()), (3, 0, None));
+    assert_eq!(host.last_report(), Some(&taken), "it is still the latest");
+    // Each report is new: after a gap, and repeated.
+    for (index, lost) in [(9, 5), (9, 0), (8, 254)] {
+        host.handle_input(report.frame(index).as_bytes(), ms(9));
+        let taken = host.take_report().unwrap();
+        assert_eq!((taken.index, taken.lost), (index, lost));
+    }
+}
+
+#[test]
+fn a_network_state_that_is_refused_changes_nothing() {
+    let mut host = begun();
+    host.set_network_state(NetworkState::Connected, ms(1)).unwrap();
+    assert_eq!(sent(&mut host, ms(1)).len(), 1);
+    assert!(host.set_network_state(NetworkState::Other(256), ms(2)).is_err());
+    // Sent again when the robot boots: the one before.
+    host.handle_input(&bytes(BiasRequest {}), ms(3));
+    let frames = sent(&mut host, ms(3));
+    let Message::SetNetworkState(told) = message(&frames[0]) else { panic!("{frames:?}") };
+    assert_eq!(told.state(), NetworkState::Connected);
+    // The same state again is not sent.
+    host.set_network_state(NetworkState::Connected, ms(4)).unwrap();
+    assert_eq!(sent(&mut host, ms(4)), [] as [Vec<u8>; 0]);
 }

@@ -1,4 +1,8 @@
-//! Helpers of the scenarios: hand-made frames, roles alone, and two roles on one line.
+//! Host and robot: frames made by hand, roles alone, and two roles on one line.
+//!
+//! The line is in memory, takes 10 bit times per byte and handles frames as the test requires.
+//! After every step both roles are asked for their next deadline: it must be in the future, or a
+//! driver would spin.
 
 use std::collections::VecDeque;
 
@@ -48,8 +52,16 @@ pub(crate) fn mag_bias() -> MagBias {
     MagBias::new([7, -8, 9])
 }
 
+pub(crate) fn kind(is_imu: bool) -> CalibrationKind {
+    if is_imu { IMU } else { MAG }
+}
+
 pub(crate) fn bytes<B: Body>(body: B) -> Vec<u8> {
     body.frame(0).as_bytes().to_vec()
+}
+
+pub(crate) fn report(index: u8) -> Vec<u8> {
+    FirmwareReport::new(&Telemetry::default(), 38).frame(index).as_bytes().to_vec()
 }
 
 /// A motor command from a careless host: speed, angular, front lamp, version.
@@ -80,6 +92,11 @@ pub(crate) fn events<R: Endpoint>(role: &mut R) -> Vec<R::Event> {
     std::iter::from_fn(|| role.poll_event()).collect()
 }
 
+/// What an application would find now.
+pub(crate) fn waiting<R: Endpoint + Clone>(role: &R) -> Vec<R::Event> {
+    events(&mut role.clone())
+}
+
 /// Lets time pass up to `end`, deadline by deadline; returns the frames sent meanwhile, with times.
 pub(crate) fn wait<R: Endpoint>(role: &mut R, end: Instant) -> Vec<(Instant, Vec<u8>)> {
     let mut frames = Vec::new();
@@ -93,6 +110,10 @@ pub(crate) fn wait<R: Endpoint>(role: &mut R, end: Instant) -> Vec<(Instant, Vec
 
 pub(crate) fn message(frame: &[u8]) -> Message<'_> {
     Frame::parse(frame).unwrap().message()
+}
+
+pub(crate) fn ids(frames: &[Vec<u8>]) -> Vec<u8> {
+    frames.iter().map(|frame| frame[4]).collect()
 }
 
 pub(crate) fn is_ping(frame: &[u8]) -> bool {
@@ -152,6 +173,39 @@ pub(crate) fn quiet_robot_at(now: Instant) -> Robot {
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
     Robot::new(config, now)
+}
+
+/// A store that refuses some results: by how many of their kind came before.
+pub(crate) struct Picky {
+    pub(crate) kept: MemoryStore,
+    /// Results so far, of the IMU and of the magnetometer.
+    pub(crate) asked: [u32; 2],
+    pub(crate) refuses: fn(u32) -> bool,
+}
+
+impl Picky {
+    pub(crate) fn new(refuses: fn(u32) -> bool) -> Self {
+        Self { kept: MemoryStore::default(), asked: [0; 2], refuses }
+    }
+
+    fn takes(&mut self, which: usize) -> Result<(), NotStored> {
+        self.asked[which] += 1;
+        if (self.refuses)(self.asked[which] - 1) { Err(NotStored) } else { Ok(()) }
+    }
+}
+
+impl BiasStore for Picky {
+    fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
+        self.kept.load()
+    }
+    fn store_imu(&mut self, bias: ImuBias) -> Result<(), NotStored> {
+        self.takes(0)?;
+        self.kept.store_imu(bias)
+    }
+    fn store_mag(&mut self, bias: MagBias) -> Result<(), NotStored> {
+        self.takes(1)?;
+        self.kept.store_mag(bias)
+    }
 }
 
 /// One direction of the line.

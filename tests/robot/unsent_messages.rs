@@ -1,64 +1,6 @@
-//! Requests, results, reports and answers that did not reach the line: due again, and counted once
-//! (U16).
+//! Results, reports and answers that did not reach the line: due again, and counted once (U16).
 
 use crate::rig::*;
-
-#[test]
-fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut host = Host::with_store(HostConfig::default(), MemoryStore::default(), ms(0));
-        *host.store_mut() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
-        host.handle_input(&bytes(imu_bias()), ms(1));
-        host.handle_input(&bytes(mag_bias()), ms(1));
-        host.handle_input(&bytes(BiasRequest {}), ms(1));
-        host.start_calibration(CalibrationKind::Magnetometer, ms(1)).unwrap();
-        host.set_network_state(NetworkState::Connected, ms(1)).unwrap();
-        let mut frames = Vec::new();
-        // Every other frame does not reach the line.
-        let mut lost = Vec::new();
-        while let Some(frame) = host.poll_transmit(ms(1)).map(<[u8]>::to_vec) {
-            if lost.iter().any(|other: &Vec<u8>| other[4] == frame[4]) {
-                frames.push(frame);
-            } else {
-                host.handle_unsent(unsent, ms(1));
-                lost.push(frame);
-            }
-            assert!(frames.len() < 40);
-        }
-        let ids = |frames: &[Vec<u8>]| {
-            let mut ids: Vec<_> = frames.iter().map(|frame| frame[4]).collect();
-            ids.sort_unstable();
-            ids.dedup();
-            ids
-        };
-        assert_eq!(ids(&lost), [1, 2, 3, 6, 7, 8, 10]);
-        assert_eq!(ids(&frames), ids(&lost), "everything has been sent eventually");
-        let indices: Vec<_> = frames.iter().map(|frame| frame[5]).collect();
-        assert_eq!(indices, (0..frames.len() as u8).collect::<Vec<_>>(), "without a gap");
-        let seen = host.statistics();
-        let motor = frames.iter().filter(|frame| frame[4] == 2).count();
-        assert_eq!((seen.commands as usize, seen.pings), (motor, 1));
-        assert_eq!(seen.calibration_retries, 0);
-        let told = events(&mut host).iter().filter(|e| **e == HostEvent::BiasesSent).count();
-        assert_eq!(told, 1, "and reported once");
-    }
-}
-
-#[test]
-fn a_calibration_request_that_never_left_does_not_count_as_an_attempt() {
-    let mut host = begun();
-    host.start_calibration(IMU, ms(10)).unwrap();
-    for at in 10..30 {
-        let frame = host.poll_transmit(ms(at)).unwrap().to_vec();
-        if speed(&frame).is_some() {
-            host.poll_transmit(ms(at)).unwrap();
-        }
-        host.handle_unsent(Unsent::Untouched, ms(at));
-    }
-    let failure = wait(&mut host, ms(5000));
-    assert_eq!(failure.iter().filter(|(_, frame)| frame[4] == 3).count(), 3, "three attempts left");
-    assert_eq!(host.statistics().calibration_retries, 2);
-}
 
 #[test]
 fn an_answer_of_a_robot_that_never_left_is_due_again() {
@@ -79,8 +21,7 @@ fn an_answer_of_a_robot_that_never_left_is_due_again() {
             frames.push(lost);
             assert!(frames.len() <= 8);
         }
-        let ids: Vec<_> = frames.iter().map(|frame| frame[4]).collect();
-        assert_eq!(ids, [3, 4, 9, 1, 6, 7, 8, 5]);
+        assert_eq!(ids(&frames), [3, 4, 9, 1, 6, 7, 8, 5]);
         let seen = robot.statistics();
         assert_eq!((seen.pongs, seen.results, seen.bias_requests, seen.reports), (1, 2, 1, 1));
         // The next report: on schedule, with the next index.
@@ -151,55 +92,6 @@ fn skipped_reports_are_counted_once_even_if_the_next_did_not_leave() {
 }
 
 #[test]
-fn a_failed_flush_repeats_no_acknowledgement() {
-    let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
-    let mut host = Host::with_store(quiet_config(), store, ms(0));
-    host.handle_input(&bytes(imu_bias()), ms(1));
-    host.handle_input(&bytes(BiasRequest {}), ms(1));
-    host.set_network_state(NetworkState::Connected, ms(1)).unwrap();
-    host.stop(ms(1));
-    assert_eq!(sent(&mut host, ms(1)).len(), 4);
-    host.handle_unsent(Unsent::Unflushed, ms(2));
-    let ids: Vec<_> = sent(&mut host, ms(2)).iter().map(|frame| frame[4]).collect();
-    // The robot asks again for the others.
-    assert_eq!(ids, [2, 10]);
-    assert_eq!(host.statistics().commands, 2, "what may have left counts");
-}
-
-#[test]
-fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
-    let mut host = quiet_host();
-    host.start_firmware_update(50, ms(3)).unwrap();
-    assert_eq!(sent(&mut host, ms(3)).len(), 1);
-    host.handle_unsent(Unsent::Unflushed, ms(4));
-    assert_eq!(wait(&mut host, ms(60_000)), [], "it may have arrived");
-    host.stop(ms(60_000));
-    assert_eq!(speeds(&wait(&mut host, ms(60_000))), [(60_000_000, 0)]);
-}
-
-#[test]
-fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut host = begun();
-        host.start_firmware_update(50, ms(10)).unwrap();
-        assert_eq!(sent(&mut host, ms(10)).len(), 2);
-        host.handle_unsent(unsent, ms(11));
-        let ids: Vec<_> = sent(&mut host, ms(11)).iter().map(|frame| frame[4]).collect();
-        assert_eq!(ids, if unsent == Unsent::CutOff { vec![2, 2, 9] } else { vec![2, 9] });
-        assert_eq!(wait(&mut host, ms(60_000)), [], "and then silence");
-
-        // Unless the application has changed its mind.
-        let mut host = begun();
-        host.start_firmware_update(50, ms(10)).unwrap();
-        sent(&mut host, ms(10));
-        host.stop(ms(11));
-        host.handle_unsent(unsent, ms(12));
-        let mut frames = wait(&mut host, ms(500)).into_iter();
-        assert!(frames.all(|(_, frame)| frame[4] == 2), "{unsent:?}");
-    }
-}
-
-#[test]
 fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     robot.calibration_result_imu(imu_bias(), ms(0));
@@ -207,8 +99,7 @@ fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     robot.handle_input(&bytes(Ping {}), ms(0));
     assert_eq!(sent(&mut robot, ms(0)).len(), 4);
     robot.handle_unsent(Unsent::Unflushed, ms(5));
-    let ids: Vec<_> = sent(&mut robot, ms(5)).iter().map(|frame| frame[4]).collect();
-    assert_eq!(ids, [6, 7, 8], "the host pings again");
+    assert_eq!(ids(&sent(&mut robot, ms(5))), [6, 7, 8], "the host pings again");
 }
 
 #[test]
@@ -242,4 +133,20 @@ fn an_answer_of_a_robot_that_is_cut_off_after_a_failed_flush_is_due_again() {
     robot.handle_unsent(Unsent::Unflushed, ms(0));
     robot.handle_unsent(Unsent::CutOff, ms(1));
     assert_eq!(robot.poll_transmit(ms(1)), Some(&lost[..]));
+}
+
+#[test]
+fn an_answer_to_an_update_request_that_did_not_leave_does_not_replace_a_newer_one() {
+    let asks = bytes(OtaRequest::start_firmware_update(50));
+    for unsent in EVERY {
+        let mut robot = quiet_robot();
+        robot.handle_input(&asks, ms(0));
+        assert!(robot.answer_update(OtaStatus::Failed, ms(0)));
+        assert!(!robot.answer_update(OtaStatus::Failed, ms(0)), "answered");
+        robot.poll_transmit(ms(0)).unwrap();
+        robot.handle_input(&asks, ms(1));
+        assert!(robot.answer_update(OtaStatus::Forbidden, ms(1)));
+        robot.handle_unsent(unsent, ms(1));
+        assert_eq!(sent(&mut robot, ms(1)), [bytes(OtaAck::new(OtaStatus::Forbidden))]);
+    }
 }

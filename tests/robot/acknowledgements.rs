@@ -1,0 +1,324 @@
+//! Everything that a role acknowledges is available to its application, however full the queues are
+//! (U15).
+
+use proptest::{collection::vec, prelude::*};
+
+use crate::rig::*;
+
+#[test]
+fn motor_events_never_take_the_room_of_rare_events() {
+    let mut robot = Robot::new(RobotConfig::default(), ms(0));
+    for turn in 0..50 {
+        robot.handle_input(&bytes(go(turn)), ms(turn as u64));
+    }
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(60));
+    robot.handle_input(&bytes(CalibrationEnd::new(IMU)), ms(60));
+    let biases = Biases::new(imu_bias(), mag_bias());
+    robot.handle_input(&bytes(biases), ms(60));
+    let seen = events(&mut robot);
+    assert_eq!(seen.last(), Some(&RobotEvent::Biases(biases)));
+    assert!(seen.contains(&RobotEvent::CalibrationEnd(IMU)));
+}
+
+#[test]
+fn the_newest_motor_event_is_the_latest_command_however_full_the_queue_is() {
+    let mut robot = quiet_robot();
+    for turn in 1..=50 {
+        robot.handle_input(&bytes(go(turn)), ms(turn as u64));
+    }
+    robot.handle_input(&bytes(MotorControl::STOP), ms(51));
+    assert_eq!(events(&mut robot).last(), Some(&RobotEvent::Motor(MotorControl::STOP)));
+}
+
+#[test]
+fn biases_end_their_request_only_if_their_event_has_room() {
+    let mut robot = Robot::new(RobotConfig::default(), ms(0));
+    sent(&mut robot, ms(0));
+    // Other requests of the host, until the queue is full.
+    for version in 40..60 {
+        let request = OtaRequest::start_firmware_update(version);
+        robot.handle_input(&bytes(request), ms(1));
+    }
+    let biases = bytes(Biases::new(imu_bias(), mag_bias()));
+    robot.handle_input(&biases, ms(2));
+    let asked = wait(&mut robot, ms(1500));
+    assert_eq!(asked.iter().filter(|(_, frame)| frame[4] == 8).count(), 1, "it requests again");
+    assert_eq!(events(&mut robot).len(), 16);
+    robot.handle_input(&biases, ms(1600));
+    assert_eq!(events(&mut robot), [RobotEvent::Biases(Biases::new(imu_bias(), mag_bias()))]);
+    assert_eq!(wait(&mut robot, ms(5000)), [], "and then no longer");
+}
+
+#[test]
+fn a_calibration_start_is_acknowledged_only_when_the_application_will_find_it() {
+    let mut robot = quiet_robot();
+    for version in 40..60 {
+        let request = OtaRequest::start_firmware_update(version);
+        robot.handle_input(&bytes(request), ms(1));
+    }
+    let start = bytes(CalibrationStart::new(IMU));
+    let end = bytes(CalibrationEnd::new(IMU));
+    robot.handle_input(&start, ms(2));
+    assert_eq!((sent(&mut robot, ms(2)), robot.calibrating()), (vec![], None));
+    events(&mut robot);
+    robot.handle_input(&start, ms(3));
+    assert_eq!((sent(&mut robot, ms(3)).len(), robot.calibrating()), (1, Some(IMU)));
+    for version in 40..60 {
+        let request = OtaRequest::start_firmware_update(version);
+        robot.handle_input(&bytes(request), ms(4));
+    }
+    robot.handle_input(&end, ms(5));
+    assert_eq!((sent(&mut robot, ms(5)), robot.calibrating()), (vec![], Some(IMU)));
+    events(&mut robot);
+    robot.handle_input(&end, ms(6));
+    assert_eq!((sent(&mut robot, ms(6)).len(), robot.calibrating()), (1, None));
+    assert_eq!(events(&mut robot), [RobotEvent::CalibrationEnd(IMU)]);
+}
+
+#[test]
+fn a_repeated_start_is_reported_with_a_flag() {
+    let mut robot = quiet_robot();
+    let start = bytes(CalibrationStart::new(IMU));
+    robot.handle_input(&start, ms(1));
+    assert_eq!(events(&mut robot), [begins(IMU)]);
+    robot.handle_input(&start, ms(2));
+    robot.handle_input(&start, ms(3));
+    let repeated = RobotEvent::CalibrationStart { kind: IMU, repeated: true };
+    assert_eq!(events(&mut robot), [repeated], "once while it waits");
+    assert_eq!(sent(&mut robot, ms(3)).len(), 1);
+    assert_eq!(robot.statistics().calibration_repeats, 2);
+    // Another kind is another calibration.
+    robot.handle_input(&bytes(CalibrationStart::new(MAG)), ms(4));
+    assert_eq!((events(&mut robot), robot.calibrating()), (vec![begins(MAG)], Some(MAG)));
+}
+
+#[test]
+fn a_calibration_can_be_aborted_by_the_robot() {
+    let mut robot = quiet_robot();
+    assert_eq!(robot.abort_calibration(), None);
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(1));
+    sent(&mut robot, ms(1));
+    events(&mut robot);
+    assert_eq!((robot.abort_calibration(), robot.calibrating()), (Some(IMU), None));
+    // The host's end is acknowledged without effect; its next start is reported.
+    robot.handle_input(&bytes(CalibrationEnd::new(IMU)), ms(2));
+    assert_eq!((sent(&mut robot, ms(2)).len(), events(&mut robot)), (1, vec![]));
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(3));
+    assert_eq!(events(&mut robot), [begins(IMU)]);
+}
+
+#[test]
+fn the_acknowledgement_of_an_older_result_ends_no_new_calibration() {
+    let mut robot = quiet_robot();
+    robot.calibration_result_imu(imu_bias(), ms(0));
+    sent(&mut robot, ms(0));
+    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(1));
+    robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(2));
+    assert_eq!(robot.calibrating(), Some(IMU));
+    robot.handle_input(&bytes(CalibrationEnd::new(IMU)), ms(3));
+    let told = [begins(IMU), RobotEvent::ImuBiasTaken, RobotEvent::CalibrationEnd(IMU)];
+    assert_eq!(events(&mut robot), told);
+}
+
+#[test]
+fn an_acknowledgement_is_not_for_a_result_that_has_not_been_sent() {
+    let mut robot = quiet_robot();
+    robot.calibration_result_imu(imu_bias(), ms(0));
+    robot.calibration_result_mag(mag_bias(), ms(0));
+    robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(1));
+    robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(1));
+    assert_eq!((events(&mut robot), robot.statistics().acks_refused), (vec![], 2));
+    assert_eq!(sent(&mut robot, ms(1)).len(), 2);
+}
+
+#[test]
+fn the_latest_command_and_network_state_have_getters_and_are_the_newest_of_their_events() {
+    let mut robot = quiet_robot();
+    assert_eq!(robot.network_state(), None);
+    for turn in 1..=30_u32 {
+        robot.handle_input(&bytes(go(turn as i16)), ms(turn.into()));
+        let state = SetNetworkState::new(NetworkState::from(turn)).unwrap();
+        robot.handle_input(&bytes(state), ms(turn.into()));
+    }
+    assert_eq!(robot.network_state(), Some(NetworkState::Other(30)));
+    robot.handle_timeout(ms(600));
+    let seen = events(&mut robot);
+    assert!(seen.len() <= 9 && robot.lost_events() == 61 - seen.len() as u32);
+    let newest = |is: fn(&RobotEvent) -> bool| *seen.iter().rfind(|event| is(event)).unwrap();
+    let motion = newest(|event| matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog));
+    assert_eq!(motion, RobotEvent::Watchdog);
+    let network = newest(|event| matches!(event, RobotEvent::NetworkState(_)));
+    assert_eq!(network, RobotEvent::NetworkState(NetworkState::Other(30)));
+}
+
+#[test]
+fn a_calibration_ends_when_its_result_is_acknowledged_and_the_next_start_is_reported() {
+    for kind in [IMU, MAG] {
+        let mut robot = quiet_robot();
+        robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
+        robot.calibration_result_imu(imu_bias(), ms(2));
+        robot.calibration_result_mag(mag_bias(), ms(2));
+        sent(&mut robot, ms(2));
+        // Of the other kind: it ends nothing.
+        let acks =
+            [bytes(ImuBiasAck::new(ErrorCode::Fine)), bytes(MagBiasAck::new(ErrorCode::Fine))];
+        let (own, other) = if kind == IMU { (0, 1) } else { (1, 0) };
+        robot.handle_input(&acks[other], ms(3));
+        assert_eq!(robot.calibrating(), Some(kind));
+        robot.handle_input(&acks[own], ms(4));
+        assert_eq!(robot.calibrating(), None);
+        events(&mut robot);
+        robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(3_600_000));
+        assert_eq!(events(&mut robot), [begins(kind)]);
+    }
+}
+
+/// A single event for a robot.
+#[derive(Clone, Copy, Debug)]
+enum ToRobot {
+    Start(bool),
+    End(bool),
+    Biases(i16),
+    Result(bool, i16),
+    ResultAck(bool),
+    Motor(i16),
+    Network(u8),
+    Update(i16),
+    Abort,
+    Take(usize),
+    Sleep(u32),
+}
+
+fn to_robot() -> impl Strategy<Value = ToRobot> {
+    prop_oneof![
+        2 => any::<bool>().prop_map(ToRobot::Start),
+        2 => any::<bool>().prop_map(ToRobot::End),
+        2 => (0..5_i16).prop_map(ToRobot::Biases),
+        2 => (any::<bool>(), 0..5_i16).prop_map(|(imu, value)| ToRobot::Result(imu, value)),
+        2 => any::<bool>().prop_map(ToRobot::ResultAck),
+        3 => (-100..=100_i16).prop_map(ToRobot::Motor),
+        2 => (0..5_u8).prop_map(ToRobot::Network),
+        3 => (0..100_i16).prop_map(ToRobot::Update),
+        1 => Just(ToRobot::Abort),
+        2 => (0..18_usize).prop_map(ToRobot::Take),
+        1 => (0..600_000_u32).prop_map(ToRobot::Sleep),
+    ]
+}
+
+/// Whether the bias request is still repeated.
+fn asks(robot: &Robot) -> bool {
+    let mut robot = robot.clone();
+    let end = robot.poll_timeout().unwrap_or(ms(0)) + Duration::from_millis(2000);
+    wait(&mut robot, end).iter().any(|(_, frame)| frame[4] == 8)
+}
+
+fn newest_calibration(robot: &Robot) -> Option<RobotEvent> {
+    let is = |event: &RobotEvent| {
+        matches!(event, RobotEvent::CalibrationStart { .. } | RobotEvent::CalibrationEnd(_))
+    };
+    waiting(robot).into_iter().rfind(is)
+}
+
+proptest! {
+    #[test]
+    fn a_robot_loses_nothing_that_it_acknowledges_or_stops_requesting(
+        calls in vec(to_robot(), 1..120),
+    ) {
+        let mut now = ms(0);
+        let mut robot = Robot::new(RobotConfig::default(), now);
+        sent(&mut robot, now);
+        for call in calls {
+            match call {
+                ToRobot::Start(is_imu) => {
+                    let kind = kind(is_imu);
+                    robot.handle_input(&bytes(CalibrationStart::new(kind)), now);
+                    let acks = sent(&mut robot, now).iter().filter(|it| it[4] == 3).count();
+                    let told = matches!(
+                        newest_calibration(&robot),
+                        Some(RobotEvent::CalibrationStart { kind: told, .. }) if told == kind
+                    );
+                    prop_assert_eq!(acks == 1, told && robot.calibrating() == Some(kind));
+                }
+                ToRobot::End(is_imu) => {
+                    let kind = kind(is_imu);
+                    let is_running = robot.calibrating() == Some(kind);
+                    robot.handle_input(&bytes(CalibrationEnd::new(kind)), now);
+                    let acks = sent(&mut robot, now).iter().filter(|it| it[4] == 4).count();
+                    let told = newest_calibration(&robot) == Some(RobotEvent::CalibrationEnd(kind));
+                    prop_assert!(!is_running || (acks == 1) == told);
+                    prop_assert!(!is_running || (acks == 1) == robot.calibrating().is_none());
+                }
+                ToRobot::Biases(value) => {
+                    let imu = ImuBias::new([value; 3], [0; 3]);
+                    let biases = Biases::new(imu, mag_bias());
+                    let asked = asks(&robot);
+                    robot.handle_input(&bytes(biases), now);
+                    let told = waiting(&robot).contains(&RobotEvent::Biases(biases));
+                    prop_assert!(!asked || asks(&robot) != told);
+                }
+                ToRobot::Result(true, value) => {
+                    robot.calibration_result_imu(ImuBias::new([value; 3], [0; 3]), now);
+                }
+                ToRobot::Result(false, value) => {
+                    robot.calibration_result_mag(MagBias::new([value; 3]), now);
+                }
+                ToRobot::ResultAck(is_imu) => {
+                    let count = |robot: &Robot, event| {
+                        waiting(robot).into_iter().filter(|it| *it == event).count()
+                    };
+                    let repeats = |robot: &Robot, id| {
+                        let mut robot = robot.clone();
+                        let frames = wait(&mut robot, now + Duration::from_millis(2000));
+                        frames.iter().any(|(_, frame)| frame[4] == id)
+                    };
+                    let fine = ErrorCode::Fine;
+                    let (id, event, ack) = match is_imu {
+                        true => (6, RobotEvent::ImuBiasTaken, bytes(ImuBiasAck::new(fine))),
+                        false => (7, RobotEvent::MagBiasTaken, bytes(MagBiasAck::new(fine))),
+                    };
+                    let (before, repeated) = (count(&robot, event), repeats(&robot, id));
+                    robot.handle_input(&ack, now);
+                    let told = count(&robot, event) > before;
+                    prop_assert_eq!(repeated && !repeats(&robot, id), told);
+                }
+                ToRobot::Motor(speed) => {
+                    robot.handle_input(&bytes(go(speed)), now);
+                    let is = |event: &RobotEvent| {
+                        matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog)
+                    };
+                    if let Some(event) = waiting(&robot).into_iter().rfind(is) {
+                        prop_assert_eq!(event, RobotEvent::Motor(go(speed)));
+                    }
+                }
+                ToRobot::Network(state) => {
+                    let state = NetworkState::from(u32::from(state));
+                    robot.handle_input(&bytes(SetNetworkState::new(state).unwrap()), now);
+                    prop_assert_eq!(robot.network_state(), Some(state));
+                }
+                ToRobot::Update(version) => {
+                    let request = OtaRequest::start_firmware_update(version);
+                    let by = UpdateSource::Request;
+                    let event = RobotEvent::UpdateRequested { version, by };
+                    // Answered earlier, so that only this request can be answered now.
+                    robot.answer_update(OtaStatus::Forbidden, now);
+                    robot.handle_input(&bytes(request), now);
+                    let told = waiting(&robot).contains(&event);
+                    prop_assert!(told || !robot.clone().answer_update(OtaStatus::Forbidden, now));
+                }
+                ToRobot::Abort => drop(robot.abort_calibration()),
+                ToRobot::Take(count) => drop(events_up_to(&mut robot, count)),
+                ToRobot::Sleep(micros) => {
+                    let end = now + Duration::from_micros(micros);
+                    wait(&mut robot, end);
+                    now = end;
+                }
+            }
+            robot.handle_timeout(now);
+            sent(&mut robot, now);
+        }
+    }
+}
+
+fn events_up_to(robot: &mut Robot, count: usize) -> Vec<RobotEvent> {
+    std::iter::from_fn(|| robot.poll_event()).take(count).collect()
+}
