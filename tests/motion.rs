@@ -11,26 +11,19 @@
 #[cfg(feature = "ucp")]
 #[path = "motion/host.rs"]
 mod host;
-/// A framing that breaks its contract.
-#[path = "motion/lying_framing.rs"]
-mod lying_framing;
 /// The master.
 #[path = "motion/master.rs"]
 mod master;
 #[path = "harness/port.rs"]
 #[allow(dead_code, reason = "io.rs uses more of it")]
 mod port;
-/// Frames that must not be sent.
-#[cfg(feature = "ucp")]
-#[path = "motion/refused_frames.rs"]
-mod refused_frames;
 /// The robot.
 #[cfg(feature = "ucp")]
 #[path = "motion/robot.rs"]
 mod robot;
 #[cfg(feature = "ucp")]
 #[path = "harness/rover_rig.rs"]
-#[allow(dead_code, unused_imports, reason = "host and robot use more of it")]
+#[allow(dead_code, unused_imports, unused_macros, reason = "host and robot use more of it")]
 mod rover_rig;
 /// The slave.
 #[path = "motion/slave.rs"]

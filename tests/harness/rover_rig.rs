@@ -175,6 +175,19 @@ pub(crate) fn quiet_robot_at(now: Instant) -> Robot {
     Robot::new(config, now)
 }
 
+/// Each act of a fresh role adds one to each of these counts, and changes no other.
+macro_rules! assert_counted {
+    ($new:expr; $($name:literal: $($count:ident),* => |$role:ident| $act:block)+) => {$({
+        let mut role = $new;
+        let mut expected = *role.statistics();
+        let $role = &mut role;
+        $act
+        $(expected.$count += 1;)*
+        assert_eq!(*role.statistics(), expected, $name);
+    })+};
+}
+pub(crate) use assert_counted;
+
 /// A store that refuses some results: by how many of their kind came before.
 pub(crate) struct Picky {
     pub(crate) kept: MemoryStore,

@@ -1,118 +1,72 @@
 //! Counts: each event changes its own count by one and no other.
 
-use axlewire::ucp::robot::RobotStatistics;
-
 use crate::rig::*;
 
 #[test]
 fn every_event_of_a_robot_is_counted_once_and_in_one_place() {
-    type Act = fn(&mut Robot);
-    type Count = fn(&mut RobotStatistics) -> &mut u32;
-    let table: [(&str, Act, &[Count]); 13] = [
-        ("a command", |robot| robot.handle_input(&bytes(go(1)), ms(1)), &[|it| &mut it.commands]),
-        (
-            "a command whose turn is clamped",
-            |robot| robot.handle_input(&careless(100, -101, 0, 0), ms(1)),
-            &[|it| &mut it.commands, |it| &mut it.commands_clamped],
-        ),
-        (
-            "a command that would start an update",
-            |robot| robot.handle_input(&careless(1, 1, 0, 39), ms(1)),
-            &[|it| &mut it.commands_refused],
-        ),
-        (
-            "the watchdog",
-            |robot| {
-                robot.handle_input(&bytes(go(1)), ms(1));
-                robot.handle_timeout(ms(501));
-                robot.handle_timeout(ms(2000));
-            },
-            &[|it| &mut it.commands, |it| &mut it.watchdog],
-        ),
-        (
-            "two pings that share a pong, which leaves the second time only",
-            |robot| {
-                robot.handle_input(&bytes(Ping {}), ms(1));
-                robot.handle_input(&bytes(Ping {}), ms(1));
-                robot.poll_transmit(ms(1)).unwrap();
-                robot.handle_unsent(Unsent::Untouched, ms(1));
-                sent(robot, ms(1));
-            },
-            &[|it| &mut it.pings, |it| &mut it.pings, |it| &mut it.pongs],
-        ),
-        (
-            "a start, repeated",
-            |robot| {
-                for _ in 0..2 {
-                    robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(1));
-                }
-            },
-            &[|it| &mut it.calibration_repeats],
-        ),
-        (
-            "an end of another calibration than the one that runs",
-            |robot| {
+    assert_counted! {
+        quiet_robot();
+        "a command": commands => |robot| {
+            robot.handle_input(&bytes(go(1)), ms(1));
+        }
+        "a command whose turn is clamped": commands, commands_clamped => |robot| {
+            robot.handle_input(&careless(100, -101, 0, 0), ms(1));
+        }
+        "a command that would start an update": commands_refused => |robot| {
+            robot.handle_input(&careless(1, 1, 0, 39), ms(1));
+        }
+        "the watchdog": commands, watchdog => |robot| {
+            robot.handle_input(&bytes(go(1)), ms(1));
+            robot.handle_timeout(ms(501));
+            robot.handle_timeout(ms(2000));
+        }
+        "two pings that share a pong, which leaves the second time only":
+            pings, pings, pongs
+        => |robot| {
+            robot.handle_input(&bytes(Ping {}), ms(1));
+            robot.handle_input(&bytes(Ping {}), ms(1));
+            robot.poll_transmit(ms(1)).unwrap();
+            robot.handle_unsent(Unsent::Untouched, ms(1));
+            sent(robot, ms(1));
+        }
+        "a start, repeated": calibration_repeats => |robot| {
+            for _ in 0..2 {
                 robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(1));
-                robot.handle_input(&bytes(CalibrationEnd::new(MAG)), ms(1));
-                assert_eq!(robot.calibrating(), Some(IMU));
-            },
-            &[|it| &mut it.calibration_refused],
-        ),
-        (
-            "a start of unknown kind",
-            |robot| {
-                let kind = CalibrationKind::Other(9);
-                robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
-                assert_eq!(robot.calibrating(), None);
-            },
-            &[|it| &mut it.calibration_refused],
-        ),
-        (
-            "a result of each kind",
-            |robot| {
-                robot.calibration_result_imu(imu_bias(), ms(1));
-                robot.calibration_result_mag(mag_bias(), ms(1));
-                sent(robot, ms(1));
-            },
-            &[|it| &mut it.results, |it| &mut it.results],
-        ),
-        (
-            "acknowledgements of nothing",
-            |robot| {
-                robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(1));
-                robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(1));
-            },
-            &[|it| &mut it.acks_refused, |it| &mut it.acks_refused],
-        ),
-        (
-            "a report, after two that were skipped",
-            |robot| {
-                robot.set_telemetry(&Telemetry::default(), ms(0));
-                sent(robot, ms(59));
-            },
-            &[|it| &mut it.reports, |it| &mut it.reports_skipped, |it| &mut it.reports_skipped],
-        ),
-        (
-            "an unknown frame",
-            |robot| {
-                let mut buffer = [0; 64];
-                let frame = RawFrame { id: 0x20, index: 0, body: &[1] };
-                robot.handle_input(frame.encode(&mut buffer).unwrap(), ms(1));
-            },
-            &[|it| &mut it.unknown],
-        ),
-        (
-            "a frame of a robot",
-            |robot| robot.handle_input(&report(0), ms(1)),
-            &[|it| &mut it.misdirected],
-        ),
-    ];
-    for (name, act, counts) in table {
-        let mut robot = quiet_robot();
-        let mut expected = RobotStatistics::default();
-        act(&mut robot);
-        counts.iter().for_each(|count| *count(&mut expected) += 1);
-        assert_eq!(*robot.statistics(), expected, "{name}");
+            }
+        }
+        "an end of another calibration than the one that runs": calibration_refused => |robot| {
+            robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(1));
+            robot.handle_input(&bytes(CalibrationEnd::new(MAG)), ms(1));
+            assert_eq!(robot.calibrating(), Some(IMU));
+        }
+        "a start of unknown kind": calibration_refused => |robot| {
+            let kind = CalibrationKind::Other(9);
+            robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
+            assert_eq!(robot.calibrating(), None);
+        }
+        "a result of each kind": results, results => |robot| {
+            robot.calibration_result_imu(imu_bias(), ms(1));
+            robot.calibration_result_mag(mag_bias(), ms(1));
+            sent(robot, ms(1));
+        }
+        "acknowledgements of nothing": acks_refused, acks_refused => |robot| {
+            robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(1));
+            robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(1));
+        }
+        "a report, after two that were skipped":
+            reports, reports_skipped, reports_skipped
+        => |robot| {
+            robot.set_telemetry(&Telemetry::default(), ms(0));
+            sent(robot, ms(59));
+        }
+        "an unknown frame": unknown => |robot| {
+            let mut buffer = [0; 64];
+            let frame = RawFrame { id: 0x20, index: 0, body: &[1] };
+            robot.handle_input(frame.encode(&mut buffer).unwrap(), ms(1));
+        }
+        "a frame of a robot": misdirected => |robot| {
+            robot.handle_input(&report(0), ms(1));
+        }
     }
 }
 

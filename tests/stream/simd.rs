@@ -6,12 +6,12 @@ use axlewire::{
         self, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
         three,
     },
-    stream::{Counters, Decoder, Event, Portable, Reason},
+    stream::Portable,
     ucp::{self, Body, Ucp},
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::{checked_line, hostile_streams, known_framings::Known, oracle};
+use crate::{checked_line, hostile_streams, known_framings::Known, oracle, rig};
 
 /// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {
@@ -153,28 +153,12 @@ fn decoders_with_and_without_batches_agree() {
     let noise = [0xAA, 0x55, 0x00, 0xBB, 0x12].repeat(100);
     let stream = [&noise[..], &responses(3), &noise, &exchanges(3)].concat();
     for chunk in [1, 64, 200, 5000] {
+        let chunks: Vec<_> = stream.chunks(chunk).collect();
         assert_eq!(
-            events::<ikeya::BothDirections>(&stream, chunk),
-            events::<Portable<ikeya::BothDirections>>(&stream, chunk)
+            rig::seen::<ikeya::BothDirections, 8>(&chunks, true),
+            rig::seen::<Portable<ikeya::BothDirections>, 8>(&chunks, true)
         );
     }
-}
-
-/// The bytes of a frame, or length and reason of a gap.
-type Seen = Result<Vec<u8>, (u64, Reason)>;
-
-fn events<F: Known>(stream: &[u8], chunk: usize) -> (Vec<Seen>, Counters) {
-    let mut decoder = Decoder::<F, 8>::new();
-    let mut events = Vec::new();
-    for mut piece in stream.chunks(chunk) {
-        while let Some(event) = decoder.decode(&mut piece) {
-            events.push(match event {
-                Event::Frame(frame) => Ok(F::bytes(&frame).to_vec()),
-                Event::Skipped(gap) => Err((gap.len, gap.reason)),
-            });
-        }
-    }
-    (events, decoder.counters())
 }
 
 #[test]

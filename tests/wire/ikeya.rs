@@ -152,7 +152,7 @@ fn a_speed_converts_between_its_units() {
     assert_eq!(Rps::new(-2.5).unwrap().rpm(), -150.0);
     let turn = Rps::from_rad_per_s(core::f32::consts::TAU).unwrap();
     assert_eq!((turn.get(), turn.rad_per_s()), (1.0, core::f32::consts::TAU));
-    assert_eq!(f32::from(Rps::ZERO), 0.0);
+    assert_eq!((f32::from(Rps::ZERO), f32::from(Rps::new(-2.5).unwrap())), (0.0, -2.5));
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert!(Rps::new(bad).is_err() && Rps::from_rpm(bad).is_err());
         assert!(Rps::from_rad_per_s(bad).is_err() && Rps::try_from(bad).is_err());
@@ -207,6 +207,7 @@ fn a_position_out_of_range_is_an_error_and_never_a_wrap_or_a_clamp() {
         assert_eq!(Position::from_counts_euclidean(counts), Err(error));
     }
     assert_eq!(Position::from_revolutions(32768.0), Err(truncating(268_435_456)));
+    assert_eq!(Position::from_revolutions(-32769.0), Err(truncating(-268_443_648)));
     assert_eq!(Position::from_revolutions(1e9), Err(truncating(8_192_000_000_000)));
     assert_eq!(Position::from_revolutions(-1e300), Err(truncating(i64::MIN)));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -240,6 +241,7 @@ fn dip_switches_are_read_as_configured_and_never_guessed() {
     assert_eq!("0101".parse::<DipSwitch>().unwrap().mode(), Mode::Position);
     for bits in 0..=u8::MAX {
         let Ok(dip) = DipSwitch::from_bits(bits) else {
+            assert_eq!(DipSwitch::from_bits(bits), Err(EncodeError::DipSwitch { bits }));
             assert!(bits > 15);
             continue;
         };
@@ -276,11 +278,6 @@ fn one_rps_read_as_a_position_is_16256_turns() {
     assert_eq!(write.as_position(), Position::new(0, 16_256));
     let write = WriteRequest::position(NodeId::N1, Position::new(0, -1));
     assert!(write.as_velocity().is_nan());
-}
-
-#[test]
-fn a_speed_becomes_an_f32_as_it_is() {
-    assert_eq!(f32::from(Rps::new(-2.5).unwrap()), -2.5);
 }
 
 #[cfg(feature = "arbitrary")]

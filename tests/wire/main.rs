@@ -2,6 +2,9 @@
 
 mod captures;
 mod crc16;
+#[path = "../harness/dice.rs"]
+#[allow(dead_code, reason = "only bytes are random here")]
+mod dice;
 mod ikeya;
 mod layout;
 mod motor_commands;

@@ -24,7 +24,8 @@ fn a_speed_or_turn_out_of_range_is_an_error_with_the_value_and_the_limits() {
             Err(found) => assert!(!legal && found == error),
         }
     }
-    let error = MotorControl::new(0, -101).unwrap_err();
+    let error = EncodeError::Percent { value: -101, min: -100, max: 100 };
+    assert_eq!(MotorControl::new(-101, 200), Err(error), "the speed first");
     assert_eq!(error.to_string(), "-101 is outside -100..=100");
 }
 
@@ -85,7 +86,7 @@ fn received(speed: i16, angular: i16, front_led: i16, version: u16) -> RawMotorC
 }
 
 #[test]
-fn a_received_command_can_be_sent_only_if_it_is_in_range_and_starts_no_update() {
+fn a_motor_command_cast_from_bytes_neither_starts_an_update_nor_is_out_of_range() {
     for version in 0..=u16::MAX {
         let command = MotorControl::try_from(received(10, 20, 100, version));
         if received(10, 20, 100, version).starts_update() {
@@ -109,7 +110,7 @@ fn a_received_command_can_be_sent_only_if_it_is_in_range_and_starts_no_update() 
 }
 
 #[test]
-fn foreign_bytes_are_relayed_only_by_an_explicit_call() {
+fn a_motor_command_copied_from_a_received_frame_is_not_sent_as_it_is() {
     let bytes = frame(2, 0, zerocopy::IntoBytes::as_bytes(&received(130, -500, 7, 99)));
     let mut buffer = [0; 64];
     let view = Frame::parse(&bytes).unwrap();
@@ -117,6 +118,11 @@ fn foreign_bytes_are_relayed_only_by_an_explicit_call() {
     assert_eq!(view.relay_unchecked().encode(&mut buffer), Ok(&bytes[..]));
     let Message::MotorControl(command) = view.message() else { panic!() };
     assert_eq!((command.speed(), command.version(), command.starts_update()), (130, 99, true));
+    assert!(MotorControl::try_from(*command).is_err());
+    // In range and without an update, only speed, turn and lamp are copied.
+    let command = MotorControl::try_from(received(50, -10, 1, 0)).unwrap();
+    let harmless = MotorControl::new(50, -10).unwrap().with_front_led(true);
+    assert_eq!(command.frame(7).as_bytes(), harmless.frame(7).as_bytes());
 }
 
 #[test]

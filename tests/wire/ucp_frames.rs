@@ -7,7 +7,7 @@ use axlewire::{
     crc16,
     encode::Encode,
     error::{EncodeError, ParseError},
-    stream::{Event, Frames, Reason},
+    stream::{Frames, Reason},
     ucp::{
         Body, Frame, FrameOf, Header, Message, MotorControl, RawFrame, Ucp,
         message::{CalibrationKind, CalibrationStart, ErrorCode, Ping, Pong},
@@ -63,18 +63,7 @@ fn every_length_field_is_judged_by_the_cap() {
 }
 
 #[test]
-fn a_frame_behind_a_repeated_sync_byte_is_found() {
-    let mut line = vec![0xFD, 0xFD, 0xFD, 0xFF];
-    line.extend(frame(1, 0, &[]));
-    let mut decoder = axlewire::ucp::Decoder::new();
-    let mut input = &line[..];
-    let Some(Event::Skipped(gap)) = decoder.decode(&mut input) else { panic!() };
-    assert_eq!((gap.len, gap.reason), (4, Reason::Header));
-    assert!(matches!(decoder.decode(&mut input), Some(Event::Frame(frame)) if frame.id() == 1));
-}
-
-#[test]
-fn a_frame_cast_from_bytes_with_the_header_of_another_is_not_encoded() {
+fn a_frame_cast_from_bytes_is_not_sent_under_an_id_that_is_not_its_bodys() {
     use zerocopy::TryFromBytes;
     let mut buffer = [0xEE; 64];
     for id in 0..=u8::MAX {

@@ -12,10 +12,17 @@ use axlewire::{
     stream::{Counters, Event, Frames, Framing, Reason},
     ucp::{
         self, Body, Message, RawFrame,
-        message::{CalibrationKind, ErrorCode, NetworkState, OtaStatus, Report},
+        message::{
+            Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind, CalibrationStart,
+            CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck,
+            MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Pong,
+            RawMotorControl, Report, SetNetworkState,
+        },
     },
 };
 use serde_json::Value;
+
+use crate::rig::{frame, hex};
 
 struct Vector {
     protocol: String,
@@ -253,99 +260,81 @@ fn every_ucp_vector_decodes_to_its_fields_and_encodes_back() {
 
 /// Compares the fields, builds the frame again from them, and names the message.
 fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
+    fn built(body: impl Body, index: u8) -> Vec<u8> {
+        body.frame(index).as_bytes().to_vec()
+    }
     let index = frame.index();
     let err = || ErrorCode::from(int::<u8>(&fields["err"]));
     let kind = || CalibrationKind::from(int::<u8>(&fields["type"]));
+    let imu = || ImuBias::new(ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
+    let mag = || MagBias::new(ints(&fields["mag_bias"]));
+    let state = || NetworkState::from(int::<u32>(&fields["state"]));
     let (name, again) = match frame.message() {
-        Message::Ping(ping) => ("Ping", ping.frame(index).as_bytes().to_vec()),
+        Message::Ping(ping) => ("Ping", built(*ping, index)),
         Message::Pong(pong) => {
             assert_eq!(pong.err(), err());
-            ("Pong", ucp::message::Pong::new(err()).frame(index).as_bytes().to_vec())
+            ("Pong", built(Pong::new(err()), index))
         }
         Message::MotorControl(command) => ("MotorControl", motor_control(command, fields, index)),
         Message::CalibrationStart(start) => {
             assert_eq!(start.kind(), kind());
-            (
-                "CalibrationStart",
-                ucp::message::CalibrationStart::new(kind()).frame(index).as_bytes().to_vec(),
-            )
+            ("CalibrationStart", built(CalibrationStart::new(kind()), index))
         }
         Message::CalibrationStartAck(ack) => {
             assert_eq!((ack.kind(), ack.err()), (kind(), err()));
-            let ack = ucp::message::CalibrationStartAck::new(kind(), err());
-            ("CalibrationStartAck", ack.frame(index).as_bytes().to_vec())
+            ("CalibrationStartAck", built(CalibrationStartAck::new(kind(), err()), index))
         }
         Message::CalibrationEnd(end) => {
             assert_eq!(end.kind(), kind());
-            (
-                "CalibrationEnd",
-                ucp::message::CalibrationEnd::new(kind()).frame(index).as_bytes().to_vec(),
-            )
+            ("CalibrationEnd", built(CalibrationEnd::new(kind()), index))
         }
         Message::CalibrationEndAck(ack) => {
             assert_eq!((ack.kind(), ack.err()), (kind(), err()));
-            let ack = ucp::message::CalibrationEndAck::new(kind(), err());
-            ("CalibrationEndAck", ack.frame(index).as_bytes().to_vec())
+            ("CalibrationEndAck", built(CalibrationEndAck::new(kind(), err()), index))
         }
-        Message::Report(report) => (
-            match report {
-                Report::Firmware(_) => "FirmwareReport",
-                Report::Document(_) => "DocumentReport",
-            },
-            telemetry(report, fields, index),
-        ),
+        Message::Report(report) => telemetry(report, fields, index),
         Message::ImuBias(bias) => {
             let (acc, gyro) = (ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
             assert_eq!((bias.acc(), bias.gyro()), (acc, gyro));
-            ("ImuBias", ucp::message::ImuBias::new(acc, gyro).frame(index).as_bytes().to_vec())
+            ("ImuBias", built(imu(), index))
         }
         Message::ImuBiasAck(ack) => {
             assert_eq!(ack.err(), err());
-            ("ImuBiasAck", ucp::message::ImuBiasAck::new(err()).frame(index).as_bytes().to_vec())
+            ("ImuBiasAck", built(ImuBiasAck::new(err()), index))
         }
         Message::MagBias(bias) => {
-            let mag = ints(&fields["mag_bias"]);
-            assert_eq!(bias.mag(), mag);
-            ("MagBias", ucp::message::MagBias::new(mag).frame(index).as_bytes().to_vec())
+            assert_eq!(bias.mag(), ints(&fields["mag_bias"]));
+            ("MagBias", built(mag(), index))
         }
         Message::MagBiasAck(ack) => {
             assert_eq!(ack.err(), err());
-            ("MagBiasAck", ucp::message::MagBiasAck::new(err()).frame(index).as_bytes().to_vec())
+            ("MagBiasAck", built(MagBiasAck::new(err()), index))
         }
-        Message::BiasRequest(request) => ("BiasRequest", request.frame(index).as_bytes().to_vec()),
+        Message::BiasRequest(request) => ("BiasRequest", built(*request, index)),
         Message::Biases(biases) => {
-            let imu =
-                ucp::message::ImuBias::new(ints(&fields["acc_bias"]), ints(&fields["gyro_bias"]));
-            let mag = ucp::message::MagBias::new(ints(&fields["mag_bias"]));
-            assert_eq!((biases.imu(), biases.mag(), biases.err()), (imu, mag, err()));
-            let again = ucp::message::Biases::new(imu, mag).with_err(err());
-            ("Biases", again.frame(index).as_bytes().to_vec())
+            assert_eq!((biases.imu(), biases.mag(), biases.err()), (imu(), mag(), err()));
+            ("Biases", built(Biases::new(imu(), mag()).with_err(err()), index))
         }
         Message::OtaRequest(request) => {
             let version = int(&fields["version"]);
             assert_eq!(request.version(), version);
-            let again = ucp::message::OtaRequest::start_firmware_update(version);
-            ("OtaRequest", again.frame(index).as_bytes().to_vec())
+            ("OtaRequest", built(OtaRequest::start_firmware_update(version), index))
         }
         Message::OtaAck(ack) => {
             let status = OtaStatus::from(int::<u8>(&fields["err"]));
             assert_eq!(ack.status(), status);
-            ("OtaAck", ucp::message::OtaAck::new(status).frame(index).as_bytes().to_vec())
+            ("OtaAck", built(OtaAck::new(status), index))
         }
         Message::SetNetworkState(message) => {
-            let state = NetworkState::from(int::<u32>(&fields["state"]));
-            assert_eq!((message.state(), &fields["state_width"]), (state, &1.into()));
-            let again = ucp::message::SetNetworkState::new(state).unwrap();
-            ("SetNetworkState", again.frame(index).as_bytes().to_vec())
+            assert_eq!((message.state(), &fields["state_width"]), (state(), &1.into()));
+            ("SetNetworkState", built(SetNetworkState::new(state()).unwrap(), index))
         }
         Message::SetNetworkStateWide(message) => {
-            let state = NetworkState::from(int::<u32>(&fields["state"]));
-            assert_eq!((message.state(), &fields["state_width"]), (state, &4.into()));
-            ("SetNetworkStateWide", message.frame(index).as_bytes().to_vec())
+            assert_eq!((message.state(), &fields["state_width"]), (state(), &4.into()));
+            ("SetNetworkStateWide", built(*message, index))
         }
         Message::Unknown(raw) => {
-            let hex: String = raw.body.iter().map(|byte| format!("{byte:02x}")).collect();
-            assert_eq!(fields["body"].as_str().unwrap(), hex);
+            assert_eq!(fields["body"].as_str().unwrap(), hex(raw.body));
             // A known id with an invalid body: delivered, never sent (U3, U13).
             let refusal = RawFrame { ..raw }.encode(&mut [0; 64]).unwrap_err();
             assert_eq!(refusal, EncodeError::KnownId { id: frame.id() });
@@ -358,7 +347,7 @@ fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
 }
 
 /// Constructors build legal values and refuse illegal ones (U7); a copy keeps every field.
-fn motor_control(command: &ucp::message::RawMotorControl, fields: &Value, index: u8) -> Vec<u8> {
+fn motor_control(command: &RawMotorControl, fields: &Value, index: u8) -> Vec<u8> {
     let (speed, angular) = (int::<i16>(&fields["speed"]), int::<i16>(&fields["angular"]));
     assert_eq!((command.speed(), command.angular()), (speed, angular));
     assert_eq!(command.front_led(), int::<i16>(&fields["front_led"]));
@@ -378,16 +367,13 @@ fn motor_control(command: &ucp::message::RawMotorControl, fields: &Value, index:
             || command.reserve1() != 0
             || command.reserve2() != 0;
         let lamp = ![0, 100].contains(&command.front_led());
-        assert_eq!(ucp::message::RawMotorControl::from(ordinary) == *command, !reserved && !lamp);
+        assert_eq!(RawMotorControl::from(ordinary) == *command, !reserved && !lamp);
     }
     assert_eq!(ucp::MotorControl::try_from(*command).is_ok(), legal && !command.starts_update());
-    let mut frame = vec![0xFD, 0xFF, 20, 0, 2, index];
-    frame.extend(zerocopy::IntoBytes::as_bytes(command));
-    frame.extend(axlewire::crc16::compute(&frame).to_le_bytes());
-    frame
+    frame(2, index, zerocopy::IntoBytes::as_bytes(command))
 }
 
-fn telemetry(report: Report<'_>, fields: &Value, index: u8) -> Vec<u8> {
+fn telemetry(report: Report<'_>, fields: &Value, index: u8) -> (&'static str, Vec<u8>) {
     let telemetry = ucp::Telemetry {
         battery_pct: int(&fields["battery_pct"]),
         rpm: ints(&fields["rpm"]),
@@ -405,12 +391,14 @@ fn telemetry(report: Report<'_>, fields: &Value, index: u8) -> Vec<u8> {
             assert_eq!(fields["layout"], "firmware-36");
             let version = int(&fields["version"]);
             assert_eq!(report.version(), Some(version));
-            ucp::message::FirmwareReport::new(&telemetry, version).frame(index).as_bytes().to_vec()
+            let again = FirmwareReport::new(&telemetry, version).frame(index);
+            ("FirmwareReport", again.as_bytes().to_vec())
         }
         Report::Document(_) => {
             assert_eq!(fields["layout"], "wiki-34");
             assert_eq!(report.version(), None);
-            ucp::message::DocumentReport::new(&telemetry).frame(index).as_bytes().to_vec()
+            let again = DocumentReport::new(&telemetry).frame(index);
+            ("DocumentReport", again.as_bytes().to_vec())
         }
     }
 }

@@ -3,10 +3,9 @@
 use std::error::Error;
 
 use axlewire::{
-    encode::Encode,
     error::{EncodeError, ParseError},
-    ikeya::{self, Mode, NodeId, Position, ReadRequest, Rps, slave::DipSwitch},
-    ucp::{self, MotorControl, RawFrame},
+    ikeya::{self, Mode, NodeId},
+    ucp,
 };
 
 /// Each error has its text, and no error behind it.
@@ -62,48 +61,6 @@ fn an_error_of_a_value_names_the_value_and_its_limits() {
             "header (id 0x05, length 40) does not match its body",
         ),
     ]);
-}
-
-#[test]
-fn a_refused_value_is_an_error_with_that_value() {
-    let (min, max) = (-268_443_647, 268_435_455);
-    assert_eq!(NodeId::new(0), Err(EncodeError::NodeId { value: 0 }));
-    assert_eq!(DipSwitch::from_bits(16), Err(EncodeError::DipSwitch { bits: 16 }));
-    let value = f64::INFINITY;
-    assert_eq!(Rps::new(f32::INFINITY), Err(EncodeError::NotFinite { value }));
-    assert_eq!(Position::from_revolutions(value), Err(EncodeError::NotFinite { value }));
-    for (counts, revolutions) in [(268_435_456, 32_768.0), (-268_443_648, -32_769.0)] {
-        let out = Err(EncodeError::Position { counts: counts.into(), min, max });
-        assert_eq!(Position::from_counts(counts), out);
-        assert_eq!(Position::from_revolutions(revolutions), out);
-    }
-    let counts = 8192 * 1_000_000;
-    let far = Err(EncodeError::Position { counts, min, max });
-    assert_eq!(Position::from_revolutions(1e6), far);
-    let far = Err(EncodeError::Position { counts: -counts, min, max });
-    assert_eq!(Position::from_revolutions(-1e6), far);
-
-    let percent = |value, min| Err(EncodeError::Percent { value, min, max: 100 });
-    assert_eq!(MotorControl::new(-101, 200), percent(-101, -100), "the speed first");
-    assert_eq!(MotorControl::new(0, 101), percent(101, -100));
-    for turn in [MotorControl::turn_left, MotorControl::turn_right] {
-        assert_eq!(turn(50, -1), percent(-1, 0));
-        assert_eq!(turn(50, 101), percent(101, 0));
-        assert_eq!(turn(101, 5), percent(101, -100));
-    }
-
-    let mut buffer = [0xEE; 11];
-    let too_small = Err(EncodeError::BufferTooSmall { needed: 4, available: 3 });
-    assert_eq!(ReadRequest::new(NodeId::N1).encode(&mut buffer[..3]), too_small);
-    let raw = |id, body| RawFrame { id, index: 0, body };
-    let too_small = Err(EncodeError::BufferTooSmall { needed: 12, available: 11 });
-    assert_eq!(raw(0x20, &[1; 4]).encode(&mut buffer), too_small);
-    let too_long = Err(EncodeError::BodyTooLong { length: 57, limit: 56 });
-    assert_eq!(raw(0x20, &[1; 57]).encode(&mut buffer), too_long);
-    assert_eq!(raw(10, &[]).encode(&mut buffer), Err(EncodeError::KnownId { id: 10 }));
-    let nested = Err(EncodeError::NestedHeader { at: 7 });
-    assert_eq!(raw(0x20, &[0, 0xFD, 0xFF]).encode(&mut buffer), nested);
-    assert_eq!(buffer, [0xEE; 11], "an error writes nothing");
 }
 
 #[test]
