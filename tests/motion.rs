@@ -7,24 +7,9 @@
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
-/// The host of a rover.
-#[cfg(feature = "ucp")]
-#[path = "motion/host.rs"]
-mod host;
 /// The master.
 #[path = "motion/master.rs"]
 mod master;
-#[path = "harness/port.rs"]
-#[allow(dead_code, reason = "io.rs uses more of it")]
-mod port;
-/// The robot.
-#[cfg(feature = "ucp")]
-#[path = "motion/robot.rs"]
-mod robot;
-#[cfg(feature = "ucp")]
-#[path = "harness/rover_rig.rs"]
-#[allow(dead_code, unused_imports, unused_macros, reason = "host and robot use more of it")]
-mod rover_rig;
 /// The slave.
 #[path = "motion/slave.rs"]
 mod slave;

@@ -41,6 +41,14 @@ mod pin_in_a_driver;
 mod rounds;
 #[cfg(feature = "ucp")]
 mod rover;
+#[cfg(feature = "ucp")]
+mod rover_host;
+#[cfg(feature = "ucp")]
+#[path = "../harness/rover_rig.rs"]
+#[allow(dead_code, unused_imports, unused_macros, reason = "host and robot use more of it")]
+mod rover_rig;
+#[cfg(feature = "ucp")]
+mod rover_robot;
 #[cfg(all(unix, feature = "serialport"))]
 mod serial_port;
 mod slow_port;

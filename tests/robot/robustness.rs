@@ -108,7 +108,8 @@ proptest! {
                     sent(&mut robot, now);
                 }
             }
-            let expected = last.filter(|(_, at)| now - *at < Duration::from_millis(500)).map_or((0, 0), |it| it.0);
+            let valid = last.filter(|(_, at)| now - *at < Duration::from_millis(500));
+            let expected = valid.map_or((0, 0), |it| it.0);
             let command = robot.command(now);
             prop_assert_eq!((command.speed(), command.angular()), expected);
         }
