@@ -34,12 +34,18 @@ fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
     assert_eq!(result!(unplugged, ping, ping_async(soon)), Err(GONE));
     assert_eq!(result!(unplugged, drive, drive_async(5, 5)), Err(GONE));
     assert_eq!(result!(unplugged, drive_for, drive_for_async(5, 5, span)), Err(GONE));
-    assert_eq!(result!(unplugged, stop, stop_async()), Err(GONE));
-    assert_eq!(result!(unplugged, next_report, next_report_async(soon)), Err(GONE));
     let begun = result!(unplugged, start_calibration, start_calibration_async(IMU, soon));
     assert_eq!(begun, Err(GONE));
     let ended = result!(unplugged, end_calibration, end_calibration_async(IMU, soon));
     assert_eq!(ended, Err(GONE));
+    for is_async in BOTH {
+        let mut rover = unplugged();
+        // A report is not waited for; a stop is retried for 100 ms.
+        let report = call!(is_async, rover, next_report, next_report_async(soon));
+        assert_eq!((report, rover.now()), (Err(GONE), at_ms(0)));
+        assert_eq!(call!(is_async, rover, stop, stop_async()), Err(GONE));
+        assert!((100_000..102_000).contains(&rover.now().as_micros()), "{:?}", rover.now());
+    }
 }
 
 #[test]

@@ -19,7 +19,7 @@ use axlewire::{
 use crate::{
     pin::{Pin, is_on},
     port::{Port, Step, Unplugged, Wakes, World},
-    rig::{BOTH, Bus, Running, at_ms, host, ms, on, run},
+    rig::{BOTH, Bus, GONE, Running, at_ms, host, ms, on, run},
 };
 
 // The calls under test.
@@ -208,6 +208,10 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
         // The first frame is a motor command.
         let id = rover.port().written.get(4);
         assert_eq!(id, Some(&2), "a thousand stops, but not a byte");
+        // A call that needs an answer fails.
+        let deadline = rover.now() + ms(50);
+        let report = call!(is_async, rover, next_report, next_report_async(deadline));
+        assert_eq!(report, Err(GONE));
     }
 }
 

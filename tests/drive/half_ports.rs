@@ -7,7 +7,7 @@ use embedded_io::Write;
 use crate::{
     port::Port,
     recorder::Recorder,
-    rig::{BOTH, GONE, at_ms, host, on, robot, rps, slave},
+    rig::{BOTH, GONE, at_ms, on, robot, rps, slave},
 };
 
 #[test]
@@ -53,21 +53,5 @@ fn a_command_of_a_rover_counts_although_its_reports_cannot_be_sent() {
         let mut next = || call!(is_async, driver, next_command, next_command_async(deadline));
         assert_eq!(next(), Ok(Some(command)));
         assert_eq!(next(), Err(GONE));
-    }
-}
-
-#[cfg(feature = "ucp")]
-#[test]
-fn a_stop_of_a_rover_that_has_left_is_done_although_the_receiver_fails() {
-    for is_async in BOTH {
-        let mut rover = host();
-        rover.port_mut().is_deaf = true;
-        let stopped = call!(is_async, rover, stop, stop_async());
-        assert_eq!(stopped, Ok(()));
-        assert_eq!(rover.port().written[4], 2);
-        // Calls that need the answer fail.
-        let deadline = at_ms(50);
-        let report = call!(is_async, rover, next_report, next_report_async(deadline));
-        assert_eq!(report, Err(GONE));
     }
 }

@@ -15,7 +15,7 @@ use axlewire::{
 
 use crate::{
     port::{Port, Step, World},
-    rig::{BOTH, BYTE_US, GONE, Rover, Running, at_ms, events, ms, on, rover},
+    rig::{BOTH, BYTE_US, Rover, Running, at_ms, events, ms, on, rover},
 };
 
 /// The rover as it is.
@@ -244,22 +244,6 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
         assert_eq!(next(at_ms(1000)), Ok(Some(MotorControl::STOP)));
         assert!(world.now() < at_ms(510));
         assert_eq!(robot.poll_event(), None::<RobotEvent>);
-    }
-}
-
-#[test]
-fn a_vanished_port_is_an_error_of_every_call_of_the_host() {
-    for is_async in BOTH {
-        let (world, mut rover, _) = story();
-        rover.port().unplugged.set(true);
-        let deadline = after(&world, 1000);
-        assert_eq!(call!(is_async, rover, ping, ping_async(deadline)).map(drop), Err(GONE));
-        assert_eq!(call!(is_async, rover, drive, drive_async(10, 0)), Err(GONE));
-        let report = call!(is_async, rover, next_report, next_report_async(deadline));
-        assert_eq!((report, world.now()), (Err(GONE), at_ms(0)));
-        // A stop is retried for 100 ms.
-        assert_eq!(call!(is_async, rover, stop, stop_async()), Err(GONE));
-        assert!((100_000..102_000).contains(&world.now_us()), "{:?}", world.now());
     }
 }
 

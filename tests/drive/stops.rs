@@ -4,8 +4,8 @@ use axlewire::{
     drive::DriveError,
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, WriteRequest,
-        master::{CommandError, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        NodeId, WriteRequest,
+        master::{MasterConfig, MasterEvent, NodeSet, StopProgress},
     },
     time::{Duration, Instant},
 };
@@ -149,19 +149,6 @@ fn drive_for_of_a_lost_node_ends_with_the_owed_stop() {
         story.world.add(move || unplugged.set(world.now() >= lost));
         assert_eq!(drive_for(&mut story, ms(5000), is_async), Err(OWED_2));
         assert!(story.world.now() < lost + ms(500), "at once, not at the end of its time");
-    }
-}
-
-#[test]
-fn drive_for_that_is_refused_sends_nothing() {
-    for is_async in BOTH {
-        let mut story = Story::new(manual()).discovered();
-        let error = CommandError::WrongMode { node: NodeId::N5, mode: Mode::Position };
-        let driven =
-            call!(is_async, story.bus, drive_for, drive_for_async(NodeId::N5, rps(1.0), ms(5)));
-        assert_eq!(driven, Err(error.into()));
-        assert_eq!(story.bus.role().statistics().writes, 0);
-        assert_eq!(story.bus.role().stops_owed(), NodeSet::NONE);
     }
 }
 

@@ -137,6 +137,13 @@ impl World {
 
     /// The task is woken when a byte arrives.
     pub(super) fn sleep_until_byte<T>(&self, wire: &Wire, context: &Context<'_>) -> Poll<T> {
+        let is_here = |(until, waker): &(Until, Waker)| {
+            matches!(until, Until::Byte(it) if Rc::ptr_eq(it, wire))
+                && waker.will_wake(context.waker())
+        };
+        if self.0.sleepers.borrow().iter().any(is_here) {
+            return Poll::Pending;
+        }
         self.sleep(Until::Byte(wire.clone()), context)
     }
 
