@@ -72,6 +72,13 @@ pub mod endpoint;
 pub mod error;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod events;
+// Its page is about both protocols.
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+#[cfg_attr(
+    not(all(feature = "ikeya", feature = "ucp")),
+    doc = "The fields of messages as a table."
+)]
+pub mod fields;
 #[cfg(feature = "ikeya")]
 pub mod ikeya;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
@@ -84,9 +91,6 @@ mod map;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
 // Pages, not code.
-#[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
-#[doc = include_str!("fields.md")]
-pub mod fields {}
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 pub mod guide;
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]

@@ -133,6 +133,7 @@
 mod batch;
 pub mod board;
 mod contents;
+pub(crate) mod fields;
 mod framing;
 mod judge;
 pub mod master;

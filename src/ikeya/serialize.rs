@@ -5,11 +5,16 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 use super::{
     board::{OneMotor, Status, ThreeMotors},
     contents::{Motors, Values},
+    fields::{COUNT, NODE, PAYLOAD, ROTATION, RPS},
     framing::{Packet, Request, Response},
     three::{Packet as PacketOfThree, Request as RequestOfThree, Response as ResponseOfThree},
     units::{NodeId, Position},
 };
-use crate::{map::Fields, text::Hex};
+use crate::{
+    fields::record::{BYTES, LENGTH, MESSAGE, PROTOCOL},
+    map::Fields,
+    text::Hex,
+};
 
 /// What the packets of both kinds of boards have in common.
 struct Parts<'a> {
@@ -46,15 +51,15 @@ serialized! {
 
 impl Fields for Parts<'_> {
     fn put<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
-        map.serialize_entry("length", &self.bytes.len())?;
-        map.serialize_entry("protocol", self.protocol)?;
-        map.serialize_entry("message", self.message)?;
-        map.serialize_entry("node", &self.node)?;
+        map.serialize_entry(LENGTH.name, &self.bytes.len())?;
+        map.serialize_entry(PROTOCOL.name, self.protocol)?;
+        map.serialize_entry(MESSAGE.name, self.message)?;
+        map.serialize_entry(NODE.name, &self.node)?;
         self.values.put(map)?;
         if let (Values::Command(..), [_, _, payload @ .., _, _]) = (&self.values, self.bytes) {
-            map.serialize_entry("payload", &Hex(payload))?;
+            map.serialize_entry(PAYLOAD.name, &Hex(payload))?;
         }
-        map.serialize_entry("bytes", &Hex(self.bytes))
+        map.serialize_entry(BYTES.name, &Hex(self.bytes))
     }
 }
 
@@ -85,10 +90,10 @@ impl Fields for Values {
         match self {
             Self::None => Ok(()),
             Self::Command(speed, position) => {
-                map.serialize_entry("rps", &Speeds(speed))?;
+                map.serialize_entry(RPS.name, &Speeds(speed))?;
                 positions(position, map)
             }
-            Self::Speeds(speed) => map.serialize_entry("rps", &Speeds(speed)),
+            Self::Speeds(speed) => map.serialize_entry(RPS.name, &Speeds(speed)),
             Self::Positions(position) => positions(position, map),
         }
     }
@@ -98,12 +103,12 @@ impl Fields for Values {
 fn positions<M: SerializeMap>(positions: &Motors<Position>, map: &mut M) -> Result<(), M::Error> {
     match positions {
         Motors::One([position]) => {
-            map.serialize_entry("count", &position.count())?;
-            map.serialize_entry("rotation", &position.rotation())
+            map.serialize_entry(COUNT.name, &position.count())?;
+            map.serialize_entry(ROTATION.name, &position.rotation())
         }
         Motors::Three(positions) => {
-            map.serialize_entry("count", &positions.map(Position::count))?;
-            map.serialize_entry("rotation", &positions.map(Position::rotation))
+            map.serialize_entry(COUNT.name, &positions.map(Position::count))?;
+            map.serialize_entry(ROTATION.name, &positions.map(Position::rotation))
         }
     }
 }

@@ -23,11 +23,14 @@
 //! * `[u8; 2]`: the bytes on the wire, little-endian.
 //! * `as u16`: the value in them: an integer of 8, 16 or 32 bits, a code, or an array of those.
 //! * `= "field_ms"`: its key in JSON.
-//! * `in "ms"`: its unit in text, `field 40 ms`; optional.
+//! * `in "ms"`: its unit in text, `field 40 ms`; optional. `raw "0.1 V"` instead: what 1 is, where
+//!   the text has the number alone.
+//! * `by "U11"`: the ruling that decides it; optional.
 //!
-//! The struct, `new`, a getter of each field, text and data are made of these: a *plain* message.
-//! With `;` in place of the fields, the body is written by hand, with `Print` in `contents` and
-//! `Fields` in `serialize`: for a range, a layout of its own, or a rule for what may be sent.
+//! The struct, `new`, a getter of each field, text, data and the entry in
+//! [`FIELDS`](crate::fields::FIELDS) are made of these: a *plain* message. With `;` in place of the
+//! fields, the body is written by hand, with `Print` in `contents` and its fields in `fields`: for a
+//! range, a layout of its own, or a rule for what may be sent.
 //!
 //! It does not compile if two bodies of an id have one length, if a body is longer than 56 bytes,
 //! or if a key is one that every frame has. The roles do not send it: that is for them to say.
@@ -60,8 +63,8 @@ macro_rules! catalogue {
 
                 /// Robot to host, answers a ping: `err`, 1 byte.
                 to_host "pong" Pong(&'a Pong) {
-                    /// Whether the ping arrived undamaged (ruling U12).
-                    err: u8 as ErrorCode = "err",
+                    /// Whether the ping arrived undamaged.
+                    err: u8 as ErrorCode = "err" by "U12",
                 }
             }
 
@@ -75,15 +78,15 @@ macro_rules! catalogue {
                 /// Host to robot, begins a calibration: `type`, 1 byte (ruling U11).
                 to_robot "calibration_start" CalibrationStart(&'a CalibrationStart) {
                     /// Sensors to be calibrated.
-                    kind: u8 as CalibrationKind = "type",
+                    kind: u8 as CalibrationKind = "type" by "U11",
                 }
 
                 /// Robot to host, answers the start at once: `type | err`, 2 bytes.
                 to_host "calibration_start_ack" CalibrationStartAck(&'a CalibrationStartAck) {
                     /// Sensors being calibrated.
-                    kind: u8 as CalibrationKind = "type",
+                    kind: u8 as CalibrationKind = "type" by "U11",
                     /// Whether the request arrived undamaged.
-                    err: u8 as ErrorCode = "err",
+                    err: u8 as ErrorCode = "err" by "U12",
                 }
             }
 
@@ -92,7 +95,7 @@ macro_rules! catalogue {
                 /// Host to robot, ends a calibration: `type`, 1 byte (ruling U11).
                 to_robot "calibration_end" CalibrationEnd(&'a CalibrationEnd) {
                     /// Sensors that were calibrated.
-                    kind: u8 as CalibrationKind = "type",
+                    kind: u8 as CalibrationKind = "type" by "U11",
                 }
 
                 /// Robot to host, answers the end at once: `type | err`, 2 bytes.
@@ -100,9 +103,9 @@ macro_rules! catalogue {
                 /// The vendor firmware returns the type of the last *start* here.
                 to_host "calibration_end_ack" CalibrationEndAck(&'a CalibrationEndAck) {
                     /// Sensors that were calibrated.
-                    kind: u8 as CalibrationKind = "type",
+                    kind: u8 as CalibrationKind = "type" by "U11",
                     /// Whether the request arrived undamaged.
-                    err: u8 as ErrorCode = "err",
+                    err: u8 as ErrorCode = "err" by "U12",
                 }
             }
 
@@ -118,16 +121,16 @@ macro_rules! catalogue {
                 ///
                 /// Repeated every 1000 ms until acknowledged; the robot does not store it (U11).
                 to_host "imu_bias" ImuBias(&'a ImuBias) {
-                    /// Accelerometer biases x, y, z, raw.
-                    acc: [[u8; 2]; 3] as [i16; 3] = "acc_bias",
-                    /// Gyroscope biases x, y, z, raw.
-                    gyro: [[u8; 2]; 3] as [i16; 3] = "gyro_bias",
+                    /// Bias of the accelerometer x, y, z.
+                    acc: [[u8; 2]; 3] as [i16; 3] = "acc_bias" raw "1/16384 g" by "U11",
+                    /// Bias of the gyroscope x, y, z.
+                    gyro: [[u8; 2]; 3] as [i16; 3] = "gyro_bias" raw "1/16.4 °/s" by "U11",
                 }
 
                 /// Host to robot, acknowledges an [`ImuBias`]: `err`, 1 byte.
                 to_robot "imu_bias_ack" ImuBiasAck(&'a ImuBiasAck) {
                     /// Whether it arrived undamaged; the vendor firmware ignores it.
-                    err: u8 as ErrorCode = "err",
+                    err: u8 as ErrorCode = "err" by "U12",
                 }
             }
 
@@ -138,14 +141,14 @@ macro_rules! catalogue {
                 ///
                 /// Repeated every 1000 ms until acknowledged; the robot does not store it (U11).
                 to_host "mag_bias" MagBias(&'a MagBias) {
-                    /// Magnetometer biases x, y, z, raw.
-                    mag: [[u8; 2]; 3] as [i16; 3] = "mag_bias",
+                    /// Bias of the magnetometer x, y, z.
+                    mag: [[u8; 2]; 3] as [i16; 3] = "mag_bias" raw "sensor count" by "U11",
                 }
 
                 /// Host to robot, acknowledges a [`MagBias`]: `err`, 1 byte.
                 to_robot "mag_bias_ack" MagBiasAck(&'a MagBiasAck) {
                     /// Whether it arrived undamaged; the vendor firmware ignores it.
-                    err: u8 as ErrorCode = "err",
+                    err: u8 as ErrorCode = "err" by "U12",
                 }
             }
 
@@ -166,7 +169,7 @@ macro_rules! catalogue {
                 /// byte. Shipped robots never send it.
                 to_host "ota_ack" OtaAck(&'a OtaAck) {
                     /// The robot's decision on the request.
-                    status: u8 as OtaStatus = "err",
+                    status: u8 as OtaStatus = "err" by "U4",
                 }
             }
 

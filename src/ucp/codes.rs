@@ -3,7 +3,10 @@
 use core::fmt::{self, Write};
 
 use super::{catalogue::catalogue_of_codes, value::Value};
-use crate::text::Line;
+use crate::{
+    fields::field::{Kind, Typed},
+    text::Line,
+};
 
 /// Codes with names for some values; `Other` keeps the rest as received and prints as a number
 /// behind a word.
@@ -74,6 +77,11 @@ macro_rules! codes {
                     }
                 }
             }
+        }
+
+        impl Typed for $name {
+            const KIND: Kind = <$raw>::KIND;
+            const VALUES: &'static [(u32, &'static str)] = &[$(($value, $text)),+];
         }
 
         impl fmt::Display for $name {

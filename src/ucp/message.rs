@@ -48,7 +48,7 @@ impl defmt::Format for Frame {
 }
 
 /// What a variant of [`Message`] holds.
-trait Held<'a>: Sized {
+pub(super) trait Held<'a>: Sized {
     /// Lengths of the bodies that it can be, bytes.
     const LENGTHS: &'static [usize];
 

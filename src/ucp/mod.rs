@@ -147,6 +147,7 @@ mod body;
 mod catalogue;
 mod codes;
 mod contents;
+pub(crate) mod fields;
 mod frame;
 mod framing;
 mod header;

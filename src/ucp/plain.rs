@@ -57,6 +57,10 @@ macro_rules! plain_body {
             fn print(&self, _: &mut $crate::text::Line<'_>, _: &'static str) {}
         }
 
+        impl $crate::ucp::value::Described for $name {
+            const LAYOUTS: &'static [$crate::ucp::value::Layout] = &[&[]];
+        }
+
         #[cfg(feature = "serde")]
         impl $crate::map::Fields for $name {
             fn put<M: serde::ser::SerializeMap>(&self, _: &mut M) -> Result<(), M::Error> {
@@ -66,8 +70,9 @@ macro_rules! plain_body {
     };
 
     ($(#[$doc:meta])* $name:ident($id:ident) {$(
-        $(#[$field_doc:meta])*
-        $field:ident: $wire:ty as $value:ty = $key:literal $(in $unit:literal)?,
+        $(#[doc = $field_doc:literal])*
+        $field:ident: $wire:ty as $value:ty = $key:literal
+            $(in $unit:literal)? $(raw $raw_unit:literal)? $(by $source:literal)?,
     )+}) => {
         $crate::ucp::plain::body! {
             $(#[$doc])*
@@ -83,7 +88,7 @@ macro_rules! plain_body {
             }
 
             $(
-                $(#[$field_doc])*
+                $(#[doc = $field_doc])*
                 #[must_use]
                 pub fn $field(&self) -> $value {
                     $crate::ucp::value::Value::from_wire(self.$field)
@@ -96,6 +101,15 @@ macro_rules! plain_body {
                 $crate::ucp::value::List::new(line, before)
                     $(.value(stringify!($field), self.$field(), concat!($($unit)?)))+;
             }
+        }
+
+        impl $crate::ucp::value::Described for $name {
+            const LAYOUTS: &'static [$crate::ucp::value::Layout] = &[&[&[$(
+                $crate::fields::field::field! {
+                    $(#[doc = $field_doc])*
+                    $key: $value, $($unit)? $($raw_unit)? by concat!($($source)?)
+                }
+            ),+]]];
         }
 
         #[cfg(feature = "serde")]

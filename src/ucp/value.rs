@@ -1,6 +1,6 @@
 //! Values in a body: their bytes on the wire, and their text.
 
-use crate::text::Line;
+use crate::{fields::field::Field, text::Line};
 
 /// A value of a field.
 pub(super) trait Value: Copy {
@@ -23,6 +23,19 @@ pub(super) trait Print {
     /// Appends the values on one line, with `before` in front of them. A body without values
     /// appends nothing.
     fn print(&self, line: &mut Line<'_>, before: &'static str);
+}
+
+/// The fields of a body, in parts.
+pub(super) type Layout = &'static [&'static [Field]];
+
+/// A body that says what its fields are.
+pub(super) trait Described {
+    /// Its layouts, each of another length.
+    const LAYOUTS: &'static [Layout];
+}
+
+impl<B: Described> Described for &B {
+    const LAYOUTS: &'static [Layout] = B::LAYOUTS;
 }
 
 /// Appends values, separated by commas.

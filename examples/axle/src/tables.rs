@@ -1,28 +1,28 @@
 //! Frames and gaps of a capture as rows of typed columns: a table per message, and one of gaps.
 //!
-//! Tables and columns are known before the first byte is read, from the schema of `decode --json`.
-//! So a batch of rows is all that is held, and a [`Sink`] takes it in: a file format, or a plot.
-//! A message that the schema has not, or a layout of one, gets a table of its own when it comes.
+//! Tables and columns are known before the first byte is read: they are the fields of the library.
+//! So a batch of rows is all that is held, and a [`Sink`] takes it in: a file format.
 
 mod column;
 mod described;
-mod own;
 mod row;
+
+use axlewire::fields::Shape;
 
 use crate::{
     args::Protocol,
     failure::Failure,
-    listing::{LineClock, Modes, Out, Place, REASONS, Shown, SkippedBytes, Style},
+    listing::{Modes, Place, REASONS, Shown, SkippedBytes},
 };
+use column::Unfit;
 #[cfg(feature = "parquet")]
 pub(crate) use column::Values;
 pub(crate) use column::{Cell, Column};
-pub(crate) use described::Type;
+use described::Described;
 #[cfg(feature = "mcap")]
 pub(crate) use described::json_schema;
-use described::{Described, Field, Kind};
-use own::Line;
-use row::{Row, Slot, Unfit};
+pub(crate) use described::name;
+use row::{Row, Slot};
 
 /// Rows of a table after which they go to the sink.
 const BATCH: usize = 64 * 1024;
@@ -48,15 +48,12 @@ pub(crate) struct Table {
     pub(crate) numbers: Vec<u64>,
     /// Where each field of a frame goes, behind the columns of its place.
     slots: Vec<Slot>,
-    /// Of a table that the schema does not have: its fields, and their first columns behind those
-    /// of the place.
-    own: Vec<(Field, usize)>,
 }
 
 /// All tables.
 #[derive(Debug)]
 pub(crate) struct Tables {
-    /// By protocol; then the gaps, and last those that the schema does not have.
+    /// By protocol; then the gaps.
     all: Vec<Table>,
     /// The first of each protocol.
     first: [usize; 3],
@@ -78,19 +75,19 @@ const PLACE: [&str; 4] = ["offset", "t", "interface", "direction"];
 
 impl Tables {
     /// Empty tables. Without times there are no columns of time, interface and direction.
-    pub(crate) fn new(has_times: bool) -> Result<Self, Failure> {
-        let Some(described) = described::all() else { return Err(bug()) };
-        let mut all: Vec<_> = described.into_iter().map(|it| Table::new(it, has_times)).collect();
+    pub(crate) fn new(has_times: bool) -> Self {
+        let described = described::all().into_iter();
+        let mut all: Vec<_> = described.map(|it| Table::new(it, has_times)).collect();
         let place = |table: &Table| table.protocol.map_or(3, |protocol| protocol as usize);
         all.sort_by_key(place);
         let first = [0, 1, 2].map(|protocol| all.partition_point(|it| place(it) < protocol));
-        Ok(Self { all, first, last: 0, has_times, count: 0, is_full: false, unfit: None })
+        Self { all, first, last: 0, has_times, count: 0, is_full: false, unfit: None }
     }
 
     /// Adds a frame. `modes` are those of the nodes in front of it.
     pub(crate) fn frame<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) {
         let name = frame.name();
-        let is_its = |table: &Table| table.is_of(S::PROTOCOL, name) && table.own.is_empty();
+        let is_its = |table: &Table| (table.protocol, table.message) == (Some(S::PROTOCOL), name);
         if !self.all.get(self.last).is_some_and(is_its) {
             let first = self.first.get(S::PROTOCOL as usize).copied().unwrap_or_default();
             let its = self.all.iter().skip(first).position(is_its);
@@ -102,40 +99,9 @@ impl Tables {
             let columns = columns.get_mut(from..).unwrap_or_default();
             frame.serialize(Row { slots, columns, whole: frame.bytes(), mode })
         });
-        if added.is_err()
-            && let Err(unfit) = self.line(at, frame, modes)
-        {
+        if let Err(unfit) = added {
             self.unfit = Some(unfit);
         }
-    }
-
-    /// Adds a frame that is not as the schema says, as its line: to a table of such lines, which is
-    /// made if there is none.
-    #[cold]
-    fn line<S: Shown>(&mut self, at: Place, frame: &S, modes: &Modes) -> Result<(), Unfit> {
-        let mut out = Out::default();
-        Style::Json.frame(&mut out, &mut LineClock::default(), at, frame, modes);
-        let line = Line::read(&out.0).ok_or(Unfit)?;
-        let name = frame.name();
-        let mut layouts = 0;
-        for table in 0..self.all.len() {
-            let Some(known) = self.all.get(table) else { break };
-            if known.is_of(S::PROTOCOL, name) {
-                layouts += 1;
-                let is_own = !known.own.is_empty();
-                if is_own && self.add(table, at, |table, from| table.line(from, &line)).is_ok() {
-                    return Ok(());
-                }
-            }
-        }
-        let all = described::all().ok_or(Unfit)?;
-        let new = own::describe(&all, Some(S::PROTOCOL), name, &line).ok_or(Unfit)?;
-        let mut table = Table::of_lines(new, self.has_times);
-        if layouts > 0 {
-            table.name = format!("{}-{}", table.name, layouts + 1);
-        }
-        self.all.push(table);
-        self.add(self.all.len() - 1, at, |table, from| table.line(from, &line))
     }
 
     /// Adds a gap.
@@ -212,46 +178,21 @@ impl Tables {
 }
 
 impl Table {
-    fn is_of(&self, protocol: Protocol, message: &str) -> bool {
-        self.protocol == Some(protocol) && self.message == message
-    }
-
-    /// A table whose rows are added as lines.
-    fn of_lines(of: Described, has_times: bool) -> Self {
-        let fields = of.fields.clone();
-        let mut table = Self::new(of, has_times);
-        for slot in core::mem::take(&mut table.slots) {
-            let field = fields.iter().find(|field| field.name == slot.name && slot.width > 0);
-            table.own.extend(field.map(|field| (field.clone(), slot.first)));
-        }
-        table
-    }
-
     fn new(of: Described, has_times: bool) -> Self {
         let (mut columns, mut slots, mut place) = (Vec::new(), Vec::new(), 0);
-        for field in of.fields {
-            let (name, unit, is_optional) = (field.name, field.unit, field.is_optional);
-            let is_place = PLACE.contains(&&*name);
+        for (field, names) in of.fields {
+            let name = field.name;
+            let is_place = PLACE.contains(&name);
             let first = columns.len() - place;
-            if IN_THE_NAME.contains(&&*name) {
+            if IN_THE_NAME.contains(&name) {
                 // No line of a table would differ from another.
             } else if !is_place || has_times || name == "offset" {
-                let mut column = |name: String, kind, is_optional| {
-                    columns.push(Column::new(name, kind, unit, is_optional));
+                let titles = match field.shape {
+                    Shape::One => vec![name.to_owned()],
+                    Shape::Array(len) => (0..len).map(|at| format!("{name}_{at}")).collect(),
+                    Shape::Object(keys) => keys.iter().map(|key| format!("{name}_{key}")).collect(),
                 };
-                match field.kind {
-                    Kind::One(kind) => column(name.to_string(), kind, is_optional),
-                    Kind::Array(kind, len) => {
-                        for at in 0..len {
-                            column(format!("{name}_{at}"), kind.clone(), is_optional);
-                        }
-                    }
-                    Kind::Object(kind, names) => {
-                        for of in names {
-                            column(format!("{name}_{of}"), kind.clone(), true);
-                        }
-                    }
-                }
+                columns.extend(titles.into_iter().map(|it| Column::new(it, &field, names.clone())));
             }
             if is_place {
                 place = columns.len();
@@ -262,7 +203,7 @@ impl Table {
         }
         let name = name(of.protocol, of.message);
         let (protocol, message, numbers) = (of.protocol, of.message, Vec::new());
-        Self { name, protocol, message, columns, numbers, slots, own: Vec::new() }
+        Self { name, protocol, message, columns, numbers, slots }
     }
 
     /// Fills the columns of a place, and returns their number.
@@ -290,17 +231,9 @@ impl Table {
     }
 }
 
-/// The name of a table: protocol and message, or `skipped`.
-pub(crate) fn name(protocol: Option<Protocol>, message: &str) -> String {
-    match protocol {
-        Some(protocol) => format!("{}.{message}", protocol.name()),
-        None => message.to_owned(),
-    }
-}
-
 /// What the tests exclude.
 fn bug() -> Failure {
-    let line = "the tool has a bug: a frame has a field that decode.schema.json has not";
+    let line = "the tool has a bug: a frame has a field that the table of fields has not";
     Failure::Failed(line.to_owned())
 }
 

@@ -50,7 +50,7 @@ impl TableFile for Csv {
     }
 }
 
-/// As in JSON, without quotes: only a text may have a comma, and then it has those of CSV.
+/// As in JSON, without quotes: no value has a comma.
 fn print(out: &mut Out, cell: Cell<'_>) {
     match cell {
         Cell::Integer(value) => out.text(itoa::Buffer::new().format(value)),
@@ -60,17 +60,6 @@ fn print(out: &mut Out, cell: Cell<'_>) {
         Cell::Float(f32::NEG_INFINITY) => out.text("-inf"),
         // Writing to memory does not fail.
         Cell::Float(value) => drop(serde_json::to_writer(&mut out.0, &value)),
-        Cell::Double(value) if value.is_nan() => out.text("nan"),
-        Cell::Double(f64::INFINITY) => out.text("inf"),
-        Cell::Double(f64::NEG_INFINITY) => out.text("-inf"),
-        Cell::Double(value) => drop(serde_json::to_writer(&mut out.0, &value)),
-        Cell::Flag(value) => out.text(if value { "true" } else { "false" }),
-        Cell::Text(text) if text.is_empty() || text.contains([',', '"', '\n', '\r']) => {
-            out.text("\"");
-            out.text(&text.replace('"', "\"\""));
-            out.text("\"");
-        }
-        Cell::Text(text) => out.text(text),
         Cell::Time(micros) => crate::listing::seconds(out, micros),
         Cell::Name(name) => out.text(name),
         Cell::Bytes(bytes) => {

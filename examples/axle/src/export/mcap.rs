@@ -75,7 +75,7 @@ impl Topics {
         for mark in sheet.marks.iter_mut().flat_map(|marks| marks.drain(..)) {
             let line = sheet.out.0.get(begin..mark.end).unwrap_or_default();
             begin = mark.end;
-            let channel_id = self.topic(mark.protocol, mark.message, line)?;
+            let channel_id = self.topic(mark.protocol, mark.message)?;
             if let Some(micros) = mark.at.micros {
                 self.latest = Some(micros.checked_mul(1000).ok_or(Trouble::Late)?);
             }
@@ -96,62 +96,16 @@ impl Topics {
         &mut self,
         protocol: Option<Protocol>,
         message: &'static str,
-        line: &[u8],
     ) -> Result<u16, mcap::McapError> {
         let key = (protocol.map(Protocol::name), message);
         if let Some(known) = self.known.get(&key) {
             return Ok(*known);
         }
         let name = tables::name(protocol, message);
-        let schema = tables::json_schema(protocol, message, line).unwrap_or_default();
+        let schema = tables::json_schema(protocol, message);
         let schema = self.writer.add_schema(&name, "jsonschema", schema.as_bytes())?;
         let id = self.writer.add_channel(schema, &name, "json", &BTreeMap::new())?;
         self.known.insert(key, id);
         Ok(id)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        decode::Mark,
-        listing::{Modes, Place, Shown},
-        tables::tests::{Added, lamp},
-    };
-
-    #[test]
-    fn a_message_that_the_schema_has_not_has_a_schema_of_its_first_line() {
-        let path = std::env::temp_dir().join(format!("axle-{}-lamp.mcap", std::process::id()));
-        let file = BufWriter::new(std::fs::File::create(&path).unwrap());
-        let writer = WriteOptions::new().compression(None).create(file).unwrap();
-        let mut topics = Topics { writer, known: BTreeMap::new(), count: 0, latest: None };
-        let (style, lamp) = (Style::Json, lamp());
-        let added = Added("set_lamp", &lamp);
-        let mut sheet = Sheet::new(Some(style));
-        let (at, mut clock) = (Place::default(), Default::default());
-        style.frame(&mut sheet.out, &mut clock, at, &added, &Modes::default());
-        let (end, protocol) = (sheet.out.0.len(), Some(Added::PROTOCOL));
-        sheet.marks = Some(vec![Mark { end, at, protocol, message: "set_lamp" }]);
-        assert!(topics.write(&mut sheet).is_ok());
-        topics.writer.finish().unwrap();
-        drop(topics);
-        let bytes = std::fs::read(&path).unwrap();
-        std::fs::remove_file(path).unwrap();
-        let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().collect();
-        let message = messages[0].as_ref().unwrap();
-        assert_eq!((messages.len(), &*message.channel.topic), (1, "ucp.set_lamp"));
-        let schema = message.channel.schema.as_ref().unwrap();
-        let schema: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
-        let property = |name: &str| schema["properties"][name].clone();
-        let types =
-            ["index", "colour", "is_on", "name", "bytes"].map(|it| property(it)["type"].clone());
-        assert_eq!(types, ["integer", "integer", "boolean", "string", "string"]);
-        assert_eq!(property("t_c")["items"]["type"], "integer");
-        let speed = serde_json::json!([{"type": "number"}, {"enum": ["nan", "inf", "-inf"]}]);
-        assert_eq!(property("watts")["oneOf"], speed);
-        assert_eq!(property("by")["properties"]["left"]["oneOf"], speed);
-        assert_eq!(property("index")["unit"], "frame");
-        assert_eq!(property("colour")["unit"], "unknown");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::{fs::File, ops::Range, path::Path, sync::Arc};
 
+use axlewire::fields::Kind;
 use bytes::Bytes;
 use parquet::{
     basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physical},
@@ -9,9 +10,7 @@ use parquet::{
         page::{CompressedPage, Page, PageWriter},
         writer::ColumnCloseResult,
     },
-    data_type::{
-        BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
-    },
+    data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type},
     errors::ParquetError,
     file::{
         metadata::{ColumnChunkMetaData, KeyValue},
@@ -24,7 +23,7 @@ use parquet::{
 };
 
 use super::folder::TableFile;
-use crate::tables::{Column, Table, Type, Values};
+use crate::tables::{Column, Table, Values};
 
 pub(super) struct Parquet(SerializedFileWriter<File>);
 
@@ -66,7 +65,7 @@ fn create(path: &Path, table: &Table) -> Result<SerializedFileWriter<File>, Parq
         .set_key_value_metadata(Some(units.collect()));
     for column in &table.columns {
         let path = ColumnPath::from(&*column.name);
-        if matches!(column.kind, Type::Name(_)) {
+        if matches!(column.kind, Kind::Name(_)) {
             properties = properties.set_column_dictionary_enabled(path, true);
         } else if ["t", "offset"].contains(&&*column.name) {
             properties = properties.set_column_statistics_enabled(path, EnabledStatistics::Chunk);
@@ -78,18 +77,17 @@ fn create(path: &Path, table: &Table) -> Result<SerializedFileWriter<File>, Parq
 
 fn field(column: &Column) -> Result<Field, ParquetError> {
     let (physical, logical) = match column.kind {
-        Type::U8 => (Physical::INT32, Some(LogicalType::integer(8, false))),
-        Type::I16 => (Physical::INT32, Some(LogicalType::integer(16, true))),
-        Type::U16 => (Physical::INT32, Some(LogicalType::integer(16, false))),
-        Type::U32 => (Physical::INT32, Some(LogicalType::integer(32, false))),
-        Type::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
-        Type::I64 => (Physical::INT64, Some(LogicalType::integer(64, true))),
-        Type::F32 => (Physical::FLOAT, None),
-        Type::F64 => (Physical::DOUBLE, None),
-        Type::Bool => (Physical::BOOLEAN, None),
-        Type::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
-        Type::Name(_) | Type::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
-        Type::Bytes => (Physical::BYTE_ARRAY, None),
+        Kind::U8 => (Physical::INT32, Some(LogicalType::integer(8, false))),
+        Kind::I8 => (Physical::INT32, Some(LogicalType::integer(8, true))),
+        Kind::I16 => (Physical::INT32, Some(LogicalType::integer(16, true))),
+        Kind::U16 => (Physical::INT32, Some(LogicalType::integer(16, false))),
+        Kind::I32 => (Physical::INT32, Some(LogicalType::integer(32, true))),
+        Kind::U32 => (Physical::INT32, Some(LogicalType::integer(32, false))),
+        Kind::U64 => (Physical::INT64, Some(LogicalType::integer(64, false))),
+        Kind::F32 => (Physical::FLOAT, None),
+        Kind::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::MICROS))),
+        Kind::Name(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Kind::Bytes => (Physical::BYTE_ARRAY, None),
     };
     let repetition = match column.present {
         Some(_) => Repetition::OPTIONAL,
@@ -112,10 +110,7 @@ fn group(file: &mut SerializedFileWriter<File>, table: &Table) -> Result<(), Par
             continue;
         }
         let Some(mut to) = group.next_column()? else { break };
-        let names = match &column.kind {
-            Type::Name(names) => names.iter().map(|name| ByteArray::from(*name)).collect(),
-            _ => Vec::new(),
-        };
+        let names: Vec<_> = column.names.iter().map(|name| ByteArray::from(*name)).collect();
         for piece in pieces(column) {
             write(&mut to, column, &names, &piece)?;
         }
@@ -165,9 +160,7 @@ fn write(
     match &column.values {
         Values::Small(values) => put::<Int32Type>(to, part(values, range), piece),
         Values::Float(values) => put::<FloatType>(to, part(values, range), piece),
-        Values::Double(values) => put::<DoubleType>(to, part(values, range), piece),
-        Values::Flag(values) => put::<BoolType>(to, part(values, range), piece),
-        Values::Large(values) if column.kind != Type::Time => {
+        Values::Large(values) if column.kind != Kind::Time => {
             // The same 64 bits, whether they have a sign or not.
             let values: Vec<_> = part(values, range).iter().map(|value| *value as i64).collect();
             put::<Int64Type>(to, &values, piece)
@@ -259,43 +252,4 @@ fn bytes(
         offset_index: None,
     };
     Ok((pages.into_inner()?.into(), close))
-}
-
-#[cfg(test)]
-mod tests {
-    use parquet::file::reader::{FileReader, SerializedFileReader};
-
-    use super::{super::folder::Folder, *};
-    use crate::tables::tests::{Added, lamp, tables_of};
-
-    #[test]
-    fn a_message_that_the_schema_has_not_has_the_columns_of_its_first_line() {
-        let path = std::env::temp_dir().join(format!("axle-{}-lamp.parquet", std::process::id()));
-        std::fs::create_dir(&path).unwrap();
-        let (lamp, less) = (lamp(), serde_json::json!({"colour": 2, "name": "c"}));
-        let mut tables = tables_of(&[Added("set_lamp", &lamp), Added("set_lamp", &less)]);
-        let mut folder = Folder::<Parquet>::new(path.clone(), &path);
-        tables.give_rest(&mut folder).unwrap();
-        folder.finish().unwrap();
-        let file = File::open(path.join("ucp.set_lamp.parquet")).unwrap();
-        let reader = SerializedFileReader::new(file).unwrap();
-        let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
-        std::fs::remove_dir_all(path).unwrap();
-        let told = |row: usize, name: &str| {
-            let value = rows[row].get_column_iter().find(|(known, _)| *known == name);
-            value.unwrap().1.to_string()
-        };
-        for (name, first, second) in [
-            ("index", "7", "7"),
-            ("colour", "1", "2"),
-            ("cold", "-3", "null"),
-            ("watts", "0.1", "null"),
-            ("is_on", "true", "null"),
-            ("name", "\"a, \"b\"\"", "\"c\""),
-            ("t_c_1", "-3", "null"),
-            ("huge", "18446744073709551615", "null"),
-        ] {
-            assert_eq!([told(0, name), told(1, name)], [first, second], "{name}");
-        }
-    }
 }

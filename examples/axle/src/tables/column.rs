@@ -1,14 +1,35 @@
 //! Values of one column.
 
-use serde_json::Value;
+use core::fmt;
 
-use super::{Type, row::Unfit};
+use axlewire::fields::{Field, Kind};
+use serde::ser;
+
+/// A frame does not fit the columns: its fields are not those of the table of fields.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unfit;
+
+impl fmt::Display for Unfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a field is not in the table of fields")
+    }
+}
+
+impl std::error::Error for Unfit {}
+
+impl ser::Error for Unfit {
+    fn custom<T: fmt::Display>(_: T) -> Self {
+        Self
+    }
+}
 
 /// A column: its values, where there are any.
 #[derive(Debug)]
 pub(crate) struct Column {
     pub(crate) name: String,
-    pub(crate) kind: Type,
+    pub(crate) kind: Kind,
+    /// The names that occur in a column of names.
+    pub(crate) names: Vec<&'static str>,
     /// What 1 is; `none` for what is not measured.
     pub(crate) unit: &'static str,
     pub(crate) values: Values,
@@ -26,10 +47,8 @@ pub(crate) enum Values {
     Float(Vec<f32>),
     /// Places in the list of names.
     Name(Vec<u8>),
-    /// The end of each run of bytes, and all runs in one; texts too.
+    /// The end of each run of bytes, and all runs in one.
     Bytes(Vec<u32>, Vec<u8>),
-    Double(Vec<f64>),
-    Flag(Vec<bool>),
 }
 
 /// One value.
@@ -38,9 +57,6 @@ pub(crate) enum Cell<'a> {
     Integer(i64),
     Unsigned(u64),
     Float(f32),
-    Double(f64),
-    Flag(bool),
-    Text(&'a str),
     /// Microseconds since 1970.
     Time(u64),
     Name(&'a str),
@@ -49,18 +65,18 @@ pub(crate) enum Cell<'a> {
 }
 
 impl Column {
-    pub(super) fn new(name: String, kind: Type, unit: &'static str, is_optional: bool) -> Self {
-        let values = match kind {
-            Type::U8 | Type::I16 | Type::U16 | Type::U32 => Values::Small(Vec::new()),
-            Type::I64 | Type::U64 | Type::Time => Values::Large(Vec::new()),
-            Type::F32 => Values::Float(Vec::new()),
-            Type::F64 => Values::Double(Vec::new()),
-            Type::Bool => Values::Flag(Vec::new()),
-            Type::Name(_) => Values::Name(Vec::new()),
-            Type::Bytes | Type::Text => Values::Bytes(Vec::new(), Vec::new()),
+    pub(super) fn new(name: String, field: &Field, names: Vec<&'static str>) -> Self {
+        let values = match field.kind {
+            Kind::U8 | Kind::I8 | Kind::U16 | Kind::I16 | Kind::U32 | Kind::I32 => {
+                Values::Small(Vec::new())
+            }
+            Kind::U64 | Kind::Time => Values::Large(Vec::new()),
+            Kind::F32 => Values::Float(Vec::new()),
+            Kind::Name(_) => Values::Name(Vec::new()),
+            Kind::Bytes => Values::Bytes(Vec::new(), Vec::new()),
         };
-        let present = is_optional.then(Vec::new);
-        Self { name, kind, unit, values, present }
+        let present = field.is_optional.then(Vec::new);
+        Self { name, kind: field.kind, names, unit: field.unit, values, present }
     }
 
     /// The values of the rows in their order.
@@ -81,25 +97,15 @@ impl Column {
     /// One of the values.
     fn cell(&self, at: usize) -> Option<Cell<'_>> {
         Some(match (&self.values, &self.kind) {
-            (Values::Small(values), Type::U32) => Cell::Integer((*values.get(at)? as u32).into()),
+            (Values::Small(values), Kind::U32) => Cell::Integer((*values.get(at)? as u32).into()),
             (Values::Small(values), _) => Cell::Integer((*values.get(at)?).into()),
-            (Values::Large(values), Type::Time) => Cell::Time(*values.get(at)?),
-            (Values::Large(values), Type::I64) => Cell::Integer(*values.get(at)? as i64),
+            (Values::Large(values), Kind::Time) => Cell::Time(*values.get(at)?),
             (Values::Large(values), _) => Cell::Unsigned(*values.get(at)?),
             (Values::Float(values), _) => Cell::Float(*values.get(at)?),
-            (Values::Double(values), _) => Cell::Double(*values.get(at)?),
-            (Values::Flag(values), _) => Cell::Flag(*values.get(at)?),
-            (Values::Name(values), Type::Name(names)) => {
-                Cell::Name(names.get(usize::from(*values.get(at)?))?)
-            }
-            (Values::Name(_), _) => return None,
-            (Values::Bytes(ends, bytes), kind) => {
+            (Values::Name(values), _) => Cell::Name(self.names.get(usize::from(*values.get(at)?))?),
+            (Values::Bytes(ends, bytes), _) => {
                 let begin = at.checked_sub(1).and_then(|before| ends.get(before)).unwrap_or(&0);
-                let bytes = bytes.get(*begin as usize..*ends.get(at)? as usize)?;
-                match kind {
-                    Type::Text => Cell::Text(str::from_utf8(bytes).ok()?),
-                    _ => Cell::Bytes(bytes),
-                }
+                Cell::Bytes(bytes.get(*begin as usize..*ends.get(at)? as usize)?)
             }
         })
     }
@@ -115,8 +121,6 @@ impl Column {
                 ends.clear();
                 bytes.clear();
             }
-            Values::Double(values) => values.clear(),
-            Values::Flag(values) => values.clear(),
         }
     }
 
@@ -132,8 +136,6 @@ impl Column {
             Values::Large(values) if has_value => drop(values.pop()),
             Values::Float(values) if has_value => drop(values.pop()),
             Values::Name(values) if has_value => drop(values.pop()),
-            Values::Double(values) if has_value => drop(values.pop()),
-            Values::Flag(values) if has_value => drop(values.pop()),
             Values::Bytes(ends, bytes) => {
                 if has_value {
                     ends.pop();
@@ -161,7 +163,7 @@ impl Column {
     #[inline]
     pub(super) fn integer(&mut self, value: i64) -> Result<(), Unfit> {
         match &mut self.values {
-            // All types of this width take their values only: the schema says so, and a test does.
+            // All types of this width take their values only: the table of fields says so.
             Values::Small(values) => values.push(value as i32),
             Values::Large(values) => values.push(value as u64),
             _ => return Err(Unfit),
@@ -189,34 +191,6 @@ impl Column {
         Ok(())
     }
 
-    /// A value of a line of JSON, for a table that is of the lines themselves.
-    pub(super) fn json(&mut self, value: &Value) -> Result<(), Unfit> {
-        match (&mut self.values, &self.kind, value) {
-            (_, _, Value::Null) => return self.absent(),
-            (Values::Bytes(ends, bytes), Type::Text, _) => {
-                match value {
-                    Value::String(text) => bytes.extend_from_slice(text.as_bytes()),
-                    other => bytes.extend_from_slice(other.to_string().as_bytes()),
-                }
-                ends.push(u32::try_from(bytes.len()).map_err(|_| Unfit)?);
-            }
-            (_, _, Value::String(text)) => return self.text(text),
-            (Values::Flag(values), _, Value::Bool(value)) => values.push(*value),
-            (Values::Double(values), _, Value::Number(value)) => {
-                values.push(value.as_f64().ok_or(Unfit)?);
-            }
-            (Values::Large(values), Type::I64, Value::Number(value)) => {
-                values.push(value.as_i64().ok_or(Unfit)? as u64);
-            }
-            (Values::Large(_) | Values::Small(_), _, Value::Number(value)) => {
-                return self.unsigned(value.as_u64().ok_or(Unfit)?);
-            }
-            _ => return Err(Unfit),
-        }
-        self.is_present();
-        Ok(())
-    }
-
     #[inline]
     pub(super) fn bytes(&mut self, value: &[u8]) -> Result<(), Unfit> {
         let Values::Bytes(ends, bytes) = &mut self.values else { return Err(Unfit) };
@@ -229,28 +203,22 @@ impl Column {
     /// A name, hex digits, or a speed that JSON has no number for.
     #[inline]
     pub(super) fn text(&mut self, value: &str) -> Result<(), Unfit> {
-        match (&mut self.values, &self.kind) {
-            (Values::Bytes(ends, bytes), Type::Bytes) => {
+        match &mut self.values {
+            Values::Bytes(ends, bytes) => {
                 for pair in value.as_bytes().chunks(2) {
                     let [high, low] = pair else { return Err(Unfit) };
                     bytes.push(digit(*high)? << 4 | digit(*low)?);
                 }
                 ends.push(u32::try_from(bytes.len()).map_err(|_| Unfit)?);
             }
-            (Values::Name(values), Type::Name(names)) => {
-                let place = names.iter().position(|name| *name == value).ok_or(Unfit)?;
+            Values::Name(values) => {
+                let place = self.names.iter().position(|name| *name == value).ok_or(Unfit)?;
                 values.push(place as u8);
             }
-            (Values::Float(values), _) => values.push(match value {
+            Values::Float(values) => values.push(match value {
                 "nan" => f32::NAN,
                 "inf" => f32::INFINITY,
                 "-inf" => f32::NEG_INFINITY,
-                _ => return Err(Unfit),
-            }),
-            (Values::Double(values), _) => values.push(match value {
-                "nan" => f64::NAN,
-                "inf" => f64::INFINITY,
-                "-inf" => f64::NEG_INFINITY,
                 _ => return Err(Unfit),
             }),
             _ => return Err(Unfit),
@@ -268,8 +236,6 @@ impl Values {
             Self::Float(values) => values.len(),
             Self::Name(values) => values.len(),
             Self::Bytes(ends, _) => ends.len(),
-            Self::Double(values) => values.len(),
-            Self::Flag(values) => values.len(),
         }
     }
 }

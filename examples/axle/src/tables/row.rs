@@ -1,21 +1,18 @@
 //! A frame as one row of columns. The frame serialises itself, as it does for JSON; each value goes
 //! straight to its column.
 
-use core::fmt;
-use std::borrow::Cow;
-
 use axlewire::ikeya::Mode;
 use serde::{
     Serialize, Serializer,
-    ser::{self, Impossible, SerializeMap, SerializeTuple},
+    ser::{Impossible, SerializeMap, SerializeTuple},
 };
 
-use super::column::Column;
+use super::column::{Column, Unfit};
 
 /// Where a field of a line goes.
 #[derive(Debug)]
 pub(super) struct Slot {
-    pub(super) name: Cow<'static, str>,
+    pub(super) name: &'static str,
     /// Its first column.
     pub(super) first: usize,
     /// Number of its columns; 0 for a field that is the same in the whole table.
@@ -24,25 +21,7 @@ pub(super) struct Slot {
     pub(super) is_whole: bool,
 }
 
-/// A frame does not fit the columns: its fields are not those of the schema.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Unfit;
-
 type Fit = Result<(), Unfit>;
-
-impl fmt::Display for Unfit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a field is not in decode.schema.json")
-    }
-}
-
-impl std::error::Error for Unfit {}
-
-impl ser::Error for Unfit {
-    fn custom<T: fmt::Display>(_: T) -> Self {
-        Self
-    }
-}
 
 /// Serialises a frame into a row.
 #[derive(Debug)]
@@ -89,7 +68,7 @@ impl SerializeMap for Row<'_> {
         loop {
             let (slot, rest) = self.slots.split_first().ok_or(Unfit)?;
             self.slots = rest;
-            if key.serialize(IsName(&slot.name))? {
+            if key.serialize(IsName(slot.name))? {
                 let whole = self.whole;
                 return match slot.width {
                     0 => Ok(()),
