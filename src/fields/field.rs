@@ -179,11 +179,15 @@ const fn without_period(text: &str) -> &str {
     }
 }
 
-/// A field with its doc comment as its meaning: `"key": type, "unit" by "source"`.
+/// A field with its doc comment as its meaning: `"key": type, "unit" by "source"`; and what
+/// else is to be said, such as `, optional()`.
 macro_rules! field {
-    ($(#[doc = $doc:literal])* $key:literal: $of:ty, $($unit:literal)? by $source:expr) => {
+    (
+        $(#[doc = $doc:literal])*
+        $key:literal: $of:ty, $($unit:literal)? by $source:expr $(, $with:ident($($value:expr),*))*
+    ) => {
         $crate::fields::field::Field::new::<$of>($key, $source, concat!($($doc),*))
-            $(.unit($unit))?
+            $(.unit($unit))? $(.$with($($value),*))*
     };
 }
 pub(crate) use field;

@@ -16,92 +16,76 @@ const REASONS: &[&str] = &[
 
 const PROTOCOLS: &[&str] = &["ucp", "ikeya", "ikeya-3"];
 
-const SKIPPED: &[Field] = &[
-    field! {
+/// Fields, each as for `field`.
+macro_rules! fields {
+    ($({$($field:tt)+})+) => {
+        &[&[$(field! { $($field)+ }),+]]
+    };
+}
+
+const SKIPPED: &[&[Field]] = fields! {
+    {
         /// Length of a run of bytes that belong to no frame.
-        "length": u64, "byte" by "B4"
+        "length": u64, "byte" by "B4", within(1, u64::MAX)
     }
-    .within(1, u64::MAX),
-    field! {
+    {
         /// Why its first byte was skipped.
-        "reason": &str, by "B4"
+        "reason": &str, by "B4", named(REASONS)
     }
-    .named(REASONS),
-    field! {
+    {
         /// Bytes by reason, if there are several reasons; only in the tool's output.
-        "reasons": u64, "byte" by "B4"
+        "reasons": u64, "byte" by "B4", within(1, u64::MAX), object(REASONS), optional(), of_tool()
     }
-    .within(1, u64::MAX)
-    .object(REASONS)
-    .optional()
-    .of_tool(),
-];
+};
 
-const GUESSED: &[Field] = &[
-    field! {
+const GUESSED: &[&[Field]] = fields! {
+    {
         /// The protocol with the most bytes in its frames.
-        "protocol": &str, by "tool"
+        "protocol": &str, by "tool", named(PROTOCOLS)
     }
-    .named(PROTOCOLS)
-    .of_tool(),
-    field! {
+    {
         /// Bytes that were looked at, from the beginning.
-        "received": u64, "byte" by "tool"
+        "received": u64, "byte" by "tool", within(1, u64::MAX)
     }
-    .within(1, u64::MAX)
-    .of_tool(),
-    field! {
+    {
         /// How many of them are in frames of each protocol.
-        "framed": u64, "byte" by "tool"
+        "framed": u64, "byte" by "tool", object(PROTOCOLS)
     }
-    .object(PROTOCOLS)
-    .of_tool(),
-];
+};
 
-const SUMMARY: &[Field] = &[
-    field! {
+const SUMMARY: &[&[Field]] = fields! {
+    {
         /// Length of the input.
         "received": u64, "byte" by "B2"
     }
-    .of_tool(),
-    field! {
+    {
         /// Bytes in frames.
         "framed": u64, "byte" by "B2"
     }
-    .of_tool(),
-    field! {
+    {
         /// Bytes in gaps.
         "skipped": u64, "byte" by "B2"
     }
-    .of_tool(),
-    field! {
+    {
         /// Bytes not yet decided; 0 at the end of an input.
         "pending": u64, "byte" by "B2"
     }
-    .of_tool(),
-    field! {
+    {
         /// Number of frames.
         "frames": u64, "frame" by "B2"
     }
-    .of_tool(),
-    field! {
+    {
         /// Bytes in gaps by reason, without those that do not occur.
-        "skipped_by": u64, "byte" by "B4"
+        "skipped_by": u64, "byte" by "B4", within(1, u64::MAX), object(REASONS)
     }
-    .within(1, u64::MAX)
-    .object(REASONS)
-    .of_tool(),
-    field! {
+    {
         /// Packets with a time before that of the packet in front of them; only if there are any.
-        "times_back": u64, "packet" by "tool"
+        "times_back": u64, "packet" by "tool", within(1, u64::MAX), optional()
     }
-    .within(1, u64::MAX)
-    .optional()
-    .of_tool(),
-];
+};
 
 pub(super) const RECORDS: &[Record] = &[
-    Record::line("skipped", &[SKIPPED]),
-    Record::line("protocol", &[GUESSED]),
-    Record::line("summary", &[SUMMARY]),
+    Record::line("skipped", SKIPPED),
+    Record::line("protocol", GUESSED),
+    Record::line("summary", SUMMARY),
 ];

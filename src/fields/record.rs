@@ -27,38 +27,29 @@ pub struct Record {
 
 const EVENT: Field = field! {
     /// Kind of line; only in the tool's output.
-    "event": &str, by "tool"
-}
-.of_tool();
+    "event": &str, by "tool", of_tool()
+};
 
 /// The place of a frame or a gap.
 const PLACE: [Field; 4] = [
     field! {
         /// Position of the first byte in the input; in a capture with times, in the bytes of its
         /// interface and direction; only in the tool's output.
-        "offset": u64, "byte" by "tool"
-    }
-    .of_tool(),
+        "offset": u64, "byte" by "tool", of_tool()
+    },
     field! {
         /// When its last byte had been received, since 1970; behind a USB adapter up to 16 ms after
         /// it was on the line; only in the tool's output, if the capture has times.
-        "t": Time, "s" by "tool"
-    }
-    .of_tool()
-    .optional(),
+        "t": Time, "s" by "tool", of_tool(), optional()
+    },
     field! {
         /// Interface of a pcapng file, from 0; only in the tool's output, if the capture has times.
-        "interface": u64, by "tool"
-    }
-    .of_tool()
-    .optional(),
+        "interface": u64, by "tool", of_tool(), optional()
+    },
     field! {
         /// Received or sent by the recording program; only in the tool's output, where it is known.
-        "direction": &str, by "tool"
-    }
-    .named(&["in", "out"])
-    .of_tool()
-    .optional(),
+        "direction": &str, by "tool", named(&["in", "out"]), of_tool(), optional()
+    },
 ];
 
 pub(crate) const LENGTH: Field = field! {
@@ -110,6 +101,7 @@ impl Record {
         let length = self.length.map(|(least, most)| LENGTH.within(least as u64, most as u64));
         let protocol = self.protocol.as_ref().map(|name| PROTOCOL.named(slice::from_ref(name)));
         let message = self.protocol.map(|_| MESSAGE.named(slice::from_ref(&self.message)));
+        let is_of_tool = matches!(self.event, "protocol" | "summary");
         let is_ucp = self.protocol == Some("ucp");
         let id = self.id.map_or(ID, |id| ID.within(id.into(), id.into()));
         let of_ucp = [is_ucp.then_some(id), is_ucp.then_some(INDEX)];
@@ -118,5 +110,6 @@ impl Record {
             .chain(place.iter().copied())
             .chain([length, protocol, message].into_iter().chain(of_ucp).flatten())
             .chain(self.own.iter().copied().flatten().chain(self.end).copied())
+            .map(move |field| if is_of_tool { field.of_tool() } else { field })
     }
 }

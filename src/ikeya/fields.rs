@@ -8,9 +8,8 @@ use crate::fields::{
 
 pub(super) const NODE: Field = field! {
     /// The addressed or responding node.
-    "node": u8, by "I1"
-}
-.within(1, 8);
+    "node": u8, by "I1", within(1, 8)
+};
 pub(super) const RPS: Field = field! {
     /// Speed in revolutions per second.
     "rps": f32, "1/s" by "I4"
@@ -30,11 +29,8 @@ pub(super) const PAYLOAD: Field = field! {
 const MODE: Field = field! {
     /// The mode in which the node last answered, so the reading that counts; only in the tool's
     /// output, and once the node has answered.
-    "mode": &str, by "I3"
-}
-.named(&["velocity", "position"])
-.optional()
-.of_tool();
+    "mode": &str, by "I3", named(&["velocity", "position"]), optional(), of_tool()
+};
 
 /// The packets of one kind of board.
 macro_rules! records {

@@ -3,13 +3,11 @@
 
 mod support;
 
-use std::{collections::BTreeMap, fmt::Display};
-
 use axlewire::{
     crc16,
     fields::{FIELDS, Field, Kind, Shape},
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use support::{bytes, decode, pcapng::PcapNg, schema::Schema};
 
 const SCHEMA: &str = include_str!("../decode.schema.json");
@@ -137,180 +135,99 @@ fn the_checker_refuses_keywords_that_it_does_not_know() {
     assert!(Schema::new(r##"{"$ref": "#/$defs/nothing"}"##).is_err());
 }
 
-/// JSON whose keys keep their order.
-enum Json {
-    /// A number, or a string with its quotes.
-    One(String),
-    Array(Vec<Json>),
-    Object(Vec<(String, Json)>),
-}
-
-impl Json {
-    fn text(text: impl Display) -> Self {
-        Self::One(format!("\"{text}\""))
-    }
-
-    fn number(number: impl Display) -> Self {
-        Self::One(number.to_string())
-    }
-
-    fn texts(texts: &[&str]) -> Self {
-        Self::Array(texts.iter().map(Self::text).collect())
-    }
-
-    fn object<const N: usize>(entries: [(&str, Self); N]) -> Self {
-        Self::Object(entries.map(|(key, value)| (key.to_owned(), value)).into())
-    }
-
-    fn reference(name: &str) -> Self {
-        Self::object([("$ref", Self::text(format!("#/$defs/{name}")))])
-    }
-
-    /// On one line.
-    fn flat(&self) -> String {
-        let entry = |(key, value): &(String, Self)| format!("\"{key}\": {}", value.flat());
-        let list = |all: Vec<String>| all.join(", ");
-        match self {
-            Self::One(text) => text.clone(),
-            Self::Array(all) => format!("[{}]", list(all.iter().map(Self::flat).collect())),
-            Self::Object(all) => format!("{{{}}}", list(all.iter().map(entry).collect())),
-        }
-    }
-
-    /// On lines of at most 100 columns; `used` are in front of it on the first.
-    fn lines(&self, indent: usize, used: usize) -> String {
-        let (flat, inner) = (self.flat(), " ".repeat(indent + 2));
-        if used + flat.len() < 100 {
-            return flat;
-        }
-        let (open, body, close) = match self {
-            Self::One(_) => return flat,
-            Self::Object(all) => {
-                let entry = |(key, value): &(String, Self)| {
-                    let key = format!("{inner}\"{key}\": ");
-                    format!("{key}{}", value.lines(indent + 2, key.chars().count()))
-                };
-                ('{', all.iter().map(entry).collect::<Vec<_>>().join(",\n"), '}')
-            }
-            Self::Array(all) => {
-                let (mut body, mut line) = (String::new(), inner.clone());
-                for (at, one) in all.iter().map(Self::flat).enumerate() {
-                    if at > 0 && line.len() + 1 + one.len() >= 100 {
-                        body += &format!("{},\n", line.trim_end().trim_end_matches(','));
-                        line.clone_from(&inner);
-                    }
-                    line += &format!("{one}, ");
-                }
-                ('[', body + line.trim_end().trim_end_matches(','), ']')
-            }
-        };
-        format!("{open}\n{body}\n{}{close}", " ".repeat(indent))
-    }
-}
-
-/// The schema of a value of this field; adds the definition that it refers to.
-fn property(field: &Field, types: &mut BTreeMap<String, Json>) -> Json {
-    let mut defined = |name: &str, schema: Json| {
-        types.insert(name.to_owned(), schema);
-        Json::reference(name)
+/// The schema of a value of this field.
+fn property(field: &Field) -> Value {
+    let (least, most): (i64, i64) = match field.kind {
+        Kind::U8 => (0, u8::MAX.into()),
+        Kind::U16 => (0, u16::MAX.into()),
+        Kind::I8 => (i8::MIN.into(), i8::MAX.into()),
+        Kind::I16 => (i16::MIN.into(), i16::MAX.into()),
+        Kind::I32 => (i32::MIN.into(), i32::MAX.into()),
+        _ => (0, u32::MAX.into()),
     };
-    let is = |kind: &str| ("type", Json::text(kind));
-    let from = |least: i64| ("minimum", Json::number(least));
-    let to = |most: u64| ("maximum", Json::number(most));
-    let name = field.kind.name();
-    let mut integer =
-        |least, most| defined(name, Json::object([is("integer"), from(least), to(most)]));
     let one = match (field.kind, field.limits) {
-        (Kind::Name([name]), _) => Json::object([("const", Json::text(name))]),
-        (Kind::Name(names), _) => Json::object([("enum", Json::texts(names))]),
-        (_, Some((least, most))) if least == most => Json::object([("const", Json::number(least))]),
-        (_, Some((least, u64::MAX))) => Json::object([is("integer"), from(least as i64)]),
-        (_, Some((least, most))) => Json::object([is("integer"), from(least as i64), to(most)]),
-        (Kind::U8, _) => integer(0, u8::MAX.into()),
-        (Kind::U16, _) => integer(0, u16::MAX.into()),
-        (Kind::U32, _) => integer(0, u32::MAX.into()),
-        (Kind::I8, _) => integer(i8::MIN.into(), i8::MAX as u64),
-        (Kind::I16, _) => integer(i16::MIN.into(), i16::MAX as u64),
-        (Kind::I32, _) => integer(i32::MIN.into(), i32::MAX as u64),
-        (Kind::U64, _) => defined(name, Json::object([is("integer"), from(0)])),
-        (Kind::Time, _) => defined(name, Json::object([is("number"), from(0)])),
-        (Kind::F32, _) => {
-            let names = Json::object([("enum", Json::texts(&["nan", "inf", "-inf"]))]);
-            let either = Json::Array(vec![Json::object([is("number")]), names]);
-            defined(name, Json::object([("oneOf", either)]))
-        }
-        (Kind::Bytes, _) => {
-            let digits = ("pattern", Json::text("^([0-9a-f]{2})*$"));
-            defined(name, Json::object([is("string"), digits]))
-        }
+        (Kind::Name([name]), _) => json!({"const": name}),
+        (Kind::Name(names), _) => json!({"enum": names}),
+        (Kind::F32, _) => json!({"oneOf": [{"type": "number"}, {"enum": ["nan", "inf", "-inf"]}]}),
+        (Kind::Time, _) => json!({"type": "number", "minimum": 0}),
+        (Kind::Bytes, _) => json!({"type": "string", "pattern": "^([0-9a-f]{2})*$"}),
+        (_, Some((least, most))) if least == most => json!({"const": least}),
+        (Kind::U64, limits) => json!({"type": "integer", "minimum": limits.map_or(0, |it| it.0)}),
+        (_, Some((least, most))) => json!({"type": "integer", "minimum": least, "maximum": most}),
+        _ => json!({"type": "integer", "minimum": least, "maximum": most}),
     };
     match field.shape {
         Shape::One => one,
         Shape::Array(len) => {
-            let size = |key| (key, Json::number(len));
-            let array = [is("array"), ("items", one), size("minItems"), size("maxItems")];
-            defined(&format!("{name}_x{len}"), Json::object(array))
+            json!({"type": "array", "items": one, "minItems": len, "maxItems": len})
         }
         Shape::Object(keys) => {
-            let one = one.flat();
-            let values = keys.iter().map(|key| ((*key).to_owned(), Json::One(one.clone())));
-            let mut object = vec![is("object"), ("properties", Json::Object(values.collect()))];
-            // Each count of at least 1 is left out if there is none.
+            let values: Map<_, _> = keys.iter().map(|key| ((*key).into(), one.clone())).collect();
+            let mut object =
+                json!({"type": "object", "properties": values, "additionalProperties": false});
             if field.limits.is_none() {
-                object.push(("required", Json::texts(keys)));
+                object["required"] = json!(keys);
             }
-            object.push(("additionalProperties", Json::One("false".to_owned())));
-            // It is there only if it has several.
             if field.is_optional {
-                object.push(("minProperties", Json::number(2)));
+                // With one reason, that says all.
+                object["minProperties"] = 2.into();
             }
-            Json::Object(object.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+            object
         }
     }
 }
 
 /// The schema of all lines.
 fn made() -> String {
-    let (mut kinds, mut lines, mut types) = (Vec::new(), Vec::new(), BTreeMap::new());
+    let (mut kinds, mut definitions) = (Vec::new(), Vec::new());
     for record in FIELDS {
-        let mut name = record.message.to_owned();
-        if let (Some(protocol), Some((least, most))) = (record.protocol, record.length) {
-            let len = if least == most { format!(".{least}") } else { String::new() };
-            name = format!("{protocol}.{name}{len}");
-        }
-        let fields = || record.fields();
-        let properties = fields().map(|it| (it.name.to_owned(), property(&it, &mut types)));
-        let properties = Json::Object(properties.collect());
-        let required: Vec<_> = fields().filter(|it| !it.is_optional).map(|it| it.name).collect();
-        let line = Json::object([
-            ("type", Json::text("object")),
-            ("properties", properties),
-            ("required", Json::texts(&required)),
-            ("additionalProperties", Json::One("false".to_owned())),
-        ]);
-        kinds.push(Json::reference(&name));
-        lines.push((name, line));
+        let name = match (record.protocol, record.length) {
+            (Some(protocol), Some((least, most))) if least == most => {
+                format!("{protocol}.{}.{least}", record.message)
+            }
+            (Some(protocol), _) => format!("{protocol}.{}", record.message),
+            _ => record.message.to_owned(),
+        };
+        let required = record.fields().filter(|field| !field.is_optional).map(|field| field.name);
+        let required = json!(required.collect::<Vec<_>>());
+        // In the order of the line, which a map of JSON does not keep.
+        let property = |field: Field| format!(r#""{}": {}"#, field.name, property(&field));
+        let properties: Vec<_> = record.fields().map(property).collect();
+        kinds.push(format!(r##"    {{"$ref": "#/$defs/{name}"}}"##));
+        definitions.push(format!(
+            r#"    "{name}": {{
+      "type": "object", "additionalProperties": false,
+      "required": {required},
+      "properties": {{{}}}
+    }}"#,
+            properties.join(", ")
+        ));
     }
-    lines.extend(types);
-    let page = "The page `fields` of the library has the meaning and the unit of each field.";
-    let schema = Json::object([
-        ("$schema", Json::text("https://json-schema.org/draft/2020-12/schema")),
-        ("title", Json::text("A line of axle decode --json")),
-        ("description", Json::text(page)),
-        ("oneOf", Json::Array(kinds)),
-        ("$defs", Json::Object(lines)),
-    ]);
-    schema.lines(0, 0) + "\n"
+    format!(
+        r#"{{
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "title": "A line of axle decode --json",
+  "description": "The page `fields` of the library has the meaning and the unit of each field.",
+  "oneOf": [
+{}
+  ],
+  "$defs": {{
+{}
+  }}
+}}
+"#,
+        kinds.join(",\n"),
+        definitions.join(",\n")
+    )
 }
 
 /// With `AXLEWIRE_WRITE=1`, this writes the schema.
 #[test]
 fn the_schema_has_the_fields_of_the_table() {
-    let made = made();
     if std::env::var_os("AXLEWIRE_WRITE").is_some() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/decode.schema.json");
-        std::fs::write(path, made).unwrap();
+        std::fs::write(path, made()).unwrap();
     } else {
-        assert!(made == SCHEMA, "run this test with AXLEWIRE_WRITE=1: it writes the schema");
+        assert!(made() == SCHEMA, "run this test with AXLEWIRE_WRITE=1: it writes the schema");
     }
 }

@@ -209,3 +209,27 @@ fn a_gap_has_its_length_and_its_reason() {
     assert_eq!(serde_json::from_str::<Gap>(text).unwrap(), gap);
     assert!(to_value(Frame::parse(Ping {}.frame(0).as_bytes()).unwrap()).is_ok());
 }
+
+/// CBOR writes the number of fields first: if it is wrong, bytes are left, or missing.
+#[test]
+fn a_map_announces_the_number_of_its_fields() {
+    fn is_right(data: &(impl serde::Serialize + ?Sized)) {
+        let mut bytes = Vec::new();
+        ciborium::into_writer(data, &mut bytes).unwrap();
+        let mut rest = &bytes[..];
+        let map: ciborium::Value = ciborium::from_reader(&mut rest).unwrap();
+        assert!(map.is_map() && rest.is_empty(), "{map:?}");
+        // An array or a map of unknown length would end with this.
+        assert_eq!(bytes[0] & 0x1F, map.as_map().unwrap().len() as u8);
+    }
+    let node = NodeId::N1;
+    is_right(&Request::Read(&ReadRequest::new(node)));
+    is_right(&Request::Write(&WriteRequest::velocity(node, Rps::ZERO)));
+    is_right(&Response::Velocity(&VelocityResponse::new(node, Rps::ZERO)));
+    let command = MotorControl::turn_left(1, 2).unwrap();
+    for bytes in [Ping {}.frame(0).as_bytes(), command.frame(0).as_bytes()] {
+        let frame = Frame::parse(bytes).unwrap();
+        is_right(frame);
+        is_right(&frame.message());
+    }
+}

@@ -32,8 +32,6 @@ use detect::{guess, no_frame};
 pub(crate) use framing::Choice;
 use framing::for_framing;
 use printer::Printer;
-#[cfg(all(test, feature = "mcap"))]
-pub(crate) use stream::Mark;
 use stream::StreamOf;
 pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 pub(crate) use walk::{Next, Walked, walk};

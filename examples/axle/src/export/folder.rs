@@ -8,7 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::Job;
+use super::job::Job;
 use crate::{
     beside::{Beside, COLUMNS, LIST, cannot_write},
     decode::{self, Walked},

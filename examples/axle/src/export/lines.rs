@@ -2,7 +2,7 @@
 
 use std::io::{BufWriter, Write};
 
-use super::Job;
+use super::job::Job;
 use crate::{
     beside::{Beside, cannot_write},
     decode::{Sheet, Walked},

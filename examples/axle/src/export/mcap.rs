@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, io::BufWriter};
 
 use mcap::{WriteOptions, Writer, records::MessageHeader};
 
-use super::Job;
+use super::job::Job;
 use crate::{
     args::Protocol,
     beside::{Beside, cannot_write},

@@ -2,6 +2,7 @@
 
 mod csv;
 mod folder;
+mod job;
 mod lines;
 #[cfg(feature = "mcap")]
 mod mcap;
@@ -13,9 +14,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use job::Job;
+
 use crate::{
-    beside,
-    decode::{self, Chosen, Named, Walked},
+    decode::{self, Named, Walked},
     failure::Failure,
     help::EXIT_CODES,
     input::Input,
@@ -67,22 +69,6 @@ enum Format {
     Lines,
     Mcap,
     Parquet,
-}
-
-/// What an exporter needs.
-struct Job<'a> {
-    input: Input,
-    chosen: Chosen,
-    output: &'a Path,
-    force: bool,
-    signals: Signals,
-}
-
-impl Job<'_> {
-    /// Fails after a signal.
-    fn go_on(signals: &Signals) -> Result<(), Failure> {
-        if signals.is_raised() { Err(beside::interrupted()) } else { Ok(()) }
-    }
 }
 
 /// Runs the subcommand.

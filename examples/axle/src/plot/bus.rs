@@ -8,7 +8,7 @@ use super::{
     columns::Columns,
     errors::Errors,
     line::{Line, Mode, Numbers},
-    picture::{Look, Panel, Series, Size},
+    picture::{Look, Panel, Series, Size, colour},
 };
 
 /// Counts of a turn (ruling I5).
@@ -224,9 +224,4 @@ impl Curves {
         let lines = self.measured.into_iter().map(|it| series(it, Look::Line, ""));
         held.chain(lines).collect()
     }
-}
-
-/// Nodes are 1 to 8.
-pub(super) fn colour(node: u8) -> usize {
-    usize::from(node.saturating_sub(1)) % super::picture::ERROR
 }

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    bus,
     columns::Columns,
     line::Line,
-    picture::{ERROR, Look, Panel, Series, Size},
+    picture::{ERROR, Look, Panel, Series, Size, colour},
 };
 
 /// A row of ticks. In the order of the picture.
@@ -83,10 +82,10 @@ impl Errors {
     pub(super) fn panel(self) -> Panel {
         let series = self.0.into_iter().map(|(row, columns)| {
             let (name, colour) = match row {
-                Row::Silent(node) => (format!("node {node} silent"), bus::colour(node)),
-                Row::Late(node) => (format!("node {node} late"), bus::colour(node)),
-                Row::Stray(node) => (format!("node {node} unasked"), bus::colour(node)),
-                Row::Nan(node) => (format!("node {node} NaN"), bus::colour(node)),
+                Row::Silent(node) => (format!("node {node} silent"), colour(node)),
+                Row::Late(node) => (format!("node {node} late"), colour(node)),
+                Row::Stray(node) => (format!("node {node} unasked"), colour(node)),
+                Row::Nan(node) => (format!("node {node} NaN"), colour(node)),
                 Row::Lost => ("report lost".to_owned(), 1),
                 Row::Refused => ("refused".to_owned(), 3),
                 Row::Crc => ("bad CRC".to_owned(), ERROR),

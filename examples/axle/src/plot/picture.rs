@@ -119,6 +119,11 @@ pub(super) const PALETTE: [(u8, u8, u8); 9] = [
 /// The colour of errors.
 pub(super) const ERROR: usize = 8;
 
+/// The colour of a node, 1 to 8.
+pub(super) fn colour(node: u8) -> usize {
+    usize::from(node.saturating_sub(1)) % ERROR
+}
+
 /// A smaller difference, as a part of the values or of 1, is drawn as none.
 const LEAST: f64 = 1e-12;
 

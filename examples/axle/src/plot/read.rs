@@ -3,9 +3,9 @@
 use std::time::{Duration, SystemTime};
 
 use super::{
-    Args,
     bus::Bus,
     line::Line,
+    options::Args,
     picture::{Axis, Panel, Picture},
     rover::Rover,
 };
