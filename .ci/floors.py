@@ -34,6 +34,8 @@ from rust_uses import Item, Module, lookup, macro_of_ancestor, read_crate, resol
 FLOORS = [
     ["machine", "time", "error"],
     ["crc16", "encode", "endpoint", "inbox", "map", "stats", "text"],
+    ["fields::field"],
+    ["fields::record"],
     ["events", "outbox"],
     # Bytes to frames.
     ["stream::ledger", "stream::fill"],
@@ -42,6 +44,7 @@ FLOORS = [
     ["stream::portable", "stream::search"],
     ["stream::capture", "stream::decoder", "stream::frames", "stream::split"],
     ["stream"],
+    ["fields::lines"],
     # The motor bus: packets, framings, then the two roles.
     ["ikeya::units"],
     ["ikeya::wire"],
@@ -51,6 +54,7 @@ FLOORS = [
     ["ikeya::framing"],
     ["ikeya::contents"],
     ["ikeya::board"],
+    ["ikeya::fields"],
     ["ikeya::serialize"],
     ["ikeya::master::health", "ikeya::master::nodes", "ikeya::master::schedule"],
     ["ikeya::master::config", "ikeya::master::event", "ikeya::master::statistics"],
@@ -70,7 +74,7 @@ FLOORS = [
     ["ucp::body"],
     ["ucp::motor", "ucp::report", "ucp::update"],
     ["ucp::message"],
-    ["ucp::contents", "ucp::serialize"],
+    ["ucp::contents", "ucp::fields", "ucp::serialize"],
     ["ucp::batch"],
     ["ucp::framing"],
     ["ucp::role"],
@@ -87,6 +91,7 @@ FLOORS = [
     ["ucp::robot::state"],
     ["ucp::robot"],
     ["ucp"],
+    ["fields"],
     # Two doors, and a line for tests.
     ["io", "drive", "sim"],
     # Pages, without code.

@@ -13,7 +13,8 @@ use super::{
     robot::RobotConfig,
 };
 use crate::{
-    encode::Encode, endpoint::Endpoint, error::EncodeError, stream::Frames, time::Instant,
+    encode::Encode, endpoint::Endpoint, error::EncodeError, fields::FIELDS, stream::Frames,
+    time::Instant,
 };
 
 /// Hands a table to the macro that expands it, with one more entry.
@@ -106,6 +107,28 @@ fn a_new_message_prints_its_values_with_their_units_and_is_data_with_its_keys() 
     assert_eq!(to_value(command).unwrap(), data);
     let data = json!({"message": "lamp_state", "id": 66, "temperature_c": [25, -3], "err": 0});
     assert_eq!(to_value(state.message()).unwrap(), data);
+}
+
+#[test]
+fn a_new_message_is_in_the_table_of_fields() {
+    let told = |message: &str| -> Vec<_> {
+        let record = FIELDS.iter().find(|record| record.message == message).unwrap();
+        assert_eq!(
+            (record.id, record.length.map(|it| it.0)),
+            (Some(0x42), record.length.map(|it| it.1))
+        );
+        let own = record.fields().filter(|field| !field.is_of_tool).skip(5);
+        own.map(|field| (field.name, field.kind.name(), field.unit, field.meaning)).collect()
+    };
+    let fields = [
+        ("brightness_pct", "u8", "%", "Brightness, percent"),
+        ("colour", "u8", "none", "Colour"),
+        ("time_ms", "u16", "ms", "For how long, milliseconds"),
+        ("bytes", "bytes", "none", "The whole frame as on the wire"),
+    ];
+    assert_eq!(told("set_lamp"), fields);
+    let temperature = "Temperatures, left and right, degrees Celsius";
+    assert_eq!(told("lamp_state")[0], ("temperature_c", "i16", "C", temperature));
 }
 
 #[test]
