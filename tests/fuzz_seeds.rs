@@ -6,7 +6,7 @@
 #[path = "models/kit.rs"]
 #[allow(dead_code, reason = "the models use more of it")]
 mod kit;
-#[path = "adverse/rulings.rs"]
+#[path = "harness/rulings.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod rulings;
 #[path = "../fuzz/src/targets/mod.rs"]

@@ -4,7 +4,7 @@
 #[path = "../../tests/models/kit.rs"]
 #[allow(dead_code, reason = "the models use more of it")]
 mod kit;
-#[path = "../../tests/adverse/rulings.rs"]
+#[path = "../../tests/harness/rulings.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod rulings;
 mod targets;

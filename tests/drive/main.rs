@@ -23,6 +23,7 @@ mod recorder;
 
 mod bus;
 mod clocks;
+mod cut_off_packets;
 mod errors;
 mod every_call;
 #[cfg(feature = "ucp")]
@@ -35,7 +36,12 @@ mod held_requests;
 mod held_up;
 #[cfg(feature = "ucp")]
 mod io;
+mod late_slaves;
+#[allow(dead_code, reason = "the tests of a rover use more of it")]
+mod motor_line;
+mod outdated_orders;
 mod parts;
+mod paused_packets;
 mod pin_alone;
 mod pin_in_a_driver;
 mod rounds;
@@ -52,8 +58,10 @@ mod rover_robot;
 #[cfg(all(unix, feature = "serialport"))]
 mod serial_port;
 mod slow_port;
+mod stalled_ports;
 mod stops;
 mod unsent_frames;
 mod waiting;
 mod waking;
 mod withdrawn;
+mod wrong_clocks;

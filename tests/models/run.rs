@@ -4,7 +4,7 @@ use std::{env, time::Instant};
 
 use super::search::{Limits, World, explore};
 
-/// Search depth of a world: in every test run, and in `deep.sh`.
+/// Search depth of a world: in every test run, and in the deep run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Depth(pub(crate) usize, pub(crate) usize);
 

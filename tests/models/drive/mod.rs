@@ -4,9 +4,7 @@ mod account;
 mod action;
 mod checks;
 mod fault;
-#[cfg(feature = "ucp")]
 mod host;
-#[cfg(feature = "ucp")]
 mod host_account;
 mod line;
 mod master;
@@ -72,7 +70,6 @@ pub(crate) fn waiting(run: &mut Run) {
 }
 
 /// A host with blocking calls.
-#[cfg(feature = "ucp")]
 pub(crate) fn host(run: &mut Run) {
     use host::{Action, Call, HostLife};
     let faults = if run.is_deep { 2 } else { 1 };

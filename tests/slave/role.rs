@@ -11,7 +11,7 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use crate::rig::*;
+use crate::packets::*;
 
 fn slave(mode: Mode) -> Slave {
     Slave::new(NodeId::N2, mode, SlaveConfig::direct(), Instant::from_micros(0))

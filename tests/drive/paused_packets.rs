@@ -11,9 +11,8 @@ use axlewire::{
 };
 
 use crate::{
-    motor::Motor,
+    motor_line::{Bus, Motor, Wire, Write, run},
     port::{Unplugged, poll},
-    wire::{Bus, Wire, Write, run},
 };
 
 /// A motor at 10 rps behind a port that from now on handles successive parts of each WRITE like

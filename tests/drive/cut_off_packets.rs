@@ -12,10 +12,7 @@ use axlewire::{
     time::Instant,
 };
 
-use crate::{
-    motor::Motor,
-    wire::{Bus, Wire, Write, run},
-};
+use crate::motor_line::{Bus, Motor, Wire, Write, run};
 
 fn rps(value: f32) -> Rps {
     Rps::new(value).unwrap()

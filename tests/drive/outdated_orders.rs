@@ -2,21 +2,18 @@
 
 use axlewire::{
     drive::DriveError,
-    endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, Position, Rps, VelocityResponse,
-        master::{MasterConfig, Polling, StopProgress},
+        Mode, NodeId, Position, Rps,
+        master::{Polling, StopProgress},
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use crate::{
-    motor::Motor,
+    motor_line::{Bus, Motor, Wire, run},
     port::Unplugged,
-    wire::{Bus, Wire, run},
 };
 
-const MS: fn(u32) -> Duration = Duration::from_millis;
 const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(MS_20)];
 const MS_20: Duration = Duration::from_millis(20);
 
@@ -163,40 +160,5 @@ fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
         let world = wire.world();
         let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
         assert!(payloads.all(|payload| payload == [0; 4]), "sent ten seconds after it failed");
-    }
-}
-
-/// How an application tells its master that it is alive.
-type Sign = fn(&mut Master, Instant);
-
-#[test]
-fn a_late_sign_of_life_does_not_revive_a_command_that_is_too_old() {
-    let signs: [Sign; 4] = [
-        |master, now| master.set_velocity(NodeId::N2, Rps::ZERO, now).unwrap(),
-        |master, now| master.stop(NodeId::N2, now),
-        |master, now| master.stop_all(now),
-        |master, now| master.keep_alive(now),
-    ];
-    for (index, sign) in signs.into_iter().enumerate() {
-        let mut config = MasterConfig::direct();
-        config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect();
-        (config.polling, config.dead_man) = (Polling::Manual, Some(MS(500)));
-        let mut now = Instant::from_millis(0);
-        let mut master: Master = Master::new(config, now);
-        master.discover(now);
-        for node in [NodeId::N1, NodeId::N2] {
-            assert!(master.poll_transmit(now).is_some());
-            now += Duration::from_micros(400);
-            master.handle_input(VelocityResponse::new(node, Rps::ZERO).as_bytes(), now);
-        }
-        master.set_velocity(NodeId::N1, rps(5.0), now).unwrap();
-        assert!(master.poll_transmit(now).is_some());
-        now += MS(3_600_000);
-        sign(&mut master, now);
-        assert!(
-            master.stops_owed().contains(NodeId::N1),
-            "sign {index}: an hour of silence is ignored"
-        );
-        assert_eq!(master.statistics().dead_man, 1, "sign {index}");
     }
 }

@@ -1,11 +1,6 @@
 //! Properties of the motor bus roles under any faults of the line: no answer from another node or
 //! to another request, no set-point that was never sent or is stopped by now, no READ without an
 //! end, no forgotten stop.
-//!
-//! The scenarios, one per sentence of the rulings, are in `ikeya_roles.rs`; those of the rover in
-//! `ucp_roles.rs`.
-
-#![cfg(all(feature = "ikeya", feature = "sim"))]
 
 use std::collections::VecDeque;
 

@@ -3,48 +3,16 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse,
-        WriteRequest,
+        Master, Mode, NodeId, Position,
         master::{Health, MasterConfig, MasterEvent, Polling},
     },
     time::{Duration, Instant},
 };
 
-pub(crate) const US: fn(u32) -> Duration = Duration::from_micros;
-pub(crate) const MS: fn(u32) -> Duration = Duration::from_millis;
+pub(crate) use crate::packets::*;
 
 pub(crate) const READ: u8 = 0xAA;
 pub(crate) const WRITE: u8 = 0xBB;
-
-pub(crate) fn rps(value: f32) -> Rps {
-    Rps::new(value).unwrap()
-}
-
-pub(crate) fn read(node: NodeId) -> Vec<u8> {
-    ReadRequest::new(node).as_bytes().to_vec()
-}
-
-pub(crate) fn velocity(node: NodeId, value: f32) -> Vec<u8> {
-    VelocityResponse::new(node, rps(value)).as_bytes().to_vec()
-}
-
-pub(crate) fn position(node: NodeId, at: Position) -> Vec<u8> {
-    PositionResponse::new(node, at).as_bytes().to_vec()
-}
-
-/// A WRITE of a speed.
-pub(crate) fn write(node: NodeId, value: f32) -> Vec<u8> {
-    WriteRequest::velocity(node, rps(value)).as_bytes().to_vec()
-}
-
-/// A WRITE of a position.
-pub(crate) fn hold(node: NodeId, at: Position) -> Vec<u8> {
-    WriteRequest::position(node, at).as_bytes().to_vec()
-}
-
-pub(crate) const fn turns(rotation: i16) -> Position {
-    Position::new(0, rotation)
-}
 
 pub(crate) fn direct() -> MasterConfig {
     MasterConfig::direct()

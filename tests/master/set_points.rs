@@ -78,19 +78,6 @@ fn a_confirmed_write_is_reported_after_the_read_that_followed_it() {
 }
 
 #[test]
-fn a_write_that_cannot_be_confirmed_is_reported_with_its_cause() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-    desk.master.confirm(NodeId::N1, desk.now).unwrap();
-    for _ in 0..3 {
-        desk.turn();
-        desk.silence();
-    }
-    let failed = MasterEvent::NotConfirmed { node: NodeId::N1, cause: Cause::Silent };
-    assert_eq!(desk.told().last(), Some(&failed));
-}
-
-#[test]
 fn a_flood_of_set_points_does_not_keep_the_others_from_being_read() {
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     let mut reads = [0; 9];

@@ -8,18 +8,13 @@
 //! cargo test --release --test campaign -- --ignored --nocapture
 //! ```
 
-#![cfg(all(feature = "sim", any(feature = "ikeya", feature = "ucp")))]
+#![cfg(all(feature = "sim", feature = "ikeya", feature = "ucp"))]
 
 /// An episode on a bus.
-#[cfg(feature = "ikeya")]
-#[path = "campaign/bus.rs"]
 mod bus;
 /// The results of all episodes.
-#[path = "campaign/results.rs"]
 mod results;
 /// An episode with a rover.
-#[cfg(feature = "ucp")]
-#[path = "campaign/rover.rs"]
 mod rover;
 
 use axlewire::{
@@ -60,7 +55,6 @@ fn run(seeds: std::ops::Range<u64>, episode: fn(u64) -> Vec<Run>) -> Table {
 }
 
 #[test]
-#[cfg(feature = "ikeya")]
 fn every_motor_of_a_bus_stops_within_its_bound() {
     let table = run(0..40, bus::episode);
     println!("{table}");
@@ -68,7 +62,6 @@ fn every_motor_of_a_bus_stops_within_its_bound() {
 }
 
 #[test]
-#[cfg(feature = "ucp")]
 fn every_rover_stops_within_its_bound() {
     let table = run(0..40, rover::episode);
     println!("{table}");
@@ -76,7 +69,6 @@ fn every_rover_stops_within_its_bound() {
 }
 
 #[test]
-#[cfg(feature = "ikeya")]
 #[ignore = "takes minutes: see the top of this file"]
 fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
     let table = run(0..50_000, bus::episode);
@@ -85,7 +77,6 @@ fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
 }
 
 #[test]
-#[cfg(feature = "ucp")]
 #[ignore = "takes minutes: see the top of this file"]
 fn every_rover_stops_within_its_bound_50_000_times() {
     let table = run(0..50_000, rover::episode);

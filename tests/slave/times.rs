@@ -10,7 +10,7 @@ use axlewire::{
     time::Instant,
 };
 
-use crate::rig::*;
+use crate::packets::*;
 
 const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N1;

@@ -6,7 +6,7 @@ use axlewire::{
     time::Duration,
 };
 
-use crate::{motor::Motor, wire::Wire};
+use crate::motor_line::{Motor, Wire};
 
 #[test]
 fn one_wrong_reading_of_the_clock_holds_up_no_stop() {

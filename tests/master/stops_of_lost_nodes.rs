@@ -141,27 +141,6 @@ fn without_stops_abnormal_a_node_that_comes_back_gets_no_write_at_all() {
 }
 
 #[test]
-fn a_search_share_of_0_looks_for_nodes_that_are_owed_a_stop_alone_at_1_percent() {
-    let mut config = direct();
-    config.recovery_share_pct = 0;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.lose(NodeId::N1);
-    assert_eq!(desk.exchange(), None, "no node is searched for");
-    desk.master.stop(NodeId::N1, desk.now);
-    let mut asked = vec![];
-    for _ in 0..10 {
-        let packet = desk.packet();
-        if packet[0] == READ {
-            asked.push(desk.now);
-            desk.silence();
-        }
-    }
-    let pauses: Vec<_> = asked[1..].windows(2).map(|it| (it[1] - it[0]).as_micros()).collect();
-    let pace = 100 * WINDOW_US;
-    assert!(pauses.iter().all(|it| (pace..pace + 2 * WINDOW_US).contains(it)), "{pauses:?}");
-}
-
-#[test]
 fn a_node_that_comes_back_during_its_stop_pays_it_and_stays_at_rest() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.lose_by_hand(NodeId::N1);
@@ -181,19 +160,6 @@ fn an_id_that_was_never_heard_has_all_attempts_of_a_read_at_once() {
     let begin = desk.now;
     assert_eq!(desk.packets(3), [read(NodeId::N5), read(NodeId::N5), read(NodeId::N5)]);
     assert!(desk.now < begin + MS(5));
-}
-
-#[test]
-fn a_search_share_above_50_percent_counts_as_50() {
-    let mut config = direct();
-    config.recovery_share_pct = 100;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.lose(NodeId::N1);
-    desk.turn();
-    let begin = desk.now;
-    desk.silence();
-    desk.turn();
-    assert_eq!(desk.now, begin + US(2 * WINDOW_US));
 }
 
 #[test]

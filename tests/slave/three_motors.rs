@@ -12,7 +12,7 @@ use axlewire::{
     time::Instant,
 };
 
-use crate::rig::{MS, rps};
+use crate::packets::{MS, rps};
 
 const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N3;

@@ -6,7 +6,6 @@ use axlewire::{
         NodeId, Target,
         master::{CommandError, MasterConfig, MasterEvent, StopProgress},
     },
-    time::Instant,
 };
 
 use crate::rig::*;
@@ -177,24 +176,6 @@ fn no_sign_of_life_that_comes_too_late_revives_a_command() {
             assert_eq!(desk.master.statistics().dead_man, u32::from(is_dead), "{name}");
         }
     }
-}
-
-#[test]
-fn a_refused_set_point_is_no_sign_of_life() {
-    let mut desk = Desk::with_nodes(armed(), &[N1, N3]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-    let end = desk.now + MS(100);
-    desk.packets(1);
-    desk.now += MS(50);
-    assert!(desk.master.set_position(NodeId::N1, turns(1), desk.now).is_err());
-    assert!(desk.master.set_velocity(NodeId::N3, rps(1.0), desk.now).is_err());
-    assert!(desk.master.set_velocity(NodeId::N7, rps(1.0), desk.now).is_err());
-    assert!(desk.master.confirm(NodeId::N3, desk.now).is_err());
-    let just_before = Instant::from_micros(end.as_micros() - 1);
-    desk.master.handle_timeout(just_before);
-    assert_eq!(desk.master.statistics().dead_man, 0);
-    desk.master.handle_timeout(end);
-    assert_eq!(desk.master.statistics().dead_man, 1);
 }
 
 #[test]

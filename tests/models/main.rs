@@ -27,17 +27,23 @@
 //! # Outside the models
 //!
 //! An answer later than `late_guard`, which cannot be distinguished from the next one; more than
-//! two nodes; answers that a master receives in pieces (covered by `roles.rs`).
+//! two nodes; answers that a master receives in pieces (see `tests/master/any_line.rs`).
 //!
 //! On UCP: settings other than `sends_first_stop`, `low_ids_only` and the robot's bias requests;
-//! the content of reports and pongs (covered by `ucp_roles.rs`); a host and a robot talking to each
+//! the content of reports and pongs (see the scenarios of host and robot); a host and a robot talking to each
 //! other.
 //!
 //! # Depths
 //!
 //! A normal run tries 2 or 3 consecutive actions from each of about ninety prepared states: an
-//! abnormal node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run,
-//! `tests/models/deep.sh`, goes further, and prints the depth, states and time of each world:
+//! abnormal node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run
+//! searches every world to its full depth, and prints the depth, states and time of each, in about
+//! half an hour and 4 GB (a name behind it, such as `deep_host`, selects worlds; `MODELS_DEPTH=5`
+//! gives all of them that depth):
+//!
+//! ```sh
+//! cargo test --release --test models -- --ignored --nocapture --test-threads 1
+//! ```
 //!
 //! | World, for both kinds of boards | Consecutive actions | States in each |
 //! |---|---|---|
@@ -74,88 +80,40 @@
 //! | an async driver of a master: commanded, cut off, in position mode | 3 | 34,000 to 87,000 |
 //! | the same in other states and settings | 2 | 970 to 2,900 |
 //! | a driver of a host | 3 | 6,900 to 8,500 |
-#![cfg(all(any(feature = "ikeya", feature = "ucp"), feature = "std"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "std"))]
+#![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
-#[cfg(feature = "ikeya")]
-#[path = "models/account.rs"]
 mod account;
-#[cfg(feature = "ikeya")]
-#[path = "models/action.rs"]
 mod action;
-#[cfg(feature = "ikeya")]
-#[path = "models/bus.rs"]
 mod bus;
-#[cfg(feature = "ikeya")]
-#[path = "models/checks.rs"]
 mod checks;
-#[cfg(feature = "ikeya")]
-#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
-#[path = "models/drive/mod.rs"]
 mod drive;
-#[cfg(feature = "ikeya")]
-#[path = "models/exchange.rs"]
 mod exchange;
-#[path = "models/fingerprint.rs"]
 mod fingerprint;
-#[cfg(feature = "ucp")]
-#[path = "models/host.rs"]
 mod host;
-#[cfg(feature = "ucp")]
-#[path = "models/host_account.rs"]
 mod host_account;
-#[cfg(feature = "ucp")]
-#[path = "models/host_calls.rs"]
 mod host_calls;
-#[cfg(feature = "ucp")]
-#[path = "models/host_checks.rs"]
 mod host_checks;
-#[cfg(feature = "ucp")]
-#[path = "models/host_motion.rs"]
 mod host_motion;
-#[cfg(feature = "ucp")]
-#[path = "models/host_request.rs"]
 mod host_request;
-#[cfg(feature = "ucp")]
-#[path = "models/host_starts.rs"]
 mod host_starts;
-#[cfg(feature = "ucp")]
-#[path = "models/host_store.rs"]
 mod host_store;
-#[cfg(feature = "ikeya")]
-#[path = "models/kit.rs"]
 mod kit;
-#[cfg(feature = "ikeya")]
-#[path = "models/merging.rs"]
 mod merging;
-#[cfg(feature = "ucp")]
-#[path = "models/robot.rs"]
+mod random_masters;
 mod robot;
-#[cfg(feature = "ucp")]
-#[path = "models/robot_account.rs"]
 mod robot_account;
-#[cfg(feature = "ucp")]
-#[path = "models/robot_checks.rs"]
 mod robot_checks;
-#[cfg(feature = "ucp")]
-#[path = "models/robot_starts.rs"]
 mod robot_starts;
-#[path = "models/run.rs"]
+#[path = "../harness/rulings.rs"]
+mod rulings;
 mod run;
-#[path = "models/search.rs"]
 mod search;
-#[cfg(feature = "ikeya")]
-#[path = "models/slave.rs"]
 mod slave;
-#[path = "models/sleep.rs"]
 mod sleep;
-#[cfg(feature = "ikeya")]
-#[path = "models/starts.rs"]
 mod starts;
-#[cfg(feature = "ucp")]
-#[path = "models/ucp.rs"]
 mod ucp;
 
-#[cfg(feature = "ikeya")]
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 use run::Run;
 
@@ -172,7 +130,7 @@ macro_rules! models {
         }
 
         #[test]
-        #[ignore = "takes minutes: see tests/models/deep.sh"]
+        #[ignore = "takes minutes: see the top of this file"]
         fn $deep() {
             $({
                 let mut run = Run::new($group, true);
@@ -183,7 +141,6 @@ macro_rules! models {
     )+};
 }
 
-#[cfg(feature = "ikeya")]
 models! {
     a_fresh_master_obeys_the_rulings deep_fresh:
         "one motor", starts::fresh::<OneMotor>;
@@ -206,10 +163,6 @@ models! {
     a_slave_obeys_the_rulings deep_slave:
         "one motor", slave::lines::<OneMotor>;
         "three motors", slave::lines::<ThreeMotors>;
-}
-
-#[cfg(feature = "ucp")]
-models! {
     a_host_moves_a_robot_as_its_application_says deep_host_motion:
         "host, motion", host_starts::motion;
     a_host_starts_an_update_by_its_own_call_alone deep_host_updates:
@@ -224,20 +177,10 @@ models! {
         "robot, answers", robot_starts::answers;
     a_robot_with_a_full_queue_acknowledges_nothing deep_robot_queues:
         "robot, queues", robot_starts::queues;
-}
-
-#[cfg(feature = "ikeya")]
-#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
-models! {
     a_blocking_driver_of_a_master_obeys_the_rulings deep_blocking_driver:
         "blocking driver", drive::blocking;
     an_async_driver_of_a_master_obeys_the_rulings deep_async_driver:
         "async driver", drive::waiting;
-}
-
-#[cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
-#[cfg(all(feature = "ikeya", feature = "ucp"))]
-models! {
     a_driver_of_a_host_obeys_the_rulings deep_driver_of_a_host:
         "driver of a host", drive::host;
 }

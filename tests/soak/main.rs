@@ -12,25 +12,15 @@
 
 #![cfg(all(feature = "sim", feature = "ikeya", feature = "ucp"))]
 
-#[path = "soak/account.rs"]
 mod account;
-#[path = "soak/bus.rs"]
 mod bus;
-#[path = "soak/bus_application.rs"]
 mod bus_application;
-#[path = "soak/bus_checks.rs"]
 mod bus_checks;
-#[path = "soak/lane.rs"]
 mod lane;
-#[path = "soak/plan.rs"]
 mod plan;
-#[path = "soak/rover.rs"]
 mod rover;
-#[path = "soak/rover_checks.rs"]
 mod rover_checks;
-#[path = "soak/schedule.rs"]
 mod schedule;
-#[path = "soak/station.rs"]
 mod station;
 
 use std::time::Instant;

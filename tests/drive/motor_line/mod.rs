@@ -1,7 +1,9 @@
 //! A line in virtual time, with a port and a clock that follow the test's instructions.
 //!
-//! Unlike the scripted port of `harness/port.rs`, bytes take time, motors answer what has reached
+//! Unlike the scripted port, bytes take time, motors answer what has reached
 //! them, and a write may depend on its bytes and on the time.
+
+mod motor;
 
 use std::{
     cell::{RefCell, RefMut},
@@ -19,10 +21,8 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use crate::{
-    motor::Motor,
-    port::{Unplugged, poll},
-};
+pub(crate) use self::motor::Motor;
+use crate::port::{Unplugged, poll};
 
 /// Time from a request to its answer, microseconds.
 const ANSWER_US: u64 = 50;

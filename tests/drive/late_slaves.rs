@@ -2,15 +2,14 @@
 
 use axlewire::{
     drive::Driver,
-    endpoint::Endpoint,
     ikeya::{
         Mode, NodeId, ReadRequest, Rps, Slave, WriteRequest,
         slave::{SlaveConfig, SlaveEvent},
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use crate::wire::Wire;
+use crate::motor_line::Wire;
 
 const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
@@ -60,17 +59,6 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
         slave.service().unwrap();
         assert_eq!(wire.world().sent.len(), 4 + 8);
     }
-}
-
-#[test]
-fn a_command_of_the_old_mode_is_not_handed_out_after_the_switch() {
-    let now = Instant::from_micros(0);
-    let mut slave: Slave =
-        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
-    slave.handle_input(FIVE_RPS().as_bytes(), now);
-    slave.set_mode(Mode::Position);
-    assert_eq!(slave.command(now), None);
-    assert_eq!(slave.poll_event(), None, "a position node is given a speed");
 }
 
 #[test]

@@ -10,10 +10,7 @@ use axlewire::{
     ikeya::{Mode, NodeId, Rps},
 };
 
-use crate::{
-    motor::Motor,
-    wire::{Bus, Wire},
-};
+use crate::motor_line::{Bus, Motor, Wire};
 
 /// A bus whose only motor turns at 5 rps.
 fn turning() -> (Wire, Bus) {
