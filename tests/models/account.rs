@@ -4,12 +4,22 @@
 //! Nothing here looks inside the master. The rulings are I6 (hold), I8 (confirmation), I11 (doubt),
 //! I12 (debts) and I13 (order).
 
-use axlewire::{ikeya::Mode, time::Instant};
+use axlewire::{
+    ikeya::Mode,
+    time::{Duration, Instant},
+};
 
 use super::kit::Write;
 
+/// Count of a node at its other place.
+pub(crate) const ODD_PLACE: i16 = 200;
+
 /// Number of windows without the answer after which a node is abnormal.
 pub(crate) const STRIKES: u8 = 3;
+
+/// Time within which the first position measured for a stop has to be written; it doubles with each
+/// one that was given up.
+const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
 /// Number of exchanges with a node in doubt after which the application is notified.
 const UNDECIDED: u8 = 6;
@@ -61,6 +71,10 @@ pub(crate) struct Account {
     /// The position that the node was told to hold, and whether another one is allowed.
     pub(crate) hold: Option<(i16, i16)>,
     pub(crate) may_hold_anew: bool,
+    /// How often the node has measured a position for this stop, and when each of the two places
+    /// was last heard.
+    places_heard: u32,
+    places_heard_at: [Option<Instant>; 2],
     /// Stop WRITEs since the call that the node may have missed or forgotten.
     pub(crate) stops_missed: u8,
     pub(crate) confirm: Confirm,
@@ -103,6 +117,7 @@ impl Account {
         self.drop_target();
         if !self.is_halted {
             (self.is_odd_stop, self.hold, self.may_hold_anew) = (!self.is_odd_stop, None, true);
+            (self.places_heard, self.places_heard_at) = (0, [None; 2]);
         }
         (self.is_halted, self.is_under_order) = (true, false);
         self.owe_again();
@@ -124,7 +139,13 @@ impl Account {
     }
 
     /// A WRITE is handed out: checks whether it is allowed.
-    pub(crate) fn write(&mut self, write: Write, is_three: bool) -> Result<(), String> {
+    pub(crate) fn write(
+        &mut self,
+        write: Write,
+        is_three: bool,
+        at: Instant,
+        gap: Duration,
+    ) -> Result<(), String> {
         let zero = write.speed == 0;
         let speed = self.target.map(|number| f32::from(number).to_bits());
         let place = self.target.map(|number| (7, 100 + i16::from(number)));
@@ -155,6 +176,13 @@ impl Account {
         if is_hold {
             if self.hold.is_some_and(|hold| hold != write.place) && !self.may_hold_anew {
                 return Err("a different position to hold".into());
+            }
+            let doublings = self.places_heard.saturating_sub(1).min(9);
+            let patience = HOLD_PATIENCE.saturating_mul(1 << doublings) + gap;
+            let heard_at = self.places_heard_at[usize::from(write.place.0 == ODD_PLACE)];
+            let is_old = heard_at.is_none_or(|heard_at| at > heard_at + patience);
+            if is_old && self.hold != Some(write.place) {
+                return Err("a position to hold that is too old".into());
             }
             (self.hold, self.may_hold_anew) = (Some(write.place), false);
         }
@@ -204,8 +232,12 @@ impl Account {
     }
 
     /// The answer arrived in its window.
-    pub(crate) fn hear_answer(&mut self, mode: Mode) {
+    pub(crate) fn hear_answer(&mut self, mode: Mode, place: (i16, i16), at: Instant) {
         (self.misses, self.guard_until) = (0, None);
+        if mode == Mode::Position {
+            self.places_heard += 1;
+            self.places_heard_at[usize::from(place.0 == ODD_PLACE)] = Some(at);
+        }
         match self.record {
             Some(record) if record != mode && !self.is_in_doubt => return self.begin_doubt(),
             Some(record) if record != mode => {

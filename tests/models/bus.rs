@@ -11,7 +11,7 @@ use axlewire::{
 };
 
 use super::{
-    account::{Account, Confirm},
+    account::{Account, Confirm, ODD_PLACE},
     action::{Action, Answer, Call, Exchange, Fate, Menu},
     fingerprint::{COUNTERS, COUNTERS_AND_STATUS, Merge},
     kit::{Kit, Reply, Sent},
@@ -67,9 +67,13 @@ pub(crate) struct Bus<B: Kit> {
 
 impl<B: Kit> Bus<B> {
     /// Nodes 1 and up, in these modes, and a master that knows none of them.
-    pub(crate) fn new(modes: &[Mode], mut config: MasterConfig, menu: Menu) -> Self {
+    pub(crate) fn new(modes: &[Mode], config: MasterConfig, menu: Menu) -> Self {
+        Self::at(Instant::from_micros(1_000_000), modes, config, menu)
+    }
+
+    /// The same, at this time.
+    pub(crate) fn at(now: Instant, modes: &[Mode], mut config: MasterConfig, menu: Menu) -> Self {
         config.nodes = NodeId::ALL[..modes.len()].iter().copied().collect();
-        let now = Instant::from_micros(1_000_000);
         let motor = |&mode| Motor { mode, is_told_to_stop: true, is_odd_place: false };
         Self {
             master: Master::new(config, now),
@@ -96,6 +100,13 @@ impl<B: Kit> Bus<B> {
 
     pub(super) fn account(&mut self, node: NodeId) -> &mut Account {
         &mut self.accounts[usize::from(node.get()) - 1]
+    }
+
+    /// Whether the master has something to send.
+    pub(super) fn sends(&self) -> bool {
+        let mut probe = self.master.clone();
+        probe.handle_timeout(self.now);
+        probe.poll_transmit(self.now).is_some()
     }
 
     fn answer_time(&self) -> Duration {
@@ -173,11 +184,14 @@ impl<B: Kit> Bus<B> {
     /// Hands out the next packet; returns whether an answer is expected.
     pub(super) fn send(&mut self, fate: Fate) -> Result<Option<bool>, String> {
         self.pass_time()?;
-        let Some(bytes) = self.master.poll_transmit(self.now) else {
+        let Some(bytes) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) else {
             self.check_rest()?;
             return Ok(None);
         };
-        let sent = Sent::read::<B>(bytes);
+        let sent = Sent::read::<B>(&bytes);
+        if self.master.config().removes_echo && !matches!(fate, Fate::Untouched | Fate::CutOff) {
+            self.master.handle_input(&bytes, self.now);
+        }
         let is_exchange = sent.is_exchange::<B>();
         if is_exchange && self.asked.is_some() {
             return Err("a second request in an open window".into());
@@ -188,7 +202,8 @@ impl<B: Kit> Bus<B> {
         self.line_free = end;
         let rotation = self.account(sent.node).rotation();
         if let Some(write) = sent.write {
-            self.account(sent.node).write(write, B::ANSWERS_WRITE)?;
+            let (now, gap) = (self.now, self.master.config().turnaround_gap);
+            self.account(sent.node).write(write, B::ANSWERS_WRITE, now, gap)?;
         }
         let arrives = matches!(fate, Fate::Arrives | Fate::UnflushedArrives);
         if is_exchange {
@@ -273,7 +288,7 @@ impl<B: Kit> Bus<B> {
         let motor = &mut self.motors[usize::from(node.get()) - 1];
         motor.is_odd_place = !motor.is_odd_place && motor.mode == Mode::Position;
         let far = if self.is_far { 13_000 } else { 0 };
-        let count = if motor.is_odd_place { 200 } else { 100 };
+        let count = if motor.is_odd_place { ODD_PLACE } else { 100 };
         Reply { node, mode: motor.mode, place: (count, rotation + far) }
     }
 
@@ -293,7 +308,7 @@ impl<B: Kit> Bus<B> {
         if is_in_window {
             self.asked = None;
             self.line_free = at + self.master.config().turnaround_gap;
-            self.account(reply.node).hear_answer(reply.mode);
+            self.account(reply.node).hear_answer(reply.mode, reply.place, at);
         } else {
             self.account(reply.node).hear_outside(reply.mode);
         }
@@ -327,11 +342,8 @@ impl<B: Kit> World for Bus<B> {
     type Action = Action;
 
     fn actions(&self) -> Vec<Action> {
-        let mut probe = self.master.clone();
-        probe.handle_timeout(self.now);
-        let sends = probe.poll_transmit(self.now).is_some();
         let is_heard = self.asked.is_some_and(|asked| asked.is_heard);
-        self.menu.actions(self.motors.len(), sends, is_heard, self.late.is_some())
+        self.menu.actions(self.motors.len(), self.sends(), is_heard, self.late.is_some())
     }
 
     fn step(&mut self, action: Action) -> Checked {

@@ -16,7 +16,7 @@ use super::{
     sleep::check_sleep,
 };
 
-/// Most exchanges of the other node for which an urgent one waits.
+/// Most exchanges of each other node for which an urgent one waits.
 const URGENT_WAITS: u8 = 4;
 
 /// The same in the cycle.
@@ -26,11 +26,12 @@ const CYCLE_WAITS: u8 = 10;
 const LONGEST_PAUSE: Duration = Duration::from_millis(150);
 
 impl<B: Kit> Bus<B> {
-    /// No node waits longer than stated in `queue.rs`, here for two nodes.
+    /// No node waits longer than stated in `queue.rs`.
     pub(super) fn check_order(&mut self, sent: &Sent) -> Checked {
         let (now, is_discovering) = (self.now, self.master.is_discovering());
         let is_exchange = sent.is_exchange::<B>();
         let polls = self.menu.polls_fastest;
+        let others = self.motors.len() as u8 - 1;
         for (account, node) in self.accounts.iter_mut().zip(NodeId::ALL) {
             if node == sent.node {
                 if is_exchange && account.guard_until.is_some_and(|until| now < until) {
@@ -53,7 +54,7 @@ impl<B: Kit> Bus<B> {
             } else if polls && !is_discovering && !account.is_owed && !account.is_in_doubt {
                 account.cycle_waits += 1;
             }
-            if account.waits > URGENT_WAITS || account.cycle_waits > CYCLE_WAITS {
+            if account.waits > URGENT_WAITS * others || account.cycle_waits > CYCLE_WAITS * others {
                 return Err(format!("node {node} waits too long"));
             }
         }
@@ -81,9 +82,10 @@ impl<B: Kit> Bus<B> {
                     }
                 }
                 MasterEvent::NotConfirmed { node, .. } => {
+                    let attempts = self.master.config().attempts.clamp(1, STRIKES);
                     let account = self.account(node);
                     let confirm = std::mem::take(&mut account.confirm);
-                    if confirm != Confirm::Fails && account.misses < STRIKES {
+                    if confirm != Confirm::Fails && account.misses < attempts {
                         return Err(format!("NotConfirmed without a reason: {confirm:?}"));
                     }
                 }

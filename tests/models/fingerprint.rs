@@ -23,22 +23,8 @@ pub(crate) struct Merge {
     pub(crate) skipped: &'static [&'static str],
 }
 
-/// Counters, settings that never change, and data already handed out.
-#[cfg(feature = "ikeya")]
-pub(crate) const COUNTERS: &[&str] = &[
-    "config",
-    "last_failure",
-    "ledger",
-    "lost",
-    "packet",
-    "has_answered",
-    "has_failed",
-    "sent",
-    "statistics",
-];
-
-/// The same, and the last answer if no stop may hold its position.
-#[cfg(feature = "ikeya")]
+/// Counters, settings that never change, data already handed out, and what an account notes for a
+/// check of its own; and the last answer, which is left out if no stop may hold its position.
 pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
     "config",
     "last_failure",
@@ -47,10 +33,17 @@ pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
     "packet",
     "has_answered",
     "has_failed",
+    "places_heard",
+    "places_heard_at",
     "sent",
     "statistics",
     "status",
 ];
+
+pub(crate) const COUNTERS: &[&str] = match COUNTERS_AND_STATUS {
+    [counters @ .., _] => counters,
+    [] => &[],
+};
 
 impl Merge {
     pub(crate) fn fingerprint(self, state: &impl Debug) -> u64 {

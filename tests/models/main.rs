@@ -105,8 +105,6 @@ mod robot;
 mod robot_account;
 mod robot_checks;
 mod robot_starts;
-#[path = "../harness/rulings.rs"]
-mod rulings;
 mod run;
 mod search;
 mod slave;
