@@ -1,5 +1,9 @@
 //! What a master may send to its nodes, by the rulings alone: I6 (a stop holds a position measured
 //! after it), I11 (doubt), I12 (debts) and I13 (dead-man).
+//!
+//! [`judge`] is the rule for one WRITE. The models call it with an account of their own of every
+//! mode, order and debt. A [`Node`] is for worlds in which bytes may be damaged and it is not known
+//! what the master has heard: there it follows the modes, doubts and debts that the master reports.
 
 use axlewire::{
     ikeya::{Mode, master::NodeSet},
@@ -9,7 +13,7 @@ use axlewire::{
 use crate::kit::Write;
 
 /// Time in which a measured position has to be written first.
-const HOLD_PATIENCE: Duration = Duration::from_millis(20);
+pub(crate) const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
 /// A set-point: a speed, or count and rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +35,46 @@ impl Aim {
             Self::Rps(rps) => write.speed == rps.to_bits(),
             Self::Place(place) => write.place == place,
         }
+    }
+}
+
+/// The latest order for a node.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Order {
+    SetPoint(Option<Aim>),
+    /// Whether the written position was measured after the stop was requested.
+    Stop {
+        is_measured: bool,
+    },
+}
+
+/// Whether this WRITE may be sent to a node in this mode, which may be in doubt.
+pub(crate) fn judge(
+    write: &Write,
+    is_three: bool,
+    mode: Option<Mode>,
+    is_in_doubt: bool,
+    order: Order,
+) -> Result<(), String> {
+    let Some(mode) = mode else {
+        return Err("a WRITE to a node that has never answered".into());
+    };
+    // Halves of 0 to 12,287 are less than 1e-9 rps.
+    let is_small = |half: i16| (0..=12_287).contains(&half);
+    let is_still = is_small(write.place.1) && (!is_three || is_small(write.place.0));
+    let is_allowed = match order {
+        Order::SetPoint(aim) => {
+            !is_in_doubt && aim.is_some_and(|aim| aim.mode() == mode && aim.is_in(write))
+        }
+        Order::Stop { is_measured } if is_in_doubt => is_measured && is_still,
+        Order::Stop { is_measured } => match mode {
+            Mode::Velocity => write.speed == 0,
+            Mode::Position => is_measured,
+        },
+    };
+    match is_allowed {
+        true => Ok(()),
+        false => Err(format!("{write:?} in {mode} mode (in doubt: {is_in_doubt}) after {order:?}")),
     }
 }
 
@@ -156,31 +200,22 @@ impl Node {
     pub(crate) fn judge(&self, write: &Write, is_three: bool, now: Instant) -> Result<(), String> {
         let Seen { mode, is_in_doubt, is_owed, .. } = self.seen;
         let Some(stopped_at) = self.stopped_at else {
-            let Some(aim) = self.aim.filter(|aim| aim.is_in(write)) else {
-                return Err(format!("a set-point that is not in force: {:?} is", self.aim));
-            };
-            let is_sure = self.heard == Some(aim.mode()) && mode == self.heard && !is_in_doubt;
-            return match is_sure && !is_owed {
-                true => Ok(()),
-                false => Err("a set-point in another mode or while a stop is owed".into()),
+            return match is_owed || self.heard != mode {
+                true => Err("a set-point in another mode or while a stop is owed".into()),
+                false => judge(write, is_three, mode, is_in_doubt, Order::SetPoint(self.aim)),
             };
         };
-        let mut held = self.measured.iter().filter(|it| it.place == write.place);
-        let Some(held) = held.find(|it| it.at >= stopped_at) else {
-            let is_zero = write.speed == 0 && mode == Some(Mode::Velocity) && self.heard == mode;
-            return match is_zero && !is_in_doubt {
-                true => Ok(()),
-                false => Err("neither 0 rps nor a position measured after the stop".into()),
-            };
-        };
-        // Halves of 0 to 12,287 are less than 1e-9 rps.
-        let is_small = |half: i16| (0..=12_287).contains(&half);
-        let is_still = is_small(write.place.1) && (!is_three || is_small(write.place.0));
-        if is_in_doubt && !is_still {
-            return Err("a WRITE in doubt that may move the node".into());
+        let mut measured = self.measured.iter().filter(|it| it.place == write.place);
+        let measured = measured.find(|it| it.at >= stopped_at);
+        let order = Order::Stop { is_measured: measured.is_some() };
+        judge(write, is_three, mode, is_in_doubt, order)?;
+        let is_old =
+            measured.is_some_and(|it| it.heard_at.is_none_or(|at| now > at + HOLD_PATIENCE));
+        let is_hold = is_in_doubt || mode == Some(Mode::Position);
+        if !is_hold && self.heard != mode {
+            return Err("0 rps to a node that was last heard in another mode".into());
         }
-        let is_old = held.heard_at.is_none_or(|at| now > at + HOLD_PATIENCE);
-        match is_old && self.held != Some(write.place) {
+        match is_hold && is_old && self.held != Some(write.place) {
             true => Err("a position to hold that is too old".into()),
             false => Ok(()),
         }

@@ -9,17 +9,16 @@ use axlewire::{
     time::{Duration, Instant},
 };
 
-use super::kit::Write;
+use super::{
+    kit::Write,
+    rulings::{Aim, HOLD_PATIENCE, Order, judge},
+};
 
 /// Count of a node at its other place.
 pub(crate) const ODD_PLACE: i16 = 200;
 
 /// Number of windows without the answer after which a node is abnormal.
 pub(crate) const STRIKES: u8 = 3;
-
-/// Time within which the first position measured for a stop has to be written; it doubles with each
-/// one that was given up.
-const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
 /// Number of exchanges with a node in doubt after which the application is notified.
 const UNDECIDED: u8 = 6;
@@ -147,31 +146,15 @@ impl Account {
         gap: Duration,
     ) -> Result<(), String> {
         let zero = write.speed == 0;
-        let speed = self.target.map(|number| f32::from(number).to_bits());
-        let place = self.target.map(|number| (7, 100 + i16::from(number)));
-        let is_measured = |place: (i16, i16)| place.1 % 1000 == self.rotation();
-        match (self.record, self.is_in_doubt) {
-            (None, _) => return Err("a WRITE to a node that has never answered".into()),
-            (Some(_), true) => {
-                let is_still = (0..=12287).contains(&write.place.1)
-                    && (!is_three || (0..=12287).contains(&write.place.0));
-                if !(self.is_halted && is_measured(write.place) && is_still) {
-                    return Err("a WRITE in doubt that may move the node".into());
-                }
-            }
-            (Some(Mode::Velocity), _) if self.is_halted && zero => {}
-            (Some(Mode::Velocity), _) if !self.is_halted && Some(write.speed) == speed => {}
-            (Some(Mode::Position), _) if self.is_halted && is_measured(write.place) => {}
-            (Some(Mode::Position), _) if !self.is_halted && Some(write.place) == place => {}
-            (Some(mode), _) if self.is_halted => {
-                return Err(format!("after a stop, a {mode} node gets: {write:?}"));
-            }
-            (Some(mode), _) => {
-                return Err(format!(
-                    "a {mode} node gets something other than its set-point: {write:?}"
-                ));
-            }
-        }
+        let aim = self.target.map(|number| match self.record {
+            Some(Mode::Position) => Aim::Place((7, 100 + i16::from(number))),
+            _ => Aim::Rps(f32::from(number)),
+        });
+        let order = match self.is_halted {
+            true => Order::Stop { is_measured: write.place.1 % 1000 == self.rotation() },
+            false => Order::SetPoint(aim),
+        };
+        judge(&write, is_three, self.record, self.is_in_doubt, order)?;
         let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
         if is_hold {
             if self.hold.is_some_and(|hold| hold != write.place) && !self.may_hold_anew {

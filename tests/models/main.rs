@@ -105,6 +105,9 @@ mod robot;
 mod robot_account;
 mod robot_checks;
 mod robot_starts;
+#[path = "../harness/rulings.rs"]
+#[allow(dead_code, reason = "the fuzz target of a session uses more of it")]
+mod rulings;
 mod run;
 mod search;
 mod slave;
