@@ -203,7 +203,9 @@ fn one_is_gone(change: impl Fn(&mut MasterConfig)) -> Desk {
     change(&mut config);
     let mut desk = Desk::with_nodes(config, &NodeId::ALL.map(|node| (node, Mode::Velocity)));
     desk.answer(NodeId::N2, Answer::Silence);
+    let fell_silent = desk.now;
     while desk.master.health(NodeId::N2) != Some(Health::Abnormal) {
+        assert!(desk.now < fell_silent + desk.master.read_bound(), "it is not read");
         set_all(&mut desk);
     }
     desk
