@@ -37,7 +37,6 @@ mod held_up;
 #[cfg(feature = "ucp")]
 mod io;
 mod late_slaves;
-#[allow(dead_code, reason = "the tests of a rover use more of it")]
 mod motor_line;
 mod outdated_orders;
 mod parts;
@@ -47,6 +46,8 @@ mod pin_in_a_driver;
 mod rounds;
 #[cfg(feature = "ucp")]
 mod rover;
+#[cfg(feature = "ucp")]
+mod rover_faults;
 #[cfg(feature = "ucp")]
 mod rover_host;
 #[cfg(feature = "ucp")]

@@ -12,8 +12,8 @@ use axlewire::{
 };
 
 use crate::{
+    motor_line::{Wire, Write},
     port::Unplugged,
-    wire::{Wire, Write},
 };
 
 /// A host that has driven, and a moment later.
