@@ -26,7 +26,7 @@ pub(crate) fn plot(capture: &str, more: &[&str], output: &str) -> Vec<u8> {
 
 /// The data in the page of a capture.
 pub(crate) fn page(capture: &str, more: &[&str]) -> Value {
-    let folder = Folder::new(&format!("page-{}", more.len() + capture.len()));
+    let folder = Folder::new("page");
     let page = String::from_utf8(plot(capture, more, &folder.path("a.html"))).unwrap();
     let (_, rest) = page.split_once("<script id=\"data\" type=\"application/json\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
