@@ -1,8 +1,8 @@
 //! A message of one's own is one entry of the table: in unit tests the tables have one more.
 
-extern crate std;
+extern crate alloc;
 
-use std::{format, string::ToString, vec, vec::Vec};
+use alloc::{format, string::ToString, vec, vec::Vec};
 
 use serde_json::{json, to_value};
 
