@@ -21,20 +21,9 @@ const STEP_US: u64 = 20;
 /// Bytes in flight, each with the time at which it arrives.
 pub(crate) type Wire = Rc<RefCell<VecDeque<(u64, u8)>>>;
 
-/// What a task waits for.
-enum Until {
-    Time(u64),
-    Byte(Wire),
-}
-
-impl Until {
-    /// When it happens, as far as is known now.
-    fn at_us(&self) -> Option<u64> {
-        match self {
-            Self::Time(at) => Some(*at),
-            Self::Byte(wire) => wire.borrow().front().map(|&(at, _)| at),
-        }
-    }
+/// When the next byte arrives.
+fn arrival_us(wire: &Wire) -> Option<u64> {
+    wire.borrow().front().map(|&(at, _)| at)
 }
 
 /// Time, and its other participants. Clones are the same world, which is also a clock.
@@ -45,7 +34,9 @@ pub(crate) struct World(Rc<Inner>);
 struct Inner {
     now_us: Cell<u64>,
     actors: RefCell<Vec<Box<dyn FnMut()>>>,
-    sleepers: RefCell<Vec<(Until, Waker)>>,
+    /// Tasks that wait for a time, and for a byte: one for each line.
+    sleepers: RefCell<Vec<(u64, Waker)>>,
+    readers: RefCell<Vec<(Wire, Waker)>>,
     lines: RefCell<Vec<Wire>>,
     calls: Cell<u64>,
     naps: Cell<u64>,
@@ -104,15 +95,16 @@ impl World {
         self.0.now_us.set(self.now_us() + micros);
         self.0.actors.borrow_mut().iter_mut().for_each(|actor| actor());
         // An actor may have changed anything, so each task looks again.
-        let is_due = |until: &Until| until.at_us().is_some_and(|at| at <= self.now_us());
-        let (is_all, mut sleepers) = (self.has_actors(), self.0.sleepers.borrow_mut());
-        sleepers.retain(|(until, waker)| {
-            let is_woken = is_all || is_due(until);
+        let (now_us, is_all) = (self.now_us(), self.has_actors());
+        let stays = |at: Option<u64>, waker: &Waker| {
+            let is_woken = is_all || at.is_some_and(|at| at <= now_us);
             if is_woken {
                 waker.wake_by_ref();
             }
             !is_woken
-        });
+        };
+        self.0.sleepers.borrow_mut().retain(|(at, waker)| stays(Some(*at), waker));
+        self.0.readers.borrow_mut().retain(|(wire, waker)| stays(arrival_us(wire), waker));
     }
 
     /// The same in small steps: the others run often.
@@ -126,31 +118,28 @@ impl World {
             self.step(STEP_US);
             return true;
         }
-        let next = self.0.sleepers.borrow().iter().filter_map(|(until, _)| until.at_us()).min();
+        let (sleepers, readers) = (self.0.sleepers.borrow(), self.0.readers.borrow());
+        let arrivals = readers.iter().filter_map(|(wire, _)| arrival_us(wire));
+        let next = sleepers.iter().map(|&(at, _)| at).chain(arrivals).min();
+        drop((sleepers, readers));
         next.inspect(|at| self.step(at.saturating_sub(self.now_us()))).is_some()
-    }
-
-    fn sleep<T>(&self, until: Until, context: &Context<'_>) -> Poll<T> {
-        self.0.sleepers.borrow_mut().push((until, context.waker().clone()));
-        Poll::Pending
     }
 
     /// The task is woken when a byte arrives.
     pub(super) fn sleep_until_byte<T>(&self, wire: &Wire, context: &Context<'_>) -> Poll<T> {
-        let is_here = |(until, waker): &(Until, Waker)| {
-            matches!(until, Until::Byte(it) if Rc::ptr_eq(it, wire))
-                && waker.will_wake(context.waker())
-        };
-        if self.0.sleepers.borrow().iter().any(is_here) {
-            return Poll::Pending;
-        }
-        self.sleep(Until::Byte(wire.clone()), context)
+        let mut readers = self.0.readers.borrow_mut();
+        readers.retain(|(other, _)| !Rc::ptr_eq(other, wire));
+        readers.push((wire.clone(), context.waker().clone()));
+        Poll::Pending
     }
 
     pub(super) async fn sleep_until(&self, at_us: u64) {
-        poll_fn(|context| match self.now_us() >= at_us {
-            true => Poll::Ready(()),
-            false => self.sleep(Until::Time(at_us), context),
+        poll_fn(|context| {
+            if self.now_us() >= at_us {
+                return Poll::Ready(());
+            }
+            self.0.sleepers.borrow_mut().push((at_us, context.waker().clone()));
+            Poll::Pending
         })
         .await;
     }
@@ -193,6 +182,7 @@ impl World {
             }
         };
         self.0.sleepers.borrow_mut().clear();
+        self.0.readers.borrow_mut().clear();
         output
     }
 }
