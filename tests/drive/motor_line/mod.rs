@@ -1,7 +1,7 @@
 //! A line in virtual time, with a port and a clock that follow the test's instructions.
 //!
-//! Unlike the scripted port, bytes take time, motors answer what has reached
-//! them, and a write may depend on its bytes and on the time.
+//! Unlike the port of `harness/port.rs`, each reading of its clock takes time, motors are on its
+//! line, and a write may depend on its bytes and on the time.
 
 mod motor;
 

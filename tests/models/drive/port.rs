@@ -1,7 +1,7 @@
 //! The port, the pin and the clock of a driver, all of them handles of a line.
 //!
-//! Unlike the scripted port of `harness/port.rs` it has a line behind it: the search chooses the
-//! faults, calls take time, and contract violations of the driver are detected.
+//! Unlike the port of `harness/port.rs` it numbers its failures for the account of a search, and
+//! objects to a driver that breaks its contract.
 
 use std::cell::RefMut;
 

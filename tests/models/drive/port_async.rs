@@ -1,5 +1,5 @@
 //! The port, pin and clock of `port.rs` for async calls: the same behaviour, but a waiting task
-//! sleeps in virtual time, which the scripted port of `harness/port.rs` lacks.
+//! sleeps.
 
 use std::{
     future::poll_fn,
