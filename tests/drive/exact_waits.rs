@@ -16,10 +16,12 @@ use axlewire::{
 };
 use embedded_hal_async::delay::DelayNs;
 
+#[cfg(feature = "ucp")]
+use crate::rig::host;
 use crate::{
     port::{Port, Step, Unplugged, World},
     recorder::Recorder,
-    rig::{BOTH, On, Story, host, on, only_two_and_five},
+    rig::{BOTH, On, Story, on, only_two_and_five},
 };
 
 /// Plugs the port in again at this time.

@@ -16,10 +16,12 @@ use axlewire::{
     sim::MotorNode,
 };
 
+#[cfg(feature = "ucp")]
+use crate::rig::{GONE, host};
 use crate::{
     pin::{Pin, is_on},
     port::{Port, Step, Unplugged, Wakes, World},
-    rig::{BOTH, Bus, GONE, Running, at_ms, host, ms, on, run},
+    rig::{BOTH, Bus, Running, at_ms, ms, on, run},
 };
 
 // The calls under test.

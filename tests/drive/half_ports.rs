@@ -4,10 +4,12 @@
 use axlewire::ikeya::{NodeId, ReadRequest, WriteRequest, board::Target, slave::SlaveConfig};
 use embedded_io::Write;
 
+#[cfg(feature = "ucp")]
+use crate::rig::robot;
 use crate::{
     port::Port,
     recorder::Recorder,
-    rig::{BOTH, GONE, at_ms, on, robot, rps, slave},
+    rig::{BOTH, GONE, at_ms, on, rps, slave},
 };
 
 #[test]

@@ -37,6 +37,7 @@ mod held_up;
 #[cfg(feature = "ucp")]
 mod io;
 mod late_slaves;
+#[cfg_attr(not(feature = "ucp"), allow(dead_code, reason = "a rover uses more of it"))]
 mod motor_line;
 mod outdated_orders;
 mod parts;
