@@ -16,6 +16,16 @@ use crate::{
     port::Unplugged,
 };
 
+/// A call of a driver, blocking or async.
+macro_rules! on {
+    ($is_async:expr, $wire:expr, $it:ident, $call:ident, $call_async:ident($($value:expr),*)) => {
+        match $is_async {
+            true => $wire.block_on($it.$call_async($($value),*)),
+            false => $it.$call($($value),*),
+        }
+    };
+}
+
 /// A host that has driven, and a moment later.
 fn host() -> (Wire, Driver<Host, Wire, Wire>) {
     let wire = Wire::link();
@@ -67,10 +77,7 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
         assert!(host.drive(99, 0).is_err());
         let cut = wire.world().sent.len();
         wire.write_all();
-        match is_async {
-            true => wire.block_on(host.stop_async()).unwrap(),
-            false => host.stop().unwrap(),
-        }
+        on!(is_async, wire, host, stop, stop_async()).unwrap();
         let sent: Vec<u8> = wire.world().sent[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
         assert_eq!(sent.len(), 2 * stop, "the rest of the command was sent, or only one stop");
@@ -95,10 +102,7 @@ fn a_stop_that_a_port_cut_in_two_is_sent_again() {
         for is_async in [false, true] {
             let (wire, mut host) = host();
             wire.write_as(steps.iter().copied());
-            let stopped = match is_async {
-                true => wire.block_on(host.stop_async()),
-                false => host.stop(),
-            };
+            let stopped = on!(is_async, wire, host, stop, stop_async());
             let drives_on = robot_drives_on(&wire);
             let is_true = stopped.is_err() || drives_on <= Duration::from_millis(1);
             assert!(is_true, "{steps:?}: {stopped:?}, but it keeps driving for {drives_on:?}");
@@ -112,10 +116,7 @@ fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
         let (wire, mut host) = host();
         wire.world().is_deaf = true;
         let begin_us = wire.world().now_us;
-        let stopped = match is_async {
-            true => wire.block_on(host.stop_async()),
-            false => host.stop(),
-        };
+        let stopped = on!(is_async, wire, host, stop, stop_async());
         assert_eq!(stopped, Ok(()), "it was written and flushed");
         assert!(wire.world().now_us - begin_us < 10_000, "not immediate");
         assert!(robot_drives_on(&wire) <= Duration::from_millis(1));
@@ -141,10 +142,7 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
                 robot.role_mut().set_telemetry(&Telemetry::default(), now);
             }
             let by = robot.now() + Duration::from_millis(1);
-            let command = match is_async {
-                true => wire.block_on(robot.next_command_async(by)),
-                false => robot.next_command(by),
-            };
+            let command = on!(is_async, wire, robot, next_command, next_command_async(by));
             match command {
                 Ok(Some(command)) => speeds.push(command.speed()),
                 Ok(None) => {}
@@ -168,10 +166,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
         wire.receive(&drive());
         wire.pass(10_000_000);
         let by = robot.now() + Duration::from_millis(1);
-        let command = match is_async {
-            true => wire.block_on(robot.next_command_async(by)),
-            false => robot.next_command(by),
-        };
+        let command = on!(is_async, wire, robot, next_command, next_command_async(by));
         let speed = command.unwrap().map_or(0, |command| command.speed());
         assert_eq!(speed, 0, "it drives on a ten-second-old command");
     }
@@ -192,11 +187,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
                 assert_eq!((command.speed(), command.angular()), (0, 0));
             }
         };
-        match is_async {
-            true => wire.block_on(robot.run_until_async(by, speed)),
-            false => robot.run_until(by, speed),
-        }
-        .unwrap();
+        on!(is_async, wire, robot, run_until, run_until_async(by, speed)).unwrap();
         assert_eq!(robot.role().statistics().commands, 1, "it was valid");
         assert_eq!(robot.role().statistics().watchdog, 1);
     }
@@ -205,10 +196,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
 /// The next command of a robot that is called continuously, for 5 ms.
 fn next(wire: &Wire, robot: &mut Driver<Robot, Wire, Wire>, is_async: bool) {
     let by = robot.now() + Duration::from_millis(5);
-    let command = match is_async {
-        true => wire.block_on(robot.next_command_async(by)),
-        false => robot.next_command(by),
-    };
+    let command = on!(is_async, wire, robot, next_command, next_command_async(by));
     command.unwrap();
 }
 
@@ -314,10 +302,7 @@ fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence()
         let begin_us = wire.world().now_us;
         wire.receive_in(3_000_000, &drive());
         let by = robot.now() + Duration::from_millis(10_000);
-        let command = match is_async {
-            true => wire.block_on(robot.next_command_async(by)),
-            false => robot.next_command(by),
-        };
+        let command = on!(is_async, wire, robot, next_command, next_command_async(by));
         assert_eq!(command.unwrap().map(|command| command.speed()), Some(60));
         let drove_us = drives_until(&wire, &mut robot, is_async, begin_us + 3_000_000);
         assert!((485_000..=500_000).contains(&drove_us), "async {is_async}: {drove_us} us");

@@ -5,6 +5,11 @@ use proptest::{collection::vec, prelude::*};
 
 use crate::rig::*;
 
+/// Update requests, until the queue of events is full.
+fn fill(robot: &mut Robot, now: Instant) {
+    (40..60).for_each(|it| robot.handle_input(&bytes(OtaRequest::start_firmware_update(it)), now));
+}
+
 #[test]
 fn motor_events_never_take_the_room_of_rare_events() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
@@ -21,24 +26,10 @@ fn motor_events_never_take_the_room_of_rare_events() {
 }
 
 #[test]
-fn the_newest_motor_event_is_the_latest_command_however_full_the_queue_is() {
-    let mut robot = quiet_robot();
-    for turn in 1..=50 {
-        robot.handle_input(&bytes(go(turn)), ms(turn as u64));
-    }
-    robot.handle_input(&bytes(MotorControl::STOP), ms(51));
-    assert_eq!(events(&mut robot).last(), Some(&RobotEvent::Motor(MotorControl::STOP)));
-}
-
-#[test]
 fn biases_end_their_request_only_if_their_event_has_room() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
     sent(&mut robot, ms(0));
-    // Other requests of the host, until the queue is full.
-    for version in 40..60 {
-        let request = OtaRequest::start_firmware_update(version);
-        robot.handle_input(&bytes(request), ms(1));
-    }
+    fill(&mut robot, ms(1));
     let biases = bytes(Biases::new(imu_bias(), mag_bias()));
     robot.handle_input(&biases, ms(2));
     let asked = wait(&mut robot, ms(1500));
@@ -52,10 +43,7 @@ fn biases_end_their_request_only_if_their_event_has_room() {
 #[test]
 fn a_calibration_start_is_acknowledged_only_when_the_application_will_find_it() {
     let mut robot = quiet_robot();
-    for version in 40..60 {
-        let request = OtaRequest::start_firmware_update(version);
-        robot.handle_input(&bytes(request), ms(1));
-    }
+    fill(&mut robot, ms(1));
     let start = bytes(CalibrationStart::new(IMU));
     let end = bytes(CalibrationEnd::new(IMU));
     robot.handle_input(&start, ms(2));
@@ -63,10 +51,7 @@ fn a_calibration_start_is_acknowledged_only_when_the_application_will_find_it() 
     events(&mut robot);
     robot.handle_input(&start, ms(3));
     assert_eq!((sent(&mut robot, ms(3)).len(), robot.calibrating()), (1, Some(IMU)));
-    for version in 40..60 {
-        let request = OtaRequest::start_firmware_update(version);
-        robot.handle_input(&bytes(request), ms(4));
-    }
+    fill(&mut robot, ms(4));
     robot.handle_input(&end, ms(5));
     assert_eq!((sent(&mut robot, ms(5)), robot.calibrating()), (vec![], Some(IMU)));
     events(&mut robot);

@@ -167,6 +167,7 @@ fn reports_of_both_layouts_are_counted_by_their_index() {
         (config.layout, config.bias_request_period) = (layout, None);
         let mut robot = Robot::new(config, ms(0));
         robot.set_telemetry(&Telemetry { power_w: 9, ..Telemetry::default() }, ms(0));
+        let mut host = quiet_host();
         for index in 0..=256 {
             let frames = sent(&mut robot, ms(20 * index));
             let frame = Frame::parse(&frames[0]).unwrap();
@@ -174,6 +175,9 @@ fn reports_of_both_layouts_are_counted_by_their_index() {
             assert_eq!((frame.index(), report.telemetry().power_w), (index as u8, 9));
             let version = if layout == ReportLayout::Document { None } else { Some(40) };
             assert_eq!(report.version(), version);
+            host.handle_input(&frames[0], ms(20 * index));
+            let read = host.take_report().unwrap();
+            assert_eq!((read.telemetry.power_w, read.version), (9, version));
         }
     }
 }
