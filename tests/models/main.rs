@@ -27,11 +27,12 @@
 //! # Outside the models
 //!
 //! An answer later than `late_guard`, which cannot be distinguished from the next one; more than
-//! two nodes; answers that a master receives in pieces (see `tests/master/any_line.rs`).
+//! two nodes (three in the random stories of `random_masters.rs`); answers that a master receives
+//! in pieces (see `tests/master/any_line.rs`).
 //!
 //! On UCP: settings other than `sends_first_stop`, `low_ids_only` and the robot's bias requests;
-//! the content of reports and pongs (see the scenarios of host and robot); a host and a robot talking to each
-//! other.
+//! the content of reports and pongs (see `tests/host` and `tests/robot`); a host and a robot
+//! talking to each other.
 //!
 //! # Depths
 //!
