@@ -1,6 +1,6 @@
 //! A motor bus on a port, with its master; shared by `scan`, `spin` and `stop`.
 
-use std::{thread, time};
+use std::time;
 
 use axlewire::{
     ikeya::{
@@ -13,6 +13,7 @@ use axlewire::{
 
 use crate::{
     args::{self, Protocol},
+    clock,
     failure::Failure,
     line::Line,
     session::Session,
@@ -240,7 +241,7 @@ impl<B: Boards> Bus<B> {
                 return result;
             }
             if result.is_err() {
-                thread::sleep(FAILURE_PAUSE);
+                clock::sleep(FAILURE_PAUSE);
             }
         }
     }

@@ -8,6 +8,7 @@ mod beside;
 mod boards;
 mod bus;
 mod calibrate;
+mod clock;
 mod decode;
 mod drive;
 mod export;
@@ -32,9 +33,6 @@ mod play;
 mod played;
 mod plot;
 mod ports;
-#[cfg(test)]
-#[path = "../../../tests/harness/quiet.rs"]
-mod quiet;
 mod record;
 mod replay;
 mod report;

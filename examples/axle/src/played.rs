@@ -8,13 +8,15 @@ use std::{
     collections::VecDeque,
     io::{self, ErrorKind},
     rc::Rc,
-    thread,
     time::{Duration, Instant},
 };
 
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
-use crate::line::{Line, Wire};
+use crate::{
+    clock,
+    line::{Line, Wire},
+};
 use devices::BusEar;
 pub(crate) use devices::{
     BusState, Node, PlayedRover, RoverState, Said, confirmable_stops, speeds,
@@ -60,6 +62,7 @@ pub(crate) fn rover(mut on_bytes: impl FnMut(&mut RoverState) + 'static) -> Play
 /// A silent line.
 pub(crate) fn silence(is_instant: bool) -> Line {
     let play = |_: &[u8]| Vec::new();
+    clock::play();
     let (is_gone, back_at) = (Rc::default(), Rc::default());
     let wire = PlayedWire { play, unread: VecDeque::new(), is_gone, back_at };
     Line::new("played", wire, is_instant)
@@ -70,6 +73,7 @@ pub(crate) fn played<T: 'static>(
     state: T,
     mut play: impl FnMut(&mut T, &[u8]) -> Vec<u8> + 'static,
 ) -> Played<T> {
+    clock::play();
     let (state, is_gone) = (Rc::new(RefCell::new(state)), Rc::new(Cell::new(false)));
     let back_at = Rc::new(Cell::new(None));
     let theirs = Rc::clone(&state);
@@ -96,7 +100,7 @@ impl Played<BusState> {
 
 impl<P: FnMut(&[u8]) -> Vec<u8>> PlayedWire<P> {
     fn check(&self) -> io::Result<()> {
-        let is_back = self.back_at.get().is_some_and(|at| Instant::now() >= at);
+        let is_back = self.back_at.get().is_some_and(|at| clock::now() >= at);
         match self.is_gone.get() && !is_back {
             true => Err(io::Error::new(ErrorKind::BrokenPipe, "unplugged")),
             false => Ok(()),
@@ -106,16 +110,16 @@ impl<P: FnMut(&[u8]) -> Vec<u8>> PlayedWire<P> {
 
 impl<P: FnMut(&[u8]) -> Vec<u8>> Wire for PlayedWire<P> {
     fn wait(&mut self, patience: Duration) -> io::Result<bool> {
-        let begin = Instant::now();
+        let begin = clock::now();
         loop {
             self.check()?;
             let said = (self.play)(&[]);
             self.unread.extend(said);
-            let left = patience.saturating_sub(begin.elapsed());
+            let left = patience.saturating_sub(clock::since(begin));
             if !self.unread.is_empty() || left.is_zero() {
                 return Ok(!self.unread.is_empty());
             }
-            thread::sleep(left.min(Duration::from_millis(1)));
+            clock::sleep(left.min(Duration::from_millis(1)));
         }
     }
 }

@@ -15,6 +15,7 @@ use axlewire::{
 
 use crate::{
     args::{self, Protocol},
+    clock,
     decode::BUFFER_LEN,
     failure::Failure,
     help::EXIT_CODES,
@@ -79,7 +80,7 @@ where
     let baud = args.baud.unwrap_or(args.protocol.default_baud());
     let line = Line::connect(&args.port, baud)?;
     let file = Recording::create(&args.output, args.force, args.protocol, line.path(), baud)?;
-    let end = args.micros.map(|micros| Instant::now() + Duration::from_micros(micros));
+    let end = args.micros.map(|micros| clock::now() + Duration::from_micros(micros));
     let (account, recorded) = record_line::<F>(line, file, end, &signals);
     if args.output != Path::new("-") {
         let mut out = io::stdout().lock();
@@ -104,7 +105,7 @@ where
     let mut buffer = [0; 4096];
     let mut recorded = Ok(());
     let broken = loop {
-        let now = Instant::now();
+        let now = clock::now();
         if recorded.is_err() || signals.is_raised() || end.is_some_and(|end| now >= end) {
             break Ok(());
         }
@@ -145,7 +146,7 @@ where
             unwritten: VecDeque::new(),
             chunks: VecDeque::new(),
             written: 0,
-            heard_at: Instant::now(),
+            heard_at: clock::now(),
         }
     }
 
@@ -157,7 +158,7 @@ where
     /// The same, with the time: microseconds since 1970, never less than before.
     pub(crate) fn take_at(&mut self, bytes: &[u8], micros: u64) -> Result<(), Failure> {
         if bytes.is_empty() {
-            if self.heard_at.elapsed().as_micros() >= QUIET.as_micros().into()
+            if clock::since(self.heard_at).as_micros() >= QUIET.as_micros().into()
                 && self.decoder.pending() > 0
             {
                 self.decoder.idle();
@@ -166,7 +167,7 @@ where
             self.file.check_reader();
             return self.file.check();
         }
-        self.heard_at = Instant::now();
+        self.heard_at = clock::now();
         let end = self.decoder.received() + bytes.len() as u64;
         self.chunks.push_back((end, micros));
         self.unwritten.extend(bytes);

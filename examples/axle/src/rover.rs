@@ -1,6 +1,6 @@
 //! A rover on a port, with its host; shared by `drive` and `stop`.
 
-use std::{thread, time};
+use std::time;
 
 use axlewire::{
     error::EncodeError,
@@ -13,6 +13,7 @@ use axlewire::{
 
 use crate::{
     args::{self, Protocol},
+    clock,
     failure::Failure,
     line::Line,
     session::Session,
@@ -205,7 +206,7 @@ impl Rover {
                 break result.err();
             }
             if result.is_err() {
-                thread::sleep(FAILURE_PAUSE);
+                clock::sleep(FAILURE_PAUSE);
             }
         };
         if let Some(failure) = failure {

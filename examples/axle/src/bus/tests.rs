@@ -1,14 +1,14 @@
 //! A bus on a line within the process.
 
-use std::{cell::RefCell, rc::Rc, time::Instant as Clock};
+use std::{cell::RefCell, rc::Rc};
 
 use axlewire::ikeya::{Rps, board::ThreeMotors};
 
 use super::*;
 use crate::{
     args::PortArgs,
+    clock,
     played::{self, BusState, Node, Played, Said, confirmable_stops},
-    quiet::undisturbed,
 };
 
 const POSITION: i32 = 8192 * 3;
@@ -31,232 +31,203 @@ fn turning(on_request: impl FnMut(Said, &mut BusState) + 'static) -> Played<BusS
 
 #[test]
 fn the_options_of_a_master_are_its_settings() {
-    undisturbed(|| {
-        let config = |direct, echo| MasterArgs::new(PortArgs::new(None), direct, echo).config();
-        assert_eq!(config(false, false), MasterConfig::usb_adapter());
-        assert_eq!(config(true, false), MasterConfig::direct());
-        assert!(config(false, true).removes_echo && config(true, true).removes_echo);
-    });
+    let config = |direct, echo| MasterArgs::new(PortArgs::new(None), direct, echo).config();
+    assert_eq!(config(false, false), MasterConfig::usb_adapter());
+    assert_eq!(config(true, false), MasterConfig::direct());
+    assert!(config(false, true).removes_echo && config(true, true).removes_echo);
 }
 
 #[test]
 fn the_settings_are_completed_by_the_line() {
-    undisturbed(|| {
-        let line = turning(|_, _| {}).line;
-        let plain = MasterConfig::usb_adapter();
-        for (baud, expected) in [(None, 500_000), (Some(9600), 9600)] {
-            let config = complete(plain, &PortArgs::new(baud), &line);
-            assert_eq!((config.baud, config.accepts_early), (expected, true));
-            assert_eq!(config.polling, Polling::Every(Duration::from_millis(20)));
-            assert_eq!(config.dead_man, Some(Duration::from_millis(500)));
-            assert_eq!(config.reply_timeout, plain.reply_timeout);
-        }
-    });
+    let line = turning(|_, _| {}).line;
+    let plain = MasterConfig::usb_adapter();
+    for (baud, expected) in [(None, 500_000), (Some(9600), 9600)] {
+        let config = complete(plain, &PortArgs::new(baud), &line);
+        assert_eq!((config.baud, config.accepts_early), (expected, true));
+        assert_eq!(config.polling, Polling::Every(Duration::from_millis(20)));
+        assert_eq!(config.dead_man, Some(Duration::from_millis(500)));
+        assert_eq!(config.reply_timeout, plain.reply_timeout);
+    }
 }
 
 #[test]
 fn only_a_line_that_takes_no_time_may_answer_early() {
-    undisturbed(|| {
-        for is_instant in [true, false] {
-            let line = played::silence(is_instant);
-            let config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line);
-            assert_eq!(config.accepts_early, is_instant);
-        }
-    });
+    for is_instant in [true, false] {
+        let line = played::silence(is_instant);
+        let config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line);
+        assert_eq!(config.accepts_early, is_instant);
+    }
 }
 
 #[test]
 fn a_stop_that_is_owed_is_told_with_what_was_heard() {
-    undisturbed(|| {
-        let cases = [
-            (true, Some(Cause::Damaged), ""),
-            (false, Some(Cause::Damaged), " (damaged bytes received)"),
-            (false, Some(Cause::Unexpected), " (other answers received)"),
-            (false, Some(Cause::Silent), " (nothing received)"),
-            (false, None, " (nothing received)"),
-        ];
-        for (is_online, failure, expected) in cases {
-            assert_eq!(heard(is_online, failure), expected);
-        }
-    });
+    let cases = [
+        (true, Some(Cause::Damaged), ""),
+        (false, Some(Cause::Damaged), " (damaged bytes received)"),
+        (false, Some(Cause::Unexpected), " (other answers received)"),
+        (false, Some(Cause::Silent), " (nothing received)"),
+        (false, None, " (nothing received)"),
+    ];
+    for (is_online, failure, expected) in cases {
+        assert_eq!(heard(is_online, failure), expected);
+    }
 }
 
 #[test]
 fn a_read_gives_what_was_measured_after_it_and_nothing_older() {
-    undisturbed(|| {
-        let signals = Signals::none();
-        let reads = Rc::new(RefCell::new(0));
-        let count = Rc::clone(&reads);
-        let line = turning(move |said, bus| {
-            if said == Said::Read(1) {
-                *count.borrow_mut() += 1;
-                bus.nodes[0].rps += 1.0;
-            }
-        });
-        let mut bus = on(&line.line, both());
-        assert!(bus.discover(&signals).unwrap());
-        for _ in 0..3 {
-            let before = *reads.borrow();
-            let status = bus.read(NodeId::N1, &signals).unwrap();
-            let Some(Status::Velocity(rps)) = status else { panic!("{status:?}") };
-            assert!(rps > 2.0 + before as f32, "{rps} after {before}");
+    let signals = Signals::none();
+    let reads = Rc::new(RefCell::new(0));
+    let count = Rc::clone(&reads);
+    let line = turning(move |said, bus| {
+        if said == Said::Read(1) {
+            *count.borrow_mut() += 1;
+            bus.nodes[0].rps += 1.0;
         }
-        line.state.borrow_mut().nodes[0].is_dumb = true;
-        assert_eq!(bus.read(NodeId::N1, &signals).unwrap(), None);
-        signals.raise();
-        assert_eq!(bus.read(NodeId::N2, &signals).unwrap(), None);
-        let asked = line.said().len();
-        assert!(!bus.discover(&signals).unwrap());
-        assert_eq!(line.said().len(), asked, "at once");
     });
+    let mut bus = on(&line.line, both());
+    assert!(bus.discover(&signals).unwrap());
+    for _ in 0..3 {
+        let before = *reads.borrow();
+        let status = bus.read(NodeId::N1, &signals).unwrap();
+        let Some(Status::Velocity(rps)) = status else { panic!("{status:?}") };
+        assert!(rps > 2.0 + before as f32, "{rps} after {before}");
+    }
+    line.state.borrow_mut().nodes[0].is_dumb = true;
+    assert_eq!(bus.read(NodeId::N1, &signals).unwrap(), None);
+    signals.raise();
+    assert_eq!(bus.read(NodeId::N2, &signals).unwrap(), None);
+    let asked = line.said().len();
+    assert!(!bus.discover(&signals).unwrap());
+    assert_eq!(line.said().len(), asked, "at once");
 }
 
 #[test]
 fn an_answer_in_another_mode_that_is_not_certain_is_no_status() {
-    undisturbed(|| {
-        let signals = Signals::none();
-        let line = turning(|said, bus| {
-            let node = &mut bus.nodes[0];
-            // One answer in the other mode, then none.
-            if said == Said::Read(1) && node.rps == 5.0 {
-                node.is_dumb = node.mode == Mode::Position;
-                node.mode = Mode::Position;
-            }
-        });
-        let mut bus = on(&line.line, both());
-        assert!(bus.discover(&signals).unwrap());
-        line.state.borrow_mut().nodes[0].rps = 5.0;
-        assert_eq!(bus.read(NodeId::N1, &signals).unwrap(), None);
-        assert!(bus.master().is_mode_in_doubt(NodeId::N1));
+    let signals = Signals::none();
+    let line = turning(|said, bus| {
+        let node = &mut bus.nodes[0];
+        // One answer in the other mode, then none.
+        if said == Said::Read(1) && node.rps == 5.0 {
+            node.is_dumb = node.mode == Mode::Position;
+            node.mode = Mode::Position;
+        }
     });
+    let mut bus = on(&line.line, both());
+    assert!(bus.discover(&signals).unwrap());
+    line.state.borrow_mut().nodes[0].rps = 5.0;
+    assert_eq!(bus.read(NodeId::N1, &signals).unwrap(), None);
+    assert!(bus.master().is_mode_in_doubt(NodeId::N1));
 }
 
 #[test]
 fn a_status_does_not_count_if_another_answer_has_put_the_mode_in_doubt() {
-    undisturbed(|| {
-        // Another node has the same id. Once the first one turns, both answer one READ, then none
-        // does, and then only the first.
-        let other = Node { is_dumb: true, ..Node::position(1, POSITION) };
-        let mut reads = 0;
-        let line = played::bus(&[Node::velocity(1), other], move |_, bus| {
-            reads += u32::from(bus.nodes[0].rps == 2.0);
-            (bus.nodes[0].is_dumb, bus.nodes[1].is_dumb) = (reads == 2, reads != 1);
-        });
-        let mut bus = on(&line.line, NodeId::N1.into());
-        assert!(bus.discover(&Signals::none()).unwrap());
-        let before = line.said().len();
-        line.state.borrow_mut().nodes[0].rps = 2.0;
-        let status = bus.read(NodeId::N1, &Signals::none()).unwrap();
-        assert_eq!(status, Some(Status::Velocity(2.0)));
-        assert!(!bus.master().is_mode_in_doubt(NodeId::N1));
-        assert!(line.said().len() >= before + 3, "it was asked again");
+    // Another node has the same id. Once the first one turns, both answer one READ, then none
+    // does, and then only the first.
+    let other = Node { is_dumb: true, ..Node::position(1, POSITION) };
+    let mut reads = 0;
+    let line = played::bus(&[Node::velocity(1), other], move |_, bus| {
+        reads += u32::from(bus.nodes[0].rps == 2.0);
+        (bus.nodes[0].is_dumb, bus.nodes[1].is_dumb) = (reads == 2, reads != 1);
     });
+    let mut bus = on(&line.line, NodeId::N1.into());
+    assert!(bus.discover(&Signals::none()).unwrap());
+    let before = line.said().len();
+    line.state.borrow_mut().nodes[0].rps = 2.0;
+    let status = bus.read(NodeId::N1, &Signals::none()).unwrap();
+    assert_eq!(status, Some(Status::Velocity(2.0)));
+    assert!(!bus.master().is_mode_in_doubt(NodeId::N1));
+    assert!(line.said().len() >= before + 3, "it was asked again");
 }
 
 #[test]
 fn a_refresh_asks_each_node_even_if_nothing_else_does() {
-    undisturbed(|| {
-        let line = turning(|_, _| {});
-        let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
-        (config.nodes, config.polling) = (both(), Polling::Manual);
-        let mut bus: Bus = Bus::new(line.line.clone(), config);
-        assert!(bus.discover(&Signals::none()).unwrap());
-        let before = line.said().len();
-        bus.refresh(both());
-        assert_eq!(line.said()[before..], [Said::Read(1), Said::Read(2)]);
-    });
+    let line = turning(|_, _| {});
+    let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
+    (config.nodes, config.polling) = (both(), Polling::Manual);
+    let mut bus: Bus = Bus::new(line.line.clone(), config);
+    assert!(bus.discover(&Signals::none()).unwrap());
+    let before = line.said().len();
+    bus.refresh(both());
+    assert_eq!(line.said()[before..], [Said::Read(1), Said::Read(2)]);
 }
 
 #[test]
 fn a_refresh_learns_what_the_nodes_have_become() {
-    undisturbed(|| {
-        let signals = Signals::none();
-        let line = turning(|_, _| {});
-        let mut bus = on(&line.line, both());
-        assert!(bus.discover(&signals).unwrap());
-        for node in &mut line.state.borrow_mut().nodes {
-            (node.mode, node.counts, node.rps) = match node.mode {
-                Mode::Velocity => (Mode::Position, 7, 0.0),
-                Mode::Position => (Mode::Velocity, 0, 0.5),
-            };
-        }
-        let begin = Clock::now();
-        bus.refresh(both());
-        assert!(begin.elapsed() < time::Duration::from_millis(150), "{:?}", begin.elapsed());
-        assert_eq!(bus.master().mode(NodeId::N1), Some(Mode::Position));
-        assert_eq!(bus.master().mode(NodeId::N2), Some(Mode::Velocity));
-        line.state.borrow_mut().nodes[0].is_dumb = true;
-        bus.refresh(both());
-        assert!(begin.elapsed() < time::Duration::from_millis(800), "not for long");
-    });
+    let signals = Signals::none();
+    let line = turning(|_, _| {});
+    let mut bus = on(&line.line, both());
+    assert!(bus.discover(&signals).unwrap());
+    for node in &mut line.state.borrow_mut().nodes {
+        (node.mode, node.counts, node.rps) = match node.mode {
+            Mode::Velocity => (Mode::Position, 7, 0.0),
+            Mode::Position => (Mode::Velocity, 0, 0.5),
+        };
+    }
+    let begin = clock::now();
+    bus.refresh(both());
+    assert!(clock::since(begin) < time::Duration::from_millis(150), "{:?}", clock::since(begin));
+    assert_eq!(bus.master().mode(NodeId::N1), Some(Mode::Position));
+    assert_eq!(bus.master().mode(NodeId::N2), Some(Mode::Velocity));
+    line.state.borrow_mut().nodes[0].is_dumb = true;
+    bus.refresh(both());
+    assert!(clock::since(begin) < time::Duration::from_millis(800), "not for long");
 }
 
 #[test]
 fn all_nodes_are_stopped_each_in_its_mode_and_confirm_it_twice() {
-    undisturbed(|| {
-        let line = turning(|_, _| {});
-        let mut bus = on(&line.line, NodeSet::ALL);
-        bus.stop(both()).unwrap();
-        assert_eq!(both().iter().map(|node| bus.halt(node)).collect::<Vec<_>>(), [Halt::Still; 2]);
-        assert_eq!((bus.complaint(NodeId::N1), bus.complaint(NodeId::N2)), (None, None));
-        let said = line.said();
-        for said in said.iter().filter(|said| matches!(said, Said::Write(..))) {
-            assert!(
-                matches!(said, Said::Write(1, 0.0, _) | Said::Write(2, _, POSITION)),
-                "{said:?}"
-            );
-        }
-        assert!(confirmable_stops(&said, 1) >= 2, "{said:?}");
-        let holds = said.iter().filter(|said| matches!(said, Said::Write(2, ..))).count();
-        assert!(holds >= 2, "{said:?}");
-    });
+    let line = turning(|_, _| {});
+    let mut bus = on(&line.line, NodeSet::ALL);
+    bus.stop(both()).unwrap();
+    assert_eq!(both().iter().map(|node| bus.halt(node)).collect::<Vec<_>>(), [Halt::Still; 2]);
+    assert_eq!((bus.complaint(NodeId::N1), bus.complaint(NodeId::N2)), (None, None));
+    let said = line.said();
+    for said in said.iter().filter(|said| matches!(said, Said::Write(..))) {
+        assert!(matches!(said, Said::Write(1, 0.0, _) | Said::Write(2, _, POSITION)), "{said:?}");
+    }
+    assert!(confirmable_stops(&said, 1) >= 2, "{said:?}");
+    let holds = said.iter().filter(|said| matches!(said, Said::Write(2, ..))).count();
+    assert!(holds >= 2, "{said:?}");
 }
 
 #[test]
 fn an_id_counts_as_silent_only_after_as_many_requests_as_the_master_attempts() {
-    undisturbed(|| {
-        let line = turning(|_, bus| bus.nodes[0].is_dumb = true);
-        let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
-        config.nodes = NodeId::N1.into();
-        // The second one is open after the second that an unanswered id is allowed.
-        (config.attempts, config.reply_timeout) = (3, Duration::from_millis(600));
-        let mut bus = Bus::<OneMotor>::new(line.line.clone(), config);
-        let begin = Clock::now();
-        bus.stop(NodeId::N1.into()).unwrap();
-        let asked = line.said().iter().filter(|said| **said == Said::Read(1)).count();
-        assert_eq!((asked, bus.halt(NodeId::N1)), (3, Halt::Silent), "{:?}", begin.elapsed());
-    });
+    let line = turning(|_, bus| bus.nodes[0].is_dumb = true);
+    let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
+    config.nodes = NodeId::N1.into();
+    // The second one is open after the second that an unanswered id is allowed.
+    (config.attempts, config.reply_timeout) = (3, Duration::from_millis(600));
+    let mut bus = Bus::<OneMotor>::new(line.line.clone(), config);
+    let begin = clock::now();
+    bus.stop(NodeId::N1.into()).unwrap();
+    let asked = line.said().iter().filter(|said| **said == Said::Read(1)).count();
+    assert_eq!((asked, bus.halt(NodeId::N1)), (3, Halt::Silent), "{:?}", clock::since(begin));
 }
 
 #[test]
 fn a_stop_on_a_slow_line_has_the_time_that_it_needs() {
-    undisturbed(|| {
-        let line = turning(|_, _| {}).line;
-        let bound = |baud| {
-            let config = complete(MasterConfig::usb_adapter(), &PortArgs::new(Some(baud)), &line);
-            let bus = Bus::<ThreeMotors>::new(line.clone(), config);
-            (bus.stop_bound(), bus.master().stop_bound())
-        };
-        let ((fast, needed), (slow, needed_slowly)) = (bound(500_000), bound(9600));
-        assert_eq!(fast, needed.max(Duration::from_millis(3000)));
-        assert_eq!(slow, needed_slowly.max(Duration::from_millis(3000)));
-        assert!(needed_slowly > Duration::from_millis(3000), "{needed_slowly:?}");
-    });
+    let line = turning(|_, _| {}).line;
+    let bound = |baud| {
+        let config = complete(MasterConfig::usb_adapter(), &PortArgs::new(Some(baud)), &line);
+        let bus = Bus::<ThreeMotors>::new(line.clone(), config);
+        (bus.stop_bound(), bus.master().stop_bound())
+    };
+    let ((fast, needed), (slow, needed_slowly)) = (bound(500_000), bound(9600));
+    assert_eq!(fast, needed.max(Duration::from_millis(3000)));
+    assert_eq!(slow, needed_slowly.max(Duration::from_millis(3000)));
+    assert!(needed_slowly > Duration::from_millis(3000), "{needed_slowly:?}");
 }
 
 #[test]
 fn the_dead_man_of_the_master_is_noticed() {
-    undisturbed(|| {
-        let line = turning(|_, _| {});
-        let mut bus = on(&line.line, NodeId::N1.into());
-        assert!(bus.discover(&Signals::none()).unwrap());
-        let now = bus.now();
-        bus.master_mut().set_velocity(NodeId::N1, Rps::new(1.0).unwrap(), now).unwrap();
-        let end = bus.now() + Duration::from_millis(700);
-        while bus.now() < end {
-            bus.round(end).unwrap();
-        }
-        assert!(bus.has_dead_man_fired);
-        assert_eq!(line.state.borrow().nodes[0].rps, 0.0);
-    });
+    let line = turning(|_, _| {});
+    let mut bus = on(&line.line, NodeId::N1.into());
+    assert!(bus.discover(&Signals::none()).unwrap());
+    let now = bus.now();
+    bus.master_mut().set_velocity(NodeId::N1, Rps::new(1.0).unwrap(), now).unwrap();
+    let end = bus.now() + Duration::from_millis(700);
+    while bus.now() < end {
+        bus.round(end).unwrap();
+    }
+    assert!(bus.has_dead_man_fired);
+    assert_eq!(line.state.borrow().nodes[0].rps, 0.0);
 }

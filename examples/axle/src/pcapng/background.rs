@@ -111,6 +111,7 @@ mod tests {
     use crate::pcapng::Reader;
 
     #[test]
+    #[ignore = "real time"]
     fn a_disk_that_stalls_delays_nobody_and_is_told() {
         let (_reader, writer) = std::io::pipe().unwrap();
         let mut recording = Background::new(Recording::to_file(File::from(OwnedFd::from(writer))));
@@ -125,6 +126,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "real time"]
     fn packets_for_which_the_disk_was_too_slow_are_told_at_the_end() {
         let (mut reader, writer) = std::io::pipe().unwrap();
         let mut recording = Background::new(Recording::to_file(File::from(OwnedFd::from(writer))));

@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::{Direction, Writer};
-use crate::{args::Protocol, failure::Failure};
+use crate::{args::Protocol, clock, failure::Failure};
 
 /// A capture in a file or on standard output, and the clock of its times.
 pub(crate) struct Recording {
@@ -30,12 +30,12 @@ pub(crate) struct Stamp {
 
 impl Stamp {
     pub(crate) fn new() -> Self {
-        Self { start: Instant::now(), is_then: SystemTime::now() }
+        Self { start: clock::now(), is_then: SystemTime::now() }
     }
 
     /// Microseconds since 1970.
     pub(crate) fn micros(self) -> u64 {
-        let time = self.is_then + self.start.elapsed();
+        let time = self.is_then + clock::since(self.start);
         time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64)
     }
 }

@@ -6,9 +6,10 @@ use axlewire::{
 };
 
 use super::*;
-use crate::{pcapng::Reader, quiet::undisturbed};
+use crate::pcapng::Reader;
 
 fn frames(name: &str) -> (Frames<Ucp>, PathBuf) {
+    clock::play();
     let path = std::env::temp_dir().join(format!("axle-{name}-{}", std::process::id()));
     let file = Recording::create(&path, true, Protocol::Ucp, "port", 115_200).unwrap();
     (Frames::new(file), path)
@@ -29,27 +30,25 @@ fn recorded(path: &Path) -> (Vec<Vec<u8>>, Vec<u64>) {
 
 #[test]
 fn a_frame_that_is_cut_off_is_written_after_a_pause_and_the_next_one_whole() {
-    undisturbed(|| {
-        let (mut frames, path) = frames("cut");
-        let frame = MotorControl::STOP.frame(0);
-        let bytes = frame.as_bytes();
-        frames.take(&bytes[..10]).unwrap();
-        frames.take(&[]).unwrap();
-        assert_eq!(frames.account().skipped(), 0, "it may go on");
-        std::thread::sleep(Duration::from_micros(QUIET.as_micros().into()));
-        frames.take(&[]).unwrap();
-        assert_eq!(frames.account().skipped(), 10);
-        frames.take(&[bytes, bytes].concat()).unwrap();
-        frames.take(&bytes[..3]).unwrap();
-        let (account, finished) = frames.finish();
-        finished.unwrap();
-        assert_eq!((account.frames, account.skipped(), account.received), (2, 13, 61));
-        let (packets, times) = recorded(&path);
-        assert_eq!(packets, [&bytes[..10], bytes, bytes, &bytes[..3]]);
-        assert!(times[1] - times[0] >= QUIET.as_micros().into(), "{times:?}");
-        assert_eq!(times[1], times[2]);
-        assert!(times.is_sorted() && times[0] > 0, "{times:?}");
-    });
+    let (mut frames, path) = frames("cut");
+    let frame = MotorControl::STOP.frame(0);
+    let bytes = frame.as_bytes();
+    frames.take(&bytes[..10]).unwrap();
+    frames.take(&[]).unwrap();
+    assert_eq!(frames.account().skipped(), 0, "it may go on");
+    clock::sleep(Duration::from_micros(QUIET.as_micros().into()));
+    frames.take(&[]).unwrap();
+    assert_eq!(frames.account().skipped(), 10);
+    frames.take(&[bytes, bytes].concat()).unwrap();
+    frames.take(&bytes[..3]).unwrap();
+    let (account, finished) = frames.finish();
+    finished.unwrap();
+    assert_eq!((account.frames, account.skipped(), account.received), (2, 13, 61));
+    let (packets, times) = recorded(&path);
+    assert_eq!(packets, [&bytes[..10], bytes, bytes, &bytes[..3]]);
+    assert!(times[1] - times[0] >= QUIET.as_micros().into(), "{times:?}");
+    assert_eq!(times[1], times[2]);
+    assert!(times.is_sorted() && times[0] > 0, "{times:?}");
 }
 
 #[test]
@@ -61,7 +60,7 @@ fn a_frame_that_is_found_late_has_the_time_at_which_it_came() {
     // It may be part of the other frame, until that one turns out to be none.
     frames.take(&[&other[..8], drive.as_bytes()].concat()).unwrap();
     assert_eq!(frames.account().frames, 0);
-    std::thread::sleep(Duration::from_millis(2));
+    clock::sleep(Duration::from_millis(2));
     frames.take(&[1; 40]).unwrap();
     frames.finish().1.unwrap();
     let (packets, times) = recorded(&path);

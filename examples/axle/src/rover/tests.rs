@@ -1,6 +1,6 @@
 //! A rover on a line within the process.
 
-use std::{collections::VecDeque, time::Instant as Clock};
+use std::collections::VecDeque;
 
 use axlewire::{
     endpoint::Endpoint,
@@ -13,7 +13,7 @@ use axlewire::{
 use serialport::{SerialPort as _, TTYPort};
 
 use super::*;
-use crate::{args::PortArgs, played, quiet::undisturbed};
+use crate::{args::PortArgs, clock, played};
 
 #[test]
 fn a_positive_turn_is_to_the_right_and_the_text_says_so() {
@@ -34,233 +34,209 @@ fn a_positive_turn_is_to_the_right_and_the_text_says_so() {
 
 #[test]
 fn a_rover_is_at_rest_once_every_wheel_has_been_still_for_three_reports() {
-    undisturbed(|| {
-        let begin = Clock::now();
-        let line = played::rover(move |rover| {
-            let millis = begin.elapsed().as_millis();
-            rover.wheels = match millis / 110 {
-                0 | 1 => Some([9, 0, 0, 0]),
-                2 => Some([0, -9, 0, 0]),
-                3 => Some([0, 0, 9, 0]),
-                4 => Some([0, 0, 0, -9]),
-                5 => Some([9, -9, 9, -9]),
-                // Still for one report in three.
-                6 | 7 => Some([if millis % 60 < 15 { 0 } else { 9 }; 4]),
-                _ => None,
-            };
-        });
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        rover.stop().unwrap();
-        assert!(begin.elapsed().as_millis() >= 880, "{:?}", begin.elapsed());
-        let commands = &line.state.borrow().commands;
-        assert!(commands.len() >= 5 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
+    let begin = clock::now();
+    let line = played::rover(move |rover| {
+        let millis = clock::since(begin).as_millis();
+        rover.wheels = match millis / 110 {
+            0 | 1 => Some([9, 0, 0, 0]),
+            2 => Some([0, -9, 0, 0]),
+            3 => Some([0, 0, 9, 0]),
+            4 => Some([0, 0, 0, -9]),
+            5 => Some([9, -9, 9, -9]),
+            // Still for one report in three.
+            6 | 7 => Some([if millis % 60 < 15 { 0 } else { 9 }; 4]),
+            _ => None,
+        };
     });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    rover.stop().unwrap();
+    assert!(clock::since(begin).as_millis() >= 880, "{:?}", clock::since(begin));
+    let commands = &line.state.borrow().commands;
+    assert!(commands.len() >= 5 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
 }
 
 #[test]
 fn a_stop_is_sent_three_times_and_heard_before_a_report_counts() {
-    undisturbed(|| {
-        let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        let before = line.state.borrow().commands.len();
-        rover.stop().unwrap();
-        assert!(line.state.borrow().commands.len() >= before + 3);
-        assert!(rover.host().is_stop_sent());
-        let text = rover.describe().unwrap();
-        assert!(text.starts_with("rpm    0    0    0    0  heading  90 deg  "), "{text}");
-    });
+    let line = played::rover(|_| {});
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    let before = line.state.borrow().commands.len();
+    rover.stop().unwrap();
+    assert!(line.state.borrow().commands.len() >= before + 3);
+    assert!(rover.host().is_stop_sent());
+    let text = rover.describe().unwrap();
+    assert!(text.starts_with("rpm    0    0    0    0  heading  90 deg  "), "{text}");
 }
 
 #[test]
 fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
-    undisturbed(|| {
-        // It stands still until it has heard of the stop, and then turns.
-        let mut pings = None;
-        let line = played::rover(move |rover| {
-            if rover.commands.len() >= STOPS as usize {
-                let before = *pings.get_or_insert(rover.pings);
-                rover.wheels = (rover.pings > before).then_some([9; 4]);
-            }
-        });
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        assert!(rover.stop().is_err());
-        assert_eq!(line.state.borrow().wheels, Some([9; 4]));
+    // It stands still until it has heard of the stop, and then turns.
+    let mut pings = None;
+    let line = played::rover(move |rover| {
+        if rover.commands.len() >= STOPS as usize {
+            let before = *pings.get_or_insert(rover.pings);
+            rover.wheels = (rover.pings > before).then_some([9; 4]);
+        }
     });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    assert!(rover.stop().is_err());
+    assert_eq!(line.state.borrow().wheels, Some([9; 4]));
 }
 
 #[test]
 fn reports_from_before_a_stop_was_heard_do_not_count_towards_those_behind_it() {
-    undisturbed(|| {
-        // It stands still all the time, but reports nothing from the third stop on, until it has
-        // answered three pings: at the second at the latest it is known to have heard.
-        let mut played = played::PlayedRover::default();
-        let pong = Pong::new(ErrorCode::Fine).frame(0);
-        let mut answered = 0;
-        let line = played::played(played::RoverState::default(), move |state, bytes| {
-            let pings = state.pings;
-            let said = played.hear(state, bytes);
-            if state.pings > pings && state.is_dumb {
-                answered += 1;
-                state.is_dumb = answered < 3;
-                return pong.as_bytes().to_vec();
-            }
-            state.is_dumb |= answered == 0 && state.commands.len() >= STOPS as usize;
-            said
-        });
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        rover.stop().unwrap();
-        assert!(!line.state.borrow().is_dumb, "it has told nothing since");
+    // It stands still all the time, but reports nothing from the third stop on, until it has
+    // answered three pings: at the second at the latest it is known to have heard.
+    let mut played = played::PlayedRover::default();
+    let pong = Pong::new(ErrorCode::Fine).frame(0);
+    let mut answered = 0;
+    let line = played::played(played::RoverState::default(), move |state, bytes| {
+        let pings = state.pings;
+        let said = played.hear(state, bytes);
+        if state.pings > pings && state.is_dumb {
+            answered += 1;
+            state.is_dumb = answered < 3;
+            return pong.as_bytes().to_vec();
+        }
+        state.is_dumb |= answered == 0 && state.commands.len() >= STOPS as usize;
+        said
     });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    rover.stop().unwrap();
+    assert!(!line.state.borrow().is_dumb, "it has told nothing since");
 }
 
 #[test]
 fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
-    undisturbed(|| {
-        let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        let now = rover.now();
-        rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
-        while !line.state.borrow().commands.contains(&(30, 0)) {
-            let end = rover.now() + CALL_PERIOD;
-            rover.round(end).unwrap();
-        }
-        let (before, begin) = (line.state.borrow().commands.len(), Clock::now());
-        rover.stop().unwrap();
-        let commands = line.state.borrow().commands[before..].to_vec();
-        assert!(commands.len() >= 3 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
-        assert!(begin.elapsed().as_millis() < 1400, "{:?}", begin.elapsed());
-    });
+    let line = played::rover(|_| {});
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    let now = rover.now();
+    rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
+    while !line.state.borrow().commands.contains(&(30, 0)) {
+        let end = rover.now() + CALL_PERIOD;
+        rover.round(end).unwrap();
+    }
+    let (before, begin) = (line.state.borrow().commands.len(), clock::now());
+    rover.stop().unwrap();
+    let commands = line.state.borrow().commands[before..].to_vec();
+    assert!(commands.len() >= 3 && commands.iter().all(|it| *it == (0, 0)), "{commands:?}");
+    assert!(clock::since(begin).as_millis() < 1400, "{:?}", clock::since(begin));
 }
 
 #[test]
 fn the_wheels_of_a_report_are_told_in_their_order() {
-    undisturbed(|| {
-        let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        let end = rover.now() + Duration::from_millis(5000);
-        while rover.describe().is_none() && rover.now() < end {
-            rover.round(end).unwrap();
-        }
-        let text = rover.describe().unwrap();
-        let expected = "rpm    1   -2    3   -4  heading  90 deg  24.3 V  1.56 A  battery 87 %  lost \
-                    reports 0";
-        assert_eq!(text, expected);
-    });
+    let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    let end = rover.now() + Duration::from_millis(5000);
+    while rover.describe().is_none() && rover.now() < end {
+        rover.round(end).unwrap();
+    }
+    let text = rover.describe().unwrap();
+    let expected = "rpm    1   -2    3   -4  heading  90 deg  24.3 V  1.56 A  battery 87 %  lost \
+                reports 0";
+    assert_eq!(text, expected);
 }
 
 #[test]
 fn a_search_that_is_over_finds_nothing() {
-    undisturbed(|| {
-        let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(!rover.find(|| true).unwrap());
-        assert!(rover.find(|| false).unwrap());
-        assert!(!rover.find(|| true).unwrap(), "even if it is heard");
-    });
+    let line = played::rover(|_| {});
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(!rover.find(|| true).unwrap());
+    assert!(rover.find(|| false).unwrap());
+    assert!(!rover.find(|| true).unwrap(), "even if it is heard");
 }
 
 #[test]
 fn a_search_that_finds_no_robot_tells_what_was_received_and_how_long_it_took() {
-    undisturbed(|| {
-        let strays = |count: u32| {
-            played::played(count, |left, _| {
-                let is_more = *left > 0;
-                *left = left.saturating_sub(1);
-                vec![0; usize::from(is_more)]
-            })
-        };
-        for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
-            let mut rover = Rover::on(strays(count).line, &PortArgs::new(None));
-            let begin = Clock::now();
-            let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
-            assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
-            assert!(begin.elapsed().as_millis() >= 1999, "{:?}", begin.elapsed());
-        }
-    });
+    let strays = |count: u32| {
+        played::played(count, |left, _| {
+            let is_more = *left > 0;
+            *left = left.saturating_sub(1);
+            vec![0; usize::from(is_more)]
+        })
+    };
+    for (count, heard) in [(0, "nothing"), (5, "5 bytes but no message")] {
+        let mut rover = Rover::on(strays(count).line, &PortArgs::new(None));
+        let begin = clock::now();
+        let Err(Failure::Failed(told)) = rover.find(|| false) else { panic!("found") };
+        assert_eq!(told, format!("no robot answers on \"played\": {heard} received in 2 s"));
+        assert!(clock::since(begin).as_millis() >= 1999, "{:?}", clock::since(begin));
+    }
 }
 
 #[test]
 fn a_search_is_over_soon_after_it_is_told_so_however_silent_the_line_is() {
-    undisturbed(|| {
-        let line = played::rover(|rover| rover.is_dumb = true);
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        let begin = Clock::now();
-        assert!(!rover.find(|| begin.elapsed().as_millis() >= 300).unwrap());
-        assert!(begin.elapsed().as_millis() < 700, "{:?}", begin.elapsed());
-    });
+    let line = played::rover(|rover| rover.is_dumb = true);
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    let begin = clock::now();
+    assert!(!rover.find(|| clock::since(begin).as_millis() >= 300).unwrap());
+    assert!(clock::since(begin).as_millis() < 700, "{:?}", clock::since(begin));
 }
 
 #[test]
 fn the_dead_man_of_the_host_is_noticed() {
-    undisturbed(|| {
-        let line = played::rover(|_| {});
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        let now = rover.now();
-        rover.host_mut().drive(motor_control(20, 0).unwrap(), now).unwrap();
-        let end = rover.now() + Duration::from_millis(700);
-        while rover.now() < end {
-            rover.round(end).unwrap();
-        }
-        assert!(rover.has_dead_man_fired);
-        assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
-    });
+    let line = played::rover(|_| {});
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    let now = rover.now();
+    rover.host_mut().drive(motor_control(20, 0).unwrap(), now).unwrap();
+    let end = rover.now() + Duration::from_millis(700);
+    while rover.now() < end {
+        rover.round(end).unwrap();
+    }
+    assert!(rover.has_dead_man_fired);
+    assert_eq!(line.state.borrow().commands.last(), Some(&(0, 0)));
 }
 
 #[test]
 fn a_late_pong_does_not_tell_that_a_later_ping_was_heard() {
-    undisturbed(|| {
-        let late = time::Duration::from_millis(700);
-        let (mut played, mut waiting) = (played::PlayedRover::default(), VecDeque::new());
-        let line = played::played(played::RoverState::default(), move |state, bytes| {
-            let said = played.hear(state, bytes);
-            if !said.is_empty() {
-                waiting.push_back((Clock::now() + late, said));
-            }
-            let mut due = Vec::new();
-            while waiting.front().is_some_and(|(at, _)| *at <= Clock::now()) {
-                due.extend(waiting.pop_front().map(|(_, said)| said).unwrap_or_default());
-            }
-            due
-        });
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        let (mark, begin) = (rover.mark(), Clock::now());
-        // All pings are young: each may be answered yet, also those of the first round.
-        let seen = rover.host().statistics();
-        assert_eq!(mark.open, Some(seen.pings - pongs(seen)));
-        assert_ne!(mark.open, Some(0));
-        while !rover.has_heard(&mark) && begin.elapsed() < 5 * late {
-            let end = rover.now() + CALL_PERIOD;
-            rover.round(end).unwrap();
+    let late = time::Duration::from_millis(700);
+    let (mut played, mut waiting) = (played::PlayedRover::default(), VecDeque::new());
+    let line = played::played(played::RoverState::default(), move |state, bytes| {
+        let said = played.hear(state, bytes);
+        if !said.is_empty() {
+            waiting.push_back((clock::now() + late, said));
         }
-        assert!((late..3 * late).contains(&begin.elapsed()), "{:?}", begin.elapsed());
+        let mut due = Vec::new();
+        while waiting.front().is_some_and(|(at, _)| *at <= clock::now()) {
+            due.extend(waiting.pop_front().map(|(_, said)| said).unwrap_or_default());
+        }
+        due
     });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    let (mark, begin) = (rover.mark(), clock::now());
+    // All pings are young: each may be answered yet, also those of the first round.
+    let seen = rover.host().statistics();
+    assert_eq!(mark.open, Some(seen.pings - pongs(seen)));
+    assert_ne!(mark.open, Some(0));
+    while !rover.has_heard(&mark) && clock::since(begin) < 5 * late {
+        let end = rover.now() + CALL_PERIOD;
+        rover.round(end).unwrap();
+    }
+    assert!((late..3 * late).contains(&clock::since(begin)), "{:?}", clock::since(begin));
 }
 
 #[test]
 fn pings_of_others_make_every_pong_doubtful() {
-    undisturbed(|| {
-        let line = played::rover(|_| {});
-        for has_others in [false, true] {
-            let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-            assert!(rover.find(|| false).unwrap());
-            if has_others {
-                rover.others_have_pinged();
-            }
-            let mark = rover.mark();
-            assert!(!rover.has_heard(&mark));
-            let end = rover.now() + Duration::from_millis(700);
-            while rover.now() < end && !rover.has_heard(&mark) {
-                rover.round(end).unwrap();
-            }
-            assert_eq!(rover.has_heard(&mark), !has_others);
+    let line = played::rover(|_| {});
+    for has_others in [false, true] {
+        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+        assert!(rover.find(|| false).unwrap());
+        if has_others {
+            rover.others_have_pinged();
         }
-    });
+        let mark = rover.mark();
+        assert!(!rover.has_heard(&mark));
+        let end = rover.now() + Duration::from_millis(700);
+        while rover.now() < end && !rover.has_heard(&mark) {
+            rover.round(end).unwrap();
+        }
+        assert_eq!(rover.has_heard(&mark), !has_others);
+    }
 }
 
 #[test]
@@ -277,40 +253,32 @@ fn the_host_of_a_rover_has_the_speed_of_its_line() {
 
 #[test]
 fn commands_from_before_a_stop_are_no_stops() {
-    undisturbed(|| {
-        // With each report comes a pong, as if it had heard everything at once.
-        let mut played = played::PlayedRover::default();
-        let pong = Pong::new(ErrorCode::Fine).frame(0);
-        let line = played::played(played::RoverState::default(), move |state, bytes| {
-            let said = played.hear(state, bytes);
-            if said.is_empty() { said } else { [&said, pong.as_bytes()].concat() }
-        });
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        assert!(rover.find(|| false).unwrap());
-        while line.state.borrow().commands.len() < 2 * STOPS as usize {
-            let now = rover.now();
-            rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
-            rover.round(now + CALL_PERIOD).unwrap();
-        }
-        let before = line.state.borrow().commands.len();
-        rover.stop().unwrap();
-        let stops = line.state.borrow().commands[before..].to_vec();
-        assert!(stops.len() >= STOPS as usize, "{stops:?}");
+    // With each report comes a pong, as if it had heard everything at once.
+    let mut played = played::PlayedRover::default();
+    let pong = Pong::new(ErrorCode::Fine).frame(0);
+    let line = played::played(played::RoverState::default(), move |state, bytes| {
+        let said = played.hear(state, bytes);
+        if said.is_empty() { said } else { [&said, pong.as_bytes()].concat() }
     });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    while line.state.borrow().commands.len() < 2 * STOPS as usize {
+        let now = rover.now();
+        rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
+        rover.round(now + CALL_PERIOD).unwrap();
+    }
+    let before = line.state.borrow().commands.len();
+    rover.stop().unwrap();
+    let stops = line.state.borrow().commands[before..].to_vec();
+    assert!(stops.len() >= STOPS as usize, "{stops:?}");
 }
 
 #[test]
 fn pings_that_are_lost_do_not_stay_open() {
-    undisturbed(|| {
-        let line = played::rover(|rover| rover.is_dumb = true);
-        let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-        let begin = Clock::now();
-        assert!(!rover.find(|| begin.elapsed().as_millis() >= 1700).unwrap());
-        let (mark, pings) = (rover.mark(), rover.host().statistics().pings);
-        assert!(
-            mark.open.is_some_and(|open| (1..pings).contains(&open)),
-            "{pings} {:?}",
-            mark.open
-        );
-    });
+    let line = played::rover(|rover| rover.is_dumb = true);
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    let begin = clock::now();
+    assert!(!rover.find(|| clock::since(begin).as_millis() >= 1700).unwrap());
+    let (mark, pings) = (rover.mark(), rover.host().statistics().pings);
+    assert!(mark.open.is_some_and(|open| (1..pings).contains(&open)), "{pings} {:?}", mark.open);
 }

@@ -8,7 +8,6 @@ use super::*;
 use crate::{
     args::PortArgs,
     played::{self, BusState, Node, Played, Said},
-    quiet::undisturbed,
 };
 
 fn goal(turns: i32) -> Goal<OneMotor> {
@@ -40,58 +39,50 @@ fn at_the_second(mut react: impl FnMut(&mut Node) + 'static) -> impl FnMut(Said,
 
 #[test]
 fn the_way_begins_where_the_motor_is_when_it_is_read_again() {
-    undisturbed(|| {
-        let moved = at_the_second(|node| node.counts = 8192 * 5);
-        let line = played::bus(&[Node::position(1, 8192)], moved);
-        let (turns, mut told) = (|it: i32| Target::Position(Position::new(0, it as i16)), None);
-        let tell = |found| {
-            told = Some(found);
-            Ok(())
-        };
-        let target = aimed(&line, &goal(2), tell, &Signals::none()).unwrap();
-        assert_eq!((told, target), (Some(turns(3)), Some(turns(7))));
-    });
+    let moved = at_the_second(|node| node.counts = 8192 * 5);
+    let line = played::bus(&[Node::position(1, 8192)], moved);
+    let (turns, mut told) = (|it: i32| Target::Position(Position::new(0, it as i16)), None);
+    let tell = |found| {
+        told = Some(found);
+        Ok(())
+    };
+    let target = aimed(&line, &goal(2), tell, &Signals::none()).unwrap();
+    assert_eq!((told, target), (Some(turns(3)), Some(turns(7))));
 }
 
 #[test]
 fn a_signal_in_front_of_the_command_moves_nothing() {
-    undisturbed(|| {
-        let signals = Rc::new(Signals::none());
-        let raised = Rc::clone(&signals);
-        let line = played::bus(&[Node::velocity(1)], at_the_second(move |_| raised.raise()));
-        let goal = Goal::Speed(Rps::new(2.0).unwrap());
-        assert_eq!(aimed(&line, &goal, |_| Ok(()), &signals).unwrap(), None);
-        let told = |_| panic!("it is not even looked for");
-        assert_eq!(aimed(&line, &goal, told, &signals).unwrap(), None);
-    });
+    let signals = Rc::new(Signals::none());
+    let raised = Rc::clone(&signals);
+    let line = played::bus(&[Node::velocity(1)], at_the_second(move |_| raised.raise()));
+    let goal = Goal::Speed(Rps::new(2.0).unwrap());
+    assert_eq!(aimed(&line, &goal, |_| Ok(()), &signals).unwrap(), None);
+    let told = |_| panic!("it is not even looked for");
+    assert_eq!(aimed(&line, &goal, told, &signals).unwrap(), None);
 }
 
 #[test]
 fn a_mode_in_doubt_or_another_one_moves_nothing() {
-    undisturbed(|| {
-        let goal = Goal::Speed(Rps::new(2.0).unwrap());
-        for (falls_silent, says) in [
-            (true, "the mode of node 1 is in doubt"),
-            (false, "node 1 is in position mode: use --revolutions"),
-        ] {
-            let turns = at_the_second(move |node| {
-                node.is_dumb = falls_silent && node.mode == Mode::Position;
-                node.mode = Mode::Position;
-            });
-            let line = played::bus(&[Node::velocity(1)], turns);
-            let error = aimed(&line, &goal, |_| Ok(()), &Signals::none()).unwrap_err();
-            assert_eq!(error.to_string(), says);
-        }
-    });
+    let goal = Goal::Speed(Rps::new(2.0).unwrap());
+    for (falls_silent, says) in [
+        (true, "the mode of node 1 is in doubt"),
+        (false, "node 1 is in position mode: use --revolutions"),
+    ] {
+        let turns = at_the_second(move |node| {
+            node.is_dumb = falls_silent && node.mode == Mode::Position;
+            node.mode = Mode::Position;
+        });
+        let line = played::bus(&[Node::velocity(1)], turns);
+        let error = aimed(&line, &goal, |_| Ok(()), &Signals::none()).unwrap_err();
+        assert_eq!(error.to_string(), says);
+    }
 }
 
 #[test]
 fn an_output_that_is_closed_moves_nothing() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let goal = Goal::Speed(Rps::new(2.0).unwrap());
-        let closed = |_| Err(Failure::Failed("closed".to_owned()));
-        let error = aimed(&line, &goal, closed, &Signals::none()).unwrap_err();
-        assert_eq!(error.to_string(), "closed");
-    });
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let goal = Goal::Speed(Rps::new(2.0).unwrap());
+    let closed = |_| Err(Failure::Failed("closed".to_owned()));
+    let error = aimed(&line, &goal, closed, &Signals::none()).unwrap_err();
+    assert_eq!(error.to_string(), "closed");
 }

@@ -9,6 +9,7 @@ use std::{
 
 use super::args::Watched;
 use crate::{
+    clock,
     decode::{self, Sheet, Stream},
     failure::Failure,
     line::QUIET,
@@ -47,7 +48,7 @@ impl Udp {
             to,
             stream: decode::stream_of(watched.protocol, Direction::In),
             sheet: Sheet::new(Some(Style::Json)),
-            heard_at: Instant::now(),
+            heard_at: clock::now(),
             is_open: false,
             sent: 0,
             lost: None,
@@ -58,10 +59,10 @@ impl Udp {
     pub(super) fn take(&mut self, bytes: &[u8], micros: u64) {
         let Some(sender) = &mut self.0 else { return };
         if !bytes.is_empty() {
-            (sender.heard_at, sender.is_open) = (Instant::now(), true);
+            (sender.heard_at, sender.is_open) = (clock::now(), true);
             sender.stream.feed(bytes, Some(micros), &mut sender.sheet);
         } else if sender.is_open
-            && sender.heard_at.elapsed().as_micros() >= QUIET.as_micros().into()
+            && clock::since(sender.heard_at).as_micros() >= QUIET.as_micros().into()
         {
             // A partial frame has ended (ruling B3).
             sender.is_open = false;

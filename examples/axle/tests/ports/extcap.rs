@@ -13,7 +13,6 @@ use super::{
     record::{decoded, fresh},
     sim,
     support::axle,
-    undisturbed,
 };
 
 /// A pipe of the name that Wireshark would choose.
@@ -41,23 +40,21 @@ fn drained(fifo: &str) -> thread::JoinHandle<String> {
 
 #[test]
 fn a_live_capture_has_every_frame_until_it_is_stopped() {
-    undisturbed(|| {
-        let (_sim, port) = sim("ucp");
-        let fifo = fifo();
-        let reader = drained(&fifo);
-        let capture = capture(&port, "ucp", &fifo);
-        thread::sleep(Duration::from_millis(700));
-        capture.signal("TERM");
-        assert_eq!(capture.success(), Vec::<String>::new());
-        let path = reader.join().unwrap();
-        let (events, summary) = decoded(&path);
-        let reports = events.iter().filter(|event| event["message"] == "report").count();
-        assert!(reports > 10, "{reports} reports");
-        assert_eq!(summary["skipped"], 0);
-        // The name that Wireshark shows, and by which the dissector knows whose times they are.
-        let file = fs::read(path).unwrap();
-        assert!(file.windows(port.len()).any(|bytes| bytes == port.as_bytes()));
-    });
+    let (_sim, port) = sim("ucp");
+    let fifo = fifo();
+    let reader = drained(&fifo);
+    let capture = capture(&port, "ucp", &fifo);
+    thread::sleep(Duration::from_millis(700));
+    capture.signal("TERM");
+    assert_eq!(capture.success(), Vec::<String>::new());
+    let path = reader.join().unwrap();
+    let (events, summary) = decoded(&path);
+    let reports = events.iter().filter(|event| event["message"] == "report").count();
+    assert!(reports > 10, "{reports} reports");
+    assert_eq!(summary["skipped"], 0);
+    // The name that Wireshark shows, and by which the dissector knows whose times they are.
+    let file = fs::read(path).unwrap();
+    assert!(file.windows(port.len()).any(|bytes| bytes == port.as_bytes()));
 }
 
 #[test]

@@ -10,12 +10,11 @@ mod extcap;
 mod faults;
 mod gone;
 mod input;
+mod line;
 #[cfg(feature = "dashboard")]
 mod page;
 mod played;
 mod progress;
-#[path = "../../../../tests/harness/quiet.rs"]
-mod quiet;
 mod record;
 mod replay;
 mod rover;
@@ -35,7 +34,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use quiet::undisturbed;
 use support::process::Process;
 
 /// A simulation and the path of its port.

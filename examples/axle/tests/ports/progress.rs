@@ -4,26 +4,20 @@ use std::process::Command;
 
 use axlewire::ucp::{Body, message::Ping};
 
-use super::{
-    support::{file, terminal::Terminal},
-    undisturbed,
-};
+use super::support::{file, terminal::Terminal};
 
 #[test]
 fn the_progress_bar_fits_into_60_columns() {
-    undisturbed(|| {
-        let frame = Ping {}.frame(7);
-        let path = file("progress.bin", &frame.as_bytes().repeat(3_000_000));
-        // The listing does not go to the terminal, so that the bar can.
-        let command =
-            format!("{} decode {} > /dev/null", env!("CARGO_BIN_EXE_axle"), path.display());
-        let mut terminal = Terminal::spawn(Command::new("sh").args(["-c", &command]), (60, 10));
-        let bar = terminal.row(" of ");
-        assert!(bar.trim_end().ends_with(" left"), "{bar:?}");
-        assert!(bar.contains('[') && bar.chars().count() <= 60, "{bar:?}");
-        assert_eq!(terminal.code(), Some(0));
-        std::fs::remove_file(&path).unwrap();
-    });
+    let frame = Ping {}.frame(7);
+    let path = file("progress.bin", &frame.as_bytes().repeat(3_000_000));
+    // The listing does not go to the terminal, so that the bar can.
+    let command = format!("{} decode {} > /dev/null", env!("CARGO_BIN_EXE_axle"), path.display());
+    let mut terminal = Terminal::spawn(Command::new("sh").args(["-c", &command]), (60, 10));
+    let bar = terminal.row(" of ");
+    assert!(bar.trim_end().ends_with(" left"), "{bar:?}");
+    assert!(bar.contains('[') && bar.chars().count() <= 60, "{bar:?}");
+    assert_eq!(terminal.code(), Some(0));
+    std::fs::remove_file(&path).unwrap();
 }
 
 #[test]

@@ -15,7 +15,6 @@ use super::{
         file,
         pcapng::{Packet, PcapNg},
     },
-    undisturbed,
 };
 
 /// A capture of a master that turns node 1 at these speeds, every 50 ms.
@@ -39,99 +38,89 @@ fn capture(speeds: &[f32], mode_is_known: bool) -> String {
 
 #[test]
 fn a_recording_is_sent_again_and_what_it_moves_is_stopped() {
-    undisturbed(|| {
-        let (sim, port) = sim(TWO_NODES);
-        let path = fresh("spin.pcapng");
-        Process::start(&format!("spin -p {port} --node 1 --rps 2 --for 0.6 --record {path}")).end();
-        let again = fresh("again.pcapng");
-        let replay = format!("replay {path} -p {port} --move --record {again}");
-        let lines = Process::start(&replay).success();
-        assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
-        let commands = |path: &str| -> Vec<_> {
-            let (events, _) = decoded(path);
-            let sent = events.into_iter().filter(|event| event["message"] == "write");
-            sent.map(|event| event["bytes"].clone()).collect()
-        };
-        // In between come the stops of the end.
-        assert!(commands(&again).starts_with(&commands(&path)));
-        let turning = sim.lines().iter().filter(|line| line.ends_with("command 2.00 rps")).count();
-        assert_eq!(turning, 2);
-    });
+    let (sim, port) = sim(TWO_NODES);
+    let path = fresh("spin.pcapng");
+    Process::start(&format!("spin -p {port} --node 1 --rps 2 --for 0.6 --record {path}")).end();
+    let again = fresh("again.pcapng");
+    let replay = format!("replay {path} -p {port} --move --record {again}");
+    let lines = Process::start(&replay).success();
+    assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+    let commands = |path: &str| -> Vec<_> {
+        let (events, _) = decoded(path);
+        let sent = events.into_iter().filter(|event| event["message"] == "write");
+        sent.map(|event| event["bytes"].clone()).collect()
+    };
+    // In between come the stops of the end.
+    assert!(commands(&again).starts_with(&commands(&path)));
+    let turning = sim.lines().iter().filter(|line| line.ends_with("command 2.00 rps")).count();
+    assert_eq!(turning, 2);
 }
 
 #[test]
 fn commands_need_to_be_meant() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let path = capture(&[1.0, 2.0], true);
-        let error = Process::start(&format!("replay {path} -p {}", line.path)).complaint(1);
-        let expected = "2 of 2 frames move something: use --move if you mean it; nothing is sent";
-        assert_eq!(error, expected);
-        assert!(line.said().is_empty());
-    });
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let path = capture(&[1.0, 2.0], true);
+    let error = Process::start(&format!("replay {path} -p {}", line.path)).complaint(1);
+    let expected = "2 of 2 frames move something: use --move if you mean it; nothing is sent";
+    assert_eq!(error, expected);
+    assert!(line.said().is_empty());
 }
 
 #[test]
 fn a_node_in_another_mode_than_in_the_capture_gets_nothing() {
-    undisturbed(|| {
-        for (known, expected) in [
-            (true, "node 1 is in position mode, but a command is for velocity mode"),
-            (false, "16256.0000 turns for node 1, which is at 0.0000, is farther than --max-turns"),
-        ] {
-            let line = played::bus(&[Node::position(1, 0)], |_, _| {});
-            let path = capture(&[1.0], known);
-            let replay = Process::start(&format!("replay {path} --move -p {}", line.path));
-            let error = replay.complaint(1);
-            assert!(error.starts_with(expected), "{error}");
-            assert!(speeds(&line.said()).is_empty());
-        }
-    });
+    for (known, expected) in [
+        (true, "node 1 is in position mode, but a command is for velocity mode"),
+        (false, "16256.0000 turns for node 1, which is at 0.0000, is farther than --max-turns"),
+    ] {
+        let line = played::bus(&[Node::position(1, 0)], |_, _| {});
+        let path = capture(&[1.0], known);
+        let replay = Process::start(&format!("replay {path} --move -p {}", line.path));
+        let error = replay.complaint(1);
+        assert!(error.starts_with(expected), "{error}");
+        assert!(speeds(&line.said()).is_empty());
+    }
 }
 
 #[test]
 fn a_node_that_changes_its_mode_ends_the_replay_and_is_stopped_in_its_new_mode() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |said, bus| {
-            if said == Said::Write(1, 1.0, 133_169_152) {
-                bus.nodes[0] = Node { follows: false, ..Node::position(1, 4096) };
-            }
-        });
-        let node = NodeId::N1;
-        let write = *WriteRequest::velocity(node, Rps::new(1.0).unwrap()).as_bytes();
-        let read = *ReadRequest::new(node).as_bytes();
-        let answer = *VelocityResponse::new(node, Rps::ZERO).as_bytes();
-        let packets: [Packet<'_>; 4] =
-            [(0, 1, &answer), (10, 2, &write), (90_000, 2, &read), (5_000_000, 2, &write)];
-        let path = file("turncoat.pcapng", &PcapNg::new(147, &packets).0);
-        let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
-        let error = Process::start(&replay).complaint(1);
-        assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
-        let said = line.said();
-        let first = said.iter().position(|said| matches!(said, Said::Write(..))).unwrap();
-        let later = &said[first + 1..];
-        // It is held where it is.
-        assert!(later.iter().any(|said| matches!(said, Said::Write(1, _, 4096))), "{later:?}");
-        assert!(!later.contains(&said[first]), "{later:?}");
+    let line = played::bus(&[Node::velocity(1)], |said, bus| {
+        if said == Said::Write(1, 1.0, 133_169_152) {
+            bus.nodes[0] = Node { follows: false, ..Node::position(1, 4096) };
+        }
     });
+    let node = NodeId::N1;
+    let write = *WriteRequest::velocity(node, Rps::new(1.0).unwrap()).as_bytes();
+    let read = *ReadRequest::new(node).as_bytes();
+    let answer = *VelocityResponse::new(node, Rps::ZERO).as_bytes();
+    let packets: [Packet<'_>; 4] =
+        [(0, 1, &answer), (10, 2, &write), (90_000, 2, &read), (5_000_000, 2, &write)];
+    let path = file("turncoat.pcapng", &PcapNg::new(147, &packets).0);
+    let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
+    let error = Process::start(&replay).complaint(1);
+    assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
+    let said = line.said();
+    let first = said.iter().position(|said| matches!(said, Said::Write(..))).unwrap();
+    let later = &said[first + 1..];
+    // It is held where it is.
+    assert!(later.iter().any(|said| matches!(said, Said::Write(1, _, 4096))), "{later:?}");
+    assert!(!later.contains(&said[first]), "{later:?}");
 }
 
 #[test]
 fn pongs_of_the_capture_do_not_tell_that_the_stop_was_heard() {
-    undisturbed(|| {
-        let (sim, port) = sim("ucp --delay 0.4");
-        let ping = Ping {}.frame(0);
-        let drive = MotorControl::new(60, 0).unwrap().frame(0);
-        let mut packets: Vec<Packet<'_>> =
-            (0..100).map(|at| (at * 20_000, 2, ping.as_bytes())).collect();
-        packets.push((2_000_000, 2, drive.as_bytes()));
-        let path = file("pings.pcapng", &PcapNg::new(150, &packets).0);
-        let replay = format!("replay {} --move -p {port}", path.to_str().unwrap());
-        Process::start(&replay).success();
-        // No wait: the rover is at rest already.
-        let lines = sim.lines();
-        assert!(lines.iter().any(|line| line.ends_with("  moving")), "{lines:?}");
-        assert!(lines.iter().any(|line| line.contains("at rest after")), "{lines:?}");
-    });
+    let (sim, port) = sim("ucp --delay 0.4");
+    let ping = Ping {}.frame(0);
+    let drive = MotorControl::new(60, 0).unwrap().frame(0);
+    let mut packets: Vec<Packet<'_>> =
+        (0..100).map(|at| (at * 20_000, 2, ping.as_bytes())).collect();
+    packets.push((2_000_000, 2, drive.as_bytes()));
+    let path = file("pings.pcapng", &PcapNg::new(150, &packets).0);
+    let replay = format!("replay {} --move -p {port}", path.to_str().unwrap());
+    Process::start(&replay).success();
+    // No wait: the rover is at rest already.
+    let lines = sim.lines();
+    assert!(lines.iter().any(|line| line.ends_with("  moving")), "{lines:?}");
+    assert!(lines.iter().any(|line| line.contains("at rest after")), "{lines:?}");
 }
 
 /// Shipped robots give the first frame up at its id, read past the header of the second one, and
@@ -172,91 +161,78 @@ fn what_would_be_a_hidden_frame_for_a_robot_is_none_for_a_host_or_a_motor() {
 
 #[test]
 fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
-        let packets: [Packet<'_>; 2] = [(0, 2, &write), (u64::MAX, 2, &write)];
-        let path = file("ages.pcapng", &PcapNg::new(147, &packets).0);
-        let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
-        let error = Process::start(&replay).complaint(1);
-        assert_eq!(error, "frame 2 is due after more than a year");
-        assert!(line.said().is_empty());
-    });
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
+    let packets: [Packet<'_>; 2] = [(0, 2, &write), (u64::MAX, 2, &write)];
+    let path = file("ages.pcapng", &PcapNg::new(147, &packets).0);
+    let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
+    let error = Process::start(&replay).complaint(1);
+    assert_eq!(error, "frame 2 is due after more than a year");
+    assert!(line.said().is_empty());
 }
 
 #[test]
 fn an_echo_in_the_recording_is_not_sent() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
-        let answer = *VelocityResponse::new(NodeId::N1, Rps::ZERO).as_bytes();
-        let packets: [Packet<'_>; 3] = [(0, 2, &write), (10, 1, &write), (20, 1, &answer)];
-        let path = file("echo.pcapng", &PcapNg::new(147, &packets).0);
-        let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
-        Process::start(&replay).success();
-        let said = speeds(&line.said());
-        assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 1, "{said:?}");
-    });
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
+    let answer = *VelocityResponse::new(NodeId::N1, Rps::ZERO).as_bytes();
+    let packets: [Packet<'_>; 3] = [(0, 2, &write), (10, 1, &write), (20, 1, &answer)];
+    let path = file("echo.pcapng", &PcapNg::new(147, &packets).0);
+    let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
+    Process::start(&replay).success();
+    let said = speeds(&line.said());
+    assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 1, "{said:?}");
 }
 
 #[test]
 fn a_speed_above_the_limit_is_found_before_anything_is_sent() {
-    undisturbed(|| {
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let path = capture(&[1.0, 2.0, 25.0], true);
-        let replay = Process::start(&format!("replay {path} --move -p {}", line.path));
-        let error = replay.complaint(1);
-        assert!(error.starts_with("25.0 rps for node 1 is more than --max-rps 20"), "{error}");
-        assert!(speeds(&line.said()).is_empty());
-    });
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let path = capture(&[1.0, 2.0, 25.0], true);
+    let replay = Process::start(&format!("replay {path} --move -p {}", line.path));
+    let error = replay.complaint(1);
+    assert!(error.starts_with("25.0 rps for node 1 is more than --max-rps 20"), "{error}");
+    assert!(speeds(&line.said()).is_empty());
 }
 
 #[test]
 fn the_pace_is_that_of_the_capture_or_faster() {
-    undisturbed(|| {
-        let path = capture(&[1.0; 9], true);
-        for (factor, least_ms) in [(1, 400), (4, 100)] {
-            let line = played::bus(&[Node::velocity(1)], |_, _| {});
-            let replay = format!("replay {path} --move --speed {factor} -p {}", line.path);
-            Process::start(&replay).success();
-            let bus = line.lock();
-            let at: Vec<_> = bus
-                .said
-                .iter()
-                .filter(|(said, _)| *said == Said::Write(1, 1.0, 133_169_152))
-                .map(|(_, at)| *at)
-                .collect();
-            assert_eq!(at.len(), 9);
-            let took = (at[8] - at[0]).as_millis();
-            assert!((least_ms - 20..3 * least_ms).contains(&took), "{took} ms");
-        }
-    });
+    let path = capture(&[1.0; 9], true);
+    for (factor, least_ms) in [(1, 400), (4, 100)] {
+        let line = played::bus(&[Node::velocity(1)], |_, _| {});
+        let replay = format!("replay {path} --move --speed {factor} -p {}", line.path);
+        Process::start(&replay).success();
+        let bus = line.lock();
+        let at: Vec<_> = bus
+            .said
+            .iter()
+            .filter(|(said, _)| *said == Said::Write(1, 1.0, 133_169_152))
+            .map(|(_, at)| *at)
+            .collect();
+        assert_eq!(at.len(), 9);
+        let took = (at[8] - at[0]).as_millis();
+        assert!((least_ms - 20..3 * least_ms).contains(&took), "{took} ms");
+    }
 }
 
 #[test]
 fn the_other_side_of_a_capture_moves_nothing() {
-    undisturbed(|| {
-        let line = played::parrot(&[]);
-        let path = capture(&[1.0], true);
-        let lines =
-            Process::start(&format!("replay {path} --as device -p {}", line.path)).success();
-        assert!(lines[1].contains("velocity_response"), "{lines:?}");
-        let answer = VelocityResponse::new(NodeId::N1, Rps::ZERO);
-        assert_eq!(*line.lock(), answer.as_bytes());
-    });
+    let line = played::parrot(&[]);
+    let path = capture(&[1.0], true);
+    let lines = Process::start(&format!("replay {path} --as device -p {}", line.path)).success();
+    assert!(lines[1].contains("velocity_response"), "{lines:?}");
+    let answer = VelocityResponse::new(NodeId::N1, Rps::ZERO);
+    assert_eq!(*line.lock(), answer.as_bytes());
 }
 
 #[test]
 fn raw_bytes_need_a_protocol_and_have_an_even_pace() {
-    undisturbed(|| {
-        let bytes = ReadRequest::new(NodeId::N1).as_bytes().repeat(3);
-        let path = file("reads.bin", &bytes);
-        let path = path.to_str().unwrap();
-        let error = Process::start(&format!("replay {path} -p /dev/none")).complaint(2);
-        assert_eq!(error, "--protocol is needed for a capture of raw bytes");
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let replay = format!("replay {path} -P ikeya --every 0.05 -p {}", line.path);
-        Process::start(&replay).success();
-        assert_eq!(line.said(), [Said::Read(1); 3]);
-    });
+    let bytes = ReadRequest::new(NodeId::N1).as_bytes().repeat(3);
+    let path = file("reads.bin", &bytes);
+    let path = path.to_str().unwrap();
+    let error = Process::start(&format!("replay {path} -p /dev/none")).complaint(2);
+    assert_eq!(error, "--protocol is needed for a capture of raw bytes");
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let replay = format!("replay {path} -P ikeya --every 0.05 -p {}", line.path);
+    Process::start(&replay).success();
+    assert_eq!(line.said(), [Said::Read(1); 3]);
 }

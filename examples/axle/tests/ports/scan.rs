@@ -7,102 +7,89 @@ use serde_json::{Value, json};
 use super::{
     Process, TWO_NODES,
     played::{self, Node, parrot},
-    sim, undisturbed,
+    sim,
 };
 
 #[test]
 fn scan_finds_the_nodes_with_their_modes() {
-    undisturbed(|| {
-        let (_sim, port) = sim(TWO_NODES);
-        let table = Process::start(&format!("scan --port {port}")).success();
-        let rows: Vec<Vec<_>> =
-            table.iter().map(|line| line.split_whitespace().collect()).collect();
-        assert_eq!(rows[1], ["1", "velocity", "0000", "0010", "0.00", "rps"]);
-        assert_eq!(rows[2], ["3", "position", "0101", "0111", "0.0000", "turns"]);
-        assert_eq!((&*table[3], table.len()), ("2 nodes answer.", 4));
+    let (_sim, port) = sim(TWO_NODES);
+    let table = Process::start(&format!("scan --port {port}")).success();
+    let rows: Vec<Vec<_>> = table.iter().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(rows[1], ["1", "velocity", "0000", "0010", "0.00", "rps"]);
+    assert_eq!(rows[2], ["3", "position", "0101", "0111", "0.0000", "turns"]);
+    assert_eq!((&*table[3], table.len()), ("2 nodes answer.", 4));
 
-        let records = Process::start(&format!("scan --json --port {port}")).success();
-        let records: Vec<Value> =
-            records.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
-        let expected = [
-            json!({"event": "node", "node": 1, "mode": "velocity", "rps": 0.0,
-                   "dip": {"value_plus_one": "0000", "value": "0010"}}),
-            json!({"event": "node", "node": 3, "mode": "position", "count": 0, "rotation": 0,
-                   "dip": {"value_plus_one": "0101", "value": "0111"}}),
-            json!({"event": "summary", "nodes": 2, "damaged": 0}),
-        ];
-        assert_eq!(records, expected);
-    });
+    let records = Process::start(&format!("scan --json --port {port}")).success();
+    let records: Vec<Value> =
+        records.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let expected = [
+        json!({"event": "node", "node": 1, "mode": "velocity", "rps": 0.0,
+               "dip": {"value_plus_one": "0000", "value": "0010"}}),
+        json!({"event": "node", "node": 3, "mode": "position", "count": 0, "rotation": 0,
+               "dip": {"value_plus_one": "0101", "value": "0111"}}),
+        json!({"event": "summary", "nodes": 2, "damaged": 0}),
+    ];
+    assert_eq!(records, expected);
 }
 
 #[test]
 fn scan_finds_all_nodes_of_a_noisy_bus_every_time() {
-    undisturbed(|| {
-        let nodes: String = (1..=8).map(|node| format!(" --node {node}:velocity")).collect();
-        let (_sim, port) = sim(&format!("ikeya --noise 1e-4 --seed 7{nodes}"));
-        for _ in 0..5 {
-            let table = Process::start(&format!("scan --port {port}")).success();
-            assert_eq!(table.last().unwrap(), "8 nodes answer.");
-            // Node 8 has no switch setting under the reading in which 1 is 001.
-            assert!(table[8].contains("1110") && table[8].contains("none"), "{table:?}");
-        }
-    });
+    let nodes: String = (1..=8).map(|node| format!(" --node {node}:velocity")).collect();
+    let (_sim, port) = sim(&format!("ikeya --noise 1e-4 --seed 7{nodes}"));
+    for _ in 0..5 {
+        let table = Process::start(&format!("scan --port {port}")).success();
+        assert_eq!(table.last().unwrap(), "8 nodes answer.");
+        // Node 8 has no switch setting under the reading in which 1 is 001.
+        assert!(table[8].contains("1110") && table[8].contains("none"), "{table:?}");
+    }
 }
 
 #[test]
 fn a_bus_without_nodes_is_no_failure() {
-    undisturbed(|| {
-        let line = parrot(&[]);
-        let lines = Process::start(&format!("scan --port {}", line.path)).success();
-        assert_eq!(lines.len(), 1);
-        assert!(lines[0].starts_with(&format!("No node answers on {:?}", line.path)), "{lines:?}");
-        let heard = line.lock();
-        assert_eq!(heard.len(), 24 * 4, "each id is asked three times");
-        assert!(heard.chunks(4).all(|packet| packet[0] == 0xAA), "and nothing else is sent");
-    });
+    let line = parrot(&[]);
+    let lines = Process::start(&format!("scan --port {}", line.path)).success();
+    assert_eq!(lines.len(), 1);
+    assert!(lines[0].starts_with(&format!("No node answers on {:?}", line.path)), "{lines:?}");
+    let heard = line.lock();
+    assert_eq!(heard.len(), 24 * 4, "each id is asked three times");
+    assert!(heard.chunks(4).all(|packet| packet[0] == 0xAA), "and nothing else is sent");
 }
 
 #[test]
 fn a_node_that_answers_with_garbage_for_ever_is_named_and_does_not_hold_anybody_up() {
-    undisturbed(|| {
-        let line = parrot(&[0x55, 0x01, 0x55, 0xAA, 0x00, 0xFF, 0x56, 0x03, 0x42, 0x55]);
-        let scan = Process::start(&format!("scan --port {}", line.path)).success();
-        assert_eq!(scan.iter().filter(|line| line.contains("only damaged answers")).count(), 8);
-        assert!(scan.last().unwrap().starts_with("No node answers on"), "{scan:?}");
+    let line = parrot(&[0x55, 0x01, 0x55, 0xAA, 0x00, 0xFF, 0x56, 0x03, 0x42, 0x55]);
+    let scan = Process::start(&format!("scan --port {}", line.path)).success();
+    assert_eq!(scan.iter().filter(|line| line.contains("only damaged answers")).count(), 8);
+    assert!(scan.last().unwrap().starts_with("No node answers on"), "{scan:?}");
 
-        let spin = Process::start(&format!("spin --port {} --node 1 --rps 1", line.path));
-        assert_eq!(spin.complaint(1), "node 1 does not answer; nodes that do: none");
-        let heard = line.lock();
-        assert!(!heard.contains(&0xBB), "no node was commanded");
-    });
+    let spin = Process::start(&format!("spin --port {} --node 1 --rps 1", line.path));
+    assert_eq!(spin.complaint(1), "node 1 does not answer; nodes that do: none");
+    let heard = line.lock();
+    assert!(!heard.contains(&0xBB), "no node was commanded");
 }
 
 #[test]
 fn a_direct_line_has_to_answer_at_once_and_an_adapter_has_20_ms() {
-    undisturbed(|| {
-        // Only a stall that `undisturbed` notices can change a result: at 8 ms, 12 are left until
-        // the adapter's time is up; at 15 ms, a direct line is that much too late.
-        for (delay_ms, option, expected) in
-            [(8, "", "1 node answers."), (15, "--direct", "No node answers on")]
-        {
-            let slow = Node { delay: Duration::from_millis(delay_ms), ..Node::velocity(1) };
-            let line = played::bus(&[slow], |_, _| {});
-            let scan = Process::start(&format!("scan {option} --port {}", line.path)).success();
-            assert!(scan.last().unwrap().starts_with(expected), "{scan:?}");
-        }
-    });
+    // Only a stall of the machine can change a result: at 8 ms, 12 are left until the adapter's
+    // time is up; at 15 ms, a direct line is that much too late.
+    for (delay_ms, option, expected) in
+        [(8, "", "1 node answers."), (15, "--direct", "No node answers on")]
+    {
+        let slow = Node { delay: Duration::from_millis(delay_ms), ..Node::velocity(1) };
+        let line = played::bus(&[slow], |_, _| {});
+        let scan = Process::start(&format!("scan {option} --port {}", line.path)).success();
+        assert!(scan.last().unwrap().starts_with(expected), "{scan:?}");
+    }
 }
 
 #[test]
 fn a_pseudo_terminal_may_answer_before_its_line_speed_allows() {
-    undisturbed(|| {
-        // At 9600 bit/s a READ and its answer take 12 ms.
-        let line = played::bus(&[Node::velocity(1)], |_, _| {});
-        let link = std::env::temp_dir().join(format!("axle-link-{}", std::process::id()));
-        std::os::unix::fs::symlink(&line.path, &link).unwrap();
-        let scan = Process::start(&format!("scan --baud 9600 --port {}", link.display()));
-        let lines = scan.success();
-        std::fs::remove_file(&link).unwrap();
-        assert_eq!(lines.last().unwrap(), "1 node answers.", "{lines:?}");
-    });
+    // At 9600 bit/s a READ and its answer take 12 ms.
+    let line = played::bus(&[Node::velocity(1)], |_, _| {});
+    let link = std::env::temp_dir().join(format!("axle-link-{}", std::process::id()));
+    std::os::unix::fs::symlink(&line.path, &link).unwrap();
+    let scan = Process::start(&format!("scan --baud 9600 --port {}", link.display()));
+    let lines = scan.success();
+    std::fs::remove_file(&link).unwrap();
+    assert_eq!(lines.last().unwrap(), "1 node answers.", "{lines:?}");
 }

@@ -20,330 +20,277 @@ use super::{
     Process, TWO_NODES,
     played::{self, Node, Said, confirmable_stops, parrot, speeds},
     record::{decoded, fresh},
-    sim, undisturbed, wait_until,
+    sim, wait_until,
 };
 
 #[test]
 fn stop_finds_what_a_killed_program_has_left_turning_and_stops_it() {
-    undisturbed(|| {
-        let (sim, port) = sim(TWO_NODES);
-        for args in ["--node 1 --rps 3", "--node 3 --revolutions 1000"] {
-            let spin = Process::start(&format!("spin --port {port} {args} --for 600"));
-            let first = spin.line("node");
-            assert!(first.contains("target "), "{first}");
-            sim.line(if args.contains("rps") {
-                "command 3.00 rps"
-            } else {
-                "command 1000.0000 turns"
-            });
-            spin.kill();
-        }
-        let lines = Process::start(&format!("stop --port {port}")).success();
-        assert!(lines[0].starts_with("node 1: 0.0") && lines[0].ends_with("stopped and confirmed"));
-        assert!(
-            lines[1].starts_with("node 3: ") && lines[1].ends_with("turns, stopped and confirmed")
-        );
-        assert_eq!(lines[2..], ["silent: 2, 4, 5, 6, 7, 8"]);
-        sim.line("node 1: at rest");
-        sim.line("node 3: at rest");
-    });
+    let (sim, port) = sim(TWO_NODES);
+    for args in ["--node 1 --rps 3", "--node 3 --revolutions 1000"] {
+        let spin = Process::start(&format!("spin --port {port} {args} --for 600"));
+        let first = spin.line("node");
+        assert!(first.contains("target "), "{first}");
+        sim.line(if args.contains("rps") { "command 3.00 rps" } else { "command 1000.0000 turns" });
+        spin.kill();
+    }
+    let lines = Process::start(&format!("stop --port {port}")).success();
+    assert!(lines[0].starts_with("node 1: 0.0") && lines[0].ends_with("stopped and confirmed"));
+    assert!(lines[1].starts_with("node 3: ") && lines[1].ends_with("turns, stopped and confirmed"));
+    assert_eq!(lines[2..], ["silent: 2, 4, 5, 6, 7, 8"]);
+    sim.line("node 1: at rest");
+    sim.line("node 3: at rest");
 }
 
 #[test]
 fn stop_records_a_bus_that_is_silent_and_then_the_rover() {
-    undisturbed(|| {
-        let (sim, port) = sim("ucp");
-        let drive = Process::start(&format!("drive -p {port} --speed 60 --turn 0 -f 600"));
-        sim.line("moving");
-        drive.kill();
-        let path = fresh("stop.pcapng");
-        Process::start(&format!("stop -p {port} --record {path}")).success();
-        let (events, _) = decoded(&path);
-        let is = |interface: u64, message: &str| {
-            let found =
-                |event: &Value| event["interface"] == interface && event["message"] == message;
-            events.iter().any(found)
-        };
-        assert!(is(0, "read_request") && is(1, "motor_control") && is(1, "report"));
-    });
+    let (sim, port) = sim("ucp");
+    let drive = Process::start(&format!("drive -p {port} --speed 60 --turn 0 -f 600"));
+    sim.line("moving");
+    drive.kill();
+    let path = fresh("stop.pcapng");
+    Process::start(&format!("stop -p {port} --record {path}")).success();
+    let (events, _) = decoded(&path);
+    let is = |interface: u64, message: &str| {
+        let found = |event: &Value| event["interface"] == interface && event["message"] == message;
+        events.iter().any(found)
+    };
+    assert!(is(0, "read_request") && is(1, "motor_control") && is(1, "report"));
 }
 
 #[test]
 fn a_recording_that_cannot_be_made_does_not_keep_a_motor_turning() {
-    undisturbed(|| {
-        let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |_, _| {});
-        let stop = format!("stop -p {} -P ikeya --record /dev/full", line.path);
-        let error = Process::start(&stop).complaint(1);
-        assert!(error.starts_with("cannot create \"/dev/full\": "), "{error}");
-        assert_eq!(line.lock().nodes[0].rps, 0.0);
-    });
+    let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |_, _| {});
+    let stop = format!("stop -p {} -P ikeya --record /dev/full", line.path);
+    let error = Process::start(&stop).complaint(1);
+    assert!(error.starts_with("cannot create \"/dev/full\": "), "{error}");
+    assert_eq!(line.lock().nodes[0].rps, 0.0);
 }
 
 #[test]
 fn on_a_line_with_echo_silent_ids_are_silent() {
-    undisturbed(|| {
-        let (_sim, port) = sim("ikeya --node 1:velocity --echo");
-        let lines = Process::start(&format!("stop -p {port} -P ikeya --echo")).success();
-        assert_eq!(lines[1..], ["silent: 2, 3, 4, 5, 6, 7, 8"]);
-    });
+    let (_sim, port) = sim("ikeya --node 1:velocity --echo");
+    let lines = Process::start(&format!("stop -p {port} -P ikeya --echo")).success();
+    assert_eq!(lines[1..], ["silent: 2, 3, 4, 5, 6, 7, 8"]);
 }
 
 #[test]
 fn stop_sends_to_a_bus_nothing_but_reads_and_stops() {
-    undisturbed(|| {
-        let nodes = [Node { rps: 2.0, ..Node::velocity(2) }, Node::position(7, -8192 * 3)];
-        let line = played::bus(&nodes, |_, _| {});
-        Process::start(&format!("stop --port {}", line.path)).success();
-        let said = line.said();
-        let is_hold = |said: &Said| matches!(said, Said::Write(7, _, to) if *to == -8192 * 3);
-        for said in &said {
-            let is_stop = matches!(said, Said::Write(2, 0.0, _)) || is_hold(said);
-            assert!(is_stop || matches!(said, Said::Read(1..=8)), "{said:?}");
-        }
-        assert!(
-            confirmable_stops(&said, 2) >= 2 && said.iter().filter(|it| is_hold(it)).count() >= 2
-        );
-        assert_eq!(line.lock().strays, 0);
-        assert_eq!(line.lock().nodes[0].rps, 0.0);
-    });
+    let nodes = [Node { rps: 2.0, ..Node::velocity(2) }, Node::position(7, -8192 * 3)];
+    let line = played::bus(&nodes, |_, _| {});
+    Process::start(&format!("stop --port {}", line.path)).success();
+    let said = line.said();
+    let is_hold = |said: &Said| matches!(said, Said::Write(7, _, to) if *to == -8192 * 3);
+    for said in &said {
+        let is_stop = matches!(said, Said::Write(2, 0.0, _)) || is_hold(said);
+        assert!(is_stop || matches!(said, Said::Read(1..=8)), "{said:?}");
+    }
+    assert!(confirmable_stops(&said, 2) >= 2 && said.iter().filter(|it| is_hold(it)).count() >= 2);
+    assert_eq!(line.lock().strays, 0);
+    assert_eq!(line.lock().nodes[0].rps, 0.0);
 }
 
 #[test]
 fn stop_of_one_node_leaves_the_others_alone_and_fails_if_that_node_is_silent() {
-    undisturbed(|| {
-        let turning = |id| Node { rps: 2.0, ..Node::velocity(id) };
-        let line = played::bus(&[turning(2), turning(7)], |_, _| {});
-        let stop = |node| Process::start(&format!("stop -p {} -P ikeya -n {node}", line.path));
-        let lines = stop(2).success();
-        assert_eq!(lines, ["node 2: 0.00 rps, stopped and confirmed"]);
-        let is_two = |said: &Said| matches!(said, Said::Read(2) | Said::Write(2, 0.0, _));
-        assert!(line.said().iter().all(is_two), "{:?}", line.said());
-        assert_eq!(line.lock().nodes[1].rps, 2.0);
-        stop(3).complaint(1);
-        assert_eq!(line.lock().nodes[1].rps, 2.0);
-    });
+    let turning = |id| Node { rps: 2.0, ..Node::velocity(id) };
+    let line = played::bus(&[turning(2), turning(7)], |_, _| {});
+    let stop = |node| Process::start(&format!("stop -p {} -P ikeya -n {node}", line.path));
+    let lines = stop(2).success();
+    assert_eq!(lines, ["node 2: 0.00 rps, stopped and confirmed"]);
+    let is_two = |said: &Said| matches!(said, Said::Read(2) | Said::Write(2, 0.0, _));
+    assert!(line.said().iter().all(is_two), "{:?}", line.said());
+    assert_eq!(line.lock().nodes[1].rps, 2.0);
+    stop(3).complaint(1);
+    assert_eq!(line.lock().nodes[1].rps, 2.0);
 }
 
 #[test]
 fn stop_waits_until_the_motor_stands_still() {
-    undisturbed(|| {
-        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-        let line = played::bus(&[node], |_, _| {});
-        let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
-        wait_until("the stops", || confirmable_stops(&line.said(), 1) >= 2);
-        thread::sleep(Duration::from_millis(1500));
-        assert!(stop.lines().is_empty(), "{:?}", stop.lines());
-        line.change(|node| node.rps = 0.04);
-        assert_eq!(stop.success()[0], "node 1: 0.04 rps, stopped and confirmed");
-    });
+    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+    let line = played::bus(&[node], |_, _| {});
+    let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
+    wait_until("the stops", || confirmable_stops(&line.said(), 1) >= 2);
+    thread::sleep(Duration::from_millis(1500));
+    assert!(stop.lines().is_empty(), "{:?}", stop.lines());
+    line.change(|node| node.rps = 0.04);
+    assert_eq!(stop.success()[0], "node 1: 0.04 rps, stopped and confirmed");
 }
 
 #[test]
 fn stop_fails_when_a_node_never_confirms() {
-    undisturbed(|| {
-        // It answers one READ, and then only receives.
-        let line = played::bus(&[Node::velocity(1), Node::velocity(4)], |said, bus| {
-            bus.nodes[0].is_dumb |= matches!(said, Said::Write(1, ..));
-        });
-        line.lock().nodes[1].rps = 2.0;
-        let ended = Process::start(&format!("stop --port {}", line.path)).end();
-        let expected = "axle: node 1 was told to stop and has not confirmed it (nothing received): it \
-                        may be moving";
-        assert_eq!((ended.code, &*ended.stderr), (Some(1), &[expected.to_owned()][..]));
-        assert_eq!(ended.stdout[0], "node 4: 0.00 rps, stopped and confirmed");
-        assert!(confirmable_stops(&line.said(), 1) >= 3, "{:?}", speeds(&line.said()));
+    // It answers one READ, and then only receives.
+    let line = played::bus(&[Node::velocity(1), Node::velocity(4)], |said, bus| {
+        bus.nodes[0].is_dumb |= matches!(said, Said::Write(1, ..));
     });
+    line.lock().nodes[1].rps = 2.0;
+    let ended = Process::start(&format!("stop --port {}", line.path)).end();
+    let expected = "axle: node 1 was told to stop and has not confirmed it (nothing received): it \
+                    may be moving";
+    assert_eq!((ended.code, &*ended.stderr), (Some(1), &[expected.to_owned()][..]));
+    assert_eq!(ended.stdout[0], "node 4: 0.00 rps, stopped and confirmed");
+    assert!(confirmable_stops(&line.said(), 1) >= 3, "{:?}", speeds(&line.said()));
 }
 
 #[test]
 fn stop_fails_when_a_motor_turns_on() {
-    undisturbed(|| {
-        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-        let line = played::bus(&[node], |_, _| {});
-        let stop = format!("stop --port {} --protocol ikeya --node 1 --json", line.path);
-        let ended = Process::start(&stop).end();
-        let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
-        assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
-        let said: Vec<Value> =
-            ended.stdout.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
-        let outcome =
-            serde_json::json!({"event": "outcome", "at_rest": false, "failure": expected});
-        assert_eq!(said, [outcome]);
-    });
+    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+    let line = played::bus(&[node], |_, _| {});
+    let stop = format!("stop --port {} --protocol ikeya --node 1 --json", line.path);
+    let ended = Process::start(&stop).end();
+    let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+    assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
+    let said: Vec<Value> =
+        ended.stdout.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let outcome = serde_json::json!({"event": "outcome", "at_rest": false, "failure": expected});
+    assert_eq!(said, [outcome]);
 }
 
 #[test]
 fn a_motor_that_turns_on_is_the_outcome_and_a_recording_that_fails_is_told_before_it() {
-    undisturbed(|| {
-        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-        let line = played::bus(&[node], |_, _| {});
-        let stop = format!("stop -p {} -P ikeya -n 1 -j --record /dev/full", line.path);
-        let ended = Process::start(&stop).end();
-        let [recording, motor] = &ended.stderr[..] else { panic!("{ended:?}") };
-        assert!(recording.starts_with("axle: cannot create \"/dev/full\": "), "{recording}");
-        let turns_on = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
-        assert_eq!((ended.code, &**motor), (Some(1), &*format!("axle: {turns_on}")));
-        let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
-        assert_eq!((&outcome["at_rest"], &outcome["failure"]), (&false.into(), &turns_on.into()));
-    });
+    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+    let line = played::bus(&[node], |_, _| {});
+    let stop = format!("stop -p {} -P ikeya -n 1 -j --record /dev/full", line.path);
+    let ended = Process::start(&stop).end();
+    let [recording, motor] = &ended.stderr[..] else { panic!("{ended:?}") };
+    assert!(recording.starts_with("axle: cannot create \"/dev/full\": "), "{recording}");
+    let turns_on = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+    assert_eq!((ended.code, &**motor), (Some(1), &*format!("axle: {turns_on}")));
+    let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
+    assert_eq!((&outcome["at_rest"], &outcome["failure"]), (&false.into(), &turns_on.into()));
 }
 
 #[test]
 fn a_motor_that_confirms_late_has_its_time_to_coast_from_then_on() {
-    undisturbed(|| {
-        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-        let line = played::bus(&[node], |said, bus| {
-            bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)) && speeds_said(bus) == 1;
-        });
-        let begin = Instant::now();
-        let stop = Process::start(&format!("stop -p {} -P ikeya", line.path));
-        wait_until("a stop", || !speeds(&line.said()).is_empty());
-        thread::sleep(Duration::from_millis(1200));
-        line.change(|node| node.is_dumb = false);
-        thread::sleep(Duration::from_millis(3600).saturating_sub(begin.elapsed()));
-        line.change(|node| node.rps = 0.0);
-        assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
+    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+    let line = played::bus(&[node], |said, bus| {
+        bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)) && speeds_said(bus) == 1;
     });
+    let begin = Instant::now();
+    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path));
+    wait_until("a stop", || !speeds(&line.said()).is_empty());
+    thread::sleep(Duration::from_millis(1200));
+    line.change(|node| node.is_dumb = false);
+    thread::sleep(Duration::from_millis(3600).saturating_sub(begin.elapsed()));
+    line.change(|node| node.rps = 0.0);
+    assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
 }
 
 #[test]
 fn a_single_node_has_to_answer_and_no_other_is_stopped() {
-    undisturbed(|| {
-        let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(4) }], |_, _| {});
-        for protocol in ["", " --protocol ikeya"] {
-            let stop = Process::start(&format!("stop --port {} --node 5{protocol}", line.path));
-            assert_eq!(stop.complaint(1), "node 5 does not answer");
-        }
-        let said = line.said();
-        assert!(said.len() >= 6 && said.iter().all(|said| *said == Said::Read(5)), "{said:?}");
-        assert_eq!(line.lock().nodes[0].rps, 2.0);
-    });
+    let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(4) }], |_, _| {});
+    for protocol in ["", " --protocol ikeya"] {
+        let stop = Process::start(&format!("stop --port {} --node 5{protocol}", line.path));
+        assert_eq!(stop.complaint(1), "node 5 does not answer");
+    }
+    let said = line.said();
+    assert!(said.len() >= 6 && said.iter().all(|said| *said == Said::Read(5)), "{said:?}");
+    assert_eq!(line.lock().nodes[0].rps, 2.0);
 }
 
 #[test]
 fn a_line_on_which_nothing_answers_is_no_stop() {
-    undisturbed(|| {
-        let line = parrot(&[]);
-        for (protocol, expected) in [
-            ("", "no node answers on "),
-            ("--protocol ikeya", "no node answers on "),
-            ("--protocol ikeya-3", "no node answers on "),
-            ("--protocol ucp", "no robot answers on "),
-        ] {
-            let stop = Process::start(&format!("stop --port {} {protocol}", line.path)).end();
-            assert_eq!((stop.code, &*stop.stdout, stop.stderr.len()), (Some(1), &[][..], 1));
-            let complaint = stop.stderr[0].strip_prefix("axle: ").unwrap();
-            assert!(complaint.starts_with(expected), "{protocol}: {complaint}");
-            assert_eq!(complaint.contains("no robot answers"), !protocol.contains("ikeya"));
-        }
-    });
+    let line = parrot(&[]);
+    for (protocol, expected) in [
+        ("", "no node answers on "),
+        ("--protocol ikeya", "no node answers on "),
+        ("--protocol ikeya-3", "no node answers on "),
+        ("--protocol ucp", "no robot answers on "),
+    ] {
+        let stop = Process::start(&format!("stop --port {} {protocol}", line.path)).end();
+        assert_eq!((stop.code, &*stop.stdout, stop.stderr.len()), (Some(1), &[][..], 1));
+        let complaint = stop.stderr[0].strip_prefix("axle: ").unwrap();
+        assert!(complaint.starts_with(expected), "{protocol}: {complaint}");
+        assert_eq!(complaint.contains("no robot answers"), !protocol.contains("ikeya"));
+    }
 }
 
 #[test]
 fn a_node_with_only_damaged_answers_is_not_called_stopped() {
-    undisturbed(|| {
-        let line = parrot(&[0x55, 0x01, 0x55, 0xAA, 0x00, 0xFF, 0x56, 0x03]);
-        let stop = Process::start(&format!("stop --port {} --protocol ikeya --node 1", line.path));
-        let expected = "id 1 gives only damaged answers: its motor may be moving";
-        assert_eq!(stop.complaint(1), expected);
-    });
+    let line = parrot(&[0x55, 0x01, 0x55, 0xAA, 0x00, 0xFF, 0x56, 0x03]);
+    let stop = Process::start(&format!("stop --port {} --protocol ikeya --node 1", line.path));
+    let expected = "id 1 gives only damaged answers: its motor may be moving";
+    assert_eq!(stop.complaint(1), expected);
 }
 
 #[test]
 fn a_stop_is_not_interrupted() {
-    undisturbed(|| {
-        let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-        let line = played::bus(&[node], |_, _| {});
-        let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
-        line.wait_for(Said::Write(1, 0.0, 0));
-        for signal in ["INT", "TSTP", "QUIT", "TERM"] {
-            stop.signal(signal);
-            thread::sleep(Duration::from_millis(100));
-        }
-        // While nothing moves, a second one, a second later, ends a tool.
-        thread::sleep(Duration::from_millis(1000));
-        stop.signal("INT");
+    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
+    let line = played::bus(&[node], |_, _| {});
+    let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
+    line.wait_for(Said::Write(1, 0.0, 0));
+    for signal in ["INT", "TSTP", "QUIT", "TERM"] {
+        stop.signal(signal);
         thread::sleep(Duration::from_millis(100));
-        line.change(|node| node.rps = 0.0);
-        assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
-    });
+    }
+    // While nothing moves, a second one, a second later, ends a tool.
+    thread::sleep(Duration::from_millis(1000));
+    stop.signal("INT");
+    thread::sleep(Duration::from_millis(100));
+    line.change(|node| node.rps = 0.0);
+    assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
 }
 
 #[test]
 fn stop_finds_a_rover_with_and_without_its_protocol() {
-    undisturbed(|| {
-        for protocol in ["", " --protocol ucp"] {
-            let line = played::rover(Some([70, -70, 70, -70]));
-            let stop = Process::start(&format!("stop --port {}{protocol}", line.path));
-            wait_until("the stops", || line.lock().commands.len() >= 8);
-            assert!(stop.lines().is_empty(), "its wheels are turning: {:?}", stop.lines());
-            line.lock().wheels = None;
-            let lines = stop.success();
-            assert!(lines[0].contains("rpm    0    0    0    0") && lines[0].ends_with("stopped"));
-            let rover = line.lock();
-            assert!(
-                rover.commands.iter().all(|command| *command == (0, 0)),
-                "{:?}",
-                rover.commands
-            );
-            assert_eq!(rover.strays > 0, protocol.is_empty(), "READ packets are sent first");
-        }
-    });
+    for protocol in ["", " --protocol ucp"] {
+        let line = played::rover(Some([70, -70, 70, -70]));
+        let stop = Process::start(&format!("stop --port {}{protocol}", line.path));
+        wait_until("the stops", || line.lock().commands.len() >= 8);
+        assert!(stop.lines().is_empty(), "its wheels are turning: {:?}", stop.lines());
+        line.lock().wheels = None;
+        let lines = stop.success();
+        assert!(lines[0].contains("rpm    0    0    0    0") && lines[0].ends_with("stopped"));
+        let rover = line.lock();
+        assert!(rover.commands.iter().all(|command| *command == (0, 0)), "{:?}", rover.commands);
+        assert_eq!(rover.strays > 0, protocol.is_empty(), "READ packets are sent first");
+    }
 }
 
 #[test]
 fn a_rover_that_turns_on_the_spot_is_not_called_stopped() {
-    undisturbed(|| {
-        let line = played::rover(Some([70, -70, 70, -70]));
-        let stop = Process::start(&format!("stop --port {} --protocol ucp", line.path));
-        let complaint = stop.complaint(1);
-        assert!(complaint.ends_with("but its wheels are still turning"), "{complaint}");
-    });
+    let line = played::rover(Some([70, -70, 70, -70]));
+    let stop = Process::start(&format!("stop --port {} --protocol ucp", line.path));
+    let complaint = stop.complaint(1);
+    assert!(complaint.ends_with("but its wheels are still turning"), "{complaint}");
 }
 
 #[test]
 fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
-    undisturbed(|| {
-        let start = Instant::now();
-        let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);
-        let id = NodeId::new(3).unwrap();
-        let mut slave =
-            Slave::<ThreeMotors>::new(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
-        slave.set_velocity([Rps::new(2.0).unwrap(); 3]);
-        let line = played::PlayedLine::new(Vec::new(), move |told, bytes| {
-            slave.handle_input(bytes, now());
-            while let Some(event) = slave.poll_event() {
-                if let SlaveEvent::Command(Target::Velocity(speeds)) = event {
-                    slave.set_velocity(speeds);
-                    told.lock().unwrap().push(speeds.map(Rps::get));
-                }
+    let start = Instant::now();
+    let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);
+    let id = NodeId::new(3).unwrap();
+    let mut slave =
+        Slave::<ThreeMotors>::new(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
+    slave.set_velocity([Rps::new(2.0).unwrap(); 3]);
+    let line = played::PlayedLine::new(Vec::new(), move |told, bytes| {
+        slave.handle_input(bytes, now());
+        while let Some(event) = slave.poll_event() {
+            if let SlaveEvent::Command(Target::Velocity(speeds)) = event {
+                slave.set_velocity(speeds);
+                told.lock().unwrap().push(speeds.map(Rps::get));
             }
-            slave.poll_transmit(now()).map(<[u8]>::to_vec).unwrap_or_default()
-        });
-        let lines =
-            Process::start(&format!("stop --port {} --protocol ikeya-3", line.path)).success();
-        assert_eq!(lines[0], "node 3: 0.00 0.00 0.00 rps, stopped and confirmed");
-        let told = line.lock();
-        assert!(told.len() >= 2 && told.iter().all(|speeds| *speeds == [0.0; 3]), "{told:?}");
+        }
+        slave.poll_transmit(now()).map(<[u8]>::to_vec).unwrap_or_default()
     });
+    let lines = Process::start(&format!("stop --port {} --protocol ikeya-3", line.path)).success();
+    assert_eq!(lines[0], "node 3: 0.00 0.00 0.00 rps, stopped and confirmed");
+    let told = line.lock();
+    assert!(told.len() >= 2 && told.iter().all(|speeds| *speeds == [0.0; 3]), "{told:?}");
 }
 
 #[test]
 fn a_stop_that_waits_sends_the_stop_again_to_a_node_that_is_back() {
-    undisturbed(|| {
-        let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |said, bus| {
-            // The first stop is lost, and the node is offline for a moment.
-            if matches!(said, Said::Write(1, 0.0, _)) && speeds_said(bus) == 1 {
-                (bus.nodes[0].is_dumb, bus.nodes[0].follows) = (true, false);
-            }
-        });
-        let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
-        wait_until("the first stop", || !speeds(&line.said()).is_empty());
-        thread::sleep(Duration::from_millis(500));
-        line.change(|node| (node.is_dumb, node.follows) = (false, true));
-        assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
-        assert_eq!(line.lock().nodes[0].rps, 0.0);
+    let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(1) }], |said, bus| {
+        // The first stop is lost, and the node is offline for a moment.
+        if matches!(said, Said::Write(1, 0.0, _)) && speeds_said(bus) == 1 {
+            (bus.nodes[0].is_dumb, bus.nodes[0].follows) = (true, false);
+        }
     });
+    let stop = Process::start(&format!("stop --port {} --protocol ikeya", line.path));
+    wait_until("the first stop", || !speeds(&line.said()).is_empty());
+    thread::sleep(Duration::from_millis(500));
+    line.change(|node| (node.is_dumb, node.follows) = (false, true));
+    assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
+    assert_eq!(line.lock().nodes[0].rps, 0.0);
 }
 
 fn speeds_said(bus: &played::BusState) -> usize {

@@ -10,7 +10,7 @@ use std::{
 
 use serialport::{SerialPort, TTYPort};
 
-use super::{Process, TWO_NODES, sim, undisturbed};
+use super::{Process, TWO_NODES, sim};
 
 /// A server for one connection at a time to a serial port. It closes the connection when it is told
 /// to.
@@ -54,32 +54,27 @@ impl Server {
 
 #[test]
 fn a_port_of_a_tcp_server_is_a_port() {
-    undisturbed(|| {
-        let (sim, port) = sim(TWO_NODES);
-        let server = Server::start(&port);
-        let scan = Process::start(&format!("scan --port {}", server.address)).success();
-        assert_eq!(scan.last().unwrap(), "2 nodes answer.", "{scan:?}");
-        let spin = format!("spin --port {} --node 1 --rps 2 --for 1", server.address);
-        let lines = Process::start(&spin).success();
-        assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
-        sim.line("node 1: command 2.00 rps");
-        sim.line("node 1: at rest");
-    });
+    let (sim, port) = sim(TWO_NODES);
+    let server = Server::start(&port);
+    let scan = Process::start(&format!("scan --port {}", server.address)).success();
+    assert_eq!(scan.last().unwrap(), "2 nodes answer.", "{scan:?}");
+    let spin = format!("spin --port {} --node 1 --rps 2 --for 1", server.address);
+    let lines = Process::start(&spin).success();
+    assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+    sim.line("node 1: command 2.00 rps");
+    sim.line("node 1: at rest");
 }
 
 #[test]
 fn a_tcp_server_that_goes_away_is_told_with_what_may_be_moving() {
-    undisturbed(|| {
-        let (sim, port) = sim(TWO_NODES);
-        let server = Server::start(&port);
-        let spin =
-            Process::start(&format!("spin -p {} --node 1 --rps 2 --for 600", server.address));
-        sim.line("node 1: command 2.00 rps");
-        server.close.send(()).unwrap();
-        let error = spin.complaint(1);
-        let lost = format!("port {:?} failed: disconnected (", server.address);
-        assert!(error.starts_with(&lost) && error.ends_with("it may be moving"), "{error}");
-    });
+    let (sim, port) = sim(TWO_NODES);
+    let server = Server::start(&port);
+    let spin = Process::start(&format!("spin -p {} --node 1 --rps 2 --for 600", server.address));
+    sim.line("node 1: command 2.00 rps");
+    server.close.send(()).unwrap();
+    let error = spin.complaint(1);
+    let lost = format!("port {:?} failed: disconnected (", server.address);
+    assert!(error.starts_with(&lost) && error.ends_with("it may be moving"), "{error}");
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! Devices that a test plays, which answer in ways that no simulation does, and all that they hear.
 
-use std::{
-    thread,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use axlewire::{
     endpoint::Endpoint,
@@ -14,6 +11,8 @@ use axlewire::{
     time,
     ucp::{self, Message, Robot, Telemetry, robot::RobotConfig},
 };
+
+use super::clock;
 
 /// A request from the tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +95,7 @@ impl BusEar {
                     Said::Write(write.id().get(), write.as_velocity(), write.as_position().counts())
                 }
             };
-            bus.said.push((said, Instant::now()));
+            bus.said.push((said, clock::now()));
             on_request(said, bus);
             for node in &mut bus.nodes {
                 match (said, node.mode) {
@@ -107,7 +106,7 @@ impl BusEar {
                         node.counts = to;
                     }
                     (Said::Read(id), _) if id == node.id && !node.is_dumb => {
-                        thread::sleep(node.delay);
+                        clock::sleep(node.delay);
                         answers.extend(node.answer());
                     }
                     _ => {}
@@ -161,7 +160,7 @@ pub(crate) struct PlayedRover {
 impl Default for PlayedRover {
     fn default() -> Self {
         let robot = Robot::new(RobotConfig::default(), time::Instant::from_micros(0));
-        Self { start: Instant::now(), robot, decoder: ucp::Decoder::new() }
+        Self { start: clock::now(), robot, decoder: ucp::Decoder::new() }
     }
 }
 
@@ -183,7 +182,7 @@ impl PlayedRover {
                 },
             }
         }
-        let now = time::Instant::from_micros(self.start.elapsed().as_micros() as u64);
+        let now = time::Instant::from_micros(clock::since(self.start).as_micros() as u64);
         let robot = &mut self.robot;
         robot.handle_input(bytes, now);
         robot.handle_timeout(now);

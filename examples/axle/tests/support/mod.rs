@@ -1,6 +1,8 @@
 //! Runs the real binary, and builds captures with known events.
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+#[path = "../../src/clock.rs"]
+mod clock;
 pub(crate) mod devices;
 pub(crate) mod pcapng;
 pub(crate) mod process;

@@ -21,7 +21,7 @@ use rustix::{
 };
 
 use super::*;
-use crate::{quiet::undisturbed, watch};
+use crate::watch;
 
 /// Rows and columns of the terminal.
 const SIZE: (u16, u16) = (24, 100);
@@ -75,33 +75,10 @@ fn prepared_on_a_terminal(
     (reader.join().unwrap(), is_as_before)
 }
 
-fn show_something(screen: &Screen) {
-    screen.show(Buffer::with_lines(["the page"])).unwrap();
-    thread::sleep(Duration::from_millis(100));
-}
-
 #[test]
-#[ignore = "started by a test below"]
-fn panics_with_a_page() {
-    let screen = Screen::enter().unwrap();
-    show_something(&screen);
-    panic!("planted");
-}
-
-#[test]
-#[ignore = "started by a test below"]
-fn panics_in_another_thread() {
-    let mut screen = Screen::enter().unwrap();
-    let panicked = thread::spawn(|| panic!("planted")).join();
-    assert!(panicked.is_err());
-    show_something(&screen);
-    screen.leave();
-    println!("afterwards");
-}
-
-#[test]
+#[ignore = "real time"]
 fn after_a_panic_the_terminal_is_as_before_and_the_message_is_readable() {
-    let (text, is_as_before) = on_a_terminal("watch::screen::tests::panics_with_a_page");
+    let (text, is_as_before) = on_a_terminal("watch::screen::tests::started::panics_with_a_page");
     let at = |what: &str| text.find(what).unwrap_or_else(|| panic!("no {what:?} in {text:?}"));
     assert!(is_as_before);
     assert!(at(ansi::ENTER) < at("page") && at("page") < at(ansi::LEAVE), "{text:?}");
@@ -109,8 +86,10 @@ fn after_a_panic_the_terminal_is_as_before_and_the_message_is_readable() {
 }
 
 #[test]
+#[ignore = "real time"]
 fn a_panic_elsewhere_does_not_write_into_the_page() {
-    let (text, is_as_before) = on_a_terminal("watch::screen::tests::panics_in_another_thread");
+    let (text, is_as_before) =
+        on_a_terminal("watch::screen::tests::started::panics_in_another_thread");
     let at = |what: &str| text.find(what).unwrap_or_else(|| panic!("no {what:?} in {text:?}"));
     assert!(is_as_before);
     assert!(at("page") < at(ansi::LEAVE) && at(ansi::LEAVE) < at("planted"), "{text:?}");
@@ -122,16 +101,6 @@ fn page(text: &str) -> String {
     let mut parser = vt100::Parser::new(SIZE.0, SIZE.1, 0);
     parser.process(text.split(ansi::LEAVE).next().unwrap().as_bytes());
     parser.screen().contents()
-}
-
-#[test]
-#[ignore = "started by tests below"]
-fn watches() {
-    let args = watch::Args::augment_args(clap::Command::new("watch"));
-    let line = env::var("AXLE_WATCH").unwrap();
-    let matches = args.get_matches_from(line.split_whitespace());
-    let outcome = watch::run(&watch::Args::from_arg_matches(&matches).unwrap());
-    println!("outcome: {:?}", outcome.map_err(|failure| failure.to_string()));
 }
 
 /// What `axle watch` with these options writes to a terminal; `say` is the other end of its line.
@@ -151,7 +120,7 @@ fn watched(
         let _ = stream.read(&mut [0]);
     });
     let (text, is_as_before) =
-        prepared_on_a_terminal("watch::screen::tests::watches", keys, |command| {
+        prepared_on_a_terminal("watch::screen::tests::started::watches", keys, |command| {
             command.env("AXLE_WATCH", format!("watch -p tcp:{port} -P ucp {options}"));
             prepare(command)
         });
@@ -161,6 +130,7 @@ fn watched(
 }
 
 #[test]
+#[ignore = "real time"]
 fn there_is_a_page_on_a_terminal_that_can_show_one_unless_lines_are_wanted() {
     for (options, term, has_page) in [
         ("", "xterm", true),
@@ -177,57 +147,42 @@ fn there_is_a_page_on_a_terminal_that_can_show_one_unless_lines_are_wanted() {
 }
 
 #[test]
+#[ignore = "real time"]
 fn a_recording_that_cannot_start_is_on_the_page_and_in_the_outcome() {
-    undisturbed(|| {
-        // No file can be created there.
-        let text = watched("--for 0.5", "r", |_| {}, |command| command.current_dir("/proc"));
-        let page = page(&text);
-        assert!(page.contains("cannot create \"axle-") && !page.contains("REC"), "{page}");
-        assert!(text.contains("outcome: Err(\"cannot create"), "{text:?}");
-    });
+    // No file can be created there.
+    let text = watched("--for 0.5", "r", |_| {}, |command| command.current_dir("/proc"));
+    let page = page(&text);
+    assert!(page.contains("cannot create \"axle-") && !page.contains("REC"), "{page}");
+    assert!(text.contains("outcome: Err(\"cannot create"), "{text:?}");
 }
 
 #[test]
+#[ignore = "real time"]
 fn a_frame_that_comes_while_a_line_is_printed_is_whole() {
-    undisturbed(|| {
-        let say = |stream: &mut dyn Write| {
-            let (mut buffer, raw) = ([0; 64], RawFrame { id: 0x70, index: 0, body: &[7; 54] });
-            let frame = raw.encode(&mut buffer).unwrap();
-            thread::sleep(Duration::from_millis(600));
-            for byte in frame {
-                stream.write_all(&[*byte]).unwrap();
-                thread::sleep(Duration::from_millis(12));
-            }
-        };
-        let text = watched("--plain --for 1.7", "", say, |command| command);
-        assert!(text.contains("62 in 1 frame\r\n"), "{text:?}");
-    });
+    let say = |stream: &mut dyn Write| {
+        let (mut buffer, raw) = ([0; 64], RawFrame { id: 0x70, index: 0, body: &[7; 54] });
+        let frame = raw.encode(&mut buffer).unwrap();
+        thread::sleep(Duration::from_millis(600));
+        for byte in frame {
+            stream.write_all(&[*byte]).unwrap();
+            thread::sleep(Duration::from_millis(12));
+        }
+    };
+    let text = watched("--plain --for 1.7", "", say, |command| command);
+    assert!(text.contains("62 in 1 frame\r\n"), "{text:?}");
 }
 
 #[test]
-#[ignore = "started by a test below"]
-fn tells_whether_it_has_keys() {
-    let mut screen = Screen::enter().unwrap();
-    let has_keys = screen.has_keys();
-    screen.leave();
-    println!("has keys: {has_keys}");
-}
-
-#[test]
+#[ignore = "real time"]
 fn keys_come_from_a_terminal_only() {
-    let tells = "watch::screen::tests::tells_whether_it_has_keys";
+    let tells = "watch::screen::tests::started::tells_whether_it_has_keys";
     assert!(on_a_terminal(tells).0.contains("has keys: true"));
     let (text, _) = prepared_on_a_terminal(tells, "", |command| command.stdin(Stdio::null()));
     assert!(text.contains("has keys: false"), "{text:?}");
 }
 
 #[test]
-#[ignore = "started by a test below"]
-fn tells_whether_it_is_ascii() {
-    println!("is ASCII: {}", is_ascii());
-}
-
-#[test]
+#[ignore = "real time"]
 fn the_first_variable_that_is_set_decides_whether_a_terminal_shows_only_ascii() {
     for (values, expected) in [
         ([None, None, None], false),
@@ -239,7 +194,7 @@ fn the_first_variable_that_is_set_decides_whether_a_terminal_shows_only_ascii() 
         ([Some(""), Some(""), Some("POSIX")], true),
         ([Some(""), None, Some("C.utf8")], false),
     ] {
-        let tells = "watch::screen::tests::tells_whether_it_is_ascii";
+        let tells = "watch::screen::tests::started::tells_whether_it_is_ascii";
         let (text, _) = prepared_on_a_terminal(tells, "", |command| {
             for (name, value) in ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().zip(values) {
                 match value {
@@ -254,14 +209,13 @@ fn the_first_variable_that_is_set_decides_whether_a_terminal_shows_only_ascii() 
 }
 
 #[test]
+#[ignore = "real time"]
 fn bytes_that_the_page_was_too_slow_for_are_told_once_and_only_if_there_are_some() {
-    undisturbed(|| {
-        let (text, _) = on_a_terminal("watch::live::tests::looks_on_too_slowly");
-        let page = page(&text);
-        assert_eq!(page.matches("too slow").count(), 1, "{page}");
-        assert!(page.contains("the page was too slow for 10 bytes"), "{page}");
-        assert!(page.contains("a note"), "{page}");
-    });
+    let (text, _) = on_a_terminal("watch::live::tests::looks_on_too_slowly");
+    let page = page(&text);
+    assert_eq!(page.matches("too slow").count(), 1, "{page}");
+    assert!(page.contains("the page was too slow for 10 bytes"), "{page}");
+    assert!(page.contains("a note"), "{page}");
 }
 
 #[test]
@@ -278,5 +232,59 @@ fn each_colour_of_the_page_is_one_of_the_terminal() {
         after.set_string(0, 0, "x", style.add_modifier(Modifier::BOLD));
         let text = ansi::change(&Buffer::empty(Rect::new(0, 0, 1, 1)), &after);
         assert_eq!(text, format!("\x1b[1;1H\x1b[0;1;{code}mx"));
+    }
+}
+
+/// What the tests above start.
+mod started {
+    use super::*;
+
+    fn show_something(screen: &Screen) {
+        screen.show(Buffer::with_lines(["the page"])).unwrap();
+        thread::sleep(Duration::from_millis(100));
+    }
+
+    #[test]
+    #[ignore = "started by tests above"]
+    fn watches() {
+        let args = watch::Args::augment_args(clap::Command::new("watch"));
+        let line = env::var("AXLE_WATCH").unwrap();
+        let matches = args.get_matches_from(line.split_whitespace());
+        let outcome = watch::run(&watch::Args::from_arg_matches(&matches).unwrap());
+        println!("outcome: {:?}", outcome.map_err(|failure| failure.to_string()));
+    }
+
+    #[test]
+    #[ignore = "started by a test above"]
+    fn panics_with_a_page() {
+        let screen = Screen::enter().unwrap();
+        show_something(&screen);
+        panic!("planted");
+    }
+
+    #[test]
+    #[ignore = "started by a test above"]
+    fn panics_in_another_thread() {
+        let mut screen = Screen::enter().unwrap();
+        let panicked = thread::spawn(|| panic!("planted")).join();
+        assert!(panicked.is_err());
+        show_something(&screen);
+        screen.leave();
+        println!("afterwards");
+    }
+
+    #[test]
+    #[ignore = "started by a test above"]
+    fn tells_whether_it_has_keys() {
+        let mut screen = Screen::enter().unwrap();
+        let has_keys = screen.has_keys();
+        screen.leave();
+        println!("has keys: {has_keys}");
+    }
+
+    #[test]
+    #[ignore = "started by a test above"]
+    fn tells_whether_it_is_ascii() {
+        println!("is ASCII: {}", is_ascii());
     }
 }
