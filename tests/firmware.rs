@@ -34,8 +34,6 @@ mod programs;
 /// A board in QEMU.
 #[path = "firmware/qemu.rs"]
 mod qemu;
-#[path = "harness/quiet.rs"]
-mod quiet;
 /// What a line of text tells of a role: the file of the firmware.
 #[path = "../examples/firmware/src/report.rs"]
 #[allow(unreachable_pub, reason = "public in the firmware")]

@@ -21,7 +21,7 @@ images=$(dirname "$(./run.sh --build "${programs[@]}" uart_check bench | head -1
 # From the top, where cargo is not configured to build for a board. The tests mostly wait, so more
 # run than there are cores.
 (cd ../.. && AXLEWIRE_FIRMWARE=required AXLEWIRE_FIRMWARE_IMAGES=$images \
-    cargo test --quiet --test firmware -- --nocapture --test-threads=4) >"$folder/tests" 2>&1 ||
+    cargo test --quiet --test firmware -- --nocapture --test-threads=1) >"$folder/tests" 2>&1 ||
     { cat "$folder/tests"; exit 1; }
 grep '[1-9][0-9]* passed' "$folder/tests"
 ./no_panic.sh "${programs[@]}" no_panic
