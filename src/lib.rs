@@ -72,6 +72,8 @@ pub mod endpoint;
 pub mod error;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod events;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod field;
 // Its page is about both protocols.
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 #[cfg_attr(
@@ -90,6 +92,8 @@ mod machine;
 mod map;
 #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod record;
 // Pages, not code.
 #[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
 pub mod guide;

@@ -1,10 +1,10 @@
 //! The lines that are not frames: gaps, and what the tool says about a whole capture.
 
-use super::{
+use crate::{
     field::{Field, field},
     record::Record,
+    stream::Reason,
 };
-use crate::stream::Reason;
 
 const REASONS: &[&str] = &[
     Reason::Header.name(),

@@ -1,11 +1,11 @@
 #![cfg_attr(all(feature = "ikeya", feature = "ucp"), doc = include_str!("../fields.md"))]
 
-pub(crate) mod field;
 mod lines;
-pub(crate) mod record;
 
-pub use field::{Field, Kind, Shape};
-pub use record::Record;
+pub use crate::{
+    field::{Field, Kind, Shape},
+    record::Record,
+};
 
 /// All objects of `axle decode --json`, each with its fields. It is made of the tables that encode
 /// and decode the messages, so it has every message.

@@ -1,7 +1,7 @@
 //! The fields of packets, as a table.
 
 use super::{three, wire};
-use crate::fields::{
+use crate::{
     field::{Field, field},
     record::{BYTES, Record},
 };

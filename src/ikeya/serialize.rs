@@ -11,8 +11,8 @@ use super::{
     units::{NodeId, Position},
 };
 use crate::{
-    fields::record::{BYTES, LENGTH, MESSAGE, PROTOCOL},
     map::Fields,
+    record::{BYTES, LENGTH, MESSAGE, PROTOCOL},
     text::Hex,
 };
 

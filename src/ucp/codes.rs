@@ -4,7 +4,7 @@ use core::fmt::{self, Write};
 
 use super::{catalogue::catalogue_of_codes, value::Value};
 use crate::{
-    fields::field::{Kind, Typed},
+    field::{Kind, Typed},
     text::Line,
 };
 

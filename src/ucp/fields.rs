@@ -13,7 +13,7 @@ use super::{
     update::RawOtaRequest,
     value::{Described, Layout},
 };
-use crate::fields::{
+use crate::{
     field::{Field, field},
     record::{BYTES, Record},
 };

@@ -105,7 +105,7 @@ macro_rules! plain_body {
 
         impl $crate::ucp::value::Described for $name {
             const LAYOUTS: &'static [$crate::ucp::value::Layout] = &[&[&[$(
-                $crate::fields::field::field! {
+                $crate::field::field! {
                     $(#[doc = $field_doc])*
                     $key: $value, $($unit)? $($raw_unit)? by concat!($($source)?)
                 }

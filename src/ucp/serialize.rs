@@ -4,8 +4,8 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::{frame::Frame, message::Message};
 use crate::{
-    fields::record::{BYTES, ID, INDEX, LENGTH, MESSAGE, PROTOCOL},
     map::Fields,
+    record::{BYTES, ID, INDEX, LENGTH, MESSAGE, PROTOCOL},
     text::Hex,
 };
 

@@ -1,6 +1,6 @@
 //! Values in a body: their bytes on the wire, and their text.
 
-use crate::{fields::field::Field, text::Line};
+use crate::{field::Field, text::Line};
 
 /// A value of a field.
 pub(super) trait Value: Copy {

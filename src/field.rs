@@ -1,6 +1,6 @@
 //! One field: its name, its type, and what it means.
 
-/// A field of a [`Record`](super::Record).
+/// A field of a [`Record`](crate::fields::Record).
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub struct Field {
@@ -186,7 +186,7 @@ macro_rules! field {
         $(#[doc = $doc:literal])*
         $key:literal: $of:ty, $($unit:literal)? by $source:expr $(, $with:ident($($value:expr),*))*
     ) => {
-        $crate::fields::field::Field::new::<$of>($key, $source, concat!($($doc),*))
+        $crate::field::Field::new::<$of>($key, $source, concat!($($doc),*))
             $(.unit($unit))? $(.$with($($value),*))*
     };
 }

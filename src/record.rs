@@ -2,7 +2,7 @@
 
 use core::slice;
 
-use super::field::{Field, Time, field};
+use crate::field::{Field, Time, field};
 
 /// An object of `axle decode --json`: a frame with one message, a gap, or another line. A message
 /// with two layouts has a record for each.
