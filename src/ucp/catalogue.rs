@@ -35,7 +35,7 @@
 //! It does not compile if two bodies of an id have one length, if a body is longer than 56 bytes,
 //! or if a key is one that every frame has. The roles do not send it: that is for them to say.
 //!
-//! The unit tests of the crate add a message: `new_message`. Three tests in `tests/wire` repeat
+//! The unit tests, in `src/ucp/tests.rs`, add a message. Three tests in `tests/wire` repeat
 //! ruling U4, and fail until the message is there, too. Two others fail until the page `fields` and
 //! the JSON Schema of the tool have it; with `AXLEWIRE_WRITE=1` they write them.
 
@@ -50,7 +50,7 @@ macro_rules! expand_table {
 pub(super) use expand_table;
 
 #[cfg(all(test, feature = "serde"))]
-pub(super) use super::new_message::expand_table;
+pub(super) use super::tests::expand_table;
 
 /// The messages, by id.
 macro_rules! catalogue {

@@ -155,14 +155,14 @@ pub mod host;
 mod inbox;
 pub mod message;
 mod motor;
-#[cfg(all(test, feature = "serde"))]
-mod new_message;
 mod plain;
 mod report;
 pub mod robot;
 mod role;
 #[cfg(feature = "serde")]
 mod serialize;
+#[cfg(all(test, feature = "serde"))]
+mod tests;
 mod update;
 mod value;
 
