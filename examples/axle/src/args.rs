@@ -54,7 +54,7 @@ pub(crate) fn baud() -> RangedI64ValueParser<u32> {
 /// A file for a recording.
 fn recording() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path == Path::new("-") {
-        true => Err("standard output has the lines of this subcommand: name a file"),
+        true => Err("standard output carries the lines of this subcommand: name a file"),
         false => Ok(path),
     })
 }
@@ -81,7 +81,7 @@ impl Protocol {
         }
     }
 
-    /// Speed of its lines, bit/s, unless they are set to another.
+    /// Default speed of its lines, bit/s.
     pub(crate) const fn default_baud(self) -> u32 {
         match self {
             Self::Ucp => ucp::BAUD,

@@ -15,20 +15,20 @@ use std::{
 
 use crate::{failure::Failure, input::Input, signals::Signals};
 
-/// What is being written. Dropped before [`keep`](Self::keep), it is removed.
+/// An unfinished output. Dropped before [`keep`](Self::keep), it is removed.
 #[derive(Debug)]
 pub(crate) struct Beside {
     path: PathBuf,
     kind: Kind,
     force: bool,
-    /// What is to be removed; `None` once it has its own name.
+    /// The temporary path; `None` once it has been renamed.
     temporary: Arc<Mutex<Option<PathBuf>>>,
 }
 
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Kind {
     File,
-    /// With files of this extension only, and the list of their columns.
+    /// Only files with this extension, and the list of their columns.
     Folder(&'static str),
 }
 
@@ -36,17 +36,17 @@ enum Kind {
 pub(crate) const LIST: &str = "columns.csv";
 pub(crate) const COLUMNS: &str = "table,column,unit,type";
 
-/// The most names that are tried for what is to be renamed.
+/// Maximum number of temporary names to try.
 const ATTEMPTS: u32 = 100;
 
-/// How often a signal is looked for.
+/// Interval between two checks for a signal.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// After a signal, the time to end by itself: reading may wait for a pipe that says nothing.
+/// Time to end cleanly after a signal: reading may block on a silent pipe.
 const GRACE: Duration = Duration::from_millis(500);
 
 impl Beside {
-    /// A file for `path`, made from `input`. One that is there is not overwritten unless `force` is
+    /// A file for `path`, made from `input`. An existing file is not overwritten unless `force` is
     /// set, and the input never.
     pub(crate) fn file(path: &Path, force: bool, input: &Input) -> Result<(Self, File), Failure> {
         if path
@@ -64,7 +64,7 @@ impl Beside {
         Ok((beside, file))
     }
 
-    /// A folder for `path`, made from `input`. One that is there is not replaced unless `force` is
+    /// A folder for `path`, made from `input`. An existing one is not replaced unless `force` is
     /// set and it is an export with this extension, and nothing else. Returns where to write the
     /// files.
     pub(crate) fn folder(
@@ -81,7 +81,7 @@ impl Beside {
     fn new(path: PathBuf, kind: Kind, force: bool, input: &Input) -> Result<Self, Failure> {
         if input.is_at(&path) && (kind != Kind::File || !path.is_dir()) {
             let what =
-                if path.is_dir() { "has the capture in it" } else { "is the capture itself" };
+                if path.is_dir() { "contains the capture itself" } else { "is the capture itself" };
             return Err(Failure::Usage(format!("{path:?} {what}: choose another name")));
         }
         let beside = Self { path, kind, force, temporary: Arc::default() };
@@ -89,8 +89,8 @@ impl Beside {
         Ok(beside)
     }
 
-    /// Makes what is to be renamed, under the first name that nothing has: after a `kill -9`
-    /// something may be left of another process that had the same number.
+    /// Creates the temporary file or folder under the first free name: after a `kill -9`
+    /// one of an earlier process with the same id may be left.
     fn create<T>(&self, make: impl Fn(&Path) -> io::Result<T>) -> Result<T, Failure> {
         for attempt in 0..ATTEMPTS {
             let temporary = beside(&self.path, "part", attempt)?;
@@ -104,11 +104,11 @@ impl Beside {
                 Err(error) => return Err(cannot_create(&self.path, &error)),
             }
         }
-        let line = "all names for a part of it are taken: remove the hidden .part files beside it";
+        let line = "all temporary names are taken: remove the hidden .part files beside it";
         Err(Failure::Failed(format!("cannot create {:?}: {line}", self.path)))
     }
 
-    /// Whoever may not read what is replaced may not read the new one either.
+    /// The new file gets the permissions of the one it replaces.
     fn take_mode(&self, temporary: &Path) {
         if let Ok(known) = fs::metadata(&self.path)
             && (self.kind == Kind::File || !known.permissions().readonly())
@@ -122,7 +122,7 @@ impl Beside {
         *self.temporary.lock().unwrap_or_else(PoisonError::into_inner) = Some(temporary);
     }
 
-    /// From now on a signal ends the tool even while it waits for its input, and nothing is left.
+    /// From now on a signal ends the tool even while it waits for input, and nothing is left.
     pub(crate) fn end_on(&self, signals: &Signals) {
         let (temporary, signals) = (Arc::downgrade(&self.temporary), signals.watcher());
         thread::spawn(move || {
@@ -144,7 +144,7 @@ impl Beside {
         });
     }
 
-    /// Gives it its name, and replaces what has it.
+    /// Renames it to its final path, and replaces what is there.
     pub(crate) fn keep(self) -> Result<(), Failure> {
         self.check()?;
         let mut temporary = self.temporary.lock().unwrap_or_else(PoisonError::into_inner);
@@ -172,7 +172,7 @@ impl Beside {
         Ok(())
     }
 
-    /// Whether what has the name, if anything, may be replaced.
+    /// Whether an existing file or folder at the path may be replaced.
     fn check(&self) -> Result<(), Failure> {
         let Ok(known) = fs::symlink_metadata(&self.path) else { return Ok(()) };
         let cannot = |why: &str| Failure::Failed(format!("cannot create {:?}: {why}", self.path));
@@ -181,10 +181,8 @@ impl Beside {
                 Err(cannot_create(&self.path, &io::ErrorKind::AlreadyExists.into()))
             }
             Kind::File if known.is_file() => Ok(()),
-            Kind::File => Err(cannot("there is something else than a file")),
-            Kind::Folder(_) if !known.is_dir() => {
-                Err(cannot("there is something else than a folder"))
-            }
+            Kind::File => Err(cannot("it exists and is not a file")),
+            Kind::Folder(_) if !known.is_dir() => Err(cannot("it exists and is not a folder")),
             Kind::Folder(extension) => match not_of_export(&self.path, extension) {
                 Ok(None) => Ok(()),
                 Ok(Some(why)) => Err(cannot(&why)),
@@ -227,12 +225,12 @@ impl Drop for Beside {
     }
 }
 
-/// What is said after a signal.
+/// The failure after a signal.
 pub(crate) fn interrupted() -> Failure {
     Failure::Failed("interrupted: nothing was written".to_owned())
 }
 
-/// The failure to write what was to get this name.
+/// The failure to write this path.
 pub(crate) fn cannot_write(path: &Path, error: &dyn Display) -> Failure {
     Failure::Failed(format!("cannot write {path:?}: {error}; nothing was kept"))
 }

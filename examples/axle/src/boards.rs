@@ -1,4 +1,4 @@
-//! What the tool says about the two kinds of boards, and what it takes for them.
+//! Output and arguments of the two kinds of boards.
 
 use std::fmt;
 

@@ -37,7 +37,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 /// [`Master::stop_bound`].
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 
-/// Time allowed for nodes to answer before they are stopped by what was known of them.
+/// Time allowed for nodes to answer; after it they are stopped by their last known status.
 const REFRESH: Duration = Duration::from_millis(200);
 
 /// Pause after a port failure during a stop, before the stop continues.

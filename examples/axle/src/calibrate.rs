@@ -55,7 +55,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// Longest wait for the result: the robot repeats it every second until it is acknowledged.
+/// Longest wait for the result: the robot repeats it every second until it is then acknowledged.
 const RESULT_PATIENCE: Duration = Duration::from_millis(5000);
 
 /// What happens.
@@ -110,14 +110,14 @@ struct Calibration {
     /// The latest result.
     result: Option<Event>,
     /// Number of results that had come before the end was asked for. They are of an earlier
-    /// calibration: robots repeat theirs every second until it is acknowledged.
+    /// calibration: robots repeat theirs every second until it is then acknowledged.
     earlier: u32,
     /// Number of results that were no repetition.
     taken: u32,
 }
 
-/// Shortest time between beginning and end: in it, a result that the robot still repeats comes, and
-/// is acknowledged.
+/// Shortest time between start and end: for a result that the robot still repeats, which
+/// is then acknowledged.
 const SHORTEST_US: u64 = 1_200_000;
 
 impl Calibration {
@@ -249,13 +249,13 @@ impl Event {
     }
 }
 
-/// Gets a message when Enter is pressed. The end of the input is no Enter.
+/// Gets a message when Enter is pressed. The end of the input does not count.
 fn enter() -> Receiver<()> {
     let (pressed, enter) = mpsc::channel();
     thread::spawn(move || {
         let mut line = String::new();
         if io::stdin().read_line(&mut line).is_ok_and(|count| count > 0) {
-            // Fails only if nobody waits any more.
+            // Fails only if the receiver is gone.
             let _ = pressed.send(());
         }
     });

@@ -136,7 +136,7 @@ struct Drive {
     form: Form,
     teller: Teller,
     page: Page,
-    /// Whether the page could be left.
+    /// Whether leaving the page worked.
     left: Result<(), Failure>,
 }
 
@@ -145,7 +145,7 @@ impl Drive {
     fn run(mut self, command: MotorControl, micros: u64, signals: &Signals) -> Result<(), Failure> {
         let driven = guarded(|| self.drive(command, micros, signals));
         // In any case, stop the wheels first and report errors afterwards. That the wheels may
-        // still turn is the most serious one.
+        // still turn is the most serious error.
         let stopped = self.stop();
         let is_at_rest = stopped.is_ok();
         let besides = |failure: Failure| failure.and("it was stopped and is at rest");

@@ -43,7 +43,7 @@ impl Failure {
         Self::Usage(format!("{line} {feature}: build it with --features {feature}"))
     }
 
-    /// The first paragraph of clap's message on one line, with what was probably meant; --help
+    /// The first paragraph of clap's message on one line, with the likely intention; --help
     /// shows usage and tips.
     pub(crate) fn usage(error: &clap::Error) -> Self {
         let text = error.render().to_string();

@@ -84,7 +84,7 @@ impl Write for Flaky {
     }
 }
 
-/// Half a second in which nothing goes.
+/// Half a second in which nothing works.
 fn broken_at_first(millis: u128) -> Faults {
     let fault = (millis < 500).then_some(ErrorKind::Other);
     Faults { read: fault, write: fault }
@@ -138,7 +138,7 @@ fn a_port_that_fails_for_a_while_does_not_end_the_stop_of_a_rover() {
 
 #[test]
 fn a_stop_of_a_rover_is_not_over_while_the_last_one_sent_has_not_left() {
-    // Enough stops leave and are heard before. Then the port fails, and later only takes
+    // Enough stops leave and are heard first. Then the port fails, and later only takes
     // nothing, which may pass.
     let faults = |millis| {
         let write = match millis {

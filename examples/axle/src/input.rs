@@ -26,7 +26,7 @@ pub(crate) struct Input {
     /// The first bytes, up to the length that was asked for.
     first: Vec<u8>,
     first_len: usize,
-    /// A second handle and the length, if it is a file that is there as a whole.
+    /// A second handle and the length, if it is a regular file.
     file: Option<(File, u64)>,
     progress: Option<ProgressBar>,
 }
@@ -73,7 +73,7 @@ impl Input {
         &self.first
     }
 
-    /// The file and its length, if the input is there as a whole and not a stream.
+    /// The file and its length, if the input is a regular file and not a stream.
     pub(crate) fn file(&self) -> Option<(&File, u64)> {
         self.file.as_ref().map(|(file, len)| (file, *len))
     }
@@ -121,8 +121,8 @@ impl Input {
         Ok(front.starts_with(&MAGIC))
     }
 
-    /// Reads ahead: up to `len` bytes, fewer at the end of the input, or once there are enough of
-    /// them for `is_enough`. They come again with the next `read`.
+    /// Reads ahead: up to `len` bytes, fewer at the end of the input, or once they are enough
+    /// for `is_enough`. The next `read` returns them again.
     pub(crate) fn peek(
         &mut self,
         len: usize,

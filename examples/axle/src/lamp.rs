@@ -23,16 +23,16 @@ pub(crate) struct Args {
     #[command(flatten)]
     line: args::PortArgs,
 
-    /// Whether it is to shine
+    /// Whether to switch it on
     #[arg(value_enum)]
     state: State,
 }
 
 #[derive(Clone, Copy, Debug, Eq, PartialEq, clap::ValueEnum)]
 enum State {
-    /// Shine
+    /// On
     On,
-    /// Do not shine
+    /// Off
     Off,
 }
 

@@ -75,7 +75,7 @@ fn factor(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How long to listen behind the last frame, microseconds.
+/// How long to listen after the last frame, microseconds.
 const LINGER_US: u64 = 200_000;
 
 /// Longest time of a replay, microseconds.
@@ -122,7 +122,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         has_sent |= direction == Some(Direction::Out);
         frames.push((direction, Due { after_us: last_us, bytes, meant, effect }));
     }
-    // What the recording program has sent and heard again is an echo.
+    // Bytes that the recording program sent and then received are its own echo.
     frames.retain(|(direction, _)| !has_sent || *direction == Some(Direction::Out));
     if frames.is_empty() {
         let line = format!("no frame of a {} in the capture", args.side);

@@ -161,7 +161,7 @@ impl Rover {
         result
     }
 
-    /// This moment, to ask later whether the robot has heard what was sent by then.
+    /// A mark, to ask later whether the robot has heard everything sent before it.
     pub(crate) fn mark(&mut self) -> Mark {
         let (now, seen) = (self.now(), self.host().statistics());
         let open = self.pings.open(now, seen.pings, pongs(seen));
@@ -245,7 +245,7 @@ impl Rover {
     }
 }
 
-/// A moment in the talk with a robot.
+/// A moment in the exchange with a robot.
 pub(crate) struct Mark {
     at: Instant,
     /// Number of pongs by then.

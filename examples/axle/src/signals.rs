@@ -80,7 +80,7 @@ impl Signals {
         Ok(signals)
     }
 
-    /// For a subcommand that has something to bring to its end: a second signal does not cut that
+    /// For a subcommand that must finish something: a second signal does not cut that
     /// short.
     pub(crate) fn listen_gently() -> Result<Self, Failure> {
         let signals = Self {
@@ -91,7 +91,7 @@ impl Signals {
         };
         #[cfg(unix)]
         for &signal in ENDS {
-            // In this order: a signal does not free itself.
+            // In this order, so that no signal releases itself.
             flag::register_conditional_default(signal, Arc::clone(free())).map_err(deaf)?;
             flag::register(signal, Arc::clone(&signals.end)).map_err(deaf)?;
         }

@@ -122,7 +122,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// The port, opened for one protocol after the other, with one recording. A recording that fails
-/// does not keep anything from being stopped; what failed is told at the end.
+/// does not keep anything from being stopped; the failure is reported at the end.
 struct Lines<'a> {
     args: &'a PortArgs,
     recording: Option<SharedRecording>,

@@ -87,7 +87,7 @@ impl Teller {
                     let error = self.end.try_recv().ok().and_then(Result::err);
                     error.unwrap_or(io::ErrorKind::BrokenPipe.into())
                 });
-                // Not every caller has a use for it, so it comes again at the end.
+                // Some callers ignore this error, so it is returned again at the end.
                 return Err(Failure::Write(match failure.raw_os_error() {
                     Some(code) => io::Error::from_raw_os_error(code),
                     None => failure.kind().into(),

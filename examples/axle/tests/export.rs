@@ -191,7 +191,7 @@ fn the_capture_itself_is_never_replaced() {
         fs::write(&from, &bytes).unwrap();
         let command = if form == "svg" { "plot" } else { "export" };
         let [from_text, to_text] = [&from, &to].map(|path| path.to_str().unwrap());
-        let what = if is_folder { "has the capture in it" } else { "is the capture itself" };
+        let what = if is_folder { "contains the capture itself" } else { "is the capture itself" };
         let says = format!("{:?} {what}: choose another name", to);
         for more in [&[][..], &["--force"]] {
             let args = [&[command, from_text, "-o", to_text], more].concat();
@@ -291,7 +291,7 @@ fn with_force_no_other_kind_of_thing_is_replaced() {
         };
         if ["csv", "parquet"].contains(&form) {
             fs::write(&to, "a file").unwrap();
-            force("there is something else than a folder");
+            force("it exists and is not a folder");
             assert_eq!(fs::read(&to).unwrap(), b"a file");
             fs::remove_file(&to).unwrap();
             fs::create_dir(&to).unwrap();
@@ -313,7 +313,7 @@ fn with_force_no_other_kind_of_thing_is_replaced() {
             force(&format!("\"ucp.ping.{form}\" in it is not of an export"));
         } else {
             fs::create_dir(&to).unwrap();
-            force("there is something else than a file");
+            force("it exists and is not a file");
             assert!(to.is_dir());
         }
     }

@@ -1,4 +1,4 @@
-//! How long a stop is waited for.
+//! How long to wait for a stop.
 
 use axlewire::time::{Duration, Instant};
 

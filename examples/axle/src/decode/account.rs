@@ -1,8 +1,8 @@
 //! The account of a whole file with several threads: each reads its own parts.
 //!
 //! Part *k* begins at the first place to split ([`split_point`](stream::split_point)) behind *k*
-//! times the length of a part. Each thread finds both ends of its parts by itself, because whether
-//! a place is one depends only on the bytes around it.
+//! times the length of a part. Each thread finds both ends of its parts independently: whether
+//! a position is a split point depends only on the bytes around it.
 
 use std::{
     fs::File,
@@ -19,11 +19,11 @@ use axlewire::stream::{self, Counters, Frames, Framing};
 /// Length of a part: it stays in a processor's own cache between reading and decoding.
 const PART: usize = 256 * 1024;
 
-/// How far behind its beginning or end a part may really begin or end.
+/// How far after its nominal start or end a part may actually start or end.
 const SLACK: usize = 16 * 1024;
 
 /// The account of a file of `len` bytes, its end included. `None` if it is short, if it cannot be
-/// read, or if there is no place to split where one is needed: then one thread has to do it.
+/// read, or if it has no split point where one is needed: then one thread has to do it.
 pub(super) fn of_file<F: Framing>(file: &File, len: u64, jobs: usize) -> Option<Counters> {
     let parts = len / PART as u64;
     if parts < 2 {
@@ -44,7 +44,7 @@ pub(super) fn of_file<F: Framing>(file: &File, len: u64, jobs: usize) -> Option<
                     let Ok(mut sum) = sum.lock() else { return };
                     match (found, &mut *sum) {
                         (Some(found), Some(sum)) => *sum += found,
-                        // No need to go on.
+                        // The others can stop.
                         (None, sum) => {
                             *sum = None;
                             next.store(parts, Ordering::Relaxed);
@@ -58,8 +58,8 @@ pub(super) fn of_file<F: Framing>(file: &File, len: u64, jobs: usize) -> Option<
     sum.into_inner().ok().flatten()
 }
 
-/// The account from the first place behind `begin` to the first behind `end`, or to the end of the
-/// file.
+/// The account from the first split point after `begin` to the first after `end`, or to the end of
+/// the file.
 fn account<F: Framing>(
     file: &File,
     begin: u64,
@@ -67,7 +67,7 @@ fn account<F: Framing>(
     len: u64,
     buffer: &mut Vec<u8>,
 ) -> Option<Counters> {
-    // What is in front tells whether a place is one.
+    // The bytes before a position tell whether it is a split point.
     let from = begin.saturating_sub(F::MAX_LEN as u64);
     let to = end.map_or(len, |end| (end + SLACK as u64).min(len));
     buffer.resize((to - from) as usize, 0);

@@ -11,7 +11,7 @@ use axlewire::{
 use super::{account, framing::Choice};
 use crate::{args::Protocol, failure::Failure, input::Input};
 
-/// How many of some bytes belong to frames of a protocol.
+/// Share of some bytes that belongs to frames of a protocol.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) struct Share {
     pub(super) protocol: Protocol,
@@ -19,7 +19,7 @@ pub(super) struct Share {
     pub(super) frames: u64,
 }
 
-/// What the beginning of raw bytes seems to be.
+/// The likely protocol of raw bytes, judged by their beginning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Guess {
     /// The largest first.
@@ -57,10 +57,10 @@ impl fmt::Display for Guess {
     }
 }
 
-/// The most bytes that are looked at.
+/// Maximum number of bytes to look at.
 pub(super) const SAMPLE_LEN: usize = 64 * 1024;
 
-/// Frames that make a guess sure enough to begin with.
+/// Number of frames that make a guess reliable.
 const SURE_FRAMES: u64 = 3;
 
 /// The share of each protocol in `sample`, the largest first. Its end counts as a quiet line, as

@@ -37,7 +37,7 @@ pub(crate) use stream::{BUFFER_LEN, Sheet, Stream, Taken};
 pub(crate) use walk::{Next, Walked, walk};
 pub(crate) use whole::{Chosen, choose, walk_into};
 
-/// The most threads that are used: each has its own buffers, and the more there are, the shorter
+/// Maximum number of threads: each has its own buffers, and the more there are, the shorter
 /// are the parts of the file.
 const MOST_JOBS: usize = 16;
 
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         Some(protocol) => protocol,
         None => detected(args, choice, &mut input)?,
     };
-    // For a hint at the end, if there are no frames.
+    // For the hint at the end, if there are no frames.
     input.keep_first(detect::SAMPLE_LEN);
     let run = for_framing!(decode, protocol, choice.direction);
     let account = run(args, protocol, &mut input)?;
@@ -129,7 +129,7 @@ where
     let (mut sheet, mut account, mut stream) =
         (Sheet::new(style), Counters::default(), StreamOf::<F>::new(0));
     let mut broken = None;
-    // A stream may be slow, and its lines are wanted as they come.
+    // A stream may be slow: print its lines as they come.
     match (input.file(), style) {
         (Some((file, len)), None) if jobs > 1 => {
             if let Some(account) = account::of_file::<F>(file, len, jobs) {

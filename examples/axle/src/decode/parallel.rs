@@ -2,8 +2,8 @@
 //!
 //! The file is read in parts that end where decoding can begin anew
 //! ([`split_point`](stream::split_point)). Each worker lists one part at a time, and the lines are
-//! written in the order of the parts. What a part has to know of those before it, the modes of the
-//! nodes, a worker finds in a quick first pass and hands on before it writes a line.
+//! written in the order of the parts. What a part needs from earlier ones, the modes of the
+//! nodes, is found in a quick first pass and handed on before a line is written.
 
 use std::{
     collections::BTreeMap,
@@ -29,11 +29,11 @@ const LISTED: usize = 192 * 1024;
 /// The lines are up to this many times as long as the bytes.
 const GROWTH: usize = 40;
 
-/// A stretch without a place to split becomes a part of at most this length; then the rest of the
+/// A stretch without a split point becomes a part of at most this length; then the rest of the
 /// file is decoded by one thread.
 const LONGEST_PART: usize = 96 * 1024;
 
-/// How far in front of the end of what was read a place to split is looked for first.
+/// How far before the end of the buffer the search for a split point starts.
 const NEAR_END: usize = 1024;
 
 /// A part of the file.
@@ -57,19 +57,19 @@ struct Listed {
     buffer: Vec<u8>,
 }
 
-/// What one thread has to go on with: bytes for which there was no place to split, and what is
+/// What is left for one thread: bytes without a split point, and what is
 /// known before them.
 pub(super) struct Rest {
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
     pub(super) modes: Modes,
     pub(super) account: Counters,
-    /// The input's failure, which comes behind all this.
+    /// The failure of the input, after all this.
     pub(super) failure: Option<Failure>,
 }
 
 /// Lists the input with `jobs` threads, and passes the lines of each part to `write`. Returns what
-/// is left for one thread: at least the bytes behind the last place to split.
+/// is left for one thread: at least the bytes after the last split point.
 pub(super) fn list<F>(
     input: &mut Input,
     style: Style,
@@ -98,7 +98,7 @@ where
         let mut writing = Writing::default();
         let (mut sent, mut written, mut under_way) = (0, 0, 0);
         loop {
-            // One part more than there are threads, so that none waits for the reading; fewer if
+            // One part more than threads, so that none waits for the reader; fewer if
             // they are long, because their lines are held in memory.
             while sent <= written + jobs && under_way <= LISTED && !reading.is_over {
                 let room = writing.spare.pop().unwrap_or_default();
@@ -127,7 +127,7 @@ where
                 under_way -= listed.buffer.len();
                 writing.account += listed.account;
                 if let Err(failure) = write(&listed.lines) {
-                    // The reader of the output has gone: nothing else matters.
+                    // The reader of the output is gone: stop.
                     drop(parts);
                     return Err(failure);
                 }
@@ -155,10 +155,10 @@ where
 /// What has been listed.
 #[derive(Default)]
 struct Writing {
-    /// Parts that were done before one in front of them.
+    /// Finished parts that wait for an earlier one.
     waiting: BTreeMap<usize, Listed>,
     account: Counters,
-    /// Buffers for bytes and lines, to be used again: new ones would be zeroed by the system.
+    /// Buffers for bytes and lines, reused: the system would zero new ones.
     spare: Vec<(Vec<u8>, Vec<u8>)>,
 }
 
@@ -176,7 +176,7 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// The next part; `None` when the input has ended, or has no place to split for too long.
+    /// The next part; `None` when the input has ended, or has no split point for too long.
     fn next_part<F: Framing>(
         &mut self,
         part_len: usize,
@@ -188,7 +188,7 @@ impl Reading<'_> {
             if !self.is_over {
                 self.is_over = self.input.fill(&mut self.rest, len)?;
             }
-            // Little is left behind the place, because it has to be copied.
+            // Little is left after the split point, because it has to be copied.
             let near = |back: usize| {
                 stream::split_point::<F>(&self.rest, self.rest.len().saturating_sub(back))
             };

@@ -52,7 +52,7 @@ impl Printer {
     }
 
     /// Ends a listing that could not be finished: what was decoded is still valid, and the missing
-    /// summary shows that it is incomplete. But if the summary alone is wanted, it is all there is.
+    /// summary shows that it is incomplete. With `--summary`, the summary is all there is.
     pub(super) fn break_off(mut self, account: &Counters, times_back: u64) -> Result<(), Failure> {
         match self.style {
             None if account.received > 0 => self.finish(account, times_back),

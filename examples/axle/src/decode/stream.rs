@@ -17,8 +17,8 @@ use crate::{
 /// Length of the longest frame of any protocol.
 pub(crate) const BUFFER_LEN: usize = axlewire::ucp::MAX_LEN;
 
-/// What becomes of the frames: the lines of a listing, and what they need to know of the lines
-/// before; their counts; the frames themselves.
+/// Where the frames go: the lines of a listing, with what they need to know of the lines
+/// before; a table of counts; the frames themselves.
 pub(crate) struct Sheet {
     /// `None` if no lines are wanted.
     pub(crate) style: Option<Style>,
@@ -264,7 +264,7 @@ fn place_of(next: &mut Place, chunks: &mut VecDeque<(u64, u64)>, length: u64) ->
     place
 }
 
-/// Drops the chunks in which no event ends any more: the next ends at this offset or behind it.
+/// Drops the chunks in which no later event can end: the next ends at this offset or after it.
 fn forget_before(chunks: &mut VecDeque<(u64, u64)>, offset: u64) {
     while chunks.front().is_some_and(|&(end, _)| end < offset) {
         chunks.pop_front();

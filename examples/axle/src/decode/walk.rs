@@ -13,7 +13,7 @@ use crate::{
     pcapng::{self, Direction, Packet, Reader},
 };
 
-/// The most bytes that are fed at once: their lines are up to 40 times as long, and are held in
+/// Maximum number of bytes fed at once: their lines are up to 40 times as long, and are held in
 /// memory.
 const PIECE: usize = 16 * 1024;
 
@@ -35,12 +35,12 @@ pub(crate) struct Walked {
     pub(crate) times_back: u64,
     /// The modes of the nodes at the end of the last line.
     pub(crate) modes: Modes,
-    /// Why not all was read. What was is on the sheet all the same.
+    /// Why reading ended early. What was read is on the sheet.
     pub(crate) broken: Option<Failure>,
 }
 
 /// Feeds a capture to a sheet; each interface and each direction is a stream of its own. `go_on` is
-/// called in front of every piece, may empty the sheet, and says whether to go on.
+/// called before every piece, may empty the sheet, and tells whether to go on.
 pub(crate) fn walk(
     input: &mut Input,
     choice: Choice,
@@ -136,7 +136,7 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                     return Ok(());
                 }
                 line.feed(self.choice, None, piece, None, sheet);
-                // At once: on a pipe, the next piece may be long in coming.
+                // At once: on a pipe, the next piece may take long.
                 if sheet.is_full() {
                     return Ok(());
                 }

@@ -1,4 +1,4 @@
-//! A whole capture into something else than a listing: tables, files, plots.
+//! A whole capture as tables, files or plots.
 
 use super::{
     Choice, Next, Sheet, Walked,
@@ -24,7 +24,7 @@ pub(crate) struct Chosen {
 }
 
 /// Finds out what `input` is, as `axle decode` does: pcapng tells its protocols, and raw bytes are
-/// of the one that is named, or of the one that they look like.
+/// of the named one, or of the one that they look like.
 pub(crate) fn choose(input: &mut Input, named: Option<Protocol>) -> Result<Chosen, Failure> {
     let mut choice = Choice { protocol: named, direction: None };
     let has_times = input.is_pcapng()?;

@@ -1,8 +1,8 @@
 //! `axle extcap`: live capture for Wireshark, in the protocol that it speaks with such programs.
 //!
 //! Wireshark asks for the interfaces, for the link types and the settings of one, and then runs the
-//! capture, which writes pcapng to a pipe until it is stopped by a signal or the pipe is closed.
-//! What is asked is in the arguments, and the answers are lines on standard output.
+//! capture, which writes pcapng to a pipe until a signal stops it or the pipe is closed.
+//! Requests come as arguments, and the answers are lines on standard output.
 
 mod say;
 
@@ -40,7 +40,7 @@ pub(crate) struct Args {
     #[arg(long)]
     extcap_interfaces: bool,
 
-    /// The interface that the other options are about
+    /// The interface to which the other options apply
     #[arg(long, value_name = "NAME")]
     extcap_interface: Option<String>,
 
@@ -60,11 +60,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "PATH")]
     fifo: Option<PathBuf>,
 
-    /// Version of Wireshark; all are served alike
+    /// Version of Wireshark; it makes no difference
     #[arg(long, value_name = "VERSION")]
     extcap_version: Option<String>,
 
-    /// A capture filter: there are none, display filters do it
+    /// A capture filter; not supported, use display filters
     #[arg(long, value_name = "FILTER")]
     extcap_capture_filter: Option<String>,
 
@@ -73,7 +73,7 @@ pub(crate) struct Args {
     port: Option<String>,
 
     /// Line speed, bit/s; 0 is that of the protocol
-    // Text, as the protocol is: a bad one is a failure like others, of which the pipe must know.
+    // Text, like the protocol: a bad value is a failure that the pipe must be told.
     #[arg(short, long, value_name = "BAUD", default_value = "0")]
     baud: String,
 
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     } else if args.capture {
         return capture(args);
     } else if args.filter().is_some() {
-        // Wireshark asks whether it is valid, and takes any answer for a no.
+        // Wireshark asks whether it is valid, and treats any answer as "no".
         say::no_filter(&mut text);
     } else {
         let line = "one of --extcap-interfaces, --extcap-dlts, --extcap-config and --capture is \

@@ -36,7 +36,7 @@ fn title(port: &SerialPortInfo) -> String {
     product.map_or_else(|| "Serial line".to_owned(), |product| format!("Serial line, {product}"))
 }
 
-/// The link types of the protocols. Which one it is, the capture says.
+/// The link types of the protocols. The capture itself says which one it uses.
 pub(super) fn link_types(out: &mut String) {
     for protocol in PROTOCOLS {
         let number = pcapng::link_type(protocol).to_string();
@@ -104,7 +104,7 @@ fn argument(out: &mut String, values: &[(&str, &str)]) {
     line(out, "arg", values);
 }
 
-/// Braces and control characters would end a value or the line.
+/// Removes braces and control characters, which would end a value or the line.
 fn line(out: &mut String, kind: &str, values: &[(&str, &str)]) {
     out.push_str(kind);
     out.push(' ');

@@ -59,7 +59,7 @@ impl Line {
         Ok(line)
     }
 
-    /// The recording that is wanted of this line.
+    /// The recording requested for this line.
     pub(crate) fn recording(
         args: &PortArgs,
         protocol: Protocol,
@@ -138,7 +138,7 @@ impl Line {
 }
 
 impl Line {
-    /// A recording that fails does not keep anything from being sent; what failed is told at the
+    /// A failing recording does not keep anything from being sent; the failure is reported at the
     /// end.
     fn record(&self, direction: Direction, bytes: &[u8]) {
         if let Some(recording) = &self.recording {

@@ -46,7 +46,7 @@ impl TcpPort {
         self.stream.peer_addr().is_ok_and(|peer| peer.ip().is_loopback())
     }
 
-    /// A signal ends the wait, so that signals that never end do not prolong it for ever.
+    /// A signal ends the wait, so that endless signals cannot prolong it.
     fn receive(&mut self) -> io::Result<bool> {
         match self.stream.read(&mut self.held) {
             Ok(0) => Err(lost("the server has closed the connection")),
@@ -119,7 +119,7 @@ impl Write for TcpPort {
         }
     }
 
-    /// Nothing to wait for: when the bytes are on the line, only the server knows.
+    /// Nothing to wait for: only the server knows when the bytes are on the line.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

@@ -31,7 +31,7 @@ pub(super) fn gap(out: &mut Out, at: Place, gap: &SkippedBytes) {
     out.text(r#","reason":""#);
     out.text(gap.reason.name());
     out.text("\"");
-    // If it is the only one, that says all.
+    // A single reason needs no counts.
     if gap.account.skipped_for(gap.reason) < gap.length {
         out.text(r#","reasons":"#);
         reasons(out, &gap.account);

@@ -20,7 +20,7 @@ const FAREWELL: Duration = Duration::from_millis(2000);
 pub(crate) struct Background {
     /// `None` once it was checked.
     news: Option<SyncSender<News>>,
-    /// The failure of the recording, when no more news can come.
+    /// The failure of the recording, once nothing more is recorded.
     end: Receiver<Result<(), Failure>>,
     stamp: Stamp,
     path: String,
@@ -51,7 +51,7 @@ impl Background {
                     }
                 }
             }
-            // Fails only if nobody asks any more.
+            // Fails only if the receiver is gone.
             let _ = ended.send(recording.check());
         });
         Self { news: Some(news), end, stamp, path, lost: 0 }
@@ -96,7 +96,7 @@ impl Background {
 
 impl Drop for Background {
     fn drop(&mut self) {
-        // There is another failure, which is reported too.
+        // Another failure is reported already.
         if let Err(failure) = self.check() {
             let _ = failure.report();
         }

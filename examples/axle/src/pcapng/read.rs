@@ -1,4 +1,4 @@
-//! Reads the packets of a capture, whatever the bytes are.
+//! Reads the packets of a capture, including damaged and hostile ones.
 
 use std::{
     fmt,
@@ -32,7 +32,7 @@ pub(crate) struct Interface {
     offset_s: i64,
 }
 
-/// Unit of time, as the option has it.
+/// Unit of time, as coded in the option.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 struct Unit(u8);
 

@@ -177,7 +177,7 @@ impl Recording {
         }
     }
 
-    /// Notices that the reader of a named pipe has gone, while there is nothing to write.
+    /// Notices that the reader of a named pipe is gone while there is nothing to write.
     pub(crate) fn check_reader(&mut self) {
         if matches!(self.writer.get_mut(), Output::Pipe(_)) && has_no_reader(&self.path) {
             self.fail(io::ErrorKind::BrokenPipe.into());
@@ -201,7 +201,7 @@ impl Recording {
     }
 }
 
-/// Whether nothing reads from a named pipe: it cannot be opened once more without waiting then.
+/// Whether a named pipe has no reader: then it cannot be opened again without waiting.
 /// Only where the flag for that is known; elsewhere, the next write notices.
 #[cfg(any(
     all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")),

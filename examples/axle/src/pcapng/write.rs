@@ -15,7 +15,7 @@ pub(crate) struct Writer<W> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Begins a capture, with this line.
+    /// Starts a capture with one interface, this line.
     pub(crate) fn new(out: W, protocol: Protocol, port: &str, baud: u32) -> io::Result<Self> {
         let mut writer = Self { out, block: Vec::new(), interfaces: 0 };
         writer.write(u32::from_le_bytes(MAGIC), |body| {
@@ -29,7 +29,7 @@ impl<W: Write> Writer<W> {
         Ok(writer)
     }
 
-    /// Goes on with another line, which is an interface of its own.
+    /// Continues with another line, as a new interface.
     pub(crate) fn interface(
         &mut self,
         protocol: Protocol,

@@ -1,4 +1,4 @@
-//! The nodes of a bus that are commanded: their modes are read before, and they are stopped.
+//! The commanded nodes of a bus: their modes are read first, and they are stopped at the end.
 
 use axlewire::ikeya::{
     NodeId,
@@ -86,7 +86,7 @@ impl<B: Boards> Commanded<B> {
         if self.nodes.is_empty() {
             return Ok(Vec::new());
         }
-        // The master has not heard the answers of the meantime.
+        // The master did not hear the answers in between.
         self.bus.refresh(self.nodes);
         // A stop in the wrong mode would send a motor to position 0. So a node that has changed its
         // mode, and has not told this master, is left to one that has to hear it first.

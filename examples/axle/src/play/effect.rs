@@ -68,7 +68,7 @@ pub(crate) struct Write {
     positions: Vec<Position>,
 }
 
-/// What is refused.
+/// Limits of commands.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Limits {
     /// Refuse a speed above this, in either direction
@@ -176,7 +176,7 @@ pub(crate) fn hidden_frame<'a>(frames: impl IntoIterator<Item = &'a [u8]>) -> Op
     })
 }
 
-/// How many ways to go on are tried. A capture made to have more hides something for certain.
+/// Maximum number of continuations to try. A capture with more is certainly hiding something.
 const CONTINUATIONS: u32 = 1_000_000;
 
 /// Whether these bytes, with what may be sent behind them, begin with a frame that a shipped robot

@@ -44,16 +44,16 @@ const TURNAROUND: Duration = Duration::from_micros(200);
 const QUESTIONS: u32 = 3;
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// A role that says what it is told to.
+/// A role that sends given frames.
 pub(crate) struct Player {
     protocol: Protocol,
     due: VecDeque<Due>,
     start: Instant,
     /// Line speed, bit/s.
     baud: u32,
-    /// What the line will return of what was sent, if it does that.
+    /// Sent bytes that the line will echo, if it does.
     echo: Option<VecDeque<u8>>,
-    /// How long to listen behind the last frame, microseconds.
+    /// How long to listen after the last frame, microseconds.
     linger_us: u64,
     last_at: Instant,
     /// When the line has carried all that was handed out, and the answers to it.
@@ -63,7 +63,7 @@ pub(crate) struct Player {
     /// The frame handed out last.
     sending: Box<[u8]>,
     attendance: Attendance,
-    /// Why nothing more is handed out.
+    /// Why sending has ended.
     failure: Option<Failure>,
     /// The nodes that are commanded.
     commanded: NodeSet,
@@ -81,7 +81,7 @@ pub(crate) struct Player {
     pub(crate) lost: usize,
 }
 
-/// What a line is told.
+/// Settings of a player.
 pub(crate) struct Part {
     pub(crate) protocol: Protocol,
     pub(crate) baud: u32,
@@ -213,7 +213,7 @@ impl Endpoint for Player {
             echo.drain(..same);
             bytes = bytes.get(same..).unwrap_or_default();
             if !bytes.is_empty() {
-                // Damaged, or something else came first: the rest is shown as it is.
+                // Damaged, or other bytes came first: the rest is shown unchanged.
                 echo.clear();
             }
         }
@@ -269,7 +269,7 @@ impl Endpoint for Player {
 
     fn handle_unsent(&mut self, _: Unsent, _: Instant) {
         self.lost += 1;
-        // An unknown part of it comes back.
+        // An unknown part of it is echoed.
         self.echo.iter_mut().for_each(VecDeque::clear);
     }
 

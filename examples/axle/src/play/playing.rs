@@ -28,7 +28,7 @@ pub(crate) struct Plan<'a> {
     pub(crate) protocol: Protocol,
     pub(crate) side: Side,
     pub(crate) frames: VecDeque<Due>,
-    /// How long to listen behind the last frame, microseconds; what moves does so meanwhile.
+    /// How long to listen after the last frame, microseconds; motors keep moving meanwhile.
     pub(crate) linger_us: u64,
     pub(crate) limits: Limits,
     pub(crate) is_json: bool,

@@ -91,7 +91,7 @@ pub(super) enum UcpMessage {
         #[arg(value_enum)]
         kind: Kind,
     },
-    /// Show a state of the network by the robot's lamp
+    /// Show a state of the network on the robot's lamp
     NetworkState {
         /// The state
         #[arg(value_enum)]

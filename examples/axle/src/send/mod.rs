@@ -53,7 +53,7 @@ struct Times {
     #[arg(long, value_name = "SECONDS", default_value = "0.1", value_parser = args::seconds)]
     every: u64,
 
-    /// How long to listen behind the last one, seconds; what moves does so meanwhile
+    /// How long to listen after the last one, seconds; motors keep moving meanwhile
     #[arg(short = 'f', long = "for", value_name = "SECONDS", default_value = "0.5", value_parser = args::seconds)]
     linger_us: u64,
 
@@ -69,7 +69,7 @@ struct Times {
     json: bool,
 }
 
-/// Time from a WRITE to the READ behind it, microseconds.
+/// Time from a WRITE to the READ after it, microseconds.
 const READ_AFTER_US: u64 = 2000;
 
 /// Runs the subcommand.
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     play::run(plan(args)?)
 }
 
-/// The message as often as it is wanted, and a READ behind each WRITE.
+/// The message, repeated as requested, and a READ after each WRITE.
 fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
     let (protocol, meant) = (args.message.protocol(), args.message.mode());
     let (first, times) = (args.message.bytes(0).map_err(Failure::Usage)?, &args.times);

@@ -16,7 +16,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Links `path` to the pseudo-terminal `target`. What a killed simulation has left at `path` is
+    /// Links `path` to the pseudo-terminal `target`. A stale link of a killed simulation is
     /// replaced: a link to a pseudo-terminal that no longer exists, or that is `target` now.
     ///
     /// Fails if anything else is there.
@@ -49,7 +49,7 @@ impl Link {
 impl Drop for Link {
     fn drop(&mut self) {
         if fs::read_link(&self.path).is_ok_and(|target| target == self.target) {
-            // Nobody is left to be told.
+            // There is nowhere left to report it.
             let _ = fs::remove_file(&self.path);
         }
     }

@@ -55,7 +55,7 @@ impl Pty {
         Instant::from_micros(self.start.elapsed().as_micros() as u64)
     }
 
-    /// Moves what is there by now from the port to the wire and from the wire to the port; returns
+    /// Moves due bytes from the port to the wire and from the wire to the port; returns
     /// whether there are bytes for the simulation.
     fn carry(&mut self) -> io::Result<bool> {
         let now = self.now();

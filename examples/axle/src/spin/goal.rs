@@ -1,4 +1,4 @@
-//! What a motor is asked for, and the target that this is for its node.
+//! The goal of a motor, and the target that it is for its node.
 
 use axlewire::ikeya::{NodeId, Position, Rps, Status, Target};
 
@@ -20,11 +20,11 @@ pub(super) struct GoalArgs {
     revolutions: Vec<Position>,
 }
 
-/// What was asked for.
+/// The requested goal.
 #[derive(Clone, Debug)]
 pub(super) enum Goal<B: Boards> {
     Speed(B::Velocity),
-    /// A way from where the motors are.
+    /// A distance from the current position.
     Way(Vec<Position>),
 }
 

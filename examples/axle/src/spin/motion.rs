@@ -68,7 +68,7 @@ pub(super) struct Spin<B: Boards> {
     pub(super) form: Form,
     pub(super) teller: Teller,
     pub(super) page: Page,
-    /// Whether the page could be left.
+    /// Whether leaving the page worked.
     pub(super) left: Result<(), Failure>,
 }
 

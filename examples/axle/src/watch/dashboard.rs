@@ -23,7 +23,7 @@ pub(crate) struct Dashboard<F> {
     /// What is shown instead while the picture is paused.
     frozen: Option<Box<Model>>,
     drawn_at: Option<u64>,
-    /// What the last picture showed: revision of the model, and size.
+    /// Model revision and size of the last picture.
     drawn: (u64, Rect),
     /// The user has changed something.
     is_new: bool,
@@ -92,12 +92,12 @@ where
         next.copied().map_or(Filter::All, Filter::Node)
     }
 
-    /// Has a picture drawn at the next tick, whatever has changed.
+    /// Forces a redraw at the next tick.
     pub(crate) fn renew(&mut self) {
         self.is_new = true;
     }
 
-    /// Gives the terminal to somebody else until `meanwhile` returns whether to come back.
+    /// Gives the terminal away until `meanwhile` returns whether to come back.
     pub(crate) fn away(&mut self, meanwhile: impl FnOnce() -> bool) -> Result<(), Failure> {
         self.screen.leave();
         if meanwhile() {

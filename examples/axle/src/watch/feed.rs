@@ -62,7 +62,7 @@ where
             return;
         }
         let mut bytes = bytes;
-        // Bytes that have waited came near an earlier packet than those that follow.
+        // Pending bytes belong near an earlier packet than those that follow.
         let mut near = self.near.take();
         while let Some(event) = self.decoder.decode(&mut bytes) {
             match event {

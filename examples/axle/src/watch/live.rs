@@ -1,4 +1,4 @@
-//! The page while something moves. It only looks on: the line's bytes are handed to a thread
+//! The page while something moves. It only observes: the line's bytes are handed to a thread
 //! without ever waiting for it, and the keys that stop raise the same flag as Ctrl-C.
 
 use std::{
@@ -32,16 +32,16 @@ use crate::{
     signals::Signals,
 };
 
-/// Number of pieces of news that may wait for the page: more than a second of a full bus.
+/// Number of updates that may wait for the page: more than a second of a full bus.
 const QUEUE: usize = 16 * 1024;
 
-/// Longest wait of the page for news, so that keys and the size of the terminal are noticed.
+/// Longest wait of the page for updates, so that keys and the terminal's size are noticed.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Time allowed for the page to end, longer than for its terminal.
 const FAREWELL: Duration = Duration::from_millis(1000);
 
-/// What the page is told, and when it happened, microseconds.
+/// An update for the page, and its time, microseconds.
 struct News(u64, What);
 
 enum What {
@@ -101,7 +101,7 @@ impl Live {
             let feed = Feed::<F>::new(Model::new(protocol), None);
             let sink = Sink { stop: Some(Arc::clone(&stop.0)) };
             let shown = Dashboard::open(feed, view, sink).and_then(|dashboard| {
-                // Nobody waits for it if the `Live` is gone.
+                // Fails only if the `Live` is gone.
                 let _ = opened.send(());
                 looker.look_on(dashboard)
             });
@@ -159,7 +159,7 @@ impl Live {
 
 impl Drop for Live {
     fn drop(&mut self) {
-        // There is another failure to report.
+        // Another failure is reported already.
         drop(self.leave());
     }
 }
@@ -168,7 +168,7 @@ fn given_up() -> Failure {
     Failure::Failed("the tool has a bug: its page gave up".to_owned())
 }
 
-/// Without the page nobody sees what moves or has a key to stop it, so its end stops that.
+/// Without the page there is no view of what moves and no key to stop it, so its end stops that.
 struct StopAtTheEnd(Arc<AtomicBool>);
 
 impl Drop for StopAtTheEnd {
@@ -177,11 +177,11 @@ impl Drop for StopAtTheEnd {
     }
 }
 
-/// Hands news to the page.
+/// Hands updates to the page.
 #[derive(Clone)]
 struct Tell {
     news: SyncSender<News>,
-    /// Number of bytes that the page was too slow for.
+    /// Number of bytes lost because the page was too slow.
     lost: Arc<AtomicU64>,
     start: Instant,
 }

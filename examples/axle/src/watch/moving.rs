@@ -22,14 +22,14 @@ pub(crate) struct PageArgs {
     page: bool,
 }
 
-/// The page, if it is wanted.
+/// The page, if it was requested.
 #[derive(Default)]
 pub(crate) struct Page {
     #[cfg(all(unix, feature = "dashboard"))]
     live: Option<Live>,
 }
 
-/// What the page says of its line.
+/// What the page shows of its line.
 #[cfg_attr(
     not(all(unix, feature = "dashboard")),
     expect(dead_code, reason = "there is no page to say it")
@@ -43,7 +43,7 @@ pub(crate) struct About {
 }
 
 impl PageArgs {
-    /// Shows the page, if it is wanted; the line is to be used from now on.
+    /// Shows the page, if it was requested; use the returned line from now on.
     #[cfg(all(unix, feature = "dashboard"))]
     pub(crate) fn open(
         self,

@@ -22,7 +22,7 @@ use crate::{
     signals::{self, Signals},
 };
 
-/// Room for what a terminal that is busy with drawing may keep us from reading.
+/// Room for bytes that arrive while a slow terminal delays us.
 const BUFFER_LEN: usize = 16 * 1024;
 
 pub(super) fn watch<F>(watched: &Watched<'_>) -> Result<(), Failure>
@@ -69,7 +69,7 @@ fn suspend(signals: &Signals) -> bool {
     loop {
         signals::suspend();
         if signals.is_end() || screen::is_in_front() {
-            // One from meanwhile is of a thread that has touched the terminal in the background.
+            // A signal in between came from a thread that touched the terminal in the background.
             signals.take_suspension();
             return !signals.is_end();
         }

@@ -4,7 +4,7 @@ use axlewire::ikeya::{Mode, NodeId};
 
 use super::{Log, Rate, Trend};
 
-/// Time after which a node or a READ that nothing was heard of counts as past.
+/// Time without traffic after which a node or a READ counts as past.
 const PAST: u64 = 1_000_000;
 
 /// Number of consecutive READs without an answer that make a node silent (ruling I7).
@@ -63,9 +63,9 @@ pub(crate) enum Health {
     Missing(u32),
     /// Three READs in a row were not answered.
     Silent,
-    /// Nothing was heard of it or for it for a second.
+    /// No traffic from it or to it for a second.
     Quiet,
-    /// Commands for it are heard, but neither READs nor answers.
+    /// Commands to it are heard, but neither READs nor answers.
     Commanded,
 }
 
@@ -111,7 +111,7 @@ impl Bus {
         self.is_of_three
     }
 
-    /// The nodes that something was heard of or for.
+    /// The nodes with any traffic from or to them.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = (NodeId, &Node)> {
         NodeId::ALL.into_iter().zip(&self.nodes).filter_map(|(id, node)| Some((id, node.as_ref()?)))
     }
@@ -191,7 +191,7 @@ impl Bus {
         self.asked = self.asked.filter(|(asked, _)| *asked != id);
     }
 
-    /// Books a READ whose answer has not come.
+    /// Counts a READ that was not answered.
     fn miss(&mut self, at: u64, log: &mut Log) {
         let Some((id, _)) = self.asked.take() else { return };
         let Some(node) = self.node(id) else { return };
@@ -210,7 +210,7 @@ impl Bus {
         }
     }
 
-    /// Books skipped bytes on the node that they are near.
+    /// Counts skipped bytes on the node that they are near.
     pub(super) fn damage(&mut self, id: NodeId, bytes: u64) {
         if let Some(node) = self.node(id) {
             node.damaged += bytes;

@@ -1,6 +1,6 @@
 //! Values over time: rates, and the last values of a sparkline.
 
-/// How often something comes.
+/// The rate of an event.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rate {
     pub(crate) count: u64,
@@ -45,7 +45,7 @@ impl Default for Trend {
 impl Trend {
     /// Adds this value for each interval that has passed.
     pub(super) fn tick(&mut self, value: Option<f64>, now: u64) {
-        // After a long pause, the values of before are gone.
+        // After a long pause, the earlier values are gone.
         self.due = self.due.max(now.saturating_sub(STEP * LEN as u64));
         while self.due <= now {
             self.due += STEP;

@@ -111,7 +111,7 @@ pub(super) fn draw(view: &View, bus: &Bus, now: u64, area: Rect, buffer: &mut Bu
     }
     let columns = Columns::of(bus, area.width);
     let mut y = area.y;
-    // Rather one more node than the titles.
+    // One more node is worth more than the titles.
     if usize::from(area.height) > nodes.len() {
         let mut x = area.x;
         for &(column, width) in &columns.columns {

@@ -1,4 +1,4 @@
-//! Keys, read by a thread of their own: nobody waits for one.
+//! Keys, read by a separate thread, so that nothing waits for one.
 
 use std::{
     io::{self, Read},
@@ -50,14 +50,14 @@ fn pass_on(mut input: impl Read, keys: &SyncSender<u8>, sink: &Sink) {
         match input.read(&mut key) {
             Ok(1..) => {}
             Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            // Nobody can press a key any more.
+            // No more keys can come.
             Ok(0) | Err(_) => return stop(),
         }
         let [key] = key;
         if matches!(key, b' ' | b's' | b'q' | ESCAPE) {
             stop();
         }
-        // If nobody takes them, they are lost.
+        // A full queue loses them.
         let _ = keys.try_send(key);
     }
 }

@@ -1,6 +1,6 @@
 //! The terminal: a page of its own, without echo, and the way back from it in any case.
 //!
-//! Nobody waits for the terminal. A thread writes the newest picture, and one that stalls, such as
+//! Nothing waits for the terminal. A thread writes the newest picture, and a stalled one, such as
 //! an ssh without a network, keeps only that thread waiting; pictures that are out of date by then
 //! are never written.
 
@@ -42,7 +42,7 @@ pub(crate) struct Screen {
     is_left: bool,
 }
 
-/// What the thread has to do, and has done.
+/// State shared with the thread.
 #[derive(Default)]
 struct Desk {
     work: Mutex<Work>,
@@ -76,7 +76,7 @@ pub(crate) fn is_possible() -> bool {
 pub(crate) fn is_in_front() -> bool {
     match termios::tcgetpgrp(io::stdout()) {
         Ok(group) => group == getpgrp(),
-        // It is not the terminal of this session, so nobody minds.
+        // It is not the terminal of this session, so it does not matter.
         Err(_) => true,
     }
 }
