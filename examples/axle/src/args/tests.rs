@@ -52,7 +52,7 @@ fn a_command_line_that_would_do_harm_is_refused() {
     };
     for (words, says) in [
         ("scan -p x -b 9599", "9599 is not in 9600"),
-        ("spin -p x -n 1 --rps 1 --record -", "standard output has the lines"),
+        ("spin -p x -n 1 --rps 1 --record -", "standard output carries the lines"),
         ("spin -p x -n 1 --rps 1 --max-rps 0", "a limit must be above 0"),
         ("spin -p x -n 1 --rps 1 --revolutions 1", "cannot be used with"),
         ("spin -p x -n 9 --rps 1", "1..=8"),

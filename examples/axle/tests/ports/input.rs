@@ -51,7 +51,7 @@ fn a_wrong_value_is_explained_in_one_line_before_any_port_is_touched() {
         ("lamp --port /none", "<STATE>"),
         ("lamp --port /none dim", "[possible values: on, off]"),
         ("network --port /none good", "[possible values: unknown, sim-absent,"),
-        ("ping --port /none --record -", "standard output has the lines of this subcommand"),
+        ("ping --port /none --record -", "standard output carries the lines of this subcommand"),
         ("calibrate --port /none", "--kind <KIND>"),
         ("calibrate --port /none --kind gps", "[possible values: magnetometer, imu]"),
         ("completions csh", "[possible values: bash,"),
