@@ -9,7 +9,7 @@ use super::support::{file, terminal::Terminal};
 #[test]
 fn the_progress_bar_fits_into_60_columns() {
     let frame = Ping {}.frame(7);
-    let path = file("progress.bin", &frame.as_bytes().repeat(3_000_000));
+    let path = file("progress.bin", &frame.as_bytes().repeat(1_500_000));
     // The listing does not go to the terminal, so that the bar can.
     let command = format!("{} decode {} > /dev/null", env!("CARGO_BIN_EXE_axle"), path.display());
     let mut terminal = Terminal::spawn(Command::new("sh").args(["-c", &command]), (60, 10));

@@ -11,7 +11,7 @@ use std::{
 use super::axle;
 
 /// Far longer than any step here takes, even on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running tool; killed when it is dropped.
 pub(crate) struct Process {

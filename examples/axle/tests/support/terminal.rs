@@ -23,7 +23,7 @@ use rustix::{
 use super::axle;
 
 /// Far longer than any step here takes, even on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A running tool on a terminal; killed when it is dropped.
 pub(crate) struct Terminal {
