@@ -2,8 +2,8 @@
 //! higher is better.
 //!
 //! `cargo bench --bench ratios` takes less than 50 seconds once it is built. Contenders take turns,
-//! and a value is the ratio of their medians, so other load on the machine affects both sides alike.
-//! It fails if an answer is wrong, and with `-- --goals` if a figure is below its goal.
+//! and a value is the ratio of their medians, so other load on the machine affects both sides
+//! alike. It fails if an answer is wrong, and with `-- --goals` if a figure is below its goal.
 //!
 //! With `-- --test` the contenders pretend to take known times (`pretended.rs`), and every figure
 //! must be the one of these times.

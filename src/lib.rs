@@ -4,7 +4,6 @@
 //! * `ucp`: **UCP**, the UART between a rover's Linux board and its STM32, 115,200 bit/s.
 //!
 //! Both ends of each: master and slave, host and robot.
-//!
 #![doc = include_str!("guarantees.md")]
 //!
 //! **Before you connect a motor, read the page `safety`**: what can move or fail to stop, what this
@@ -43,7 +42,6 @@
 //! collects into a `Vec`.
 //!
 //! # Features
-//!
 #![doc = include_str!("features.md")]
 //!
 //! All are additive, and every combination builds.

@@ -47,8 +47,8 @@ const NAP: Duration = Duration::from_micros(200);
 ///
 /// * `read_ready` returns at once.
 /// * `read` waits until there is a byte or the port fails. A driver calls it only when there is.
-/// * `write` takes up to 256 bytes. If the system has no room for any for 20 ms, it fails
-///   with [`TimedOut`](io::ErrorKind::TimedOut); the port may recover, so call the driver again.
+/// * `write` takes up to 256 bytes. If the system has no room for any for 20 ms, it fails with
+///   [`TimedOut`](io::ErrorKind::TimedOut); the port may recover, so call the driver again.
 /// * `flush` waits until all bytes are out. If the system sends none for a second, it fails with
 ///   `TimedOut`. The bytes that are left in the UART itself then take at most its own time, unless
 ///   the driver of the operating system hangs.

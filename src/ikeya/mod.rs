@@ -86,9 +86,9 @@
 //!   for [`DipSwitch`]. To find the truth, scan ids 1..=8 with READ.
 //! * **I3** One [`WriteRequest`], two constructors, two readings: its bytes do not tell a speed
 //!   from a position. A WRITE is not answered.
-//! * **I4** Any `f32` and any `i16` decodes. NaN and infinities are refused on encoding, by
-//!   [`Rps`] and by a velocity response that was received; a slave refuses them on receipt as
-//!   well. The document's ±32767 is a slip: -32768 is legal.
+//! * **I4** Any `f32` and any `i16` decodes. NaN and infinities are refused on encoding, by [`Rps`]
+//!   and by a velocity response that was received; a slave refuses them on receipt as well. The
+//!   document's ±32767 is a slip: -32768 is legal.
 //! * **I5** A [`Position`] is `rotation · 8192 + count` counts, an `i32`. Splitting counts
 //!   truncates unless you choose otherwise; out of range is an error, never a wrap or a clamp.
 //! * **I6** Position mode has no stop: a stop reads the node and then writes back the position of

@@ -13,8 +13,8 @@ pub enum Verdict {
     },
     /// The start of a possible frame.
     Partial {
-        /// Length, bytes, that the slice must have for `judge` to say more. Greater than its length
-        /// now.
+        /// Length, bytes, that the slice must have for `judge` to say more. Greater than its
+        /// length now.
         need: usize,
     },
     /// No frame starts at the first byte.

@@ -29,8 +29,8 @@
 //!
 //! The struct, `new`, a getter of each field, text, data and the entry in
 //! [`FIELDS`](crate::fields::FIELDS) are made of these: a *plain* message. With `;` in place of the
-//! fields, the body is written by hand, with `Print` in `contents` and its fields in `fields`: for a
-//! range, a layout of its own, or a rule for what may be sent.
+//! fields, the body is written by hand, with `Print` in `contents` and its fields in `fields`: for
+//! a range, a layout of its own, or a rule for what may be sent.
 //!
 //! It does not compile if two bodies of an id have one length, if a body is longer than 56 bytes,
 //! or if a key is one that every frame has. The roles do not send it: that is for them to say.

@@ -118,8 +118,8 @@
 //! * **U12** Pong 0 means fine; 1 means that the ping arrived damaged.
 //! * **U13** Never sent: a report by a host, a body shorter than its message, `len` above 60. Each
 //!   of these hangs or corrupts shipped robots, so no constructor makes one, and a frame cast from
-//!   bytes with the id or length of another is not encoded. Nor is a [`RawFrame`] with a second
-//!   FD FF: shipped robots give it up at its id, and take what follows there for a frame. Only
+//!   bytes with the id or length of another is not encoded. Nor is a [`RawFrame`] with a second FD
+//!   FF: shipped robots give it up at its id, and take what follows there for a frame. Only
 //!   [`Frame::relay_unchecked`] passes on whatever was received.
 //! * **U14** Firmware built from the vendor's main branch hangs forever on any frame with an id in
 //!   5..=0x0A, the answer to its own boot request included. v6.38, which ships, does not.

@@ -1,8 +1,8 @@
 //! A stop at a random moment on a line with every fault at once: how long and how far each motor
 //! still moves, compared with the bounds on the safety page.
 //!
-//! Twenty episodes of each kind run with the other tests. To run all 50,000 of each kind and print the
-//! table:
+//! Twenty episodes of each kind run with the other tests. To run all 50,000 of each kind and print
+//! the table:
 //!
 //! ```sh
 //! cargo test --release --test campaign -- --ignored --nocapture

@@ -1,5 +1,5 @@
-//! Wake-ups: whatever an async call waits for wakes its task. The port and its world wake nobody but
-//! the task that waits for them.
+//! Wake-ups: whatever an async call waits for wakes its task. The port and its world wake nobody
+//! but the task that waits for them.
 
 use std::{
     future::Future,

@@ -148,8 +148,8 @@ pub(crate) struct Tally {
     pub(crate) delivered: usize,
     /// Deliveries of anything that did not arrive whole, and second deliveries.
     pub(crate) phantoms: usize,
-    /// Byte strings that were not sent, or not there, but are valid frames by the oracle: the noise
-    /// has made them so, and no receiver can tell.
+    /// Byte strings that were not sent, or not there, but are valid frames by the oracle: the
+    /// noise has made them so, and no receiver can tell.
     pub(crate) unavoidable: usize,
     /// Phantoms that are none of these.
     pub(crate) invented: usize,

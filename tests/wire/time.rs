@@ -74,7 +74,8 @@ fn ten_bit_times_per_byte_are_rounded_up() {
         ((1, 1_000_000), 10),
         ((1, 3_000_000), 4),
         ((64, 500_000), 1280),
-        // The longest frame that can be received, and the lengths around the one that 32 bits hold.
+        // The longest frame that can be received, and the lengths around the one that 32 bits
+        // hold.
         ((256, 115_200), 22_223),
         ((429, 115_200), 37_240),
         ((430, 115_200), 37_327),

@@ -1,5 +1,5 @@
-//! `decode.schema.json` describes what `axle decode --json` prints. It is made of the table of fields
-//! of the library.
+//! `decode.schema.json` describes what `axle decode --json` prints. It is made of the table of
+//! fields of the library.
 
 mod support;
 

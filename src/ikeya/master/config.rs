@@ -41,9 +41,9 @@ pub struct MasterConfig {
     /// Whether this is a 2-wire line whose adapter hears its own bytes: the echo is then removed.
     pub removes_echo: bool,
     /// Whether an answer may arrive before the line could have carried it, as behind a pipe, a
-    /// socket or an emulator. Otherwise such bytes must be older than the request: they are counted
-    /// as [`early`](super::NodeStatistics::early) and ignored. Also set it if the clock is coarser
-    /// than 50 µs.
+    /// socket or an emulator. Otherwise such bytes must be older than the request: they are
+    /// counted as [`early`](super::NodeStatistics::early) and ignored. Also set it if the
+    /// clock is coarser than 50 µs.
     pub accepts_early: bool,
     /// Maximum age of a measured position that a stop may hold without reading a new one; zero by
     /// default: always read (I6). If it cannot be written within 20 ms, a new one is read anyway.

@@ -24,8 +24,8 @@ pub struct SlaveConfig {
     /// pause that the port makes inside a packet.
     pub idle: Duration,
     /// Time during which an answer may still be sent, from the end of the request plus
-    /// [`turnaround_gap`](Self::turnaround_gap) (ruling I14): after it the master has given up, and
-    /// may be asking another node.
+    /// [`turnaround_gap`](Self::turnaround_gap) (ruling I14): after it the master has given up,
+    /// and may be asking another node.
     ///
     /// A driver that has not seen its port empty for this long (at least 4 ms, at most 20 ms)
     /// treats the bytes it finds as received when it last did.

@@ -30,10 +30,10 @@ pub struct HostConfig {
     /// `true`.
     ///
     /// A vendor robot keeps driving while *any* byte arrives. A host that is restarted within
-    /// 500 ms and only pings would keep it moving, so the host tells it to stand still at once, and
-    /// again every 100 ms until the application drives. Set `false` for hosts that only listen: no
-    /// motor command is sent before the first call, and the robot keeps following any other
-    /// program.
+    /// 500 ms and only pings would keep it moving, so the host tells it to stand still at once,
+    /// and again every 100 ms until the application drives. Set `false` for hosts that only
+    /// listen: no motor command is sent before the first call, and the robot keeps following
+    /// any other program.
     pub sends_first_stop: bool,
     /// Dead-man: after this much silence from the application the robot is told to stand still
     /// (ruling U10); 500 ms.

@@ -31,8 +31,8 @@ pub struct RobotConfig {
     /// Period at which a calibration result is repeated until it is acknowledged (ruling U11);
     /// 1000 ms.
     pub result_period: Duration,
-    /// Period of requests for biases, from the start until the biases arrive (ruling U11); 1000 ms,
-    /// `None` for no requests.
+    /// Period of requests for biases, from the start until the biases arrive (ruling U11); 1000
+    /// ms, `None` for no requests.
     pub bias_request_period: Option<Duration>,
     /// Pause that cuts off a frame, in addition to two byte times; 5 ms, longer than the pauses of
     /// a host with a USB adapter within a frame.

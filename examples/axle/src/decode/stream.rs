@@ -28,7 +28,8 @@ pub(crate) struct Sheet {
     pub(crate) marks: Option<Vec<Mark>>,
     /// Modes of the nodes on the line whose bytes are fed.
     pub(crate) modes: Modes,
-    /// The frames themselves, if they are wanted, and the nodes that changed their modes meanwhile.
+    /// The frames themselves, if they are wanted, and the nodes that changed their modes
+    /// meanwhile.
     pub(crate) taken: Option<(Vec<Taken>, BTreeSet<NodeId>)>,
     /// Their counts, if they are wanted.
     pub(crate) table: Option<Table>,

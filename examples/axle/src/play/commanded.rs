@@ -39,8 +39,8 @@ struct Commanded<B: Boards> {
     nodes: NodeSet,
     /// Their modes before the first frame.
     modes: Modes,
-    /// Their master. The one that has read the modes also stops them: it can even stop a node whose
-    /// answers are lost meanwhile.
+    /// Their master. The one that has read the modes also stops them: it can even stop a node
+    /// whose answers are lost meanwhile.
     bus: Bus<B>,
     line: Line,
     config: MasterConfig,

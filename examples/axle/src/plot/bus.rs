@@ -35,7 +35,8 @@ pub(super) struct Bus {
     asked: Option<(u8, u64)>,
     /// Whether there was one.
     has_requests: bool,
-    /// Commands whose meaning is not known: in front of the first answer of their node (ruling I3).
+    /// Commands whose meaning is not known: in front of the first answer of their node (ruling
+    /// I3).
     ambiguous: u64,
 }
 

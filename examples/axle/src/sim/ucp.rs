@@ -21,8 +21,8 @@ use crate::{failure::Failure, help::EXIT_CODES, session::Session};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(super) struct Args {
-    /// Never ask the host for biases, for hosts that cannot take that message, such as the vendor's
-    /// Python SDK; without this, the rover asks every second until it gets them
+    /// Never ask the host for biases, for hosts that cannot take that message, such as the
+    /// vendor's Python SDK; without this, the rover asks every second until it gets them
     #[arg(long)]
     no_bias_requests: bool,
 

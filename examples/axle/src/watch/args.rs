@@ -58,8 +58,8 @@ pub(crate) struct Args {
     pub(super) record: Option<PathBuf>,
 
     /// Send each frame and gap to this host, as a datagram with the object of axle decode --json,
-    /// without interface, as a line that is watched has no number; t is that of --record. Of a name
-    /// with several addresses, to each. For PlotJuggler: UDP server, JSON, timestamp t
+    /// without interface, as a line that is watched has no number; t is that of --record. Of a
+    /// name with several addresses, to each. For PlotJuggler: UDP server, JSON, timestamp t
     #[arg(long, value_name = "HOST:PORT", conflicts_with = "file")]
     pub(super) udp: Option<String>,
 }
