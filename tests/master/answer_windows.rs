@@ -1,13 +1,5 @@
 //! Answer windows: which packet counts as the answer to a request, and which is late (I7).
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        NodeId, Position, Status,
-        master::{Cause, Health, MasterEvent},
-    },
-};
-
 use crate::rig::*;
 
 #[test]

@@ -1,14 +1,5 @@
 //! The dead-man of a master: a silent application stops its nodes (I13).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position,
-        master::{CommandError, MasterConfig, MasterEvent, NodeSet, Polling},
-    },
-    time::Instant,
-};
-
 use crate::rig::*;
 
 fn armed() -> MasterConfig {

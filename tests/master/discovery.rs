@@ -1,13 +1,5 @@
 //! Discovery: which nodes are asked, how often, and what takes precedence.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position,
-        master::{Health, MasterConfig, MasterEvent, Polling, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 #[test]

@@ -1,7 +1,5 @@
 //! The echo of an echoing line where the record of it is full, or a packet did not leave.
 
-use axlewire::endpoint::{Endpoint, Unsent};
-
 use crate::rig::*;
 
 #[test]

@@ -1,10 +1,5 @@
 //! Health: strikes, and the search for abnormal nodes (I7).
 
-use axlewire::ikeya::{
-    NodeId,
-    master::{Cause, Health, MasterEvent, Polling},
-};
-
 use crate::rig::*;
 
 #[test]

@@ -1,13 +1,5 @@
 //! Stops that are interrupted: by a mode in doubt, a late driver or a silent application.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        NodeId, Target,
-        master::{CommandError, MasterConfig, MasterEvent, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 #[test]

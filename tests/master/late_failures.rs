@@ -1,14 +1,6 @@
 //! A master whose packets fail late, whose attempts outlast its patience, or whose set-points keep
 //! changing.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Mode, NodeId, Position, Status, Target,
-        master::{Cause, Health, MasterEvent, NodeSet, Polling, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 #[test]

@@ -1,10 +1,5 @@
 //! Modes: in doubt, changed, and what may be written meanwhile (I11).
 
-use axlewire::ikeya::{
-    Mode, NodeId, Position, Status, Target, WriteRequest,
-    master::{Cause, CommandError, Health, MasterEvent, StopProgress},
-};
-
 use crate::rig::*;
 
 #[test]

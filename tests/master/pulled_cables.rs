@@ -1,13 +1,6 @@
 //! A motor whose cable is pulled out while it turns is stopped when it is back (I12).
 
-use axlewire::{
-    ikeya::{
-        Master, Mode, NodeId,
-        master::{Health, MasterConfig},
-    },
-    sim::{Line, MotorNode, Who},
-    time::Instant,
-};
+use axlewire::sim::MotorNode;
 
 use crate::rig::*;
 

@@ -1,11 +1,16 @@
 //! A master called by hand, in time controlled by the test.
 
-use axlewire::{
-    endpoint::Endpoint,
+/// What the scenarios use of the library.
+pub(crate) use axlewire::{
+    endpoint::{Endpoint, Unsent},
     ikeya::{
-        Master, Mode, NodeId, Position,
-        master::{Health, MasterConfig, MasterEvent, Polling},
+        Master, Mode, NodeId, Position, Slave, Status, Target, WriteRequest,
+        board::ThreeMotors,
+        master::{
+            Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress,
+        },
     },
+    sim::{Line, Who},
     time::{Duration, Instant},
 };
 

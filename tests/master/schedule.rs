@@ -1,10 +1,7 @@
 //! Times that a caller can know in advance: the rate of a bus before it is wired, and the bounds of
 //! a master's calls.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{Master, board::ThreeMotors, master::Schedule},
-};
+use axlewire::ikeya::master::Schedule;
 
 use crate::rig::*;
 

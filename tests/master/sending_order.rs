@@ -1,13 +1,5 @@
 //! The order in which packets are sent, and the longest wait of each (I13).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId,
-        master::{Health, MasterConfig, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 const MIXED: [(NodeId, Mode); 4] = [

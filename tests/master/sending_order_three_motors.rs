@@ -1,16 +1,7 @@
 //! The longest wait of each packet on a bus of boards with three motors, where each WRITE is an
 //! exchange (I13).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId,
-        board::ThreeMotors,
-        master::StopProgress,
-        three::{PositionResponse, VelocityResponse},
-    },
-    time::Instant,
-};
+use axlewire::ikeya::three::{PositionResponse, VelocityResponse};
 
 use crate::rig::*;
 

@@ -1,12 +1,6 @@
 //! Set-points: the latest one is repeated, and a confirmation always ends in one event.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Mode, NodeId, Position, Rps,
-        master::{Cause, CommandError, MasterEvent},
-    },
-};
+use axlewire::ikeya::Rps;
 
 use crate::rig::*;
 

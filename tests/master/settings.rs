@@ -1,15 +1,5 @@
 //! Settings of a master: polling, gaps, echo removal, queues, defaults and memory.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Master, NodeId, Slave, Status,
-        board::ThreeMotors,
-        master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling},
-    },
-    time::{Duration, Instant},
-};
-
 use crate::rig::*;
 
 #[test]

@@ -1,12 +1,6 @@
 //! Standstill is measured, separately from a paid stop (I12).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        NodeId, Position, PositionResponse,
-        master::{MasterEvent, StopProgress},
-    },
-};
+use axlewire::ikeya::PositionResponse;
 
 use crate::rig::*;
 

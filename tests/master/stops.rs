@@ -1,13 +1,5 @@
 //! Stops of nodes that answer: owed until confirmed twice (I6, I12).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position, Target,
-        master::{CommandError, Health, MasterEvent, NodeSet, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };

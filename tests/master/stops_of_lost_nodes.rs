@@ -1,13 +1,5 @@
 //! Stops of nodes that do not answer, and nodes that are lost while moving (I12, I13).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        NodeId, Target,
-        master::{CommandError, Health, MasterEvent, NodeSet, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };

@@ -1,15 +1,8 @@
 //! Boards with three motors: each WRITE is answered, and all three motors count (I10).
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId, Position, Slave, Status, Target,
-        board::ThreeMotors,
-        master::{MasterConfig, MasterEvent, StopProgress},
-        slave::SlaveConfig,
-        three::{PositionResponse, VelocityResponse, WriteRequest},
-    },
-    time::Instant,
+use axlewire::ikeya::{
+    slave::SlaveConfig,
+    three::{PositionResponse, VelocityResponse, WriteRequest},
 };
 
 use crate::rig::*;

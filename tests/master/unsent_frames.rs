@@ -1,13 +1,5 @@
 //! Frames that did not reach the line: the master decides again (I12).
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        NodeId,
-        master::{CommandError, Health, MasterEvent, StopProgress},
-    },
-};
-
 use crate::rig::*;
 
 const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
