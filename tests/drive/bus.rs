@@ -1,22 +1,12 @@
 //! High-level calls on a motor bus: what discovery, set-points, reads and stops return, and when.
 
-use axlewire::{
-    drive::{DriveError, Operation},
-    ikeya::{
-        Master, Mode, NodeId, Position, Status, Target,
-        master::{Cause, CommandError, Health, MasterConfig, MasterEvent},
-        slave::{SlaveConfig, SlaveEvent},
-    },
-    time::Instant,
+use axlewire::ikeya::{
+    Status,
+    master::{Cause, MasterEvent},
+    slave::SlaveEvent,
 };
 
-use crate::{
-    port::{Port, Step},
-    rig::{
-        BOTH, Bus, FOUND, GONE, HELD, STOPPED, Story, at_ms, events, manual, ms, on,
-        only_two_and_five, rps, slave,
-    },
-};
+use crate::rig::*;
 
 #[test]
 fn discovery_finds_all_nodes_within_its_bound() {
@@ -323,7 +313,7 @@ fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
             |deadline| call!(is_async, driver, next_command, next_command_async(deadline));
         assert_eq!(next(at_ms(2)), Ok(None));
         assert_eq!(world.now(), at_ms(2));
-        let write = axlewire::ikeya::WriteRequest::velocity(NodeId::N2, rps(1.5));
+        let write = WriteRequest::velocity(NodeId::N2, rps(1.5));
         embedded_io::Write::write(&mut far, write.as_bytes()).unwrap();
         assert_eq!(next(at_ms(100)), Ok(Some(Target::Velocity(rps(1.5)))));
         assert_eq!(world.now(), Instant::from_micros(2160));

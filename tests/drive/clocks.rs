@@ -2,16 +2,12 @@
 
 use std::cell::RefCell;
 
-use axlewire::{
-    drive::{Clock, Driver, WithDelay},
-    time::Instant,
-};
+use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
 use crate::{
-    port::{Port, World},
     recorder::{Recorder, bytes},
-    rig::at_ms,
+    rig::*,
 };
 
 #[test]

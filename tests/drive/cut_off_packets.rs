@@ -1,18 +1,11 @@
 //! Packets partly sent when the port fails: what the node makes of the rest.
 
-use axlewire::{
-    drive::{Driver, Rs485},
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Target,
-        WriteRequest,
-        master::{MasterConfig, Polling},
-        slave::SlaveConfig,
-    },
-    time::Instant,
-};
+use axlewire::ikeya::PositionResponse;
 
-use crate::motor_line::{Bus, Motor, Wire, Write, run};
+use crate::{
+    motor_line::{Bus, Motor, Wire, Write, run},
+    rig::*,
+};
 
 fn rps(value: f32) -> Rps {
     Rps::new(value).unwrap()

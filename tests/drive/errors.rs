@@ -2,14 +2,11 @@
 
 use std::error::Error;
 
+use axlewire::ikeya::master::Cause;
 #[cfg(feature = "ucp")]
 use axlewire::ucp;
-use axlewire::{
-    drive::{DriveError, Operation},
-    ikeya::{self, NodeId, master::Cause},
-};
 
-use crate::port::Unplugged;
+use crate::rig::*;
 
 /// Each error has its text, and behind it the error of this text.
 fn assert_texts(table: impl IntoIterator<Item = (DriveError<Unplugged>, String, Option<String>)>) {
@@ -45,7 +42,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
         told(failed(Cause::Unexpected), "node 2 did not answer: only other answers were heard"),
         told(failed(Cause::Dropped), "node 2 did not answer: its set-point was dropped"),
     ]);
-    let bus = ikeya::master::CommandError::NotOnline { node };
+    let bus = CommandError::NotOnline { node };
     assert_texts([(bus.into(), bus.to_string(), Some(bus.to_string()))]);
 }
 
@@ -60,7 +57,7 @@ fn an_error_of_a_rover_says_what_the_robot_did_or_did_not_do() {
         told(Operation::Calibration, "the robot did not answer a calibration in time"),
     ]);
     // A refused value is the source of the refusal, which is the source of the error.
-    let value = ucp::MotorControl::new(101, 0).unwrap_err();
+    let value = MotorControl::new(101, 0).unwrap_err();
     let rover = CommandError::Value(value);
     assert_texts([(rover.into(), rover.to_string(), Some(rover.to_string()))]);
     assert_eq!(rover.source().unwrap().to_string(), value.to_string());

@@ -1,15 +1,6 @@
 //! Every high-level call, blocking and async: a failing port and a refusal come back as they are.
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{
-        Mode, NodeId, Position, Target,
-        master::{CommandError, NodeSet, StopProgress},
-        slave::SlaveConfig,
-    },
-};
-
-use crate::rig::{BOTH, GONE, Story, at_ms, both, ms, only, only_two_and_five, rps, slave};
+use crate::rig::*;
 
 const PLACE: Position = Position::new(1, 2);
 

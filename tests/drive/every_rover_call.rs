@@ -1,16 +1,9 @@
 //! Every high-level call of a host and of a robot, blocking and async: a failing port, a refusal
 //! and a silent robot come back as they are.
 
-use axlewire::{
-    drive::{DriveError, Operation},
-    time::Duration,
-    ucp::{MotorControl, host::CommandError, message::CalibrationKind},
-};
+use axlewire::ucp::{host::CommandError, message::CalibrationKind};
 
-use crate::{
-    port::{Port, Step, Unplugged},
-    rig::{BOTH, GONE, Rover, at_ms, both, host, ms, robot},
-};
+use crate::rig::*;
 
 const IMU: CalibrationKind = CalibrationKind::Imu;
 const NOBODY: CalibrationKind = CalibrationKind::Other(9);

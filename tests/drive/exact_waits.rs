@@ -3,26 +3,10 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-#[cfg(feature = "ucp")]
-use axlewire::ucp::{Host, host::HostConfig};
-use axlewire::{
-    drive::{Clock, DriveError, Driver, WithDelay},
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Master, NodeId,
-        master::{MasterConfig, StopProgress},
-    },
-    time::{Duration, Instant},
-};
+use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
-#[cfg(feature = "ucp")]
-use crate::rig::host;
-use crate::{
-    port::{Port, Step, Unplugged, World},
-    recorder::Recorder,
-    rig::{BOTH, On, Story, on, only_two_and_five},
-};
+use crate::{recorder::Recorder, rig::*};
 
 /// Plugs the port in again at this time.
 fn replug(world: &World, port: &Port, at_us: u64) {

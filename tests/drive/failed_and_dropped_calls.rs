@@ -1,11 +1,8 @@
 //! Ports that fail and calls that are dropped: the next call continues where this one ended.
 
-use axlewire::drive::DriveError;
-
 use crate::{
-    port::{Port, Step, Unplugged, World},
     recorder::{ASYNC, ROUNDS, Recorder},
-    rig::{at_ms, on},
+    rig::*,
 };
 
 #[test]

@@ -6,22 +6,12 @@ use std::{
     task::{Context, Waker},
 };
 
-use axlewire::{
-    drive::{DriveError, Driver, Rs485},
-    ikeya::{
-        Master, Mode, NodeId, Position, ReadRequest, Rps, Slave, WriteRequest,
-        master::{Health, MasterConfig, Polling},
-        slave::SlaveConfig,
-    },
-    sim::MotorNode,
-};
+use axlewire::sim::MotorNode;
 
-#[cfg(feature = "ucp")]
-use crate::rig::{GONE, host};
 use crate::{
     pin::{Pin, is_on},
-    port::{Port, Step, Unplugged, Wakes, World},
-    rig::{BOTH, Bus, Running, at_ms, ms, on, run},
+    port::Wakes,
+    rig::*,
 };
 
 // The calls under test.

@@ -1,16 +1,10 @@
 //! Ports of which one half fails: what the other half has done counts, and the failure is returned
 //! where it matters.
 
-use axlewire::ikeya::{NodeId, ReadRequest, WriteRequest, board::Target, slave::SlaveConfig};
+use axlewire::ikeya::board::Target;
 use embedded_io::Write;
 
-#[cfg(feature = "ucp")]
-use crate::rig::robot;
-use crate::{
-    port::Port,
-    recorder::Recorder,
-    rig::{BOTH, GONE, at_ms, on, rps, slave},
-};
+use crate::{recorder::Recorder, rig::*};
 
 #[test]
 fn a_receiver_that_fails_while_a_frame_is_sent_is_an_error_of_the_round_that_sent_it() {

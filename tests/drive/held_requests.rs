@@ -1,18 +1,8 @@
 //! Requests that a port holds back, so that their answers come when they are no longer expected.
 
-use axlewire::{
-    ikeya::{
-        NodeId, Position, ReadRequest, Status,
-        master::{Health, MasterConfig},
-    },
-    time::{Duration, Instant},
-};
+use axlewire::ikeya::Status;
 
-use crate::{
-    dice::Dice,
-    port::Step,
-    rig::{BOTH, Story, only_two_and_five},
-};
+use crate::{dice::Dice, rig::*};
 
 /// One step of virtual time, microseconds.
 const STEP_US: u64 = 20;

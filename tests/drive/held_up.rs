@@ -1,14 +1,6 @@
 //! A driver that is held up: how often it looks, and from when on the bytes it finds count as old.
 
-use axlewire::{
-    endpoint::Endpoint,
-    time::{Duration, Instant},
-};
-
-use crate::{
-    port::{Port, World},
-    rig::{BOTH, On, at_ms, on},
-};
+use crate::rig::*;
 
 /// A role that acts on commands: bytes that waited for more than 4 ms are old. Notes since when.
 #[derive(Default)]

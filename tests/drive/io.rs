@@ -4,7 +4,7 @@ use std::{future::Future, pin::pin, task::Poll};
 
 use axlewire::{
     error::EncodeError,
-    ikeya::{NodeId, Response, Rps, ToMaster, VelocityResponse},
+    ikeya::{Response, ToMaster, VelocityResponse},
     io::{FrameReader, FrameWriter, WriteError},
     stream::{Event, Framing, Gap, Reason},
     ucp::{
@@ -13,7 +13,7 @@ use axlewire::{
     },
 };
 
-use crate::port::{Port, Step, Unplugged, poll};
+use crate::rig::*;
 
 /// Polls once, and drops the future if it is not ready, like a timeout.
 fn poll_once<T>(future: impl Future<Output = T>) -> Option<T> {

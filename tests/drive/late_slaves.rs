@@ -1,15 +1,8 @@
 //! A slave that is called late, or whose switch is moved, neither obeys nor sends outdated data.
 
-use axlewire::{
-    drive::Driver,
-    ikeya::{
-        Mode, NodeId, ReadRequest, Rps, Slave, WriteRequest,
-        slave::{SlaveConfig, SlaveEvent},
-    },
-    time::Duration,
-};
+use axlewire::ikeya::slave::SlaveEvent;
 
-use crate::motor_line::Wire;
+use crate::{motor_line::Wire, rig::*};
 
 const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());

@@ -1,17 +1,8 @@
 //! A master's stops and set-points when switches move, ports fail and applications go silent.
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{
-        Mode, NodeId, Position, Rps,
-        master::{Polling, StopProgress},
-    },
-    time::Duration,
-};
-
 use crate::{
     motor_line::{Bus, Motor, Wire, run},
-    port::Unplugged,
+    rig::*,
 };
 
 const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(MS_20)];

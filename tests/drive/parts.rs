@@ -1,15 +1,10 @@
 //! What a driver and a port are made of comes back out, and what a clock or a store leaves to
 //! its trait does what the trait says.
 
-use axlewire::{
-    drive::{Clock, Driver},
-    time::Instant,
-};
-
 use crate::{
     pin::{drain, undelayed},
-    port::Port,
     recorder::{Recorder, bytes},
+    rig::*,
 };
 
 #[test]

@@ -2,17 +2,9 @@
 
 use std::pin::pin;
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{
-        Mode, NodeId, Rps, WriteRequest,
-        master::{NodeSet, Polling},
-    },
-};
-
 use crate::{
     motor_line::{Bus, Motor, Wire, Write, run},
-    port::{Unplugged, poll},
+    rig::*,
 };
 
 /// A motor at 10 rps behind a port that from now on handles successive parts of each WRITE like

@@ -2,15 +2,9 @@
 
 use std::{cell::Cell, rc::Rc, task::Poll};
 
-use axlewire::{
-    drive::{DriveError, Driver, NoDelay, Rs485, Rs485Error},
-    time::Duration,
-};
+use axlewire::drive::NoDelay;
 
-use crate::{
-    port::{Log, Port, Unplugged, World, poll},
-    recorder::Recorder,
-};
+use crate::{port::Log, recorder::Recorder, rig::*};
 
 #[derive(Clone, Default)]
 pub(crate) struct Pin {

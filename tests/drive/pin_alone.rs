@@ -2,13 +2,11 @@
 
 use std::error::Error;
 
-use axlewire::drive::{Rs485, Rs485Error};
 use embedded_io::Error as _;
 
 use crate::{
     pin::{Delay, Pin, Pinned, Stuck, delayed, drain, flush, logged, ready, undelayed, write},
-    port::{Port, Step, Unplugged, poll},
-    rig::BOTH,
+    rig::*,
 };
 
 #[test]

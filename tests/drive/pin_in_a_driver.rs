@@ -1,12 +1,9 @@
 //! Driver enable under a driver: whatever fails, stalls or is dropped, the pin is switched off.
 
-use axlewire::drive::{DriveError, Driver, Rs485Error};
-
 use crate::{
     pin::{drain, is_on, ready, serve, undelayed},
-    port::{Port, Step, Unplugged, World, poll},
     recorder::{Recorder, bytes},
-    rig::BOTH,
+    rig::*,
 };
 
 #[test]

@@ -2,16 +2,7 @@
 
 use std::{collections::VecDeque, pin::pin, rc::Rc, task::Poll};
 
-use axlewire::{
-    drive::DriveError,
-    endpoint::{Endpoint, Unsent},
-    time::Instant,
-};
-
-use crate::{
-    port::{Step, Unplugged, poll},
-    rig::On,
-};
+use crate::rig::*;
 
 /// So many bytes to be read.
 pub(crate) fn bytes(count: usize) -> Step {

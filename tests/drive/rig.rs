@@ -3,20 +3,23 @@
 use std::{cell::RefCell, rc::Rc};
 
 #[cfg(feature = "ucp")]
-use axlewire::ucp::{Host, Robot, Telemetry, host::HostConfig, robot::RobotConfig};
-use axlewire::{
-    drive::{DriveError, Driver},
-    endpoint::Endpoint,
+pub(crate) use axlewire::ucp::{
+    Host, MotorControl, Robot, Telemetry, host::HostConfig, robot::RobotConfig,
+};
+/// What the scenarios use of the library, and their port.
+pub(crate) use axlewire::{
+    drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error},
+    endpoint::{Endpoint, Unsent},
     ikeya::{
-        Master, Mode, NodeId, Position, Rps, Slave, Target,
+        Master, Mode, NodeId, Position, ReadRequest, Rps, Slave, Target, WriteRequest,
         board::OneMotor,
-        master::{MasterConfig, NodeSet, Polling},
+        master::{CommandError, Health, MasterConfig, NodeSet, Polling, StopProgress},
         slave::SlaveConfig,
     },
     time::{Duration, Instant},
 };
 
-use crate::port::{Port, Unplugged, World};
+pub(crate) use crate::port::{Port, Step, Unplugged, World, poll};
 
 /// The blocking form of a call, or the async one.
 macro_rules! call {

@@ -2,12 +2,9 @@
 
 use std::{cell::Cell, rc::Rc};
 
-use axlewire::{drive::DriveError, time::Instant};
-
 use crate::{
-    port::{Port, Step, World},
     recorder::{Call, ROUNDS, Recorder, bytes},
-    rig::{BOTH, at_ms, on},
+    rig::*,
 };
 
 #[test]

@@ -2,21 +2,13 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use axlewire::{
-    drive::{DriveError, Operation},
-    time::Instant,
-    ucp::{
-        Host, MotorControl, Robot,
-        host::{CalibrationStep, CommandError, FailureCause, HostConfig, HostEvent, Link},
-        message::{CalibrationKind, NetworkState},
-        robot::{RobotConfig, RobotEvent},
-    },
+use axlewire::ucp::{
+    host::{CalibrationStep, CommandError, FailureCause, HostEvent, Link},
+    message::{CalibrationKind, NetworkState},
+    robot::RobotEvent,
 };
 
-use crate::{
-    port::{Port, Step, World},
-    rig::{BOTH, BYTE_US, Rover, Running, at_ms, events, ms, on, rover},
-};
+use crate::rig::*;
 
 /// The rover as it is.
 fn story() -> (World, Rover, Running<Robot>) {

@@ -1,19 +1,10 @@
 //! A rover's link: stops cut by a port, failing receivers and transmitters, robots held up.
 
-use axlewire::{
-    drive::{DriveError, Driver},
-    endpoint::Endpoint,
-    time::{Duration, Instant},
-    ucp::{
-        Body, FrameOf, Host, MotorControl, Robot, Telemetry,
-        host::HostConfig,
-        robot::{RobotConfig, RobotEvent},
-    },
-};
+use axlewire::ucp::{Body, FrameOf, Telemetry, robot::RobotEvent};
 
 use crate::{
     motor_line::{Wire, Write},
-    port::Unplugged,
+    rig::*,
 };
 
 /// A call of a driver, blocking or async.

@@ -5,12 +5,10 @@ use std::{
     task::{Context, Poll, Waker},
 };
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{Mode, NodeId, Rps},
+use crate::{
+    motor_line::{Bus, Motor, Wire},
+    rig::*,
 };
-
-use crate::motor_line::{Bus, Motor, Wire};
 
 /// A bus whose only motor turns at 5 rps.
 fn turning() -> (Wire, Bus) {

@@ -1,19 +1,8 @@
 //! Stops through a driver: `Ok` only for a paid one, and `drive_for` ends with one (I12).
 
-use axlewire::{
-    drive::DriveError,
-    endpoint::Endpoint,
-    ikeya::{
-        NodeId, WriteRequest,
-        master::{MasterConfig, MasterEvent, NodeSet, StopProgress},
-    },
-    time::{Duration, Instant},
-};
+use axlewire::ikeya::master::MasterEvent;
 
-use crate::{
-    port::Unplugged,
-    rig::{BOTH, HELD, STOPPED, Story, manual, ms, only, only_two_and_five, rps},
-};
+use crate::rig::*;
 
 type Outcome = Result<(), DriveError<Unplugged>>;
 

@@ -1,15 +1,8 @@
 //! Ports that fail: what is still sent, and what goes back to its role (I12, U16).
 
-use axlewire::{
-    drive::DriveError,
-    endpoint::Unsent,
-    ikeya::{NodeId, WriteRequest},
-};
-
 use crate::{
-    port::{Port, Step},
     recorder::{ASYNC, Call, ROUNDS, Recorder},
-    rig::{GONE, On, Story, at_ms, manual, on, rps},
+    rig::*,
 };
 
 fn frames_of(driver: &On<Recorder>) -> usize {

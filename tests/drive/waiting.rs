@@ -1,14 +1,8 @@
 //! Waiting for events: until the deadline and no longer, serving the role in between.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    time::{Duration, Instant},
-};
-
 use crate::{
-    port::{Port, World},
     recorder::{Call, Recorder},
-    rig::{BOTH, at_ms, on},
+    rig::*,
 };
 
 #[test]

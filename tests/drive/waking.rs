@@ -7,13 +7,7 @@ use std::{
     task::{Context, Poll, Waker},
 };
 
-use axlewire::drive::DriveError;
-
-use crate::{
-    port::{Port, Step, Wakes, World},
-    recorder::Recorder,
-    rig::{BOTH, GONE, at_ms, on},
-};
+use crate::{port::Wakes, recorder::Recorder, rig::*};
 
 /// A future, polled by hand.
 struct Task<'a, T> {

@@ -1,17 +1,6 @@
 //! Set-points that are withdrawn because their calls fail: the node is owed a stop (I12).
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{
-        NodeId, Position, ReadRequest,
-        master::{CommandError, Health, NodeSet},
-    },
-};
-
-use crate::{
-    port::{Step, Unplugged},
-    rig::{BOTH, Bus, HELD, STOPPED, Story, manual, only, only_two_and_five, rps},
-};
+use crate::rig::*;
 
 fn set(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> {
     call!(is_async, story.bus, set_velocity, set_velocity_async(NodeId::N2, rps(3.0)))

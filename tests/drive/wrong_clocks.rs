@@ -1,12 +1,9 @@
 //! A clock with one wrong reading: it delays no stop, and no call idles longer.
 
-use axlewire::{
-    drive::DriveError,
-    ikeya::{Mode, NodeId, Rps, master::Polling},
-    time::Duration,
+use crate::{
+    motor_line::{Motor, Wire},
+    rig::*,
 };
-
-use crate::motor_line::{Motor, Wire};
 
 #[test]
 fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
