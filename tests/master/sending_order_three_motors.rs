@@ -1,57 +1,14 @@
 //! The longest wait of each packet on a bus of boards with three motors, where each WRITE is an
 //! exchange (I13).
 
-use axlewire::ikeya::three::{PositionResponse, VelocityResponse};
+use crate::{boards::Boards, rig::*};
 
-use crate::rig::*;
-
-/// Eight boards that answer every request at once, and their master.
-struct Boards {
-    master: Master<ThreeMotors>,
-    now: Instant,
-    modes: [Mode; 8],
-}
-
-impl Boards {
-    fn new(modes: [Mode; 8]) -> Self {
-        let now = Instant::from_micros(1_000_000);
-        let mut boards = Self { master: Master::new(direct(), now), now, modes };
-        boards.master.discover(now);
-        while boards.master.is_discovering() {
-            boards.exchange();
-        }
-        boards
-    }
-
-    /// The next request, already answered.
-    fn exchange(&mut self) -> Vec<u8> {
-        let sent = loop {
-            if let Some(packet) = self.master.poll_transmit(self.now) {
-                break packet.to_vec();
-            }
-            let next = self.master.poll_timeout().expect("something to do");
-            assert!(next > self.now, "a busy loop at {next:?}");
-            self.now = next;
-            self.master.handle_timeout(next);
-        };
-        let node = NodeId::new(sent[1]).unwrap();
-        let answer = match self.modes[usize::from(sent[1]) - 1] {
-            Mode::Velocity => VelocityResponse::new(node, [0.0; 3].map(rps)).as_bytes().to_vec(),
-            Mode::Position => PositionResponse::new(node, [turns(7); 3]).as_bytes().to_vec(),
-        };
-        self.now += US(900);
-        self.master.handle_input(&answer, self.now);
-        while self.master.poll_event().is_some() {}
-        sent
-    }
-
-    fn set(&mut self, node: NodeId, to: i16) {
-        // Refused while its stop is owed.
-        let _ = match self.modes[usize::from(node.get()) - 1] {
-            Mode::Velocity => self.master.set_velocity(node, [rps(f32::from(to)); 3], self.now),
-            Mode::Position => self.master.set_position(node, [turns(to); 3], self.now),
-        };
-    }
+fn set(boards: &mut Boards, node: NodeId, to: i16) {
+    // Refused while its stop is owed.
+    let _ = match boards.mode(node) {
+        Mode::Velocity => boards.master.set_velocity(node, [rps(f32::from(to)); 3], boards.now),
+        Mode::Position => boards.master.set_position(node, [turns(to); 3], boards.now),
+    };
 }
 
 /// All but node 8 get a new set-point before each packet, and are stopped often, rarely or never.
@@ -64,11 +21,11 @@ fn longest_wait(
     let mut longest = 0;
     let starts = (0..5).flat_map(|offset| [1, 2, 3, 4, 5, 7, 1000].map(|period| (offset, period)));
     for (offset, period) in starts {
-        let mut boards = Boards::new(modes);
+        let mut boards = Boards::new(direct(), modes, 900);
         let mut waited = None;
         for turn in 0..1000 {
             for &node in &NodeId::ALL[..7] {
-                boards.set(node, 1);
+                set(&mut boards, node, 1);
                 if turn % period == 0 && boards.master.stop_progress(node) != StopProgress::Owed {
                     boards.master.stop(node, boards.now);
                 }
@@ -77,7 +34,7 @@ fn longest_wait(
                 begin(&mut boards);
                 waited = Some(0);
             }
-            let packet = boards.exchange();
+            let packet = boards.exchange().expect("something to do");
             if waited.is_some() && is_done(&packet) {
                 break;
             }
@@ -125,7 +82,7 @@ fn a_position_stop_is_read_after_at_most_24_exchanges_and_written_next() {
 fn a_new_set_point_waits_for_at_most_24_exchanges() {
     for mode in [Mode::Velocity, Mode::Position] {
         for modes in mixtures(mode) {
-            let begin = |boards: &mut Boards| boards.set(NodeId::N8, 4);
+            let begin = |boards: &mut Boards| set(boards, NodeId::N8, 4);
             let waited = longest_wait(modes, begin, |packet| (packet[0], packet[1]) == (WRITE, 8));
             assert!((1..=24).contains(&waited), "{waited} of {modes:?}");
         }

@@ -2,12 +2,13 @@
 
 use axlewire::ikeya::{
     slave::SlaveConfig,
-    three::{PositionResponse, VelocityResponse, WriteRequest},
+    three::{PositionResponse, WriteRequest},
 };
 
-use crate::rig::*;
-
-const T0: Instant = Instant::from_micros(5_000);
+use crate::{
+    boards::{Boards, T0},
+    rig::*,
+};
 
 #[test]
 fn a_three_motor_board_answers_writes_and_its_master_waits_for_the_answer() {
@@ -46,52 +47,15 @@ fn a_three_motor_board_answers_writes_and_its_master_waits_for_the_answer() {
     assert_eq!(slave.statistics().replies, slave.statistics().reads + slave.statistics().writes);
 }
 
-/// Boards 1 and 8 in velocity mode at these speeds; their packets are answered.
-struct Boards {
-    master: Master<ThreeMotors>,
-    now: Instant,
-    speeds: [f32; 3],
-    events: Vec<MasterEvent<ThreeMotors>>,
-}
-
-impl Boards {
-    fn new(mut config: MasterConfig) -> Self {
-        config.nodes = [NodeId::N1, NodeId::N8].into_iter().collect();
-        let mut boards =
-            Self { master: Master::new(config, T0), now: T0, speeds: [0.0; 3], events: vec![] };
-        boards.master.discover(T0);
-        while boards.master.is_discovering() {
-            boards.exchange();
-        }
-        boards.events.clear();
-        boards
-    }
-
-    fn exchange(&mut self) -> Option<Vec<u8>> {
-        loop {
-            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
-                let node = NodeId::new(packet[1]).unwrap();
-                let answer = VelocityResponse::new(node, self.speeds.map(rps));
-                let echo = if self.master.config().removes_echo { &packet[..] } else { &[] };
-                self.now += US(700);
-                self.master.handle_input(&[echo, answer.as_bytes()].concat(), self.now);
-                self.events.extend(core::iter::from_fn(|| self.master.poll_event()));
-                return Some(packet);
-            }
-            self.now = self.master.poll_timeout()?;
-            self.master.handle_timeout(self.now);
-        }
-    }
-
-    fn still(&self) -> usize {
-        let is_still = |event: &&MasterEvent<_>| matches!(event, MasterEvent::StandingStill { .. });
-        self.events.iter().filter(is_still).count()
-    }
+/// Boards 1 and 8 in velocity mode.
+fn two_boards(mut config: MasterConfig) -> Boards {
+    config.nodes = [NodeId::N1, NodeId::N8].into_iter().collect();
+    Boards::new(config, [Mode::Velocity; 8], 700)
 }
 
 #[test]
 fn the_answer_of_a_stop_write_pays_for_it() {
-    let mut boards = Boards::new(manual());
+    let mut boards = two_boards(manual());
     boards.master.stop(NodeId::N8, boards.now);
     let stop = WriteRequest::velocity(NodeId::N8, [rps(0.0); 3]).as_bytes().to_vec();
     let sent: Vec<_> = core::iter::from_fn(|| boards.exchange()).collect();
@@ -102,7 +66,7 @@ fn the_answer_of_a_stop_write_pays_for_it() {
 #[test]
 fn a_write_waits_for_a_late_answer_because_it_is_answered_itself() {
     for is_stop in [false, true] {
-        let mut boards = Boards::new(manual());
+        let mut boards = two_boards(manual());
         boards.master.read(NodeId::N8, boards.now).unwrap();
         assert!(boards.master.poll_transmit(boards.now).is_some());
         boards.now = boards.master.poll_timeout().expect("a window");
@@ -131,11 +95,14 @@ fn turning_on_the_spot_is_not_a_standstill() {
         ([0.05, 0.0, 0.0], false),
         ([0.0, 0.05, 0.0], false),
     ] {
-        let mut boards = Boards::new(manual());
+        let mut boards = two_boards(manual());
         boards.speeds = speeds;
         boards.master.stop(NodeId::N1, boards.now);
         while boards.exchange().is_some() {}
-        assert_eq!(boards.still(), usize::from(is_still), "{speeds:?}");
+        let is_still_told =
+            |event: &&MasterEvent<_>| matches!(event, MasterEvent::StandingStill { .. });
+        let told = boards.events.iter().filter(is_still_told).count();
+        assert_eq!(told, usize::from(is_still), "{speeds:?}");
     }
 }
 
@@ -193,7 +160,7 @@ fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
         let packet = WriteRequest::position(NodeId::N1, places);
         let harmless = packet.as_velocity().iter().all(|rps| rps.to_bits() < 0x3000_0000);
         assert_eq!(harmless, may, "the table agrees with the packet");
-        let mut boards = Boards::new(manual());
+        let mut boards = two_boards(manual());
         boards.master.stop(NodeId::N1, boards.now);
         // Its WRITE of 0 rps is answered like a position node's.
         assert!(boards.master.poll_transmit(boards.now).is_some());
@@ -212,7 +179,7 @@ fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
 fn the_longest_echo_is_removed() {
     let mut config = direct();
     config.removes_echo = true;
-    let mut boards = Boards::new(config);
+    let mut boards = two_boards(config);
     for _ in 0..50 {
         boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
         boards.exchange();
@@ -225,7 +192,7 @@ fn the_longest_echo_is_removed() {
 
 #[test]
 fn a_stop_has_one_attempt_per_round_if_its_write_is_answered() {
-    let mut boards = Boards::new(direct());
+    let mut boards = two_boards(direct());
     boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
     boards.master.stop(NodeId::N8, boards.now);
     let mut sent = || kind(&boards.exchange().unwrap());
@@ -237,57 +204,34 @@ fn a_stop_has_one_attempt_per_round_if_its_write_is_answered() {
 /// A control loop with a new speed for seven boards before each packet, and one moving board in
 /// position mode: node 1, 100 counts further with each answer.
 struct Busy {
-    master: Master<ThreeMotors>,
-    now: Instant,
-    counts: i32,
+    boards: Boards,
     commands: u16,
-    answer_us: u32,
-    /// Node 1 has lost power.
-    is_dead: bool,
 }
 
 impl Busy {
     fn new(config: MasterConfig, answer_us: u32) -> Self {
-        let master = Master::new(config, T0);
-        let mut busy = Self { master, now: T0, counts: 0, commands: 0, answer_us, is_dead: false };
-        busy.master.discover(busy.now);
+        let mut modes = [Mode::Velocity; 8];
+        modes[0] = Mode::Position;
+        let mut boards = Boards::new(config, modes, answer_us);
+        (boards.speeds, boards.moves) = ([1.0; 3], 100);
+        let mut busy = Self { boards, commands: 0 };
         for _ in 0..300 {
             busy.exchange();
         }
-        assert_eq!(busy.master.mode(NodeId::N1), Some(Mode::Position));
+        assert_eq!(busy.boards.master.mode(NodeId::N1), Some(Mode::Position));
         busy
     }
 
-    /// The next packet, with the position in its answer, if any.
-    fn exchange(&mut self) -> (Vec<u8>, i32) {
-        loop {
-            self.commands += 1;
+    fn exchange(&mut self) -> Vec<u8> {
+        let commands = &mut self.commands;
+        let packet = self.boards.exchange_during(|boards| {
+            *commands += 1;
             for node in &NodeId::ALL[1..] {
-                let speeds = [rps(f32::from(self.commands % 50)); 3];
-                let _ = self.master.set_velocity(*node, speeds, self.now);
+                let speeds = [rps(f32::from(*commands % 50)); 3];
+                let _ = boards.master.set_velocity(*node, speeds, boards.now);
             }
-            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
-                let node = NodeId::new(packet[1]).unwrap();
-                if self.is_dead && node == NodeId::N1 {
-                    self.now = self.master.poll_timeout().unwrap();
-                    self.master.handle_timeout(self.now);
-                    return (packet, self.counts);
-                }
-                self.now += US(self.answer_us);
-                let answer = if node == NodeId::N1 {
-                    self.counts += 100;
-                    let positions = [Position::from_counts(self.counts).unwrap(); 3];
-                    PositionResponse::new(node, positions).as_bytes().to_vec()
-                } else {
-                    VelocityResponse::new(node, [rps(1.0); 3]).as_bytes().to_vec()
-                };
-                self.master.handle_input(&answer, self.now);
-                while self.master.poll_event().is_some() {}
-                return (packet, self.counts);
-            }
-            self.now = self.master.poll_timeout().unwrap();
-            self.master.handle_timeout(self.now);
-        }
+        });
+        packet.expect("something to do")
     }
 }
 
@@ -303,26 +247,24 @@ fn a_position_is_held_right_behind_its_read_however_many_set_points_wait() {
             for _ in 0..offset {
                 busy.exchange();
             }
-            busy.master.stop(NodeId::N1, busy.now);
+            busy.boards.master.stop(NodeId::N1, busy.boards.now);
             let mut others = 0;
-            let measured = loop {
+            let first = loop {
                 match busy.exchange() {
-                    (packet, counts) if packet[1] == 1 => {
-                        assert_eq!(packet[0], READ, "it is measured first");
-                        break counts;
-                    }
+                    packet if packet[1] == 1 => break packet,
                     _ => others += 1,
                 }
             };
+            assert_eq!(first[0], READ, "it is measured first");
             assert!(others <= 24, "{others} exchanges before the READ");
-            let positions = [Position::from_counts(measured).unwrap(); 3];
+            let positions = [Position::from_counts(busy.boards.counts).unwrap(); 3];
             let hold = WriteRequest::position(NodeId::N1, positions).as_bytes().to_vec();
-            assert_eq!(busy.exchange().0, hold, "the answer is held, with no packet in between");
-            let begin = busy.now;
-            while busy.master.stop_progress(NodeId::N1) == StopProgress::Owed {
+            assert_eq!(busy.exchange(), hold, "the answer is held, with no packet in between");
+            let begin = busy.boards.now;
+            while busy.boards.master.stop_progress(NodeId::N1) == StopProgress::Owed {
                 busy.exchange();
             }
-            assert!(busy.now - begin < busy.master.stop_bound());
+            assert!(busy.boards.now - begin < busy.boards.master.stop_bound());
         }
     }
 }
@@ -331,13 +273,13 @@ fn a_position_is_held_right_behind_its_read_however_many_set_points_wait() {
 fn a_dead_board_is_found_within_the_read_bound_however_busy_the_others_are() {
     for (config, answer_us) in [(direct(), 700), (MasterConfig::usb_adapter(), 17_000)] {
         let mut busy = Busy::new(config, answer_us);
-        busy.master.read(NodeId::N1, busy.now).unwrap();
-        let (begin, bound) = (busy.now, busy.master.read_bound());
-        let failures = busy.master.node_statistics(NodeId::N1).failures;
-        busy.is_dead = true;
-        while busy.master.node_statistics(NodeId::N1).failures == failures {
+        busy.boards.master.read(NodeId::N1, busy.boards.now).unwrap();
+        let (begin, bound) = (busy.boards.now, busy.boards.master.read_bound());
+        let failures = busy.boards.master.node_statistics(NodeId::N1).failures;
+        busy.boards.dead = Some(NodeId::N1);
+        while busy.boards.master.node_statistics(NodeId::N1).failures == failures {
             busy.exchange();
-            assert!(busy.now - begin <= bound, "not abnormal within {bound:?}");
+            assert!(busy.boards.now - begin <= bound, "not abnormal within {bound:?}");
         }
     }
 }
