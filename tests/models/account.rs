@@ -4,13 +4,9 @@
 //! Nothing here looks inside the master. The rulings are I6 (hold), I8 (confirmation), I11 (doubt),
 //! I12 (debts) and I13 (order).
 
-use axlewire::{
-    ikeya::Mode,
-    time::{Duration, Instant},
-};
-
 use super::{
     kit::Write,
+    names::*,
     rulings::{Aim, HOLD_PATIENCE, Order, judge},
 };
 

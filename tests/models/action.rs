@@ -1,6 +1,6 @@
 //! Actions on a motor bus, in small steps or one exchange at a time.
 
-use axlewire::ikeya::NodeId;
+use crate::names::*;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Action {

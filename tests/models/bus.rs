@@ -4,17 +4,12 @@
 //! an answer that may be late. An answer later than its deadline plus `late_guard` is lost: the
 //! protocol has no sequence numbers by which a master could distinguish it from the next one.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{Master, Mode, NodeId, Position, master::MasterConfig},
-    time::{Duration, Instant, wire_time},
-};
-
 use super::{
     account::{Account, Confirm, ODD_PLACE},
     action::{Action, Answer, Call, Exchange, Fate, Menu},
     fingerprint::{COUNTERS, COUNTERS_AND_STATUS, Merge},
     kit::{Kit, Reply, Sent},
+    names::*,
     search::World,
 };
 

@@ -1,18 +1,12 @@
 //! Invariants of a motor bus, after every step.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId,
-        master::{Health, MasterEvent},
-    },
-    time::Duration,
-};
+use axlewire::ikeya::master::MasterEvent;
 
 use super::{
     account::{Confirm, STRIKES},
     bus::{Bus, Checked},
     kit::{Kit, Sent},
+    names::*,
     sleep::check_sleep,
 };
 

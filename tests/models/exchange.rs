@@ -1,11 +1,10 @@
 //! Composite steps: time passes, or a whole exchange happens.
 
-use axlewire::{endpoint::Endpoint, time::Duration};
-
 use super::{
     action::{Answer, Exchange, Fate, Wait},
     bus::{Asked, Bus, Checked},
     kit::Kit,
+    names::*,
 };
 
 impl<B: Kit> Bus<B> {

@@ -3,9 +3,8 @@
 //! It is built from the role's `{:?}`: every `Instant` becomes its distance to now, and fields that
 //! cannot affect the future are left out. So no private field has to be exposed.
 
+use crate::names::*;
 use std::fmt::{Debug, Write};
-
-use axlewire::time::Instant;
 
 /// Older times are equivalent. No role looks back further than this, microseconds: the longest
 /// limit in these models is the 20 ms between two positions that show a standstill. The roles of

@@ -1,19 +1,10 @@
 //! A host, its application, its port, and a robot that sends anything at any time.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    time::{Duration, Instant},
-    ucp::{
-        Host, MotorControl,
-        host::{CalibrationStep, HostConfig, HostEvent},
-        message::{CalibrationKind, ErrorCode, OtaStatus},
-    },
-};
-
 use super::{
     host_account::Account,
     host_checks::is_frequent,
     host_store::Shelf,
+    names::*,
     search::World,
     ucp::{Checked, Fate, Feed, check_kept, merge, ms, queue},
 };

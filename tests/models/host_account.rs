@@ -1,19 +1,12 @@
 //! The account of a host: what was called and received, what may be sent, and what is owed.
 
-use axlewire::{
-    endpoint::Unsent,
-    time::Instant,
-    ucp::{
-        Frame, Message,
-        host::{CalibrationStep, Link},
-        message::{CalibrationKind, ErrorCode},
-    },
-};
+use axlewire::ucp::host::Link;
 
 use super::{
     host_motion::Motion,
     host_request::{Ack, Request, Results},
     host_store::Shelf,
+    names::*,
     ucp::{Checked, ms},
 };
 
@@ -69,7 +62,7 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    pub(crate) fn new(config: &axlewire::ucp::host::HostConfig, now: Instant) -> Self {
+    pub(crate) fn new(config: &HostConfig, now: Instant) -> Self {
         Self {
             motion: Motion::new(config.sends_first_stop, now),
             low_ids_only: config.low_ids_only,

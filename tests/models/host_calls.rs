@@ -1,13 +1,11 @@
 //! The calls of a host's application, and those that are refused.
 
-use axlewire::ucp::{
-    host::{CalibrationStep, CommandError},
-    message::NetworkState,
-};
+use axlewire::ucp::host::CommandError;
 
 use super::{
     host::{Act, ROOM, Site, VERSION, command},
     host_account::Update,
+    names::*,
     ucp::{Checked, queue},
 };
 

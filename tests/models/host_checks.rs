@@ -1,22 +1,15 @@
 //! What a host receives, and the invariants after every step.
 
-use axlewire::{
-    endpoint::Endpoint,
-    time::Instant,
-    ucp::{
-        Telemetry,
-        host::{CalibrationStep, FailureCause, HostEvent},
-        message::{
-            BiasRequest, CalibrationEndAck, CalibrationKind, CalibrationStartAck, ErrorCode,
-            FirmwareReport, ImuBias, MagBias, OtaAck, OtaStatus, Pong,
-        },
-    },
+use axlewire::ucp::{
+    host::FailureCause,
+    message::{BiasRequest, CalibrationEndAck, CalibrationStartAck, FirmwareReport, OtaAck},
 };
 
 use super::{
     host::{Hear, ROOM, Site, command},
     host_account::Update,
     host_request::{Ack, Results},
+    names::*,
     sleep::check_sleep,
     ucp::{Checked, bytes, damaged, queue, unknown},
 };

@@ -1,12 +1,11 @@
 //! The account of a host's motor commands: what may be sent, and what must be sent (U10, U16).
 
-use axlewire::{
-    endpoint::Unsent,
-    time::Instant,
-    ucp::{MotorControl, message::RawMotorControl},
-};
+use axlewire::ucp::message::RawMotorControl;
 
-use super::ucp::{Checked, halted, ms};
+use super::{
+    names::*,
+    ucp::{Checked, halted, ms},
+};
 
 /// The first frame of a host (ruling U16).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,15 +1,8 @@
 //! A host's requests to a robot, and the results it has received.
 
-use axlewire::{
-    time::{Instant, wire_time},
-    ucp::{
-        BAUD,
-        host::{CalibrationStep, HostEvent},
-        message::CalibrationKind,
-    },
-};
+use axlewire::ucp::BAUD;
 
-use super::ucp::ms;
+use super::{names::*, ucp::ms};
 
 /// A calibration request: sent at most three times, 200 ms apart.
 #[derive(Clone, Debug)]

@@ -1,15 +1,8 @@
 //! The worlds of a host, and their initial states.
 
-use axlewire::{
-    endpoint::Unsent,
-    ucp::{
-        host::{CalibrationStep, HostConfig},
-        message::{CalibrationKind, ErrorCode, OtaStatus},
-    },
-};
-
 use super::{
     host::{Act, Hear, Site},
+    names::*,
     run::{Depth, Run},
     search::World,
     ucp::Fate,

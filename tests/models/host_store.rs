@@ -1,9 +1,7 @@
 //! A store of biases that fails on request.
 
-use axlewire::ucp::{
-    host::{BiasStore, NotStored},
-    message::{ImuBias, MagBias},
-};
+use crate::names::*;
+use axlewire::ucp::host::{BiasStore, NotStored};
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shelf {

@@ -1,9 +1,6 @@
 //! Packets of both kinds of boards, read and written independently of the library.
 
-use axlewire::ikeya::{
-    Mode, NodeId, Position, Rps, Target,
-    board::{OneMotor, ThreeMotors},
-};
+use crate::names::*;
 
 #[path = "../harness/board_packets.rs"]
 #[allow(dead_code, reason = "not every user of this kit writes and answers")]

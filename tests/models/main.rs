@@ -101,6 +101,7 @@ mod host_starts;
 mod host_store;
 mod kit;
 mod merging;
+mod names;
 mod random_masters;
 mod robot;
 mod robot_account;
@@ -116,7 +117,7 @@ mod sleep;
 mod starts;
 mod ucp;
 
-use axlewire::ikeya::board::{OneMotor, ThreeMotors};
+use crate::names::*;
 use run::Run;
 
 /// A shallow and a deep test for each group of worlds.

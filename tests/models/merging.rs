@@ -1,19 +1,10 @@
 //! The fingerprint itself: which states it merges, and which it separates.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId, Rps, VelocityResponse,
-        board::OneMotor,
-        master::{MasterConfig, Polling},
-    },
-    time::{Duration, Instant},
-};
-
 use super::{
     action::{Action, Call, Exchange, Menu},
     bus::Bus,
     fingerprint::{COUNTERS_AND_STATUS, Merge},
+    names::*,
     search::World,
 };
 

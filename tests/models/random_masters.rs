@@ -1,21 +1,13 @@
 //! Random stories of the same world, longer than a search can try them: up to three nodes, any
 //! settings, any pauses, and clocks that are about to wrap.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode,
-        board::{OneMotor, ThreeMotors},
-        master::{MasterConfig, Polling},
-    },
-    sim::Rng,
-    time::{Duration, Instant},
-};
+use axlewire::sim::Rng;
 
 use super::{
     action::{Action, Answer, Fate, Menu, Wait},
     bus::{Bus, Checked},
     kit::Kit,
+    names::*,
     search::World,
 };
 

@@ -1,16 +1,9 @@
 //! A robot, its application, its port, and a host that sends anything at any time.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    time::{Duration, Instant},
-    ucp::{
-        Robot, Telemetry,
-        message::{CalibrationKind, ErrorCode, OtaStatus},
-        robot::{RobotConfig, RobotEvent},
-    },
-};
+use axlewire::ucp::Robot;
 
 use super::{
+    names::*,
     robot_account::Account,
     robot_checks::{imu, is_frequent, mag},
     search::World,

@@ -1,16 +1,7 @@
 //! The account of a robot: its commands and requests, what may be sent, and what is owed.
 
-use axlewire::{
-    endpoint::Unsent,
-    time::Instant,
-    ucp::{
-        Frame, Message, MotorControl, Telemetry,
-        message::{CalibrationKind, ErrorCode, OtaStatus},
-        robot::RobotConfig,
-    },
-};
-
 use super::{
+    names::*,
     robot_checks::{imu, mag},
     ucp::{Checked, halted, ms},
 };

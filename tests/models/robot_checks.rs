@@ -2,19 +2,17 @@
 
 use axlewire::{
     crc16,
-    endpoint::Endpoint,
-    time::Instant,
     ucp::{
-        MotorControl,
         message::{
-            Biases, CalibrationEnd, CalibrationKind, CalibrationStart, ErrorCode, ImuBias,
-            ImuBiasAck, MagBias, MagBiasAck, NetworkState, OtaRequest, Ping, Pong, SetNetworkState,
+            Biases, CalibrationEnd, CalibrationStart, ImuBiasAck, MagBiasAck, OtaRequest, Ping,
+            SetNetworkState,
         },
-        robot::{RobotEvent, UpdateSource},
+        robot::UpdateSource,
     },
 };
 
 use super::{
+    names::*,
     robot::{Hear, ROOM, Rover, UPDATE_TO},
     sleep::check_sleep,
     ucp::{Checked, bytes, damaged, halted, queue, unknown},

@@ -1,14 +1,7 @@
 //! The worlds of a robot, and their initial states.
 
-use axlewire::{
-    endpoint::Unsent,
-    ucp::{
-        message::{CalibrationKind, ErrorCode, OtaStatus},
-        robot::RobotConfig,
-    },
-};
-
 use super::{
+    names::*,
     robot::{Act, Hear, Rover},
     run::{Depth, Run},
     ucp::Fate,

@@ -1,18 +1,15 @@
 //! A slave, node 1, and everything that can be received on its line.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Mode, NodeId, Position, Slave, Target,
-        slave::{SlaveConfig, SlaveEvent},
-    },
-    time::{Duration, Instant},
+use axlewire::ikeya::{
+    Slave,
+    slave::{SlaveConfig, SlaveEvent},
 };
 
 use super::{
     bus::Checked,
     fingerprint::{COUNTERS, Merge},
     kit::Kit,
+    names::*,
     run::{Depth, Run},
     search::World,
     sleep::check_sleep,

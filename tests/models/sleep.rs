@@ -1,9 +1,6 @@
 //! Deadlines that are not too late.
 
-use axlewire::{
-    endpoint::Endpoint,
-    time::{Duration, Instant},
-};
+use crate::names::*;
 
 /// A driver that sleeps until the role's deadline misses nothing: just before it, or for ten
 /// minutes if there is none, the role has nothing to send.

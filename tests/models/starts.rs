@@ -1,17 +1,10 @@
 //! The worlds of the motor bus, and their initial states.
 
-use axlewire::{
-    ikeya::{
-        Mode, NodeId,
-        master::{MasterConfig, Polling},
-    },
-    time::Duration,
-};
-
 use super::{
     action::{Action, Call, Exchange, Fate, Menu, Wait},
     bus::Bus,
     kit::Kit,
+    names::*,
     run::{Depth, Run},
 };
 

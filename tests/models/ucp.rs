@@ -1,14 +1,8 @@
 //! What the worlds of a host and of a robot share: received frames, time, and the state of a port.
 
-use axlewire::{
-    crc16,
-    endpoint::{Endpoint, Unsent},
-    stream::Counters,
-    time::{Duration, Instant},
-    ucp::{Body, MotorControl},
-};
+use axlewire::{crc16, stream::Counters, ucp::Body};
 
-use super::fingerprint::Merge;
+use super::{fingerprint::Merge, names::*};
 
 /// The result of a step: `Err` names the invariant.
 pub(crate) type Checked = Result<(), String>;

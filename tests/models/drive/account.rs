@@ -1,12 +1,6 @@
 //! What a driver of a master owes its caller and its node after every call, by an independent
 //! account.
 
-use axlewire::{
-    drive::Driver,
-    endpoint::Endpoint,
-    ikeya::{Master, master::Health},
-};
-
 use super::{
     action::Call,
     line::{DrivenLine, Shared},
@@ -15,6 +9,7 @@ use super::{
     port::Wired,
     task::End,
 };
+use crate::names::*;
 
 #[derive(Debug, Default)]
 pub(crate) struct Account {

@@ -1,12 +1,11 @@
 //! Actions on a driver.
 
-use axlewire::ikeya::Mode;
-
 use super::{
     fault::{Flushing, Pinning, Reading, Writing},
     line::DrivenLine,
     node::{Answer, Node},
 };
+use crate::names::*;
 
 /// A single action.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

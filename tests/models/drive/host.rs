@@ -6,12 +6,6 @@ use std::{
     rc::Rc,
 };
 
-use axlewire::{
-    drive::{DriveError, Driver},
-    time::Duration,
-    ucp::{Host, host::HostConfig},
-};
-
 use super::{
     action::Fault,
     fault::Failure,
@@ -24,6 +18,7 @@ use super::{
     wire::{Shape, Speech, Wire},
 };
 use crate::fingerprint::{COUNTERS, Merge};
+use crate::names::*;
 
 /// 115,200 bit/s.
 const BYTE_US: u64 = 87;

@@ -9,12 +9,11 @@ use std::{
     task::Waker,
 };
 
-use axlewire::time::Instant;
-
 use super::{
     fault::{Failure, Flushing, Pinning, Reading, Writing},
     wire::Wire,
 };
+use crate::names::*;
 
 /// Most operations of the port, the pin and the clock in one call: far more than any call of these
 /// worlds needs.

@@ -7,12 +7,6 @@ use std::{
     rc::Rc,
 };
 
-use axlewire::{
-    drive::{DriveError, Driver},
-    ikeya::{Master, Mode, NodeId, Position, Rps, Target, board::OneMotor, master::MasterConfig},
-    time::Duration,
-};
-
 use super::{
     account::Account,
     action::{Action, Call, Pass, Setup},
@@ -25,6 +19,7 @@ use super::{
     wire::Wire,
 };
 use crate::fingerprint::{COUNTERS_AND_STATUS, Merge};
+use crate::names::*;
 
 pub(super) const N1: NodeId = NodeId::N1;
 
@@ -168,7 +163,7 @@ impl<P: Wired> Life for MasterLife<P> {
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = MasterConfig::direct();
         config.nodes = [N1].into_iter().collect();
-        config.polling = axlewire::ikeya::master::Polling::Every(Duration::from_millis(1));
+        config.polling = Polling::Every(Duration::from_millis(1));
         config.dead_man = setup.dead_man_ms.map(Duration::from_millis);
         let driver = Driver::with(|now| Master::new(config, now), P::plug(&line), line.clone());
         Self { setup, line, node, driver, account: Account::default() }

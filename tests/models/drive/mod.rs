@@ -16,9 +16,10 @@ mod replay;
 mod task;
 mod wire;
 
-use axlewire::{drive::Rs485, ikeya::Mode};
-
-use crate::run::{Depth, Run};
+use crate::{
+    names::*,
+    run::{Depth, Run},
+};
 use {
     action::{Action, Call, Fault, Setup},
     line::Shared,

@@ -2,12 +2,13 @@
 
 use std::{cell::RefCell, collections::VecDeque, rc::Rc};
 
-use axlewire::ikeya::{Mode, NodeId, Position, PositionResponse, Rps, VelocityResponse};
+use axlewire::ikeya::PositionResponse;
 
 use super::{
     line::Peer,
     wire::{Shape, Speech},
 };
+use crate::names::*;
 
 /// 500 kbit/s.
 pub(crate) const BYTE_US: u64 = 20;

@@ -1,7 +1,5 @@
 //! The result of a call to a master's driver, and the state in which it left its port.
 
-use axlewire::time::Duration;
-
 use super::{
     account::Before,
     action::Call,
@@ -11,6 +9,7 @@ use super::{
     node::{Entry, target_payload},
     port::Wired,
 };
+use crate::names::*;
 
 impl<P: Wired> MasterLife<P> {
     /// The port and the pin are left in order, and the time limits were kept.

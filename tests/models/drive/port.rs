@@ -5,15 +5,13 @@
 
 use std::cell::RefMut;
 
-use axlewire::{
-    drive::{Clock, DriveError, Rs485, Rs485Error},
-    time::{Duration, Instant},
-};
+use axlewire::drive::{Clock, Rs485Error};
 
 use super::{
     fault::{Failure, Flushing, Pinning, Reading, Writing},
     line::{DrivenLine, Shared},
 };
+use crate::names::*;
 
 /// Delays between the pin and the first byte, and the last byte and the pin, microseconds.
 const BEFORE_US: u64 = 30;

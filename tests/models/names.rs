@@ -1,0 +1,18 @@
+//! What the models use of the library.
+
+pub(crate) use axlewire::{
+    drive::{DriveError, Driver, Rs485},
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Master, Mode, NodeId, Position, Rps, Target, VelocityResponse,
+        board::{OneMotor, ThreeMotors},
+        master::{Health, MasterConfig, Polling},
+    },
+    time::{Duration, Instant, wire_time},
+    ucp::{
+        Frame, Host, Message, MotorControl, Telemetry,
+        host::{CalibrationStep, HostConfig, HostEvent},
+        message::{CalibrationKind, ErrorCode, ImuBias, MagBias, NetworkState, OtaStatus, Pong},
+        robot::{RobotConfig, RobotEvent},
+    },
+};
