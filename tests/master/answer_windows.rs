@@ -4,8 +4,7 @@ use crate::rig::*;
 
 #[test]
 fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     // 80 us of request, 500 us of patience, 160 us of answer.
     assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(740)));
     desk.hear(740, &velocity(NodeId::N1, 1.0));
@@ -14,8 +13,7 @@ fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
         "at the deadline counts as in time"
     );
 
-    desk.turn();
-    desk.hear(741, &velocity(NodeId::N1, 1.0));
+    desk.turn_with(741, &velocity(NodeId::N1, 1.0));
     desk.master.handle_timeout(desk.now);
     let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
     assert_eq!(desk.told(), [suspect], "after it does not");
@@ -25,8 +23,7 @@ fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
 #[test]
 fn a_request_that_the_port_held_back_within_its_window_has_a_window_from_there() {
     for (flushed_us, deadline_us) in [(0, 740), (80, 740), (81, 741), (400, 1060), (740, 1400)] {
-        let mut desk = Desk::with_nodes(direct(), &[N1]);
-        desk.turn();
+        let mut desk = Desk::asking(direct());
         let begin = desk.now;
         desk.master.handle_taken(begin);
         desk.master.handle_flushed(begin + US(flushed_us));
@@ -79,8 +76,7 @@ fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_i
 
 #[test]
 fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answer() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     let begin = desk.now;
     desk.master.handle_taken(begin);
     // Nobody has let time pass meanwhile.
@@ -96,8 +92,7 @@ fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answ
 
 #[test]
 fn an_answer_shows_that_its_request_has_left() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     desk.master.handle_taken(desk.now);
     desk.hear(290, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.turn(), read(NodeId::N1), "the line is free");
@@ -109,8 +104,7 @@ fn an_answer_shows_that_its_request_has_left() {
 
 #[test]
 fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_counts() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     let held_at = desk.now;
     desk.master.handle_taken(held_at);
     for _ in 0..2 {
@@ -200,8 +194,7 @@ fn every_node_whose_request_left_late_is_guarded_and_no_node_that_was_only_told_
 
 #[test]
 fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     desk.master.handle_taken(desk.now);
     desk.turn();
     desk.master.handle_taken(desk.now);
@@ -215,8 +208,7 @@ fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() 
 
 #[test]
 fn a_request_given_up_in_doubt_keeps_the_line_free_for_its_answer() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     let begin = desk.now;
     desk.master.handle_taken(begin + US(400));
     desk.master.handle_unsent(Unsent::CutOff, begin + US(400));
@@ -233,8 +225,7 @@ fn a_request_given_up_in_doubt_keeps_the_line_free_for_its_answer() {
 
 #[test]
 fn behind_a_write_the_window_begins_when_both_requests_have_left() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.turn();
     assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(160 + 740)));
 }
@@ -287,13 +278,11 @@ fn an_answer_of_another_node_is_counted_and_never_accepted() {
 #[test]
 fn a_late_answer_is_not_taken_for_the_next_one() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
-    desk.silence();
+    desk.miss();
     // The node is not asked again before the guard ends, and the late answer meets no window.
     desk.hear(400, &velocity(NodeId::N1, 9.0));
     assert_eq!(desk.master.poll_transmit(desk.now), None);
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 1.0));
     let statuses: Vec<_> = desk
         .told()
         .into_iter()
@@ -308,8 +297,7 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
 fn a_write_that_is_not_answered_does_not_wait_for_a_late_answer() {
     for is_stop in [false, true] {
         let mut desk = Desk::with_nodes(direct(), &[N1]);
-        desk.turn();
-        desk.silence();
+        desk.miss();
         assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(500)), "the guard");
         if is_stop {
             desk.master.stop(NodeId::N1, desk.now);
@@ -333,8 +321,7 @@ fn while_one_node_is_guarded_the_others_are_read() {
 
 #[test]
 fn a_second_answer_to_one_request_is_late() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     let twice = [velocity(NodeId::N1, 1.0), velocity(NodeId::N1, 2.0)].concat();
     desk.hear(450, &twice);
     let status = Status::Velocity(1.0);
@@ -344,8 +331,7 @@ fn a_second_answer_to_one_request_is_late() {
 
 #[test]
 fn any_f32_is_a_status() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     let nan = [0x55, 0x01, 0x00, 0x00, 0xC0, 0x7F];
     let mut answer = nan.to_vec();
     answer.extend(axlewire::crc16::compute(&nan).to_le_bytes());
@@ -376,16 +362,14 @@ fn latencies_are_measured_from_the_end_of_the_request_to_the_beginning_of_the_an
 fn a_late_answer_to_the_third_strike_does_not_answer_the_search_for_the_node() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for _ in 0..3 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
     }
     desk.told();
     assert_eq!(desk.master.poll_transmit(desk.now), None);
     assert_eq!(desk.master.poll_timeout(), Some(desk.now + US(500)));
     desk.hear(400, &velocity(NodeId::N1, 9.0));
     assert_eq!((desk.told(), desk.master.health(NodeId::N1)), (vec![], Some(Health::Abnormal)));
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 1.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.master.status(NodeId::N1).unwrap().0, Status::Velocity(1.0));
 }
 

@@ -66,8 +66,7 @@ fn a_repeated_discovery_joins_the_running_one() {
     let mut asked = 8;
     while desk.master.is_discovering() {
         desk.master.discover(desk.now);
-        desk.turn();
-        desk.silence();
+        desk.miss();
         asked += 1;
     }
     assert_eq!(asked, 3 * 8, "as often as without the extra calls");
@@ -100,8 +99,7 @@ fn an_application_that_discovers_all_the_time_does_not_keep_the_nodes_from_being
 #[test]
 fn an_application_that_discovers_all_the_time_does_not_keep_a_lost_node_from_being_stopped() {
     for config in [direct(), MasterConfig::usb_adapter()] {
-        let mut desk = Desk::with_nodes(config, &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(config, 1.0);
         desk.lose(NodeId::N1);
         let (begin, mut stops) = (desk.now, 0);
         while desk.now < begin + MS(2000) {
@@ -138,8 +136,7 @@ fn a_discovery_reads_a_node_that_is_owed_a_stop_and_writes_nothing_blind() {
     let mut config = direct();
     // The search has had its turn, and is not due for a while.
     config.recovery_share_pct = 1;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(config, 1.0);
     desk.lose(NodeId::N1);
     while desk.exchange().unwrap() != read(NodeId::N1) {}
     while desk.exchange().unwrap() != read(NodeId::N1) {}

@@ -10,8 +10,7 @@ fn the_echo_of_the_packet_that_no_longer_fitted_into_the_record_is_removed() {
     let mut desk = Desk::new(config);
     for _ in 0..33 {
         desk.master.discover(desk.now);
-        desk.turn();
-        desk.silence();
+        desk.miss();
     }
     desk.master.discover(desk.now);
     let asked = desk.turn();

@@ -7,8 +7,7 @@ fn three_strikes_make_a_node_abnormal_and_one_answer_brings_it_back() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     let mut told = vec![];
     for _ in 0..3 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
         told.append(&mut desk.told());
     }
     let health = |health| MasterEvent::Health { node: NodeId::N1, health };
@@ -32,14 +31,12 @@ fn a_read_that_is_asked_again_is_a_retry_also_while_a_stop_is_owed_and_none_afte
             desk.master.stop(NodeId::N1, desk.now);
         }
         for retries in [1, 2] {
-            desk.turn();
-            desk.silence();
+            desk.miss();
             desk.turn();
             assert_eq!(desk.master.node_statistics(NodeId::N1).retries, retries);
             desk.hear(600, &velocity(NodeId::N1, 0.0));
             for _ in 0..5 {
-                desk.turn();
-                desk.hear(600, &velocity(NodeId::N1, 0.0));
+                desk.turn_with(600, &velocity(NodeId::N1, 0.0));
             }
             assert_eq!(desk.master.node_statistics(NodeId::N1).retries, retries);
         }
@@ -51,11 +48,9 @@ fn one_answer_ends_a_series_of_strikes() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for _ in 0..10 {
         for _ in 0..2 {
-            desk.turn();
-            desk.silence();
+            desk.miss();
         }
-        desk.turn();
-        desk.hear(290, &velocity(NodeId::N1, 0.0));
+        desk.turn_with(290, &velocity(NodeId::N1, 0.0));
         assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
     }
 }
@@ -124,22 +119,18 @@ fn a_read_has_succeeded_once_the_node_has_answered_whatever_fails_afterwards() {
     let outcome = |desk: &Desk| desk.master.read_outcome(NodeId::N1);
     desk.master.read(NodeId::N1, desk.now).unwrap();
     assert_eq!(outcome(&desk), None);
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     assert_eq!(outcome(&desk), Some(Ok(())));
     // The reads of the cycle that follow fail before anyone looks.
     for _ in 0..2 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
     }
     desk.master.read(NodeId::N1, desk.now).unwrap();
-    desk.turn();
-    desk.silence();
+    desk.miss();
     assert_eq!(desk.master.last_failure(NodeId::N1), Some(Cause::Silent));
     assert_eq!(outcome(&desk), Some(Err(Cause::Silent)));
     // An answer after a failure counts as well.
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     assert_eq!(outcome(&desk), Some(Ok(())));
 }
 
@@ -147,11 +138,9 @@ fn a_read_has_succeeded_once_the_node_has_answered_whatever_fails_afterwards() {
 fn a_read_that_was_answered_is_not_undone_by_a_later_failure() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.read(NodeId::N1, desk.now).unwrap();
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     for _ in 0..3 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
     }
     assert_eq!(desk.master.last_failure(NodeId::N1), Some(Cause::Silent));
     assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Ok(())));
@@ -194,8 +183,7 @@ fn the_guard_is_kept_after_every_missed_answer_the_last_attempt_included() {
         (config.attempts, config.late_guard, config.polling) = (attempts, MS(7), polling);
         let mut desk = Desk::with_nodes(config, &[N1]);
         for missed in 0..2 {
-            desk.turn();
-            desk.silence();
+            desk.miss();
             let closed = desk.now;
             assert_eq!(desk.turn(), read(NodeId::N1));
             assert_eq!(desk.now, closed + MS(7), "{attempts}, {polling:?}, {missed}");
@@ -241,8 +229,7 @@ fn the_last_failure_is_the_latest_one_with_its_own_cause() {
         assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Err(cause)));
         // An answer in between does not make it forget the failure.
         desk.master.read(NodeId::N1, desk.now).unwrap();
-        desk.turn();
-        desk.hear(290, &velocity(NodeId::N1, 0.0));
+        desk.turn_with(290, &velocity(NodeId::N1, 0.0));
         assert_eq!(desk.master.last_failure(NodeId::N1), Some(cause));
     }
 }

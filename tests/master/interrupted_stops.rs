@@ -4,8 +4,7 @@ use crate::rig::*;
 
 #[test]
 fn what_was_paid_before_a_mode_was_in_doubt_does_not_count() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     let zero = write(NodeId::N1, 0.0);
     assert_eq!(desk.packets(2), [zero.clone(), read(NodeId::N1)]);
     // One half is paid. Then the node answers in the other mode, and again in its own.
@@ -26,9 +25,7 @@ fn what_was_paid_before_a_mode_was_in_doubt_does_not_count() {
 
 #[test]
 fn a_position_from_before_a_mode_was_in_doubt_is_not_held() {
-    let mut desk = Desk::with_nodes(manual(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(30)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(manual(), turns(30));
     assert_eq!(desk.packets(2), [read(NodeId::N3), hold(NodeId::N3, turns(30))]);
     desk.answer(NodeId::N3, Answer::Velocity(2.0));
     assert_eq!(desk.packets(1), [read(NodeId::N3)]);
@@ -78,8 +75,7 @@ fn a_position_is_held_for_20_ms_after_it_was_measured_and_twice_as_long_each_tim
     for gap_us in [0, 300] {
         let mut config = manual();
         config.turnaround_gap = US(gap_us);
-        let mut desk = Desk::with_nodes(config, &[N3]);
-        desk.master.stop(NodeId::N3, desk.now);
+        let mut desk = Desk::stopping(config, N3);
         assert_eq!(desk.packet(), read(NodeId::N3));
         for patience_ms in [20, 40, 80, 160] {
             desk.hear(340, &position(NodeId::N3, turns(3)));
@@ -97,8 +93,7 @@ fn the_search_pauses_for_its_share_of_an_exchange_and_the_gap_after_it() {
     {
         let mut config = direct();
         (config.turnaround_gap, config.recovery_share_pct) = (US(gap_us), share_pct);
-        let mut desk = Desk::with_nodes(config, &[N1]);
-        desk.lose(NodeId::N1);
+        let mut desk = Desk::losing(config);
         // Nobody else is there: only the search sends.
         desk.turn();
         let asked = desk.now;
@@ -114,8 +109,7 @@ fn the_search_pauses_for_its_share_of_an_exchange_and_the_gap_after_it() {
 fn a_search_at_0_percent_looks_only_for_nodes_that_are_owed_a_stop_and_for_these_at_1_percent() {
     let mut config = direct();
     config.recovery_share_pct = 0;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.lose(NodeId::N1);
+    let mut desk = Desk::losing(config);
     assert_eq!(desk.master.poll_timeout(), None, "it was never told to move");
     desk.master.stop(NodeId::N1, desk.now);
     let zero = write(NodeId::N1, 0.0);
@@ -173,9 +167,7 @@ fn no_sign_of_life_that_comes_too_late_revives_a_command() {
 #[test]
 fn a_stop_that_confirms_a_paid_one_holds_the_same_position_however_late_the_driver_is() {
     for late in [MS(0), MS(20), MS(21), MS(500)] {
-        let mut desk = Desk::with_nodes(manual(), &[N3]);
-        desk.answer(NodeId::N3, Answer::Position(turns(30)));
-        desk.master.stop(NodeId::N3, desk.now);
+        let mut desk = Desk::stopping_at(manual(), turns(30));
         desk.packets(9);
         desk.answer(NodeId::N3, Answer::Position(turns(40)));
         desk.master.stop(NodeId::N3, desk.now);
@@ -203,9 +195,7 @@ fn a_stop_of_all_that_comes_too_late_is_preceded_by_the_dead_man() {
 
 #[test]
 fn a_paid_stop_leaves_the_held_position_behind_and_not_the_one_to_which_the_shaft_has_run() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(30)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(direct(), turns(30));
     assert_eq!(desk.packets(1), [read(NodeId::N3)]);
     // It runs on while the stop is paid, and after.
     for at in 31..40 {
@@ -219,8 +209,7 @@ fn a_paid_stop_leaves_the_held_position_behind_and_not_the_one_to_which_the_shaf
 
 #[test]
 fn a_node_in_doubt_that_is_owed_a_stop_refuses_because_of_the_stop() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     desk.answer(NodeId::N1, Answer::Position(turns(-3)));
     desk.packets(2);
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));

@@ -7,8 +7,7 @@ use crate::rig::*;
 fn a_read_has_failed_when_its_node_is_abnormal_however_many_attempts_are_left() {
     let mut config = direct();
     config.attempts = 9;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(config, 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk.master.read(NodeId::N1, desk.now).unwrap();
     desk.lose(NodeId::N1);
@@ -56,9 +55,7 @@ fn set_points_of_several_nodes_take_turns_however_often_all_of_them_change() {
 
 #[test]
 fn a_flush_that_fails_behind_a_paid_half_does_not_move_the_held_position() {
-    let mut desk = Desk::with_nodes(manual(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(30)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(manual(), turns(30));
     assert_eq!(desk.packets(2), [read(NodeId::N3), hold(NodeId::N3, turns(30))]);
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     assert_eq!(desk.packets(1), [read(NodeId::N3)]);
@@ -72,8 +69,7 @@ fn a_flush_that_fails_behind_a_paid_half_does_not_move_the_held_position() {
 #[test]
 fn a_standstill_from_before_a_change_of_mode_is_forgotten() {
     for is_released in [false, true] {
-        let mut desk = Desk::with_nodes(manual(), &[N1]);
-        desk.master.stop(NodeId::N1, desk.now);
+        let mut desk = Desk::stopping(manual(), N1);
         desk.packets(9);
         assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
         if is_released {
@@ -94,17 +90,14 @@ fn a_standstill_from_before_a_change_of_mode_is_forgotten() {
 fn a_node_that_has_missed_its_only_attempt_keeps_its_set_point() {
     let mut config = direct();
     config.attempts = 1;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(config, 1.0);
     for missed in 1..3 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
         assert_eq!(desk.master.health(NodeId::N1), Some(Health::Suspect(missed)));
         assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(1.0))));
         assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
     }
-    desk.turn();
-    desk.silence();
+    desk.miss();
     assert_eq!(desk.master.set_point(NodeId::N1), None);
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
 }
@@ -155,8 +148,7 @@ fn nothing_follows_a_cut_off_write_before_the_silence_is_over() {
 
 #[test]
 fn a_read_that_is_under_way_confirms_no_set_point_that_came_after_it() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(direct());
     for speed in [1.0, 2.0] {
         // Its window is open.
         desk.master.set_velocity(NodeId::N1, rps(speed), desk.now).unwrap();
@@ -170,8 +162,7 @@ fn a_read_that_is_under_way_confirms_no_set_point_that_came_after_it() {
         desk.master.confirm(NodeId::N1, desk.now).unwrap();
         desk.hear(460, &velocity(NodeId::N1, 0.0));
         assert_eq!(desk.news(), []);
-        desk.turn();
-        desk.hear(460, &velocity(NodeId::N1, 0.0));
+        desk.turn_with(460, &velocity(NodeId::N1, 0.0));
         assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }]);
         desk.turn();
     }

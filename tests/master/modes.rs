@@ -4,14 +4,12 @@ use crate::rig::*;
 
 #[test]
 fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.turn();
     let at = Position::new(5, 6);
     desk.hear(450, &position(NodeId::N1, at));
     assert_eq!(desk.told(), [], "not accepted yet");
-    desk.turn();
-    desk.hear(450, &position(NodeId::N1, at));
+    desk.turn_with(450, &position(NodeId::N1, at));
     let changed = MasterEvent::ModeChanged { node: NodeId::N1, mode: Mode::Position };
     let status = MasterEvent::Status { node: NodeId::N1, status: Status::Position(at) };
     assert_eq!(desk.told(), [changed, status]);
@@ -26,19 +24,16 @@ fn a_mode_change_at_run_time_is_accepted_the_second_time_and_ends_the_set_point(
 fn a_read_is_not_answered_by_an_answer_that_leaves_the_mode_in_doubt() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     desk.master.read(NodeId::N1, desk.now).unwrap();
-    desk.turn();
-    desk.hear(450, &position(NodeId::N1, turns(3)));
+    desk.turn_with(450, &position(NodeId::N1, turns(3)));
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
     assert_eq!(desk.master.read_outcome(NodeId::N1), None, "the status is still the old one");
-    desk.turn();
-    desk.hear(450, &position(NodeId::N1, turns(3)));
+    desk.turn_with(450, &position(NodeId::N1, turns(3)));
     assert_eq!(desk.master.read_outcome(NodeId::N1), Some(Ok(())));
 }
 
 /// A velocity node with a set-point that has just answered as a position node.
 fn in_doubt_at(at: Position) -> Desk {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.answer(NodeId::N1, Answer::Position(at));
     assert_eq!(kinds(&desk.packets(2)), [(WRITE, 1), (READ, 1)]);
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
@@ -84,8 +79,7 @@ fn an_answer_in_the_recorded_mode_settles_the_doubt_and_the_set_point_continues(
 
 #[test]
 fn a_doubt_does_not_confirm_what_was_written_before_it() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk.answer(NodeId::N1, Answer::Position(turns(7)));
     desk.packets(2);
@@ -98,8 +92,7 @@ fn a_doubt_does_not_confirm_what_was_written_before_it() {
 
 #[test]
 fn a_changed_mode_ends_the_confirmation_with_the_set_point() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk.answer(NodeId::N1, Answer::Position(turns(7)));
     desk.packets(3);
@@ -110,8 +103,7 @@ fn a_changed_mode_ends_the_confirmation_with_the_set_point() {
 
 #[test]
 fn a_late_answer_in_another_mode_puts_the_mode_in_doubt_and_decides_nothing() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(manual(), 1.0);
     desk.packets(1);
     for _ in 0..3 {
         desk.hear(1000, &position(NodeId::N1, turns(7)));
@@ -132,8 +124,7 @@ fn a_late_answer_in_another_mode_puts_the_mode_in_doubt_and_decides_nothing() {
 fn an_early_answer_in_another_mode_puts_the_mode_in_doubt() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.master.read(NodeId::N1, desk.now).unwrap();
-    desk.turn();
-    desk.hear(1, &position(NodeId::N1, turns(7)));
+    desk.turn_with(1, &position(NodeId::N1, turns(7)));
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
     assert_eq!(desk.master.node_statistics(NodeId::N1).early, 1);
 }
@@ -162,8 +153,7 @@ fn in_doubt_a_stop_may_write_a_position_that_a_velocity_node_reads_as_standstill
         let mut desk = in_doubt_at(at);
         desk.master.stop(NodeId::N1, desk.now);
         // The READ for which the stop waits is damaged in the mode only: the doubt stays.
-        desk.turn();
-        desk.silence();
+        desk.miss();
         // One more answer would decide. A late one neither decides nor measures.
         desk.hear(10, &position(NodeId::N1, at));
         assert_eq!(kinds(&desk.packets(1)), [(READ, 1)], "{at:?}");
@@ -265,9 +255,7 @@ fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
 
 #[test]
 fn a_hold_is_measured_again_after_the_mode_was_in_doubt() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(40)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(direct(), turns(40));
     desk.run(MS(10));
     desk.answer(NodeId::N3, Answer::Velocity(2.0));
     while !desk.master.is_mode_in_doubt(NodeId::N3) {
@@ -281,8 +269,7 @@ fn a_hold_is_measured_again_after_the_mode_was_in_doubt() {
 
 #[test]
 fn a_hold_is_not_confirmed_when_the_mode_is_in_doubt() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping(direct(), N3);
     desk.run(MS(10));
     desk.news();
     desk.master.confirm(NodeId::N3, desk.now).unwrap();
@@ -298,8 +285,7 @@ fn a_hold_is_not_confirmed_when_the_mode_is_in_doubt() {
 
 #[test]
 fn a_node_that_comes_back_in_another_mode_is_stopped_in_that_one() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 5.0);
     desk.lose(NodeId::N1);
     desk.answer(NodeId::N1, Answer::Position(turns(-3)));
     let sent = desk.run(MS(60));
@@ -314,8 +300,7 @@ fn a_node_that_comes_back_in_another_mode_is_stopped_in_that_one() {
 
 #[test]
 fn a_set_point_that_has_not_left_when_the_doubt_begins_is_not_sent() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(manual(), 1.0);
     desk.hear(1000, &position(NodeId::N1, turns(7)));
     desk.answer(NodeId::N1, Answer::Silence);
     assert_eq!(kinds(&desk.packets(6)), [(READ, 1); 6]);
@@ -324,8 +309,7 @@ fn a_set_point_that_has_not_left_when_the_doubt_begins_is_not_sent() {
 #[test]
 fn in_doubt_the_cycle_writes_nothing_however_late_the_driver_is() {
     let mut desk = in_doubt_at(turns(7));
-    desk.turn();
-    desk.silence();
+    desk.miss();
     desk.now += MS(1);
     assert_eq!(desk.packet(), read(NodeId::N1));
 }
@@ -352,8 +336,7 @@ fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
 fn a_node_whose_answers_alternate_between_the_modes_is_never_said_to_be_stopped() {
     let answers = [Answer::Position(turns(7)), Answer::Velocity(0.5)];
     for first in [0, 1] {
-        let mut desk = Desk::with_nodes(direct(), &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(direct(), 1.0);
         desk.packets(2);
         desk.master.stop(NodeId::N1, desk.now);
         let mut reads = first;

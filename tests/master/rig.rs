@@ -120,6 +120,41 @@ impl Desk {
         desk
     }
 
+    /// Node 1, commanded to turn.
+    pub(crate) fn turning(config: MasterConfig, speed: f32) -> Self {
+        let mut desk = Self::with_nodes(config, &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(speed), desk.now).unwrap();
+        desk
+    }
+
+    /// One node, told to stop.
+    pub(crate) fn stopping(config: MasterConfig, node: (NodeId, Mode)) -> Self {
+        let mut desk = Self::with_nodes(config, &[node]);
+        desk.master.stop(node.0, desk.now);
+        desk
+    }
+
+    /// Node 3, told to stop, which it answers at this place.
+    pub(crate) fn stopping_at(config: MasterConfig, place: Position) -> Self {
+        let mut desk = Self::stopping(config, N3);
+        desk.answer(NodeId::N3, Answer::Position(place));
+        desk
+    }
+
+    /// Node 1, silent until it is abnormal.
+    pub(crate) fn losing(config: MasterConfig) -> Self {
+        let mut desk = Self::with_nodes(config, &[N1]);
+        desk.lose(NodeId::N1);
+        desk
+    }
+
+    /// Node 1, just asked by a READ.
+    pub(crate) fn asking(config: MasterConfig) -> Self {
+        let mut desk = Self::with_nodes(config, &[N1]);
+        desk.turn();
+        desk
+    }
+
     /// From now on a node answers this.
     pub(crate) fn answer(&mut self, node: NodeId, answer: Answer) {
         self.answers[usize::from(node.get()) - 1] = answer;
@@ -203,6 +238,18 @@ impl Desk {
             }
             self.sent.push(packet);
         }
+    }
+
+    /// Advances to the next READ; these bytes arrive this much later.
+    pub(crate) fn turn_with(&mut self, after_us: u32, bytes: &[u8]) {
+        self.turn();
+        self.hear(after_us, bytes);
+    }
+
+    /// Advances to the next READ, which is not answered.
+    pub(crate) fn miss(&mut self) {
+        self.turn();
+        self.silence();
     }
 
     /// Advances to the next packet and returns it, unanswered.

@@ -73,8 +73,7 @@ fn no_attempts_count_as_one() {
         assert!(desk.master.health(N1.0).is_some(), "found in the one pass");
         desk.told();
         desk.master.read(N1.0, desk.now).unwrap();
-        desk.turn();
-        desk.silence();
+        desk.miss();
         assert!(desk.master.read_outcome(N1.0).unwrap().is_err(), "failed after one");
         // An id that was never heard is read once at once for a stop, and then searched for.
         let mut desk = Desk::new(config);
@@ -97,8 +96,7 @@ fn each_time_of_a_master_has_a_setting_of_its_own() {
     let mut config = direct();
     (config.reply_timeout, config.late_guard) = (US(700), US(1100));
     config.turnaround_gap = US(130);
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.turn();
+    let mut desk = Desk::asking(config);
     let asked = desk.now;
     // The READ, the timeout and the answer.
     assert_eq!(desk.master.poll_timeout(), Some(asked + US(80 + 700 + 160)));

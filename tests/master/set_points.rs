@@ -22,8 +22,7 @@ fn a_command_for_the_wrong_mode_or_an_unknown_node_is_refused() {
 
 #[test]
 fn the_latest_set_point_wins_and_is_repeated_every_cycle() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.master.set_velocity(NodeId::N1, rps(2.0), desk.now).unwrap();
     for _ in 0..5 {
         assert_eq!(desk.turn(), read(NodeId::N1));
@@ -58,16 +57,14 @@ fn nodes_are_visited_in_turn_with_a_write_before_each_read() {
 
 #[test]
 fn a_confirmed_write_is_reported_after_the_read_that_followed_it() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk.turn();
     assert_eq!(desk.told(), []);
     desk.hear(450, &velocity(NodeId::N1, 0.5));
     let confirmed = MasterEvent::Confirmed { node: NodeId::N1 };
     assert_eq!(desk.told().last(), Some(&confirmed));
-    desk.turn();
-    desk.hear(450, &velocity(NodeId::N1, 0.5));
+    desk.turn_with(450, &velocity(NodeId::N1, 0.5));
     assert!(!desk.told().contains(&confirmed), "reported once");
 }
 
@@ -91,8 +88,7 @@ fn a_flood_of_set_points_does_not_keep_the_others_from_being_read() {
 
 /// Sets a node's speed and requests its confirmation.
 fn confirming() -> Desk {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk
 }

@@ -7,8 +7,7 @@ fn periodic_polling_keeps_its_period_without_drift() {
     let mut config = direct();
     config.polling = Polling::Every(Duration::from_millis(10));
     let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.turn();
     let begin = desk.now;
     for turn in 1..100 {
@@ -23,8 +22,7 @@ fn a_requested_node_is_read_at_once_whatever_its_period() {
     let mut config = direct();
     config.polling = Polling::Every(Duration::from_millis(100));
     let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     assert!(desk.master.poll_timeout() > Some(desk.now + Duration::from_millis(90)));
     desk.master.read(NodeId::N1, desk.now).unwrap();
     let asked_at = desk.now;
@@ -38,8 +36,7 @@ fn read_every_10_ms() -> (Desk, Instant) {
     config.polling = Polling::Every(MS(10));
     let mut desk = Desk::with_nodes(config, &[N1]);
     // The first is late: it was due during the discovery.
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.turn();
     let begin = desk.now;
     desk.hear(290, &velocity(NodeId::N1, 0.0));
@@ -127,8 +124,7 @@ fn a_turnaround_gap_is_kept_after_requests_and_answers() {
     let mut config = direct();
     config.turnaround_gap = US(100);
     let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.turn();
-    desk.hear(290, &velocity(NodeId::N1, 0.0));
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     let heard = desk.now;
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
@@ -226,8 +222,7 @@ fn a_line_without_the_configured_echo_still_works() {
 fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for turn in 0..20 {
-        desk.turn();
-        desk.hear(290, &velocity(NodeId::N1, turn as f32));
+        desk.turn_with(290, &velocity(NodeId::N1, turn as f32));
     }
     assert_eq!(desk.master.lost_events(), 12);
     let events = desk.told();
@@ -304,14 +299,12 @@ fn the_defaults_of_a_master_are_those_of_the_rulings() {
 fn rare_events_have_room_however_many_readings_are_waiting() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for _ in 0..100 {
-        desk.turn();
-        desk.hear(290, &velocity(NodeId::N1, 1.0));
+        desk.turn_with(290, &velocity(NodeId::N1, 1.0));
     }
     let lost = desk.master.lost_events();
     desk.master.stop(NodeId::N1, desk.now);
     for _ in 0..2 {
-        desk.turn();
-        desk.hear(450, &velocity(NodeId::N1, 1.0));
+        desk.turn_with(450, &velocity(NodeId::N1, 1.0));
     }
     assert_eq!(desk.news(), [MasterEvent::Stopped { node: NodeId::N1 }]);
     assert_eq!(desk.master.lost_events(), lost + 2, "two readings");
@@ -323,16 +316,14 @@ fn an_answer_earlier_than_the_line_allows_is_accepted_if_configured() {
         let mut config = direct();
         config.accepts_early = accepts_early;
         let mut desk = Desk::with_nodes(config, &[N1]);
-        desk.turn();
-        desk.hear(1, &velocity(NodeId::N1, 9.0));
+        desk.turn_with(1, &velocity(NodeId::N1, 9.0));
         assert_eq!(!desk.told().is_empty(), accepts_early);
         let early = desk.master.node_statistics(NodeId::N1).early;
         assert_eq!(early, u32::from(!accepts_early));
     }
     // The line needs 80 us for the READ and 160 us for the answer; half of the answer is tolerated.
     for (after, is_taken) in [(80 + 79, false), (80 + 80, true)] {
-        let mut desk = Desk::with_nodes(direct(), &[N1]);
-        desk.turn();
+        let mut desk = Desk::asking(direct());
         desk.hear(after, &velocity(NodeId::N1, 9.0));
         assert_eq!(!desk.told().is_empty(), is_taken, "{after} us");
         // The window stays open for the genuine one.

@@ -83,9 +83,7 @@ fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
         (19_999, 0, false),
         (60_000, 0, true),
     ] {
-        let mut desk = Desk::with_nodes(manual(), &[N3]);
-        desk.answer(NodeId::N3, Answer::Position(place(8190)));
-        desk.master.stop(NodeId::N3, desk.now);
+        let mut desk = Desk::stopping_at(manual(), place(8190));
         assert_eq!(desk.packets(9).len(), 5);
         assert_eq!(desk.news(), [MasterEvent::Stopped { node: NodeId::N3 }]);
         let paid = desk.now;
@@ -101,8 +99,7 @@ fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
 
 #[test]
 fn a_slow_shaft_is_compared_with_where_it_was_20_ms_ago_and_not_with_its_last_reading() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping(direct(), N3);
     // 4 counts per millisecond: half a turn per second.
     for millis in 0..200 {
         let at = Position::from_counts(4 * millis).unwrap();

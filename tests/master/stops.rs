@@ -20,8 +20,7 @@ fn stop_means_zero_for_velocity_and_hold_for_position_but_never_go_to_zero() {
 
 #[test]
 fn a_stop_is_paid_by_two_writes_that_have_each_been_followed_by_an_answer() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     let (stop, read) = (write(NodeId::N1, 0.0), read(NodeId::N1));
     assert_eq!(desk.packets(2), [stop.clone(), read.clone()]);
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
@@ -91,9 +90,7 @@ fn hold_age_is_the_maximum_age_of_a_position_held_without_a_read() {
 
 #[test]
 fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(40)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(direct(), turns(40));
     let mut written = writes(&desk.packets(5));
     // A shaft that is pushed is not held at the new position.
     for drift in 41..60 {
@@ -113,9 +110,7 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
 
 #[test]
 fn a_hold_is_measured_again_after_the_node_was_abnormal() {
-    let mut desk = Desk::with_nodes(direct(), &[N3]);
-    desk.answer(NodeId::N3, Answer::Position(turns(40)));
-    desk.master.stop(NodeId::N3, desk.now);
+    let mut desk = Desk::stopping_at(direct(), turns(40));
     desk.run(MS(10));
     desk.news();
     desk.lose(NodeId::N3);
@@ -172,8 +167,7 @@ fn while_a_stop_is_owed_set_points_are_refused_and_not_kept() {
 
 #[test]
 fn a_stop_drops_the_set_point_at_once_sent_or_not() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 5.0);
     desk.master.stop(NodeId::N1, desk.now);
     let written = writes(&desk.run(MS(20)));
     assert!(written.len() > 2 && written.iter().all(|it| *it == write(NodeId::N1, 0.0)));
@@ -181,8 +175,7 @@ fn a_stop_drops_the_set_point_at_once_sent_or_not() {
 
 #[test]
 fn a_release_does_not_cancel_a_stop() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(manual(), 5.0);
     desk.master.stop(NodeId::N1, desk.now);
     desk.master.release(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
@@ -291,8 +284,7 @@ fn a_position_is_held_however_long_the_gap_between_packets() {
     for gap in [MS(19), MS(20), MS(21), MS(200)] {
         let mut config = direct();
         config.turnaround_gap = gap;
-        let mut desk = Desk::with_nodes(config, &[N3]);
-        desk.master.stop(NodeId::N3, desk.now);
+        let mut desk = Desk::stopping(config, N3);
         let sent = desk.packets(6);
         let stop = hold(NodeId::N3, Position::new(7, 3));
         assert_eq!(sent[1], stop, "{gap:?}: {sent:02x?}");

@@ -10,8 +10,7 @@ const PAUSE_US: u32 = 100 / 5 * WINDOW_US;
 
 #[test]
 fn an_abnormal_velocity_node_is_stopped_blind_at_once_and_then_at_the_pace_of_the_search() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.lose(NodeId::N1);
+    let mut desk = Desk::losing(direct());
     // The search has just failed to find it.
     desk.packets(2);
     desk.now += US(500);
@@ -53,8 +52,7 @@ fn an_abnormal_position_node_is_stopped_after_its_next_good_answer() {
 fn a_stop_that_waits_survives_the_third_strike() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for _ in 0..2 {
-        desk.turn();
-        desk.silence();
+        desk.miss();
     }
     desk.turn();
     desk.master.stop(NodeId::N1, desk.now);
@@ -65,8 +63,7 @@ fn a_stop_that_waits_survives_the_third_strike() {
 
 #[test]
 fn a_half_paid_stop_starts_over_after_its_node_was_abnormal() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     desk.packets(2);
     desk.lose(NodeId::N1);
     desk.answer(NodeId::N1, Answer::Velocity(5.0));
@@ -80,8 +77,7 @@ fn a_half_paid_stop_starts_over_after_its_node_was_abnormal() {
 
 #[test]
 fn a_node_that_becomes_abnormal_under_a_set_point_is_owed_a_stop() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 5.0);
     desk.lose(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
     let refused = CommandError::NotOnline { node: NodeId::N1 };
@@ -97,8 +93,7 @@ fn a_node_that_becomes_abnormal_under_a_set_point_is_owed_a_stop() {
 
 #[test]
 fn a_released_node_that_becomes_abnormal_is_also_owed_a_stop() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(direct(), 5.0);
     desk.packets(2);
     desk.master.release(NodeId::N1);
     desk.lose(NodeId::N1);
@@ -119,8 +114,7 @@ fn a_node_that_was_never_told_to_move_is_owed_nothing_when_it_becomes_abnormal()
 fn without_stops_abnormal_a_node_that_comes_back_gets_no_write_at_all() {
     let mut config = direct();
     config.stops_abnormal = false;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+    let mut desk = Desk::turning(config, 5.0);
     desk.lose(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
     desk.answer(NodeId::N1, Answer::Velocity(5.0));
@@ -158,8 +152,7 @@ fn an_id_that_was_never_heard_has_all_attempts_of_a_read_at_once() {
 fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
     let mut config = direct();
     config.stops_abnormal = false;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(config, N1);
     desk.run(MS(10));
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
     desk.lose(NodeId::N1);
@@ -178,8 +171,7 @@ fn hold_age_does_not_hold_for_a_node_that_is_lost() {
 
 #[test]
 fn a_doubt_does_not_let_a_lost_node_exceed_the_search_rate() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.lose(NodeId::N1);
+    let mut desk = Desk::losing(direct());
     desk.packets(2);
     desk.now += US(500);
     desk.master.stop(NodeId::N1, desk.now);
@@ -196,12 +188,10 @@ fn a_doubt_does_not_let_a_lost_node_exceed_the_search_rate() {
 
 #[test]
 fn a_node_that_is_lost_again_under_the_same_stop_gets_another_immediate_attempt() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     for _ in 0..3 {
         while desk.master.health(NodeId::N1) != Some(Health::Abnormal) {
-            desk.turn();
-            desk.silence();
+            desk.miss();
         }
         let begin = desk.now;
         assert_eq!(desk.packet(), write(NodeId::N1, 0.0));
@@ -209,8 +199,7 @@ fn a_node_that_is_lost_again_under_the_same_stop_gets_another_immediate_attempt(
         assert!(desk.now - begin < US(1000), "immediately, not at the search rate");
         desk.silence();
         // It answers once, during the search, which pays half of the stop.
-        desk.turn();
-        desk.hear(450, &velocity(NodeId::N1, 1.0));
+        desk.turn_with(450, &velocity(NodeId::N1, 1.0));
         assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
         assert_eq!(desk.master.stops_owed(), NodeId::N1.into());
     }

@@ -34,8 +34,7 @@ fn a_read_that_did_not_leave_opens_no_window_and_is_sent_again() {
 fn a_repeated_read_that_did_not_leave_is_no_repetition() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut desk = Desk::with_nodes(direct(), &[N1]);
-        desk.turn();
-        desk.silence();
+        desk.miss();
         for _ in 0..3 {
             assert_eq!(desk.turn(), read(NodeId::N1));
             fail(&mut desk, unsent);
@@ -56,8 +55,7 @@ fn a_repeated_read_that_did_not_leave_is_no_repetition() {
 #[test]
 fn a_set_point_that_did_not_leave_is_new_again_unless_another_has_come() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut desk = Desk::with_nodes(manual(), &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(manual(), 1.0);
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         assert!(desk.master.is_set_point_sent(NodeId::N1));
         fail(&mut desk, unsent);
@@ -73,8 +71,7 @@ fn a_set_point_that_did_not_leave_is_new_again_unless_another_has_come() {
 #[test]
 fn a_set_point_that_did_not_leave_is_never_sent_once_it_is_dropped() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut desk = Desk::with_nodes(manual(), &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(manual(), 1.0);
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         let mut released = desk.clone();
         // The driver learns of the failure late, after the application has acted.
@@ -123,8 +120,7 @@ fn a_stop_and_the_news_that_a_packet_did_not_leave_may_come_in_either_order() {
 #[test]
 fn a_stop_write_that_did_not_leave_pays_nothing() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let mut desk = Desk::with_nodes(manual(), &[N1]);
-        desk.master.stop(NodeId::N1, desk.now);
+        let mut desk = Desk::stopping(manual(), N1);
         let stop = write(NodeId::N1, 0.0);
         for _ in 0..3 {
             assert_eq!(desk.packet(), stop);
@@ -139,8 +135,7 @@ fn a_stop_write_that_did_not_leave_pays_nothing() {
 
 #[test]
 fn after_a_failed_flush_an_answer_does_not_pay_for_the_write_in_front_of_its_read() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     assert_eq!(kind(&desk.packet()), (WRITE, 1));
     assert_eq!(kind(&desk.packet()), (READ, 1));
     fail(&mut desk, Unsent::Unflushed);
@@ -166,8 +161,7 @@ fn after_a_failed_flush_all_set_points_are_new_again_including_paid_stops() {
 #[test]
 fn a_write_that_did_not_leave_is_not_confirmed_by_the_read_after_it() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let mut desk = Desk::with_nodes(manual(), &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(manual(), 1.0);
         desk.master.confirm(NodeId::N1, desk.now).unwrap();
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         fail(&mut desk, unsent);
@@ -196,8 +190,7 @@ fn a_discovery_on_a_failing_port_skips_no_node() {
 
 #[test]
 fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.lose(NodeId::N1);
+    let mut desk = Desk::losing(direct());
     desk.packets(2);
     desk.now += US(500);
     desk.master.stop(NodeId::N1, desk.now);
@@ -233,8 +226,7 @@ fn an_echo_is_not_expected_of_a_frame_that_did_not_leave() {
 
 #[test]
 fn a_frame_that_left_is_not_taken_back_twice() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    let mut desk = Desk::turning(manual(), 1.0);
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
     fail(&mut desk, Unsent::Untouched);
     fail(&mut desk, Unsent::Untouched);
@@ -246,8 +238,7 @@ fn a_frame_that_left_is_not_taken_back_twice() {
 
 #[test]
 fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     let begin = desk.now;
     assert_eq!(kind(&desk.packet()), (WRITE, 1));
     assert_eq!(kind(&desk.packet()), (READ, 1));
@@ -271,8 +262,7 @@ fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
 
 #[test]
 fn a_node_in_the_search_is_asked_again_at_once_when_its_read_did_not_leave() {
-    let mut desk = Desk::with_nodes(direct(), &[N1]);
-    desk.lose(NodeId::N1);
+    let mut desk = Desk::losing(direct());
     desk.turn();
     let begin = desk.now;
     fail(&mut desk, Unsent::Untouched);
@@ -287,8 +277,7 @@ fn a_read_of_the_search_that_was_cut_off_is_repeated_as_soon_as_the_silence_is_o
         if is_stop {
             desk.master.stop(node.0, desk.now);
             // The attempt that is made at once.
-            desk.turn();
-            desk.silence();
+            desk.miss();
         }
         assert_eq!(desk.turn(), read(node.0));
         for _ in 0..3 {
@@ -318,8 +307,7 @@ fn a_discovery_of_silent_nodes_on_a_failing_port_makes_all_its_attempts() {
 
 #[test]
 fn the_silence_after_a_cut_off_read_begins_when_the_write_before_it_has_left() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.stop(NodeId::N1, desk.now);
+    let mut desk = Desk::stopping(manual(), N1);
     let begin = desk.now;
     assert_eq!(kind(&desk.packet()), (WRITE, 1));
     assert_eq!(kind(&desk.packet()), (READ, 1));
@@ -332,8 +320,7 @@ fn the_silence_after_a_cut_off_read_begins_when_the_write_before_it_has_left() {
 #[test]
 fn the_write_of_a_dropped_or_replaced_set_point_is_outdated() {
     let fresh = |config| {
-        let mut desk = Desk::with_nodes(config, &[N1]);
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        let mut desk = Desk::turning(config, 1.0);
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
         assert!(!desk.master.is_outdated());
         desk
