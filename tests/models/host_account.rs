@@ -56,8 +56,6 @@ pub(crate) struct Account {
     pub(crate) network: Option<u32>,
     pub(crate) is_network_due: bool,
     last: Option<Last>,
-    /// A failing flush may still lose frames.
-    pub(crate) is_unflushed: bool,
     index: u8,
 }
 
@@ -81,7 +79,6 @@ impl Account {
             network: None,
             is_network_due: false,
             last: None,
-            is_unflushed: false,
             index: 0,
         }
     }
@@ -163,7 +160,6 @@ impl Account {
             return Err(format!("index {}, {} bytes", frame.index(), bytes.len()));
         }
         self.index = self.index.wrapping_add(1);
-        self.is_unflushed = true;
         if self.update == Update::Silent {
             return Err(format!("{message:?} during a firmware update"));
         }
@@ -243,7 +239,6 @@ impl Account {
         }
         if unsent == Unsent::Unflushed {
             self.is_network_due = self.network.is_some();
-            self.is_unflushed = false;
             return;
         }
         self.index = self.index.wrapping_sub(u8::from(last.is_some()));
@@ -261,12 +256,6 @@ impl Account {
             Some(Last::Ping) if self.ping_until.take().is_some() => self.ping_at = now,
             _ => {}
         }
-    }
-
-    /// The port is flushed: nothing can come back now.
-    pub(crate) fn flushed(&mut self) {
-        self.is_unflushed = false;
-        self.motion.flushed();
     }
 
     /// The latest time for the next action.

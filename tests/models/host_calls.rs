@@ -3,30 +3,31 @@
 use axlewire::ucp::host::CommandError;
 
 use super::{
-    host::{Act, ROOM, Site, VERSION, command},
+    host::{Call, Site, VERSION, command},
     host_account::Update,
     names::*,
+    site::ROOM,
     ucp::{Checked, queue},
 };
 
 impl Site {
     /// A call and its result.
-    pub(super) fn call(&mut self, act: Act) -> Checked {
+    pub(super) fn request(&mut self, call: Call) -> Checked {
         let is_updating = self.account.update != Update::None;
-        let (now, room_is_over) = (self.now, queue(&self.host).len() > ROOM);
+        let (now, room_is_over) = (self.now, queue(&self.role).len() > ROOM);
         let is_calibrating = self.account.request.is_some() || room_is_over;
-        let (result, expected) = match act {
-            Act::Go(number) => {
-                let result = self.host.drive(command(number), now);
+        let (result, expected) = match call {
+            Call::Go(number) => {
+                let result = self.role.drive(command(number), now);
                 if result.is_ok() {
                     self.account.motion.call(command(number), now);
                 }
                 (result, is_updating.then_some(CommandError::Updating))
             }
-            Act::Calibrate(step, kind) => {
+            Call::Calibrate(step, kind) => {
                 let result = match step {
-                    CalibrationStep::Start => self.host.start_calibration(kind, now),
-                    CalibrationStep::End => self.host.end_calibration(kind, now),
+                    CalibrationStep::Start => self.role.start_calibration(kind, now),
+                    CalibrationStep::End => self.role.end_calibration(kind, now),
                 };
                 if result.is_ok() {
                     self.account.calibrate(step, kind);
@@ -34,8 +35,8 @@ impl Site {
                 let calibrating = is_calibrating.then_some(CommandError::Calibrating);
                 (result, is_updating.then_some(CommandError::Updating).or(calibrating))
             }
-            Act::Show(state) => {
-                let result = self.host.set_network_state(NetworkState::from(state), now);
+            Call::Show(state) => {
+                let result = self.role.set_network_state(NetworkState::from(state), now);
                 if result.is_ok() && self.account.network.replace(state) != Some(state) {
                     self.account.is_network_due = true;
                 }
@@ -43,7 +44,7 @@ impl Site {
                 (result, is_barred.then_some(CommandError::LowIdsOnly { id: 0x0A }))
             }
             _ => {
-                let result = self.host.start_firmware_update(VERSION, now);
+                let result = self.role.start_firmware_update(VERSION, now);
                 let motion = &mut self.account.motion;
                 let expected = match () {
                     () if self.account.low_ids_only => Some(CommandError::LowIdsOnly { id: 9 }),

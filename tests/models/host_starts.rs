@@ -1,141 +1,121 @@
 //! The worlds of a host, and their initial states.
 
 use super::{
-    host::{Act, Hear, Site},
+    host::{Act, Call::*, Hear, HostSide, Site},
     names::*,
     run::{Depth, Run},
     search::World,
-    ucp::Fate,
+    site,
 };
+
+type Menu = site::Menu<HostSide>;
 
 const IMU: CalibrationKind = CalibrationKind::Imu;
 const MAG: CalibrationKind = CalibrationKind::Magnetometer;
 const START: CalibrationStep = CalibrationStep::Start;
 const END: CalibrationStep = CalibrationStep::End;
 
-const DONE: Act = Act::Round(Fate::Flushed);
-const LOST: Act = Act::Round(Fate::NotFlushed);
-const BACK: Act = Act::Round(Fate::First(Unsent::Untouched));
-const CUT: Act = Act::Round(Fate::First(Unsent::CutOff));
+const DONE: Act = Act::DONE;
 
 /// Everything that moves the robot, and every fate of the frames.
-const MOTION: &[Act] = &[
-    Act::Go(1),
-    Act::Go(2),
-    Act::Go(3),
-    Act::Stop,
-    DONE,
-    LOST,
-    BACK,
-    CUT,
-    Act::One,
-    Act::Fail(Unsent::Untouched),
-    Act::Fail(Unsent::CutOff),
-    Act::Fail(Unsent::Unflushed),
-    Act::Wait(1_000),
-    Act::Wait(500_000),
-    Act::ToDeadline(0),
-    Act::ToDeadline(1),
-    Act::Wait(10_000_000),
-    Act::Run(450),
-    Act::Run(1_100),
+const MOTION: Menu = &[
+    Act::FATES,
+    &[
+        Act::Call(Go(1)),
+        Act::Call(Go(2)),
+        Act::Call(Go(3)),
+        Act::Call(Stop),
+        Act::Fail(Unsent::CutOff),
+        Act::Wait(1_000),
+        Act::Wait(500_000),
+        Act::ToDeadline(0),
+        Act::ToDeadline(1),
+        Act::Wait(10_000_000),
+        Act::Run(450),
+        Act::Run(1_100),
+    ],
 ];
 
 /// A firmware update, among commands and answers.
-const UPDATE: &[Act] = &[
-    Act::Go(1),
-    Act::Stop,
-    Act::Update,
-    Act::EndUpdate,
-    Act::Calibrate(START, IMU),
-    Act::Show(3),
-    Act::Hear(Hear::UpdateAnswer(OtaStatus::Accepted)),
-    Act::Hear(Hear::UpdateAnswer(OtaStatus::Forbidden)),
-    Act::Hear(Hear::BiasRequest),
-    Act::Hear(Hear::Report),
-    Act::Hear(Hear::Imu(1)),
-    DONE,
-    LOST,
-    BACK,
-    CUT,
-    Act::One,
-    Act::Fail(Unsent::Untouched),
-    Act::Fail(Unsent::CutOff),
-    Act::Fail(Unsent::Unflushed),
-    Act::ToDeadline(0),
-    Act::Run(600),
+const UPDATE: Menu = &[
+    Act::FATES,
+    &[
+        Act::Call(Go(1)),
+        Act::Call(Stop),
+        Act::Call(Update),
+        Act::Call(EndUpdate),
+        Act::Call(Calibrate(START, IMU)),
+        Act::Call(Show(3)),
+        Act::Hear(Hear::UpdateAnswer(OtaStatus::Accepted)),
+        Act::Hear(Hear::UpdateAnswer(OtaStatus::Forbidden)),
+        Act::Hear(Hear::BiasRequest),
+        Act::Hear(Hear::Report),
+        Act::Hear(Hear::Imu(1)),
+        Act::Fail(Unsent::CutOff),
+        Act::ToDeadline(0),
+        Act::Run(600),
+    ],
 ];
 
 /// Calibrations, results and biases, with all kinds of answers.
-const CALIBRATION: &[Act] = &[
-    Act::Go(2),
-    Act::Calibrate(START, IMU),
-    Act::Calibrate(START, MAG),
-    Act::Calibrate(END, IMU),
-    Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine)),
-    Act::Hear(Hear::StartAck(IMU, ErrorCode::Damaged)),
-    Act::Hear(Hear::StartAck(MAG, ErrorCode::Fine)),
-    Act::Hear(Hear::EndAck(IMU)),
-    Act::Hear(Hear::Imu(1)),
-    Act::Hear(Hear::Imu(2)),
-    Act::Hear(Hear::Mag(1)),
-    Act::Hear(Hear::BiasRequest),
-    Act::Hear(Hear::Pong),
-    Act::Hear(Hear::Unknown),
-    Act::Hear(Hear::Damaged),
-    Act::Hear(Hear::Echo),
-    Act::Show(3),
-    Act::Show(1),
-    Act::SetStore(true),
-    Act::SetStore(false),
-    Act::TakeEvent,
-    DONE,
-    LOST,
-    BACK,
-    CUT,
-    Act::One,
-    Act::Fail(Unsent::Untouched),
-    Act::Fail(Unsent::Unflushed),
-    Act::Wait(500_000),
-    Act::ToDeadline(0),
-    Act::ToDeadline(1),
-    Act::Run(700),
+const CALIBRATION: Menu = &[
+    Act::FATES,
+    &[
+        Act::Call(Go(2)),
+        Act::Call(Calibrate(START, IMU)),
+        Act::Call(Calibrate(START, MAG)),
+        Act::Call(Calibrate(END, IMU)),
+        Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine)),
+        Act::Hear(Hear::StartAck(IMU, ErrorCode::Damaged)),
+        Act::Hear(Hear::StartAck(MAG, ErrorCode::Fine)),
+        Act::Hear(Hear::EndAck(IMU)),
+        Act::Hear(Hear::Imu(1)),
+        Act::Hear(Hear::Imu(2)),
+        Act::Hear(Hear::Mag(1)),
+        Act::Hear(Hear::BiasRequest),
+        Act::Hear(Hear::Pong),
+        Act::Hear(Hear::Unknown),
+        Act::Hear(Hear::Damaged),
+        Act::Hear(Hear::Echo),
+        Act::Call(Show(3)),
+        Act::Call(Show(1)),
+        Act::Call(SetStore(true)),
+        Act::Call(SetStore(false)),
+        Act::TakeEvent,
+        Act::Wait(500_000),
+        Act::ToDeadline(0),
+        Act::ToDeadline(1),
+        Act::Run(700),
+    ],
 ];
 
 /// Frames in halves, among whole ones.
-const HALVES: &[Act] = &[
+const HALVES: Menu = &[&[
     Act::Hear(Hear::Front),
     Act::Hear(Hear::Rest),
     Act::Hear(Hear::Imu(2)),
     Act::Hear(Hear::Pong),
     Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine)),
     Act::Hear(Hear::Damaged),
-    Act::Go(1),
-    Act::Calibrate(START, IMU),
+    Act::Call(Go(1)),
+    Act::Call(Calibrate(START, IMU)),
     DONE,
     Act::ToDeadline(0),
     Act::Wait(1_000),
-];
+]];
 
-fn site(menu: &'static [Act]) -> Site {
+fn site(menu: Menu) -> Site {
     Site::new(HostConfig::default(), false, menu)
 }
 
-impl Site {
-    fn undrained(mut self) -> Self {
-        self.takes_events = false;
-        self
-    }
-}
-
 /// A host that only listens until it is called.
-fn listening(menu: &'static [Act]) -> Site {
+fn listening(menu: Menu) -> Site {
     let mut config = HostConfig::default();
     config.sends_first_stop = false;
     Site::new(config, false, menu)
 }
 
-fn low_ids_only(menu: &'static [Act]) -> Site {
+fn low_ids_only(menu: Menu) -> Site {
     let mut config = HostConfig::default();
     config.low_ids_only = true;
     Site::new(config, false, menu)
@@ -153,27 +133,27 @@ fn full(room: usize) -> Site {
 
 pub(crate) fn motion(run: &mut Run) {
     run.world("fresh", Depth(3, 6), site(MOTION));
-    run.world("driving", Depth(3, 6), site(MOTION).after(&[DONE, Act::Go(1), DONE]));
-    let owed = [DONE, Act::Go(2), DONE, Act::Wait(5_000), Act::Stop, CUT];
+    run.world("driving", Depth(3, 6), site(MOTION).after(&[DONE, Act::Call(Go(1)), DONE]));
+    let owed = [DONE, Act::Call(Go(2)), DONE, Act::Wait(5_000), Act::Call(Stop), Act::CUT];
     run.world("a stop is owed", Depth(3, 6), site(MOTION).after(&owed));
     run.world("listening", Depth(2, 6), listening(MOTION));
 }
 
 pub(crate) fn updates(run: &mut Run) {
     run.world("standing", Depth(2, 5), site(UPDATE).after(&[DONE]));
-    run.world("requested", Depth(2, 5), site(UPDATE).after(&[DONE, Act::Update]));
-    let silent = [DONE, Act::Update, DONE];
+    run.world("requested", Depth(2, 5), site(UPDATE).after(&[DONE, Act::Call(Update)]));
+    let silent = [DONE, Act::Call(Update), DONE];
     run.world("updating", Depth(2, 5), site(UPDATE).after(&silent));
-    let in_flight = [DONE, Act::Update, Act::One, Act::One];
+    let in_flight = [DONE, Act::Call(Update), Act::One, Act::One];
     let asking = site(UPDATE).after(&in_flight);
-    run.world("stopped while requesting", Depth(2, 5), asking.clone().after(&[Act::Stop]));
+    run.world("stopped while requesting", Depth(2, 5), asking.clone().after(&[Act::Call(Stop)]));
     run.world("requesting", Depth(2, 5), asking);
     run.world("listening", Depth(2, 5), listening(UPDATE));
     run.world("low ids only", Depth(2, 5), low_ids_only(UPDATE));
 }
 
 pub(crate) fn calibrations(run: &mut Run) {
-    let asked = [DONE, Act::Calibrate(START, IMU), DONE];
+    let asked = [DONE, Act::Call(Calibrate(START, IMU)), DONE];
     run.world("requested", Depth(2, 4), site(CALIBRATION).after(&asked));
     let started = Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine));
     let running = site(CALIBRATION).after(&asked).after(&[started, DONE]);
@@ -193,7 +173,7 @@ pub(crate) fn queues(run: &mut Run) {
     run.world("room for one", Depth(2, 4), full(1));
     let last_room = full(1).after(&[Act::Hear(Hear::Imu(1))]);
     run.world("an acknowledgement is due", Depth(2, 4), last_room);
-    let asked = [Act::Calibrate(START, IMU), DONE];
+    let asked = [Act::Call(Calibrate(START, IMU)), DONE];
     run.world("full, with a request", Depth(2, 4), full(0).after(&asked));
     let reports = [Act::Hear(Hear::Report)].repeat(8);
     let busy = site(CALIBRATION).undrained().after(&[DONE]).after(&reports);
@@ -206,9 +186,9 @@ fn hosts_that_differ_in_time_and_counters_alone_have_the_same_fingerprint() {
     let silent = site(MOTION).after(&[Act::Run(3_000)]);
     // Two motor commands and two pings later, a common multiple of their periods.
     let later = silent.clone().after(&[Act::Run(1_000)]);
-    assert_ne!(format!("{:?}", silent.host), format!("{:?}", later.host));
+    assert_ne!(format!("{:?}", silent.role), format!("{:?}", later.role));
     assert_eq!(silent.fingerprint(), later.fingerprint());
-    for act in [Act::Go(1), Act::Stop, Act::Show(1), Act::One, Act::Wait(1_000)] {
+    for act in [Act::Call(Go(1)), Act::Call(Stop), Act::Call(Show(1)), Act::One, Act::Wait(1_000)] {
         let other = silent.clone().after(&[act]);
         let is_new = other.fingerprint() != silent.fingerprint();
         // A poll without a result changes nothing.

@@ -112,6 +112,7 @@ mod robot_starts;
 mod rulings;
 mod run;
 mod search;
+mod site;
 mod slave;
 mod sleep;
 mod starts;

@@ -8,9 +8,10 @@ pub(crate) use axlewire::{
         board::{OneMotor, ThreeMotors},
         master::{Health, MasterConfig, Polling},
     },
+    stream::Counters,
     time::{Duration, Instant, wire_time},
     ucp::{
-        Frame, Host, Message, MotorControl, Telemetry,
+        Frame, Host, Message, MotorControl, Robot, Telemetry,
         host::{CalibrationStep, HostConfig, HostEvent},
         message::{CalibrationKind, ErrorCode, ImuBias, MagBias, NetworkState, OtaStatus, Pong},
         robot::{RobotConfig, RobotEvent},

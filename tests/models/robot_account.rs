@@ -2,8 +2,7 @@
 
 use super::{
     names::*,
-    robot_checks::{imu, mag},
-    ucp::{Checked, halted, ms},
+    ucp::{Checked, halted, imu, mag, ms},
 };
 
 /// Something that is sent every 1000 ms until the host has it (U11).
@@ -88,7 +87,6 @@ pub(crate) struct Account {
     pub(crate) report_at: Option<Instant>,
     pub(crate) network: Option<u32>,
     last: Option<Last>,
-    pub(crate) is_unflushed: bool,
     index: u8,
 }
 
@@ -112,7 +110,6 @@ impl Account {
             report_at: None,
             network: None,
             last: None,
-            is_unflushed: false,
             index: 0,
         }
     }
@@ -135,7 +132,6 @@ impl Account {
     pub(crate) fn frame(&mut self, bytes: &[u8], now: Instant) -> Checked {
         let frame = Frame::parse(bytes).map_err(|error| format!("not a frame: {error:?}"))?;
         let message = frame.message();
-        self.is_unflushed = true;
         let is_fine = |err| err == ErrorCode::Fine;
         let (is_right, last) = match message {
             Message::Pong(pong) => {
@@ -203,7 +199,6 @@ impl Account {
             _ => {}
         }
         if !is_lost {
-            self.is_unflushed = false;
             for repeat in [&mut self.imu, &mut self.mag, &mut self.bias_request] {
                 repeat.earliest = now;
             }

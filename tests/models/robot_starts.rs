@@ -2,26 +2,25 @@
 
 use super::{
     names::*,
-    robot::{Act, Hear, Rover},
+    robot::{Act, Call::*, Hear, RobotSide, Rover},
     run::{Depth, Run},
-    ucp::Fate,
+    site,
 };
+
+type Menu = site::Menu<RobotSide>;
 
 const IMU: CalibrationKind = CalibrationKind::Imu;
 const MAG: CalibrationKind = CalibrationKind::Magnetometer;
 
-const DONE: Act = Act::Round(Fate::Flushed);
-const LOST: Act = Act::Round(Fate::NotFlushed);
-const BACK: Act = Act::Round(Fate::First(Unsent::Untouched));
-const CUT: Act = Act::Round(Fate::First(Unsent::CutOff));
+const DONE: Act = Act::DONE;
 
 /// Motor commands of all kinds, damaged, old and in halves, and frames that must not count as one.
-const MOTION: &[Act] = &[
+const MOTION: Menu = &[&[
     Act::Hear(Hear::Motor(1)),
     Act::Hear(Hear::Motor(2)),
     Act::Hear(Hear::Motor(3)),
     Act::Hear(Hear::Motor(4)),
-    Act::HearOld(Hear::Motor(1)),
+    Act::Call(HearOld(Hear::Motor(1))),
     Act::Hear(Hear::MotorUpdate),
     Act::Hear(Hear::DamagedMotor),
     Act::Hear(Hear::Ping),
@@ -30,8 +29,8 @@ const MOTION: &[Act] = &[
     Act::Hear(Hear::Front),
     Act::Hear(Hear::Rest),
     Act::Hear(Hear::LongFront),
-    Act::TakeCommand,
-    Act::TakeEvents,
+    Act::Call(TakeCommand),
+    Act::Call(TakeEvents),
     DONE,
     Act::Wait(1_000),
     Act::Wait(300_000),
@@ -41,51 +40,47 @@ const MOTION: &[Act] = &[
     Act::Wait(10_000_000),
     Act::Run(499),
     Act::Run(600),
-];
+]];
 
 /// Everything that a host can request, and every fate of the answers.
-const ANSWERS: &[Act] = &[
-    Act::Hear(Hear::Motor(2)),
-    Act::Hear(Hear::MotorUpdate),
-    Act::Hear(Hear::Ping),
-    Act::Hear(Hear::Start(IMU)),
-    Act::Hear(Hear::Start(MAG)),
-    Act::Hear(Hear::End(IMU)),
-    Act::Hear(Hear::End(MAG)),
-    Act::Hear(Hear::ImuAck(ErrorCode::Fine)),
-    Act::Hear(Hear::ImuAck(ErrorCode::Damaged)),
-    Act::Hear(Hear::MagAck),
-    Act::Hear(Hear::Biases),
-    Act::Hear(Hear::Update),
-    Act::Hear(Hear::Show(3)),
-    Act::Telemetry(50),
-    Act::Telemetry(49),
-    Act::Imu(1),
-    Act::Imu(2),
-    Act::Mag(1),
-    Act::Abort,
-    Act::AnswerUpdate(OtaStatus::Forbidden),
-    Act::TakeEvent,
-    DONE,
-    LOST,
-    BACK,
-    CUT,
-    Act::One,
-    Act::Fail(Unsent::Untouched),
-    Act::Fail(Unsent::CutOff),
-    Act::Fail(Unsent::Unflushed),
-    Act::Wait(45_000),
-    Act::ToDeadline(0),
-    Act::ToDeadline(1),
-    Act::Run(1_100),
+const ANSWERS: Menu = &[
+    Act::FATES,
+    &[
+        Act::Hear(Hear::Motor(2)),
+        Act::Hear(Hear::MotorUpdate),
+        Act::Hear(Hear::Ping),
+        Act::Hear(Hear::Start(IMU)),
+        Act::Hear(Hear::Start(MAG)),
+        Act::Hear(Hear::End(IMU)),
+        Act::Hear(Hear::End(MAG)),
+        Act::Hear(Hear::ImuAck(ErrorCode::Fine)),
+        Act::Hear(Hear::ImuAck(ErrorCode::Damaged)),
+        Act::Hear(Hear::MagAck),
+        Act::Hear(Hear::Biases),
+        Act::Hear(Hear::Update),
+        Act::Hear(Hear::Show(3)),
+        Act::Call(Telemetry(50)),
+        Act::Call(Telemetry(49)),
+        Act::Call(Imu(1)),
+        Act::Call(Imu(2)),
+        Act::Call(Mag(1)),
+        Act::Call(Abort),
+        Act::Call(AnswerUpdate(OtaStatus::Forbidden)),
+        Act::TakeEvent,
+        Act::Fail(Unsent::CutOff),
+        Act::Wait(45_000),
+        Act::ToDeadline(0),
+        Act::ToDeadline(1),
+        Act::Run(1_100),
+    ],
 ];
 
-fn rover(menu: &'static [Act]) -> Rover {
+fn rover(menu: Menu) -> Rover {
     Rover::new(RobotConfig::default(), menu)
 }
 
 /// A robot that requests nothing.
-fn quiet(menu: &'static [Act]) -> Rover {
+fn quiet(menu: Menu) -> Rover {
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
     Rover::new(config, menu)
@@ -103,7 +98,7 @@ fn full(room: usize) -> Rover {
 
 pub(crate) fn motion(run: &mut Run) {
     run.world("fresh", Depth(2, 5), quiet(MOTION));
-    let driving = [Act::Hear(Hear::Motor(1)), Act::TakeCommand, DONE];
+    let driving = [Act::Hear(Hear::Motor(1)), Act::Call(TakeCommand), DONE];
     run.world("driving", Depth(3, 5), quiet(MOTION).after(&driving));
     let changes = [Act::Hear(Hear::Motor(1)), Act::Hear(Hear::Motor(2))].repeat(6);
     let left = quiet(MOTION).undrained().after(&changes);
@@ -112,9 +107,9 @@ pub(crate) fn motion(run: &mut Run) {
 
 pub(crate) fn answers(run: &mut Run) {
     run.world("fresh", Depth(2, 4), rover(ANSWERS));
-    let reporting = [Act::Telemetry(50), Act::Hear(Hear::Start(IMU)), DONE];
+    let reporting = [Act::Call(Telemetry(50)), Act::Hear(Hear::Start(IMU)), DONE];
     run.world("calibrating", Depth(2, 4), rover(ANSWERS).after(&reporting));
-    let results = [Act::Imu(1), Act::Mag(1), DONE];
+    let results = [Act::Call(Imu(1)), Act::Call(Mag(1)), DONE];
     run.world("results", Depth(2, 4), rover(ANSWERS).after(&reporting).after(&results));
     let due = [Hear::Ping, Hear::Start(IMU), Hear::End(IMU), Hear::End(MAG)].map(Act::Hear);
     run.world("answers are due", Depth(2, 4), rover(ANSWERS).after(&[DONE]).after(&due));
@@ -125,5 +120,9 @@ pub(crate) fn answers(run: &mut Run) {
 pub(crate) fn queues(run: &mut Run) {
     run.world("full", Depth(2, 4), full(0));
     run.world("room for one", Depth(2, 4), full(1));
-    run.world("full, with results", Depth(2, 4), full(0).after(&[Act::Imu(1), Act::Mag(1), DONE]));
+    run.world(
+        "full, with results",
+        Depth(2, 4),
+        full(0).after(&[Act::Call(Imu(1)), Act::Call(Mag(1)), DONE]),
+    );
 }

@@ -1,6 +1,6 @@
 //! What the worlds of a host and of a robot share: received frames, time, and the state of a port.
 
-use axlewire::{crc16, stream::Counters, ucp::Body};
+use axlewire::{crc16, ucp::Body};
 
 use super::{fingerprint::Merge, names::*};
 
@@ -49,6 +49,14 @@ pub(crate) const fn ms(millis: u32) -> Duration {
 
 pub(crate) fn bytes<B: Body>(body: B) -> Vec<u8> {
     body.frame(0).as_bytes().to_vec()
+}
+
+pub(crate) fn imu(value: i16) -> ImuBias {
+    ImuBias::new([value; 3], [-value; 3])
+}
+
+pub(crate) fn mag(value: i16) -> MagBias {
+    MagBias::new([value; 3])
 }
 
 /// Speed and turn 0, the lamp unchanged.
