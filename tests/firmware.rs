@@ -25,6 +25,9 @@ mod driver_enable_pin;
 /// The firmware master.
 #[path = "firmware/master.rs"]
 mod master;
+/// What they use of the library.
+#[path = "firmware/names.rs"]
+mod names;
 /// The firmware on a noisy wire.
 #[path = "firmware/noise.rs"]
 mod noise;

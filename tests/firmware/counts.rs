@@ -1,16 +1,11 @@
 //! Whatever the firmware counts is compared with what was sent and heard here. The counters of the
 //! USART, which QEMU never moves, are those of `uart.rs`.
 
-use axlewire::{
-    crc16,
-    encode::Encode,
-    ikeya::{NodeId, ReadRequest, WriteRequest},
-    time::Duration,
-    ucp::{Body, message::Ping},
-};
+use axlewire::crc16;
 
 use crate::{
     master::Nodes,
+    names::*,
     qemu::{Board, PATIENCE, Program},
     slave::{NODE, rps},
     wire::Wire,
@@ -71,7 +66,7 @@ fn a_master_counts_the_requests_that_its_nodes_hear_and_the_answers_that_they_se
     let Some(mut board) = Board::start(Program::Master) else { return };
     let wire = Wire::new(board.bus());
     let clock = wire.clock();
-    let mut bus = axlewire::drive::Driver::new(Nodes::new(), wire, clock);
+    let mut bus = Driver::new(Nodes::new(), wire, clock);
     let end = bus.now() + Duration::from_millis(3000);
     bus.run_until(end, |_, _, _| {}).unwrap();
     let told = board.report_when("told", |_| true);

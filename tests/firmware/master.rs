@@ -3,19 +3,13 @@
 use std::{collections::HashSet, io, os::unix::net::UnixStream, thread};
 
 use axlewire::{
-    drive::Driver,
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position, Response, Rps, Slave, Target, ToMaster, ToSlave,
-        slave::{SlaveConfig, SlaveEvent},
-    },
-    sim::{Motor, MotorNode},
-    stream::Frames,
-    time::{Duration, Instant},
+    ikeya::{Slave, ToSlave},
+    sim::Motor,
 };
 
 use crate::{
     driver_enable_pin,
+    names::*,
     qemu::{Board, PATIENCE, Program},
     wire::{Wire, WireClock},
 };

@@ -2,23 +2,9 @@
 
 use std::{collections::HashSet, time::Instant};
 
-use axlewire::{
-    drive::Driver,
-    ikeya::{
-        Mode, NodeId, Position, Rps, Target,
-        master::{Health, MasterConfig, MasterEvent, Polling},
-        slave::SlaveEvent,
-    },
-    time::Duration,
-    ucp::{
-        MotorControl,
-        host::{HostEvent, MemoryStore},
-        message::{ImuBias, MagBias},
-    },
-};
-
 use crate::{
     master::Nodes,
+    names::*,
     qemu::{Board, PATIENCE, Program},
     robot::{board_shows, end_of, linked_by, patient, wheels_turn_at},
     slave::{Bus, NODE, is_turning_at, master_on, rps},

@@ -1,19 +1,9 @@
 //! What the programs do on a board that QEMU cannot show, on this machine: from the files of the
 //! firmware that need no hardware.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        BAUD, Master, Mode, NodeId, Rps,
-        master::{MasterConfig, MasterEvent},
-        slave::SlaveConfig,
-    },
-    sim::{Line, MotorNode},
-    time::{Duration, Instant},
-    ucp::robot::RobotConfig,
-};
+use axlewire::{ikeya::BAUD, sim::Line, ucp::robot::RobotConfig};
 
-use crate::{config::Configs, text_line::TextLine};
+use crate::{config::Configs, names::*, text_line::TextLine};
 
 /// What an emulator may delay a byte by.
 const LONG: Duration = Duration::from_millis(100);

@@ -2,18 +2,14 @@
 
 use std::os::unix::net::UnixStream;
 
-use axlewire::{
-    drive::Driver,
-    sim::Rng,
-    time::Duration,
-    ucp::{
-        Body, Host, MotorControl,
-        host::{HostConfig, HostEvent, Link, MemoryStore},
-        message::{CalibrationKind, ImuBias, MagBias, NetworkState, OtaStatus, Ping},
-    },
+use axlewire::ucp::{
+    Host,
+    host::{HostConfig, Link},
+    message::{CalibrationKind, NetworkState, OtaStatus},
 };
 
 use crate::{
+    names::*,
     qemu::{Board, PATIENCE, Program, Report},
     wire::{Wire, WireClock},
 };
@@ -47,7 +43,7 @@ pub(crate) fn linked_by(
     Some((board, Driver::new(host, wire, clock)))
 }
 
-pub(crate) fn end_of(rover: &mut Rover) -> axlewire::time::Instant {
+pub(crate) fn end_of(rover: &mut Rover) -> Instant {
     rover.now() + Duration::from_millis(PATIENCE.as_millis() as u32)
 }
 

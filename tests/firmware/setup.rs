@@ -1,9 +1,8 @@
 //! The registers that the images write at their start, from QEMU's log. QEMU has neither pins nor
 //! baud rates, so nothing else would notice a wrong one; a board would be mute.
 
-use axlewire::ucp::{Body, MotorControl};
-
 use crate::{
+    names::*,
     qemu::{Board, Program},
     wire::Wire,
 };

@@ -1,19 +1,10 @@
 //! The firmware slave against a master on this machine.
 
-use axlewire::{
-    drive::Driver,
-    encode::Encode,
-    ikeya::{
-        self, Master, Mode, NodeId, ReadRequest, Response, Rps, ToMaster, WriteRequest,
-        master::{Health, MasterConfig, MasterEvent, Polling},
-    },
-    sim::Rng,
-    stream::{Event, Frames},
-    time::Duration,
-};
+use axlewire::{ikeya, stream::Event};
 
 use crate::{
     driver_enable_pin,
+    names::*,
     qemu::{Board, PATIENCE, Program, Report},
     wire::{Wire, WireClock},
 };

@@ -15,7 +15,9 @@ use std::{
     time::{Duration, Instant as Clock},
 };
 
-use axlewire::{drive, sim::Rng, time::Instant};
+use axlewire::drive;
+
+use crate::names::*;
 
 /// Disturbs the bytes of one direction: flips a bit in about one byte in 60, and inserts a stray
 /// byte before about one in 100, half of the time one that begins a packet.

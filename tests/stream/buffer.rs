@@ -1,15 +1,8 @@
 //! The buffer of a decoder: frames in pieces, frames that are not copied, copies, and overflow.
 
-use axlewire::{
-    ikeya,
-    stream::{Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
-    ucp::{self, Ucp},
-};
+use axlewire::{ikeya, ucp};
 
-use crate::{
-    checked_line,
-    rig::{Seen, motor, response, seen},
-};
+use crate::{checked_line, rig::*};
 
 #[test]
 fn a_frame_cut_anywhere_arrives_whole() {

@@ -1,15 +1,13 @@
 //! Dense headers, where candidates are rejected in batches, against the slow oracle.
 
-use axlewire::{
-    ikeya::{BothDirections, ToMaster, ToSlave, three},
-    ucp::Ucp,
-};
+use axlewire::ikeya::{BothDirections, ToMaster, ToSlave};
 use proptest::{collection::vec, prelude::*, sample::select};
 
 use crate::{
     checked_line::{self, CheckedLine, Op},
     known_framings::Known,
     oracle::{self, Rules},
+    rig::*,
 };
 
 /// `x^15 + x + 1`: added to a good CRC, it leaves a multiple of itself, of odd parity.

@@ -1,15 +1,8 @@
 //! False headers, damage and nested frames: no good frame is lost, none is invented.
 
-use axlewire::{
-    ikeya::{self, NodeId, Position, three},
-    stream::{Event, Reason},
-    ucp::{self, Ucp},
-};
+use axlewire::{ikeya, ucp};
 
-use crate::{
-    hostile_streams,
-    rig::{Seen, motor, read, response, seen, write},
-};
+use crate::{hostile_streams, rig::*};
 
 #[test]
 fn a_false_header_swallows_nothing() {

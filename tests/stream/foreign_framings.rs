@@ -1,9 +1,9 @@
 //! Foreign framings: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
-use axlewire::stream::{
-    Counters, Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict, decode_capture,
-};
+use axlewire::stream::{OneByOne, decode_capture};
+
+use crate::rig::*;
 
 /// A framing that breaks its contract.
 struct Liar<const LIE: u8>;

@@ -8,17 +8,14 @@
 //! `cargo test --test stream noise -- --nocapture` prints the figures. `cargo bench --bench noise`
 //! sends over the same lines and shows them for every way to decode.
 
-use axlewire::{
-    ikeya::{self, three},
-    stream::{Decoder, Event, Frames},
-    ucp::Ucp,
-};
+use axlewire::ikeya;
 
 use crate::{
     dice::Dice,
     known_framings::Known,
     noisy_line::{Arrival, Noise, Place, Tally, transmit},
     oracle,
+    rig::*,
     traffic::Traffic,
 };
 

@@ -1,11 +1,7 @@
 //! Properties of every framing on hostile streams: whatever a user does, the decoder gives the same
 //! result as the slow oracle, and neither delay nor work grows without bound.
 
-use axlewire::{
-    ikeya::{self, three},
-    stream::Framing,
-    ucp::Ucp,
-};
+use axlewire::ikeya;
 use proptest::{collection::vec, prelude::*};
 
 use crate::{
@@ -13,7 +9,9 @@ use crate::{
     hostile_streams,
     judged_work::check_work,
     known_framings::Known,
-    oracle, split,
+    oracle,
+    rig::*,
+    split,
 };
 
 macro_rules! properties {

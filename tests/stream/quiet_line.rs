@@ -1,16 +1,8 @@
 //! Delay and silence: how long a false header holds frames back, and what a quiet line ends.
 
-use axlewire::{
-    ikeya,
-    stream::{Decoder, Event, Gap, Reason},
-    ucp::Ucp,
-};
+use axlewire::ikeya;
 
-use crate::{
-    checked_line::CheckedLine,
-    oracle,
-    rig::{Seen, motor, read, response, seen, write},
-};
+use crate::{checked_line::CheckedLine, oracle, rig::*};
 
 #[test]
 fn the_longest_false_header_delays_a_frame_by_at_most_a_longest_frame() {

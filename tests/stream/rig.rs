@@ -1,9 +1,11 @@
 //! Helpers of the scenarios: packets, and a decoder's output for them.
 
-use axlewire::{
-    ikeya::{self, NodeId, Rps},
-    stream::{Decoder, Event, Gap, Reason},
-    ucp::{Body, MotorControl},
+use axlewire::{ikeya, ucp::MotorControl};
+/// What the tests of streams use of the library.
+pub(crate) use axlewire::{
+    ikeya::{NodeId, Position, Rps, three},
+    stream::{Counters, Decoder, Event, Frames, Framing, Gap, Reason, Verdict},
+    ucp::{Body, Ucp},
 };
 
 use crate::known_framings::Known;

@@ -2,16 +2,13 @@
 //! oracle: streams long enough for lanes, damaged everywhere.
 
 use axlewire::{
-    ikeya::{
-        self, NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest,
-        three,
-    },
+    ikeya::{self, PositionResponse, ReadRequest, VelocityResponse, WriteRequest},
     stream::Portable,
-    ucp::{self, Body, Ucp},
+    ucp,
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::{checked_line, hostile_streams, known_framings::Known, oracle, rig};
+use crate::{checked_line, hostile_streams, known_framings::Known, oracle, rig::*};
 
 /// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {
@@ -158,8 +155,8 @@ fn decoders_with_and_without_batches_agree() {
     for chunk in [1, 64, 200, 5000] {
         let chunks: Vec<_> = stream.chunks(chunk).collect();
         assert_eq!(
-            rig::seen::<ikeya::BothDirections, 8>(&chunks, true),
-            rig::seen::<Portable<ikeya::BothDirections>, 8>(&chunks, true)
+            seen::<ikeya::BothDirections, 8>(&chunks, true),
+            seen::<Portable<ikeya::BothDirections>, 8>(&chunks, true)
         );
     }
 }

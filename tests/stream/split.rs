@@ -1,11 +1,11 @@
 //! Splitting a capture: the sides, decoded apart, give what the oracle says of the whole.
 
-use axlewire::stream::{self, Counters, Decoder, Event, Frames, Framing, Gap, Reason};
+use axlewire::stream;
 
 use crate::{
     known_framings::Known,
     oracle::{self, Answer},
-    rig::{self, motor, response},
+    rig::*,
 };
 
 /// What the oracle says of the whole is what it says of both sides of every place, one after the
@@ -83,8 +83,8 @@ fn a_frame_that_another_one_contains_is_no_place() {
     let mut outer = [&[0xFD, 0xFF, 12, 0, 0x20, 0][..], &ping, &[0, 0]].concat();
     oracle::seal(&mut outer);
     let bytes = [&outer[..], &motor()].concat();
-    assert_eq!(stream::split_point::<axlewire::ucp::Ucp>(&bytes, 1), Some(bytes.len()));
-    assert_eq!(stream::split_point::<axlewire::ucp::Ucp>(&bytes, 0), Some(outer.len()));
+    assert_eq!(stream::split_point::<Ucp>(&bytes, 1), Some(bytes.len()));
+    assert_eq!(stream::split_point::<Ucp>(&bytes, 0), Some(outer.len()));
 }
 
 #[test]
@@ -95,9 +95,9 @@ fn a_frame_that_overlaps_the_one_before_is_no_place() {
     bytes.extend([1, 2, 0, 0]);
     oracle::seal(&mut bytes[6..]);
     bytes.extend(motor());
-    check_split_points::<axlewire::ucp::Ucp>(&bytes);
+    check_split_points::<Ucp>(&bytes);
     // A search from inside the first frame meets the second.
-    assert_eq!(stream::split_point::<axlewire::ucp::Ucp>(&bytes, 1), Some(bytes.len()));
+    assert_eq!(stream::split_point::<Ucp>(&bytes, 1), Some(bytes.len()));
 }
 
 #[test]
@@ -125,9 +125,9 @@ fn a_damaged_frame_that_reaches_over_the_place_moves_it() {
     let place = stream::split_point::<axlewire::ucp::Ucp>(&bytes, 0).unwrap();
     assert_eq!(place, 4 + 2 * motor().len());
     type Ucp = axlewire::ucp::Ucp;
-    let (seen, pending) = rig::seen::<Ucp, 256>(&[&bytes[..place]], true);
+    let (seen, pending) = seen::<Ucp, 256>(&[&bytes[..place]], true);
     assert_eq!((seen.len(), pending), (3, 0));
-    assert_eq!(seen[0], rig::Seen::Gap(4, Reason::Crc));
+    assert_eq!(seen[0], Seen::Gap(4, Reason::Crc));
 }
 
 #[test]
@@ -151,13 +151,13 @@ fn a_framing_that_breaks_its_contract_only_moves_the_place() {
         const MIN_LEN: usize = 1;
         const MAX_LEN: usize = 4;
 
-        fn judge(bytes: &[u8]) -> stream::Verdict {
+        fn judge(bytes: &[u8]) -> Verdict {
             match bytes.first() {
-                None => stream::Verdict::Partial { need: 0 },
-                Some(&len @ ..10) => stream::Verdict::Frame { len: len.into() },
-                Some(10) => stream::Verdict::Frame { len: usize::MAX },
-                Some(11) => stream::Verdict::Reject { reason: Reason::Header, more: usize::MAX },
-                Some(_) => stream::Verdict::Partial { need: 0 },
+                None => Verdict::Partial { need: 0 },
+                Some(&len @ ..10) => Verdict::Frame { len: len.into() },
+                Some(10) => Verdict::Frame { len: usize::MAX },
+                Some(11) => Verdict::Reject { reason: Reason::Header, more: usize::MAX },
+                Some(_) => Verdict::Partial { need: 0 },
             }
         }
 

@@ -2,11 +2,9 @@
 
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "alloc"))]
 
-use axlewire::{
-    ikeya::BothDirections,
-    stream::{Event, Framing, Gap, Reason, decode_capture},
-    ucp::Ucp,
-};
+use axlewire::stream::decode_capture;
+
+use crate::rig::*;
 
 /// Offset, length, and the reason of a gap or `None` for a frame.
 type Span = (usize, usize, Option<Reason>);

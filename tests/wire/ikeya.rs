@@ -2,19 +2,9 @@
 
 #![cfg(feature = "ikeya")]
 
-use axlewire::{
-    encode::Encode,
-    error::{EncodeError, ParseError},
-    ikeya::{
-        BothDirections, Mode, NodeId, Packet, Position, PositionResponse, ReadRequest, Request,
-        Response, Rps, VelocityResponse, WriteRequest,
-        slave::{DipSwitch, IdReading},
-        three,
-    },
-    stream::Frames,
-};
+use axlewire::ikeya::slave::{DipSwitch, IdReading};
 
-use crate::rig::sealed;
+use crate::rig::*;
 
 #[test]
 fn a_velocity_response_received_with_nan_or_infinity_is_not_encoded_again() {

@@ -2,10 +2,9 @@
 
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-use axlewire::{
-    ikeya::{self, NodeId, Position, Rps, three},
-    ucp::{self, Body, FrameOf, Telemetry},
-};
+use axlewire::{ikeya, ucp};
+
+use crate::rig::*;
 
 /// Asserts length and alignment 1 of a packet.
 macro_rules! is_packed {
@@ -17,17 +16,17 @@ macro_rules! is_packed {
 #[test]
 fn ikeya_packets_have_their_size_and_no_alignment() {
     is_packed! {
-        ikeya::ReadRequest: 4,
-        ikeya::WriteRequest: 8,
-        ikeya::VelocityResponse: 8,
-        ikeya::PositionResponse: 8,
+        ReadRequest: 4,
+        WriteRequest: 8,
+        VelocityResponse: 8,
+        PositionResponse: 8,
         three::WriteRequest: 16,
         three::VelocityResponse: 16,
         three::PositionResponse: 16,
         NodeId: 1,
     }
-    assert_eq!(ikeya::ReadRequest::LEN, 4);
-    assert_eq!(ikeya::WriteRequest::LEN, ikeya::MAX_LEN);
+    assert_eq!(ReadRequest::LEN, 4);
+    assert_eq!(WriteRequest::LEN, ikeya::MAX_LEN);
     assert_eq!(three::WriteRequest::LEN, three::MAX_LEN);
 }
 
@@ -35,34 +34,34 @@ fn ikeya_packets_have_their_size_and_no_alignment() {
 fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
     is_packed! {
         ucp::Header: 6,
-        ucp::message::Ping: 0,
-        ucp::message::Pong: 1,
-        ucp::MotorControl: 16,
-        ucp::message::RawMotorControl: 16,
-        ucp::message::CalibrationStart: 1,
-        ucp::message::CalibrationStartAck: 2,
-        ucp::message::CalibrationEnd: 1,
-        ucp::message::CalibrationEndAck: 2,
-        ucp::message::FirmwareReport: 36,
-        ucp::message::DocumentReport: 34,
-        ucp::message::ImuBias: 12,
-        ucp::message::ImuBiasAck: 1,
-        ucp::message::MagBias: 6,
-        ucp::message::MagBiasAck: 1,
-        ucp::message::BiasRequest: 0,
-        ucp::message::Biases: 19,
-        ucp::message::OtaRequest: 2,
-        ucp::message::RawOtaRequest: 2,
-        ucp::message::OtaAck: 1,
-        ucp::message::SetNetworkState: 1,
-        ucp::message::SetNetworkStateWide: 4,
-        FrameOf<ucp::message::Ping>: 8,
-        FrameOf<ucp::MotorControl>: 24,
-        FrameOf<ucp::message::FirmwareReport>: 44,
-        FrameOf<ucp::message::DocumentReport>: 42,
-        FrameOf<ucp::message::Biases>: 27,
+        Ping: 0,
+        Pong: 1,
+        MotorControl: 16,
+        RawMotorControl: 16,
+        CalibrationStart: 1,
+        CalibrationStartAck: 2,
+        CalibrationEnd: 1,
+        CalibrationEndAck: 2,
+        FirmwareReport: 36,
+        DocumentReport: 34,
+        ImuBias: 12,
+        ImuBiasAck: 1,
+        MagBias: 6,
+        MagBiasAck: 1,
+        BiasRequest: 0,
+        Biases: 19,
+        OtaRequest: 2,
+        RawOtaRequest: 2,
+        OtaAck: 1,
+        SetNetworkState: 1,
+        SetNetworkStateWide: 4,
+        FrameOf<Ping>: 8,
+        FrameOf<MotorControl>: 24,
+        FrameOf<FirmwareReport>: 44,
+        FrameOf<DocumentReport>: 42,
+        FrameOf<Biases>: 27,
     }
-    assert_eq!(FrameOf::<ucp::message::FirmwareReport>::LEN, 44);
+    assert_eq!(FrameOf::<FirmwareReport>::LEN, 44);
     assert_eq!((ucp::MAX_LEN, ucp::MAX_BODY_LEN, ucp::SYNC), (64, 56, [0xFD, 0xFF]));
 }
 
@@ -71,21 +70,21 @@ fn ikeya_fields_have_the_documented_offsets() {
     let id = NodeId::N7;
     let rps = |bits| Rps::new(f32::from_bits(bits)).unwrap();
     let position = Position::new(0x1234, 0x5678);
-    assert_eq!(ikeya::ReadRequest::new(id).as_bytes()[..2], [0xAA, 7]);
+    assert_eq!(ReadRequest::new(id).as_bytes()[..2], [0xAA, 7]);
     assert_eq!(
-        ikeya::WriteRequest::velocity(id, rps(0x4433_2211)).as_bytes()[..6],
+        WriteRequest::velocity(id, rps(0x4433_2211)).as_bytes()[..6],
         [0xBB, 7, 0x11, 0x22, 0x33, 0x44]
     );
     assert_eq!(
-        ikeya::WriteRequest::position(id, position).as_bytes()[..6],
+        WriteRequest::position(id, position).as_bytes()[..6],
         [0xBB, 7, 0x34, 0x12, 0x78, 0x56]
     );
     assert_eq!(
-        ikeya::VelocityResponse::new(id, rps(0x4433_2211)).as_bytes()[..6],
+        VelocityResponse::new(id, rps(0x4433_2211)).as_bytes()[..6],
         [0x55, 7, 0x11, 0x22, 0x33, 0x44]
     );
     assert_eq!(
-        ikeya::PositionResponse::new(id, position).as_bytes()[..6],
+        PositionResponse::new(id, position).as_bytes()[..6],
         [0x56, 7, 0x34, 0x12, 0x78, 0x56]
     );
 }
@@ -122,7 +121,7 @@ fn telemetry() -> Telemetry {
 
 #[test]
 fn the_firmware_report_is_in_the_order_of_the_firmware() {
-    let frame = ucp::message::FirmwareReport::new(&telemetry(), 0x2423).frame(9);
+    let frame = FirmwareReport::new(&telemetry(), 0x2423).frame(9);
     let body: Vec<u8> = (1..=36).collect();
     assert_eq!(frame.as_bytes()[..6], [0xFD, 0xFF, 40, 0, 5, 9]);
     assert_eq!(frame.as_bytes()[6..42], body);
@@ -130,7 +129,7 @@ fn the_firmware_report_is_in_the_order_of_the_firmware() {
 
 #[test]
 fn the_document_report_is_in_the_order_of_the_document() {
-    let frame = ucp::message::DocumentReport::new(&telemetry()).frame(9);
+    let frame = DocumentReport::new(&telemetry()).frame(9);
     let body: Vec<u8> = (1..=10).chain(0x1F..=0x22).chain(0x0B..=0x1E).collect();
     assert_eq!(frame.as_bytes()[..6], [0xFD, 0xFF, 38, 0, 5, 9]);
     assert_eq!(frame.as_bytes()[6..40], body);
@@ -138,7 +137,7 @@ fn the_document_report_is_in_the_order_of_the_document() {
 
 #[test]
 fn motor_control_is_in_the_order_of_the_document() {
-    let frame = ucp::MotorControl::new(-2, 100).unwrap().with_front_led(true).frame(3);
+    let frame = MotorControl::new(-2, 100).unwrap().with_front_led(true).frame(3);
     let expected =
         [0xFD, 0xFF, 20, 0, 2, 3, 0xFE, 0xFF, 100, 0, 100, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
     assert_eq!(frame.as_bytes()[..22], expected);
@@ -154,16 +153,16 @@ fn bytemuck_and_zerocopy_agree_on_what_is_a_packet() {
         for id in 0..=u8::MAX {
             let bytes = [header, id, 1, 2, 3, 4, 5, 6];
             let by_zerocopy = [
-                ikeya::ReadRequest::try_ref_from_bytes(&bytes[..4]).is_ok(),
-                ikeya::WriteRequest::try_ref_from_bytes(&bytes).is_ok(),
-                ikeya::VelocityResponse::try_ref_from_bytes(&bytes).is_ok(),
-                ikeya::PositionResponse::try_ref_from_bytes(&bytes).is_ok(),
+                ReadRequest::try_ref_from_bytes(&bytes[..4]).is_ok(),
+                WriteRequest::try_ref_from_bytes(&bytes).is_ok(),
+                VelocityResponse::try_ref_from_bytes(&bytes).is_ok(),
+                PositionResponse::try_ref_from_bytes(&bytes).is_ok(),
             ];
             let by_bytemuck = [
-                try_from_bytes::<ikeya::ReadRequest>(&bytes[..4]).is_ok(),
-                try_from_bytes::<ikeya::WriteRequest>(&bytes).is_ok(),
-                try_from_bytes::<ikeya::VelocityResponse>(&bytes).is_ok(),
-                try_from_bytes::<ikeya::PositionResponse>(&bytes).is_ok(),
+                try_from_bytes::<ReadRequest>(&bytes[..4]).is_ok(),
+                try_from_bytes::<WriteRequest>(&bytes).is_ok(),
+                try_from_bytes::<VelocityResponse>(&bytes).is_ok(),
+                try_from_bytes::<PositionResponse>(&bytes).is_ok(),
             ];
             let good_id = (1..=8).contains(&id);
             let expected = [0xAA, 0xBB, 0x55, 0x56].map(|good| good_id && header == good);
@@ -171,5 +170,5 @@ fn bytemuck_and_zerocopy_agree_on_what_is_a_packet() {
         }
     }
     let body = [7; 16];
-    assert_eq!(bytemuck::from_bytes::<ucp::message::RawMotorControl>(&body).speed(), 0x0707);
+    assert_eq!(bytemuck::from_bytes::<RawMotorControl>(&body).speed(), 0x0707);
 }

@@ -2,13 +2,7 @@
 //! accident.
 #![cfg(feature = "ucp")]
 
-use axlewire::{
-    encode::Encode,
-    error::EncodeError,
-    ucp::{Body, Frame, Message, MotorControl, message::RawMotorControl},
-};
-
-use crate::rig::frame;
+use crate::rig::*;
 
 #[test]
 fn a_speed_or_turn_out_of_range_is_an_error_with_the_value_and_the_limits() {

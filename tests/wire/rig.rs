@@ -1,5 +1,22 @@
 //! Packets made by hand, which the library itself might refuse to build.
-#![allow(dead_code, reason = "each protocol uses a part")]
+#![allow(dead_code, unused_imports, reason = "each protocol uses a part")]
+
+/// What the tests of packets and messages use of the library.
+#[cfg(feature = "ikeya")]
+pub(crate) use axlewire::ikeya::{
+    BothDirections, Mode, NodeId, Packet, Position, PositionResponse, ReadRequest, Request,
+    Response, Rps, VelocityResponse, WriteRequest, three,
+};
+#[cfg(feature = "ucp")]
+pub(crate) use axlewire::ucp::{
+    Body, Frame, FrameOf, Message, MotorControl, RawFrame, Telemetry, Ucp, message::*,
+};
+pub(crate) use axlewire::{
+    encode::Encode,
+    error::{EncodeError, ParseError},
+    stream::{Counters, Event, Frames, Framing, Gap, Reason},
+    time::{Duration, Instant},
+};
 
 /// These bytes with their CRC.
 pub(crate) fn sealed(bytes: &[u8]) -> Vec<u8> {

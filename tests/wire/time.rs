@@ -1,6 +1,8 @@
 //! Time: what saturates, what wraps, and where a line's time is rounded.
 
-use axlewire::time::{Duration, Instant, Wrapping32, wire_time};
+use axlewire::time::{Wrapping32, wire_time};
+
+use crate::rig::*;
 
 const US: fn(u32) -> Duration = Duration::from_micros;
 const AT: fn(u64) -> Instant = Instant::from_micros;

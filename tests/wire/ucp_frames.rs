@@ -3,18 +3,9 @@
 
 use std::collections::BTreeSet;
 
-use axlewire::{
-    crc16,
-    encode::Encode,
-    error::{EncodeError, ParseError},
-    stream::{Frames, Reason},
-    ucp::{
-        Body, Frame, FrameOf, Header, Message, MotorControl, RawFrame, Ucp,
-        message::{CalibrationKind, CalibrationStart, ErrorCode, Ping, Pong},
-    },
-};
+use axlewire::{crc16, ucp::Header};
 
-use crate::rig::frame;
+use crate::rig::*;
 
 #[test]
 fn parsing_one_frame_says_what_is_wrong_with_it() {

@@ -1,18 +1,9 @@
 //! Messages: which ids and bodies are known, and the meaning of their values.
 #![cfg(feature = "ucp")]
 
-use axlewire::{
-    encode::Encode,
-    error::EncodeError,
-    ucp::{
-        Body, Frame, Message, MessageId, Telemetry,
-        message::{
-            CalibrationKind, ErrorCode, NetworkState, OtaRequest, OtaStatus, SetNetworkState,
-        },
-    },
-};
+use axlewire::ucp::MessageId;
 
-use crate::rig::frame;
+use crate::rig::*;
 
 #[test]
 fn every_id_and_body_length_is_its_message_or_unknown_and_never_misread() {

@@ -5,24 +5,10 @@
 
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
-use axlewire::{
-    encode::Encode,
-    error::EncodeError,
-    ikeya::{self, NodeId, Position, Rps, three},
-    stream::{Counters, Event, Frames, Framing, Reason},
-    ucp::{
-        self, Body, Message, RawFrame,
-        message::{
-            Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind, CalibrationStart,
-            CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck,
-            MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Pong,
-            RawMotorControl, Report, SetNetworkState,
-        },
-    },
-};
+use axlewire::ikeya;
 use serde_json::Value;
 
-use crate::rig::{frame, hex};
+use crate::rig::*;
 
 struct Vector {
     protocol: String,
@@ -132,39 +118,39 @@ fn is_refused<F: Framing>(vector: &Vector, reason: Reason) {
 
 fn standard_vector(vector: &Vector) {
     let fields = &vector.fields;
-    let mut frames = Frames::<ikeya::BothDirections>::new(&vector.bytes);
+    let mut frames = Frames::<BothDirections>::new(&vector.bytes);
     let packet = frames.next().expect("a packet");
     assert_eq!(frames.counters().framed, vector.bytes.len() as u64);
     let id = NodeId::new(int(&fields["id"])).unwrap();
     let position = || Position::new(int(&fields["count"]), int(&fields["rotation"]));
     match packet {
-        ikeya::Packet::Request(ikeya::Request::Read(read)) => {
+        Packet::Request(Request::Read(read)) => {
             assert_eq!(read.id(), id);
-            assert_eq!(ikeya::ReadRequest::new(id).as_bytes()[..], vector.bytes);
+            assert_eq!(ReadRequest::new(id).as_bytes()[..], vector.bytes);
         }
-        ikeya::Packet::Request(ikeya::Request::Write(write)) => {
+        Packet::Request(Request::Write(write)) => {
             assert_eq!(write.id(), id);
             assert_eq!(write.as_bytes()[..], vector.bytes);
             if fields["rps_bits"].is_string() {
                 assert_eq!(write.as_velocity().to_bits(), bits(&fields["rps_bits"]));
-                let again = |rps: Vec<Rps>| ikeya::WriteRequest::velocity(id, rps[0]);
+                let again = |rps: Vec<Rps>| WriteRequest::velocity(id, rps[0]);
                 sent_if_finite(&[write.as_velocity()], again)
                     .inspect(|again| assert_eq!(again, write));
             } else {
                 assert_eq!(write.as_position(), position());
-                assert_eq!(ikeya::WriteRequest::position(id, position()), *write);
+                assert_eq!(WriteRequest::position(id, position()), *write);
             }
         }
-        ikeya::Packet::Response(ikeya::Response::Velocity(response)) => {
+        Packet::Response(Response::Velocity(response)) => {
             assert_eq!(response.id(), id);
             assert_eq!(response.rps().to_bits(), bits(&fields["rps_bits"]));
             assert_eq!(response.as_bytes()[..], vector.bytes);
-            let again = |rps: Vec<Rps>| ikeya::VelocityResponse::new(id, rps[0]);
+            let again = |rps: Vec<Rps>| VelocityResponse::new(id, rps[0]);
             sent_if_finite(&[response.rps()], again).inspect(|again| assert_eq!(again, response));
         }
-        ikeya::Packet::Response(ikeya::Response::Position(response)) => {
+        Packet::Response(Response::Position(response)) => {
             assert_eq!((response.id(), response.position()), (id, position()));
-            assert_eq!(ikeya::PositionResponse::new(id, position()).as_bytes()[..], vector.bytes);
+            assert_eq!(PositionResponse::new(id, position()).as_bytes()[..], vector.bytes);
         }
     }
 }
@@ -182,7 +168,7 @@ fn three_motor_vector(vector: &Vector) {
     };
     match packet {
         three::Packet::Request(three::Request::Read(read)) => {
-            assert_eq!(three::ReadRequest::new(id), *read);
+            assert_eq!(ReadRequest::new(id), *read);
             assert_eq!(read.as_bytes()[..], vector.bytes);
         }
         three::Packet::Request(three::Request::Write(write)) => {
@@ -217,7 +203,7 @@ fn three_motor_vector(vector: &Vector) {
 fn every_ucp_vector_decodes_to_its_fields_and_encodes_back() {
     let mut seen = std::collections::BTreeMap::<String, usize>::new();
     for vector in vectors("ucp.jsonl") {
-        let mut frames = Frames::<ucp::Ucp>::new(&vector.bytes);
+        let mut frames = Frames::<Ucp>::new(&vector.bytes);
         let frame = frames.next().expect("a frame");
         let trailing = vector.fields["trailing_bytes"].as_str().map_or(0, |hex| hex.len() / 2);
         let whole = &vector.bytes[..vector.bytes.len() - trailing];
@@ -259,7 +245,7 @@ fn every_ucp_vector_decodes_to_its_fields_and_encodes_back() {
 }
 
 /// Compares the fields, builds the frame again from them, and names the message.
-fn check_ucp_fields(frame: &ucp::Frame, fields: &Value) -> &'static str {
+fn check_ucp_fields(frame: &Frame, fields: &Value) -> &'static str {
     fn built(body: impl Body, index: u8) -> Vec<u8> {
         body.frame(index).as_bytes().to_vec()
     }
@@ -358,7 +344,7 @@ fn motor_control(command: &RawMotorControl, fields: &Value, index: u8) -> Vec<u8
     assert_eq!(command.starts_update(), command.version() as i16 > 38);
 
     let legal = (-100..=100).contains(&speed) && (-100..=100).contains(&angular);
-    let built = ucp::MotorControl::new(speed, angular);
+    let built = MotorControl::new(speed, angular);
     assert_eq!(built.is_ok(), legal);
     if let Ok(built) = built {
         let ordinary = built.with_front_led(command.front_led() == 100);
@@ -369,12 +355,12 @@ fn motor_control(command: &RawMotorControl, fields: &Value, index: u8) -> Vec<u8
         let lamp = ![0, 100].contains(&command.front_led());
         assert_eq!(RawMotorControl::from(ordinary) == *command, !reserved && !lamp);
     }
-    assert_eq!(ucp::MotorControl::try_from(*command).is_ok(), legal && !command.starts_update());
+    assert_eq!(MotorControl::try_from(*command).is_ok(), legal && !command.starts_update());
     frame(2, index, zerocopy::IntoBytes::as_bytes(command))
 }
 
 fn telemetry(report: Report<'_>, fields: &Value, index: u8) -> (&'static str, Vec<u8>) {
-    let telemetry = ucp::Telemetry {
+    let telemetry = Telemetry {
         battery_pct: int(&fields["battery_pct"]),
         rpm: ints(&fields["rpm"]),
         acc: ints(&fields["acc"]),

@@ -4,18 +4,18 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, Slave,
+        Master, Slave,
         master::{MasterConfig, MasterEvent, MasterStatistics},
         slave::{SlaveConfig, SlaveEvent, SlaveStatistics},
     },
-    stream::Counters,
-    time::{Duration, Instant},
     ucp::{
         Host, Robot,
         host::{HostConfig, HostEvent, HostStatistics},
         robot::{RobotConfig, RobotEvent, RobotStatistics},
     },
 };
+
+use crate::rig::*;
 
 const NOW: Instant = Instant::from_micros(7);
 

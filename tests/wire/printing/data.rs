@@ -1,21 +1,11 @@
 //! Packets and messages as data: the fields of `axle decode --json`, and the bytes.
 #![cfg(feature = "serde")]
 
-use axlewire::{
-    ikeya::{
-        NodeId, Packet, Position, PositionResponse, ReadRequest, Request, Response, Rps, Status,
-        VelocityResponse, WriteRequest, board::ThreeMotors, three,
-    },
-    stream::{Gap, Reason},
-    ucp::{
-        Body, Frame, MotorControl, Telemetry,
-        message::{FirmwareReport, Ping},
-    },
-};
+use axlewire::ikeya::{Status, board::ThreeMotors};
 use serde_json::{Value, json, to_string, to_value};
 
 use super::ucp::each_kind;
-use crate::rig::{frame, hex, sealed};
+use crate::rig::*;
 
 #[test]
 fn a_frame_has_its_fields_in_order_and_its_bytes() {
@@ -47,7 +37,7 @@ fn a_message_alone_has_its_name_its_id_and_its_fields() {
     });
     let command = MotorControl::new(-60, 20).unwrap().into();
     assert_eq!(
-        to_value(axlewire::ucp::Message::MotorControl(&command)).unwrap(),
+        to_value(Message::MotorControl(&command)).unwrap(),
         json!({
             "message": "motor_control", "id": 2, "speed": -60, "angular": 20, "front_led": 0,
             "back_led": 0, "version": 0, "reserve1": 0, "reserve2": 0,

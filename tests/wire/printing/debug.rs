@@ -1,18 +1,8 @@
 //! `{:?}` shows values, not bytes.
 
-use axlewire::{
-    ikeya::{
-        NodeId, Packet, Position, PositionResponse, ReadRequest, Request, Rps, VelocityResponse,
-        WriteRequest, three,
-    },
-    ucp::{
-        Body, Frame, MotorControl,
-        message::{
-            Biases, CalibrationKind, CalibrationStart, ImuBias, MagBias, OtaRequest, Ping,
-            RawMotorControl, RawOtaRequest,
-        },
-    },
-};
+use axlewire::ucp::message::RawOtaRequest;
+
+use crate::rig::*;
 
 #[test]
 fn packets_show_speeds_and_positions() {

@@ -2,11 +2,9 @@
 
 use std::error::Error;
 
-use axlewire::{
-    error::{EncodeError, ParseError},
-    ikeya::{self, Mode, NodeId},
-    ucp,
-};
+use axlewire::{ikeya, ucp};
+
+use crate::rig::*;
 
 /// Each error has its text, and no error behind it.
 fn assert_texts(table: &[(&dyn Error, &str)]) {

@@ -1,4 +1,5 @@
 //! Packets and messages print and serialise themselves.
+
 #![cfg(all(feature = "ikeya", feature = "ucp"))]
 
 mod data;
@@ -7,7 +8,7 @@ mod errors;
 mod ikeya;
 mod ucp;
 
-use axlewire::stream::{Event, Gap, Reason};
+use crate::rig::*;
 
 fn spaced<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
     values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(" ")

@@ -1,18 +1,10 @@
 //! The text of UCP messages, against core's formatting of the same values.
 
-use axlewire::ucp::{
-    Body, Frame, Message, MotorControl, RawFrame, Telemetry,
-    message::{
-        BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind, CalibrationStart,
-        CalibrationStartAck, DocumentReport, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck,
-        MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Ping, Pong, Report,
-        SetNetworkState,
-    },
-};
+use axlewire::ucp::message::BiasRequest;
 use proptest::prelude::*;
 
 use super::spaced;
-use crate::rig::{frame, hex};
+use crate::rig::*;
 
 fn contents(frame: &[u8]) -> String {
     Frame::parse(frame).unwrap().message().contents().to_string()

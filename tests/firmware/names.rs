@@ -1,0 +1,20 @@
+//! What the tests of the firmware use of the library.
+
+pub(crate) use axlewire::{
+    drive::Driver,
+    encode::Encode,
+    endpoint::Endpoint,
+    ikeya::{
+        Master, Mode, NodeId, Position, ReadRequest, Response, Rps, Target, ToMaster, WriteRequest,
+        master::{Health, MasterConfig, MasterEvent, Polling},
+        slave::{SlaveConfig, SlaveEvent},
+    },
+    sim::{MotorNode, Rng},
+    stream::Frames,
+    time::{Duration, Instant},
+    ucp::{
+        Body, MotorControl,
+        host::{HostEvent, MemoryStore},
+        message::{ImuBias, MagBias, Ping},
+    },
+};
