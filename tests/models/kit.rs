@@ -1,6 +1,9 @@
 //! Packets of both kinds of boards, read and written independently of the library.
 
-use crate::names::*;
+use axlewire::ikeya::{
+    Mode, NodeId, Position, Rps, Target,
+    board::{OneMotor, ThreeMotors},
+};
 
 #[path = "../harness/board_packets.rs"]
 #[allow(dead_code, reason = "not every user of this kit writes and answers")]
