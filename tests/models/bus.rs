@@ -7,14 +7,10 @@
 use super::{
     account::{Account, Confirm, ODD_PLACE},
     action::{Action, Answer, Call, Exchange, Fate, Menu},
-    fingerprint::{COUNTERS, COUNTERS_AND_STATUS, Merge},
-    kit::{Kit, Reply, Sent},
+    fingerprint::{COUNTERS, COUNTERS_AND_STATUS},
+    kit::{Reply, Sent},
     names::*,
-    search::World,
 };
-
-/// A broken invariant is described in words.
-pub(crate) type Checked = Result<(), String>;
 
 #[derive(Clone, Debug)]
 pub(super) struct Motor {

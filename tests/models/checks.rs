@@ -4,10 +4,9 @@ use axlewire::ikeya::master::MasterEvent;
 
 use super::{
     account::{Confirm, STRIKES},
-    bus::{Bus, Checked},
-    kit::{Kit, Sent},
+    bus::Bus,
+    kit::Sent,
     names::*,
-    sleep::check_sleep,
 };
 
 /// Most exchanges of each other node for which an urgent one waits.

@@ -2,8 +2,7 @@
 
 use super::{
     action::{Answer, Exchange, Fate, Wait},
-    bus::{Asked, Bus, Checked},
-    kit::Kit,
+    bus::{Asked, Bus},
     names::*,
 };
 

@@ -5,7 +5,6 @@ use super::{
     host_store::Shelf,
     names::*,
     site::{self, Acts, Menu},
-    ucp::Checked,
 };
 
 /// A message from the robot.

@@ -7,7 +7,6 @@ use super::{
     host_request::{Ack, Request, Results},
     host_store::Shelf,
     names::*,
-    ucp::{Checked, ms},
 };
 
 #[derive(Clone, Copy, Debug, PartialEq)]

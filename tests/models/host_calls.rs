@@ -7,7 +7,6 @@ use super::{
     host_account::Update,
     names::*,
     site::ROOM,
-    ucp::{Checked, queue},
 };
 
 impl Site {

@@ -12,7 +12,6 @@ use super::{
     host_store::Shelf,
     names::*,
     site::{Checks, HALF, Part, ROOM, Side},
-    ucp::{Checked, bytes, damaged, imu, mag, queue, unknown},
 };
 
 impl Side for HostSide {

@@ -2,10 +2,7 @@
 
 use axlewire::ucp::message::RawMotorControl;
 
-use super::{
-    names::*,
-    ucp::{Checked, halted, ms},
-};
+use super::names::*;
 
 /// The first frame of a host (ruling U16).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use axlewire::ucp::BAUD;
 
-use super::{names::*, ucp::ms};
+use super::names::*;
 
 /// A calibration request: sent at most three times, 200 ms apart.
 #[derive(Clone, Debug)]

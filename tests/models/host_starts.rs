@@ -3,8 +3,6 @@
 use super::{
     host::{Act, Call::*, Hear, HostSide, Site},
     names::*,
-    run::{Depth, Run},
-    search::World,
     site,
 };
 

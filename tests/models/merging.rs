@@ -3,9 +3,8 @@
 use super::{
     action::{Action, Call, Exchange, Menu},
     bus::Bus,
-    fingerprint::{COUNTERS_AND_STATUS, Merge},
+    fingerprint::COUNTERS_AND_STATUS,
     names::*,
-    search::World,
 };
 
 const N1: NodeId = NodeId::N1;

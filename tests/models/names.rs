@@ -1,4 +1,4 @@
-//! What the models use of the library.
+//! What the models use of the library, and of their frame.
 
 pub(crate) use axlewire::{
     drive::{DriveError, Driver, Rs485},
@@ -16,4 +16,13 @@ pub(crate) use axlewire::{
         message::{CalibrationKind, ErrorCode, ImuBias, MagBias, NetworkState, OtaStatus, Pong},
         robot::{RobotConfig, RobotEvent},
     },
+};
+
+pub(crate) use crate::{
+    fingerprint::Merge,
+    kit::Kit,
+    run::{Depth, Run},
+    search::World,
+    sleep::check_sleep,
+    ucp::{Checked, Feed, bytes, check_kept, damaged, halted, imu, mag, merge, ms, queue, unknown},
 };

@@ -5,10 +5,8 @@ use axlewire::sim::Rng;
 
 use super::{
     action::{Action, Answer, Fate, Menu, Wait},
-    bus::{Bus, Checked},
-    kit::Kit,
+    bus::Bus,
     names::*,
-    search::World,
 };
 
 /// Steps with faults.

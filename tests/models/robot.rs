@@ -4,7 +4,6 @@ use super::{
     names::*,
     robot_account::Account,
     site::{self, Acts, Menu},
-    ucp::{Checked, halted, imu, mag},
 };
 
 /// A message from the host.

@@ -1,9 +1,6 @@
 //! The account of a robot: its commands and requests, what may be sent, and what is owed.
 
-use super::{
-    names::*,
-    ucp::{Checked, halted, imu, mag, ms},
-};
+use super::names::*;
 
 /// Something that is sent every 1000 ms until the host has it (U11).
 #[derive(Clone, Debug)]

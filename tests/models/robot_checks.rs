@@ -16,7 +16,6 @@ use super::{
     robot::{Call, Hear, RobotSide, Rover, UPDATE_TO},
     robot_account::Account,
     site::{Checks, HALF, Part, ROOM, Side},
-    ucp::{Checked, bytes, damaged, halted, imu, mag, queue, unknown},
 };
 
 /// Speed, turn and lamp as received: 1 ahead with the lamp on, 2 on the spot, 3 a zero command, 4

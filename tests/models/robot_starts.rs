@@ -3,7 +3,6 @@
 use super::{
     names::*,
     robot::{Act, Call::*, Hear, RobotSide, Rover},
-    run::{Depth, Run},
     site,
 };
 

@@ -2,7 +2,10 @@
 
 use std::{env, time::Instant};
 
-use super::search::{Limits, World, explore};
+use super::{
+    names::*,
+    search::{Limits, explore},
+};
 
 /// Search depth of a world: in every test run, and in the deep run.
 #[derive(Clone, Copy, Debug)]

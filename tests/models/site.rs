@@ -3,12 +3,7 @@
 
 use std::fmt::Debug;
 
-use super::{
-    names::*,
-    search::World,
-    sleep::check_sleep,
-    ucp::{Checked, Fate, Feed, check_kept, merge, ms, queue},
-};
+use super::{names::*, ucp::Fate};
 
 /// Capacity of the event queue.
 pub(crate) const ROOM: usize = 16;

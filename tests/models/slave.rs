@@ -5,15 +5,7 @@ use axlewire::ikeya::{
     slave::{SlaveConfig, SlaveEvent},
 };
 
-use super::{
-    bus::Checked,
-    fingerprint::{COUNTERS, Merge},
-    kit::Kit,
-    names::*,
-    run::{Depth, Run},
-    search::World,
-    sleep::check_sleep,
-};
+use super::{fingerprint::COUNTERS, names::*};
 
 /// READ 1.
 const READ: [u8; 4] = [0xAA, 0x01, 0xBE, 0xD0];

@@ -3,9 +3,7 @@
 use super::{
     action::{Action, Call, Exchange, Fate, Menu, Wait},
     bus::Bus,
-    kit::Kit,
     names::*,
-    run::{Depth, Run},
 };
 
 const VELOCITY: &[Mode] = &[Mode::Velocity];

@@ -2,7 +2,7 @@
 
 use axlewire::{crc16, ucp::Body};
 
-use super::{fingerprint::Merge, names::*};
+use super::names::*;
 
 /// The result of a step: `Err` names the invariant.
 pub(crate) type Checked = Result<(), String>;

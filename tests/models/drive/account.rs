@@ -3,11 +3,9 @@
 
 use super::{
     action::Call,
-    line::{DrivenLine, Shared},
-    master::{MasterLife, N1, Outcome, SPAN, target},
-    node::{Node, is_paid, progress, stop_payload, target_payload},
-    port::Wired,
-    task::End,
+    master::{Outcome, SPAN, target},
+    node::{is_paid, progress, stop_payload},
+    *,
 };
 use crate::names::*;
 

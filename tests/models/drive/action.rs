@@ -1,10 +1,6 @@
 //! Actions on a driver.
 
-use super::{
-    fault::{Flushing, Pinning, Reading, Writing},
-    line::DrivenLine,
-    node::{Answer, Node},
-};
+use super::{node::Answer, *};
 use crate::names::*;
 
 /// A single action.

@@ -1,9 +1,6 @@
 //! Invariants after every call of any driver.
 
-use super::{
-    fault::{Failure, Flushing, Writing},
-    line::DrivenLine,
-};
+use super::*;
 
 /// Longest time in which a port takes nothing, microseconds, plus a margin.
 pub(super) const STALL_US: u64 = 1_010_000;

@@ -6,19 +6,8 @@ use std::{
     rc::Rc,
 };
 
-use super::{
-    action::Fault,
-    fault::Failure,
-    host_account::Account,
-    line::{DrivenLine, Peer, Shared},
-    node::crc,
-    port::{Wired, failure},
-    replay::Life,
-    task::guarded,
-    wire::{Shape, Speech, Wire},
-};
+use super::{action::Fault, host_account::Account, node::crc, *};
 use crate::fingerprint::{COUNTERS, Merge};
-use crate::names::*;
 
 /// 115,200 bit/s.
 const BYTE_US: u64 = 87;

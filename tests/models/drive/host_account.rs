@@ -4,11 +4,9 @@
 use std::hash::Hash;
 
 use super::{
-    checks::STALL_US,
     host::{Call, HostLife, IDLE, Outcome, SPAN, TIMEOUT_US, Told},
-    line::DrivenLine,
-    port::Wired,
     wire::Taken,
+    *,
 };
 
 /// Time within which a stop has to be flushed (U16).

@@ -9,10 +9,7 @@ use std::{
     task::Waker,
 };
 
-use super::{
-    fault::{Failure, Flushing, Pinning, Reading, Writing},
-    wire::Wire,
-};
+use super::*;
 use crate::names::*;
 
 /// Most operations of the port, the pin and the clock in one call: far more than any call of these

@@ -10,16 +10,11 @@ use std::{
 use super::{
     account::Account,
     action::{Action, Call, Pass, Setup},
-    fault::Failure,
-    line::{DrivenLine, Shared},
-    node::{Ear, Node, SPEECH, SharedNode},
-    port::{Wired, failure},
-    replay::Life,
-    task::{End, guarded, run},
-    wire::Wire,
+    node::{Ear, SPEECH, SharedNode},
+    task::run,
+    *,
 };
 use crate::fingerprint::{COUNTERS_AND_STATUS, Merge};
-use crate::names::*;
 
 pub(super) const N1: NodeId = NodeId::N1;
 

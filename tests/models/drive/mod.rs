@@ -22,10 +22,15 @@ use crate::{
 };
 use {
     action::{Action, Call, Fault, Setup},
-    line::Shared,
-    master::MasterLife,
-    port::{Pin, Wired},
-    replay::Replay,
+    checks::STALL_US,
+    fault::{Failure, Flushing, Pinning, Reading, Writing},
+    line::{DrivenLine, Peer, Shared},
+    master::{MasterLife, N1},
+    node::{Node, target_payload},
+    port::{Pin, Wired, failure},
+    replay::{Life, Replay},
+    task::{End, guarded},
+    wire::{Shape, Speech, Wire},
 };
 
 const KNOWN: Action = Action::Call(Call::Discover);

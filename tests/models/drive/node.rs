@@ -4,10 +4,7 @@ use std::{cell::RefCell, collections::VecDeque, rc::Rc};
 
 use axlewire::ikeya::PositionResponse;
 
-use super::{
-    line::Peer,
-    wire::{Shape, Speech},
-};
+use super::*;
 use crate::names::*;
 
 /// 500 kbit/s.

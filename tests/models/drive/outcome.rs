@@ -3,11 +3,9 @@
 use super::{
     account::Before,
     action::Call,
-    checks::STALL_US,
-    fault::Failure,
-    master::{IDLE, MasterLife, N1, Outcome, SPAN, Told},
-    node::{Entry, target_payload},
-    port::Wired,
+    master::{IDLE, Outcome, SPAN, Told},
+    node::Entry,
+    *,
 };
 use crate::names::*;
 

@@ -7,10 +7,7 @@ use std::cell::RefMut;
 
 use axlewire::drive::{Clock, Rs485Error};
 
-use super::{
-    fault::{Failure, Flushing, Pinning, Reading, Writing},
-    line::{DrivenLine, Shared},
-};
+use super::*;
 use crate::names::*;
 
 /// Delays between the pin and the first byte, and the last byte and the pin, microseconds.

@@ -7,9 +7,8 @@ use std::{
 };
 
 use super::{
-    fault::{Failure, Flushing, Writing},
-    line::Shared,
     port::{Broken, Pin, SECOND_US},
+    *,
 };
 
 /// The least time that a port gets, however long it has been waiting, microseconds: twice the time

@@ -12,7 +12,7 @@ use std::{
     task::{Context, Poll, Wake, Waker},
 };
 
-use super::line::Shared;
+use super::*;
 
 /// Most polls of one call without time passing in between.
 const POLLS: u32 = 40;
