@@ -3,7 +3,7 @@
 use axlewire::ikeya::PositionResponse;
 
 use crate::{
-    motor_line::{Bus, Motor, Wire, Write, run},
+    motor_line::{Bus, Motor, Wire, Write, owe_stop, run},
     rig::*,
 };
 
@@ -41,8 +41,7 @@ fn a_cut_off_set_point_that_is_released_is_not_completed() {
 #[test]
 fn a_cut_off_set_point_is_not_completed_after_a_stop() {
     let (wire, mut bus) = cut_after(5);
-    let now = bus.now();
-    bus.role_mut().stop(NodeId::N1, now);
+    owe_stop(&mut bus);
     wire.pass(10_000);
     // Room for the rest, then the port fails again.
     wire.write_only(3);
@@ -55,10 +54,7 @@ fn a_cut_off_set_point_is_not_completed_by_the_call_that_stops() {
     for is_async in [false, true] {
         let (wire, mut bus) = cut_after(5);
         wire.write_all();
-        match is_async {
-            true => wire.block_on(bus.stop_async(NodeId::N1)).unwrap(),
-            false => bus.stop(NodeId::N1).unwrap(),
-        }
+        on!(is_async, wire, bus, stop, stop_async(NodeId::N1)).unwrap();
         assert_eq!(wire.turns(), 0.0, "it was at rest when stopped, and has turned");
         // A set-point still in force is completed.
         let (wire, mut bus) = cut_after(5);
@@ -90,8 +86,7 @@ fn a_cut_off_set_point_is_not_completed_while_the_mode_is_in_doubt() {
 #[test]
 fn a_port_that_takes_a_byte_occasionally_does_not_complete_a_set_point_after_a_stop() {
     let (wire, mut bus) = cut_after(2);
-    let now = bus.now();
-    bus.role_mut().stop(NodeId::N1, now);
+    owe_stop(&mut bus);
     for _ in 0..6 {
         wire.pass(19_000);
         wire.write_only(1);
@@ -106,9 +101,7 @@ fn a_set_point_that_was_given_up_is_not_completed_by_the_next_header() {
     let ends_like_header =
         |&rps: &Rps| WriteRequest::velocity(NodeId::N1, rps).as_bytes()[7] == 0xAA;
     let target = (1..100_000).map(|milli| rps(milli as f32 * 1e-3)).find(ends_like_header).unwrap();
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|_| ());
-    bus.discover().unwrap();
+    let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
     wire.pass(300);
     let begin = wire.world().sent.len();
     wire.write_only(7);
@@ -149,17 +142,13 @@ fn cut_in_two() -> impl FnMut(&[u8]) -> Write {
 fn a_stop_write_that_a_port_cut_in_two_pays_nothing() {
     for polling in [Polling::Manual, Polling::Fastest] {
         for is_async in [false, true] {
-            let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-            let mut bus = wire.master(|config| config.polling = polling);
-            bus.discover().unwrap();
+            let (wire, mut bus) =
+                Wire::one_motor(Mode::Velocity, |config| config.polling = polling);
             bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
             wire.pass(300_000);
             let _ = bus.service();
             wire.write_with(cut_in_two());
-            let stopped = match is_async {
-                true => wire.block_on(bus.stop_async(NodeId::N1)),
-                false => bus.stop(NodeId::N1),
-            };
+            let stopped = on!(is_async, wire, bus, stop, stop_async(NodeId::N1));
             let rps = wire.rps();
             assert!(stopped.is_err() || rps == 0.0, "reported as stopped, but turns at {rps} rps");
             wire.write_all();
@@ -195,10 +184,7 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
         bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
         assert_eq!(wire.rps(), 10.0);
         fail(&wire);
-        let stopped = match is_async {
-            true => wire.block_on(bus.stop_async(NodeId::N1)),
-            false => bus.stop(NodeId::N1),
-        };
+        let stopped = on!(is_async, wire, bus, stop, stop_async(NodeId::N1));
         let rps = wire.rps();
         assert!(stopped.is_err() || rps == 0.0, "reported as stopped, but turns at {rps} rps");
         assert!(stopped.is_ok() || !is_heard, "{stopped:?}");

@@ -7,12 +7,14 @@ use crate::{motor_line::Wire, rig::*};
 const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
 
+fn one_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
+    wire.driver(|now| Slave::new(NodeId::N1, Mode::Velocity, config, now))
+}
+
 #[test]
 fn a_cut_off_answer_does_not_continue_in_another_nodes_exchange() {
     let wire = Wire::bus(vec![]);
-    let mut slave = wire.driver(|now| -> Slave {
-        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now)
-    });
+    let mut slave = one_slave(&wire, SlaveConfig::direct());
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     wire.write_only(3);
     assert!(slave.service().is_err());
@@ -30,21 +32,16 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
     for is_async in [false, true] {
         let wire = Wire::bus(vec![]);
         let config = SlaveConfig::usb_adapter();
-        let mut slave =
-            wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
+        let mut slave = one_slave(&wire, config);
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.write_only(4);
         assert!(slave.service().is_err());
         wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
         wire.write_all();
-        match is_async {
-            true => wire.block_on(slave.service_async()).unwrap(),
-            false => slave.service().unwrap(),
-        }
+        on!(is_async, wire, slave, service, service_async()).unwrap();
         assert_eq!(wire.world().sent.len(), 4, "it talks during node 2's turn");
         // Nothing was received: the rest may be sent.
-        let mut slave =
-            wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
+        let mut slave = one_slave(&wire, config);
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.write_only(4);
         assert!(slave.service().is_err());
@@ -59,8 +56,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
     let wire = Wire::bus(vec![]);
-    let mut slave =
-        wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
+    let mut slave = one_slave(&wire, config);
     wire.receive(FIVE_RPS().as_bytes());
     slave.service().unwrap();
     assert!(slave.role().command(wire.now()).is_some());
@@ -77,8 +73,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
 
 /// A slave that has received nothing yet, and its watchdog.
 fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
-    let mut slave =
-        wire.driver(|now| -> Slave { Slave::new(NodeId::N1, Mode::Velocity, config, now) });
+    let mut slave = one_slave(&wire, config);
     slave.service().unwrap();
     slave
 }
@@ -97,11 +92,7 @@ fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
         wire.receive(FIVE_RPS().as_bytes());
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.pass(10_000_000);
-        match is_async {
-            true => wire.block_on(slave.service_async()),
-            false => slave.service(),
-        }
-        .unwrap();
+        on!(is_async, wire, slave, service, service_async()).unwrap();
         assert_eq!(slave.role().command(wire.now()), None, "it turns on a ten-second-old command");
         assert_eq!(wire.world().sent, [], "it answers a ten-second-old request");
         assert_eq!(slave.role().statistics().expired, 1);
@@ -132,11 +123,7 @@ fn an_idle_slave_answers_a_request_after_a_long_silence() {
         let begin_us = wire.world().now_us;
         wire.receive_in(2_345_678, ReadRequest::new(NodeId::N1).as_bytes());
         let by = slave.now() + Duration::from_millis(3000);
-        match is_async {
-            true => wire.block_on(slave.run_until_async(by, |_, _, _| ())),
-            false => slave.run_until(by, |_, _, _| ()),
-        }
-        .unwrap();
+        on!(is_async, wire, slave, run_until, run_until_async(by, |_, _, _| ())).unwrap();
         assert_eq!(wire.world().sent.len(), 8, "async {is_async}");
         let delay_us = wire.world().sent[0].0 - begin_us - 2_345_678;
         assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");

@@ -18,6 +18,9 @@ mod tty;
 
 #[macro_use]
 mod rig;
+#[cfg_attr(not(feature = "ucp"), allow(dead_code, reason = "a rover uses more of it"))]
+#[macro_use]
+mod motor_line;
 mod pin;
 mod recorder;
 
@@ -37,8 +40,6 @@ mod held_up;
 #[cfg(feature = "ucp")]
 mod io;
 mod late_slaves;
-#[cfg_attr(not(feature = "ucp"), allow(dead_code, reason = "a rover uses more of it"))]
-mod motor_line;
 mod outdated_orders;
 mod parts;
 mod paused_packets;

@@ -1,7 +1,7 @@
 //! A master's stops and set-points when switches move, ports fail and applications go silent.
 
 use crate::{
-    motor_line::{Bus, Motor, Wire, run},
+    motor_line::{Bus, Motor, Wire, owe_stop, run},
     rig::*,
 };
 
@@ -14,9 +14,7 @@ fn rps(value: f32) -> Rps {
 
 /// A motor that has turned at 5 rps for four seconds, and its master.
 fn turned(polling: Polling) -> (Wire, Bus) {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|config| config.polling = polling);
-    bus.discover().unwrap();
+    let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |config| config.polling = polling);
     bus.set_velocity(NodeId::N1, rps(5.0)).unwrap();
     run(&mut bus, 4000);
     assert!(wire.turns() > 19.0);
@@ -63,14 +61,11 @@ fn a_mode_that_changes_under_a_set_point_owes_a_stop() {
 
 #[test]
 fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
-    let mut bus = wire.master(|_| ());
-    bus.discover().unwrap();
+    let (wire, mut bus) = Wire::one_motor(Mode::Position, |_| ());
     bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
     run(&mut bus, 1000);
     // The stop's READ leaves, then the port takes nothing for five seconds.
-    let now = bus.now();
-    bus.role_mut().stop(NodeId::N1, now);
+    owe_stop(&mut bus);
     let reads = wire.world().motors[0].reads;
     while wire.world().motors[0].reads == reads {
         bus.service().unwrap();
@@ -101,8 +96,7 @@ fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
         });
         bus.discover().unwrap();
         bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
-        let now = bus.now();
-        bus.role_mut().stop(NodeId::N1, now);
+        owe_stop(&mut bus);
         let mut rounds = 0;
         while !bus.role().stops_owed().is_empty() {
             bus.service().unwrap();
@@ -115,9 +109,8 @@ fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
 
 #[test]
 fn a_position_from_before_the_stop_is_held_only_if_it_can_be_written_soon() {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
-    let mut bus = wire.master(|config| config.hold_age = Duration::from_millis(100));
-    bus.discover().unwrap();
+    let (wire, mut bus) =
+        Wire::one_motor(Mode::Position, |config| config.hold_age = Duration::from_millis(100));
     bus.set_position(NodeId::N1, Position::new(0, 3000)).unwrap();
     run(&mut bus, 1000);
     wire.write_only(0);
@@ -134,15 +127,12 @@ fn a_position_from_before_the_stop_is_held_only_if_it_can_be_written_soon() {
 #[test]
 fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
     for is_async in [false, true] {
-        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-        let mut bus = wire.master(|config| config.polling = Polling::Manual);
-        bus.discover().unwrap();
+        let (wire, mut bus) =
+            Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
         wire.pass(1000);
         wire.write_only(0);
-        let failed = match is_async {
-            true => wire.block_on(bus.set_velocity_async(NodeId::N1, rps(10.0))),
-            false => bus.set_velocity(NodeId::N1, rps(10.0)),
-        };
+        let failed =
+            on!(is_async, wire, bus, set_velocity, set_velocity_async(NodeId::N1, rps(10.0)));
         assert_eq!(failed, Err(DriveError::Port(Unplugged)));
         wire.pass(10_000_000);
         wire.write_all();

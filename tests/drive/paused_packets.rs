@@ -3,16 +3,15 @@
 use std::pin::pin;
 
 use crate::{
-    motor_line::{Bus, Motor, Wire, Write, run},
+    motor_line::{Bus, Wire, Write, owe_stop, run},
     rig::*,
 };
 
 /// A motor at 10 rps behind a port that from now on handles successive parts of each WRITE like
 /// this. The node drops a packet after five byte times of silence.
 fn turning(parts: impl Fn(usize) -> Write + 'static) -> (Wire, Bus) {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|config| config.polling = Polling::Manual);
-    bus.discover().unwrap();
+    let (wire, mut bus) =
+        Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
     bus.set_velocity(NodeId::N1, Rps::new(10.0).unwrap()).unwrap();
     wire.pass(300_000);
     let _ = bus.service();
@@ -35,10 +34,7 @@ fn turning(parts: impl Fn(usize) -> Write + 'static) -> (Wire, Bus) {
 }
 
 fn stop(wire: &Wire, bus: &mut Bus, is_async: bool) -> Result<(), DriveError<Unplugged>> {
-    match is_async {
-        true => wire.block_on(bus.stop_async(NodeId::N1)),
-        false => bus.stop(NodeId::N1),
-    }
+    on!(is_async, wire, bus, stop, stop_async(NodeId::N1))
 }
 
 /// The stop counts as paid only if the motor has received it; once the port works again, it is
@@ -116,8 +112,7 @@ const IN_DOUBT: fn(usize) -> Write =
 fn a_packet_in_doubt_is_flushed_before_the_next_one_is_sent() {
     let (wire, mut bus) = turning(IN_DOUBT);
     let before = wire.world().sent.len();
-    let now = bus.now();
-    bus.role_mut().stop(NodeId::N1, now);
+    owe_stop(&mut bus);
     bus.service().unwrap();
     let packet = before + WriteRequest::LEN;
     assert_eq!(wire.world().sent.len(), packet, "a READ follows a cut-off WRITE");
@@ -132,8 +127,7 @@ fn a_packet_in_doubt_whose_flush_is_cancelled_or_stalls_counts_as_cut_off() {
         let (wire, mut bus) = turning(IN_DOUBT);
         let writes = bus.role().statistics().writes;
         wire.world().flushes_hang = true;
-        let now = bus.now();
-        bus.role_mut().stop(NodeId::N1, now);
+        owe_stop(&mut bus);
         if is_cancelled {
             assert!(poll(pin!(bus.service_async())).is_pending());
             assert_eq!(bus.role().statistics().writes, writes + 1);

@@ -7,16 +7,6 @@ use crate::{
     rig::*,
 };
 
-/// A call of a driver, blocking or async.
-macro_rules! on {
-    ($is_async:expr, $wire:expr, $it:ident, $call:ident, $call_async:ident($($value:expr),*)) => {
-        match $is_async {
-            true => $wire.block_on($it.$call_async($($value),*)),
-            false => $it.$call($($value),*),
-        }
-    };
-}
-
 /// A host that has driven, and a moment later.
 fn host() -> (Wire, Driver<Host, Wire, Wire>) {
     let wire = Wire::link();
@@ -28,10 +18,11 @@ fn host() -> (Wire, Driver<Host, Wire, Wire>) {
     (wire, host)
 }
 
-fn robot(wire: &Wire) -> Driver<Robot, Wire, Wire> {
+fn robot() -> (Wire, Driver<Robot, Wire, Wire>) {
+    let wire = Wire::link();
     let mut robot = wire.driver(|now| Robot::new(RobotConfig::default(), now));
     robot.service().unwrap();
-    robot
+    (wire, robot)
 }
 
 fn drive() -> Vec<u8> {
@@ -117,8 +108,7 @@ fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
 #[test]
 fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
     for is_async in [false, true] {
-        let wire = Wire::link();
-        let mut robot = robot(&wire);
+        let (wire, mut robot) = robot();
         let (mut speeds, mut errors) = (vec![], 0);
         for millis in 0..1000 {
             if millis % 100 == 0 {
@@ -152,8 +142,7 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
 #[test]
 fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
     for is_async in [false, true] {
-        let wire = Wire::link();
-        let mut robot = robot(&wire);
+        let (wire, mut robot) = robot();
         wire.receive(&drive());
         wire.pass(10_000_000);
         let by = robot.now() + Duration::from_millis(1);
@@ -166,8 +155,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
 #[test]
 fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
     for is_async in [false, true] {
-        let wire = Wire::link();
-        let mut robot = robot(&wire);
+        let (wire, mut robot) = robot();
         let by = robot.now() + Duration::from_millis(5);
         robot.run_until(by, |_, _, _| ()).unwrap();
         wire.receive(&drive());
@@ -192,12 +180,12 @@ fn next(wire: &Wire, robot: &mut Driver<Robot, Wire, Wire>, is_async: bool) {
 }
 
 /// A robot that reports every 20 ms and has been called for a while.
-fn reporting(wire: &Wire, is_async: bool) -> Driver<Robot, Wire, Wire> {
-    let mut robot = robot(wire);
+fn reporting(is_async: bool) -> (Wire, Driver<Robot, Wire, Wire>) {
+    let (wire, mut robot) = robot();
     let now = robot.now();
     robot.role_mut().set_telemetry(&Telemetry::default(), now);
-    (0..21).for_each(|_| next(wire, &mut robot, is_async));
-    robot
+    (0..21).for_each(|_| next(&wire, &mut robot, is_async));
+    (wire, robot)
 }
 
 /// How long after a moment the robot still drives at most, with continuous calls, microseconds.
@@ -221,8 +209,7 @@ fn drives_until(
 #[test]
 fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
     for (is_async, stall_us) in [(false, 3_000_000), (true, 3_000_000), (true, 900_000)] {
-        let wire = Wire::link();
-        let mut robot = reporting(&wire, is_async);
+        let (wire, mut robot) = reporting(is_async);
         let sent = wire.world().sent.len();
         let begin_us = wire.world().now_us;
         let mut steps = vec![Write::Late(stall_us, usize::MAX)].into_iter();
@@ -239,8 +226,7 @@ fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
 #[test]
 fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up() {
     for count in 1..=4 {
-        let wire = Wire::link();
-        let mut robot = reporting(&wire, true);
+        let (wire, mut robot) = reporting(true);
         let begin_us = wire.world().now_us;
         let by = robot.now() + Duration::from_millis(100);
         let bytes = drive().repeat(count);
@@ -253,8 +239,7 @@ fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up()
 #[test]
 fn more_commands_than_a_round_takes_in_are_all_as_old_as_the_hold_up() {
     for (is_async, count) in [(false, 171), (false, 400), (true, 200), (true, 3000)] {
-        let wire = Wire::link();
-        let mut robot = reporting(&wire, is_async);
+        let (wire, mut robot) = reporting(is_async);
         let begin_us = wire.world().now_us;
         wire.receive(&drive().repeat(count));
         wire.pass(10_000_000);
@@ -264,19 +249,19 @@ fn more_commands_than_a_round_takes_in_are_all_as_old_as_the_hold_up() {
 }
 
 /// A robot that neither reports nor requests biases.
-fn silent(wire: &Wire) -> Driver<Robot, Wire, Wire> {
+fn silent() -> (Wire, Driver<Robot, Wire, Wire>) {
+    let wire = Wire::link();
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
     let mut robot = wire.driver(|now| Robot::new(config, now));
     robot.service().unwrap();
-    robot
+    (wire, robot)
 }
 
 #[test]
 fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
     for is_async in [false, true] {
-        let wire = Wire::link();
-        let mut robot = silent(&wire);
+        let (wire, mut robot) = silent();
         let begin_us = wire.world().now_us;
         wire.receive(&drive());
         wire.pass(10_000_000);
@@ -288,8 +273,7 @@ fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
 #[test]
 fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence() {
     for is_async in [false, true] {
-        let wire = Wire::link();
-        let mut robot = silent(&wire);
+        let (wire, mut robot) = silent();
         let begin_us = wire.world().now_us;
         wire.receive_in(3_000_000, &drive());
         let by = robot.now() + Duration::from_millis(10_000);
@@ -302,8 +286,7 @@ fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence()
 
 #[test]
 fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
-    let wire = Wire::link();
-    let mut robot = silent(&wire);
+    let (wire, mut robot) = silent();
     wire.receive(&drive());
     robot.service().unwrap();
     let stop = MotorControl::STOP.frame(1).as_bytes().to_vec();
@@ -318,8 +301,7 @@ fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
 
 #[test]
 fn one_wrong_reading_of_the_clock_does_not_end_the_watchdog_of_a_robot() {
-    let wire = Wire::link();
-    let mut robot = robot(&wire);
+    let (wire, mut robot) = robot();
     wire.world().glitch = Some((0, 1 << 32));
     robot.service().unwrap();
     wire.receive(&drive());

@@ -6,24 +6,28 @@ use std::{
 };
 
 use crate::{
-    motor_line::{Bus, Motor, Wire},
+    motor_line::{Bus, Wire},
     rig::*,
 };
 
 /// A bus whose only motor turns at 5 rps.
 fn turning() -> (Wire, Bus) {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|_| ());
-    bus.discover().unwrap();
+    let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
     bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
+    (wire, bus)
+}
+
+/// The same; async writes or flushes are never ready.
+fn hanging(flushes_hang: bool) -> (Wire, Bus) {
+    let (wire, bus) = turning();
+    (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
     (wire, bus)
 }
 
 #[test]
 fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
-        let (wire, mut bus) = turning();
-        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let (wire, mut bus) = hanging(flushes_hang);
         let begin_us = wire.world().now_us;
         let stopped = wire.block_on(bus.stop_async(NodeId::N1));
         assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
@@ -41,8 +45,7 @@ fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
 #[test]
 fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
     for flushes_hang in [false, true] {
-        let (wire, mut bus) = turning();
-        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let (wire, mut bus) = hanging(flushes_hang);
         let begin_us = wire.world().now_us;
         loop {
             let mut call = pin!(bus.service_async());
@@ -84,8 +87,7 @@ fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
 #[test]
 fn a_port_that_has_stalled_is_given_a_second_again() {
     for flushes_hang in [false, true] {
-        let (wire, mut bus) = turning();
-        (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+        let (wire, mut bus) = hanging(flushes_hang);
         while wire.block_on(bus.service_async()) != Err(DriveError::Stalled) {
             wire.pass(100);
         }

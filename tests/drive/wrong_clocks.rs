@@ -1,16 +1,11 @@
 //! A clock with one wrong reading: it delays no stop, and no call idles longer.
 
-use crate::{
-    motor_line::{Motor, Wire},
-    rig::*,
-};
+use crate::{motor_line::Wire, rig::*};
 
 #[test]
 fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
     for readings in 0..20 {
-        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-        let mut bus = wire.master(|_| ());
-        bus.discover().unwrap();
+        let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
         bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
         for _ in 0..100 {
             bus.service().unwrap();
@@ -36,9 +31,8 @@ fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
 
 #[test]
 fn one_wrong_reading_of_the_clock_does_not_make_a_call_idle_longer() {
-    let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Velocity)]);
-    let mut bus = wire.master(|config| config.polling = Polling::Manual);
-    bus.discover().unwrap();
+    let (wire, mut bus) =
+        Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
     wire.world().glitch = Some((0, 3_600_000_000));
     bus.service().unwrap();
     let begin_us = wire.world().now_us;

@@ -3,6 +3,16 @@
 //! Unlike the port of `harness/port.rs`, each reading of its clock takes time, motors are on its
 //! line, and a write may depend on its bytes and on the time.
 
+/// A call of a driver, blocking or async.
+macro_rules! on {
+    ($is_async:expr, $wire:expr, $it:ident, $call:ident, $call_async:ident($($value:expr),*)) => {
+        match $is_async {
+            true => $wire.block_on($it.$call_async($($value),*)),
+            false => $it.$call($($value),*),
+        }
+    };
+}
+
 mod motor;
 
 use std::{
@@ -14,15 +24,8 @@ use std::{
     task::Poll,
 };
 
-use axlewire::{
-    drive::{Clock, Driver},
-    endpoint::Endpoint,
-    ikeya::{Master, NodeId, master::MasterConfig},
-    time::{Duration, Instant},
-};
-
 pub(crate) use self::motor::Motor;
-use crate::port::{Unplugged, poll};
+use crate::rig::*;
 
 /// Time from a request to its answer, microseconds.
 const ANSWER_US: u64 = 50;
@@ -98,6 +101,14 @@ impl Wire {
     /// A bus of motors at 500 kbit/s.
     pub(crate) fn bus(motors: Vec<Motor>) -> Self {
         Self::new(20, motors)
+    }
+
+    /// A bus with node 1 alone, and its master, which has discovered it.
+    pub(crate) fn one_motor(mode: Mode, change: impl FnOnce(&mut MasterConfig)) -> (Self, Bus) {
+        let wire = Self::bus(vec![Motor::new(NodeId::N1, mode)]);
+        let mut bus = wire.master(change);
+        bus.discover().unwrap();
+        (wire, bus)
     }
 
     /// A rover's link at 115,200 bit/s.
@@ -225,6 +236,12 @@ pub(crate) fn run<R: Endpoint>(driver: &mut Driver<R, Wire, Wire>, millis: u32) 
             driver.port().pass(100);
         }
     }
+}
+
+/// The master owes node 1 a stop, which its next calls send.
+pub(crate) fn owe_stop(bus: &mut Bus) {
+    let now = bus.now();
+    bus.role_mut().stop(NodeId::N1, now);
 }
 
 impl World {
