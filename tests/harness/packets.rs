@@ -1,4 +1,4 @@
-//! Packets of a motor bus and short names for times, for tests that call a role by hand.
+//! Packets of a motor bus, and short names for times and settings, for roles called by hand.
 
 use axlewire::{
     ikeya::{NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest},
@@ -36,4 +36,10 @@ pub(crate) fn hold(node: NodeId, at: Position) -> Vec<u8> {
 
 pub(crate) const fn turns(rotation: i16) -> Position {
     Position::new(0, rotation)
+}
+
+/// Settings with a change.
+pub(crate) fn with<T>(mut settings: T, change: impl FnOnce(&mut T)) -> T {
+    change(&mut settings);
+    settings
 }

@@ -3,9 +3,7 @@
 use crate::rig::*;
 
 fn armed() -> MasterConfig {
-    let mut config = direct();
-    config.dead_man = Some(MS(100));
-    config
+    with(direct(), |config| config.dead_man = Some(MS(100)))
 }
 
 /// Node 1 was told to turn at this time.
@@ -60,8 +58,7 @@ fn a_silent_application_stops_every_node_whose_latest_order_is_no_stop() {
 
 #[test]
 fn the_deadline_of_the_dead_man_is_reported_and_kept_to_the_microsecond() {
-    let mut config = armed();
-    config.polling = Polling::Manual;
+    let config = with(armed(), |config| config.polling = Polling::Manual);
     let (mut desk, told) = turning(config);
     desk.packets(1);
     let end = told + MS(100);
@@ -132,8 +129,7 @@ fn a_released_node_is_stopped_by_the_dead_man_because_it_turns_on() {
 
 #[test]
 fn the_dead_man_stops_a_node_that_was_lost_without_its_stop() {
-    let mut config = armed();
-    config.stops_abnormal = false;
+    let config = with(armed(), |config| config.stops_abnormal = false);
     let (mut desk, _) = turning(config);
     desk.packets(2);
     desk.lose(NodeId::N1);
@@ -168,8 +164,7 @@ fn the_deadline_of_the_dead_man_is_reported_however_late_the_next_request_is_due
 fn each_node_under_an_order_is_stopped_whatever_its_id_and_its_mode() {
     for node in NodeId::ALL {
         for mode in [Mode::Velocity, Mode::Position] {
-            let mut config = armed();
-            config.polling = Polling::Manual;
+            let config = with(armed(), |config| config.polling = Polling::Manual);
             let mut desk = Desk::with_nodes(config, &[(node, mode)]);
             assert_eq!(desk.master.poll_timeout(), None, "nobody has an order");
             let told = desk.now;

@@ -4,8 +4,7 @@ use crate::rig::*;
 
 #[test]
 fn the_echo_of_the_packet_that_no_longer_fitted_into_the_record_is_removed() {
-    let mut config = direct();
-    config.removes_echo = true;
+    let config = with(direct(), |config| config.removes_echo = true);
     // The adapter does not echo at first, and nobody answers: 33 READs fill the record.
     let mut desk = Desk::new(config);
     for _ in 0..33 {
@@ -21,8 +20,7 @@ fn the_echo_of_the_packet_that_no_longer_fitted_into_the_record_is_removed() {
 
 #[test]
 fn an_echo_of_a_packet_that_was_taken_back_does_not_shift_the_next_one() {
-    let mut config = direct();
-    config.removes_echo = true;
+    let config = with(direct(), |config| config.removes_echo = true);
     let mut desk = Desk::new(config);
     desk.master.discover(desk.now);
     let asked = desk.turn();

@@ -157,8 +157,7 @@ fn the_outcome_of_a_read_is_unknown_until_it_has_one_of_its_own() {
     desk.answer(NodeId::N1, Answer::Velocity(0.0));
     desk.packets(1);
     assert_eq!(outcome(&desk), Some(Ok(())));
-    let mut config = manual();
-    config.attempts = 1;
+    let config = with(manual(), |config| config.attempts = 1);
     let mut desk = Desk::with_nodes(config, &[N1]);
     for answer in [Answer::Silence, Answer::Velocity(0.0), Answer::Silence, Answer::Silence] {
         desk.answer(NodeId::N1, answer);
@@ -211,8 +210,7 @@ fn noise_behind_the_packet_of_another_node_does_not_change_the_cause() {
 
 #[test]
 fn the_last_failure_is_the_latest_one_with_its_own_cause() {
-    let mut config = manual();
-    config.attempts = 1;
+    let config = with(manual(), |config| config.attempts = 1);
     let mut desk = Desk::with_nodes(config, &[N1]);
     assert_eq!(desk.master.last_failure(NodeId::N1), None);
     let noise = vec![0x55, 1, 2, 3, 4, 5, 6, 7, 8];

@@ -39,8 +39,7 @@ fn a_position_from_before_a_mode_was_in_doubt_is_not_held() {
 #[test]
 fn a_stop_in_doubt_holds_no_position_from_before_it_however_old_it_may_be() {
     for is_asked_before in [true, false] {
-        let mut config = manual();
-        config.hold_age = MS(1000);
+        let config = with(manual(), |config| config.hold_age = MS(1000));
         let mut desk = Desk::with_nodes(config, &[N3]);
         // Just heard, and harmless in either mode: it would be held but for the doubt.
         desk.answer(NodeId::N3, Answer::Position(turns(3)));
@@ -73,8 +72,7 @@ fn is_held_after(desk: &mut Desk, late_us: u32) -> bool {
 #[test]
 fn a_position_is_held_for_20_ms_after_it_was_measured_and_twice_as_long_each_time_after() {
     for gap_us in [0, 300] {
-        let mut config = manual();
-        config.turnaround_gap = US(gap_us);
+        let config = with(manual(), |config| config.turnaround_gap = US(gap_us));
         let mut desk = Desk::stopping(config, N3);
         assert_eq!(desk.packet(), read(NodeId::N3));
         for patience_ms in [20, 40, 80, 160] {
@@ -107,8 +105,7 @@ fn the_search_pauses_for_its_share_of_an_exchange_and_the_gap_after_it() {
 
 #[test]
 fn a_search_at_0_percent_looks_only_for_nodes_that_are_owed_a_stop_and_for_these_at_1_percent() {
-    let mut config = direct();
-    config.recovery_share_pct = 0;
+    let config = with(direct(), |config| config.recovery_share_pct = 0);
     let mut desk = Desk::losing(config);
     assert_eq!(desk.master.poll_timeout(), None, "it was never told to move");
     desk.master.stop(NodeId::N1, desk.now);
@@ -125,9 +122,7 @@ fn a_search_at_0_percent_looks_only_for_nodes_that_are_owed_a_stop_and_for_these
 }
 
 fn armed() -> MasterConfig {
-    let mut config = manual();
-    config.dead_man = Some(MS(100));
-    config
+    with(manual(), |config| config.dead_man = Some(MS(100)))
 }
 
 #[test]

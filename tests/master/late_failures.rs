@@ -5,8 +5,7 @@ use crate::rig::*;
 
 #[test]
 fn a_read_has_failed_when_its_node_is_abnormal_however_many_attempts_are_left() {
-    let mut config = direct();
-    config.attempts = 9;
+    let config = with(direct(), |config| config.attempts = 9);
     let mut desk = Desk::turning(config, 1.0);
     desk.master.confirm(NodeId::N1, desk.now).unwrap();
     desk.master.read(NodeId::N1, desk.now).unwrap();
@@ -88,8 +87,7 @@ fn a_standstill_from_before_a_change_of_mode_is_forgotten() {
 
 #[test]
 fn a_node_that_has_missed_its_only_attempt_keeps_its_set_point() {
-    let mut config = direct();
-    config.attempts = 1;
+    let config = with(direct(), |config| config.attempts = 1);
     let mut desk = Desk::turning(config, 1.0);
     for missed in 1..3 {
         desk.miss();
@@ -105,8 +103,7 @@ fn a_node_that_has_missed_its_only_attempt_keeps_its_set_point() {
 #[test]
 fn a_position_of_the_permitted_age_is_held_for_20_ms_from_the_call() {
     for (late_us, is_held) in [(0, true), (20_000, true), (20_001, false)] {
-        let mut config = manual();
-        config.hold_age = MS(1000);
+        let config = with(manual(), |config| config.hold_age = MS(1000));
         let mut desk = Desk::with_nodes(config, &[N3]);
         desk.now += MS(900);
         desk.master.stop(NodeId::N3, desk.now);

@@ -219,8 +219,7 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
         (true, MasterEvent::StopBlocked { node: NodeId::N1 }),
         (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
     ] {
-        let mut config = direct();
-        config.stops_abnormal = false;
+        let config = with(direct(), |config| config.stops_abnormal = false);
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.answer(NodeId::N1, Answer::Position(turns(-7)));
         desk.packets(1);
@@ -241,8 +240,7 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
 
 #[test]
 fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
-    let mut config = direct();
-    config.stops_abnormal = false;
+    let config = with(direct(), |config| config.stops_abnormal = false);
     let mut desk = Desk::with_nodes(config, &[N1]);
     desk.answer(NodeId::N1, Answer::Position(turns(-7)));
     desk.packets(1);

@@ -24,16 +24,12 @@ pub(crate) fn direct() -> MasterConfig {
 }
 
 pub(crate) fn manual() -> MasterConfig {
-    let mut config = direct();
-    config.polling = Polling::Manual;
-    config
+    with(direct(), |config| config.polling = Polling::Manual)
 }
 
 /// Settings of a bus with these nodes only.
 pub(crate) fn only(nodes: &[NodeId]) -> MasterConfig {
-    let mut config = direct();
-    config.nodes = nodes.iter().copied().collect();
-    config
+    with(direct(), |config| config.nodes = nodes.iter().copied().collect())
 }
 
 pub(crate) const N1: (NodeId, Mode) = (NodeId::N1, Mode::Velocity);

@@ -179,8 +179,7 @@ fn behind_a_write_that_is_leaving_only_reads_and_stops_are_handed_out() {
 
 #[test]
 fn even_if_positions_can_be_written_at_once_velocity_nodes_go_first() {
-    let mut config = mixed();
-    config.hold_age = MS(1000);
+    let config = with(mixed(), |config| config.hold_age = MS(1000));
     let mut desk = Desk::with_nodes(config, &MIXED);
     desk.master.stop_all(desk.now);
     let mut sent = kinds(&desk.packets(4));

@@ -32,8 +32,7 @@ fn a_requested_node_is_read_at_once_whatever_its_period() {
 
 /// A bus with one node that is read every 10 ms; the READ at the returned time has been answered.
 fn read_every_10_ms() -> (Desk, Instant) {
-    let mut config = direct();
-    config.polling = Polling::Every(MS(10));
+    let config = with(direct(), |config| config.polling = Polling::Every(MS(10)));
     let mut desk = Desk::with_nodes(config, &[N1]);
     // The first is late: it was due during the discovery.
     desk.turn_with(290, &velocity(NodeId::N1, 0.0));
@@ -88,8 +87,7 @@ fn a_requested_read_does_not_cost_the_next_turn() {
 #[test]
 fn an_unanswered_read_is_retried_right_after_the_guard_whatever_the_polling() {
     for polling in [Polling::Manual, Polling::Every(MS(100)), Polling::Fastest] {
-        let mut config = direct();
-        config.polling = polling;
+        let config = with(direct(), |config| config.polling = polling);
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.master.read(NodeId::N1, desk.now).unwrap();
         for _ in 0..config.attempts {
@@ -105,8 +103,7 @@ fn an_unanswered_read_is_retried_right_after_the_guard_whatever_the_polling() {
 
 #[test]
 fn manual_polling_reads_when_asked_and_writes_when_told() {
-    let mut config = direct();
-    config.polling = Polling::Manual;
+    let config = with(direct(), |config| config.polling = Polling::Manual);
     let mut desk = Desk::with_nodes(config, &[N1]);
     assert_eq!(desk.master.poll_timeout(), None);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -121,8 +118,7 @@ fn manual_polling_reads_when_asked_and_writes_when_told() {
 
 #[test]
 fn a_turnaround_gap_is_kept_after_requests_and_answers() {
-    let mut config = direct();
-    config.turnaround_gap = US(100);
+    let config = with(direct(), |config| config.turnaround_gap = US(100));
     let mut desk = Desk::with_nodes(config, &[N1]);
     desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
@@ -136,8 +132,7 @@ fn a_turnaround_gap_is_kept_after_requests_and_answers() {
 
 /// A master on a line that echoes, at the beginning of a discovery.
 fn discovering_on_an_echoing_line() -> Desk {
-    let mut config = direct();
-    config.removes_echo = true;
+    let config = with(direct(), |config| config.removes_echo = true);
     let mut desk = Desk::new(config);
     desk.master.discover(desk.now);
     desk
@@ -211,8 +206,7 @@ fn a_wrong_echo_is_one_error_and_the_next_one_is_removed_again() {
 
 #[test]
 fn a_line_without_the_configured_echo_still_works() {
-    let mut config = direct();
-    config.removes_echo = true;
+    let config = with(direct(), |config| config.removes_echo = true);
     let desk = Desk::with_nodes(config, &[N1]);
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
     assert!(desk.master.statistics().echo_errors > 0);
@@ -313,8 +307,7 @@ fn rare_events_have_room_however_many_readings_are_waiting() {
 #[test]
 fn an_answer_earlier_than_the_line_allows_is_accepted_if_configured() {
     for accepts_early in [false, true] {
-        let mut config = direct();
-        config.accepts_early = accepts_early;
+        let config = with(direct(), |config| config.accepts_early = accepts_early);
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.turn_with(1, &velocity(NodeId::N1, 9.0));
         assert_eq!(!desk.told().is_empty(), accepts_early);

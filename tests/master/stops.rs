@@ -75,8 +75,7 @@ fn a_position_being_read_when_the_stop_was_requested_is_not_held() {
 #[test]
 fn hold_age_is_the_maximum_age_of_a_position_held_without_a_read() {
     for (age_us, is_held) in [(999, true), (1000, false), (1001, false)] {
-        let mut config = manual();
-        config.hold_age = US(1000);
+        let config = with(manual(), |config| config.hold_age = US(1000));
         let mut desk = Desk::with_nodes(config, &[N3]);
         desk.answer(NodeId::N3, Answer::Position(turns(40)));
         let heard = desk.master.status(NodeId::N3).unwrap().1;
@@ -282,8 +281,7 @@ fn all_nodes_are_stopped_before_the_next_exchange() {
 #[test]
 fn a_position_is_held_however_long_the_gap_between_packets() {
     for gap in [MS(19), MS(20), MS(21), MS(200)] {
-        let mut config = direct();
-        config.turnaround_gap = gap;
+        let config = with(direct(), |config| config.turnaround_gap = gap);
         let mut desk = Desk::stopping(config, N3);
         let sent = desk.packets(6);
         let stop = hold(NodeId::N3, Position::new(7, 3));

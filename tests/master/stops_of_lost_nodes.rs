@@ -112,8 +112,7 @@ fn a_node_that_was_never_told_to_move_is_owed_nothing_when_it_becomes_abnormal()
 
 #[test]
 fn without_stops_abnormal_a_node_that_comes_back_gets_no_write_at_all() {
-    let mut config = direct();
-    config.stops_abnormal = false;
+    let config = with(direct(), |config| config.stops_abnormal = false);
     let mut desk = Desk::turning(config, 5.0);
     desk.lose(NodeId::N1);
     assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
@@ -150,8 +149,7 @@ fn an_id_that_was_never_heard_has_all_attempts_of_a_read_at_once() {
 
 #[test]
 fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
-    let mut config = direct();
-    config.stops_abnormal = false;
+    let config = with(direct(), |config| config.stops_abnormal = false);
     let mut desk = Desk::stopping(config, N1);
     desk.run(MS(10));
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
@@ -161,8 +159,7 @@ fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
 
 #[test]
 fn hold_age_does_not_hold_for_a_node_that_is_lost() {
-    let mut config = direct();
-    config.hold_age = MS(60_000);
+    let config = with(direct(), |config| config.hold_age = MS(60_000));
     let mut desk = Desk::with_nodes(config, &[N3]);
     desk.lose(NodeId::N3);
     desk.master.stop(NodeId::N3, desk.now);

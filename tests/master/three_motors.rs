@@ -177,8 +177,7 @@ fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
 
 #[test]
 fn the_longest_echo_is_removed() {
-    let mut config = direct();
-    config.removes_echo = true;
+    let config = with(direct(), |config| config.removes_echo = true);
     let mut boards = two_boards(config);
     for _ in 0..50 {
         boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();

@@ -211,8 +211,7 @@ fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
 #[test]
 fn an_echo_is_not_expected_of_a_frame_that_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut config = manual();
-        config.removes_echo = true;
+        let config = with(manual(), |config| config.removes_echo = true);
         let mut desk = Desk::new(config);
         desk.master.stop(NodeId::N1, desk.now);
         assert_eq!(desk.packet(), read(NodeId::N1));
@@ -246,8 +245,7 @@ fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
     // The WRITE takes 160 us, the READ after it 80.
     assert_eq!(desk.packet(), read(NodeId::N1));
     assert_eq!(desk.master.poll_timeout(), Some(begin + US(160 + 740)));
-    let mut config = manual();
-    config.turnaround_gap = US(100);
+    let config = with(manual(), |config| config.turnaround_gap = US(100));
     let mut desk = Desk::with_nodes(config, &[N1]);
     desk.master.read(NodeId::N1, desk.now).unwrap();
     let heard = desk.now;

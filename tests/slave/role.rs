@@ -160,8 +160,7 @@ fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
 
 #[test]
 fn a_turnaround_gap_holds_the_answer_back() {
-    let mut config = SlaveConfig::direct();
-    config.turnaround_gap = US(30);
+    let config = with(SlaveConfig::direct(), |config| config.turnaround_gap = US(30));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), Vec::<Vec<u8>>::new());
     assert_eq!(slave.poll_timeout(), Some(T0 + US(30)));
@@ -226,8 +225,7 @@ fn trap() -> Vec<u8> {
 
 #[test]
 fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
-    let mut config = SlaveConfig::direct();
-    config.two_wire = true;
+    let config = with(SlaveConfig::direct(), |config| config.two_wire = true);
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &trap(), T0), [[0; 0]; 0]);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (1, 0));
@@ -251,8 +249,7 @@ fn on_four_wires_a_slave_hears_no_answers_and_searches_only_for_requests() {
 
 #[test]
 fn a_nan_speed_does_not_feed_the_watchdog() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     for bad in [Position::new(0, 0x7FC0), Position::new(0, 0x7F80), Position::new(1, -128)] {
         let mut slave: Slave =
             Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
@@ -272,8 +269,7 @@ fn a_nan_speed_does_not_feed_the_watchdog() {
 
 #[test]
 fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     let mut damaged = write(NodeId::N2, 2.0);
@@ -288,8 +284,7 @@ fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
 
 #[test]
 fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
     slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
@@ -320,8 +315,7 @@ fn an_old_request_that_a_false_header_held_back_is_not_answered() {
 fn a_slave_drops_an_answer_that_pauses_for_five_byte_times() {
     assert_eq!(slave(Mode::Velocity).frame_pause(), US(100));
     assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
-    let mut config = SlaveConfig::direct();
-    config.idle = MS(3);
+    let config = with(SlaveConfig::direct(), |config| config.idle = MS(3));
     let patient: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(patient.frame_pause(), MS(3), "as long as its own wait");
 }

@@ -12,7 +12,7 @@ use axlewire::{
     time::Instant,
 };
 
-use crate::packets::{MS, rps};
+use crate::packets::*;
 
 const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N3;
@@ -42,8 +42,7 @@ fn write_of(speeds: [f32; 3]) -> Vec<u8> {
 
 #[test]
 fn a_speed_that_is_no_number_for_any_of_the_motors_is_refused_for_all_and_feeds_no_watchdog() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for motor in 0..3 {
             let mut slave = slave(Mode::Velocity, config);
@@ -104,8 +103,7 @@ fn a_position_board_does_not_answer_before_it_knows_where_it_is() {
 
 #[test]
 fn on_two_wires_the_answers_of_other_boards_are_followed_and_not_obeyed() {
-    let mut config = SlaveConfig::direct();
-    config.two_wire = true;
+    let config = with(SlaveConfig::direct(), |config| config.two_wire = true);
     let mut slave = slave(Mode::Position, config);
     slave.set_position(PLACES);
     // Each answer contains a READ for this node, and comes from its own id or from another.

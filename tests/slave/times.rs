@@ -16,8 +16,7 @@ const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N1;
 
 fn watched() -> Slave {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     let mut slave: Slave = Slave::new(NODE, Mode::Velocity, config, T0);
     slave.handle_input(&write(NODE, 2.0), T0);
     slave
@@ -44,8 +43,7 @@ fn a_switch_that_is_moved_drops_the_command_with_its_event_and_its_watchdog() {
 
 #[test]
 fn a_switch_that_is_moved_the_other_way_does_the_same() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(MS(100));
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     let mut slave: Slave = Slave::new(NODE, Mode::Position, config, T0);
     slave.set_position(turns(5));
     slave.handle_input(&hold(NODE, Position::new(3, 4)), T0);
@@ -99,8 +97,7 @@ fn a_slave_is_held_up_after_the_time_for_an_answer_but_at_least_4_and_at_most_20
             .into_iter()
             .chain([(US(19_999), 19_999), (MS(20), 20_000), (US(20_001), 20_000)])
     {
-        let mut config = SlaveConfig::direct();
-        config.answer_within = within;
+        let config = with(SlaveConfig::direct(), |config| config.answer_within = within);
         let slave: Slave = Slave::new(NODE, Mode::Velocity, config, T0);
         assert_eq!(slave.held_up_after(), Some(US(limit)));
         assert_eq!(slave.frame_pause(), US(100), "as long as it waits for the rest of a packet");
