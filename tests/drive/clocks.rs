@@ -5,10 +5,7 @@ use std::cell::RefCell;
 use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
-use crate::{
-    recorder::{Recorder, bytes},
-    rig::*,
-};
+use crate::rig::*;
 
 #[test]
 fn role_time_continues_after_a_clock_goes_backwards() {

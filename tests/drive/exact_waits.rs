@@ -6,7 +6,7 @@ use std::{cell::RefCell, rc::Rc};
 use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
-use crate::{recorder::Recorder, rig::*};
+use crate::rig::*;
 
 /// Plugs the port in again at this time.
 fn replug(world: &World, port: &Port, at_us: u64) {

@@ -1,9 +1,6 @@
 //! Ports that fail and calls that are dropped: the next call continues where this one ended.
 
-use crate::{
-    recorder::{ASYNC, ROUNDS, Recorder},
-    rig::*,
-};
+use crate::rig::*;
 
 #[test]
 fn a_write_that_fails_inside_a_frame_leaves_the_rest_for_the_next_call() {

@@ -8,11 +8,7 @@ use std::{
 
 use axlewire::sim::MotorNode;
 
-use crate::{
-    pin::{Pin, is_on},
-    port::Wakes,
-    rig::*,
-};
+use crate::{port::Wakes, rig::*};
 
 // The calls under test.
 

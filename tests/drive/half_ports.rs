@@ -4,7 +4,7 @@
 use axlewire::ikeya::board::Target;
 use embedded_io::Write;
 
-use crate::{recorder::Recorder, rig::*};
+use crate::rig::*;
 
 #[test]
 fn a_receiver_that_fails_while_a_frame_is_sent_is_an_error_of_the_round_that_sent_it() {

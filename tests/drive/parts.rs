@@ -1,11 +1,7 @@
 //! What a driver and a port are made of comes back out, and what a clock or a store leaves to
 //! its trait does what the trait says.
 
-use crate::{
-    pin::{drain, undelayed},
-    recorder::{Recorder, bytes},
-    rig::*,
-};
+use crate::rig::*;
 
 #[test]
 fn a_driver_gives_back_its_role_its_port_and_its_clock() {

@@ -4,7 +4,7 @@ use std::{cell::Cell, rc::Rc, task::Poll};
 
 use axlewire::drive::NoDelay;
 
-use crate::{port::Log, recorder::Recorder, rig::*};
+use crate::{port::Log, rig::*};
 
 #[derive(Clone, Default)]
 pub(crate) struct Pin {

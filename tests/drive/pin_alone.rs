@@ -5,7 +5,7 @@ use std::error::Error;
 use embedded_io::Error as _;
 
 use crate::{
-    pin::{Delay, Pin, Pinned, Stuck, delayed, drain, flush, logged, ready, undelayed, write},
+    pin::{Delay, Pinned, Stuck, delayed, flush, logged, write},
     rig::*,
 };
 

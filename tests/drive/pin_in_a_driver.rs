@@ -1,10 +1,6 @@
 //! Driver enable under a driver: whatever fails, stalls or is dropped, the pin is switched off.
 
-use crate::{
-    pin::{drain, is_on, ready, serve, undelayed},
-    recorder::{Recorder, bytes},
-    rig::*,
-};
+use crate::{pin::serve, rig::*};
 
 #[test]
 fn a_driver_switches_the_pin_once_per_round_and_releases_it_when_its_port_fails() {

@@ -20,6 +20,10 @@ pub(crate) use axlewire::{
 };
 
 pub(crate) use crate::port::{Port, Step, Unplugged, World, poll};
+pub(crate) use crate::{
+    pin::{Pin, drain, is_on, ready, undelayed},
+    recorder::{ASYNC, Call, ROUNDS, Recorder, bytes},
+};
 
 /// The blocking form of a call, or the async one.
 macro_rules! call {

@@ -2,10 +2,7 @@
 
 use std::{cell::Cell, rc::Rc};
 
-use crate::{
-    recorder::{Call, ROUNDS, Recorder, bytes},
-    rig::*,
-};
+use crate::rig::*;
 
 #[test]
 fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {

@@ -1,6 +1,6 @@
 //! How long an async port may take for a frame.
 
-use crate::{exact_waits::Pausing, recorder::Recorder, rig::*};
+use crate::{exact_waits::Pausing, rig::*};
 
 /// A port that takes this time for each write and for each flush, microseconds.
 fn slow<R: Endpoint>(role: R, write_us: u64, flush_us: u64) -> On<R> {

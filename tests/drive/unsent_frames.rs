@@ -1,9 +1,6 @@
 //! Ports that fail: what is still sent, and what goes back to its role (I12, U16).
 
-use crate::{
-    recorder::{ASYNC, Call, ROUNDS, Recorder},
-    rig::*,
-};
+use crate::rig::*;
 
 fn frames_of(driver: &On<Recorder>) -> usize {
     let is_frame = |call: &&Call| matches!(call, Call::Transmit(Some(_)));

@@ -1,9 +1,6 @@
 //! Waiting for events: until the deadline and no longer, serving the role in between.
 
-use crate::{
-    recorder::{Call, Recorder},
-    rig::*,
-};
+use crate::rig::*;
 
 #[test]
 fn on_a_silent_line_next_event_waits_until_the_deadline_and_no_longer() {

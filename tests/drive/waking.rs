@@ -7,7 +7,7 @@ use std::{
     task::{Context, Poll, Waker},
 };
 
-use crate::{port::Wakes, recorder::Recorder, rig::*};
+use crate::{port::Wakes, rig::*};
 
 /// A future, polled by hand.
 struct Task<'a, T> {

@@ -3,13 +3,7 @@
 
 use axlewire::crc16;
 
-use crate::{
-    master::Nodes,
-    names::*,
-    qemu::{Board, PATIENCE, Program},
-    slave::{NODE, rps},
-    wire::Wire,
-};
+use crate::{master::Nodes, names::*};
 
 fn packet(packet: &impl Encode) -> Vec<u8> {
     let mut buffer = [0; 16];

@@ -7,12 +7,7 @@ use axlewire::{
     sim::Motor,
 };
 
-use crate::{
-    driver_enable_pin,
-    names::*,
-    qemu::{Board, PATIENCE, Program},
-    wire::{Wire, WireClock},
-};
+use crate::{driver_enable_pin, names::*};
 
 /// Two nodes that receive everything. One of them can be muted and deafened.
 pub(crate) struct Nodes {

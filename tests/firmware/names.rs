@@ -18,3 +18,9 @@ pub(crate) use axlewire::{
         message::{ImuBias, MagBias, Ping},
     },
 };
+
+pub(crate) use crate::{
+    qemu::{Board, PATIENCE, Program, Report},
+    slave::{NODE, rps},
+    wire::{Wire, WireClock},
+};

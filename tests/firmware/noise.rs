@@ -5,10 +5,9 @@ use std::{collections::HashSet, time::Instant};
 use crate::{
     master::Nodes,
     names::*,
-    qemu::{Board, PATIENCE, Program},
     robot::{board_shows, end_of, linked_by, patient, wheels_turn_at},
-    slave::{Bus, NODE, is_turning_at, master_on, rps},
-    wire::{Noise, Wire},
+    slave::{Bus, is_turning_at, master_on},
+    wire::Noise,
 };
 
 /// Commands a speed until this many consecutive readings show it, as an application does on a bad

@@ -8,11 +8,7 @@ use axlewire::ucp::{
     message::{CalibrationKind, NetworkState, OtaStatus},
 };
 
-use crate::{
-    names::*,
-    qemu::{Board, PATIENCE, Program, Report},
-    wire::{Wire, WireClock},
-};
+use crate::names::*;
 
 pub(crate) type Rover = Driver<Host<MemoryStore>, Wire, WireClock>;
 

@@ -1,11 +1,7 @@
 //! The registers that the images write at their start, from QEMU's log. QEMU has neither pins nor
 //! baud rates, so nothing else would notice a wrong one; a board would be mute.
 
-use crate::{
-    names::*,
-    qemu::{Board, Program},
-    wire::Wire,
-};
+use crate::names::*;
 
 /// Everything that is written to the register at this address.
 fn written(log: &str, address: u32) -> Vec<u32> {

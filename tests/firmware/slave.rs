@@ -2,12 +2,7 @@
 
 use axlewire::{ikeya, stream::Event};
 
-use crate::{
-    driver_enable_pin,
-    names::*,
-    qemu::{Board, PATIENCE, Program, Report},
-    wire::{Wire, WireClock},
-};
+use crate::{driver_enable_pin, names::*};
 
 pub(crate) type Bus = Driver<Master, Wire, WireClock>;
 

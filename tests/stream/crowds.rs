@@ -4,8 +4,7 @@ use axlewire::ikeya::{BothDirections, ToMaster, ToSlave};
 use proptest::{collection::vec, prelude::*, sample::select};
 
 use crate::{
-    checked_line::{self, CheckedLine, Op},
-    known_framings::Known,
+    checked_line::{self, Op},
     oracle::{self, Rules},
     rig::*,
 };

@@ -2,7 +2,7 @@
 
 use axlewire::{ikeya, ucp};
 
-use crate::{hostile_streams, rig::*};
+use crate::rig::*;
 
 #[test]
 fn a_false_header_swallows_nothing() {

@@ -12,7 +12,6 @@ use axlewire::ikeya;
 
 use crate::{
     dice::Dice,
-    known_framings::Known,
     noisy_line::{Arrival, Noise, Place, Tally, transmit},
     oracle,
     rig::*,

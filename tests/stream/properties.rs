@@ -5,10 +5,8 @@ use axlewire::ikeya;
 use proptest::{collection::vec, prelude::*};
 
 use crate::{
-    checked_line::{self, CheckedLine, Op},
-    hostile_streams,
+    checked_line::{self, Op},
     judged_work::check_work,
-    known_framings::Known,
     oracle,
     rig::*,
     split,

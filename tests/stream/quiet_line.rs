@@ -2,7 +2,7 @@
 
 use axlewire::ikeya;
 
-use crate::{checked_line::CheckedLine, oracle, rig::*};
+use crate::{oracle, rig::*};
 
 #[test]
 fn the_longest_false_header_delays_a_frame_by_at_most_a_longest_frame() {

@@ -1,6 +1,7 @@
 //! Helpers of the scenarios: packets, and a decoder's output for them.
 
 use axlewire::{ikeya, ucp::MotorControl};
+
 /// What the tests of streams use of the library.
 pub(crate) use axlewire::{
     ikeya::{NodeId, Position, Rps, three},
@@ -8,7 +9,7 @@ pub(crate) use axlewire::{
     ucp::{Body, Ucp},
 };
 
-use crate::known_framings::Known;
+pub(crate) use crate::{checked_line::CheckedLine, hostile_streams, known_framings::Known};
 
 /// An event with the frame's bytes in it.
 #[derive(Debug, PartialEq)]

@@ -8,7 +8,7 @@ use axlewire::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::{checked_line, hostile_streams, known_framings::Known, oracle, rig::*};
+use crate::{checked_line, oracle, rig::*};
 
 /// Singly, in batches and in SIMD batches: the frames of the oracle, and its counters.
 fn check<F: Known>(stream: &[u8]) {

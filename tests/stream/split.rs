@@ -3,7 +3,6 @@
 use axlewire::stream;
 
 use crate::{
-    known_framings::Known,
     oracle::{self, Answer},
     rig::*,
 };

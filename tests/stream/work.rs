@@ -1,6 +1,6 @@
 //! Work: a candidate that arrives in pieces is judged no more often than necessary.
 
-use crate::{checked_line::CheckedLine, hostile_streams, judged_work::{self, Counted}, rig::*};
+use crate::{judged_work::{self, Counted}, rig::*};
 
 #[test]
 fn a_split_candidate_is_judged_no_more_often_than_its_bytes_can_change_the_verdict() {
