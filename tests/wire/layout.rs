@@ -67,26 +67,24 @@ fn ucp_bodies_and_frames_have_their_size_and_no_alignment() {
 
 #[test]
 fn ikeya_fields_have_the_documented_offsets() {
+    #[track_caller]
+    fn begins(packet: &[u8], bytes: &[u8]) {
+        assert_eq!(packet[..bytes.len()], *bytes);
+    }
     let id = NodeId::N7;
     let rps = |bits| Rps::new(f32::from_bits(bits)).unwrap();
     let position = Position::new(0x1234, 0x5678);
-    assert_eq!(ReadRequest::new(id).as_bytes()[..2], [0xAA, 7]);
-    assert_eq!(
-        WriteRequest::velocity(id, rps(0x4433_2211)).as_bytes()[..6],
-        [0xBB, 7, 0x11, 0x22, 0x33, 0x44]
+    begins(ReadRequest::new(id).as_bytes(), &[0xAA, 7]);
+    begins(
+        WriteRequest::velocity(id, rps(0x4433_2211)).as_bytes(),
+        &[0xBB, 7, 0x11, 0x22, 0x33, 0x44],
     );
-    assert_eq!(
-        WriteRequest::position(id, position).as_bytes()[..6],
-        [0xBB, 7, 0x34, 0x12, 0x78, 0x56]
+    begins(WriteRequest::position(id, position).as_bytes(), &[0xBB, 7, 0x34, 0x12, 0x78, 0x56]);
+    begins(
+        VelocityResponse::new(id, rps(0x4433_2211)).as_bytes(),
+        &[0x55, 7, 0x11, 0x22, 0x33, 0x44],
     );
-    assert_eq!(
-        VelocityResponse::new(id, rps(0x4433_2211)).as_bytes()[..6],
-        [0x55, 7, 0x11, 0x22, 0x33, 0x44]
-    );
-    assert_eq!(
-        PositionResponse::new(id, position).as_bytes()[..6],
-        [0x56, 7, 0x34, 0x12, 0x78, 0x56]
-    );
+    begins(PositionResponse::new(id, position).as_bytes(), &[0x56, 7, 0x34, 0x12, 0x78, 0x56]);
 }
 
 #[test]
