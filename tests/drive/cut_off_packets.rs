@@ -7,10 +7,6 @@ use crate::{
     rig::*,
 };
 
-fn rps(value: f32) -> Rps {
-    Rps::new(value).unwrap()
-}
-
 /// A motor at rest, with a set-point of 10 rps of which this many bytes have left. The node waits
 /// 20 ms for the rest.
 fn cut_after(count: usize) -> (Wire, Bus) {

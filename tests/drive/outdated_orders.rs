@@ -8,10 +8,6 @@ use crate::{
 const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(MS_20)];
 const MS_20: Duration = Duration::from_millis(20);
 
-fn rps(value: f32) -> Rps {
-    Rps::new(value).unwrap()
-}
-
 /// A motor that has turned at 5 rps for four seconds, and its master.
 fn turned(polling: Polling) -> (Wire, Bus) {
     let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |config| config.polling = polling);

@@ -154,6 +154,12 @@ pub(crate) fn begun() -> Host {
     host
 }
 
+/// The host, told to drive at this speed at this time, milliseconds.
+pub(crate) fn driven(mut host: Host, speed: i16, at: u64) -> Host {
+    host.drive(go(speed), ms(at)).unwrap();
+    host
+}
+
 /// A robot is told to begin a calibration.
 pub(crate) fn begins(kind: CalibrationKind) -> RobotEvent {
     RobotEvent::CalibrationStart { kind, repeated: false }

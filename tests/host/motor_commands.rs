@@ -5,8 +5,7 @@ use crate::rig::*;
 
 #[test]
 fn the_latest_motor_command_is_repeated_every_100_ms() {
-    let mut host = quiet_host();
-    host.drive(go(40), ms(0)).unwrap();
+    let mut host = driven(quiet_host(), 40, 0);
     assert_eq!(sent(&mut host, ms(0)).len(), 1);
     let frames = wait(&mut host, ms(450));
     let at = |millis: u64| (millis * 1000, 40);
@@ -97,8 +96,7 @@ fn the_host_sends_zero_when_the_application_has_been_silent_for_500_ms() {
 
 #[test]
 fn the_dead_man_does_not_wait_for_the_next_repetition() {
-    let mut host = quiet_host();
-    host.drive(go(40), ms(0)).unwrap();
+    let mut host = driven(quiet_host(), 40, 0);
     sent(&mut host, ms(0));
     host.drive(go(40), ms(30)).unwrap();
     let frames = speeds(&wait(&mut host, ms(560)));
@@ -107,8 +105,7 @@ fn the_dead_man_does_not_wait_for_the_next_repetition() {
 
 #[test]
 fn an_application_that_has_stopped_may_be_silent() {
-    let mut host = quiet_host();
-    host.drive(go(40), ms(0)).unwrap();
+    let mut host = driven(quiet_host(), 40, 0);
     host.stop(ms(10));
     sent(&mut host, ms(10));
     let frames = wait(&mut host, ms(2000));
@@ -118,8 +115,7 @@ fn an_application_that_has_stopped_may_be_silent() {
 
 #[test]
 fn a_late_driver_does_not_revive_a_command_that_is_too_old() {
-    let mut host = quiet_host();
-    host.drive(go(40), ms(0)).unwrap();
+    let mut host = driven(quiet_host(), 40, 0);
     // handle_timeout was not called in between.
     assert_eq!(host.poll_transmit(ms(700)).and_then(speed), Some(0));
     assert_eq!(events(&mut host), [HostEvent::DeadMan]);
@@ -359,8 +355,7 @@ fn only_a_command_that_moves_the_robot_can_be_outdated_and_only_by_another() {
 
 #[test]
 fn a_command_that_the_dead_man_has_ended_is_outdated() {
-    let mut host = begun();
-    host.drive(go(50), ms(0)).unwrap();
+    let mut host = driven(begun(), 50, 0);
     wait(&mut host, ms(499));
     assert!(!host.is_outdated());
     host.handle_timeout(ms(500));

@@ -6,8 +6,7 @@ use crate::rig::*;
 #[test]
 fn a_failed_write_or_a_discarded_stop_makes_the_stop_due_again() {
     for unsent in EVERY {
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         assert_eq!(sent(&mut host, ms(30)).len(), 1);
         host.stop(ms(31));
         assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
@@ -23,15 +22,13 @@ fn a_failed_write_or_a_discarded_stop_makes_the_stop_due_again() {
 #[test]
 fn an_old_command_is_never_sent_late() {
     for unsent in EVERY {
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
         host.stop(ms(35));
         host.handle_unsent(unsent, ms(36));
         assert!(sent(&mut host, ms(36)).iter().all(|frame| speed(frame) == Some(0)), "{unsent:?}");
 
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
         host.handle_unsent(unsent, ms(5000));
         host.handle_timeout(ms(5000));
@@ -43,8 +40,7 @@ fn an_old_command_is_never_sent_late() {
 
 #[test]
 fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
-    let mut host = begun();
-    host.drive(go(40), ms(30)).unwrap();
+    let mut host = driven(begun(), 40, 30);
     sent(&mut host, ms(30));
     host.handle_unsent(Unsent::CutOff, ms(32));
     let frames = sent(&mut host, ms(32));
@@ -53,8 +49,7 @@ fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
 
 #[test]
 fn both_frames_after_a_cut_off_one_are_sent_at_once_even_if_the_command_changes_in_between() {
-    let mut host = begun();
-    host.drive(go(10), ms(20)).unwrap();
+    let mut host = driven(begun(), 10, 20);
     sent(&mut host, ms(20));
     host.handle_unsent(Unsent::CutOff, ms(30));
     assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(10));
@@ -83,8 +78,7 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
 #[test]
 fn a_stop_requested_after_the_failure_is_sent_at_once_and_alone() {
     for unsent in EVERY {
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         sent(&mut host, ms(30));
         host.handle_unsent(unsent, ms(35));
         host.stop(ms(36));
@@ -204,8 +198,7 @@ fn behind_any_frame_that_was_cut_off_a_stop_reaches_a_simple_receiver() {
 #[test]
 fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() {
     let cut = || {
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
         host.handle_unsent(Unsent::CutOff, ms(31));
         host.stop(ms(31));
@@ -241,8 +234,7 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
 
 #[test]
 fn the_rest_of_a_command_is_outdated_by_a_stop_although_a_flush_has_failed_meanwhile() {
-    let mut host = begun();
-    host.drive(go(60), ms(30)).unwrap();
+    let mut host = driven(begun(), 60, 30);
     assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(60));
     // Of its bytes the port has taken some, and has not flushed them.
     host.handle_unsent(Unsent::Unflushed, ms(31));
@@ -259,8 +251,7 @@ fn the_rest_of_a_command_is_outdated_by_a_stop_although_a_flush_has_failed_meanw
 #[test]
 fn the_first_of_two_copies_that_the_port_did_not_touch_goes_twice_again() {
     for unsent in EVERY {
-        let mut host = begun();
-        host.drive(go(40), ms(30)).unwrap();
+        let mut host = driven(begun(), 40, 30);
         sent(&mut host, ms(30));
         host.stop(ms(31));
         host.handle_unsent(Unsent::CutOff, ms(32));

@@ -63,7 +63,6 @@ pub(crate) enum Order {
 pub(crate) struct Bus {
     pub(crate) plan: Plan,
     pub(crate) line: Lane<Head, Tail>,
-    pub(crate) start: Instant,
     pub(crate) schedule: Schedule,
     pub(crate) rng: Rng,
     pub(crate) orders: [Order; NODES],
@@ -88,7 +87,6 @@ impl Bus {
             nodes.map(|(index, node)| tail(node, index, Position::new(0, 0), &mut rng)).collect();
         Self {
             line: Lane::new(500_000, 0, plan.seed, start, head(&plan, start), tails),
-            start,
             schedule: Schedule::new(&plan, NODES as u64, End::Head),
             rng,
             orders: [Order::None; NODES],
@@ -103,11 +101,6 @@ impl Bus {
         }
     }
 
-    /// Microseconds since the start.
-    pub(crate) fn elapsed(&self) -> u64 {
-        self.line.now().as_micros().wrapping_sub(self.start.as_micros())
-    }
-
     pub(crate) fn master(&self) -> &Master {
         &self.line.head().role
     }
@@ -118,14 +111,14 @@ impl Bus {
 
     /// Runs to the end of the plan.
     pub(crate) fn run(&mut self) {
-        while self.elapsed() < self.plan.length_us {
+        while self.line.elapsed() < self.plan.length_us {
             self.command();
             // Not at the time of a poll.
             let (step, ahead) = (self.plan.step_us, self.plan.step_us * 2 / 3);
-            let step_end = ((self.elapsed() + ahead) / step + 1) * step - ahead;
+            let step_end = ((self.line.elapsed() + ahead) / step + 1) * step - ahead;
             loop {
                 let edge = self.schedule.next_edge();
-                self.run_until(edge.min(step_end));
+                self.line.run_to(edge.min(step_end));
                 if edge >= step_end {
                     break;
                 }
@@ -142,14 +135,9 @@ impl Bus {
         self.settle();
     }
 
-    fn run_until(&mut self, micros: u64) {
-        let end = Instant::from_micros(self.start.as_micros().wrapping_add(micros));
-        self.line.run_until(end);
-    }
-
     /// Lets faults end and begin.
     fn change(&mut self) {
-        let now = self.elapsed();
+        let now = self.line.elapsed();
         for fault in self.schedule.ended(now) {
             if let Fault::BrownOut(tail) = fault {
                 self.reset(tail);
@@ -168,11 +156,11 @@ impl Bus {
         for index in 0..NODES {
             let is_cut_off = self.schedule.is_cut_off(index);
             self.line.set_unplugged(index, is_cut_off);
-            let since = self.cut_off_us[index].unwrap_or(self.elapsed());
+            let since = self.cut_off_us[index].unwrap_or(self.line.elapsed());
             self.cut_off_us[index] = (is_cut_off || pair.unplugged).then_some(since);
         }
         self.line.set_faults(pair);
-        self.quiet_us = self.elapsed();
+        self.quiet_us = self.line.elapsed();
     }
 
     /// Runs into the next packet, so that the fault cuts it.
@@ -231,16 +219,16 @@ impl Bus {
 
     /// Whether there has been no fault for this long.
     pub(crate) fn is_quiet_for(&self, micros: u64) -> bool {
-        self.schedule.is_quiet() && self.elapsed() >= self.quiet_us + micros
+        self.schedule.is_quiet() && self.line.elapsed() >= self.quiet_us + micros
     }
 
     /// Whether a node has been cut off for this long.
     pub(crate) fn is_cut_off_for(&self, index: usize, micros: u64) -> bool {
-        self.cut_off_us[index].is_some_and(|since| self.elapsed() > since + micros)
+        self.cut_off_us[index].is_some_and(|since| self.line.elapsed() > since + micros)
     }
 
     pub(crate) fn has_run_out(&self, since_us: u64) -> bool {
-        self.elapsed() >= since_us + RUN_OUT_US
+        self.line.elapsed() >= since_us + RUN_OUT_US
     }
 
     /// How long a slave obeys a command that is not repeated.

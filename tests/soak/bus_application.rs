@@ -22,7 +22,7 @@ impl Bus {
         let index = self.rng.below(NODES as u64) as usize;
         let node = NodeId::ALL[index];
         let Some(mode) = self.master().mode(node) else { return };
-        let elapsed = self.elapsed();
+        let elapsed = self.line.elapsed();
         let part = self.rng.below(2001) as f32 / 1000.0 - 1.0;
         let target = match mode {
             Mode::Velocity => Target::Velocity(Rps::new(10.0 * part).unwrap()),
@@ -54,7 +54,7 @@ impl Bus {
 
     /// What the application makes of the events: a node that was lost stays stopped.
     pub(crate) fn react(&mut self) {
-        let elapsed = self.elapsed();
+        let elapsed = self.line.elapsed();
         for (at, event) in self.line.take_head_events() {
             match event {
                 MasterEvent::Status { .. } => self.account.answers += 1,
@@ -72,7 +72,7 @@ impl Bus {
                         self.ordered_us[index] = elapsed;
                     }
                     if health == Health::Online && self.schedule.is_quiet() {
-                        let at = at.as_micros().wrapping_sub(self.start.as_micros());
+                        let at = self.line.since_start(at);
                         let took = at.saturating_sub(self.quiet_us);
                         self.account.recovery_us = self.account.recovery_us.max(took);
                     }

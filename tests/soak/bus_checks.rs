@@ -30,7 +30,8 @@ impl Bus {
             for node in NodeId::ALL {
                 assert_eq!(self.master().health(node), Some(Health::Online), "node {node}");
                 // A stop given just now is still owed.
-                let is_new = self.elapsed() < self.ordered_us[usize::from(node.get() - 1)] + bound;
+                let is_new =
+                    self.line.elapsed() < self.ordered_us[usize::from(node.get() - 1)] + bound;
                 let progress = self.master().stop_progress(node);
                 assert!(is_new || progress != StopProgress::Owed, "node {node} is owed a stop");
             }
@@ -51,7 +52,7 @@ impl Bus {
         let now = self.line.tail(index).role_now();
         let command = self.slave(index).command(now);
         let (order, since) = (self.orders[index], self.ordered_us[index]);
-        let elapsed = self.elapsed();
+        let elapsed = self.line.elapsed();
         if self.is_cut_off_for(index, self.watchdog_us()) {
             self.account.checks.watchdogs += 1;
             assert_eq!(command, None, "node {index} obeys although it hears nothing");
@@ -105,7 +106,7 @@ impl Bus {
             self.account.checks.standstills += 1;
             assert!(is_still, "node {index} turns at {:?} after its stop", motor.velocity());
             // Seen at the next two readings.
-            if self.elapsed() >= since + 3 * self.plan.poll_us {
+            if self.line.elapsed() >= since + 3 * self.plan.poll_us {
                 let progress = self.master().stop_progress(NodeId::ALL[index]);
                 assert_eq!(progress, StopProgress::StandingStill, "node {index}");
             }

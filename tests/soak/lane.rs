@@ -42,6 +42,7 @@ pub(crate) struct Lane<H: Endpoint, T: Endpoint> {
     baud: u32,
     late_us: u64,
     rng: Rng,
+    start: Instant,
     now: Instant,
     head_events: Vec<(Instant, H::Event)>,
     rounds_at_once: u32,
@@ -69,6 +70,7 @@ impl<H: Endpoint, T: Endpoint> Lane<H, T> {
             baud,
             late_us,
             rng: Rng::new(seed),
+            start: now,
             now,
             head_events: Vec::new(),
             rounds_at_once: 0,
@@ -77,6 +79,15 @@ impl<H: Endpoint, T: Endpoint> Lane<H, T> {
 
     pub(crate) const fn now(&self) -> Instant {
         self.now
+    }
+
+    /// Microseconds since the start.
+    pub(crate) const fn elapsed(&self) -> u64 {
+        self.since_start(self.now)
+    }
+
+    pub(crate) const fn since_start(&self, at: Instant) -> u64 {
+        at.as_micros().wrapping_sub(self.start.as_micros())
     }
 
     pub(crate) const fn head(&self) -> &H {
@@ -160,6 +171,11 @@ impl<H: Endpoint, T: Endpoint> Lane<H, T> {
     pub(crate) fn run_until(&mut self, end: Instant) {
         while self.step(end) {}
         self.now = self.now.max(end);
+    }
+
+    /// Until this many microseconds after the start.
+    pub(crate) fn run_to(&mut self, micros: u64) {
+        self.run_until(Instant::from_micros(self.start.as_micros().wrapping_add(micros)));
     }
 
     pub(crate) fn run_for(&mut self, span: Duration) {

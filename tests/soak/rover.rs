@@ -46,7 +46,6 @@ pub(crate) enum Order {
 pub(crate) struct Link {
     pub(crate) plan: Plan,
     pub(crate) line: Lane<Head, Tail>,
-    start: Instant,
     pub(crate) schedule: Schedule,
     rng: Rng,
     pub(crate) order: Order,
@@ -67,7 +66,6 @@ impl Link {
         let tail = tail(&plan, start, &mut rng);
         Self {
             line: Lane::new(115_200, LATE_US, plan.seed, start, head(&plan, start), vec![tail]),
-            start,
             schedule: Schedule::new(&plan, 1, End::Tails),
             rng,
             order: Order::Stop,
@@ -81,11 +79,6 @@ impl Link {
         }
     }
 
-    /// Microseconds since the start.
-    pub(crate) fn elapsed(&self) -> u64 {
-        self.line.now().as_micros().wrapping_sub(self.start.as_micros())
-    }
-
     pub(crate) fn host(&self) -> &Host {
         &self.line.head().role
     }
@@ -96,12 +89,12 @@ impl Link {
 
     /// Runs to the end of the plan.
     pub(crate) fn run(&mut self) {
-        while self.elapsed() < self.plan.length_us {
+        while self.line.elapsed() < self.plan.length_us {
             self.command();
-            let step_end = (self.elapsed() / self.plan.step_us + 1) * self.plan.step_us;
+            let step_end = (self.line.elapsed() / self.plan.step_us + 1) * self.plan.step_us;
             loop {
                 let edge = self.schedule.next_edge();
-                self.run_until(edge.min(step_end));
+                self.line.run_to(edge.min(step_end));
                 if edge >= step_end {
                     break;
                 }
@@ -119,14 +112,9 @@ impl Link {
         self.close_beats();
     }
 
-    fn run_until(&mut self, micros: u64) {
-        let end = Instant::from_micros(self.start.as_micros().wrapping_add(micros));
-        self.line.run_until(end);
-    }
-
     /// Lets faults end and begin.
     fn change(&mut self) {
-        let now = self.elapsed();
+        let now = self.line.elapsed();
         for fault in self.schedule.ended(now) {
             if let Fault::BrownOut(_) = fault {
                 self.reset();
@@ -149,7 +137,7 @@ impl Link {
         let is_cut_off = self.schedule.is_cut_off(0);
         self.line.set_unplugged(0, is_cut_off);
         self.line.set_faults(pair);
-        let now = self.elapsed();
+        let now = self.line.elapsed();
         let since = self.cut_off_us.unwrap_or(now);
         self.cut_off_us = (is_cut_off || pair.unplugged).then_some(since);
         self.quiet_us = now;
@@ -168,7 +156,7 @@ impl Link {
         self.check_host_sums();
         let now = self.line.now();
         *self.line.head_mut() = head(&self.plan, now);
-        (self.order, self.ordered_us) = (Order::Stop, self.elapsed());
+        (self.order, self.ordered_us) = (Order::Stop, self.line.elapsed());
         self.account.head_resets += 1;
     }
 
@@ -183,7 +171,7 @@ impl Link {
                 4..7 => Order::Stop,
                 _ => Order::Hang,
             };
-            self.ordered_us = self.elapsed();
+            self.ordered_us = self.line.elapsed();
             let kind = usize::from(self.order == Order::Stop);
             self.account.orders[kind] += 1;
             if self.order == Order::Stop {
@@ -201,7 +189,7 @@ impl Link {
                 HostEvent::Report(_) => self.account.answers += 1,
                 HostEvent::LinkDown => self.account.lost_nodes += 1,
                 HostEvent::LinkUp if self.schedule.is_quiet() => {
-                    let at = at.as_micros().wrapping_sub(self.start.as_micros());
+                    let at = self.line.since_start(at);
                     let took = at.saturating_sub(self.quiet_us);
                     self.account.recovery_us = self.account.recovery_us.max(took);
                 }
@@ -217,7 +205,7 @@ impl Link {
 
     /// Whether there has been no fault for this long.
     pub(crate) fn is_quiet_for(&self, micros: u64) -> bool {
-        self.schedule.is_quiet() && self.elapsed() >= self.quiet_us + micros
+        self.schedule.is_quiet() && self.line.elapsed() >= self.quiet_us + micros
     }
 
     /// Notes the frames and the periods of the robot in place.

@@ -21,7 +21,7 @@ impl Link {
         let is_well = self.is_quiet_for(self.recovery_bound_us());
         self.check_command(is_well);
         self.check_motion();
-        let cut_off = self.cut_off_us.map_or(0, |since| self.elapsed() - since);
+        let cut_off = self.cut_off_us.map_or(0, |since| self.line.elapsed() - since);
         if cut_off > self.slowed(550) {
             // A host that was reset meanwhile still waits.
             assert_ne!(self.host().link(), ucp::host::Link::Up);
@@ -47,7 +47,7 @@ impl Link {
     /// The robot does what the application says, and nothing without it.
     fn check_command(&mut self, is_well: bool) {
         let command = self.robot().command(self.line.tail(0).role_now());
-        let elapsed = self.elapsed();
+        let elapsed = self.line.elapsed();
         match self.order {
             Order::Drive(wanted) if is_well && elapsed >= self.ordered_us + self.slowed(250) => {
                 self.account.checks.commands += 1;
@@ -80,7 +80,7 @@ impl Link {
             Order::Hang => self.slowed(500 + 520),
             Order::Drive(_) => return,
         };
-        if self.elapsed() > self.ordered_us + silence + 1000 * RUN_OUT_MS + self.plan.step_us {
+        if self.line.elapsed() > self.ordered_us + silence + 1000 * RUN_OUT_MS + self.plan.step_us {
             self.account.checks.standstills += 1;
             let wheels = self.line.tail(0).role.rover().telemetry().rpm;
             let is_hit = self.account.phantoms > 0 && !self.schedule.is_quiet();
