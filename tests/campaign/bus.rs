@@ -1,17 +1,15 @@
 //! An episode on a bus: up to three motors, a plug that may be loose, and a stop.
 
 use axlewire::{
-    endpoint::Endpoint,
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Slave,
         master::{MasterConfig, Polling, StopProgress},
         slave::SlaveConfig,
     },
-    sim::{Direction, Line, Motor, MotorNode, Rng, Who},
-    time::{Duration, Instant},
+    sim::{Motor, MotorNode},
 };
 
-use crate::{faults, millis, part, results::Run};
+use super::*;
 
 /// Highest commanded speed of a motor, and highest speed when moving to a position, rps.
 const FASTEST_RPS: f64 = 10.0;

@@ -18,8 +18,9 @@ mod results;
 mod rover;
 
 use axlewire::{
-    sim::{Faults, Rng},
-    time::Duration,
+    endpoint::Endpoint,
+    sim::{Direction, Faults, Line, Rng, Who},
+    time::{Duration, Instant},
 };
 use results::{Run, Table};
 

@@ -1,13 +1,11 @@
 //! An episode with a rover: a noisy link, a plug that may be loose, and a stop.
 
 use axlewire::{
-    endpoint::Endpoint,
-    sim::{Direction, Line, Rng, RoverNode, Who},
-    time::{Duration, Instant},
+    sim::RoverNode,
     ucp::{Host, MotorControl, host::HostConfig, robot::RobotConfig},
 };
 
-use crate::{faults, millis, results::Run};
+use super::*;
 
 /// The robot's watchdog, plus the same again for frames and loops along the way (ruling U10).
 const BOUND_MS: f64 = 500.0 + 20.0;

@@ -1,15 +1,11 @@
-use axlewire::{
-    ikeya,
-    stream::{Framing, Verdict},
-    ucp::Ucp,
-};
+use axlewire::ikeya;
 
-use crate::{dice::Dice, on_all_cores};
+use super::*;
 
 /// Trials whose bytes are damaged at random and pass all the same. The first bytes, which tell the
 /// length and the node, are those of a frame; all others, CRC included, are random.
 fn passed<F: Framing>(start: &[u8], len: usize, trials: u64, seed: u64) -> u64 {
-    let count = |trials: std::ops::Range<u64>| {
+    let count = |trials: Range<u64>| {
         let mut dice = Dice((seed ^ trials.start).wrapping_mul(0xD134_2543_DE82_EF95));
         let mut bytes = [0; 64];
         let mut passed = 0;
@@ -41,7 +37,7 @@ fn every_kind(trials: u64) {
     assert_chance::<ikeya::ToSlave>("READ", &[0xAA, 1], 4, trials);
     assert_chance::<ikeya::ToSlave>("WRITE", &[0xBB, 3], 8, trials);
     assert_chance::<ikeya::ToMaster>("velocity", &[0x55, 8], 8, trials);
-    assert_chance::<ikeya::three::ToMaster>("position, three motors", &[0x56, 2], 16, trials);
+    assert_chance::<three::ToMaster>("position, three motors", &[0x56, 2], 16, trials);
     for len in [8, 24, 44, 64] {
         assert_chance::<Ucp>("UCP", &[0xFD, 0xFF, len - 4, 0], len.into(), trials);
     }

@@ -6,9 +6,7 @@ mod narrow;
 #[path = "../../src/crc16/wide.rs"]
 mod wide;
 
-use axlewire::crc16;
-
-use crate::{dice::Dice, on_all_cores, oracle};
+use super::*;
 
 /// Room for a frame of 302 bytes at any place in 16 bytes.
 #[repr(align(16))]
@@ -67,9 +65,8 @@ fn both_forms_equal_the_oracle_up_to_26_bytes_and_on_some_longer_ones() {
 #[test]
 #[ignore = "takes a minute: see the top of main.rs"]
 fn both_forms_equal_the_oracle_for_all_lengths_up_to_300_and_all_alignments() {
-    let messages = |lens: std::ops::Range<u64>| -> usize {
-        lens.map(|len| check_length(len as usize, 2000)).sum()
-    };
+    let messages =
+        |lens: Range<u64>| -> usize { lens.map(|len| check_length(len as usize, 2000)).sum() };
     let messages: usize = on_all_cores(301, messages).iter().sum();
     assert_eq!(messages, 301 * 2002 + 8 * (300 * 301 / 2));
     println!("{messages} messages of 0 to 300 bytes, at 16 alignments, in both forms");

@@ -1,15 +1,8 @@
 use std::ops::Range;
 
-use axlewire::{
-    crc16,
-    encode::Encode,
-    ikeya::{
-        NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest, three,
-    },
-    ucp,
-};
+use axlewire::ucp;
 
-use crate::{dice::Dice, on_all_cores, oracle};
+use super::*;
 
 /// The longest burst that is always found: as long as the CRC.
 const BURST: usize = 16;

@@ -4,16 +4,11 @@
 
 use std::{fmt, ops::Range};
 
-use axlewire::{
-    ikeya::{self, three},
-    stream::{Framing, Verdict},
-    ucp::Ucp,
-};
+use axlewire::ikeya;
 
+use super::*;
 use crate::{
-    dice::Dice,
     errors::{with_bursts, with_errors_of_three_bits},
-    on_all_cores, oracle,
     reads::legal_reads,
 };
 

@@ -27,6 +27,16 @@ mod payloads;
 /// All strings of four bytes.
 mod reads;
 
+use axlewire::{
+    crc16,
+    encode::Encode,
+    ikeya::{
+        NodeId, Position, PositionResponse, ReadRequest, Rps, VelocityResponse, WriteRequest, three,
+    },
+    stream::{Frames, Framing, Verdict},
+    ucp::Ucp,
+};
+use dice::Dice;
 use std::{
     ops::Range,
     sync::atomic::{AtomicU64, Ordering},

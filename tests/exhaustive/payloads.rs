@@ -1,15 +1,8 @@
 use std::ops::Range;
 
-use axlewire::{
-    encode::Encode,
-    ikeya::{
-        BothDirections, NodeId, Packet, Position, PositionResponse, Request, Response, Rps,
-        VelocityResponse, WriteRequest,
-    },
-    stream::Frames,
-};
+use axlewire::ikeya::{BothDirections, Packet, Request, Response};
 
-use crate::{dice::Dice, on_all_cores, oracle};
+use super::*;
 
 /// The oracle's CRC, by a table that the oracle fills: bit by bit, 2^32 payloads would take hours.
 struct Crcs([u16; 256]);

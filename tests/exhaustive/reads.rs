@@ -1,12 +1,11 @@
 use std::ops::Range;
 
 use axlewire::{
-    ikeya::{self, ReadRequest, three},
-    stream::{Decoder, Event, Frames, Framing, Portable, Verdict},
-    ucp::Ucp,
+    ikeya,
+    stream::{Decoder, Event, Portable},
 };
 
-use crate::{on_all_cores, oracle};
+use super::*;
 
 /// The READs that rulings B1 and I1 allow.
 pub(crate) fn legal_reads() -> Vec<[u8; 4]> {

@@ -1,9 +1,7 @@
 //! What has happened in a run.
 
-use crate::{
-    plan::{DAY, Plan},
-    schedule::Fault,
-};
+use super::*;
+use crate::plan::DAY;
 
 /// Counts of a run, made by the test.
 #[derive(Debug, Default)]

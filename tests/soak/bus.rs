@@ -3,24 +3,16 @@
 use std::collections::HashSet;
 
 use axlewire::{
-    endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, Position, Slave, Target,
-        master::{MasterConfig, Polling, StopProgress},
+        Master, Slave,
+        master::{MasterConfig, Polling},
         slave::SlaveConfig,
     },
-    sim::{Faults, Motor, MotorNode, Rng},
-    time::{Duration, Instant},
+    sim::{Motor, MotorNode},
 };
 
-use crate::{
-    account::Account,
-    bus_checks::Flow,
-    lane::Lane,
-    plan::Plan,
-    schedule::{End, Fault, Schedule},
-    station::{Beats, Clock, Station},
-};
+use super::*;
+use crate::bus_checks::Flow;
 
 pub(crate) const NODES: usize = 8;
 

@@ -1,11 +1,8 @@
 //! The application of a master: its orders, and what it makes of the events.
 
-use axlewire::ikeya::{
-    Mode, NodeId, Position, Rps, Target,
-    master::{Health, MasterEvent},
-};
+use axlewire::ikeya::{Rps, master::MasterEvent};
 
-use crate::bus::{Bus, NODES, Order};
+use super::*;
 
 impl Bus {
     /// Now and then another order. Nodes that a new master has not found are looked for again: it

@@ -1,14 +1,7 @@
 //! What must hold on a bus at every look.
 
-use axlewire::ikeya::{
-    NodeId, Target,
-    master::{Health, StopProgress},
-};
-
-use crate::{
-    bus::{ANSWER, Bus, NODES, Order, READ, WRITE},
-    station::Beats,
-};
+use super::*;
+use crate::bus::{ANSWER, READ, WRITE};
 
 /// A WRITE, a READ and an answer of each node, one after another, and as much again for a packet
 /// that is repeated.
@@ -129,7 +122,7 @@ impl Bus {
     fn check_flow(&mut self) {
         let head = self.line.head();
         let tails = self.line.tails();
-        let sum = |value: fn(&crate::bus::Tail) -> u64| tails.iter().map(value).sum::<u64>();
+        let sum = |value: fn(&bus::Tail) -> u64| tails.iter().map(value).sum::<u64>();
         let flow = [head.bytes_out, sum(|it| it.bytes_in), sum(|it| it.bytes_out), head.bytes_in];
         if let Some(before) = self.flow {
             let [sent, heard, answered, received] = [0, 1, 2, 3].map(|i| flow[i] - before[i]);

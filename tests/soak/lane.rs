@@ -6,11 +6,9 @@
 //! byte would; a plug that falls out cuts the frame where it is. Frames of two tails at once do not
 //! garble each other; `campaign` and `models` test that.
 
-use axlewire::{
-    endpoint::Endpoint,
-    sim::{Faults, Rng, Wire},
-    time::{Duration, Instant, wire_time},
-};
+use axlewire::{sim::Wire, time::wire_time};
+
+use super::*;
 
 const LONGEST: usize = 64;
 const TAILS: usize = 8;

@@ -23,11 +23,24 @@ mod rover_checks;
 mod schedule;
 mod station;
 
-use std::time::Instant;
-
-use bus::Bus;
-use plan::{DAY, HOUR, Plan, SECOND};
-use rover::Link;
+use axlewire::{
+    endpoint::Endpoint,
+    ikeya::{
+        Mode, NodeId, Position, Target,
+        master::{Health, StopProgress},
+    },
+    sim::{Faults, Rng},
+    time::{Duration, Instant},
+};
+use {
+    account::Account,
+    bus::{Bus, NODES, Order},
+    lane::Lane,
+    plan::{DAY, HOUR, Plan, SECOND},
+    rover::Link,
+    schedule::{End, Fault, Schedule},
+    station::{Beats, Clock, Station},
+};
 
 fn part() -> f64 {
     std::env::var("AXLEWIRE_SOAK_PART").map_or(1.0, |text| text.parse().unwrap())
@@ -69,7 +82,7 @@ fn day() -> Plan {
 
 /// Runs a bus.
 fn run_bus(plan: Plan) {
-    let begin = Instant::now();
+    let begin = std::time::Instant::now();
     let mut bus = Bus::new(plan);
     bus.run();
     let account = &bus.account;
@@ -81,7 +94,7 @@ fn run_bus(plan: Plan) {
 
 /// Runs a host with a robot.
 fn run_link(plan: Plan) {
-    let begin = Instant::now();
+    let begin = std::time::Instant::now();
     let mut link = Link::new(plan);
     link.run();
     let account = &link.account;

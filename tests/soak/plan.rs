@@ -1,6 +1,6 @@
 //! What is run.
 
-use axlewire::time::Instant;
+use super::*;
 
 /// Lengths of a run and of its parts, microseconds.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,7 @@
 //! A host with its robot on a line with faults.
 
 use axlewire::{
-    endpoint::Endpoint,
-    sim::{Rng, RoverNode},
-    time::{Duration, Instant},
+    sim::RoverNode,
     ucp::{
         Host, MotorControl, Robot,
         host::{HostConfig, HostEvent},
@@ -11,13 +9,7 @@ use axlewire::{
     },
 };
 
-use crate::{
-    account::Account,
-    lane::Lane,
-    plan::Plan,
-    schedule::{End, Fault, Schedule},
-    station::{Beats, Clock, Station},
-};
+use super::*;
 
 /// The id of a frame.
 fn kind(frame: &[u8]) -> usize {

@@ -1,8 +1,6 @@
 //! The schedule of faults: seeded, and the same for every line.
 
-use axlewire::sim::{Faults, Rng};
-
-use crate::plan::Plan;
+use super::*;
 
 /// An end of the line.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

@@ -1,9 +1,8 @@
 //! A role with an account of its own beside it, and with the clock of its processor.
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    time::{Instant, Wrapping32},
-};
+use axlewire::{endpoint::Unsent, time::Wrapping32};
+
+use super::*;
 
 /// The clock of a station.
 pub(crate) enum Clock {
