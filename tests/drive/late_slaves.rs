@@ -73,7 +73,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
 
 /// A slave that has received nothing yet, and its watchdog.
 fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
-    let mut slave = one_slave(&wire, config);
+    let mut slave = one_slave(wire, config);
     slave.service().unwrap();
     slave
 }
