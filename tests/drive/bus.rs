@@ -1,11 +1,5 @@
 //! High-level calls on a motor bus: what discovery, set-points, reads and stops return, and when.
 
-use axlewire::ikeya::{
-    Status,
-    master::{Cause, MasterEvent},
-    slave::SlaveEvent,
-};
-
 use crate::rig::*;
 
 #[test]

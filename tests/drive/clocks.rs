@@ -2,7 +2,6 @@
 
 use std::cell::RefCell;
 
-use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
 use crate::rig::*;

@@ -1,7 +1,5 @@
 //! Packets partly sent when the port fails: what the node makes of the rest.
 
-use axlewire::ikeya::PositionResponse;
-
 use crate::{
     motor_line::{Bus, Motor, Wire, Write, owe_stop, run},
     rig::*,

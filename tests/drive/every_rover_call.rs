@@ -1,7 +1,7 @@
 //! Every high-level call of a host and of a robot, blocking and async: a failing port, a refusal
 //! and a silent robot come back as they are.
 
-use axlewire::ucp::{host::CommandError, message::CalibrationKind};
+use axlewire::ucp::host::CommandError;
 
 use crate::rig::*;
 

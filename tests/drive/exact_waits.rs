@@ -3,7 +3,6 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use axlewire::drive::WithDelay;
 use embedded_hal_async::delay::DelayNs;
 
 use crate::rig::*;

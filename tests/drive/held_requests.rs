@@ -1,7 +1,5 @@
 //! Requests that a port holds back, so that their answers come when they are no longer expected.
 
-use axlewire::ikeya::Status;
-
 use crate::{dice::Dice, rig::*};
 
 /// One step of virtual time, microseconds.

@@ -4,11 +4,11 @@ use std::{future::Future, pin::pin, task::Poll};
 
 use axlewire::{
     error::EncodeError,
-    ikeya::{Response, ToMaster, VelocityResponse},
+    ikeya::{Response, ToMaster},
     io::{FrameReader, FrameWriter, WriteError},
-    stream::{Event, Framing, Gap, Reason},
+    stream::{Framing, Gap, Reason},
     ucp::{
-        Body, RawFrame, Ucp,
+        RawFrame, Ucp,
         message::{ErrorCode, Ping, Pong},
     },
 };

@@ -1,7 +1,5 @@
 //! A slave that is called late, or whose switch is moved, neither obeys nor sends outdated data.
 
-use axlewire::ikeya::slave::SlaveEvent;
-
 use crate::{motor_line::Wire, rig::*};
 
 const FIVE_RPS: fn() -> WriteRequest =

@@ -4,18 +4,25 @@ use std::{cell::RefCell, rc::Rc};
 
 #[cfg(feature = "ucp")]
 pub(crate) use axlewire::ucp::{
-    Host, MotorControl, Robot, Telemetry, host::HostConfig, robot::RobotConfig,
+    Body, Host, MotorControl, Robot, Telemetry,
+    host::HostConfig,
+    message::CalibrationKind,
+    robot::{RobotConfig, RobotEvent},
 };
 /// What the scenarios use of the library, and their port.
 pub(crate) use axlewire::{
-    drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error},
+    drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay},
     endpoint::{Endpoint, Unsent},
     ikeya::{
-        Master, Mode, NodeId, Position, ReadRequest, Rps, Slave, Target, WriteRequest,
+        Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Status, Target,
+        VelocityResponse, WriteRequest,
         board::OneMotor,
-        master::{CommandError, Health, MasterConfig, NodeSet, Polling, StopProgress},
-        slave::SlaveConfig,
+        master::{
+            Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress,
+        },
+        slave::{SlaveConfig, SlaveEvent},
     },
+    stream::Event,
     time::{Duration, Instant},
 };
 

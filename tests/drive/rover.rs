@@ -4,8 +4,7 @@ use std::{cell::RefCell, rc::Rc};
 
 use axlewire::ucp::{
     host::{CalibrationStep, CommandError, FailureCause, HostEvent, Link},
-    message::{CalibrationKind, NetworkState},
-    robot::RobotEvent,
+    message::NetworkState,
 };
 
 use crate::rig::*;

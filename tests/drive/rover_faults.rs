@@ -1,6 +1,6 @@
 //! A rover's link: stops cut by a port, failing receivers and transmitters, robots held up.
 
-use axlewire::ucp::{Body, FrameOf, Telemetry, robot::RobotEvent};
+use axlewire::ucp::{FrameOf, Telemetry};
 
 use crate::{
     motor_line::{Wire, Write},

@@ -1,7 +1,5 @@
 //! Stops through a driver: `Ok` only for a paid one, and `drive_for` ends with one (I12).
 
-use axlewire::ikeya::master::MasterEvent;
-
 use crate::rig::*;
 
 type Outcome = Result<(), DriveError<Unplugged>>;
