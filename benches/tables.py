@@ -2,10 +2,12 @@
 """Writes the recorded figures into the tables of the documents: benches/tables.py
 
 A table is between `<!-- figures:NAME -->` and `<!-- end -->`. Its rows keep their order and their
-words; cells that are `None` here are left as they are. To check: run it, then `git diff --exit-code`.
+words; cells that are `None` here are left as they are. Fails if a table had other figures, or if a
+recorded figure is beyond its goal.
 """
 
 import re
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -99,8 +101,22 @@ def filled(table, rows):
     return "\n".join(lines).replace("|  |", "| |").replace("|  |", "| |")
 
 
+def beyond_their_goals():
+    """Ratios are at least their goal, unless it begins with `<=`; costs on a Cortex-M4 are at most."""
+    found = []
+    for path in ("benches/ratios.txt", "benches/printing.txt", "benches/tool.txt", "examples/firmware/figures.txt"):
+        values, goals = record(path)
+        for name, goal in goals.items():
+            value, limit = float(values[name]), float(goal.split()[-1]) if goal else None
+            is_cost = "at most" in goal or "firmware" in path
+            if goal and (value > limit if is_cost else value < limit):
+                found.append(f"{path}: {name} is {value}, its goal {goal}")
+    print(*found, sep="\n", end="\n" * bool(found))
+    return found
+
+
 def main():
-    figures, used = dict(tables()), []
+    figures, used, faults = dict(tables()), [], beyond_their_goals()
     for name in DOCUMENTS:
         text = (ROOT / name).read_text()
 
@@ -109,9 +125,13 @@ def main():
             return f"<!-- figures:{found[1]} -->\n{filled(found[2], figures[found[1]])}\n<!-- end -->"
 
         new = re.sub(r"<!-- figures:([\w-]+) -->\n(.*?)<!-- end -->", replaced, text, flags=re.DOTALL)
-        (ROOT / name).write_text(new)
+        if new != text:
+            (ROOT / name).write_text(new)
+            print(f"{name} had other figures than the records, and has them now")
+            faults.append(name)
     assert sorted(used) == sorted(figures), f"not one table each: {set(used) ^ set(figures)}"
+    return bool(faults)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

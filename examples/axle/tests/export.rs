@@ -391,7 +391,7 @@ mod unix {
             let mut stdin = child.stdin.take().unwrap();
             stdin.write_all(&block).unwrap();
             let start = Instant::now();
-            while names(&folder).is_empty() && start.elapsed() < Duration::from_secs(10) {
+            while names(&folder).is_empty() && start.elapsed() < Duration::from_secs(300) {
                 thread::sleep(Duration::from_millis(5));
             }
             assert_eq!(names(&folder).len(), 1, "{form}: it was written beside");
