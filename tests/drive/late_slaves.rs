@@ -5,30 +5,34 @@ use crate::{motor_line::Wire, rig::*};
 const FIVE_RPS: fn() -> WriteRequest =
     || WriteRequest::velocity(NodeId::N1, Rps::new(5.0).unwrap());
 
-fn one_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
+fn one_slave(wire: &Wire, config: SlaveConfig) -> On<Slave> {
     wire.driver(|now| Slave::new(NodeId::N1, Mode::Velocity, config, now))
+}
+
+fn command(slave: &On<Slave>) -> Option<Target<OneMotor>> {
+    slave.role().command(slave.port().world.now())
 }
 
 #[test]
 fn a_cut_off_answer_does_not_continue_in_another_nodes_exchange() {
-    let wire = Wire::bus(vec![]);
+    let wire = Wire::bus(None);
     let mut slave = one_slave(&wire, SlaveConfig::direct());
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     wire.write_only(3);
     assert!(slave.service().is_err());
-    assert_eq!(wire.world().sent.len(), 3);
-    wire.pass(5000);
+    assert_eq!(wire.sent().len(), 3);
+    wire.world.step(5000);
     wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
     wire.write_all();
     slave.service().unwrap();
-    assert_eq!(wire.world().sent.len(), 3, "it talks during node 2's turn");
+    assert_eq!(wire.sent().len(), 3, "it talks during node 2's turn");
     assert!(slave.unsent().is_empty());
 }
 
 #[test]
 fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once() {
     for is_async in [false, true] {
-        let wire = Wire::bus(vec![]);
+        let wire = Wire::bus(None);
         let config = SlaveConfig::usb_adapter();
         let mut slave = one_slave(&wire, config);
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
@@ -36,16 +40,17 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
         assert!(slave.service().is_err());
         wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
         wire.write_all();
-        on!(is_async, wire, slave, service, service_async()).unwrap();
-        assert_eq!(wire.world().sent.len(), 4, "it talks during node 2's turn");
+        call!(is_async, slave, service, service_async()).unwrap();
+        assert_eq!(wire.sent().len(), 4, "it talks during node 2's turn");
         // Nothing was received: the rest may be sent.
+        let wire = Wire::bus(None);
         let mut slave = one_slave(&wire, config);
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.write_only(4);
         assert!(slave.service().is_err());
         wire.write_all();
         slave.service().unwrap();
-        assert_eq!(wire.world().sent.len(), 4 + 8);
+        assert_eq!(wire.sent().len(), 8);
     }
 }
 
@@ -53,24 +58,24 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
 fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let wire = Wire::bus(vec![]);
+    let wire = Wire::bus(None);
     let mut slave = one_slave(&wire, config);
     wire.receive(FIVE_RPS().as_bytes());
     slave.service().unwrap();
-    assert!(slave.role().command(wire.now()).is_some());
-    wire.pass(1000);
+    assert!(command(&slave).is_some());
+    wire.world.step(1000);
     wire.receive(FIVE_RPS().as_bytes());
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
-    wire.pass(10_000_000);
+    wire.world.step(10_000_000);
     slave.service().unwrap();
-    assert_eq!(slave.role().command(wire.now()), None, "it turns on a ten-second-old command");
-    assert_eq!(wire.world().sent, [], "it answers a ten-second-old request");
+    assert_eq!(command(&slave), None, "it turns on a ten-second-old command");
+    assert_eq!(*wire.sent(), [], "it answers a ten-second-old request");
     let events: Vec<_> = std::iter::from_fn(|| slave.poll_event()).collect();
     assert_eq!(events, [SlaveEvent::Watchdog]);
 }
 
 /// A slave that has received nothing yet, and its watchdog.
-fn idle_slave(wire: &Wire, config: SlaveConfig) -> Driver<Slave, Wire, Wire> {
+fn idle_slave(wire: &Wire, config: SlaveConfig) -> On<Slave> {
     let mut slave = one_slave(wire, config);
     slave.service().unwrap();
     slave
@@ -85,14 +90,14 @@ fn with_watchdog() -> SlaveConfig {
 #[test]
 fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
     for is_async in [false, true] {
-        let wire = Wire::bus(vec![]);
+        let wire = Wire::bus(None);
         let mut slave = idle_slave(&wire, with_watchdog());
         wire.receive(FIVE_RPS().as_bytes());
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
-        wire.pass(10_000_000);
-        on!(is_async, wire, slave, service, service_async()).unwrap();
-        assert_eq!(slave.role().command(wire.now()), None, "it turns on a ten-second-old command");
-        assert_eq!(wire.world().sent, [], "it answers a ten-second-old request");
+        wire.world.step(10_000_000);
+        call!(is_async, slave, service, service_async()).unwrap();
+        assert_eq!(command(&slave), None, "it turns on a ten-second-old command");
+        assert_eq!(*wire.sent(), [], "it answers a ten-second-old request");
         assert_eq!(slave.role().statistics().expired, 1);
         assert_eq!(slave.poll_event(), Some(SlaveEvent::Watchdog));
     }
@@ -100,7 +105,7 @@ fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
 
 #[test]
 fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
-    let wire = Wire::bus(vec![]);
+    let wire = Wire::bus(None);
     let mut slave = idle_slave(&wire, with_watchdog());
     let bytes =
         [FIVE_RPS().as_bytes().repeat(20), ReadRequest::new(NodeId::N1).as_bytes().to_vec()];
@@ -108,53 +113,53 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
     let event = wire.block_on_held(slave.next_event_async(by), &bytes.concat(), 3_000_000);
     // Events reported before the rest has been taken in do not count.
     let _ = event.unwrap();
-    wire.block_on(slave.service_async()).unwrap();
-    assert_eq!(slave.role().command(wire.now()), None, "it turns on a three-second-old command");
-    assert_eq!(wire.world().sent, [], "it answers a three-second-old request");
+    wire.world.block_on(slave.service_async()).unwrap();
+    assert_eq!(command(&slave), None, "it turns on a three-second-old command");
+    assert_eq!(*wire.sent(), [], "it answers a three-second-old request");
 }
 
 #[test]
 fn an_idle_slave_answers_a_request_after_a_long_silence() {
     for is_async in [false, true] {
-        let wire = Wire::bus(vec![]);
+        let wire = Wire::bus(None);
         let mut slave = idle_slave(&wire, SlaveConfig::direct());
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         wire.receive_in(2_345_678, ReadRequest::new(NodeId::N1).as_bytes());
         let by = slave.now() + Duration::from_millis(3000);
-        on!(is_async, wire, slave, run_until, run_until_async(by, |_, _, _| ())).unwrap();
-        assert_eq!(wire.world().sent.len(), 8, "async {is_async}");
-        let delay_us = wire.world().sent[0].0 - begin_us - 2_345_678;
+        call!(is_async, slave, run_until, run_until_async(by, |_, _, _| ())).unwrap();
+        assert_eq!(wire.sent().len(), 8, "async {is_async}");
+        let delay_us = wire.sent()[0].0 - begin_us - 2_345_678;
         assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");
     }
 }
 
 #[test]
 fn a_slave_that_is_called_when_its_driver_asks_for_it_or_bytes_come_answers() {
-    let wire = Wire::bus(vec![]);
+    let wire = Wire::bus(None);
     let mut slave = idle_slave(&wire, SlaveConfig::direct());
-    let read_us = wire.world().now_us + 1_234_567;
+    let read_us = wire.world.now_us() + 1_234_567;
     wire.receive_in(1_234_567, ReadRequest::new(NodeId::N1).as_bytes());
-    while wire.world().now_us < 2_000_000 {
+    while wire.world.now_us() < 2_000_000 {
         let at_us = slave.poll_timeout().unwrap().as_micros();
-        let now_us = wire.world().now_us;
+        let now_us = wire.world.now_us();
         let bytes_us = Some(read_us).filter(|&at| at > now_us).unwrap_or(u64::MAX);
         // A 1 ms timer is up to a millisecond late; the receive interrupt is not.
         let wake_us = bytes_us.min(at_us.next_multiple_of(1000) + 1000);
-        wire.pass(wake_us.saturating_sub(now_us).max(1));
+        wire.world.step(wake_us.saturating_sub(now_us).max(1));
         slave.service().unwrap();
     }
-    assert_eq!(wire.world().sent.len(), 8);
+    assert_eq!(wire.sent().len(), 8);
 }
 
 #[test]
 fn a_command_that_a_held_up_slave_finds_half_arrived_is_not_lost() {
-    let wire = Wire::bus(vec![]);
+    let wire = Wire::bus(None);
     let mut slave = idle_slave(&wire, SlaveConfig::direct());
-    wire.pass(30_000);
+    wire.world.step(30_000);
     wire.receive(&FIVE_RPS().as_bytes()[..5]);
     slave.service().unwrap();
     wire.receive_in(60, &FIVE_RPS().as_bytes()[5..]);
-    wire.pass(60);
+    wire.world.step(60);
     slave.service().unwrap();
-    assert!(slave.role().command(wire.now()).is_some(), "the delay cut a WRITE in two");
+    assert!(command(&slave).is_some(), "the delay cut a WRITE in two");
 }

@@ -19,7 +19,6 @@ mod tty;
 #[macro_use]
 mod rig;
 #[cfg_attr(not(feature = "ucp"), allow(dead_code, reason = "a rover uses more of it"))]
-#[macro_use]
 mod motor_line;
 mod pin;
 mod recorder;

@@ -1,7 +1,7 @@
 //! A master's stops and set-points when switches move, ports fail and applications go silent.
 
 use crate::{
-    motor_line::{Bus, Motor, Wire, owe_stop, run},
+    motor_line::{Wire, owe_stop, run},
     rig::*,
 };
 
@@ -20,8 +20,7 @@ fn turned(polling: Polling) -> (Wire, Bus) {
 /// Distance that the motor turns when its switch is moved to position mode, turns.
 fn way_after_switch(wire: &Wire, bus: &mut Bus) -> f64 {
     let before = wire.turns();
-    let now_us = wire.world().now_us;
-    wire.world().motors[0].switch(Mode::Position, now_us);
+    wire.motor().switch(Mode::Position, wire.world.now_us());
     run(bus, 5000);
     assert_eq!(bus.role().mode(NodeId::N1), Some(Mode::Position));
     (wire.turns() - before).abs()
@@ -62,14 +61,14 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
     run(&mut bus, 1000);
     // The stop's READ leaves, then the port takes nothing for five seconds.
     owe_stop(&mut bus);
-    let reads = wire.world().motors[0].reads;
-    while wire.world().motors[0].reads == reads {
+    let reads = wire.motor().reads;
+    while wire.motor().reads == reads {
         bus.service().unwrap();
     }
     wire.write_only(0);
     for _ in 0..1000 {
         let _ = bus.service();
-        wire.pass(5);
+        wire.world.step(5);
     }
     run(&mut bus, 5000);
     let before = wire.turns();
@@ -84,7 +83,7 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
 #[test]
 fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
     for (loop_us, gap_us) in [(1000, 50), (25_000, 50), (25_000, 1000), (59_000, 5000)] {
-        let wire = Wire::bus(vec![Motor::new(NodeId::N1, Mode::Position)]);
+        let wire = Wire::bus(Some(Mode::Position));
         let mut bus = wire.master(|config| {
             config.turnaround_gap = Duration::from_micros(gap_us);
             config.reply_timeout = Duration::from_millis(100);
@@ -96,7 +95,7 @@ fn a_position_stop_is_paid_in_a_loop_that_is_always_too_late_for_its_write() {
         let mut rounds = 0;
         while !bus.role().stops_owed().is_empty() {
             bus.service().unwrap();
-            wire.pass(loop_us);
+            wire.world.step(loop_us);
             rounds += 1;
             assert!(rounds < 40, "not paid with a loop of {loop_us} us and a gap of {gap_us} us");
         }
@@ -125,17 +124,16 @@ fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
     for is_async in [false, true] {
         let (wire, mut bus) =
             Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
-        wire.pass(1000);
+        wire.world.step(1000);
         wire.write_only(0);
-        let failed =
-            on!(is_async, wire, bus, set_velocity, set_velocity_async(NodeId::N1, rps(10.0)));
+        let failed = call!(is_async, bus, set_velocity, set_velocity_async(NodeId::N1, rps(10.0)));
         assert_eq!(failed, Err(DriveError::Port(Unplugged)));
-        wire.pass(10_000_000);
+        wire.world.step(10_000_000);
         wire.write_all();
         bus.read(NodeId::N1).unwrap();
         run(&mut bus, 100);
-        let world = wire.world();
-        let mut payloads = world.motors[0].writes.iter().map(|&(_, payload)| payload);
+        let motor = wire.motor();
+        let mut payloads = motor.writes.iter().map(|&(_, payload)| payload);
         assert!(payloads.all(|payload| payload == [0; 4]), "sent ten seconds after it failed");
     }
 }

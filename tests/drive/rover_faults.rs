@@ -2,23 +2,20 @@
 
 use axlewire::ucp::{FrameOf, Telemetry};
 
-use crate::{
-    motor_line::{Wire, Write},
-    rig::*,
-};
+use crate::{motor_line::Wire, rig::*};
 
 /// A host that has driven, and a moment later.
-fn host() -> (Wire, Driver<Host, Wire, Wire>) {
+fn host() -> (Wire, On<Host>) {
     let wire = Wire::link();
     let mut host = wire.driver(|now| Host::new(HostConfig::default(), now));
     host.service().unwrap();
-    wire.pass(30_000);
+    wire.world.step(30_000);
     host.drive(60, 0).unwrap();
-    wire.pass(30_000);
+    wire.world.step(30_000);
     (wire, host)
 }
 
-fn robot() -> (Wire, Driver<Robot, Wire, Wire>) {
+fn robot() -> (Wire, On<Robot>) {
     let wire = Wire::link();
     let mut robot = wire.driver(|now| Robot::new(RobotConfig::default(), now));
     robot.service().unwrap();
@@ -31,7 +28,7 @@ fn drive() -> Vec<u8> {
 
 /// How long after the last byte sent a robot that receives all of it still drives.
 fn robot_drives_on(wire: &Wire) -> Duration {
-    let sent = &wire.world().sent;
+    let sent = &wire.sent();
     let mut robot = Robot::new(RobotConfig::default(), Instant::from_micros(0));
     let (mut bytes, mut drove) = (sent.iter().peekable(), Instant::from_micros(0));
     let last = sent.last().unwrap().0;
@@ -57,10 +54,10 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
         let (wire, mut host) = host();
         wire.write_only(10);
         assert!(host.drive(99, 0).is_err());
-        let cut = wire.world().sent.len();
+        let cut = wire.sent().len();
         wire.write_all();
-        on!(is_async, wire, host, stop, stop_async()).unwrap();
-        let sent: Vec<u8> = wire.world().sent[cut..].iter().map(|&(_, byte)| byte).collect();
+        call!(is_async, host, stop, stop_async()).unwrap();
+        let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
         assert_eq!(sent.len(), 2 * stop, "the rest of the command was sent, or only one stop");
         for frame in sent.chunks(stop) {
@@ -72,19 +69,19 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
 
 #[test]
 fn a_stop_that_a_port_cut_in_two_is_sent_again() {
-    let fails_10_ms = [Write::Some(10)].into_iter().chain([Write::Error; 10]);
+    let fails_10_ms = [Step::Few(10)].into_iter().chain(vec![Step::Error; 10]);
     let pauses = [
         fails_10_ms.collect(),
-        vec![Write::Some(10), Write::Late(50_000, usize::MAX)],
-        vec![Write::Out(10, 30_000)],
-        vec![Write::Out(10, 200_000)],
-        vec![Write::Some(10), Write::Late(30_000, 7), Write::Late(30_000, usize::MAX)],
+        vec![Step::Few(10), Step::Blocks(50_000)],
+        vec![Step::Drains(10, 30_000)],
+        vec![Step::Drains(10, 200_000)],
+        vec![Step::Few(10), Step::Lags(30_000, 7), Step::Blocks(30_000)],
     ];
     for steps in pauses {
         for is_async in [false, true] {
             let (wire, mut host) = host();
-            wire.write_as(steps.iter().copied());
-            let stopped = on!(is_async, wire, host, stop, stop_async());
+            wire.write_as(steps.iter().cloned());
+            let stopped = call!(is_async, host, stop, stop_async());
             let drives_on = robot_drives_on(&wire);
             let is_true = stopped.is_err() || drives_on <= Duration::from_millis(1);
             assert!(is_true, "{steps:?}: {stopped:?}, but it keeps driving for {drives_on:?}");
@@ -96,11 +93,11 @@ fn a_stop_that_a_port_cut_in_two_is_sent_again() {
 fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
     for is_async in [false, true] {
         let (wire, mut host) = host();
-        wire.world().is_deaf = true;
-        let begin_us = wire.world().now_us;
-        let stopped = on!(is_async, wire, host, stop, stop_async());
+        (host.port_mut().is_deaf, host.port_mut().is_blind) = (true, true);
+        let begin_us = wire.world.now_us();
+        let stopped = call!(is_async, host, stop, stop_async());
         assert_eq!(stopped, Ok(()), "it was written and flushed");
-        assert!(wire.world().now_us - begin_us < 10_000, "not immediate");
+        assert!(wire.world.now_us() - begin_us < 10_000, "not immediate");
         assert!(robot_drives_on(&wire) <= Duration::from_millis(1));
     }
 }
@@ -123,14 +120,14 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
                 robot.role_mut().set_telemetry(&Telemetry::default(), now);
             }
             let by = robot.now() + Duration::from_millis(1);
-            let command = on!(is_async, wire, robot, next_command, next_command_async(by));
+            let command = call!(is_async, robot, next_command, next_command_async(by));
             match command {
                 Ok(Some(command)) => speeds.push(command.speed()),
                 Ok(None) => {}
                 Err(error) => {
                     assert_eq!(error, DriveError::Port(Unplugged));
                     errors += 1;
-                    wire.pass(1000);
+                    wire.world.step(1000);
                 }
             }
         }
@@ -144,9 +141,9 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
     for is_async in [false, true] {
         let (wire, mut robot) = robot();
         wire.receive(&drive());
-        wire.pass(10_000_000);
+        wire.world.step(10_000_000);
         let by = robot.now() + Duration::from_millis(1);
-        let command = on!(is_async, wire, robot, next_command, next_command_async(by));
+        let command = call!(is_async, robot, next_command, next_command_async(by));
         let speed = command.unwrap().map_or(0, |command| command.speed());
         assert_eq!(speed, 0, "it drives on a ten-second-old command");
     }
@@ -159,45 +156,39 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
         let by = robot.now() + Duration::from_millis(5);
         robot.run_until(by, |_, _, _| ()).unwrap();
         wire.receive(&drive());
-        wire.pass(2_000_000);
+        wire.world.step(2_000_000);
         let by = robot.now() + Duration::from_millis(5);
         let speed = |_: &mut Robot, event, _| {
             if let RobotEvent::Motor(command) = event {
                 assert_eq!((command.speed(), command.angular()), (0, 0));
             }
         };
-        on!(is_async, wire, robot, run_until, run_until_async(by, speed)).unwrap();
+        call!(is_async, robot, run_until, run_until_async(by, speed)).unwrap();
         assert_eq!(robot.role().statistics().commands, 1, "it was valid");
         assert_eq!(robot.role().statistics().watchdog, 1);
     }
 }
 
 /// The next command of a robot that is called continuously, for 5 ms.
-fn next(wire: &Wire, robot: &mut Driver<Robot, Wire, Wire>, is_async: bool) {
+fn next(robot: &mut On<Robot>, is_async: bool) {
     let by = robot.now() + Duration::from_millis(5);
-    let command = on!(is_async, wire, robot, next_command, next_command_async(by));
-    command.unwrap();
+    call!(is_async, *robot, next_command, next_command_async(by)).unwrap();
 }
 
 /// A robot that reports every 20 ms and has been called for a while.
-fn reporting(is_async: bool) -> (Wire, Driver<Robot, Wire, Wire>) {
+fn reporting(is_async: bool) -> (Wire, On<Robot>) {
     let (wire, mut robot) = robot();
     let now = robot.now();
     robot.role_mut().set_telemetry(&Telemetry::default(), now);
-    (0..21).for_each(|_| next(&wire, &mut robot, is_async));
+    (0..21).for_each(|_| next(&mut robot, is_async));
     (wire, robot)
 }
 
 /// How long after a moment the robot still drives at most, with continuous calls, microseconds.
-fn drives_until(
-    wire: &Wire,
-    robot: &mut Driver<Robot, Wire, Wire>,
-    is_async: bool,
-    from_us: u64,
-) -> u64 {
+fn drives_until(robot: &mut On<Robot>, is_async: bool, from_us: u64) -> u64 {
     let mut drove_us = 0;
     for _ in 0..200 {
-        next(wire, robot, is_async);
+        next(robot, is_async);
         let now = robot.now();
         if !robot.role().command(now).stands_still() {
             drove_us = now.as_micros() - from_us;
@@ -210,15 +201,14 @@ fn drives_until(
 fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
     for (is_async, stall_us) in [(false, 3_000_000), (true, 3_000_000), (true, 900_000)] {
         let (wire, mut robot) = reporting(is_async);
-        let sent = wire.world().sent.len();
-        let begin_us = wire.world().now_us;
-        let mut steps = vec![Write::Late(stall_us, usize::MAX)].into_iter();
-        wire.write_with(move |_| steps.next().unwrap_or(Write::All));
+        let sent = wire.sent().len();
+        let begin_us = wire.world.now_us();
+        wire.write_as([Step::Blocks(stall_us)]);
         // The next report is due within 20 ms.
         wire.receive_in(25_000, &drive());
-        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
-        assert!(wire.world().sent.len() > sent, "no report was sent");
-        assert!(wire.world().now_us > begin_us + stall_us, "the write did not stall");
+        let drove_us = drives_until(&mut robot, is_async, begin_us);
+        assert!(wire.sent().len() > sent, "no report was sent");
+        assert!(wire.world.now_us() > begin_us + stall_us, "the write did not stall");
         assert!(drove_us <= 525_000, "async {is_async}: until {drove_us} us after the command");
     }
 }
@@ -227,11 +217,11 @@ fn a_command_that_arrives_while_a_write_stalls_is_as_old_as_the_stall() {
 fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up() {
     for count in 1..=4 {
         let (wire, mut robot) = reporting(true);
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         let by = robot.now() + Duration::from_millis(100);
         let bytes = drive().repeat(count);
         wire.block_on_held(robot.next_command_async(by), &bytes, 3_000_000).unwrap();
-        let drove_us = drives_until(&wire, &mut robot, true, begin_us);
+        let drove_us = drives_until(&mut robot, true, begin_us);
         assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
 }
@@ -240,16 +230,16 @@ fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up()
 fn more_commands_than_a_round_takes_in_are_all_as_old_as_the_hold_up() {
     for (is_async, count) in [(false, 171), (false, 400), (true, 200), (true, 3000)] {
         let (wire, mut robot) = reporting(is_async);
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         wire.receive(&drive().repeat(count));
-        wire.pass(10_000_000);
-        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
+        wire.world.step(10_000_000);
+        let drove_us = drives_until(&mut robot, is_async, begin_us);
         assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
 }
 
 /// A robot that neither reports nor requests biases.
-fn silent() -> (Wire, Driver<Robot, Wire, Wire>) {
+fn silent() -> (Wire, On<Robot>) {
     let wire = Wire::link();
     let mut config = RobotConfig::default();
     config.bias_request_period = None;
@@ -262,10 +252,10 @@ fn silent() -> (Wire, Driver<Robot, Wire, Wire>) {
 fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
     for is_async in [false, true] {
         let (wire, mut robot) = silent();
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         wire.receive(&drive());
-        wire.pass(10_000_000);
-        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us);
+        wire.world.step(10_000_000);
+        let drove_us = drives_until(&mut robot, is_async, begin_us);
         assert_eq!(drove_us, 0, "async {is_async}: it drives on a ten-second-old command");
     }
 }
@@ -274,12 +264,12 @@ fn a_robot_without_reports_that_was_held_up_does_not_drive_on_old_commands() {
 fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence() {
     for is_async in [false, true] {
         let (wire, mut robot) = silent();
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         wire.receive_in(3_000_000, &drive());
         let by = robot.now() + Duration::from_millis(10_000);
-        let command = on!(is_async, wire, robot, next_command, next_command_async(by));
+        let command = call!(is_async, robot, next_command, next_command_async(by));
         assert_eq!(command.unwrap().map(|command| command.speed()), Some(60));
-        let drove_us = drives_until(&wire, &mut robot, is_async, begin_us + 3_000_000);
+        let drove_us = drives_until(&mut robot, is_async, begin_us + 3_000_000);
         assert!((485_000..=500_000).contains(&drove_us), "async {is_async}: {drove_us} us");
     }
 }
@@ -290,7 +280,7 @@ fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
     wire.receive(&drive());
     robot.service().unwrap();
     let stop = MotorControl::STOP.frame(1).as_bytes().to_vec();
-    wire.pass(30_000);
+    wire.world.step(30_000);
     wire.receive(&stop[..10]);
     robot.service().unwrap();
     wire.receive(&stop[10..]);
@@ -302,13 +292,13 @@ fn a_stop_that_a_held_up_robot_finds_half_arrived_is_not_lost() {
 #[test]
 fn one_wrong_reading_of_the_clock_does_not_end_the_watchdog_of_a_robot() {
     let (wire, mut robot) = robot();
-    wire.world().glitch = Some((0, 1 << 32));
+    wire.world.glitch(0, 1 << 32);
     robot.service().unwrap();
     wire.receive(&drive());
     robot.service().unwrap();
     let now = robot.now();
     assert_eq!(robot.role().command(now).speed(), 60);
-    wire.pass(60_000_000);
+    wire.world.step(60_000_000);
     robot.service().unwrap();
     let now = robot.now();
     assert_eq!(
@@ -321,14 +311,14 @@ fn one_wrong_reading_of_the_clock_does_not_end_the_watchdog_of_a_robot() {
 #[test]
 fn a_stop_leaves_on_a_slow_link_through_a_port_that_takes_a_few_bytes_at_a_time() {
     for count in [4, 8, 12, 24] {
-        let wire = Wire::new(1042, vec![]);
+        let wire = Wire::new(1042, None);
         let mut config = HostConfig::default();
         config.baud = 9600;
         let mut host = wire.driver(|now| Host::new(config, now));
         host.drive(60, 0).unwrap();
-        wire.write_with(move |_| Write::Out(count, 0));
+        wire.write_with(move |_| Step::Drains(count, 0));
         assert_eq!(host.stop(), Ok(()), "{count} bytes at a time");
-        let sent: Vec<u8> = wire.world().sent.iter().map(|&(_, byte)| byte).collect();
+        let sent: Vec<u8> = wire.sent().iter().map(|&(_, byte)| byte).collect();
         let last = sent.len() - 24;
         let stop = MotorControl::STOP.frame(sent[last + 5]);
         assert_eq!(sent[last..], *stop.as_bytes());

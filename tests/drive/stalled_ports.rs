@@ -1,14 +1,12 @@
 //! Ports that never become ready: a call gives up after a second, and a later stop is sent again.
 
 use std::{
+    collections::VecDeque,
     pin::pin,
     task::{Context, Poll, Waker},
 };
 
-use crate::{
-    motor_line::{Bus, Wire},
-    rig::*,
-};
+use crate::{motor_line::Wire, rig::*};
 
 /// A bus whose only motor turns at 5 rps.
 fn turning() -> (Wire, Bus) {
@@ -19,25 +17,30 @@ fn turning() -> (Wire, Bus) {
 
 /// The same; async writes or flushes are never ready.
 fn hanging(flushes_hang: bool) -> (Wire, Bus) {
-    let (wire, bus) = turning();
-    (wire.world().writes_hang, wire.world().flushes_hang) = (!flushes_hang, flushes_hang);
+    let (wire, mut bus) = turning();
+    script(&mut bus, flushes_hang).extend(vec![Step::Stall; 1000]);
     (wire, bus)
+}
+
+fn script(bus: &mut Bus, is_of_flushes: bool) -> &mut VecDeque<Step> {
+    let port = bus.port_mut();
+    if is_of_flushes { &mut port.flushes } else { &mut port.writes }
 }
 
 #[test]
 fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
         let (wire, mut bus) = hanging(flushes_hang);
-        let begin_us = wire.world().now_us;
-        let stopped = wire.block_on(bus.stop_async(NodeId::N1));
+        let begin_us = wire.world.now_us();
+        let stopped = wire.world.block_on(bus.stop_async(NodeId::N1));
         assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
-        let took_us = wire.world().now_us - begin_us;
+        let took_us = wire.world.now_us() - begin_us;
         assert!(took_us < 1_500_000, "it gives up after {took_us} us");
-        let stalled = wire.block_on(bus.service_async());
+        let stalled = wire.world.block_on(bus.service_async());
         assert_eq!(stalled, Err(DriveError::Stalled), "flushes hang: {flushes_hang}");
         // The port works again: the stop is sent again.
-        (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
-        assert_eq!(wire.block_on(bus.stop_async(NodeId::N1)), Ok(()));
+        script(&mut bus, flushes_hang).clear();
+        assert_eq!(wire.world.block_on(bus.stop_async(NodeId::N1)), Ok(()));
         assert_eq!(wire.rps(), 0.0);
     }
 }
@@ -46,23 +49,23 @@ fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
 fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
     for flushes_hang in [false, true] {
         let (wire, mut bus) = hanging(flushes_hang);
-        let begin_us = wire.world().now_us;
+        let begin_us = wire.world.now_us();
         loop {
             let mut call = pin!(bus.service_async());
             let mut context = Context::from_waker(Waker::noop());
             if call.as_mut().poll(&mut context).is_ready() {
                 // Nothing is due yet.
-                wire.pass(100);
+                wire.world.step(100);
                 continue;
             }
-            wire.pass(100_100);
+            wire.world.step(100_100);
             // A task that yielded is polled again at once.
             let _ = call.as_mut().poll(&mut context);
             if let Poll::Ready(result) = call.as_mut().poll(&mut context) {
                 assert_eq!(result, Err(DriveError::Stalled));
                 break;
             }
-            let waits_us = wire.world().now_us - begin_us;
+            let waits_us = wire.world.now_us() - begin_us;
             assert!(waits_us < 1_300_000, "not found, flushes hang: {flushes_hang}");
         }
     }
@@ -71,16 +74,15 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
 #[test]
 fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
     let (wire, mut bus) = turning();
-    wire.pass(10_000);
-    wire.world().flushes_hang = true;
+    wire.world.step(10_000);
+    // Then it takes its time, but no longer.
+    bus.port_mut().flushes.extend([Step::Stall, Step::Late(2000)]);
     let mut context = Context::from_waker(Waker::noop());
     assert!(pin!(bus.service_async()).poll(&mut context).is_pending());
-    wire.pass(10_000_000);
-    // It takes its time, but no longer.
+    wire.world.step(10_000_000);
     let mut call = pin!(bus.service_async());
     assert!(call.as_mut().poll(&mut context).is_pending());
-    wire.pass(2000);
-    wire.world().flushes_hang = false;
+    wire.world.step(2000);
     assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
 }
 
@@ -88,24 +90,24 @@ fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
 fn a_port_that_has_stalled_is_given_a_second_again() {
     for flushes_hang in [false, true] {
         let (wire, mut bus) = hanging(flushes_hang);
-        while wire.block_on(bus.service_async()) != Err(DriveError::Stalled) {
-            wire.pass(100);
+        while wire.world.block_on(bus.service_async()) != Err(DriveError::Stalled) {
+            wire.world.step(100);
         }
         // It needs half a second for the next frame.
+        script(&mut bus, flushes_hang).clear();
+        script(&mut bus, flushes_hang).push_back(Step::Late(500_100));
         let mut context = Context::from_waker(Waker::noop());
         for _ in 0..10 {
             let mut call = pin!(bus.service_async());
             if call.as_mut().poll(&mut context).is_ready() {
-                wire.pass(100);
+                wire.world.step(100);
                 continue;
             }
-            wire.pass(500_000);
+            wire.world.step(500_000);
             assert!(call.as_mut().poll(&mut context).is_pending(), "flushes hang: {flushes_hang}");
-            (wire.world().writes_hang, wire.world().flushes_hang) = (false, false);
-            assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
+            assert_eq!(wire.world.block_on(call), Ok(()));
             break;
         }
-        let world = wire.world();
-        assert!(!world.writes_hang && !world.flushes_hang, "no frame was due");
+        assert!(script(&mut bus, flushes_hang).is_empty(), "no frame was due");
     }
 }

@@ -9,13 +9,13 @@ fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
         bus.set_velocity(NodeId::N1, Rps::new(5.0).unwrap()).unwrap();
         for _ in 0..100 {
             bus.service().unwrap();
-            wire.pass(10);
+            wire.world.step(10);
         }
         // An hour ahead.
-        wire.world().glitch = Some((readings, 3_600_000_000));
-        let begin_us = wire.world().now_us;
+        wire.world.glitch(readings, 3_600_000_000);
+        let begin_us = wire.world.now_us();
         let stopped = bus.stop(NodeId::N1);
-        let took_us = wire.world().now_us - begin_us;
+        let took_us = wire.world.now_us() - begin_us;
         let bound_us = u64::from(bus.role().stop_bound().as_micros());
         assert!(took_us <= bound_us + 1000, "reading {readings}: stopped after {took_us} us");
         // A deadline may seem to have passed: then the stop is owed, and the next call pays it.
@@ -24,7 +24,7 @@ fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
             assert_eq!(bus.stop(NodeId::N1), Ok(()), "reading {readings}");
         }
         assert_eq!(wire.rps(), 0.0, "reading {readings}");
-        let took_us = wire.world().now_us - begin_us;
+        let took_us = wire.world.now_us() - begin_us;
         assert!(took_us <= 2 * bound_us, "reading {readings}: paid after {took_us} us");
     }
 }
@@ -33,11 +33,11 @@ fn one_wrong_reading_of_the_clock_holds_up_no_stop() {
 fn one_wrong_reading_of_the_clock_does_not_make_a_call_idle_longer() {
     let (wire, mut bus) =
         Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
-    wire.world().glitch = Some((0, 3_600_000_000));
+    wire.world.glitch(0, 3_600_000_000);
     bus.service().unwrap();
-    let begin_us = wire.world().now_us;
+    let begin_us = wire.world.now_us();
     let end = bus.now() + Duration::from_millis(5);
     bus.run_until(end, |_, _, _| ()).unwrap();
-    let took_us = wire.world().now_us - begin_us;
+    let took_us = wire.world.now_us() - begin_us;
     assert!((5000..6000).contains(&took_us), "5 ms took {took_us} us");
 }

@@ -53,6 +53,10 @@ pub(crate) enum Step {
     Blocks(u64),
     /// Takes this long in the same way, and fails.
     BlocksAndFails(u64),
+    /// Blocks for this long in the same way, and then takes at most this many bytes.
+    Lags(u64, usize),
+    /// Takes at most this many bytes, and blocks until they are out, and then for this long.
+    Drains(usize, u64),
     /// Async only: this call never completes; the next one continues with the next step.
     Stall,
 }
@@ -78,11 +82,15 @@ pub(crate) struct Offer {
 /// Hears each byte that has left, at its time, and answers with bytes that arrive at theirs.
 pub(crate) type Peer = Box<dyn FnMut(u8, u64) -> Vec<(u64, u8)>>;
 
+/// Decides what the port does with each write, instead of its script.
+pub(crate) type Writer = Rc<RefCell<Option<Box<dyn FnMut(&[u8]) -> Step>>>>;
+
 /// Follows its scripts; after that it gives what has arrived, and takes everything.
 pub(crate) struct Port {
     pub(crate) world: World,
     pub(crate) reads: VecDeque<Step>,
     pub(crate) writes: VecDeque<Step>,
+    pub(crate) writer: Writer,
     pub(crate) flushes: VecDeque<Step>,
     pub(crate) empty: Empty,
     /// Bytes on their way here.
@@ -104,6 +112,8 @@ pub(crate) struct Port {
     pub(crate) most: usize,
     /// A byte always seems available, and every read fails.
     pub(crate) is_deaf: bool,
+    /// Asking for bytes fails.
+    pub(crate) is_blind: bool,
     /// It becomes deaf when something is written.
     pub(crate) is_deafened: bool,
     /// Every write fails.
@@ -141,6 +151,7 @@ impl Port {
             world: world.clone(),
             reads: VecDeque::new(),
             writes: VecDeque::new(),
+            writer: Rc::default(),
             flushes: VecDeque::new(),
             empty: Empty::Waits,
             inbox,
@@ -153,6 +164,7 @@ impl Port {
             drains: false,
             most: usize::MAX,
             is_deaf: false,
+            is_blind: false,
             is_deafened: false,
             is_mute: false,
             stutters: false,
@@ -297,6 +309,10 @@ impl Port {
         assert!(is_async || !bytes.is_empty(), "nothing to write");
         self.called("write");
         if bytes.is_empty() {
+            // One that stalls does not take these either.
+            if matches!(self.writes.front(), Some(Step::Stall)) {
+                pending::<()>().await;
+            }
             return Ok(0);
         }
         if is_async && self.stutters {
@@ -307,7 +323,11 @@ impl Port {
             return Err(Unplugged);
         }
         let mut most = self.most;
-        match self.writes.pop_front() {
+        let step = match &mut *self.writer.borrow_mut() {
+            Some(writer) => Some(writer(bytes)),
+            None => self.writes.pop_front(),
+        };
+        match step {
             Some(Step::Few(count)) => most = most.min(count),
             Some(Step::Error) => return Err(Unplugged),
             Some(Step::Zero) => most = 0,
@@ -316,6 +336,15 @@ impl Port {
             Some(Step::BlocksAndFails(micros)) => {
                 self.stall(micros, false).await;
                 return Err(Unplugged);
+            }
+            Some(Step::Lags(micros, count)) => {
+                self.stall(micros, false).await;
+                most = most.min(count);
+            }
+            Some(Step::Drains(count, micros)) => {
+                let taken = self.take(bytes, most.min(count));
+                self.wait_until(self.free_us + micros, false).await;
+                return Ok(taken);
             }
             Some(Step::Stall) => pending().await,
             Some(Step::Bytes(_)) => panic!("a write gives nothing"),
@@ -365,7 +394,7 @@ impl Port {
             }
             Some(Step::Stall) => pending().await,
             Some(Step::Few(_)) | None => {}
-            Some(Step::Bytes(_)) => panic!("a flush gives nothing"),
+            Some(_) => panic!("a flush gives and takes nothing"),
         }
         if !is_async && self.world.now_us() < self.holds_until_us {
             return Err(Unplugged);
@@ -398,7 +427,7 @@ impl embedded_io::ReadReady for Port {
     fn read_ready(&mut self) -> Reply<bool> {
         self.world.count_call();
         self.is_plugged()?;
-        Ok(self.is_readable())
+        if self.is_blind { Err(Unplugged) } else { Ok(self.is_readable()) }
     }
 }
 

@@ -40,6 +40,10 @@ struct Inner {
     lines: RefCell<Vec<Wire>>,
     calls: Cell<u64>,
     naps: Cell<u64>,
+    /// Time that each reading of the clock takes, microseconds.
+    reading_us: Cell<u64>,
+    /// After this many readings, one is wrong by this many microseconds.
+    glitch: Cell<Option<(u32, u64)>>,
 }
 
 impl World {
@@ -55,6 +59,16 @@ impl World {
 
     pub(crate) fn now(&self) -> Instant {
         Instant::from_micros(self.now_us())
+    }
+
+    /// From now on each reading of the clock takes this long.
+    pub(crate) fn take_per_reading(&self, micros: u64) {
+        self.0.reading_us.set(micros);
+    }
+
+    /// After this many readings of the clock, one is wrong by this many microseconds.
+    pub(crate) fn glitch(&self, readings: u32, wrong_us: u64) {
+        self.0.glitch.set(Some((readings, wrong_us)));
     }
 
     /// Calls of ports and clocks.
@@ -190,7 +204,13 @@ impl World {
 impl Clock for World {
     fn now(&mut self) -> Instant {
         self.count_call();
-        Self::now(self)
+        let now_us = self.now_us() + self.0.reading_us.get();
+        self.0.now_us.set(now_us);
+        let glitch = self.0.glitch.take();
+        let later = glitch.and_then(|(readings, us)| Some((readings.checked_sub(1)?, us)));
+        self.0.glitch.set(later);
+        let wrong_us = glitch.filter(|_| later.is_none()).map_or(0, |(_, us)| us);
+        Instant::from_micros(now_us + wrong_us)
     }
 
     /// Idles until a byte arrives; others run meanwhile.
