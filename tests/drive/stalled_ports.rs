@@ -105,7 +105,9 @@ fn a_port_that_has_stalled_is_given_a_second_again() {
             }
             wire.world.step(500_000);
             assert!(call.as_mut().poll(&mut context).is_pending(), "flushes hang: {flushes_hang}");
+            let begin_us = wire.world.now_us();
             assert_eq!(wire.world.block_on(call), Ok(()));
+            assert!(wire.world.now_us() - begin_us < 1000, "longer than the port");
             break;
         }
         assert!(script(&mut bus, flushes_hang).is_empty(), "no frame was due");
