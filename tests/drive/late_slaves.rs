@@ -120,15 +120,17 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
 
 #[test]
 fn an_idle_slave_answers_a_request_after_a_long_silence() {
-    for is_async in [false, true] {
+    // At several moments between two looks at its port.
+    let silences_us = [2_345_678, 2_348_678, 2_351_678];
+    for (is_async, silence_us) in BOTH.into_iter().flat_map(|it| silences_us.map(|us| (it, us))) {
         let wire = Wire::bus(None);
         let mut slave = idle_slave(&wire, SlaveConfig::direct());
         let begin_us = wire.world.now_us();
-        wire.receive_in(2_345_678, ReadRequest::new(NodeId::N1).as_bytes());
+        wire.receive_in(silence_us, ReadRequest::new(NodeId::N1).as_bytes());
         let by = slave.now() + Duration::from_millis(3000);
         call!(is_async, slave, run_until, run_until_async(by, |_, _, _| ())).unwrap();
         assert_eq!(wire.sent().len(), 8, "async {is_async}");
-        let delay_us = wire.sent()[0].0 - begin_us - 2_345_678;
+        let delay_us = wire.sent()[0].0 - begin_us - silence_us;
         assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");
     }
 }
