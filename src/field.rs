@@ -191,3 +191,38 @@ macro_rules! field {
     };
 }
 pub(crate) use field;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_has_what_is_said_of_it_and_the_rest_is_plain() {
+        let plain = field! {
+            /// What it is.
+            "key": u8, by "I4"
+        };
+        assert_eq!((plain.name, plain.source, plain.meaning), ("key", "I4", "What it is"));
+        assert_eq!((plain.kind, plain.shape, plain.limits), (Kind::U8, Shape::One, None));
+        assert_eq!((plain.unit, plain.is_optional, plain.is_of_tool), ("none", false, false));
+        let full = plain.of::<[i16; 3]>().unit("1/s").within(1, 8).optional().of_tool();
+        assert_eq!(
+            (full.kind, full.shape, full.limits),
+            (Kind::I16, Shape::Array(3), Some((1, 8)))
+        );
+        assert_eq!((full.unit, full.is_optional, full.is_of_tool), ("1/s", true, true));
+        let named = plain.named(&["on", "off"]).object(&["left"]);
+        assert_eq!(
+            (named.kind, named.shape),
+            (Kind::Name(&["on", "off"]), Shape::Object(&["left"]))
+        );
+    }
+
+    #[test]
+    fn each_type_is_one_word() {
+        let integers = [Kind::U8, Kind::I8, Kind::U16, Kind::I16, Kind::U32, Kind::I32, Kind::U64];
+        let others = [Kind::F32, Kind::Time, Kind::Name(&[]), Kind::Bytes];
+        assert_eq!(integers.map(Kind::name), ["u8", "i8", "u16", "i16", "u32", "i32", "u64"]);
+        assert_eq!(others.map(Kind::name), ["f32", "time", "name", "bytes"]);
+    }
+}

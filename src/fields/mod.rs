@@ -41,3 +41,17 @@ const fn joined<const N: usize>(parts: &[&[Record]]) -> [Record; N] {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use core::hint::black_box;
+
+    use super::*;
+
+    #[test]
+    fn the_table_is_the_same_when_it_is_joined_while_a_program_runs() {
+        let parts = black_box(PARTS);
+        assert_eq!(count(parts), FIELDS.len());
+        assert_eq!(joined::<{ count(PARTS) }>(parts)[..], *FIELDS);
+    }
+}

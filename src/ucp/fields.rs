@@ -231,3 +231,16 @@ const fn records<const N: usize>() -> [Record; N] {
     }
     records
 }
+
+#[cfg(test)]
+mod tests {
+    use core::hint::black_box;
+
+    use super::*;
+
+    #[test]
+    fn the_records_are_the_same_when_they_are_made_while_a_program_runs() {
+        assert_eq!(count(black_box(ENTRIES)) + 1, RECORDS.len());
+        assert_eq!(records::<{ count(ENTRIES) + 1 }>()[..], *RECORDS);
+    }
+}
