@@ -4,6 +4,12 @@ mod support;
 
 use support::{bytes, run, stdout};
 
+/// Checks the whole listing; it begins on the line below its quote.
+fn check(protocol: &str, input: &[u8], listing: &str) {
+    let listed = stdout(run(&["decode", "--protocol", protocol], input));
+    assert_eq!(listed, listing.trim_start_matches('\n'));
+}
+
 #[test]
 fn people_get_columns_and_units_of_a_rover() {
     let input = bytes(concat!(
@@ -43,10 +49,7 @@ fn people_get_columns_and_units_of_a_rover() {
        230 in 11 frames
         17 skipped: 15 header, 1 crc, 1 idle
 ";
-    assert_eq!(
-        stdout(run(&["decode", "--protocol", "ucp"], &input)),
-        listing.trim_start_matches('\n')
-    );
+    check("ucp", &input, listing);
 }
 
 #[test]
@@ -74,10 +77,7 @@ fn people_get_columns_and_units_of_a_motor_bus() {
         36 in 5 frames
          6 skipped: 1 header, 4 id, 1 idle
 ";
-    assert_eq!(
-        stdout(run(&["decode", "--protocol", "ikeya"], &input)),
-        listing.trim_start_matches('\n')
-    );
+    check("ikeya", &input, listing);
 }
 
 #[test]
@@ -93,8 +93,5 @@ fn people_get_three_values_of_a_three_motor_board() {
         32 in 2 frames
          0 skipped
 ";
-    assert_eq!(
-        stdout(run(&["decode", "--protocol", "ikeya-3"], &input)),
-        listing.trim_start_matches('\n')
-    );
+    check("ikeya-3", &input, listing);
 }
