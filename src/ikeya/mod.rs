@@ -137,6 +137,8 @@ pub(crate) mod fields;
 mod framing;
 mod judge;
 pub mod master;
+mod node_set;
+mod schedule;
 #[cfg(feature = "serde")]
 mod serialize;
 pub mod slave;

@@ -1,7 +1,9 @@
 //! Settings of a master.
 
-use super::nodes::NodeSet;
-use crate::{ikeya::units::BAUD, time::Duration};
+use crate::{
+    ikeya::{node_set::NodeSet, units::BAUD},
+    time::Duration,
+};
 
 /// Settings of a [`Master`](super::Master): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.

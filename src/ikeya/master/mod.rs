@@ -2,45 +2,32 @@
 //!
 //! [`Master`] is the role. Its code is in the files of this module, one concept each:
 //!
-//! | file | what it decides |
+//! | file | what it owns |
 //! |---|---|
-//! | `role` | commands, and the calls of [`Endpoint`](crate::endpoint::Endpoint) |
-//! | `queue`, `turns` | which packet goes next (I13) |
-//! | `window`, `replies` | which replies are accepted, and what they do (I7) |
-//! | `echo` | which received bytes are the master's own |
-//! | `strikes`, `health` | when a node is abnormal, and how it is searched for (I7) |
-//! | `discovery` | which ids are polled for the first time |
-//! | `mode` | whether a node has changed its mode (I11) |
-//! | `stop`, `set_point` | what a node is owed, and what it has been told (I12) |
-//! | `dead_man` | when a silent application has its nodes stopped (I13) |
+//! | `role` | commands, and the calls of [`Endpoint`](crate::endpoint::Endpoint); the dead-man (I13) |
+//! | `line` | what is on the wire: the reply window, the echo, what the port holds (I7) |
+//! | `queue` | which packet goes next: rounds, the search, discovery (I13) |
+//! | `node` | whether a node answers, when it is asked, and which request is due (I7, I8) |
+//! | `order` | what a node has been told, and the stop that it is owed (I6, I8, I12) |
+//! | `mode` | the mode on record, and whether it is in doubt (I11) |
+//! | `replies` | what an answer or a silence changes, and what the application is told |
 //! | `view` | what an application can query |
 
 mod config;
-mod dead_man;
-mod discovery;
-mod echo;
 mod event;
-mod health;
+mod line;
 mod mode;
 mod node;
-mod nodes;
+mod order;
 mod queue;
 mod replies;
 mod role;
-mod schedule;
-mod set_point;
 mod statistics;
-mod stop;
-mod strikes;
-mod turns;
 mod view;
-mod window;
 
+pub use super::{node_set::NodeSet, schedule::Schedule};
 pub use config::{MasterConfig, Polling};
-pub use event::{Cause, CommandError, MasterEvent};
-pub use health::Health;
-pub use nodes::NodeSet;
+pub use event::{Cause, CommandError, Health, MasterEvent};
+pub use order::StopProgress;
 pub use role::Master;
-pub use schedule::Schedule;
 pub use statistics::{MasterStatistics, NodeStatistics};
-pub use stop::StopProgress;

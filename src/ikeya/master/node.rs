@@ -1,114 +1,154 @@
-//! Everything a master keeps about one node.
+//! Everything a master keeps about one node: whether it answers, and when it is asked (I7, I8).
 
 use super::{
     config::{MasterConfig, Polling},
-    event::{Cause, CommandError},
-    health::Health,
-    set_point::{Confirm, SetPoint},
+    event::{Cause, CommandError, Health},
+    mode::{Decision, KnownMode},
+    order::{Order, Settled},
     statistics::NodeStatistics,
-    stop::{Standstill, Stop, StopProgress},
-    turns::Reason,
 };
 use crate::{
     ikeya::{
         board::{Board, Status, Target},
         units::{Mode, NodeId},
     },
-    stats::count_apart,
-    time::Instant,
+    stats::{count_apart, uncount},
+    time::{Duration, Instant},
 };
 
-/// Number of exchanges without a decision after which the application is told that a mode stays in
-/// doubt (I11). The node has been abnormal since the third, and is read at the search rate.
-pub(super) const DOUBT_EXCHANGES: u8 = 6;
+/// Number of consecutive windows without its answer after which a node is abnormal.
+const STRIKES: u8 = 3;
 
 // Flags first: short instructions can reach them there.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(super) struct Node<B: Board> {
     /// `None` until it has answered once.
-    pub(super) health: Option<Health>,
-    /// The mode on record.
-    pub(super) mode: Option<Mode>,
-    /// While the mode is in doubt: number of exchanges since then that decided nothing.
-    pub(super) doubt: Option<u8>,
-    /// Whether the latest command, sent or not, is a set-point: neither a stop nor none at all.
-    pub(super) is_under_order: bool,
-    /// Whether it has had a WRITE since it was last asked: it is read before its set-point is
-    /// repeated.
-    pub(super) is_written: bool,
-    pub(super) confirm: Confirm,
+    health: Option<Health>,
+    mode: KnownMode,
     /// Number of consecutive windows that closed without its answer.
-    pub(super) strikes: u8,
+    strikes: u8,
     /// Failed attempts of the READ in progress.
-    pub(super) attempt: u8,
+    attempt: u8,
     /// Whether the application, or a mode in doubt, asks for a READ.
-    pub(super) is_asked: bool,
+    is_asked: bool,
     /// Number of requests in the discovery in progress.
-    pub(super) scans: u8,
-    pub(super) last_failure: Option<Cause>,
+    scans: u8,
+    last_failure: Option<Cause>,
     /// The node has answered since the application requested a READ.
-    pub(super) has_answered: bool,
+    has_answered: bool,
     /// A READ has failed since then.
-    pub(super) has_failed: bool,
-    pub(super) stop: Option<Stop<B>>,
-    pub(super) set_point: Option<SetPoint<B>>,
+    has_failed: bool,
+    order: Order<B>,
     /// Time before which it is not polled: a late answer may be on its way.
-    pub(super) guarded_until: Option<Instant>,
+    guarded_until: Option<Instant>,
     /// Time of the next READ; only set with [`Polling::Every`].
-    pub(super) read_due: Option<Instant>,
-    pub(super) standstill: Standstill<B>,
-    pub(super) status: Option<(Status<B>, Instant)>,
-    pub(super) statistics: NodeStatistics,
+    read_due: Option<Instant>,
+    status: Option<(Status<B>, Instant)>,
+    statistics: NodeStatistics,
 }
 
+/// Reason for a request to a node.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Reason {
+    /// The WRITE of a freshly measured position: the second half of an attempt.
+    Hold,
+    /// A stop WRITE for a velocity node that is online.
+    SpeedStop,
+    /// A stop WRITE for any node that is online.
+    Stop,
+    /// A READ that a stop or a mode in doubt is waiting for.
+    StopRead,
+    /// The first attempt for a node that is owed a stop and is not online.
+    LostStop,
+    SetPoint,
+    Discovery,
+    Search,
+    Cycle,
+}
+
+impl Reason {
+    /// The urgent reasons by priority, then the rest.
+    pub(super) const ALL: [Self; 9] = [
+        Self::Hold,
+        Self::SpeedStop,
+        Self::Stop,
+        Self::StopRead,
+        Self::LostStop,
+        Self::SetPoint,
+        Self::Discovery,
+        Self::Search,
+        Self::Cycle,
+    ];
+
+    /// Whether it is for a stop or a mode in doubt.
+    pub(super) const fn is_stop(self) -> bool {
+        matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
+    }
+}
+
+/// Kind of request.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Request<B: Board> {
+    Read,
+    Write(Target<B>),
+}
+
+impl<B: Board> Request<B> {
+    /// Whether it is answered; a silent request is not.
+    pub(super) const fn is_exchange(&self) -> bool {
+        B::ANSWERS_WRITE || matches!(self, Self::Read)
+    }
+}
+
+/// What has changed for a node, for the role to tell the application, in this order.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Changes {
+    /// Its mode stays in doubt.
+    pub(super) is_undecided: bool,
+    /// It has answered for the first time.
+    pub(super) is_discovered: bool,
+    /// Its health is another one.
+    pub(super) health: Option<Health>,
+    /// A READ was given up.
+    pub(super) failed: Option<Cause>,
+    /// Its confirmation is given up.
+    pub(super) not_confirmed: Option<Cause>,
+    /// It has answered in another mode again.
+    pub(super) is_mode_changed: bool,
+    /// It has answered in its mode.
+    pub(super) is_answered: bool,
+    /// What that answer has settled.
+    pub(super) settled: Settled,
+}
+
+impl Changes {
+    /// The confirmation ends because the set-point was dropped.
+    fn dropped(is_unconfirmed: bool) -> Self {
+        Self { not_confirmed: is_unconfirmed.then_some(Cause::Dropped), ..Self::default() }
+    }
+}
+
+/// Commands.
 impl<B: Board> Node<B> {
     // In line it would take 90 more bytes of flash.
     #[inline(never)]
     pub(super) const fn new() -> Self {
         Self {
             health: None,
-            mode: None,
-            doubt: None,
-            set_point: None,
-            is_under_order: false,
-            is_written: false,
-            confirm: Confirm::Unasked,
-            stop: None,
-            standstill: Standstill::Unwatched,
-            status: None,
-            last_failure: None,
-            has_answered: false,
-            has_failed: false,
+            mode: KnownMode::UNKNOWN,
             strikes: 0,
             attempt: 0,
             is_asked: false,
+            scans: 0,
+            last_failure: None,
+            has_answered: false,
+            has_failed: false,
+            order: Order::NONE,
             guarded_until: None,
             read_due: None,
-            scans: 0,
+            status: None,
             statistics: NodeStatistics::NEW,
-        }
-    }
-
-    pub(super) fn is_online(&self) -> bool {
-        self.health.is_some_and(Health::is_online)
-    }
-
-    pub(super) fn is_abnormal(&self) -> bool {
-        self.health == Some(Health::Abnormal)
-    }
-
-    /// Whether it has been given a command, a paid stop included, or will be.
-    pub(super) fn is_commanded(&self) -> bool {
-        self.set_point.is_some() || self.is_under_order
-    }
-
-    pub(super) fn stop_progress(&self) -> StopProgress {
-        match (&self.stop, &self.standstill) {
-            (Some(_), _) => StopProgress::Owed,
-            (None, Standstill::Unwatched) => StopProgress::NotAsked,
-            (None, Standstill::Watched(_)) => StopProgress::Paid,
-            (None, Standstill::Reached) => StopProgress::StandingStill,
         }
     }
 
@@ -118,18 +158,17 @@ impl<B: Board> Node<B> {
     /// that mode.
     pub(super) fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
         self.check(node, &target)?;
-        self.set_point = Some(SetPoint::new(target));
-        (self.is_under_order, self.standstill) = (true, Standstill::Unwatched);
+        self.order.aim(target);
         Ok(())
     }
 
     pub(super) fn check(&self, node: NodeId, target: &Target<B>) -> Result<(), CommandError> {
-        let mode =
-            self.mode.filter(|_| self.is_online()).ok_or(CommandError::NotOnline { node })?;
-        if self.stop.is_some() {
+        let mode = self.mode.on_record().filter(|_| self.is_online());
+        let mode = mode.ok_or(CommandError::NotOnline { node })?;
+        if self.order.stop().is_some() {
             return Err(CommandError::StopOwed { node });
         }
-        if self.doubt.is_some() {
+        if self.mode.is_in_doubt() {
             return Err(CommandError::ModeInDoubt { node });
         }
         if mode != target.mode() {
@@ -138,23 +177,91 @@ impl<B: Board> Node<B> {
         Ok(())
     }
 
-    /// Drops the set-point; returns whether the application is waiting for its confirmation.
-    pub(super) fn drop_set_point(&mut self) -> bool {
-        self.set_point = None;
-        core::mem::replace(&mut self.confirm, Confirm::Unasked) != Confirm::Unasked
+    pub(super) fn release(&mut self) -> Changes {
+        Changes::dropped(self.order.release())
     }
 
-    /// The stop WRITE to be sent next, if one may be sent.
-    ///
-    /// While the mode is in doubt: only a position that means standstill to a velocity node (I11).
-    pub(super) fn stop_write(&self) -> Option<Target<B>> {
-        let stop = self.stop.as_ref().filter(|stop| !stop.is_written)?;
-        let hold = stop.hold.map(Target::Position);
-        match (self.mode?, self.doubt) {
-            (Mode::Velocity, None) => Some(Target::STANDSTILL),
-            (Mode::Position, None) => hold,
-            (_, Some(_)) => hold.filter(|_| stop.hold.is_some_and(B::is_still_as_velocity)),
+    /// Makes it owed a stop, unless it already is.
+    pub(super) fn owe_stop(&mut self, hold_age: Duration, now: Instant) -> Changes {
+        let is_new = self.order.stop().is_none();
+        let is_certain = self.is_online() && !self.mode.is_in_doubt();
+        let measured = self.status.filter(|&(_, at)| now - at < hold_age).map(|it| it.0);
+        let is_unconfirmed = self.order.owe_stop(is_certain, measured, now);
+        Changes {
+            is_undecided: is_new && self.mode.is_undecided(),
+            ..Changes::dropped(is_unconfirmed)
         }
+    }
+
+    pub(super) fn confirm(&mut self, node: NodeId) -> Result<(), CommandError> {
+        if !self.is_online() {
+            return Err(CommandError::NotOnline { node });
+        }
+        if !self.order.confirm() {
+            return Err(CommandError::NoSetPoint { node });
+        }
+        Ok(())
+    }
+
+    pub(super) fn read(&mut self, node: NodeId) -> Result<(), CommandError> {
+        if !self.is_online() {
+            return Err(CommandError::NotOnline { node });
+        }
+        (self.is_asked, self.has_answered, self.has_failed) = (true, false, false);
+        Ok(())
+    }
+}
+
+/// What is known.
+impl<B: Board> Node<B> {
+    pub(super) const fn health(&self) -> Option<Health> {
+        self.health
+    }
+
+    pub(super) const fn mode(&self) -> KnownMode {
+        self.mode
+    }
+
+    pub(super) const fn order(&self) -> &Order<B> {
+        &self.order
+    }
+
+    pub(super) const fn status(&self) -> Option<(Status<B>, Instant)> {
+        self.status
+    }
+
+    pub(super) const fn statistics(&self) -> &NodeStatistics {
+        &self.statistics
+    }
+
+    pub(super) const fn last_failure(&self) -> Option<Cause> {
+        self.last_failure
+    }
+
+    /// How the READ has ended that the application asked for.
+    pub(super) const fn read_outcome(&self) -> Option<Result<(), Cause>> {
+        match self.last_failure {
+            _ if self.has_answered => Some(Ok(())),
+            Some(cause) if self.has_failed => Some(Err(cause)),
+            _ => None,
+        }
+    }
+
+    pub(super) fn is_online(&self) -> bool {
+        self.health.is_some_and(Health::is_online)
+    }
+
+    /// Whether it is to be polled in a pass of a discovery.
+    pub(super) fn is_scanned(&self, pass: u16) -> bool {
+        !self.is_online() && u16::from(self.scans) <= pass
+    }
+}
+
+/// What is to be sent.
+impl<B: Board> Node<B> {
+    /// The stop WRITE to be sent next, if one may be sent.
+    fn stop_write(&self) -> Option<Target<B>> {
+        self.order.stop()?.write(self.mode.on_record()?, self.mode.is_in_doubt())
     }
 
     /// Whether a request for this reason is due now.
@@ -166,25 +273,25 @@ impl<B: Board> Node<B> {
     #[inline(never)]
     pub(super) fn wants(&self, reason: Reason, config: &MasterConfig) -> bool {
         let is_online = self.is_online();
+        let stop = self.order.stop();
         match reason {
             Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::StopRead if !is_online => {
                 false
             }
             Reason::Hold => {
-                self.stop.as_ref().is_some_and(Stop::is_measured) && self.stop_write().is_some()
+                stop.is_some_and(|stop| stop.is_measured()) && self.stop_write().is_some()
             }
             Reason::SpeedStop => matches!(self.stop_write(), Some(Target::Velocity(_))),
             Reason::Stop => self.stop_write().is_some(),
             Reason::StopRead => {
-                self.doubt.is_some() || (self.stop.is_some() && self.stop_write().is_none())
+                self.mode.is_in_doubt() || (stop.is_some() && self.stop_write().is_none())
             }
             Reason::LostStop | Reason::Search if is_online => false,
             Reason::LostStop => self.awaits_lost_stop(config),
-            Reason::SetPoint => {
-                self.doubt.is_none() && self.set_point.as_ref().is_some_and(|it| it.is_new)
-            }
+            Reason::SetPoint => !self.mode.is_in_doubt() && self.order.is_new(),
             Reason::Search => {
-                self.stop.is_some() || (self.is_abnormal() && config.recovery_share_pct > 0)
+                let is_sought = config.recovery_share_pct > 0;
+                stop.is_some() || (self.health.is_some() && is_sought)
             }
             Reason::Cycle => is_online && self.is_in_cycle(config),
             Reason::Discovery => true,
@@ -210,33 +317,58 @@ impl<B: Board> Node<B> {
     /// online: one, or those of a READ if the node has never been heard.
     fn awaits_lost_stop(&self, config: &MasterConfig) -> bool {
         let limit = if self.health.is_none() { config.attempts.max(1) } else { 1 };
-        self.stop.as_ref().is_some_and(|stop| stop.lost_attempts < limit)
+        self.order.stop().is_some_and(|stop| stop.lost_attempts() < limit)
     }
 
     /// Whether it takes part in the cycle: to be read, or to have its set-point repeated.
     fn is_in_cycle(&self, config: &MasterConfig) -> bool {
         let is_polled = self.is_wanted() || config.polling != Polling::Manual;
-        is_polled && self.stop.is_none() && self.doubt.is_none()
+        is_polled && self.order.stop().is_none() && !self.mode.is_in_doubt()
     }
 
     /// Whether it is to be read regardless of the polling.
     fn is_wanted(&self) -> bool {
-        self.attempt > 0 || self.is_asked || self.confirm != Confirm::Unasked
+        self.attempt > 0 || self.is_asked || self.order.awaits_confirmation()
     }
 
-    /// Records that a request that expects an answer has been sent.
+    /// Its request for this reason. A node that is not online gets its stop blind, then a READ; in
+    /// the cycle a node gets its set-point, then a READ.
+    pub(super) fn request(&self, reason: Reason) -> Request<B> {
+        let target = match reason {
+            Reason::StopRead | Reason::Discovery => None,
+            Reason::Cycle if self.order.is_written() => None,
+            Reason::SetPoint | Reason::Cycle => self.order.target(),
+            _ => self.stop_write(),
+        };
+        target.map_or(Request::Read, Request::Write)
+    }
+
+    pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
+        self.order.forget_old_hold(now, gap);
+    }
+}
+
+/// What happens on the line.
+impl<B: Board> Node<B> {
+    /// Its stop or its set-point has been handed out.
+    pub(super) fn wrote(&mut self) {
+        self.order.wrote();
+    }
+
+    pub(super) fn take_back_write(&mut self) {
+        self.order.take_back_write();
+    }
+
+    /// A request that expects an answer has been handed out.
     #[inline(never)]
-    pub(super) fn sent_request(&mut self, config: &MasterConfig, now: Instant) {
+    pub(super) fn asked(&mut self, is_scan: bool, config: &MasterConfig, now: Instant) {
         count_apart(&mut self.statistics.requests);
         if self.attempt > 0 {
             count_apart(&mut self.statistics.retries);
         }
-        (self.is_asked, self.is_written) = (false, false);
-        let is_lost = !self.is_online();
-        if let Some(stop) = &mut self.stop {
-            stop.is_asked = true;
-            stop.lost_attempts = stop.lost_attempts.saturating_add(is_lost.into());
-        }
+        self.is_asked = false;
+        self.scans = self.scans.saturating_add(is_scan.into());
+        self.order.asked(self.is_online());
         if let Polling::Every(period) = config.polling {
             // Without drift, and without a burst after a pause.
             match self.read_due {
@@ -245,5 +377,109 @@ impl<B: Board> Node<B> {
                 _ => self.read_due = Some(now + period),
             }
         }
+    }
+
+    /// That request has not left.
+    pub(super) fn take_back_request(&mut self, is_scan: bool) {
+        uncount(&mut self.statistics.requests);
+        if self.attempt > 0 {
+            uncount(&mut self.statistics.retries);
+        }
+        self.scans = self.scans.saturating_sub(is_scan.into());
+        self.is_asked = self.is_online();
+        self.order.take_back_request(self.is_asked);
+    }
+
+    /// A discovery begins.
+    pub(super) const fn begin_scan(&mut self) {
+        self.scans = 0;
+    }
+
+    /// Its answer may come until then.
+    pub(super) const fn guard_until(&mut self, at: Instant) {
+        self.guarded_until = Some(at);
+    }
+
+    /// An answer outside its window, or too early: it can put the mode in doubt, but decides
+    /// nothing.
+    pub(super) fn hear_outside_window(&mut self, mode: Mode, is_early: bool) -> Changes {
+        let counter = match is_early {
+            true => &mut self.statistics.early,
+            false => &mut self.statistics.late,
+        };
+        count_apart(counter);
+        match self.mode.differs_from(mode) {
+            true => self.doubt_mode(),
+            false => Changes::default(),
+        }
+    }
+
+    fn doubt_mode(&mut self) -> Changes {
+        count_apart(&mut self.statistics.other_mode);
+        Changes::dropped(self.mode.doubt() && self.order.doubt())
+    }
+
+    /// An answer in its window, this long after the end of the request.
+    pub(super) fn hear_answer(
+        &mut self,
+        status: &Status<B>,
+        latency: Duration,
+        now: Instant,
+    ) -> Changes {
+        let was = self.health.replace(Health::Online);
+        (self.strikes, self.attempt, self.guarded_until) = (0, 0, None);
+        let decision = self.mode.decide(status.mode());
+        let mut changes = match decision {
+            Decision::Agreed => Changes::default(),
+            Decision::Doubtful => self.doubt_mode(),
+            Decision::Settled => {
+                self.order.end_doubt();
+                Changes::default()
+            }
+            Decision::Changed => Changes::dropped(self.order.change_mode()),
+        };
+        changes.is_discovered = was.is_none();
+        changes.health = was.filter(|&was| was != Health::Online).map(|_| Health::Online);
+        if decision == Decision::Doubtful {
+            self.order.measure(status, now);
+            return changes;
+        }
+        self.statistics.reply(latency);
+        self.has_answered = true;
+        self.status = Some((*status, now));
+        changes.is_mode_changed = decision == Decision::Changed;
+        changes.is_answered = true;
+        changes.settled = self.order.answered(status, now);
+        changes
+    }
+
+    /// Its window has closed without its answer. A late one may come until the guard is over.
+    pub(super) fn miss(&mut self, cause: Cause, config: &MasterConfig, guard: Instant) -> Changes {
+        self.guarded_until = Some(guard);
+        count_apart(&mut self.statistics.timeouts);
+        if cause == Cause::Damaged {
+            count_apart(&mut self.statistics.crc_errors);
+        }
+        self.order.missed();
+        let mut changes = Changes { is_undecided: self.mode.miss(), ..Changes::default() };
+        if !self.is_online() {
+            return changes; // looked for, and not found
+        }
+        self.strikes = self.strikes.saturating_add(1);
+        self.attempt = self.attempt.saturating_add(1);
+        let is_abnormal = self.strikes >= STRIKES;
+        let health = if is_abnormal { Health::Abnormal } else { Health::Suspect(self.strikes) };
+        self.health = Some(health);
+        changes.health = Some(health);
+        if is_abnormal || self.attempt >= config.attempts.max(1) {
+            (self.attempt, self.last_failure, self.has_failed) = (0, Some(cause), true);
+            count_apart(&mut self.statistics.failures);
+            changes.failed = Some(cause);
+            changes.not_confirmed = self.order.end_confirmation().then_some(cause);
+        }
+        if is_abnormal {
+            self.order.lose(config.stops_abnormal);
+        }
+        changes
     }
 }

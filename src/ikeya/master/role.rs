@@ -2,25 +2,21 @@
 
 use super::{
     config::MasterConfig,
-    echo::Echo,
-    event::{Cause, CommandError, MasterEvent},
-    node::{DOUBT_EXCHANGES, Node},
-    set_point::Confirm,
+    event::{CommandError, MasterEvent},
+    line::{Line, frame_pause},
+    node::{Node, Reason, Request},
+    queue::{Queue, View, index_of},
     statistics::MasterStatistics,
-    stop::{Standstill, Stop},
-    turns::{Discovery, Search, Sent, Turns},
-    window::{Heard, Held, Window},
 };
 use crate::{
     endpoint::{Endpoint, Unsent},
     events::Events,
     ikeya::{
-        board::{Board, OneMotor, PACKET_LEN, Status, Target},
+        board::{Board, OneMotor, Target},
         units::NodeId,
     },
-    stats::add,
-    stream::{Decoder, Framing},
-    time::{Duration, Instant, wire_time},
+    stats::count_apart,
+    time::{Duration, Instant, reached, wire_time},
 };
 
 /// Capacity of the event queue.
@@ -95,27 +91,13 @@ const EVENTS: usize = 16;
 #[repr(C)]
 pub struct Master<B: Board = OneMotor> {
     pub(super) config: MasterConfig,
-    pub(super) answer_wire_time: Duration,
-    /// Whether the last packet was an unanswered WRITE: a READ may follow without a pause.
-    pub(super) is_behind_write: bool,
-    pub(super) held: Held,
-    pub(super) discovery: Option<Discovery>,
-    pub(super) turns: Turns,
+    pub(super) queue: Queue,
     /// Time of the last call.
     pub(super) now: Instant,
-    /// Time at which the bytes handed out have left and the gap after them is over.
-    pub(super) line_free: Option<Instant>,
-    /// The open reply window.
-    pub(super) window: Option<Window>,
-    pub(super) search: Search,
     /// Time of the application's last sign of life.
-    pub(super) alive_at: Instant,
+    alive_at: Instant,
     pub(super) statistics: MasterStatistics,
-    pub(super) packet: [u8; PACKET_LEN],
-    /// The request in `packet`.
-    pub(super) sent: Option<Sent<B>>,
-    pub(super) decoder: Decoder<B::ToMaster, PACKET_LEN>,
-    pub(super) echo: Echo,
+    pub(super) line: Line<B>,
     pub(super) nodes: [Node<B>; 8],
     pub(super) events: Events<MasterEvent<B>, EVENTS>,
 }
@@ -127,23 +109,13 @@ impl<B: Board> Master<B> {
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
             config,
-            answer_wire_time: wire_time(<B::ToMaster as Framing>::MAX_LEN, config.baud),
-            nodes: core::array::from_fn(|_| Node::new()),
-            window: None,
+            queue: Queue::default(),
             now,
-            line_free: None,
-            is_behind_write: false,
-            held: Held::Nothing,
-            turns: Turns::default(),
-            discovery: None,
-            search: Search::default(),
             alive_at: now,
-            decoder: Decoder::new(),
-            packet: [0; PACKET_LEN],
-            sent: None,
-            echo: Echo::new(),
-            events: Events::new(),
             statistics: MasterStatistics::default(),
+            line: Line::new(&config),
+            nodes: core::array::from_fn(|_| Node::new()),
+            events: Events::new(),
         }
     }
 
@@ -154,7 +126,10 @@ impl<B: Board> Master<B> {
     /// in the cycle before the next one begins, so call this as often as you like.
     pub fn discover(&mut self, now: Instant) {
         self.now = now;
-        self.begin_discovery();
+        if self.queue.begin_discovery() {
+            self.nodes.iter_mut().for_each(Node::begin_scan);
+            self.settle_discovery();
+        }
     }
 
     /// Turns a velocity node at `target` from the next cycle on. The latest set-point wins.
@@ -202,7 +177,7 @@ impl<B: Board> Master<B> {
     pub fn stop_all(&mut self, now: Instant) {
         self.sign_of_life(now);
         for id in NodeId::ALL {
-            if self.config.nodes.contains(id) || self.node(id).health.is_some() {
+            if self.config.nodes.contains(id) || self.node(id).health().is_some() {
                 self.owe_stop(id);
             }
         }
@@ -217,7 +192,8 @@ impl<B: Board> Master<B> {
     /// Stops sending set-points to a node. The node keeps the last one it received. A stop that is
     /// owed remains owed.
     pub fn release(&mut self, node: NodeId) {
-        self.drop_set_point(node);
+        let changes = self.node_mut(node).release();
+        self.tell_changes(node, &changes);
     }
 
     /// Requests a confirmation: [`MasterEvent::Confirmed`] comes once the node has answered a READ
@@ -229,15 +205,7 @@ impl<B: Board> Master<B> {
     /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] if there is none to confirm.
     pub fn confirm(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
         self.now = now;
-        let it = self.node_mut(node);
-        if !it.is_online() {
-            return Err(CommandError::NotOnline { node });
-        }
-        if it.set_point.is_none() {
-            return Err(CommandError::NoSetPoint { node });
-        }
-        it.confirm = Confirm::AfterWrite;
-        Ok(())
+        self.node_mut(node).confirm(node)
     }
 
     /// Reads a node once, in addition to polling. Use it with
@@ -250,12 +218,7 @@ impl<B: Board> Master<B> {
     /// [`CommandError::NotOnline`].
     pub fn read(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
         self.now = now;
-        let it = self.node_mut(node);
-        if !it.is_online() {
-            return Err(CommandError::NotOnline { node });
-        }
-        (it.is_asked, it.has_answered, it.has_failed) = (true, false, false);
-        Ok(())
+        self.node_mut(node).read(node)
     }
 
     fn aim(&mut self, id: NodeId, target: Target<B>, now: Instant) -> Result<(), CommandError> {
@@ -266,34 +229,39 @@ impl<B: Board> Master<B> {
         Ok(())
     }
 
-    /// Drops the set-point, and reports that to an application waiting for its confirmation.
-    pub(super) fn drop_set_point(&mut self, node: NodeId) {
-        if self.node_mut(node).drop_set_point() {
-            self.tell(MasterEvent::NotConfirmed { node, cause: Cause::Dropped });
-        }
+    /// Makes the node owed a stop, unless it already is.
+    fn owe_stop(&mut self, id: NodeId) {
+        let (now, hold_age) = (self.now, self.config.hold_age);
+        let changes = self.node_mut(id).owe_stop(hold_age, now);
+        self.tell_changes(id, &changes);
+    }
+}
+
+/// The dead-man: stops the nodes when the application is silent (I13).
+impl<B: Board> Master<B> {
+    /// Records a sign of life, which does not revive an expired command.
+    fn sign_of_life(&mut self, now: Instant) {
+        self.now = now;
+        self.expire_commands(now);
+        self.alive_at = now;
     }
 
-    /// Makes the node owed a stop, unless it already is.
-    pub(super) fn owe_stop(&mut self, id: NodeId) {
-        let (now, hold_age) = (self.now, self.config.hold_age);
-        let node = self.node_mut(id);
-        if node.stop.is_none() {
-            let held = node.set_point.filter(|set_point| set_point.is_stop);
-            let measured = node.status.filter(|&(_, at)| now - at < hold_age);
-            let (hold, measured_at) = match (held, measured) {
-                _ if node.doubt.is_some() || !node.is_online() => (None, None),
-                (Some(held), _) => (held.target.position(), None),
-                (None, Some((Status::Position(position), _))) => (Some(position), Some(now)),
-                _ => (None, None),
-            };
-            node.stop = Some(Stop::new(hold, measured_at));
-            if node.doubt == Some(DOUBT_EXCHANGES) {
-                self.tell_undecided(id);
+    /// Time at which the dead-man stops the nodes.
+    fn dead_man_at(&self) -> Option<Instant> {
+        let is_armed = self.nodes.iter().any(|node| node.order().is_set_point());
+        self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
+    }
+
+    fn expire_commands(&mut self, now: Instant) {
+        if reached(self.dead_man_at(), now) {
+            count_apart(&mut self.statistics.dead_man);
+            self.tell(MasterEvent::DeadMan);
+            for id in NodeId::ALL {
+                if self.node(id).order().is_set_point() {
+                    self.owe_stop(id);
+                }
             }
         }
-        let node = self.node_mut(id);
-        (node.is_under_order, node.standstill) = (false, Standstill::Unwatched);
-        self.drop_set_point(id);
     }
 }
 
@@ -318,9 +286,67 @@ impl<B: Board> Master<B> {
     }
 }
 
-/// Eight ids, eight nodes; the mask proves it to the compiler.
-pub(super) const fn index_of(node: NodeId) -> usize {
-    (node.get() as usize - 1) & 7
+/// Requests.
+impl<B: Board> Master<B> {
+    pub(super) const fn view(&self) -> View<'_, B> {
+        View { nodes: &self.nodes, config: &self.config, now: self.now }
+    }
+
+    /// Hands out the next request, if the line is free for it.
+    fn send_next(&mut self, now: Instant) -> Option<&[u8]> {
+        if !self.line.is_ready(now) {
+            return None;
+        }
+        for node in &mut self.nodes {
+            node.forget_old_hold(now, self.config.turnaround_gap);
+        }
+        let choice = self.queue.choose(self.view()).filter(|it| self.line.takes(it, now))?;
+        self.line.send(choice, &self.config, &mut self.statistics, now)?;
+        let exchange = self.line.window_time(&self.config) + self.config.turnaround_gap;
+        self.queue.book(&choice, exchange, &self.config, now);
+        let node = &mut self.nodes[index_of(choice.node)];
+        if matches!(choice.request, Request::Write(_)) {
+            node.wrote();
+        }
+        if choice.request.is_exchange() {
+            node.asked(self.queue.is_discovering(), &self.config, now);
+        }
+        self.line.packet()
+    }
+
+    /// Whether the packet handed out last is a WRITE of a set-point that the node no longer has.
+    fn has_sent_old_set_point(&self) -> bool {
+        self.line.sent().is_some_and(|sent| {
+            let choice = &sent.choice;
+            match (choice.reason, choice.request) {
+                (Reason::SetPoint | Reason::Cycle, Request::Write(target)) => {
+                    self.node(choice.node).order().target() != Some(target)
+                }
+                _ => false,
+            }
+        })
+    }
+
+    /// The packet handed out last has not left: its request, or the one that has replaced it, is to
+    /// be sent again.
+    fn take_back(&mut self, unsent: Unsent, now: Instant) {
+        if unsent == Unsent::Unflushed {
+            // It is unknown which of the latest WRITEs have left: send all of them again, and do
+            // not count an answer that comes now for any of them.
+            self.nodes.iter_mut().for_each(Node::take_back_write);
+            return;
+        }
+        let taken_back = self.line.take_back(unsent, &self.config, &mut self.statistics, now);
+        let Some(sent) = taken_back else { return };
+        self.queue.take_back(sent.choice.reason);
+        let node = &mut self.nodes[index_of(sent.choice.node)];
+        if matches!(sent.choice.request, Request::Write(_)) {
+            node.take_back_write();
+        }
+        if sent.is_open {
+            node.take_back_request(self.queue.is_discovering());
+        }
+    }
 }
 
 impl<B: Board> Endpoint for Master<B> {
@@ -329,31 +355,23 @@ impl<B: Board> Endpoint for Master<B> {
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
         let mut bytes = bytes;
-        let removed = self.echo.remove(&mut bytes);
-        let statistics = &mut self.statistics;
-        add(&mut statistics.echo_bytes, removed.bytes);
-        add(&mut statistics.echo_errors, removed.is_wrong.into());
-        if let Some(window) = self.window.as_mut().filter(|_| !bytes.is_empty()) {
-            window.hear_bytes();
-        }
-        while let Some((node, status)) = self.next_response(&mut bytes) {
+        self.line.remove_echo(&mut bytes, &mut self.statistics);
+        while let Some((node, status)) = self.line.next_response(&mut bytes) {
             self.hear(node, status, now);
         }
     }
 
     /// Bytes that may be from before the request are no answer to it: its window opens behind them.
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        let mut asked = self.window.take_if(|window| since < window.request_end);
+        let aside = self.line.set_window_aside(since);
         self.handle_input(bytes, now);
-        if let Some(window) = asked.as_mut().filter(|_| !bytes.is_empty()) {
-            window.heard = Heard::Others;
-        }
-        self.window = asked.or(self.window);
+        self.line.put_window_back(aside, !bytes.is_empty());
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         self.now = now;
-        self.expire_window(now);
+        let expired = self.line.expire_window(now);
+        self.miss(expired);
         self.expire_commands(now);
     }
 
@@ -361,7 +379,7 @@ impl<B: Board> Endpoint for Master<B> {
         self.now = now;
         // A set-point must not outlive its application because the driver is late.
         self.expire_commands(now);
-        if self.window.is_some() {
+        if self.line.is_waiting() {
             return None;
         }
         self.send_next(now)
@@ -369,7 +387,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     /// Five byte times: as long as a slave on a UART waits for the rest of a packet.
     fn frame_pause(&self) -> Duration {
-        wire_time(5, self.config.baud)
+        frame_pause(&self.config)
     }
 
     fn wire_time(&self, bytes: usize) -> Duration {
@@ -378,12 +396,19 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_taken(&mut self, now: Instant) {
         self.now = now;
-        self.hold_line(now);
+        self.line.hold(now);
     }
 
     fn handle_flushed(&mut self, now: Instant) {
         self.now = now;
-        self.expect_answer(now);
+        let Some(overdue) = self.line.flushed(now, &self.config) else { return };
+        self.miss(overdue.closed);
+        let guard = overdue.answer_by + self.config.late_guard;
+        for id in NodeId::ALL {
+            if overdue.concerns(id) {
+                self.node_mut(id).guard_until(guard);
+            }
+        }
     }
 
     /// Whether it is a WRITE of a set-point that has been dropped or replaced.
@@ -401,11 +426,7 @@ impl<B: Board> Endpoint for Master<B> {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let work = match &self.window {
-            Some(window) => Some(window.deadline),
-            // Not before the line is free.
-            None => self.due().map(|due| self.line_free.unwrap_or(due).max(due)),
-        };
+        let work = self.line.next_at(|| self.queue.due(self.view()));
         let dead_man = self.dead_man_at();
         // By hand: `earliest` would take 140 more bytes of flash here.
         work.map_or(dead_man, |at| Some(dead_man.unwrap_or(at).min(at)))

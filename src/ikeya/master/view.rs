@@ -1,18 +1,17 @@
 //! The getters of a master.
 
-use super::nodes::NodeSet;
 use super::{
     config::MasterConfig,
-    event::{Cause, CommandError},
-    health::Health,
+    event::{Cause, CommandError, Health},
+    order::StopProgress,
     role::Master,
     statistics::{MasterStatistics, NodeStatistics},
-    stop::StopProgress,
 };
 use crate::ikeya::board::PACKET_LEN;
 use crate::{
     ikeya::{
         board::{Board, Status, Target},
+        node_set::NodeSet,
         units::{Mode, NodeId},
     },
     stream::Counters,
@@ -29,43 +28,43 @@ impl<B: Board> Master<B> {
     /// Health of a node; `None` if it has never answered.
     #[must_use]
     pub fn health(&self, node: NodeId) -> Option<Health> {
-        self.node(node).health
+        self.node(node).health()
     }
 
     /// Mode of a node on record; `None` if it has never answered.
     #[must_use]
     pub fn mode(&self, node: NodeId) -> Option<Mode> {
-        self.node(node).mode
+        self.node(node).mode().on_record()
     }
 
     /// Whether the mode of a node is in doubt (I11).
     #[must_use]
     pub fn is_mode_in_doubt(&self, node: NodeId) -> bool {
-        self.node(node).doubt.is_some()
+        self.node(node).mode().is_in_doubt()
     }
 
     /// Last measurement of a node, and when it arrived.
     #[must_use]
     pub fn status(&self, node: NodeId) -> Option<(Status<B>, Instant)> {
-        self.node(node).status
+        self.node(node).status()
     }
 
     /// Progress of a node's latest stop.
     #[must_use]
     pub fn stop_progress(&self, node: NodeId) -> StopProgress {
-        self.node(node).stop_progress()
+        self.node(node).order().progress()
     }
 
     /// Nodes that are owed a stop, including those that have never answered.
     #[must_use]
     pub fn stops_owed(&self) -> NodeSet {
-        NodeId::ALL.into_iter().filter(|&id| self.node(id).stop.is_some()).collect()
+        NodeId::ALL.into_iter().filter(|&id| self.node(id).order().stop().is_some()).collect()
     }
 
     /// Counts of a node.
     #[must_use]
     pub fn node_statistics(&self, node: NodeId) -> &NodeStatistics {
-        &self.node(node).statistics
+        self.node(node).statistics()
     }
 
     /// Counts of the line.
@@ -83,38 +82,36 @@ impl<B: Board> Master<B> {
     /// Accounts for every received byte.
     #[must_use]
     pub const fn counters(&self) -> Counters {
-        self.decoder.counters()
+        self.line.decoder().counters()
     }
 
     /// The set-point that is repeated for a node, or that of its paid stop; `None` without one and
     /// while a stop is owed.
     #[must_use]
     pub fn set_point(&self, node: NodeId) -> Option<Target<B>> {
-        self.node(node).set_point.map(|set_point| set_point.target)
+        self.node(node).order().target()
     }
 
     /// Whether the set-point of a node has been handed out for sending, and not been taken back.
     #[must_use]
     pub fn is_set_point_sent(&self, node: NodeId) -> bool {
-        self.node(node).set_point.is_some_and(|set_point| !set_point.is_new)
+        {
+            let order = self.node(node).order();
+            order.target().is_some() && !order.is_new()
+        }
     }
 
     /// Why the last READ of a node that was given up failed; `None` if none has.
     #[must_use]
     pub fn last_failure(&self, node: NodeId) -> Option<Cause> {
-        self.node(node).last_failure
+        self.node(node).last_failure()
     }
 
     /// Result of the latest [`read`](Self::read) of a node: `Ok` once it has answered after the
     /// call, otherwise why the READ was given up. `None` while neither has happened.
     #[must_use]
     pub fn read_outcome(&self, node: NodeId) -> Option<Result<(), Cause>> {
-        let node = self.node(node);
-        match node.last_failure {
-            _ if node.has_answered => Some(Ok(())),
-            Some(cause) if node.has_failed => Some(Err(cause)),
-            _ => None,
-        }
+        self.node(node).read_outcome()
     }
 
     /// Checks whether a command would be accepted now.
@@ -129,7 +126,7 @@ impl<B: Board> Master<B> {
     /// Whether a discovery is in progress.
     #[must_use]
     pub const fn is_discovering(&self) -> bool {
-        self.discovery.is_some()
+        self.queue.is_discovering()
     }
 
     /// Longest time from the first request of a READ to its answer or its
@@ -164,7 +161,7 @@ impl<B: Board> Master<B> {
     fn request_times(&self) -> (Duration, Duration) {
         let gap = self.config.turnaround_gap;
         let write = wire_time(PACKET_LEN, self.config.baud) + gap;
-        (write, write + self.window_time() + gap)
+        (write, write + self.line.window_time(&self.config) + gap)
     }
 
     fn attempts_bound(&self, between: Duration) -> Duration {

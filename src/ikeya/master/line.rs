@@ -1,0 +1,446 @@
+//! The line: what is on the wire, who may answer until when, and which received bytes are answers
+//! (I7).
+
+use heapless::Vec;
+
+use super::{
+    config::MasterConfig, event::Cause, node::Request, queue::Choice, statistics::MasterStatistics,
+};
+use crate::{
+    encode::Encode,
+    endpoint::Unsent,
+    ikeya::{
+        board::{Board, PACKET_LEN, Status, Target},
+        units::NodeId,
+        wire::ReadRequest,
+    },
+    stats::{add, count_apart, uncount},
+    stream::{Decoder, Event, Framing},
+    time::{Duration, Instant, wire_time},
+};
+
+/// Longest time for which the line is kept free for a request that the port holds.
+const HELD: Duration = Duration::from_millis(1000);
+
+#[derive(Clone, Debug)]
+#[repr(C)]
+pub(super) struct Line<B: Board> {
+    /// Whether the last packet was an unanswered WRITE: a READ may follow without a pause.
+    is_behind_write: bool,
+    held: Held,
+    /// Time at which the bytes handed out have left and the gap after them is over.
+    free_at: Option<Instant>,
+    /// The open reply window.
+    window: Option<Window>,
+    answer_wire_time: Duration,
+    packet: [u8; PACKET_LEN],
+    /// The request in `packet`.
+    sent: Option<Sent<B>>,
+    decoder: Decoder<B::ToMaster, PACKET_LEN>,
+    echo: Echo,
+}
+
+/// A node has been asked and may answer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    pub(super) node: NodeId,
+    request_end: Instant,
+    pub(super) deadline: Instant,
+    heard: Heard,
+}
+
+/// What has been heard in the window.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Heard {
+    Nothing,
+    Bytes,
+    Others,
+}
+
+/// What the port has taken and may still hold, so that its answer is still to come.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Held {
+    Nothing,
+    /// The last exchange, with this node.
+    Last(NodeId),
+    /// Earlier ones as well: it is unknown whose answer comes.
+    Several,
+}
+
+/// The request handed out last.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sent<B: Board> {
+    pub(super) choice: Choice<B>,
+    /// Whether its window is open.
+    pub(super) is_open: bool,
+    /// Earliest time at which its first byte could leave.
+    start: Instant,
+    len: usize,
+}
+
+/// What a response is.
+pub(super) enum Response {
+    /// The answer, this long after the end of the request.
+    Answer(Duration),
+    /// From the node that was asked, but earlier than the line could have carried it.
+    Early,
+    /// Outside its window, or in another node's.
+    Late,
+}
+
+/// The requests whose answers are not taken, because the port held them for too long.
+pub(super) struct Overdue {
+    held: Held,
+    /// The window that is closed because of that.
+    pub(super) closed: Option<Window>,
+    /// Time by which they are answered.
+    pub(super) answer_by: Instant,
+}
+
+impl Window {
+    /// Why it passes without its answer.
+    pub(super) const fn cause(&self) -> Cause {
+        match self.heard {
+            Heard::Nothing => Cause::Silent,
+            Heard::Bytes => Cause::Damaged,
+            Heard::Others => Cause::Unexpected,
+        }
+    }
+}
+
+impl Overdue {
+    /// Whether this node may have been asked in one of them.
+    pub(super) fn concerns(&self, node: NodeId) -> bool {
+        self.held == Held::Several || self.held == Held::Last(node)
+    }
+}
+
+impl<B: Board> Line<B> {
+    pub(super) fn new(config: &MasterConfig) -> Self {
+        Self {
+            is_behind_write: false,
+            held: Held::Nothing,
+            free_at: None,
+            window: None,
+            answer_wire_time: wire_time(<B::ToMaster as Framing>::MAX_LEN, config.baud),
+            packet: [0; PACKET_LEN],
+            sent: None,
+            decoder: Decoder::new(),
+            echo: Echo::new(),
+        }
+    }
+
+    pub(super) const fn decoder(&self) -> &Decoder<B::ToMaster, PACKET_LEN> {
+        &self.decoder
+    }
+
+    /// Time from handing out a READ to the end of its window.
+    pub(super) fn window_time(&self, config: &MasterConfig) -> Duration {
+        wire_time(ReadRequest::LEN, config.baud) + self.answer_time(config)
+    }
+
+    /// Time from the end of a request to the end of its window.
+    fn answer_time(&self, config: &MasterConfig) -> Duration {
+        config.reply_timeout + self.answer_wire_time
+    }
+
+    /// Time of the next thing to do, if requests are due at `due`.
+    pub(super) fn next_at(&self, due: impl FnOnce() -> Option<Instant>) -> Option<Instant> {
+        match &self.window {
+            Some(window) => Some(window.deadline),
+            // Not before the line is free.
+            None => due().map(|due| self.free_at.unwrap_or(due).max(due)),
+        }
+    }
+}
+
+/// Requests.
+impl<B: Board> Line<B> {
+    /// Whether an answer is waited for.
+    pub(super) const fn is_waiting(&self) -> bool {
+        self.window.is_some()
+    }
+
+    fn is_free(&self, now: Instant) -> bool {
+        self.free_at.is_none_or(|free| now >= free)
+    }
+
+    /// Whether any request may be sent now.
+    pub(super) fn is_ready(&self, now: Instant) -> bool {
+        self.is_free(now) || self.is_behind_write
+    }
+
+    /// Whether this one may. Right behind a WRITE: only what cannot pile up, a READ, or one stop
+    /// for each node.
+    pub(super) fn takes(&self, choice: &Choice<B>, now: Instant) -> bool {
+        let is_set_point = !matches!(choice.request, Request::Read) && !choice.reason.is_stop();
+        self.is_free(now) || !is_set_point
+    }
+
+    /// Hands out a request; an exchange opens its window, and drops the bytes received before.
+    pub(super) fn send(
+        &mut self,
+        choice: Choice<B>,
+        config: &MasterConfig,
+        statistics: &mut MasterStatistics,
+        now: Instant,
+    ) -> Option<()> {
+        let len = self.encode(&choice)?;
+        let start = self.free_at.map_or(now, |free| free.max(now));
+        let is_open = choice.request.is_exchange();
+        self.sent = Some(Sent { choice, is_open, start, len });
+        let request_end = start + wire_time(len, config.baud);
+        self.free_at = Some(request_end + config.turnaround_gap);
+        self.is_behind_write = !is_open && config.turnaround_gap == Duration::ZERO;
+        count_apart(counter(&choice.request, statistics));
+        if config.removes_echo {
+            self.echo.expect(self.packet.get(..len)?);
+        }
+        if is_open {
+            self.drop_stale_bytes(statistics);
+            let deadline = request_end + self.answer_time(config);
+            let (node, heard) = (choice.node, Heard::Nothing);
+            self.window = Some(Window { node, request_end, deadline, heard });
+            if self.held != Held::Nothing {
+                self.held = Held::Several;
+            }
+        }
+        Some(())
+    }
+
+    /// The packet handed out last.
+    pub(super) fn packet(&self) -> Option<&[u8]> {
+        self.packet.get(..self.sent.as_ref()?.len)
+    }
+
+    /// The request handed out last, unless it was taken back.
+    pub(super) const fn sent(&self) -> Option<&Sent<B>> {
+        self.sent.as_ref()
+    }
+
+    /// Encodes the request into the buffer that is handed out; returns its length.
+    fn encode(&mut self, choice: &Choice<B>) -> Option<usize> {
+        let (id, buffer) = (choice.node, &mut self.packet);
+        let bytes = match choice.request {
+            Request::Read => ReadRequest::new(id).encode(buffer),
+            Request::Write(Target::Velocity(to)) => B::write_velocity(id, to).encode(buffer),
+            Request::Write(Target::Position(to)) => B::write_position(id, to).encode(buffer),
+        };
+        bytes.ok().map(|bytes| bytes.len().min(PACKET_LEN))
+    }
+
+    fn drop_stale_bytes(&mut self, statistics: &mut MasterStatistics) {
+        let stale = self.decoder.pending();
+        add(&mut statistics.stale_bytes, stale as u32);
+        while self.decoder.pending() > 0 {
+            self.decoder.idle();
+            while self.decoder.decode_buffered(&mut [].as_slice()).is_some() {}
+        }
+    }
+
+    /// The packet handed out last has not left, or not whole; `silence` is needed behind a part of
+    /// it. Returns its request, with whether its window was open.
+    pub(super) fn take_back(
+        &mut self,
+        unsent: Unsent,
+        config: &MasterConfig,
+        statistics: &mut MasterStatistics,
+        now: Instant,
+    ) -> Option<Sent<B>> {
+        let mut sent = self.sent.take()?;
+        self.is_behind_write = false;
+        if unsent == Unsent::Untouched {
+            self.free_at = Some(sent.start);
+            self.echo.forget_last();
+        } else {
+            // Bytes that the port has taken may still be on their way. Leave twice the pause that
+            // ends a packet after them: a slave must not take the next packet for the rest of this
+            // one.
+            let end = sent.start.max(now) + wire_time(sent.len, config.baud);
+            let silence = frame_pause(config).saturating_mul(2);
+            self.free_at = Some(end + config.turnaround_gap + silence);
+            self.echo.forget_all();
+        }
+        uncount(counter(&sent.choice.request, statistics));
+        sent.is_open = sent.is_open && self.window.take().is_some();
+        Some(sent)
+    }
+
+    /// The port has taken a request, and may hold it: the next one waits for its flush.
+    pub(super) fn hold(&mut self, now: Instant) {
+        if let (Some(window), Held::Nothing) = (&self.window, self.held) {
+            self.held = Held::Last(window.node);
+            self.free_at = Some(now + HELD);
+        }
+    }
+
+    /// What the port has held has left, at the latest by now. Returns what is overdue.
+    pub(super) fn flushed(&mut self, left_by: Instant, config: &MasterConfig) -> Option<Overdue> {
+        let held = core::mem::replace(&mut self.held, Held::Nothing);
+        let answer_by = left_by + self.answer_time(config);
+        let is_open = self.window.as_ref().is_some_and(|window| left_by <= window.deadline);
+        match (&mut self.window, held) {
+            (_, Held::Nothing) => None,
+            (Some(window), Held::Last(_)) if is_open => {
+                window.deadline = window.deadline.max(answer_by);
+                self.free_at = Some(window.request_end.max(left_by) + config.turnaround_gap);
+                None
+            }
+            _ => {
+                // The answer comes too late, or may be that of an earlier request.
+                (self.free_at, self.is_behind_write) = (Some(answer_by), false);
+                Some(Overdue { held, closed: self.window.take(), answer_by })
+            }
+        }
+    }
+}
+
+/// Longest pause inside a packet: as long as a slave on a UART waits for its rest.
+pub(super) fn frame_pause(config: &MasterConfig) -> Duration {
+    wire_time(5, config.baud)
+}
+
+fn counter<'a, B: Board>(
+    request: &Request<B>,
+    statistics: &'a mut MasterStatistics,
+) -> &'a mut u32 {
+    match request {
+        Request::Read => &mut statistics.reads,
+        Request::Write(_) => &mut statistics.writes,
+    }
+}
+
+/// Replies.
+impl<B: Board> Line<B> {
+    /// Removes the echo from the front of the input.
+    pub(super) fn remove_echo(&mut self, bytes: &mut &[u8], statistics: &mut MasterStatistics) {
+        let removed = self.echo.remove(bytes);
+        add(&mut statistics.echo_bytes, removed.bytes);
+        add(&mut statistics.echo_errors, removed.is_wrong.into());
+        if let Some(window) = self.window.as_mut().filter(|_| !bytes.is_empty()) {
+            if window.heard == Heard::Nothing {
+                window.heard = Heard::Bytes;
+            }
+        }
+    }
+
+    /// The next complete response in the input.
+    pub(super) fn next_response(&mut self, bytes: &mut &[u8]) -> Option<(NodeId, Status<B>)> {
+        loop {
+            match self.decoder.decode_buffered(bytes)? {
+                Event::Frame(frame) => return Some(B::response(frame)),
+                Event::Skipped(_) => {}
+            }
+        }
+    }
+
+    /// Judges a response of this node; the answer closes its window.
+    pub(super) fn judge(&mut self, id: NodeId, config: &MasterConfig, now: Instant) -> Response {
+        let half_answer = Duration::from_micros(self.answer_wire_time.as_micros() / 2);
+        match &mut self.window {
+            Some(window)
+                if window.node == id && now <= window.deadline && self.held != Held::Several =>
+            {
+                // No line is that fast, even allowing for a slightly coarse clock.
+                if now < window.request_end + half_answer && !config.accepts_early {
+                    window.heard = Heard::Others;
+                    return Response::Early;
+                }
+                let latency = now - (window.request_end + self.answer_wire_time);
+                (self.window, self.held) = (None, Held::Nothing);
+                self.free_at = Some(now + config.turnaround_gap);
+                Response::Answer(latency)
+            }
+            window => {
+                if let Some(window) = window {
+                    window.heard = Heard::Others;
+                }
+                Response::Late
+            }
+        }
+    }
+
+    /// Puts a window aside that opened after `since`: bytes that may be older are no answer.
+    pub(super) fn set_window_aside(&mut self, since: Instant) -> Option<Window> {
+        self.window.take_if(|window| since < window.request_end)
+    }
+
+    /// Puts it back, behind old bytes if there were any.
+    pub(super) const fn put_window_back(&mut self, window: Option<Window>, is_behind_bytes: bool) {
+        if let Some(mut window) = window {
+            if is_behind_bytes {
+                window.heard = Heard::Others;
+            }
+            self.window = Some(window);
+        }
+    }
+
+    /// Closes a window that has passed without its answer.
+    pub(super) fn expire_window(&mut self, now: Instant) -> Option<Window> {
+        self.window.take_if(|window| now >= window.deadline)
+    }
+}
+
+/// Longest echo in flight, in bytes: a set-point and a stop for each of eight nodes, none of them
+/// answered, and the READ after them.
+const ECHO_LEN: usize = 8 * (8 + 8) + 4;
+
+/// The bytes that an echoing line will return, in order.
+#[derive(Clone, Debug)]
+struct Echo {
+    /// Cleared once all of it has been heard.
+    sent: Vec<u8, ECHO_LEN>,
+    /// Number of these bytes heard.
+    heard: usize,
+    /// Length of the packet added last.
+    last: usize,
+}
+
+/// Echo found in the input.
+struct Removed {
+    /// Number of own bytes removed.
+    bytes: u32,
+    /// Whether the echo differed from what had been sent.
+    is_wrong: bool,
+}
+
+impl Echo {
+    const fn new() -> Self {
+        Self { sent: Vec::new(), heard: 0, last: 0 }
+    }
+
+    /// Adds a packet that has been handed out.
+    fn expect(&mut self, packet: &[u8]) {
+        if self.sent.extend_from_slice(packet).is_err() {
+            // On a line without echo the buffer must not fill up forever.
+            self.forget_all();
+            let _ = self.sent.extend_from_slice(packet);
+        }
+        self.last = packet.len();
+    }
+
+    /// Forgets the packet handed out last: it has not left.
+    fn forget_last(&mut self) {
+        let before = self.sent.len().saturating_sub(core::mem::take(&mut self.last));
+        self.sent.truncate(before.max(self.heard));
+    }
+
+    /// Forgets everything: an unknown part of the packet handed out last has left.
+    fn forget_all(&mut self) {
+        self.sent.clear();
+        (self.heard, self.last) = (0, 0);
+    }
+
+    /// Removes the echo from the front of the input.
+    fn remove(&mut self, input: &mut &[u8]) -> Removed {
+        let expected = self.sent.get(self.heard..).unwrap_or_default();
+        let same = expected.iter().zip(*input).take_while(|(sent, heard)| sent == heard).count();
+        let is_wrong = same < expected.len().min(input.len());
+        self.heard += same;
+        if is_wrong || same == expected.len() {
+            self.forget_all();
+        }
+        *input = input.get(same..).unwrap_or_default();
+        Removed { bytes: same as u32, is_wrong }
+    }
+}
