@@ -61,9 +61,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     break;
                 }
             }
-            let sent = self.send_async().await;
+            let (received, sent) = self.send_async().await;
             let has_failed = sent.is_err();
-            result = result.and(sent);
+            result = result.and(received).and(sent);
             if has_failed {
                 break;
             }
@@ -158,7 +158,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         Ok(())
     }
 
-    async fn send_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
+    /// that may forbid the rest. A failing receiver does not stop the sending.
+    async fn send_async(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
+        let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
@@ -169,14 +172,20 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             self.sending.write_wait.end();
             let Some(written) = written else {
                 self.reclaim();
-                return self.stalled_async().await;
+                return (received, self.stalled_async().await);
             };
-            self.after_write(written)?;
+            if let Err(error) = self.after_write(written) {
+                return (received, Err(error));
+            }
+            if !self.sending.rest().is_empty() {
+                received = received.and(self.receive_async().await);
+                self.give_up_outdated();
+            }
         }
         if self.sending.is_in_doubt() {
-            self.flush_async().await?;
+            return (received, self.flush_async().await);
         }
-        Ok(())
+        (received, Ok(()))
     }
 
     async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
@@ -225,6 +234,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 }
+
+type Received<E> = Result<(), DriveError<E>>;
+type Sent<E> = Result<(), DriveError<E>>;
 
 /// The result of `read`; `None` if `wait` is over first. If both are ready, `read` wins.
 async fn first<T>(read: impl Future<Output = T>, wait: impl Future<Output = ()>) -> Option<T> {

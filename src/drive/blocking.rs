@@ -141,6 +141,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                 return (received, Err(error));
             }
             received = received.and(self.receive());
+            self.give_up_outdated();
         }
         if self.sending.is_in_doubt() {
             let flushed = self.port.flush();

@@ -225,16 +225,22 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// is outdated.
     pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
         let now = self.now();
-        if !self.sending.rest().is_empty() && self.role.is_outdated() {
-            let given_up = self.sending.give_up();
-            self.tell_unsent(given_up);
-        }
+        self.give_up_outdated();
         if self.sending.rest().is_empty() {
             let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
             self.sending.load(frame)?;
             self.has_overtaken |= !self.is_empty;
         }
         Ok(true)
+    }
+
+    /// Gives up the rest of a frame that has become wrong. To be called whenever the role has heard
+    /// something, or time has passed, since its last bytes left.
+    pub(super) fn give_up_outdated(&mut self) {
+        if !self.sending.rest().is_empty() && self.role.is_outdated() {
+            let given_up = self.sending.give_up();
+            self.tell_unsent(given_up);
+        }
     }
 
     /// Notes that the port is about to be asked to take the unsent bytes.

@@ -36,11 +36,16 @@ pub enum DriveError<E> {
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
     Bus(ikeya::master::CommandError),
-    /// The stops of these nodes are not paid (ruling I12): they have not answered twice after a
-    /// stop WRITE, or have never answered at all. **Their motors may be running.** The stops stay
+    /// The stops of these nodes are not confirmed (ruling I12): they have not answered twice after
+    /// a stop WRITE, or have never answered at all. **Their motors may be running.** The stops stay
     /// owed.
     #[cfg(feature = "ikeya")]
     StopsOwed(ikeya::master::NodeSet),
+    /// These nodes have confirmed their stop and answer, but **their motors still move**, longer
+    /// than [`MasterConfig::coast`](ikeya::master::MasterConfig::coast) (ruling I12). The stops are
+    /// repeated as long as the driver is called.
+    #[cfg(feature = "ikeya")]
+    StillMoving(ikeya::master::NodeSet),
     /// A node could not be read in any of the attempts.
     #[cfg(feature = "ikeya")]
     ReadFailed {
@@ -102,6 +107,8 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             Self::StopsOwed(nodes) => {
                 write!(f, "stop of node {nodes} not confirmed: a motor may be running")
             }
+            #[cfg(feature = "ikeya")]
+            Self::StillMoving(nodes) => write!(f, "node {nodes} is still moving after its stop"),
             #[cfg(feature = "ikeya")]
             Self::ReadFailed { node, cause } => {
                 let heard = match cause {

@@ -100,7 +100,7 @@ impl Episode {
     fn read_stopped(&mut self) {
         let now = self.bus.now();
         for &(node, _) in &self.nodes {
-            if self.bus.head().stop_progress(node) == StopProgress::Paid {
+            if self.bus.head().stop_progress(node) == StopProgress::Confirmed {
                 // Refused while it is not online.
                 let _ = self.bus.head_mut().read(node, now);
             }

@@ -83,7 +83,7 @@ fn drive_for_keeps_the_command_for_its_time_and_ends_with_a_paid_stop() {
         assert_eq!(drive_for(&mut story, ms(50), is_async), Ok(()));
         let took = story.world.now() - begin;
         assert!(took >= ms(50) && took < ms(55), "{took:?}");
-        assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::Paid);
+        assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::Confirmed);
         assert_eq!(story.told_two(), STOPPED);
         let writes = story.two.borrow().role().statistics().writes;
         assert!(writes > 20, "only {writes} writes: the command is not repeated");
@@ -181,32 +181,27 @@ fn a_dropped_stop_is_owed_and_the_next_call_sends_it() {
 }
 
 #[test]
-fn await_standstill_waits_until_the_deadline_and_names_the_moving_nodes() {
-    for config in [MasterConfig::direct(), manual()] {
+fn a_motor_that_moves_on_after_its_confirmed_stop_is_still_moving() {
+    for mut config in [MasterConfig::direct(), manual()] {
+        config.coast = ms(100);
         for is_async in BOTH {
+            // Node 2 reports that it still turns at 0.5 rps.
             let mut story = Story::new(config).discovered();
-            let nodes = only_two_and_five().nodes;
-            let wait = |story: &mut Story, deadline| {
-                call!(
-                    is_async,
-                    story.bus,
-                    await_standstill,
-                    await_standstill_async(nodes, deadline)
-                )
-            };
-            stop(&mut story, is_async).unwrap();
-            // Node 2 reports that it still turns at 0.5 rps, and node 5 has not been stopped.
-            let deadline = story.world.now() + ms(50);
-            assert_eq!(wait(&mut story, deadline), Ok(nodes));
-            assert!(story.world.now() >= deadline);
+            let begin = story.world.now();
+            assert_eq!(stop(&mut story, is_async), Err(DriveError::StillMoving(only(NodeId::N2))));
+            let took = story.world.now() - begin;
+            assert!(took >= ms(100) && took < ms(130), "{took:?}");
+            assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::StillMoving);
+            let told = core::iter::from_fn(|| story.bus.role_mut().poll_event())
+                .filter(|event| matches!(event, MasterEvent::StillMoving { .. }));
+            assert_eq!(told.count(), 1);
+            // It is stopped further, and a later stop sees it still.
+            let writes = story.two.borrow().role().statistics().writes;
+            story.run(100);
+            assert!(story.two.borrow().role().statistics().writes >= writes + 5);
             story.two.borrow_mut().role_mut().set_velocity(rps(0.01));
-            story.bus.stop(NodeId::N5).unwrap();
-            let deadline = story.world.now() + ms(1000);
-            assert_eq!(wait(&mut story, deadline), Ok(NodeSet::NONE));
-            assert!(story.world.now() < deadline);
-            let still = MasterEvent::StandingStill { node: NodeId::N5 };
-            let mut events = core::iter::from_fn(|| story.bus.role_mut().poll_event());
-            assert!(events.any(|event| event == still));
+            assert_eq!(stop(&mut story, is_async), Ok(()));
+            assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::StandingStill);
         }
     }
 }

@@ -124,7 +124,7 @@ fn continuous_discoveries_find_every_node_that_is_owed_a_stop() {
     }
     desk.answer(NodeId::N5, Answer::Velocity(5.0));
     let back = desk.now;
-    while desk.master.stop_progress(NodeId::N5) != StopProgress::Paid {
+    while desk.master.stop_progress(NodeId::N5) != StopProgress::Confirmed {
         desk.master.discover(desk.now);
         desk.exchange().unwrap();
         assert!(desk.now < back + MS(100), "its stop stays owed");

@@ -199,7 +199,7 @@ fn a_paid_stop_leaves_the_held_position_behind_and_not_the_one_to_which_the_shaf
     }
     let held = Target::Position(turns(30));
     assert_eq!(desk.master.set_point(NodeId::N3), Some(held));
-    assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Paid);
+    assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Confirmed);
 }
 
 #[test]

@@ -318,7 +318,7 @@ fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
     desk.answer(NodeId::N1, Answer::Velocity(3.0));
     desk.master.stop(NodeId::N1, desk.now);
     desk.run(MS(10));
-    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Paid);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
     desk.answer(NodeId::N1, Answer::Position(turns(7)));
     let sent = desk.run(MS(100));
     assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));

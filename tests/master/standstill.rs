@@ -37,7 +37,7 @@ fn a_speed_below_a_twentieth_of_a_turn_per_second_is_a_standstill_in_either_dire
         assert_eq!(news.len(), 1 + usize::from(is_still));
         let progress = desk.master.stop_progress(NodeId::N1);
         assert_eq!(progress == StopProgress::StandingStill, is_still);
-        assert_eq!(progress == StopProgress::Paid, !is_still);
+        assert_eq!(progress == StopProgress::Confirmed, !is_still);
     }
 }
 

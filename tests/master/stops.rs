@@ -32,7 +32,7 @@ fn a_stop_is_paid_by_two_writes_that_have_each_been_followed_by_an_answer() {
     desk.answer(NodeId::N1, Answer::Velocity(3.0));
     assert_eq!(desk.packets(9), [stop, read], "and then nothing more is due");
     assert_eq!(desk.news(), [STOPPED_1]);
-    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Paid);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
     assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
 }
 
@@ -134,7 +134,7 @@ fn a_repeated_stop_joins_the_owed_one() {
             desk.master.stop_progress(node.0),
             match node.1 {
                 Mode::Velocity => StopProgress::StandingStill,
-                Mode::Position => StopProgress::Paid,
+                Mode::Position => StopProgress::Confirmed,
             }
         );
         assert_eq!(writes(&sent).len(), 2);
@@ -286,6 +286,6 @@ fn a_position_is_held_however_long_the_gap_between_packets() {
         let sent = desk.packets(6);
         let stop = hold(NodeId::N3, Position::new(7, 3));
         assert_eq!(sent[1], stop, "{gap:?}: {sent:02x?}");
-        assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Paid, "{gap:?}");
+        assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Confirmed, "{gap:?}");
     }
 }

@@ -74,7 +74,7 @@ impl Bus {
     fn check_stop(&mut self, index: usize, command: Option<Target>) {
         let node = NodeId::ALL[index];
         let progress = self.master().stop_progress(node);
-        if !matches!(progress, StopProgress::Paid | StopProgress::StandingStill) {
+        if !matches!(progress, StopProgress::Confirmed | StopProgress::StandingStill) {
             return;
         }
         self.account.checks.paid += 1;

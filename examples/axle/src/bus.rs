@@ -261,7 +261,7 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn halt(&self, node: NodeId) -> Halt {
         match self.master().stop_progress(node) {
             StopProgress::StandingStill => Halt::Still,
-            StopProgress::Paid => Halt::Moving,
+            StopProgress::Confirmed => Halt::Moving,
             _ if self.is_damaged(node) => Halt::Damaged,
             _ if self.status(node).is_none() => Halt::Silent,
             _ if self.master().is_mode_in_doubt(node) => Halt::Doubtful,

@@ -70,15 +70,15 @@ where
         self.send_target_async(node, Target::Position(target)).await
     }
 
-    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. Meanwhile
-    /// the set-point is repeated, and counts as a sign of life.
+    /// Turns a velocity node for `span`, then stops it and returns when it is seen to be
+    /// still. Meanwhile the set-point is repeated, and counts as a sign of life.
     ///
     /// If the future is dropped, the stop is owed, and the next call sends it. **If there is no
     /// next call, the motor runs on.**
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] if the stop is not paid, whatever else failed before. Otherwise
+    /// Those of [`stop_async`](Self::stop_async), whatever else failed before. Otherwise
     /// the errors of [`set_velocity_async`](Self::set_velocity_async), returned at once if the node
     /// loses its set-point on the way.
     pub async fn drive_for_async(
@@ -95,20 +95,26 @@ where
             failed => failed,
         };
         drop(guard);
-        self.pay_stops_async(node.into()).await?;
+        self.await_stops_async(node.into()).await?;
         moved
     }
 
-    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs
-    /// have each been followed by an answer (ruling I12). Continues through errors of the port.
+    /// Stops a node as [`Master::stop`] does, and returns when it is **seen to be still**: its stop
+    /// is confirmed, and two answers at least 20 ms apart show a motor that does not move (ruling
+    /// I12). Continues through errors of the port.
+    ///
+    /// To go on with other work meanwhile, call [`Master::stop`], keep calling the driver, and
+    /// watch [`Master::stop_progress`].
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running.** The
-    /// stop is still owed, and pursued as long as the driver is called.
+    /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
+    /// [`DriveError::StillMoving`] if the motor moves for longer than
+    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after that. **The motor
+    /// may be running.** The stop is repeated as long as the driver is called.
     pub async fn stop_async(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
-        self.pay_stops_async(node.into()).await
+        self.await_stops_async(node.into()).await
     }
 
     /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and
@@ -116,28 +122,12 @@ where
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after
-    /// [`Master::stop_bound`], and the ids that have never answered: only you know whether they
+    /// Those of [`stop_async`](Self::stop_async), with all nodes that they concern. The stops owed include
+    /// ids that have never answered: only you know whether they
     /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
     pub async fn stop_all_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
-        self.pay_stops_async(NodeSet::ALL).await
-    }
-
-    /// Waits until the stopped nodes among `nodes` have been measured at standstill, or until
-    /// `deadline`; returns those that have not, including those that are owed no stop.
-    ///
-    /// # Errors
-    ///
-    /// Port errors.
-    pub async fn await_standstill_async(
-        &mut self,
-        nodes: NodeSet,
-        deadline: Instant,
-    ) -> Result<NodeSet, DriveError<P::Error>> {
-        let still = |driver: &mut Self| driver.moving(nodes).is_empty().then_some(());
-        self.until_async(deadline, still).await?;
-        Ok(self.moving(nodes))
+        self.await_stops_async(NodeSet::ALL).await
     }
 
     /// Reads a node; returns a measurement received after this call was made.
@@ -188,18 +178,15 @@ where
         Ok(())
     }
 
-    /// Runs until the stops of these nodes are paid, through errors of the port.
-    async fn pay_stops_async(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
-        let deadline = self.stop_deadline();
+    /// Runs until these nodes are still, through errors of the port.
+    async fn await_stops_async(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
+        let bounds = self.stop_bounds();
         loop {
-            let paid = |driver: &mut Self| driver.owed(nodes).is_empty().then_some(());
-            let result = self.until_async(deadline, paid).await;
-            let owed = self.owed(nodes);
-            if owed.is_empty() {
-                return Ok(());
-            }
-            if self.now() >= deadline {
-                return Err(DriveError::StopsOwed(owed));
+            let until = if self.now() < bounds.0 { bounds.0 } else { bounds.1 };
+            let result =
+                self.until_async(until, |driver| driver.stopped::<P::Error>(nodes, bounds)).await;
+            if let Some(stopped) = self.stopped(nodes, bounds) {
+                return stopped;
             }
             if result.is_err() {
                 // If the port fails at once, pause before the next attempt.

@@ -69,12 +69,12 @@ where
         self.send_target(node, Target::Position(target))
     }
 
-    /// Turns a velocity node for `span`, then stops it and waits until the stop is paid. Meanwhile
-    /// the set-point is repeated, and counts as a sign of life.
+    /// Turns a velocity node for `span`, then stops it and returns when it is seen to be
+    /// still. Meanwhile the set-point is repeated, and counts as a sign of life.
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] if the stop is not paid, whatever else failed before. Otherwise
+    /// Those of [`stop`](Self::stop), whatever else failed before. Otherwise
     /// the errors of [`set_velocity`](Self::set_velocity), returned at once if the node loses its
     /// set-point on the way.
     pub fn drive_for(
@@ -93,19 +93,22 @@ where
         moved
     }
 
-    /// Stops a node as [`Master::stop`] does, and returns when the stop is paid: two stop WRITEs
-    /// have each been followed by an answer (ruling I12). Continues through errors of the port.
+    /// Stops a node as [`Master::stop`] does, and returns when it is **seen to be still**: its stop
+    /// is confirmed, and two answers at least 20 ms apart show a motor that does not move (ruling
+    /// I12). Continues through errors of the port.
     ///
-    /// No WRITE is acknowledged. On a bad line both may be damaged although both READs are
-    /// answered: keep calling the driver, which repeats the stop with each reading.
+    /// To go on with other work meanwhile, call [`Master::stop`], keep calling the driver, and
+    /// watch [`Master::stop_progress`].
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] after [`Master::stop_bound`]. **The motor may be running.** The
-    /// stop is still owed, and pursued as long as the driver is called.
+    /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
+    /// [`DriveError::StillMoving`] if the motor moves for longer than
+    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after that. **The motor
+    /// may be running.** The stop is repeated as long as the driver is called.
     pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
-        self.pay_stops(node.into())
+        self.await_stops(node.into())
     }
 
     /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and
@@ -113,28 +116,12 @@ where
     ///
     /// # Errors
     ///
-    /// [`DriveError::StopsOwed`] with the nodes whose stop is not paid after
-    /// [`Master::stop_bound`], and the ids that have never answered: only you know whether they
+    /// Those of [`stop`](Self::stop), with all nodes that they concern. The stops owed include
+    /// ids that have never answered: only you know whether they
     /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
     pub fn stop_all(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
-        self.pay_stops(NodeSet::ALL)
-    }
-
-    /// Waits until the stopped nodes among `nodes` have been measured at standstill, or until
-    /// `deadline`; returns those that have not, including those that are owed no stop.
-    ///
-    /// # Errors
-    ///
-    /// Port errors.
-    pub fn await_standstill(
-        &mut self,
-        nodes: NodeSet,
-        deadline: Instant,
-    ) -> Result<NodeSet, DriveError<P::Error>> {
-        let still = |driver: &mut Self| driver.moving(nodes).is_empty().then_some(());
-        self.until(deadline, still)?;
-        Ok(self.moving(nodes))
+        self.await_stops(NodeSet::ALL)
     }
 
     /// Reads a node; returns a measurement received after this call was made.
@@ -181,22 +168,18 @@ where
         Ok(())
     }
 
-    /// Runs until the stops of these nodes are paid, through errors of the port.
-    fn pay_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
-        let deadline = self.stop_deadline();
+    /// Runs until these nodes are still, through errors of the port.
+    fn await_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
+        let bounds = self.stop_bounds();
         loop {
-            let paid = |driver: &mut Self| driver.owed(nodes).is_empty().then_some(());
-            let result = self.until(deadline, paid);
-            let owed = self.owed(nodes);
-            if owed.is_empty() {
-                return Ok(());
-            }
-            if self.now() >= deadline {
-                return Err(DriveError::StopsOwed(owed));
+            let until = if self.now() < bounds.0 { bounds.0 } else { bounds.1 };
+            let result = self.until(until, |driver| driver.stopped::<P::Error>(nodes, bounds));
+            if let Some(stopped) = self.stopped(nodes, bounds) {
+                return stopped;
             }
             if result.is_err() {
                 // If the port fails at once, pause before the next attempt.
-                let until = (self.now() + Self::ERROR_NAP).min(deadline);
+                let until = (self.now() + Self::ERROR_NAP).min(until);
                 let until = self.on_clock(until);
                 self.clock.idle_until(until);
             }

@@ -8,7 +8,7 @@ use crate::{
     ikeya::{
         Mode, NodeId,
         board::{Board, Status, Target},
-        master::{CommandError, Health, Master, MasterEvent, NodeSet, Polling, StopProgress},
+        master::{CommandError, Health, Master, MasterEvent, NodeSet, StopProgress},
         slave::{Slave, SlaveEvent},
     },
     time::{Duration, Instant},
@@ -24,8 +24,10 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.now() + self.role.read_bound().saturating_mul(4)
     }
 
-    pub(super) fn stop_deadline(&mut self) -> Instant {
-        self.now() + self.role.stop_bound()
+    /// Times by which stops must be confirmed, and their nodes be still.
+    pub(super) fn stop_bounds(&mut self) -> (Instant, Instant) {
+        let confirmed_by = self.now() + self.role.stop_bound();
+        (confirmed_by, confirmed_by + self.role.config().coast)
     }
 
     pub(super) fn is_online(&self, node: NodeId) -> bool {
@@ -134,26 +136,25 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.role.stop_all(now);
     }
 
-    /// The nodes among these whose stop is still owed.
-    pub(super) fn owed(&mut self, nodes: NodeSet) -> NodeSet {
+    /// How the stops of these nodes have ended, once they have: all nodes are still, or one is not
+    /// confirmed or still in time.
+    pub(super) fn stopped<E>(
+        &mut self,
+        nodes: NodeSet,
+        (confirmed_by, still_by): (Instant, Instant),
+    ) -> Option<Result<(), DriveError<E>>> {
         self.drop_readings();
-        self.role.stops_owed().and(nodes)
-    }
-
-    /// The nodes among these that have not been measured at standstill.
-    pub(super) fn moving(&mut self, nodes: NodeSet) -> NodeSet {
-        self.drop_readings();
-        let mut moving = nodes;
-        for node in nodes.iter() {
-            if self.role.stop_progress(node) == StopProgress::StandingStill {
-                moving.remove(node);
-            } else if self.role.config().polling == Polling::Manual {
-                let now = self.now();
-                // A node that is not online is looked for anyway.
-                let _ = self.role.read(node, now);
-            }
+        let now = self.now();
+        let (owed, coasting) = (self.role.stops_owed().and(nodes), self.role.coasting().and(nodes));
+        if !owed.is_empty() {
+            return (now >= confirmed_by).then_some(Err(DriveError::StopsOwed(owed)));
         }
-        moving
+        if coasting.is_empty() {
+            return Some(Ok(()));
+        }
+        let is_moving = |node| self.role.stop_progress(node) == StopProgress::StillMoving;
+        let are_over = now >= still_by || coasting.iter().all(is_moving);
+        are_over.then_some(Err(DriveError::StillMoving(coasting)))
     }
 
     /// Gives a sign of life; returns when to give the next, well before the dead-man fires.

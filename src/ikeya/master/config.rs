@@ -37,8 +37,9 @@ pub struct MasterConfig {
     pub attempts: u8,
     /// When nodes are read.
     pub polling: Polling,
-    /// Search rate: share of line time spent on finding abnormal nodes, percent. 0 searches only
-    /// for nodes that are owed a stop, at 1 %; more than 50 counts as 50.
+    /// Search rate: share of line time spent on finding abnormal nodes while online nodes have
+    /// requests due, percent. An idle line is searched all the time. 0 searches only for nodes that
+    /// are owed a stop, at 1 %; more than 50 counts as 50 (I13).
     pub recovery_share_pct: u8,
     /// Whether this is a 2-wire line whose adapter hears its own bytes: the echo is then removed.
     pub removes_echo: bool,
@@ -52,6 +53,10 @@ pub struct MasterConfig {
     /// The age counts from when the driver took the answer: add the longest time between two of
     /// your calls, for which an answer may wait in the port.
     pub hold_age: Duration,
+    /// Time in which a motor may come to rest after its stop is confirmed; 2 s by default. Then
+    /// [`MasterEvent::StillMoving`](super::MasterEvent::StillMoving) reports that it still moves
+    /// (I12).
+    pub coast: Duration,
     /// Dead-man: after this much time without an accepted set-point, a stop or
     /// [`keep_alive`](super::Master::keep_alive), every node under a set-point is owed a stop
     /// (I13). `None`, the default, disables it.
@@ -69,8 +74,8 @@ pub enum Polling {
     Fastest,
     /// Each node once per period; its set-point is repeated at the same rate.
     Every(Duration),
-    /// Only on request; a set-point is then sent when it is given and with each read. Stops are
-    /// still repeated and confirmed (I12); to see a standstill, read the node.
+    /// Only on request; a set-point is then sent when it is given and with each read. A node that is
+    /// owed a stop is read and stopped in any case, until it is still (I12).
     Manual,
 }
 
@@ -90,6 +95,7 @@ impl MasterConfig {
             removes_echo: false,
             accepts_early: false,
             hold_age: Duration::ZERO,
+            coast: Duration::from_millis(2000),
             dead_man: None,
             stops_abnormal: true,
         }

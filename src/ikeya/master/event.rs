@@ -65,17 +65,26 @@ pub enum MasterEvent<B: Board = OneMotor> {
         /// The node.
         node: NodeId,
     },
-    /// A stop is paid, that is, confirmed twice: two stop WRITEs have each been followed by an
-    /// answer from the node (I12). The motor may still be slowing down.
+    /// A stop is confirmed: two stop WRITEs have each been followed by an answer from the node
+    /// (I12). Set-points are accepted again. The motor may still be slowing down, or not even have
+    /// heard the stop, which is repeated until [`StandingStill`](Self::StandingStill).
     Stopped {
         /// The node.
         node: NodeId,
     },
-    /// A node was found standing still after its stop was paid: below 0.05 rps, or within 8 counts
-    /// over at least 20 ms (I12).
+    /// The motor is seen to be still after a stop: two answers at least 20 ms apart show less than
+    /// 0.05 rps, or positions within 8 counts of each other (I12).
     StandingStill {
         /// The node.
         node: NodeId,
+    },
+    /// The stop of a node is confirmed, but its motor still moves after
+    /// [`MasterConfig::coast`](super::MasterConfig::coast) (I12). Told once; the stop is repeated.
+    StillMoving {
+        /// The node.
+        node: NodeId,
+        /// Its last status.
+        status: Status<B>,
     },
     /// The application has shown no sign of life for
     /// [`MasterConfig::dead_man`](super::MasterConfig::dead_man): every node under a set-point is

@@ -4,7 +4,7 @@ use super::{
     config::{MasterConfig, Polling},
     event::{Cause, CommandError, Health},
     mode::{Decision, KnownMode},
-    order::{Order, Settled},
+    order::{Order, Settled, Stop},
     statistics::NodeStatistics,
 };
 use crate::{
@@ -57,6 +57,9 @@ pub(super) enum Reason {
     SpeedStop,
     /// A stop WRITE for any node that is online.
     Stop,
+    /// A stop WRITE that nothing else has a turn for: blind, to a velocity node that is not online,
+    /// or to a node that is not still while its cycle takes long. Only where a WRITE is silent.
+    Repeat,
     /// A READ that a stop or a mode in doubt is waiting for.
     StopRead,
     /// The first attempt for a node that is owed a stop and is not online.
@@ -69,10 +72,11 @@ pub(super) enum Reason {
 
 impl Reason {
     /// The urgent reasons by priority, then the rest.
-    pub(super) const ALL: [Self; 9] = [
+    pub(super) const ALL: [Self; 10] = [
         Self::Hold,
         Self::SpeedStop,
         Self::Stop,
+        Self::Repeat,
         Self::StopRead,
         Self::LostStop,
         Self::SetPoint,
@@ -83,7 +87,15 @@ impl Reason {
 
     /// Whether it is for a stop or a mode in doubt.
     pub(super) const fn is_stop(self) -> bool {
-        matches!(self, Self::Hold | Self::SpeedStop | Self::Stop | Self::StopRead | Self::LostStop)
+        matches!(
+            self,
+            Self::Hold
+                | Self::SpeedStop
+                | Self::Stop
+                | Self::Repeat
+                | Self::StopRead
+                | Self::LostStop
+        )
     }
 }
 
@@ -165,7 +177,7 @@ impl<B: Board> Node<B> {
     pub(super) fn check(&self, node: NodeId, target: &Target<B>) -> Result<(), CommandError> {
         let mode = self.mode.on_record().filter(|_| self.is_online());
         let mode = mode.ok_or(CommandError::NotOnline { node })?;
-        if self.order.stop().is_some() {
+        if self.order.stop_owed().is_some() {
             return Err(CommandError::StopOwed { node });
         }
         if self.mode.is_in_doubt() {
@@ -183,7 +195,7 @@ impl<B: Board> Node<B> {
 
     /// Makes it owed a stop, unless it already is.
     pub(super) fn owe_stop(&mut self, hold_age: Duration, now: Instant) -> Changes {
-        let is_new = self.order.stop().is_none();
+        let is_new = self.order.stop_owed().is_none();
         let is_certain = self.is_online() && !self.mode.is_in_doubt();
         let measured = self.status.filter(|&(_, at)| now - at < hold_age).map(|it| it.0);
         let is_unconfirmed = self.order.owe_stop(is_certain, measured, now);
@@ -261,19 +273,42 @@ impl<B: Board> Node<B> {
 impl<B: Board> Node<B> {
     /// The stop WRITE to be sent next, if one may be sent.
     fn stop_write(&self) -> Option<Target<B>> {
-        self.order.stop()?.write(self.mode.on_record()?, self.mode.is_in_doubt())
+        self.order.stop_owed().filter(|stop| !stop.is_written())?;
+        self.stop_target()
+    }
+
+    fn stop_target(&self) -> Option<Target<B>> {
+        self.order.stop()?.target(self.mode.on_record()?, self.mode.is_in_doubt())
+    }
+
+    /// Whether this WRITE would still be sent to it.
+    pub(super) fn takes(&self, target: Target<B>) -> bool {
+        let is_wanted = match self.mode.is_in_doubt() {
+            true => None,
+            false => self.order.target(),
+        };
+        is_wanted.or_else(|| self.stop_target()) == Some(target)
+    }
+
+    /// Whether it has been heard, is owed a stop and does not answer.
+    pub(super) fn is_lost(&self) -> bool {
+        self.is_abnormal() && self.order.stop_owed().is_some()
+    }
+
+    fn is_abnormal(&self) -> bool {
+        self.health == Some(Health::Abnormal)
     }
 
     /// Whether a request for this reason is due now.
     pub(super) fn is_due(&self, reason: Reason, config: &MasterConfig, now: Instant) -> bool {
-        self.wants(reason, config) && self.earliest(reason).is_none_or(|at| now >= at)
+        self.wants(reason, config) && self.earliest(reason, config).is_none_or(|at| now >= at)
     }
 
     /// Whether a request for this reason is to be sent, now or later.
     #[inline(never)]
     pub(super) fn wants(&self, reason: Reason, config: &MasterConfig) -> bool {
         let is_online = self.is_online();
-        let stop = self.order.stop();
+        let stop = self.order.stop_owed();
         match reason {
             Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::StopRead if !is_online => {
                 false
@@ -283,6 +318,11 @@ impl<B: Board> Node<B> {
             }
             Reason::SpeedStop => matches!(self.stop_write(), Some(Target::Velocity(_))),
             Reason::Stop => self.stop_write().is_some(),
+            Reason::Repeat if B::ANSWERS_WRITE || self.mode.is_in_doubt() => false,
+            Reason::Repeat if is_online => self.order.coasting().is_some(),
+            Reason::Repeat => {
+                stop.is_some() && matches!(self.stop_target(), Some(Target::Velocity(_)))
+            }
             Reason::StopRead => {
                 self.mode.is_in_doubt() || (stop.is_some() && self.stop_write().is_none())
             }
@@ -291,7 +331,7 @@ impl<B: Board> Node<B> {
             Reason::SetPoint => !self.mode.is_in_doubt() && self.order.is_new(),
             Reason::Search => {
                 let is_sought = config.recovery_share_pct > 0;
-                stop.is_some() || (self.health.is_some() && is_sought)
+                stop.is_some() || (self.is_abnormal() && is_sought)
             }
             Reason::Cycle => is_online && self.is_in_cycle(config),
             Reason::Discovery => true,
@@ -300,7 +340,7 @@ impl<B: Board> Node<B> {
 
     /// Earliest time of a request for this reason.
     #[inline(never)]
-    pub(super) fn earliest(&self, reason: Reason) -> Option<Instant> {
+    pub(super) fn earliest(&self, reason: Reason, config: &MasterConfig) -> Option<Instant> {
         match reason {
             // An answered WRITE waits, like a READ, until no late answer can arrive.
             Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::SetPoint
@@ -308,8 +348,21 @@ impl<B: Board> Node<B> {
             {
                 None
             }
-            Reason::Cycle if !self.is_wanted() => self.read_due.max(self.guarded_until),
+            Reason::Repeat => self.order.stop().and_then(Stop::repeat_at),
+            Reason::Cycle if !self.is_wanted() => self.cycle_at(config).max(self.guarded_until),
             _ => self.guarded_until,
+        }
+    }
+
+    /// Its turn in the cycle; `None` for at once. Until it is still after a stop, it is read every
+    /// 20 ms whatever the polling.
+    fn cycle_at(&self, config: &MasterConfig) -> Option<Instant> {
+        match (self.order.coasting(), config.polling) {
+            (Some(_), _) if self.order.is_written() => None,
+            (_, Polling::Fastest) => None,
+            (Some(stop), Polling::Every(_)) => Some(self.read_due?.min(stop.repeat_at()?)),
+            (Some(stop), Polling::Manual) => stop.repeat_at(),
+            (None, _) => self.read_due,
         }
     }
 
@@ -317,13 +370,14 @@ impl<B: Board> Node<B> {
     /// online: one, or those of a READ if the node has never been heard.
     fn awaits_lost_stop(&self, config: &MasterConfig) -> bool {
         let limit = if self.health.is_none() { config.attempts.max(1) } else { 1 };
-        self.order.stop().is_some_and(|stop| stop.lost_attempts() < limit)
+        self.order.stop_owed().is_some_and(|stop| stop.lost_attempts() < limit)
     }
 
     /// Whether it takes part in the cycle: to be read, or to have its set-point repeated.
     fn is_in_cycle(&self, config: &MasterConfig) -> bool {
         let is_polled = self.is_wanted() || config.polling != Polling::Manual;
-        is_polled && self.order.stop().is_none() && !self.mode.is_in_doubt()
+        let is_polled = is_polled || self.order.coasting().is_some();
+        is_polled && self.order.stop_owed().is_none() && !self.mode.is_in_doubt()
     }
 
     /// Whether it is to be read regardless of the polling.
@@ -331,11 +385,14 @@ impl<B: Board> Node<B> {
         self.attempt > 0 || self.is_asked || self.order.awaits_confirmation()
     }
 
-    /// Its request for this reason. A node that is not online gets its stop blind, then a READ; in
-    /// the cycle a node gets its set-point, then a READ.
+    /// Its request for this reason. In the cycle a node gets its set-point, then a READ. A node that
+    /// is not online gets its stop blind, apart from its READs; where a WRITE is answered, instead
+    /// of them.
     pub(super) fn request(&self, reason: Reason) -> Request<B> {
         let target = match reason {
             Reason::StopRead | Reason::Discovery => None,
+            Reason::LostStop | Reason::Search if !B::ANSWERS_WRITE => None,
+            Reason::Repeat => self.stop_target(),
             Reason::Cycle if self.order.is_written() => None,
             Reason::SetPoint | Reason::Cycle => self.order.target(),
             _ => self.stop_write(),
@@ -351,8 +408,8 @@ impl<B: Board> Node<B> {
 /// What happens on the line.
 impl<B: Board> Node<B> {
     /// Its stop or its set-point has been handed out.
-    pub(super) fn wrote(&mut self) {
-        self.order.wrote();
+    pub(super) fn wrote(&mut self, now: Instant) {
+        self.order.wrote(now);
     }
 
     pub(super) fn take_back_write(&mut self) {
@@ -424,6 +481,7 @@ impl<B: Board> Node<B> {
         &mut self,
         status: &Status<B>,
         latency: Duration,
+        coast: Duration,
         now: Instant,
     ) -> Changes {
         let was = self.health.replace(Health::Online);
@@ -449,7 +507,7 @@ impl<B: Board> Node<B> {
         self.status = Some((*status, now));
         changes.is_mode_changed = decision == Decision::Changed;
         changes.is_answered = true;
-        changes.settled = self.order.answered(status, now);
+        changes.settled = self.order.answered(status, coast, now);
         changes
     }
 

@@ -16,8 +16,11 @@ const CONFIRMATIONS: u8 = 2;
 /// each position that is given up, so that even a slow loop eventually writes one.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
-/// Minimum time between two positions that are compared: 8 counts in this time are 0.05 rps.
-const STANDSTILL_TIME: Duration = Duration::from_millis(20);
+/// Minimum time between the two answers that show a standstill: 8 counts in this time are 0.05 rps.
+const STILL_TIME: Duration = Duration::from_millis(20);
+
+/// Longest time between two stop WRITEs, where the line allows it (I12, I13).
+const REPEAT_TIME: Duration = Duration::from_millis(20);
 
 /// The latest order to a node.
 #[derive(Clone, Debug)]
@@ -27,6 +30,8 @@ pub(super) struct Order<B: Board> {
     /// Whether the node has had a WRITE since it was last asked: it is read before the order is
     /// repeated.
     is_written: bool,
+    /// Whether the node has ever had a WRITE from this master.
+    was_written: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -35,10 +40,7 @@ enum State<B: Board> {
     SetPoint(SetPoint<B>),
     /// A set-point that is no longer repeated. The node keeps it.
     Released,
-    /// A stop that is owed.
-    Owed(Stop<B>),
-    /// A stop that is paid. Its target is repeated, unless it was released.
-    Paid(Option<SetPoint<B>>, Standstill<B>),
+    Stop(Stop<B>),
 }
 
 /// A target that is repeated in every cycle.
@@ -65,34 +67,41 @@ enum Confirm {
 pub(super) struct Settled {
     /// The WRITE to be confirmed was followed by an answer.
     pub(super) is_confirmed: bool,
-    /// The stop is paid.
+    /// The stop is confirmed.
     pub(super) is_stopped: bool,
-    /// The node was found standing still after its stop, for the first time.
+    /// The node is seen to be still.
     pub(super) is_still: bool,
+    /// The node has been moving for too long after its stop was confirmed.
+    pub(super) is_still_moving: bool,
 }
 
 impl<B: Board> Order<B> {
-    pub(super) const NONE: Self =
-        Self { state: State::None, confirm: Confirm::Unasked, is_written: false };
+    pub(super) const NONE: Self = Self {
+        state: State::None,
+        confirm: Confirm::Unasked,
+        is_written: false,
+        was_written: false,
+    };
 
     /// Takes a new set-point; the latest wins.
     pub(super) fn aim(&mut self, target: Target<B>) {
         self.state = State::SetPoint(SetPoint { target, is_new: true });
     }
 
-    /// No longer repeats the set-point, or the target of a paid stop. Returns whether the
-    /// application is waiting for its confirmation.
+    /// No longer repeats the set-point, or the target of a stop once the node is still. Returns
+    /// whether the application is waiting for its confirmation.
     pub(super) fn release(&mut self) -> bool {
         match &mut self.state {
             State::SetPoint(_) => self.state = State::Released,
-            State::Paid(set_point, _) => *set_point = None,
-            State::None | State::Released | State::Owed(_) => {}
+            State::Stop(stop) => stop.is_released = stop.stage != Stage::Owed,
+            State::None | State::Released => {}
         }
         self.end_confirmation()
     }
 
-    /// Makes the node owed a stop, unless it already is. Returns whether the application is waiting
-    /// for the confirmation of the set-point that ends with this.
+    /// Makes the node owed a stop, or joins the one that it is owed until it is still. Returns
+    /// whether the application is waiting for the confirmation of the set-point that ends with
+    /// this.
     ///
     /// If the node `is_certain`, that is, online and in its mode, the stop holds what an earlier
     /// stop has held, or the position `measured`, treated as measured `now`.
@@ -102,22 +111,27 @@ impl<B: Board> Order<B> {
         measured: Option<Status<B>>,
         now: Instant,
     ) -> bool {
-        let (hold, measured_at) = match (&self.state, measured) {
-            (State::Owed(_), _) => return self.end_confirmation(),
+        let (hold, measured_at) = match (&mut self.state, measured) {
+            (State::Stop(stop), _) if stop.stage != Stage::Still => {
+                // The application waits anew.
+                (stop.confirmed_at, stop.is_told) = (now, false);
+                return self.end_confirmation();
+            }
             _ if !is_certain => (None, None),
-            (State::Paid(Some(paid), _), _) => (paid.target.position(), None),
+            (State::Stop(stop), _) if !stop.is_released => (stop.hold, None),
             (_, Some(Status::Position(position))) => (Some(position), Some(now)),
             _ => (None, None),
         };
-        self.state = State::Owed(Stop::new(hold, measured_at));
+        self.state = State::Stop(Stop::new(hold, measured_at));
         self.end_confirmation()
     }
 
     /// The node is abnormal: it keeps its last command and is owed a stop, if that `is_stopped`.
     pub(super) fn lose(&mut self, is_stopped: bool) {
-        let is_owed = matches!(self.state, State::Owed(_));
-        self.state = if is_owed || (is_stopped && self.is_commanded()) {
-            State::Owed(Stop::new(None, None))
+        let is_owed = self.stop().is_some_and(|stop| stop.stage != Stage::Still);
+        let is_owed = is_owed || (is_stopped && self.is_commanded());
+        self.state = if is_owed {
+            State::Stop(Stop::new(None, None))
         } else if self.is_set_point() {
             State::Released
         } else {
@@ -128,13 +142,16 @@ impl<B: Board> Order<B> {
     /// The mode is in doubt: what was measured does not count, and a position that is held must be
     /// measured again. Returns whether that ends a confirmation.
     pub(super) fn doubt(&mut self) -> bool {
-        match &mut self.state {
-            State::Owed(stop) => stop.restart(),
-            State::Paid(Some(SetPoint { target: Target::Position(_), .. }), _) => {
-                self.state = State::Owed(Stop::new(None, None));
+        if let State::Stop(stop) = &mut self.state {
+            let is_held = stop.hold.is_some() && !stop.is_released;
+            match stop.stage {
+                Stage::Owed | Stage::Confirmed => stop.restart(),
+                Stage::Still if is_held => *stop = Stop::new(None, None),
+                Stage::Still => {}
+            }
+            if stop.stage == Stage::Owed {
                 return self.end_confirmation();
             }
-            _ => {}
         }
         if self.confirm == Confirm::AfterAnswer {
             // The WRITE may have been read in the other mode.
@@ -145,28 +162,30 @@ impl<B: Board> Order<B> {
 
     /// The mode is certain again, and as before.
     pub(super) fn end_doubt(&mut self) {
-        if let State::Owed(stop) = &mut self.state {
-            stop.restart();
+        if let State::Stop(stop) = &mut self.state {
+            if stop.stage == Stage::Owed {
+                stop.restart();
+            }
         }
     }
 
-    /// The mode has changed: the order was meant for the old one. The last WRITE may have been read
-    /// in the new one, where 0 rps means "go to 0", so the node is owed a stop if it had any.
-    /// Returns whether that ends a confirmation.
+    /// The mode has changed: the order was meant for the old one. Any WRITE so far, even of a stop
+    /// or of an order that was released, may have been read in the new one, where 0 rps means "go
+    /// to 0": the node is owed a stop if it has ever had one (I11). Returns whether that ends a
+    /// confirmation.
     pub(super) fn change_mode(&mut self) -> bool {
-        if let State::Owed(stop) = &mut self.state {
-            stop.restart();
-        } else if self.is_commanded() {
-            self.state = State::Owed(Stop::new(None, None));
-        } else {
-            self.state = State::None;
+        let is_commanded = self.was_written || self.is_commanded();
+        match &mut self.state {
+            State::Stop(stop) if stop.stage != Stage::Still => stop.restart(),
+            state if is_commanded => *state = State::Stop(Stop::new(None, None)),
+            state => *state = State::None,
         }
         self.end_confirmation()
     }
 
     /// Asks for a confirmation; returns whether there is a set-point to confirm.
     pub(super) fn confirm(&mut self) -> bool {
-        let is_confirmable = self.set_point().is_some();
+        let is_confirmable = self.target().is_some();
         if is_confirmable {
             self.confirm = Confirm::AfterWrite;
         }
@@ -185,24 +204,22 @@ impl<B: Board> Order<B> {
 
 /// What is to be sent.
 impl<B: Board> Order<B> {
-    /// The target that is repeated: a set-point, or that of a paid stop.
-    pub(super) const fn target(&self) -> Option<Target<B>> {
-        match self.set_point() {
-            Some(set_point) => Some(set_point.target),
-            None => None,
-        }
-    }
-
-    const fn set_point(&self) -> Option<&SetPoint<B>> {
+    /// The target that is repeated: a set-point, or that of a stop that is confirmed.
+    pub(super) fn target(&self) -> Option<Target<B>> {
         match &self.state {
-            State::SetPoint(set_point) | State::Paid(Some(set_point), _) => Some(set_point),
-            _ => None,
+            State::SetPoint(set_point) => Some(set_point.target),
+            State::Stop(stop) => stop.repeated(),
+            State::None | State::Released => None,
         }
     }
 
     /// Whether the target has not been sent yet.
     pub(super) fn is_new(&self) -> bool {
-        self.set_point().is_some_and(|it| it.is_new)
+        match &self.state {
+            State::SetPoint(set_point) => set_point.is_new,
+            State::Stop(stop) => stop.is_new && stop.repeated().is_some(),
+            State::None | State::Released => false,
+        }
     }
 
     /// Whether the node has had a WRITE since it was last asked.
@@ -215,31 +232,44 @@ impl<B: Board> Order<B> {
         matches!(self.state, State::SetPoint(_) | State::Released)
     }
 
-    /// Whether there is a command, a paid stop included, that the node has been given or will be.
+    /// Whether there is a command, a stop included, that the node has been given or will be.
     fn is_commanded(&self) -> bool {
-        self.is_set_point() || self.set_point().is_some()
+        self.is_set_point() || self.target().is_some()
     }
 
-    /// The stop that is owed.
+    /// The latest command, if it is a stop.
     pub(super) const fn stop(&self) -> Option<&Stop<B>> {
         match &self.state {
-            State::Owed(stop) => Some(stop),
+            State::Stop(stop) => Some(stop),
             _ => None,
         }
     }
 
-    pub(super) const fn progress(&self) -> StopProgress {
-        match self.state {
-            State::None | State::SetPoint(_) | State::Released => StopProgress::NotAsked,
-            State::Owed(_) => StopProgress::Owed,
-            State::Paid(_, Standstill::Watched(_)) => StopProgress::Paid,
-            State::Paid(_, Standstill::Reached) => StopProgress::StandingStill,
+    /// The stop, unless it is confirmed.
+    pub(super) fn stop_owed(&self) -> Option<&Stop<B>> {
+        self.stop().filter(|stop| stop.stage == Stage::Owed)
+    }
+
+    /// The stop, if it is confirmed and the node not still.
+    pub(super) fn coasting(&self) -> Option<&Stop<B>> {
+        self.stop().filter(|stop| stop.stage == Stage::Confirmed)
+    }
+
+    pub(super) fn progress(&self) -> StopProgress {
+        match self.stop() {
+            None => StopProgress::NotAsked,
+            Some(stop) => match stop.stage {
+                Stage::Owed => StopProgress::Owed,
+                Stage::Confirmed if stop.is_told => StopProgress::StillMoving,
+                Stage::Confirmed => StopProgress::Confirmed,
+                Stage::Still => StopProgress::StandingStill,
+            },
         }
     }
 
     /// Gives up a measured position that could not be written at once.
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        if let State::Owed(stop) = &mut self.state {
+        if let State::Stop(stop) = &mut self.state {
             stop.forget_old_hold(now, gap);
         }
     }
@@ -248,20 +278,15 @@ impl<B: Board> Order<B> {
 /// What happens to it.
 impl<B: Board> Order<B> {
     /// Its WRITE has been handed out.
-    pub(super) fn wrote(&mut self) {
-        self.is_written = true;
+    pub(super) fn wrote(&mut self, now: Instant) {
+        (self.is_written, self.was_written) = (true, true);
         match &mut self.state {
-            State::Owed(stop) => {
-                stop.is_written = true;
-                stop.writes = stop.writes.saturating_add(1);
-            }
-            State::SetPoint(set_point) | State::Paid(Some(set_point), _) => {
-                set_point.is_new = false;
-                if self.confirm == Confirm::AfterWrite {
-                    self.confirm = Confirm::AfterAnswer;
-                }
-            }
-            _ => {}
+            State::Stop(stop) => stop.wrote(now),
+            State::SetPoint(set_point) => set_point.is_new = false,
+            State::None | State::Released => {}
+        }
+        if self.confirm == Confirm::AfterWrite {
+            self.confirm = Confirm::AfterAnswer;
         }
     }
 
@@ -269,24 +294,19 @@ impl<B: Board> Order<B> {
     pub(super) fn take_back_write(&mut self) {
         self.is_written = false;
         match &mut self.state {
-            State::Owed(stop) => {
-                let was_written = core::mem::take(&mut stop.is_written);
-                stop.writes = stop.writes.saturating_sub(was_written.into());
-            }
-            State::SetPoint(set_point) | State::Paid(Some(set_point), _) => {
-                set_point.is_new = true;
-                if self.confirm == Confirm::AfterAnswer {
-                    self.confirm = Confirm::AfterWrite;
-                }
-            }
-            _ => {}
+            State::Stop(stop) => stop.take_back_write(),
+            State::SetPoint(set_point) => set_point.is_new = true,
+            State::None | State::Released => {}
+        }
+        if self.confirm == Confirm::AfterAnswer {
+            self.confirm = Confirm::AfterWrite;
         }
     }
 
     /// The node has been asked.
     pub(super) fn asked(&mut self, is_online: bool) {
         self.is_written = false;
-        if let State::Owed(stop) = &mut self.state {
+        if let State::Stop(stop) = &mut self.state {
             stop.is_asked = true;
             stop.lost_attempts = stop.lost_attempts.saturating_add((!is_online).into());
         }
@@ -294,68 +314,88 @@ impl<B: Board> Order<B> {
 
     /// The node has not been asked after all.
     pub(super) fn take_back_request(&mut self, is_online: bool) {
-        if let State::Owed(stop) = &mut self.state {
+        if let State::Stop(stop) = &mut self.state {
             stop.lost_attempts = stop.lost_attempts.saturating_sub((!is_online).into());
         }
     }
 
     /// The node has not answered: the WRITE may have been lost too, and a stop is repeated.
     pub(super) fn missed(&mut self) {
-        if let State::Owed(stop) = &mut self.state {
+        if let State::Stop(stop) = &mut self.state {
             stop.is_written = false;
         }
     }
 
     /// Keeps the position of an answer for the stop to hold.
     pub(super) fn measure(&mut self, status: &Status<B>, now: Instant) {
-        if let State::Owed(stop) = &mut self.state {
+        if let State::Stop(stop) = &mut self.state {
             stop.measure(status, now);
         }
     }
 
-    /// The node has answered in its mode: that may measure or pay a stop, or show a standstill.
-    pub(super) fn answered(&mut self, status: &Status<B>, now: Instant) -> Settled {
-        let mut settled = Settled::default();
+    /// The node has answered in its mode: that may measure or confirm a stop, or show that the node
+    /// is still.
+    pub(super) fn answered(
+        &mut self,
+        status: &Status<B>,
+        coast: Duration,
+        now: Instant,
+    ) -> Settled {
+        let mut settled = match &mut self.state {
+            State::Stop(stop) => stop.answered(status, coast, now),
+            _ => Settled::default(),
+        };
         if self.confirm == Confirm::AfterAnswer {
             self.confirm = Confirm::Unasked;
             settled.is_confirmed = true;
-        }
-        if let State::Owed(stop) = &mut self.state {
-            stop.measure(status, now);
-            settled.is_stopped = stop.pay();
-            if settled.is_stopped {
-                // A position stop is not written until there is a position to hold.
-                let target = stop.hold.map_or(Target::STANDSTILL, Target::Position);
-                let set_point = SetPoint { target, is_new: false };
-                self.state = State::Paid(Some(set_point), Standstill::Watched(None));
-            }
-        }
-        if let State::Paid(_, standstill) = &mut self.state {
-            settled.is_still = standstill.watch(*status, now);
         }
         settled
     }
 }
 
-/// A stop that is owed to a node.
+/// A stop. It is owed to the node until the node is seen to be still (I12).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop<B: Board> {
+    stage: Stage,
+    /// Whether a stop WRITE has been sent and waits for an answer.
+    is_written: bool,
+    /// Whether the target of a confirmed stop has to be sent again: its WRITE was taken back.
+    is_new: bool,
+    /// Whether it is no longer repeated once the node is still.
+    is_released: bool,
+    /// Whether the open window, if any, was opened after the stop was requested.
+    is_asked: bool,
+    /// Whether the application was told that the node is still moving.
+    is_told: bool,
+    /// Stop WRITEs sent.
+    writes: u8,
+    /// Stop WRITEs that were followed by a good answer.
+    followed: u8,
+    /// Attempts made while the node was not online.
+    lost_attempts: u8,
     /// The position to hold for a position node; `None` until it has been measured.
     hold: Option<B::Position>,
     /// Time of that measurement.
     measured_at: Option<Instant>,
     /// Time within which it must be written.
     patience: Duration,
-    /// Whether a stop WRITE has been sent and waits for an answer.
-    is_written: bool,
-    /// Stop WRITEs sent.
-    writes: u8,
-    /// Whether the open window, if any, was opened after the stop was requested.
-    is_asked: bool,
-    /// Stop WRITEs that were followed by a good answer.
-    paid: u8,
-    /// Attempts made while the node was not online.
-    lost_attempts: u8,
+    /// Time of the latest stop WRITE.
+    written_at: Option<Instant>,
+    /// Time from which the node has to become still.
+    confirmed_at: Instant,
+    /// An answer behind a stop WRITE that may be the first to show a standstill, and its time.
+    seen: Option<(Status<B>, Instant)>,
+}
+
+/// How far a stop has come.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Stage {
+    /// Not confirmed.
+    Owed,
+    /// Confirmed: two stop WRITEs have each been followed by a good answer.
+    Confirmed,
+    /// The node is seen to be still.
+    Still,
 }
 
 impl<B: Board> Stop<B> {
@@ -363,24 +403,28 @@ impl<B: Board> Stop<B> {
     /// measured at `measured_at`.
     const fn new(hold: Option<B::Position>, measured_at: Option<Instant>) -> Self {
         Self {
+            stage: Stage::Owed,
+            is_written: false,
+            is_new: false,
+            is_released: false,
+            is_asked: false,
+            is_told: false,
+            writes: 0,
+            followed: 0,
+            lost_attempts: 0,
             hold,
             measured_at,
             patience: HOLD_PATIENCE,
-            is_written: false,
-            writes: 0,
-            is_asked: false,
-            paid: 0,
-            lost_attempts: 0,
+            written_at: None,
+            confirmed_at: Instant::from_micros(0),
+            seen: None,
         }
     }
 
-    /// The stop WRITE for a node in this mode, unless one waits for an answer.
+    /// Its target for a node in this mode, once there is one.
     ///
     /// While the mode is in doubt: only a position that means standstill to a velocity node (I11).
-    pub(super) fn write(&self, mode: Mode, is_in_doubt: bool) -> Option<Target<B>> {
-        if self.is_written {
-            return None;
-        }
+    pub(super) fn target(&self, mode: Mode, is_in_doubt: bool) -> Option<Target<B>> {
         let hold = self.hold.map(Target::Position);
         match mode {
             _ if is_in_doubt => hold.filter(|_| self.hold.is_some_and(B::is_still_as_velocity)),
@@ -389,7 +433,23 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Whether a position has been measured for this stop but not written yet.
+    /// Its target, if it is confirmed and repeated. A position stop is not confirmed until there is
+    /// a position to hold.
+    fn repeated(&self) -> Option<Target<B>> {
+        let is_repeated = match self.stage {
+            Stage::Owed => false,
+            Stage::Confirmed => true,
+            Stage::Still => !self.is_released,
+        };
+        is_repeated.then(|| self.hold.map_or(Target::STANDSTILL, Target::Position))
+    }
+
+    /// Whether its WRITE waits for an answer.
+    pub(super) const fn is_written(&self) -> bool {
+        self.is_written
+    }
+
+    /// Whether a position has been measured for it but not written yet.
     pub(super) const fn is_measured(&self) -> bool {
         self.is_asked && self.measured_at.is_some() && self.writes == 0
     }
@@ -398,11 +458,34 @@ impl<B: Board> Stop<B> {
         self.lost_attempts
     }
 
-    /// Discards everything measured or paid so far: the node was abnormal, or its mode in doubt.
+    /// When it is to be written again, whatever else is due; `None` for at once.
+    pub(super) fn repeat_at(&self) -> Option<Instant> {
+        self.written_at.map(|at| at + REPEAT_TIME)
+    }
+
+    /// Discards everything measured or confirmed so far: the mode is, or was, in doubt.
     #[inline(never)]
     fn restart(&mut self) {
-        (self.hold, self.measured_at) = (None, None);
-        (self.is_written, self.writes, self.paid) = (false, 0, 0);
+        *self = Self {
+            is_asked: self.is_asked,
+            is_released: self.is_released,
+            lost_attempts: self.lost_attempts,
+            patience: self.patience,
+            ..Self::new(None, None)
+        };
+    }
+
+    fn wrote(&mut self, now: Instant) {
+        (self.is_written, self.is_new) = (true, false);
+        self.writes = self.writes.saturating_add(1);
+        self.written_at = Some(now);
+    }
+
+    fn take_back_write(&mut self) {
+        self.is_new = true;
+        let was_written = core::mem::take(&mut self.is_written);
+        self.writes = self.writes.saturating_sub(was_written.into());
+        self.written_at = None;
     }
 
     /// Keeps the position of an answer to hold, if it was requested after the stop.
@@ -424,52 +507,69 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Counts a good answer in the node's mode; returns whether the stop is now paid.
-    fn pay(&mut self) -> bool {
+    /// Takes a good answer of the node in its mode.
+    fn answered(&mut self, status: &Status<B>, coast: Duration, now: Instant) -> Settled {
+        let mut settled = Settled::default();
+        self.measure(status, now);
         if core::mem::take(&mut self.is_written) {
-            self.paid += 1;
+            self.followed = self.followed.saturating_add(1);
         }
-        self.paid >= CONFIRMATIONS
+        if self.stage == Stage::Owed && self.followed >= CONFIRMATIONS {
+            (self.stage, self.confirmed_at) = (Stage::Confirmed, now);
+            settled.is_stopped = true;
+        }
+        // An answer to a READ in front of all stop WRITEs shows nothing.
+        let is_still = self.followed > 0 && self.see(status, now);
+        if self.stage == Stage::Confirmed {
+            if is_still {
+                self.stage = Stage::Still;
+                settled.is_still = true;
+            } else if !self.is_told && now - self.confirmed_at >= coast {
+                self.is_told = true;
+                settled.is_still_moving = true;
+            }
+        }
+        settled
+    }
+
+    /// Compares an answer with an earlier one; returns whether the two show a standstill. One alone
+    /// may be of a motor that is just reversing.
+    fn see(&mut self, status: &Status<B>, now: Instant) -> bool {
+        let is_moving = matches!(status, Status::Velocity(speed) if !B::is_still(*speed));
+        let Some((before, at)) = self.seen.filter(|_| !is_moving) else {
+            self.seen = Some((*status, now)).filter(|_| !is_moving);
+            return false;
+        };
+        if now - at < STILL_TIME {
+            return false;
+        }
+        match (before, status) {
+            (Status::Velocity(_), Status::Velocity(_)) => return true,
+            (Status::Position(there), Status::Position(here)) if B::is_same_place(*here, there) => {
+                return true;
+            }
+            _ => self.seen = Some((*status, now)),
+        }
+        false
     }
 }
-/// Progress of a stop, see [`Master::stop_progress`](super::Master::stop_progress).
+
+/// Progress of a stop, see [`Master::stop_progress`](super::Master::stop_progress) (I12).
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StopProgress {
     /// The node's latest command, if any, is not a stop.
     NotAsked,
-    /// The stop is owed: it has not been confirmed twice yet.
+    /// The stop is not confirmed: set-points are refused.
     Owed,
-    /// The node has confirmed the stop twice, and may still be slowing down.
-    Paid,
-    /// The node has confirmed the stop twice, and was found standing still.
+    /// Confirmed: two stop WRITEs have each been followed by an answer. They may have been lost
+    /// although the READs behind them were answered, and the motor may still be slowing down: the
+    /// stop is repeated.
+    Confirmed,
+    /// Confirmed, but the motor still moves after
+    /// [`MasterConfig::coast`](super::MasterConfig::coast). The stop is repeated.
+    StillMoving,
+    /// Two answers at least 20 ms apart have shown a motor that is still: below 0.05 rps, or within
+    /// 8 counts.
     StandingStill,
-}
-
-/// The watch for standstill after a stop is paid.
-#[derive(Clone, Copy, Debug)]
-enum Standstill<B: Board> {
-    /// Watched, with a status to compare the next ones with.
-    Watched(Option<(Status<B>, Instant)>),
-    /// Standstill was measured.
-    Reached,
-}
-
-impl<B: Board> Standstill<B> {
-    /// Processes a status; returns whether it is the first to show a standstill.
-    fn watch(&mut self, status: Status<B>, now: Instant) -> bool {
-        let Self::Watched(before) = *self else { return false };
-        let is_still = match (status, before) {
-            (Status::Velocity(speed), _) => B::is_still(speed),
-            (Status::Position(here), Some((Status::Position(there), at))) => {
-                if now - at < STANDSTILL_TIME {
-                    return false;
-                }
-                B::is_same_place(here, there)
-            }
-            (Status::Position(_), _) => false,
-        };
-        *self = if is_still { Self::Reached } else { Self::Watched(Some((status, now))) };
-        is_still
-    }
 }

@@ -49,8 +49,12 @@ pub(super) struct Queue {
     discovery: Option<Discovery>,
     /// Time before which no abnormal node is searched for.
     search_at: Option<Instant>,
-    /// Index of the node searched for last.
+    /// Index of the node searched for last, among those that were heard before and are owed a stop,
+    /// and among the others.
+    searched_lost: usize,
     searched: usize,
+    /// Whether the last one was of the former.
+    was_lost: bool,
 }
 
 /// One request.
@@ -110,10 +114,7 @@ impl Queue {
                 if !is_on || !node.wants(reason, view.config) {
                     continue;
                 }
-                let mut at = node.earliest(reason).unwrap_or(view.now);
-                if reason == Reason::Search {
-                    at = self.search_at.unwrap_or(at).max(at);
-                }
+                let at = node.earliest(reason, view.config).unwrap_or(view.now);
                 earliest = Some(earliest.unwrap_or(at).min(at));
             }
         }
@@ -126,11 +127,13 @@ impl Queue {
             .or_else(|| self.regular(view))
             // With no regular request due, the next round begins at once.
             .or_else(|| self.urgent(view, Round::Next))
+            // An idle line belongs to the search.
+            .or_else(|| self.search(view))
     }
 
     /// The next urgent request: for a stop, a mode in doubt or a new set-point.
     fn urgent<B: Board>(&self, view: View<'_, B>, round: Round) -> Option<Choice<B>> {
-        Reason::ALL[..6].iter().find_map(|&reason| {
+        Reason::ALL[..7].iter().find_map(|&reason| {
             let last = if reason.is_stop() { self.stop } else { self.set_point };
             self.next_for(reason, last + 1, view, round)
         })
@@ -148,8 +151,21 @@ impl Queue {
     /// The next request of the search, at the search rate.
     fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
         let is_time = self.search_at.is_none_or(|at| view.now >= at);
-        let first = self.searched + 1;
-        is_time.then(|| self.next_for(Reason::Search, first, view, Round::Next)).flatten()
+        is_time.then(|| self.search(view)).flatten()
+    }
+
+    /// The next request of the search. Nodes that were heard before and are owed a stop have every
+    /// other turn.
+    fn search<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+        let one = |is_lost: bool| {
+            let last = if is_lost { self.searched_lost } else { self.searched };
+            (1..=8).find_map(|step| {
+                let index = (last + step) & 7;
+                let is_one = view.nodes[index].is_lost() == is_lost;
+                is_one.then(|| self.request(index, Reason::Search, view, Round::Next)).flatten()
+            })
+        };
+        one(!self.was_lost).or_else(|| one(self.was_lost))
     }
 
     fn discovery_or_cycle<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
@@ -205,7 +221,7 @@ impl Queue {
     fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
         let had = match reason {
             _ if round == Round::Next => 0,
-            Reason::SpeedStop | Reason::Stop if !B::ANSWERS_WRITE => 0,
+            Reason::SpeedStop | Reason::Stop | Reason::Repeat if !B::ANSWERS_WRITE => 0,
             Reason::SetPoint => self.had_set_point,
             // Directly behind its READ.
             Reason::Hold => 0,
@@ -214,11 +230,12 @@ impl Queue {
         had >> index & 1 == 0
     }
 
-    /// Advances the turns past a request that has been handed out. `exchange` is the time of one
-    /// with a node that does not answer.
+    /// Advances the turns past a request that has been handed out, to a node that `is_lost` or not.
+    /// `exchange` is the time of one with a node that does not answer.
     pub(super) fn book<B: Board>(
         &mut self,
         choice: &Choice<B>,
+        is_lost: bool,
         exchange: Duration,
         config: &MasterConfig,
         now: Instant,
@@ -243,7 +260,11 @@ impl Queue {
                 let whole = exchange.saturating_mul(100).as_micros();
                 let pause = whole.checked_div(share.into()).unwrap_or(u32::MAX);
                 self.search_at = Some(now + Duration::from_micros(pause));
-                self.searched = index;
+                self.was_lost = is_lost;
+                match is_lost {
+                    true => self.searched_lost = index,
+                    false => self.searched = index,
+                }
             }
             Reason::Cycle => {
                 self.cycle = (index + 1) & 7;

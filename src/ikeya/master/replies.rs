@@ -18,9 +18,10 @@ impl<B: Board> Master<B> {
     /// Handles a response.
     pub(super) fn hear(&mut self, id: NodeId, status: Status<B>, now: Instant) {
         let response = self.line.judge(id, &self.config, now);
+        let coast = self.config.coast;
         let node = self.node_mut(id);
         let changes = match response {
-            Response::Answer(latency) => node.hear_answer(&status, latency, now),
+            Response::Answer(latency) => node.hear_answer(&status, latency, coast, now),
             Response::Early => node.hear_outside_window(status.mode(), true),
             Response::Late => node.hear_outside_window(status.mode(), false),
         };
@@ -51,7 +52,7 @@ impl<B: Board> Master<B> {
     pub(super) fn tell_changes(&mut self, node: NodeId, changes: &Changes) {
         let it = self.node(node);
         let (mode, status, is_owed) =
-            (it.mode().on_record(), it.status(), it.order().stop().is_some());
+            (it.mode().on_record(), it.status(), it.order().stop_owed().is_some());
         if changes.is_undecided {
             self.tell(match is_owed {
                 true => MasterEvent::StopBlocked { node },
@@ -84,6 +85,9 @@ impl<B: Board> Master<B> {
         }
         if changes.settled.is_still {
             self.tell(MasterEvent::StandingStill { node });
+        }
+        if let (true, Some((status, _))) = (changes.settled.is_still_moving, status) {
+            self.tell(MasterEvent::StillMoving { node, status });
         }
     }
 }

@@ -4,7 +4,7 @@ use super::{
     config::MasterConfig,
     event::{CommandError, MasterEvent},
     line::{Line, frame_pause},
-    node::{Node, Reason, Request},
+    node::{Node, Request},
     queue::{Queue, View, index_of},
     statistics::MasterStatistics,
 };
@@ -303,10 +303,10 @@ impl<B: Board> Master<B> {
         let choice = self.queue.choose(self.view()).filter(|it| self.line.takes(it, now))?;
         self.line.send(choice, &self.config, &mut self.statistics, now)?;
         let exchange = self.line.window_time(&self.config) + self.config.turnaround_gap;
-        self.queue.book(&choice, exchange, &self.config, now);
         let node = &mut self.nodes[index_of(choice.node)];
+        self.queue.book(&choice, node.is_lost(), exchange, &self.config, now);
         if matches!(choice.request, Request::Write(_)) {
-            node.wrote();
+            node.wrote(now);
         }
         if choice.request.is_exchange() {
             node.asked(self.queue.is_discovering(), &self.config, now);
@@ -314,16 +314,12 @@ impl<B: Board> Master<B> {
         self.line.packet()
     }
 
-    /// Whether the packet handed out last is a WRITE of a set-point that the node no longer has.
-    fn has_sent_old_set_point(&self) -> bool {
-        self.line.sent().is_some_and(|sent| {
-            let choice = &sent.choice;
-            match (choice.reason, choice.request) {
-                (Reason::SetPoint | Reason::Cycle, Request::Write(target)) => {
-                    self.node(choice.node).order().target() != Some(target)
-                }
-                _ => false,
-            }
+    /// Whether the packet handed out last is a WRITE that the node would not get now: its set-point
+    /// was dropped or replaced, or its mode is in doubt or another one (I11).
+    fn has_sent_old_write(&self) -> bool {
+        self.line.sent().is_some_and(|sent| match sent.choice.request {
+            Request::Write(target) => !self.node(sent.choice.node).takes(target),
+            Request::Read => false,
         })
     }
 
@@ -411,9 +407,9 @@ impl<B: Board> Endpoint for Master<B> {
         }
     }
 
-    /// Whether it is a WRITE of a set-point that has been dropped or replaced.
+    /// Whether it is a WRITE that has been dropped or replaced, or whose mode is in doubt.
     fn is_outdated(&self) -> bool {
-        self.has_sent_old_set_point()
+        self.has_sent_old_write()
     }
 
     fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {

@@ -3,7 +3,7 @@
 use super::{
     config::MasterConfig,
     event::{Cause, CommandError, Health},
-    order::StopProgress,
+    order::{Order, StopProgress},
     role::Master,
     statistics::{MasterStatistics, NodeStatistics},
 };
@@ -55,10 +55,20 @@ impl<B: Board> Master<B> {
         self.node(node).order().progress()
     }
 
-    /// Nodes that are owed a stop, including those that have never answered.
+    /// Nodes whose stop is not confirmed, including those that have never answered.
     #[must_use]
     pub fn stops_owed(&self) -> NodeSet {
-        NodeId::ALL.into_iter().filter(|&id| self.node(id).order().stop().is_some()).collect()
+        self.nodes_with(|order| order.stop_owed().is_some())
+    }
+
+    /// Nodes whose stop is confirmed and that were not seen to be still yet.
+    #[must_use]
+    pub fn coasting(&self) -> NodeSet {
+        self.nodes_with(|order| order.coasting().is_some())
+    }
+
+    fn nodes_with(&self, has: impl Fn(&Order<B>) -> bool) -> NodeSet {
+        NodeId::ALL.into_iter().filter(|&id| has(self.node(id).order())).collect()
     }
 
     /// Counts of a node.
