@@ -1,6 +1,9 @@
 //! The bus and the rover of the scenarios, and calls that are blocking or async.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::{Cell, RefCell},
+    rc::Rc,
+};
 
 #[cfg(feature = "ucp")]
 pub(crate) use axlewire::ucp::{
@@ -108,6 +111,8 @@ pub(crate) struct Story {
     pub(crate) bus: Bus,
     pub(crate) two: Running<Slave>,
     pub(crate) five: Running<Slave>,
+    /// Whether the motor of node 2 turns as it is told.
+    pub(crate) two_obeys: Rc<Cell<bool>>,
 }
 
 impl Story {
@@ -122,8 +127,18 @@ impl Story {
         let (two, five) = (node(NodeId::N2, Mode::Velocity), node(NodeId::N5, Mode::Position));
         two.borrow_mut().role_mut().set_velocity(rps(0.5));
         five.borrow_mut().role_mut().set_position(HERE);
+        let two_obeys = Rc::new(Cell::new(true));
+        let (motor, obeys, clock) = (two.clone(), two_obeys.clone(), world.clone());
+        world.add(move || {
+            if let Ok(mut motor) = motor.try_borrow_mut() {
+                let told = motor.role().command(clock.now()).filter(|_| obeys.get());
+                if let Some(Target::Velocity(rps)) = told {
+                    motor.role_mut().set_velocity(rps);
+                }
+            }
+        });
         let bus = on(Master::new(config, world.now()), near);
-        Self { world, bus, two, five }
+        Self { world, bus, two, five, two_obeys }
     }
 
     pub(crate) fn discovered(mut self) -> Self {

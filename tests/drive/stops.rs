@@ -1,4 +1,4 @@
-//! Stops through a driver: `Ok` only for a paid one, and `drive_for` ends with one (I12).
+//! Stops through a driver: `Ok` only for a motor that is still, and `drive_for` ends with one (I12).
 
 use crate::rig::*;
 
@@ -76,14 +76,14 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
 }
 
 #[test]
-fn drive_for_keeps_the_command_for_its_time_and_ends_with_a_paid_stop() {
+fn drive_for_keeps_the_command_for_its_time_and_ends_with_a_motor_that_is_still() {
     for is_async in BOTH {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         let begin = story.world.now();
         assert_eq!(drive_for(&mut story, ms(50), is_async), Ok(()));
         let took = story.world.now() - begin;
-        assert!(took >= ms(50) && took < ms(55), "{took:?}");
-        assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::Confirmed);
+        assert!(took >= ms(70) && took < ms(80), "{took:?}");
+        assert_eq!(story.bus.role().stop_progress(NodeId::N2), StopProgress::StandingStill);
         assert_eq!(story.told_two(), STOPPED);
         let writes = story.two.borrow().role().statistics().writes;
         assert!(writes > 20, "only {writes} writes: the command is not repeated");
@@ -111,15 +111,15 @@ fn drive_for_is_a_constant_sign_of_life_even_on_a_quiet_bus() {
 }
 
 #[test]
-fn drive_for_through_errors_of_the_port_ends_with_a_paid_stop_and_returns_the_error() {
+fn drive_for_through_errors_of_the_port_ends_with_a_motor_that_is_still_and_returns_the_error() {
     for (after, span) in [(0, 5), (1, 5), (20, 1), (20, 5)] {
         for is_async in BOTH {
             let mut story = Story::new(MasterConfig::direct()).discovered();
             let begin = story.world.now();
             fail_port(&story, begin + ms(after), ms(span));
-            let driven = drive_for(&mut story, ms(50), is_async);
+            let driven = drive_for(&mut story, ms(100), is_async);
             assert_eq!(driven, Err(DriveError::Port(Unplugged)), "{after} ms");
-            assert!(story.world.now() < begin + ms(45), "it kept driving");
+            assert!(story.world.now() < begin + ms(60), "it kept driving");
             assert_eq!(story.bus.role().stops_owed(), NodeSet::NONE);
             assert_eq!(story.told_two(), STOPPED);
         }
@@ -148,7 +148,9 @@ fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
         let drive = story.bus.drive_for_async(NodeId::N2, rps(3.0), ms(1));
         let is_done = story.world.poll_times(polls, drive).is_some();
         if polls > 0 && !is_done {
-            assert_eq!(story.bus.role().stops_owed(), only(NodeId::N2), "after {polls} polls");
+            let progress = story.bus.role().stop_progress(NodeId::N2);
+            let is_owed = matches!(progress, StopProgress::Owed | StopProgress::Confirmed);
+            assert!(is_owed, "{progress:?} after {polls} polls");
         }
         assert_eq!(story.bus.role().set_point(NodeId::N2).filter(|it| Some(*it) != STOPPED), None);
         // Any call.
@@ -187,6 +189,7 @@ fn a_motor_that_moves_on_after_its_confirmed_stop_is_still_moving() {
         for is_async in BOTH {
             // Node 2 reports that it still turns at 0.5 rps.
             let mut story = Story::new(config).discovered();
+            story.two_obeys.set(false);
             let begin = story.world.now();
             assert_eq!(stop(&mut story, is_async), Err(DriveError::StillMoving(only(NodeId::N2))));
             let took = story.world.now() - begin;

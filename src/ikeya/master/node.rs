@@ -484,6 +484,7 @@ impl<B: Board> Node<B> {
         coast: Duration,
         now: Instant,
     ) -> Changes {
+        self.order.end_exchange();
         let was = self.health.replace(Health::Online);
         (self.strikes, self.attempt, self.guarded_until) = (0, 0, None);
         let decision = self.mode.decide(status.mode());
@@ -518,6 +519,7 @@ impl<B: Board> Node<B> {
         if cause == Cause::Damaged {
             count_apart(&mut self.statistics.crc_errors);
         }
+        self.order.end_exchange();
         self.order.missed();
         let mut changes = Changes { is_undecided: self.mode.miss(), ..Changes::default() };
         if !self.is_online() {

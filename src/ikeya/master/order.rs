@@ -27,8 +27,8 @@ const REPEAT_TIME: Duration = Duration::from_millis(20);
 pub(super) struct Order<B: Board> {
     state: State<B>,
     confirm: Confirm,
-    /// Whether the node has had a WRITE since it was last asked: it is read before the order is
-    /// repeated.
+    /// Whether the node has had a WRITE since its last exchange ended: it is read before the order
+    /// is repeated.
     is_written: bool,
     /// Whether the node has ever had a WRITE from this master.
     was_written: bool,
@@ -222,7 +222,7 @@ impl<B: Board> Order<B> {
         }
     }
 
-    /// Whether the node has had a WRITE since it was last asked.
+    /// Whether the node has had a WRITE since its last exchange ended.
     pub(super) const fn is_written(&self) -> bool {
         self.is_written
     }
@@ -305,7 +305,6 @@ impl<B: Board> Order<B> {
 
     /// The node has been asked.
     pub(super) fn asked(&mut self, is_online: bool) {
-        self.is_written = false;
         if let State::Stop(stop) = &mut self.state {
             stop.is_asked = true;
             stop.lost_attempts = stop.lost_attempts.saturating_add((!is_online).into());
@@ -317,6 +316,11 @@ impl<B: Board> Order<B> {
         if let State::Stop(stop) = &mut self.state {
             stop.lost_attempts = stop.lost_attempts.saturating_sub((!is_online).into());
         }
+    }
+
+    /// An exchange with the node has ended, with an answer or without.
+    pub(super) const fn end_exchange(&mut self) {
+        self.is_written = false;
     }
 
     /// The node has not answered: the WRITE may have been lost too, and a stop is repeated.
