@@ -114,19 +114,31 @@
 //!   set-points are refused, and a stop waits, unless it holds a position, measured after the stop
 //!   was requested, that a velocity node would read as standstill (rotation 0..=12287). Six
 //!   exchanges without a decision produce an event, and the node is then read at the search rate.
-//! * **I12** A stop is owed from the call until two stop WRITEs have each been followed by an
-//!   answer from the node in its mode. Until then it is repeated, whatever the polling; it survives
-//!   abnormal nodes, port errors and a full event queue, a release does not cancel it, and
-//!   set-points are refused. Standstill (below 0.05 rps, or two positions within 8 counts) is a
-//!   second event. Ids that have never answered are read first. A node that becomes abnormal while
-//!   under a set-point is owed a stop, because slaves keep their last command.
+//!   A WRITE of which only a part has left when a doubt arises is given up. A mode that changes
+//!   owes a stop to every node that has ever had a WRITE, whatever was stopped or released since:
+//!   a repeated 0 rps may have been read as "go to 0".
+//! * **I12** A stop is owed from the call until the node is *seen to be still*. It is *confirmed*
+//!   once two stop WRITEs have each been followed by an answer from the node in its mode; until
+//!   then set-points are refused. The node is *still* once two answers behind a stop WRITE, at
+//!   least 20 ms apart, both show less than 0.05 rps, or positions within 8 counts of each other.
+//!   Until then, or until a new set-point, the stop is written with every reading, at least every
+//!   20 ms, whatever the polling: an answer shows that the READ was heard, not the WRITE. A stop
+//!   survives abnormal nodes, port errors and a full event queue, and a release does not cancel it.
+//!   A node that is confirmed and still moves after [`MasterConfig::coast`] is reported once. Ids
+//!   that have never answered are read first. A node that becomes abnormal while under a set-point
+//!   is owed a stop, because slaves keep their last command.
 //! * **I13** Stops of nodes that answer go first: velocity WRITEs, then position nodes in turn. An
-//!   abnormal node gets one attempt at once and further attempts at the search rate. Then come new
-//!   set-points, in turn, then a discovery, then the cycle. A master can have a dead-man.
+//!   abnormal node gets one attempt at once. From then on a velocity node gets a blind stop WRITE
+//!   after every exchange, at most every 20 ms, and a position node its stop after its next good
+//!   answer. READs of nodes that were heard before and are owed a stop take every other turn of the
+//!   search, and an idle line belongs to the search: 0 rps reaches a velocity node within 50 ms
+//!   after its cable is back. Then come new set-points, in turn, then a discovery, then the cycle.
+//!   A master can have a dead-man.
 //! * **I14** A slave drops an answer when more bytes arrived before it was sent, or when it is too
 //!   late. On two wires it also follows the answers of other nodes.
 //!
 //! [`DipSwitch`]: slave::DipSwitch
+//! [`MasterConfig::coast`]: master::MasterConfig::coast
 //! [`MasterConfig::hold_age`]: master::MasterConfig::hold_age
 //! [`Schedule`]: master::Schedule
 

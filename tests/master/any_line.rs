@@ -150,7 +150,8 @@ impl Watched {
         for node in NodeId::ALL {
             if self.owed.contains(node) && !owed.contains(node) {
                 let progress = self.master.stop_progress(node);
-                let is_paid = matches!(progress, StopProgress::Confirmed | StopProgress::StandingStill);
+                let is_paid =
+                    matches!(progress, StopProgress::Confirmed | StopProgress::StandingStill);
                 assert!(is_paid || self.order[index(node)].is_some(), "{node}: {progress:?}");
             }
             if owed.contains(node) {

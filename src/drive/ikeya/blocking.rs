@@ -45,7 +45,7 @@ where
     /// and port errors, even if only its receiver failed. After any of them but a refusal the
     /// command is withdrawn: neither it nor its rest is sent later, and **the node is owed a stop**
     /// (ruling I12), because it may have heard the command. Keep calling the driver, or call
-    /// [`stop`](Self::stop), until the stop is paid: until then, set-points are refused with
+    /// [`stop`](Self::stop), until the stop is confirmed: until then, set-points are refused with
     /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
     pub fn set_velocity(
         &mut self,

@@ -23,7 +23,7 @@ use crate::{
 const EVENTS: usize = 16;
 
 /// The master: discovers nodes, repeats the latest set-points, reads every node in turn, sends
-/// stops until they are confirmed, and accepts only genuine replies.
+/// stops until the motors are seen to be still, and accepts only genuine replies.
 ///
 /// It has no clock and no port; see [`Endpoint`] for what to call when. A cycle visits every online
 /// node: a WRITE if it has a set-point, then a READ (I8). With
@@ -33,18 +33,20 @@ const EVENTS: usize = 16;
 /// # Stops
 ///
 /// A stop is a debt (I12). As soon as [`stop`](Self::stop) is called, the set-point is gone and new
-/// ones are refused. The stop is repeated until it is paid: two of its WRITEs have each been
-/// followed by an answer from the node, whatever happens on the line, in the port or in the event
-/// queue. [`MasterEvent::Stopped`] reports that, and [`MasterEvent::StandingStill`] follows once a
-/// measurement shows a standstill.
+/// ones are refused, until the stop is confirmed: two of its WRITEs have each been followed by an
+/// answer from the node ([`MasterEvent::Stopped`]). An answer shows that the READ was heard, not
+/// the WRITE, so the stop is repeated until two answers at least 20 ms apart show a motor that is
+/// still ([`MasterEvent::StandingStill`]), whatever happens on the line, in the port or in the
+/// event queue. A motor that still moves after [`MasterConfig::coast`] is reported
+/// ([`MasterEvent::StillMoving`]), and stopped further.
 ///
 /// * A velocity node is told 0 rps.
 /// * A position node is read, and told to hold the position of that answer (I6). It may move back
 ///   by the distance it has run since the measurement: the speed times the time from the answer to
 ///   the WRITE. The WRITE is sent next, so that time is about 0.2 ms on a dedicated line. A USB
 ///   adapter that delays answers adds its delay.
-/// * An abnormal node gets one attempt at once and further attempts at the search rate, blind for a
-///   velocity node.
+/// * A velocity node that is abnormal is told 0 rps blind, every 20 ms; a position node is read in
+///   every other turn of the search, and stopped when it answers (I13).
 /// * A node that becomes abnormal while under a set-point is owed a stop; so is every node under a
 ///   set-point after [`MasterConfig::dead_man`].
 ///
@@ -65,7 +67,7 @@ const EVENTS: usize = 16;
 ///
 /// An answer in a mode other than the one on record, even a late one, puts the mode in doubt (I11).
 /// The node is read again at once, and the next answer decides. A change of mode ends the
-/// set-point, and the node is owed a stop if it had any command, since a WRITE in flight is
+/// set-point, and the node is owed a stop if it has ever had a command, since a WRITE may have been
 /// read in the new mode. While in doubt the node gets no WRITE, with one exception: a stop may
 /// write a position that a velocity node would read as standstill. A switch moved while a command
 /// is in flight cannot be detected: move it only while the machine is at rest.
@@ -163,10 +165,12 @@ impl<B: Board> Master<B> {
     }
 
     /// Stops a node: 0 rps, or *hold where you are*, never "go to 0" (I6). The stop is owed until
-    /// [`MasterEvent::Stopped`] (I12).
+    /// the motor is seen to be still ([`MasterEvent::StandingStill`], I12); see
+    /// [`stop_progress`](Self::stop_progress).
     ///
-    /// A node that has never answered is read first. A repeated call joins the stop that is owed. A
-    /// call after the stop is paid has it confirmed again, holding the same position.
+    /// A node that has never answered is read first. A repeated call joins the stop that is owed,
+    /// and [`MasterConfig::coast`] begins anew. A call after the node is still begins a new stop,
+    /// holding the same position.
     pub fn stop(&mut self, node: NodeId, now: Instant) {
         self.sign_of_life(now);
         self.owe_stop(node);
@@ -189,8 +193,8 @@ impl<B: Board> Master<B> {
         self.sign_of_life(now);
     }
 
-    /// Stops sending set-points to a node. The node keeps the last one it received. A stop that is
-    /// owed remains owed.
+    /// Stops sending set-points to a node. The node keeps the last one it received. A stop goes on
+    /// until the node is still.
     pub fn release(&mut self, node: NodeId) {
         let changes = self.node_mut(node).release();
         self.tell_changes(node, &changes);

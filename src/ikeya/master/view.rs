@@ -95,8 +95,8 @@ impl<B: Board> Master<B> {
         self.line.decoder().counters()
     }
 
-    /// The set-point that is repeated for a node, or that of its paid stop; `None` without one and
-    /// while a stop is owed.
+    /// The set-point that is repeated for a node, or that of its confirmed stop; `None` without one and
+    /// while a stop is not confirmed.
     #[must_use]
     pub fn set_point(&self, node: NodeId) -> Option<Target<B>> {
         self.node(node).order().target()
@@ -154,8 +154,8 @@ impl<B: Board> Master<B> {
         self.attempts_bound(round.saturating_mul(16))
     }
 
-    /// Time within which a stop of nodes that answer is paid, with room for lost packets. A call
-    /// that waits for stops gives up after it.
+    /// Time within which a stop of nodes that answer is confirmed, with room for lost packets. A
+    /// call that waits for stops gives up after it.
     ///
     /// It is four times [`MasterConfig::attempts`] times the longest time between two reads of a
     /// node while stops are owed: the guard, an exchange with every other node and with one that is
