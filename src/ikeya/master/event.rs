@@ -188,3 +188,71 @@ impl Health {
         !matches!(self, Self::Abnormal)
     }
 }
+
+/// A change that a node reports to its role, which tells the application.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
+    /// Its mode stays in doubt.
+    Undecided,
+    /// It has answered for the first time.
+    Discovered,
+    /// Its health is another one.
+    Health,
+    /// A READ was given up.
+    Failed,
+    /// Its confirmation was given up with that READ.
+    Unconfirmed,
+    /// Its confirmation was given up with its set-point.
+    Dropped,
+    /// It has answered in another mode again.
+    Mode,
+    /// It has answered in its mode.
+    Answered,
+    /// The WRITE to be confirmed was followed by an answer.
+    Confirmed,
+    /// Its stop is confirmed.
+    Stopped,
+    /// It is seen to be still.
+    Still,
+    /// It moves although its stop was confirmed long ago.
+    StillMoving,
+}
+
+impl Change {
+    /// All of them, in the order in which they are told.
+    pub(super) const ALL: [Self; 12] = [
+        Self::Undecided,
+        Self::Discovered,
+        Self::Health,
+        Self::Failed,
+        Self::Unconfirmed,
+        Self::Dropped,
+        Self::Mode,
+        Self::Answered,
+        Self::Confirmed,
+        Self::Stopped,
+        Self::Still,
+        Self::StillMoving,
+    ];
+}
+
+/// The changes of a node in one step, one bit each.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Changes(u16);
+
+impl Changes {
+    pub(super) const NONE: Self = Self(0);
+
+    /// These, and one more if it `has_happened`.
+    pub(super) fn with(self, change: Change, has_happened: bool) -> Self {
+        Self(self.0 | u16::from(has_happened) << change as u16)
+    }
+
+    pub(super) const fn and(self, others: Self) -> Self {
+        Self(self.0 | others.0)
+    }
+
+    pub(super) const fn has(self, change: Change) -> bool {
+        self.0 >> change as u16 & 1 != 0
+    }
+}

@@ -2,9 +2,9 @@
 
 use super::{
     config::{MasterConfig, Polling},
-    event::{Cause, CommandError, Health},
+    event::{Cause, Change, Changes, CommandError, Health},
     mode::{Decision, KnownMode},
-    order::{Order, Settled, Stop},
+    order::{Order, Stop},
     statistics::NodeStatistics,
 };
 use crate::{
@@ -113,34 +113,6 @@ impl<B: Board> Request<B> {
     }
 }
 
-/// What has changed for a node, for the role to tell the application, in this order.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Changes {
-    /// Its mode stays in doubt.
-    pub(super) is_undecided: bool,
-    /// It has answered for the first time.
-    pub(super) is_discovered: bool,
-    /// Its health is another one.
-    pub(super) health: Option<Health>,
-    /// A READ was given up.
-    pub(super) failed: Option<Cause>,
-    /// Its confirmation is given up.
-    pub(super) not_confirmed: Option<Cause>,
-    /// It has answered in another mode again.
-    pub(super) is_mode_changed: bool,
-    /// It has answered in its mode.
-    pub(super) is_answered: bool,
-    /// What that answer has settled.
-    pub(super) settled: Settled,
-}
-
-impl Changes {
-    /// The confirmation ends because the set-point was dropped.
-    fn dropped(is_unconfirmed: bool) -> Self {
-        Self { not_confirmed: is_unconfirmed.then_some(Cause::Dropped), ..Self::default() }
-    }
-}
-
 /// Commands.
 impl<B: Board> Node<B> {
     // In line it would take 90 more bytes of flash.
@@ -190,7 +162,7 @@ impl<B: Board> Node<B> {
     }
 
     pub(super) fn release(&mut self) -> Changes {
-        Changes::dropped(self.order.release())
+        Changes::NONE.with(Change::Dropped, self.order.release())
     }
 
     /// Makes it owed a stop, unless it already is.
@@ -199,10 +171,8 @@ impl<B: Board> Node<B> {
         let is_certain = self.is_online() && !self.mode.is_in_doubt();
         let measured = self.status.filter(|&(_, at)| now - at < hold_age).map(|it| it.0);
         let is_unconfirmed = self.order.owe_stop(is_certain, measured, now);
-        Changes {
-            is_undecided: is_new && self.mode.is_undecided(),
-            ..Changes::dropped(is_unconfirmed)
-        }
+        let changes = Changes::NONE.with(Change::Dropped, is_unconfirmed);
+        changes.with(Change::Undecided, is_new && self.mode.is_undecided())
     }
 
     pub(super) fn confirm(&mut self, node: NodeId) -> Result<(), CommandError> {
@@ -467,13 +437,14 @@ impl<B: Board> Node<B> {
         count_apart(counter);
         match self.mode.differs_from(mode) {
             true => self.doubt_mode(),
-            false => Changes::default(),
+            false => Changes::NONE,
         }
     }
 
     fn doubt_mode(&mut self) -> Changes {
         count_apart(&mut self.statistics.other_mode);
-        Changes::dropped(self.mode.doubt() && self.order.doubt())
+        let is_unconfirmed = self.mode.doubt() && self.order.doubt();
+        Changes::NONE.with(Change::Dropped, is_unconfirmed)
     }
 
     /// An answer in its window, this long after the end of the request.
@@ -488,28 +459,30 @@ impl<B: Board> Node<B> {
         let was = self.health.replace(Health::Online);
         (self.strikes, self.attempt, self.guarded_until) = (0, 0, None);
         let decision = self.mode.decide(status.mode());
-        let mut changes = match decision {
-            Decision::Agreed => Changes::default(),
-            Decision::Doubtful => self.doubt_mode(),
+        let changes = Changes::NONE
+            .with(Change::Discovered, was.is_none())
+            .with(Change::Health, was.is_some_and(|was| was != Health::Online));
+        let changes = match decision {
+            Decision::Agreed => changes,
+            Decision::Doubtful => {
+                let doubted = self.doubt_mode();
+                self.order.measure(status, now);
+                return changes.and(doubted);
+            }
             Decision::Settled => {
                 self.order.end_doubt();
-                Changes::default()
+                changes
             }
-            Decision::Changed => Changes::dropped(self.order.change_mode()),
+            Decision::Changed => {
+                let is_unconfirmed = self.order.change_mode();
+                changes.with(Change::Dropped, is_unconfirmed).with(Change::Mode, true)
+            }
         };
-        changes.is_discovered = was.is_none();
-        changes.health = was.filter(|&was| was != Health::Online).map(|_| Health::Online);
-        if decision == Decision::Doubtful {
-            self.order.measure(status, now);
-            return changes;
-        }
         self.statistics.reply(latency);
         self.has_answered = true;
         self.status = Some((*status, now));
-        changes.is_mode_changed = decision == Decision::Changed;
-        changes.is_answered = true;
-        changes.settled = self.order.answered(status, coast, now);
-        changes
+        let settled = self.order.answered(status, coast, now);
+        changes.with(Change::Answered, true).and(settled)
     }
 
     /// Its window has closed without its answer. A late one may come until the guard is over.
@@ -521,7 +494,7 @@ impl<B: Board> Node<B> {
         }
         self.order.end_exchange();
         self.order.missed();
-        let mut changes = Changes { is_undecided: self.mode.miss(), ..Changes::default() };
+        let changes = Changes::NONE.with(Change::Undecided, self.mode.miss());
         if !self.is_online() {
             return changes; // looked for, and not found
         }
@@ -530,16 +503,18 @@ impl<B: Board> Node<B> {
         let is_abnormal = self.strikes >= STRIKES;
         let health = if is_abnormal { Health::Abnormal } else { Health::Suspect(self.strikes) };
         self.health = Some(health);
-        changes.health = Some(health);
-        if is_abnormal || self.attempt >= config.attempts.max(1) {
+        let is_failed = is_abnormal || self.attempt >= config.attempts.max(1);
+        let is_unconfirmed = is_failed && self.order.end_confirmation();
+        if is_failed {
             (self.attempt, self.last_failure, self.has_failed) = (0, Some(cause), true);
             count_apart(&mut self.statistics.failures);
-            changes.failed = Some(cause);
-            changes.not_confirmed = self.order.end_confirmation().then_some(cause);
         }
         if is_abnormal {
             self.order.lose(config.stops_abnormal);
         }
         changes
+            .with(Change::Health, true)
+            .with(Change::Failed, is_failed)
+            .with(Change::Unconfirmed, is_unconfirmed)
     }
 }

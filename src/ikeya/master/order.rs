@@ -1,6 +1,7 @@
 //! Orders: what a node has been told, whether it is repeated, and the stop that it is owed (I6, I8,
 //! I12).
 
+use super::event::{Change, Changes};
 use crate::{
     ikeya::{
         board::{Board, Status, Target},
@@ -62,19 +63,6 @@ enum Confirm {
     AfterAnswer,
 }
 
-/// What a good answer has settled.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Settled {
-    /// The WRITE to be confirmed was followed by an answer.
-    pub(super) is_confirmed: bool,
-    /// The stop is confirmed.
-    pub(super) is_stopped: bool,
-    /// The node is seen to be still.
-    pub(super) is_still: bool,
-    /// The node has been moving for too long after its stop was confirmed.
-    pub(super) is_still_moving: bool,
-}
-
 impl<B: Board> Order<B> {
     pub(super) const NONE: Self = Self {
         state: State::None,
@@ -122,7 +110,7 @@ impl<B: Board> Order<B> {
             (_, Some(Status::Position(position))) => (Some(position), Some(now)),
             _ => (None, None),
         };
-        self.state = State::Stop(Stop::new(hold, measured_at));
+        self.begin_stop(hold, measured_at);
         self.end_confirmation()
     }
 
@@ -130,13 +118,17 @@ impl<B: Board> Order<B> {
     pub(super) fn lose(&mut self, is_stopped: bool) {
         let is_owed = self.stop().is_some_and(|stop| stop.stage != Stage::Still);
         let is_owed = is_owed || (is_stopped && self.is_commanded());
-        self.state = if is_owed {
-            State::Stop(Stop::new(None, None))
-        } else if self.is_set_point() {
-            State::Released
+        if is_owed {
+            self.begin_stop(None, None);
         } else {
-            State::None
-        };
+            self.state = if self.is_set_point() { State::Released } else { State::None };
+        }
+    }
+
+    // In line it would take 300 more bytes of flash.
+    #[inline(never)]
+    const fn begin_stop(&mut self, hold: Option<B::Position>, measured_at: Option<Instant>) {
+        self.state = State::Stop(Stop::new(hold, measured_at));
     }
 
     /// The mode is in doubt: what was measured does not count, and a position that is held must be
@@ -144,12 +136,8 @@ impl<B: Board> Order<B> {
     pub(super) fn doubt(&mut self) -> bool {
         if let State::Stop(stop) = &mut self.state {
             let is_held = stop.hold.is_some() && !stop.is_released;
-            match stop.stage {
-                Stage::Owed | Stage::Confirmed => stop.restart(),
-                Stage::Still if is_held => *stop = Stop::new(None, None),
-                Stage::Still => {}
-            }
-            if stop.stage == Stage::Owed {
+            if stop.stage != Stage::Still || is_held {
+                stop.restart();
                 return self.end_confirmation();
             }
         }
@@ -177,7 +165,7 @@ impl<B: Board> Order<B> {
         let is_commanded = self.was_written || self.is_commanded();
         match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => stop.restart(),
-            state if is_commanded => *state = State::Stop(Stop::new(None, None)),
+            _ if is_commanded => self.begin_stop(None, None),
             state => *state = State::None,
         }
         self.end_confirmation()
@@ -344,16 +332,16 @@ impl<B: Board> Order<B> {
         status: &Status<B>,
         coast: Duration,
         now: Instant,
-    ) -> Settled {
-        let mut settled = match &mut self.state {
+    ) -> Changes {
+        let settled = match &mut self.state {
             State::Stop(stop) => stop.answered(status, coast, now),
-            _ => Settled::default(),
+            _ => Changes::NONE,
         };
-        if self.confirm == Confirm::AfterAnswer {
+        let is_confirmed = self.confirm == Confirm::AfterAnswer;
+        if is_confirmed {
             self.confirm = Confirm::Unasked;
-            settled.is_confirmed = true;
         }
-        settled
+        settled.with(Change::Confirmed, is_confirmed)
     }
 }
 
@@ -470,13 +458,10 @@ impl<B: Board> Stop<B> {
     /// Discards everything measured or confirmed so far: the mode is, or was, in doubt.
     #[inline(never)]
     fn restart(&mut self) {
-        *self = Self {
-            is_asked: self.is_asked,
-            is_released: self.is_released,
-            lost_attempts: self.lost_attempts,
-            patience: self.patience,
-            ..Self::new(None, None)
-        };
+        (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
+        (self.hold, self.measured_at) = (None, None);
+        (self.is_written, self.writes, self.written_at) = (false, 0, None);
+        (self.is_new, self.is_told) = (false, false);
     }
 
     fn wrote(&mut self, now: Instant) {
@@ -512,25 +497,25 @@ impl<B: Board> Stop<B> {
     }
 
     /// Takes a good answer of the node in its mode.
-    fn answered(&mut self, status: &Status<B>, coast: Duration, now: Instant) -> Settled {
-        let mut settled = Settled::default();
+    fn answered(&mut self, status: &Status<B>, coast: Duration, now: Instant) -> Changes {
+        let mut settled = Changes::NONE;
         self.measure(status, now);
         if core::mem::take(&mut self.is_written) {
             self.followed = self.followed.saturating_add(1);
         }
         if self.stage == Stage::Owed && self.followed >= CONFIRMATIONS {
             (self.stage, self.confirmed_at) = (Stage::Confirmed, now);
-            settled.is_stopped = true;
+            settled = settled.with(Change::Stopped, true);
         }
         // An answer to a READ in front of all stop WRITEs shows nothing.
         let is_still = self.followed > 0 && self.see(status, now);
         if self.stage == Stage::Confirmed {
             if is_still {
                 self.stage = Stage::Still;
-                settled.is_still = true;
+                settled = settled.with(Change::Still, true);
             } else if !self.is_told && now - self.confirmed_at >= coast {
                 self.is_told = true;
-                settled.is_still_moving = true;
+                settled = settled.with(Change::StillMoving, true);
             }
         }
         settled

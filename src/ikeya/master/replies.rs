@@ -1,9 +1,8 @@
 //! Replies and silences: what they change, and what the application is told of it.
 
 use super::{
-    event::MasterEvent,
+    event::{Cause, Change, Changes, MasterEvent},
     line::{Response, Window},
-    node::Changes,
     role::Master,
 };
 use crate::{
@@ -25,7 +24,7 @@ impl<B: Board> Master<B> {
             Response::Early => node.hear_outside_window(status.mode(), true),
             Response::Late => node.hear_outside_window(status.mode(), false),
         };
-        self.tell_changes(id, &changes);
+        self.tell_changes(id, changes);
         if matches!(response, Response::Answer(_)) {
             self.settle_discovery();
         }
@@ -36,7 +35,7 @@ impl<B: Board> Master<B> {
         let Some(window) = window else { return };
         let (config, guard) = (self.config, window.deadline + self.config.late_guard);
         let changes = self.node_mut(window.node).miss(window.cause(), &config, guard);
-        self.tell_changes(window.node, &changes);
+        self.tell_changes(window.node, changes);
         self.settle_discovery();
     }
 
@@ -49,45 +48,37 @@ impl<B: Board> Master<B> {
 
     /// Tells the application what has changed for a node.
     #[inline(never)]
-    pub(super) fn tell_changes(&mut self, node: NodeId, changes: &Changes) {
+    pub(super) fn tell_changes(&mut self, node: NodeId, changes: Changes) {
+        for change in Change::ALL {
+            if changes.has(change) {
+                if let Some(event) = self.event(node, change) {
+                    match change {
+                        Change::Answered => self.events.push_frequent(event),
+                        _ => self.events.push(event),
+                    }
+                }
+            }
+        }
+    }
+
+    fn event(&self, node: NodeId, change: Change) -> Option<MasterEvent<B>> {
         let it = self.node(node);
-        let (mode, status, is_owed) =
-            (it.mode().on_record(), it.status(), it.order().stop_owed().is_some());
-        if changes.is_undecided {
-            self.tell(match is_owed {
-                true => MasterEvent::StopBlocked { node },
-                false => MasterEvent::ModeInDoubt { node },
-            });
-        }
-        if let (true, Some(mode)) = (changes.is_discovered, mode) {
-            self.tell(MasterEvent::Discovered { node, mode });
-        }
-        if let Some(health) = changes.health {
-            self.tell(MasterEvent::Health { node, health });
-        }
-        if let Some(cause) = changes.failed {
-            self.tell(MasterEvent::ReadFailed { node, cause });
-        }
-        if let Some(cause) = changes.not_confirmed {
-            self.tell(MasterEvent::NotConfirmed { node, cause });
-        }
-        if let (true, Some(mode)) = (changes.is_mode_changed, mode) {
-            self.tell(MasterEvent::ModeChanged { node, mode });
-        }
-        if let (true, Some((status, _))) = (changes.is_answered, status) {
-            self.events.push_frequent(MasterEvent::Status { node, status });
-        }
-        if changes.settled.is_confirmed {
-            self.tell(MasterEvent::Confirmed { node });
-        }
-        if changes.settled.is_stopped {
-            self.tell(MasterEvent::Stopped { node });
-        }
-        if changes.settled.is_still {
-            self.tell(MasterEvent::StandingStill { node });
-        }
-        if let (true, Some((status, _))) = (changes.settled.is_still_moving, status) {
-            self.tell(MasterEvent::StillMoving { node, status });
-        }
+        Some(match change {
+            Change::Undecided if it.order().stop_owed().is_some() => {
+                MasterEvent::StopBlocked { node }
+            }
+            Change::Undecided => MasterEvent::ModeInDoubt { node },
+            Change::Discovered => MasterEvent::Discovered { node, mode: it.mode().on_record()? },
+            Change::Health => MasterEvent::Health { node, health: it.health()? },
+            Change::Failed => MasterEvent::ReadFailed { node, cause: it.last_failure()? },
+            Change::Unconfirmed => MasterEvent::NotConfirmed { node, cause: it.last_failure()? },
+            Change::Dropped => MasterEvent::NotConfirmed { node, cause: Cause::Dropped },
+            Change::Mode => MasterEvent::ModeChanged { node, mode: it.mode().on_record()? },
+            Change::Answered => MasterEvent::Status { node, status: it.status()?.0 },
+            Change::Confirmed => MasterEvent::Confirmed { node },
+            Change::Stopped => MasterEvent::Stopped { node },
+            Change::Still => MasterEvent::StandingStill { node },
+            Change::StillMoving => MasterEvent::StillMoving { node, status: it.status()?.0 },
+        })
     }
 }

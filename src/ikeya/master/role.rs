@@ -197,7 +197,7 @@ impl<B: Board> Master<B> {
     /// until the node is still.
     pub fn release(&mut self, node: NodeId) {
         let changes = self.node_mut(node).release();
-        self.tell_changes(node, &changes);
+        self.tell_changes(node, changes);
     }
 
     /// Requests a confirmation: [`MasterEvent::Confirmed`] comes once the node has answered a READ
@@ -237,7 +237,7 @@ impl<B: Board> Master<B> {
     fn owe_stop(&mut self, id: NodeId) {
         let (now, hold_age) = (self.now, self.config.hold_age);
         let changes = self.node_mut(id).owe_stop(hold_age, now);
-        self.tell_changes(id, &changes);
+        self.tell_changes(id, changes);
     }
 }
 
