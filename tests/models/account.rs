@@ -10,9 +10,6 @@ use super::{
     rulings::{Aim, HOLD_PATIENCE, Order, judge},
 };
 
-/// Count of a node at its other place.
-pub(crate) const ODD_PLACE: i16 = 200;
-
 /// Number of windows without the answer after which a node is abnormal.
 pub(crate) const STRIKES: u8 = 3;
 
@@ -52,8 +49,8 @@ pub(crate) struct Account {
     pub(crate) is_under_order: bool,
     /// The last order was a stop.
     pub(crate) is_halted: bool,
-    /// The mode has changed since: the stop's last WRITE may have been read in the new one.
-    pub(crate) is_halted_in_other_mode: bool,
+    /// The node has ever been sent a WRITE.
+    was_written: bool,
     /// Toggles with each first stop after a set-point, so that a position shows for which stop it
     /// was measured.
     pub(crate) is_odd_stop: bool,
@@ -63,15 +60,18 @@ pub(crate) struct Account {
     /// A stop WRITE has been sent and nothing was missed since.
     pub(crate) is_stop_written: bool,
     pub(crate) paid: u8,
+    /// Since when it has to become still: the stop is confirmed, or was asked for again.
+    pub(crate) coasting_since: Option<Instant>,
+    /// It was seen to be still.
+    pub(crate) is_still: bool,
+    /// When the last stop WRITE was sent.
+    pub(crate) stopped_at: Option<Instant>,
     /// The position that the node was told to hold, and whether another one is allowed.
-    pub(crate) hold: Option<(i16, i16)>,
+    hold: Option<Position>,
     pub(crate) may_hold_anew: bool,
-    /// How often the node has measured a position for this stop, and when each of the two places
-    /// was last heard.
+    /// How often the node has measured a position for this stop, and when the last ones were heard.
     places_heard: u32,
-    places_heard_at: [Option<Instant>; 2],
-    /// Stop WRITEs since the call that the node may have missed or forgotten.
-    pub(crate) stops_missed: u8,
+    places_heard_at: [Option<(i16, Instant)>; 4],
     pub(crate) confirm: Confirm,
     /// The node must not be asked before this time.
     pub(crate) guard_until: Option<Instant>,
@@ -95,8 +95,7 @@ impl Account {
         let number = 3 - self.last_target.max(1);
         (self.target, self.last_target, self.is_target_new) = (Some(number), number, true);
         (self.is_under_order, self.is_halted, self.hold) = (true, false, None);
-        self.is_halted_in_other_mode = false;
-        self.waits = 0;
+        (self.coasting_since, self.is_still, self.waits) = (None, false, 0);
     }
 
     /// The set-point is dropped.
@@ -107,12 +106,23 @@ impl Account {
         }
     }
 
+    /// The application asks for a stop; it joins one whose node is not still yet.
+    pub(crate) fn stop(&mut self, now: Instant) {
+        match self.coasting_since {
+            Some(_) => {
+                self.drop_target();
+                self.coasting_since = Some(now);
+            }
+            None => self.owe(),
+        }
+    }
+
     /// The node is owed a stop, if it is not already.
     pub(crate) fn owe(&mut self) {
         self.drop_target();
         if !self.is_halted {
             (self.is_odd_stop, self.hold, self.may_hold_anew) = (!self.is_odd_stop, None, true);
-            (self.places_heard, self.places_heard_at) = (0, [None; 2]);
+            (self.places_heard, self.places_heard_at) = (0, [None; 4]);
         }
         (self.is_halted, self.is_under_order) = (true, false);
         self.owe_again();
@@ -120,17 +130,20 @@ impl Account {
 
     /// The same stop is owed, or owed again.
     pub(crate) fn owe_again(&mut self) {
-        self.is_halted_in_other_mode = false;
+        (self.coasting_since, self.is_still) = (None, false);
         if !self.is_owed {
-            (self.is_owed, self.paid, self.stops_missed, self.waits) = (true, 0, 0, 0);
+            (self.is_owed, self.paid, self.stopped_at, self.waits) = (true, 0, None, 0);
             (self.is_stop_due, self.is_stop_written) = (true, false);
         }
     }
 
-    /// All payments and measurements are discarded.
+    /// All payments and measurements are discarded, unless the node is still.
     fn restart_stop(&mut self) {
+        if self.coasting_since.is_some() {
+            self.owe();
+        }
         (self.paid, self.is_stop_written, self.is_stop_due) = (0, false, self.is_owed);
-        self.may_hold_anew = true;
+        (self.may_hold_anew, self.stopped_at) = (true, None);
     }
 
     /// A WRITE is handed out: checks whether it is allowed.
@@ -153,19 +166,22 @@ impl Account {
         judge(&write, is_three, self.record, self.is_in_doubt, order)?;
         let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
         if is_hold {
-            if self.hold.is_some_and(|hold| hold != write.place) && !self.may_hold_anew {
+            let place = Position::new(write.place.0, write.place.1);
+            if self.hold.is_some_and(|hold| hold != place) && !self.may_hold_anew {
                 return Err("a different position to hold".into());
             }
             let doublings = self.places_heard.saturating_sub(1).min(9);
             let patience = HOLD_PATIENCE.saturating_mul(1 << doublings) + gap;
-            let heard_at = self.places_heard_at[usize::from(write.place.0 == ODD_PLACE)];
-            let is_old = heard_at.is_none_or(|heard_at| at > heard_at + patience);
-            if is_old && self.hold != Some(write.place) {
+            let mut heard = self.places_heard_at.iter().flatten();
+            let is_young =
+                |&(count, heard_at): &_| count == write.place.0 && at <= heard_at + patience;
+            if !heard.any(is_young) && self.hold != Some(place) {
                 return Err("a position to hold that is too old".into());
             }
-            (self.hold, self.may_hold_anew) = (Some(write.place), false);
+            (self.hold, self.may_hold_anew) = (Some(place), false);
         }
-        self.is_target_new = false;
+        (self.is_target_new, self.was_written) = (false, true);
+        self.stopped_at = self.is_halted.then_some(at);
         if self.is_owed {
             (self.is_stop_written, self.is_stop_due) = (true, false);
         } else if self.confirm == Confirm::AfterWrite {
@@ -176,7 +192,7 @@ impl Account {
 
     /// The last WRITE handed out did not leave, or possibly did not.
     pub(crate) fn take_back_write(&mut self) {
-        self.is_target_new = self.target.is_some();
+        (self.is_target_new, self.stopped_at) = (self.target.is_some(), None);
         if self.is_owed {
             (self.is_stop_written, self.is_stop_due) = (false, true);
             // The node may never have received the position to hold: it may be measured again.
@@ -190,9 +206,9 @@ impl Account {
         if !self.is_in_doubt {
             (self.is_in_doubt, self.undecided) = (true, 0);
             (self.is_doubt_told, self.is_block_told) = (false, false);
-            // A held position has to be measured again: that ends the set-point of a paid stop.
-            let is_hold = self.is_halted && self.record == Some(Mode::Position);
-            if is_hold && self.confirm != Confirm::Unasked {
+            // The stop is owed again, unless 0 rps was obeyed: that ends its confirmation.
+            let is_hold = self.record == Some(Mode::Position) || !self.is_still;
+            if self.is_halted && is_hold && self.confirm != Confirm::Unasked {
                 self.confirm = Confirm::Fails;
             }
             // A WRITE that may have been read in the other mode confirms nothing.
@@ -214,19 +230,17 @@ impl Account {
     pub(crate) fn hear_answer(&mut self, mode: Mode, place: (i16, i16), at: Instant) {
         (self.misses, self.guard_until) = (0, None);
         if mode == Mode::Position {
+            self.places_heard_at[self.places_heard as usize % 4] = Some((place.0, at));
             self.places_heard += 1;
-            self.places_heard_at[usize::from(place.0 == ODD_PLACE)] = Some(at);
         }
         match self.record {
             Some(record) if record != mode && !self.is_in_doubt => return self.begin_doubt(),
             Some(record) if record != mode => {
                 self.restart_stop();
-                let had_set_point = self.target.is_some() || self.is_under_order;
+                let was_commanded = self.is_under_order || self.was_written;
                 self.drop_target();
-                if had_set_point {
+                if was_commanded {
                     self.owe();
-                } else {
-                    self.is_halted_in_other_mode = self.is_halted;
                 }
             }
             Some(_) if self.is_in_doubt => self.restart_stop(),
@@ -268,6 +282,13 @@ impl Account {
         let is_readable = self.is_in_doubt && self.undecided < UNDECIDED;
         let has_work = (self.is_owed || self.is_target_new) && !self.is_in_doubt;
         self.is_askable(now) && (is_readable || has_work)
+    }
+
+    /// Whether its stop WRITE is repeated, whatever else is due, until it is still.
+    pub(crate) fn is_stop_repeated(&self, answers_write: bool) -> bool {
+        let is_blind = self.is_owed && self.record == Some(Mode::Velocity) && !answers_write;
+        let is_repeated = if self.is_online() { self.coasting_since.is_some() } else { is_blind };
+        is_repeated && !self.is_in_doubt
     }
 
     /// Whether it may be asked.

@@ -41,6 +41,10 @@ pub(crate) enum Fate {
     Arrives,
     /// Lost on the wire, undetected.
     Lost,
+    /// The port takes it in parts, and a late answer arrives in between.
+    Parts,
+    /// The master does not want its rest any more.
+    GivenUp,
     /// The port took no byte of it.
     Untouched,
     /// The port took a part of it.
@@ -164,6 +168,7 @@ impl Menu {
         }
         if late {
             actions.push(Action::LateAnswer);
+            actions.extend(sends.then_some(Action::Send(Fate::Parts)));
         }
         actions
     }

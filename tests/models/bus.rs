@@ -5,19 +5,23 @@
 //! protocol has no sequence numbers by which a master could distinguish it from the next one.
 
 use super::{
-    account::{Account, Confirm, ODD_PLACE},
+    account::{Account, Confirm},
     action::{Action, Answer, Call, Exchange, Fate, Menu},
     fingerprint::{COUNTERS, COUNTERS_AND_STATUS},
     kit::{Reply, Sent},
     names::*,
 };
 
+/// Shorter than the time that a fingerprint remembers.
+pub(super) const COAST: Duration = Duration::from_millis(60);
+
 #[derive(Clone, Debug)]
 pub(super) struct Motor {
     pub(super) mode: Mode,
-    /// The last WRITE that it received was a stop.
+    /// The last WRITE that it received was a stop in its mode.
     pub(super) is_told_to_stop: bool,
-    pub(super) is_odd_place: bool,
+    /// Where its shaft is. While it is told to move, no two measurements are alike.
+    pub(super) count: i16,
 }
 
 /// A READ, or an answered WRITE, whose window is open.
@@ -65,7 +69,8 @@ impl<B: Kit> Bus<B> {
     /// The same, at this time.
     pub(crate) fn at(now: Instant, modes: &[Mode], mut config: MasterConfig, menu: Menu) -> Self {
         config.nodes = NodeId::ALL[..modes.len()].iter().copied().collect();
-        let motor = |&mode| Motor { mode, is_told_to_stop: true, is_odd_place: false };
+        config.coast = COAST;
+        let motor = |&mode| Motor { mode, is_told_to_stop: true, count: 100 };
         Self {
             master: Master::new(config, now),
             now,
@@ -116,13 +121,13 @@ impl<B: Kit> Bus<B> {
                 self.expire_orders();
                 self.master.stop(node, now);
                 self.alive_at = now;
-                self.account(node).owe();
+                self.account(node).stop(now);
             }
             Call::StopAll => {
                 self.expire_orders();
                 self.master.stop_all(now);
                 self.alive_at = now;
-                self.accounts.iter_mut().for_each(Account::owe);
+                self.accounts.iter_mut().for_each(|account| account.stop(now));
             }
             Call::Release(node) => {
                 self.master.release(node);
@@ -192,7 +197,8 @@ impl<B: Kit> Bus<B> {
         let end = start + wire_time(sent.len, self.master.config().baud);
         self.line_free = end;
         let rotation = self.account(sent.node).rotation();
-        if let Some(write) = sent.write {
+        let fate = if fate == Fate::Parts { self.part(&sent)? } else { fate };
+        if let Some(write) = sent.write.filter(|_| fate != Fate::GivenUp) {
             let (now, gap) = (self.now, self.master.config().turnaround_gap);
             self.account(sent.node).write(write, B::ANSWERS_WRITE, now, gap)?;
         }
@@ -202,25 +208,38 @@ impl<B: Kit> Bus<B> {
             let node = sent.node;
             self.asked = Some(Asked { node, end, deadline, is_heard: arrives, rotation });
         }
-        if sent.write.is_some() {
+        if let Some(write) = sent.write.filter(|_| arrives) {
             let is_halted = self.account(sent.node).is_halted;
-            if arrives {
-                self.motors[usize::from(sent.node.get()) - 1].is_told_to_stop = is_halted;
-            } else if fate == Fate::Lost {
-                let account = self.account(sent.node);
-                account.stops_missed = (account.stops_missed + 1).min(2);
+            let motor = &mut self.motors[usize::from(sent.node.get()) - 1];
+            let is_stop = match motor.mode {
+                Mode::Velocity => f32::from_bits(write.speed).abs() < 0.05,
+                Mode::Position => write.place.1 % 1000 == rotation,
+            };
+            motor.is_told_to_stop = is_halted && is_stop;
+            if is_halted && is_stop && motor.mode == Mode::Position {
+                motor.count = write.place.0;
             }
         }
         self.port_fails(fate, &sent, start);
         Ok(Some(is_exchange))
     }
 
+    /// The port takes the packet in parts, and a late answer arrives in between. The rest is given
+    /// up if the master says so.
+    fn part(&mut self, sent: &Sent) -> Result<Fate, String> {
+        if let Some(late) = self.late.take() {
+            self.hear(late.reply, self.now)?;
+        }
+        let is_given_up = sent.write.is_some() && self.master.is_outdated();
+        Ok(if is_given_up { Fate::GivenUp } else { Fate::Arrives })
+    }
+
     /// The driver's report of a port that could not send.
     fn port_fails(&mut self, fate: Fate, sent: &Sent, start: Instant) {
         let unsent = match fate {
-            Fate::Arrives | Fate::Lost => return,
+            Fate::Arrives | Fate::Parts | Fate::Lost => return,
             Fate::Untouched => Unsent::Untouched,
-            Fate::CutOff => Unsent::CutOff,
+            Fate::CutOff | Fate::GivenUp => Unsent::CutOff,
             Fate::UnflushedArrives | Fate::UnflushedLost => Unsent::Unflushed,
         };
         self.master.handle_unsent(unsent, self.now);
@@ -277,10 +296,12 @@ impl<B: Kit> Bus<B> {
     /// The current measurement of a node.
     fn reply(&mut self, node: NodeId, rotation: i16) -> Reply {
         let motor = &mut self.motors[usize::from(node.get()) - 1];
-        motor.is_odd_place = !motor.is_odd_place && motor.mode == Mode::Position;
+        let is_moving = !motor.is_told_to_stop;
+        if is_moving && motor.mode == Mode::Position {
+            motor.count += 10;
+        }
         let far = if self.is_far { 13_000 } else { 0 };
-        let count = if motor.is_odd_place { ODD_PLACE } else { 100 };
-        Reply { node, mode: motor.mode, place: (count, rotation + far) }
+        Reply { node, mode: motor.mode, place: (motor.count, rotation + far), is_moving }
     }
 
     /// The master receives a complete answer.
@@ -353,13 +374,10 @@ impl<B: Kit> World for Bus<B> {
                     Mode::Velocity => Mode::Position,
                     Mode::Position => Mode::Velocity,
                 };
-                (motor.is_told_to_stop, motor.is_odd_place) = (true, false);
-                self.account(node).stops_missed = 2;
+                motor.is_told_to_stop = true;
             }
             Action::Reset(node) => {
-                let motor = &mut self.motors[usize::from(node.get()) - 1];
-                (motor.is_told_to_stop, motor.is_odd_place) = (true, false);
-                self.account(node).stops_missed = 2;
+                self.motors[usize::from(node.get()) - 1].is_told_to_stop = true;
             }
             Action::Wait(wait) => self.wait(wait)?,
             Action::Command(node) => {
@@ -375,7 +393,11 @@ impl<B: Kit> World for Bus<B> {
         let is_status_needed = self.master.config().hold_age > Duration::ZERO;
         let skipped = if is_status_needed { COUNTERS } else { COUNTERS_AND_STATUS };
         let alive_at = self.master.config().dead_man.map(|_| self.alive_at);
-        let world = (&self.motors, &self.accounts, self.asked, self.late, alive_at);
+        let late = self.late.map(|Late { reply, until }| {
+            let place = Position::new(reply.place.0, reply.place.1);
+            (reply.node, reply.mode, reply.is_moving, place, until)
+        });
+        let world = (&self.motors, &self.accounts, self.asked, late, alive_at);
         Merge { now: self.now, skipped }.fingerprint(&(&self.master, world))
     }
 }

@@ -1,10 +1,10 @@
 //! Invariants of a motor bus, after every step.
 
-use axlewire::ikeya::master::MasterEvent;
+use axlewire::ikeya::master::{MasterEvent, StopProgress};
 
 use super::{
     account::{Confirm, STRIKES},
-    bus::Bus,
+    bus::{Bus, COAST},
     kit::Sent,
     names::*,
 };
@@ -17,6 +17,9 @@ const CYCLE_WAITS: u8 = 10;
 
 /// Longest time until the search returns to a node that is owed a stop: one window at 1 %.
 const LONGEST_PAUSE: Duration = Duration::from_millis(150);
+
+/// Longest time between two stop WRITEs, until the node is still (I12, I13).
+const REPEAT: Duration = Duration::from_millis(20);
 
 impl<B: Kit> Bus<B> {
     /// No node waits longer than stated in `queue.rs`.
@@ -34,6 +37,14 @@ impl<B: Kit> Bus<B> {
                 }
                 (account.waits, account.cycle_waits) = (0, 0);
                 continue;
+            }
+            let is_recent = account.stopped_at.is_some_and(|at| now < at + REPEAT);
+            if account.is_stop_repeated(B::ANSWERS_WRITE)
+                && is_exchange
+                && !B::ANSWERS_WRITE
+                && !is_recent
+            {
+                return Err(format!("a READ of node {} before a stop is repeated", sent.node));
             }
             if !is_exchange || !account.is_askable(now) {
                 continue;
@@ -59,13 +70,9 @@ impl<B: Kit> Bus<B> {
         while let Some(event) = self.takes_events.then(|| self.master.poll_event()).flatten() {
             match event {
                 MasterEvent::Stopped { node } => {
-                    let motor = self.motors[usize::from(node.get()) - 1].clone();
-                    let account = self.account(node);
-                    if account.paid < 2 {
-                        return Err(format!("Stopped, with {} payments", account.paid));
-                    }
-                    if account.stops_missed < 2 && !motor.is_told_to_stop {
-                        return Err("Stopped, but the node got no stop".into());
+                    let paid = self.account(node).paid;
+                    if paid < 2 {
+                        return Err(format!("Stopped, with {paid} payments"));
                     }
                 }
                 MasterEvent::Confirmed { node } => {
@@ -95,18 +102,39 @@ impl<B: Kit> Bus<B> {
         let owed = self.master.stops_owed();
         for (index, account) in self.accounts.iter_mut().enumerate() {
             let node = NodeId::ALL[index];
+            let progress = self.master.stop_progress(node);
             if account.is_owed && !owed.contains(node) {
                 if account.paid < 2 {
                     return Err(format!("node {node}: the stop is forgotten"));
                 }
                 (account.is_owed, account.is_stop_due) = (false, false);
+                account.coasting_since = Some(self.now);
+            }
+            if let Some(since) = account.coasting_since.filter(|_| !owed.contains(node)) {
+                let heard = self.master.status(node).filter(|_| !account.is_in_doubt);
+                let is_late = heard.is_some_and(|(_, at)| at >= since + COAST);
+                match progress {
+                    StopProgress::StandingStill if !self.motors[index].is_told_to_stop => {
+                        return Err(format!("node {node} is still, but it was told to move"));
+                    }
+                    StopProgress::StandingStill => {
+                        (account.coasting_since, account.is_still) = (None, true);
+                    }
+                    StopProgress::Confirmed if !is_late => {}
+                    StopProgress::StillMoving if is_late => {}
+                    _ => return Err(format!("node {node} coasts, and is {progress:?}")),
+                }
+            } else if account.is_still && !owed.contains(node) {
+                // A stop that was released ends when the node is abnormal.
+                account.is_still = progress == StopProgress::StandingStill;
+                if !account.is_still && account.is_online() {
+                    return Err(format!("node {node} was still, and is {progress:?}"));
+                }
             }
             if !account.is_owed && owed.contains(node) {
-                // A paid stop is owed again after the node was abnormal or in doubt, or has changed
-                // its mode.
-                let is_renewed =
-                    account.is_in_doubt || !account.is_online() || account.is_halted_in_other_mode;
-                if !(account.is_halted && is_renewed) {
+                // The stop of a still node is owed again if it is abnormal or in doubt.
+                let is_renewed = account.is_in_doubt || !account.is_online();
+                if !(account.is_still && is_renewed) {
                     return Err(format!("node {node}: a stop that was not requested"));
                 }
                 account.owe_again();
@@ -144,6 +172,10 @@ impl<B: Kit> Bus<B> {
         }
         if is_owed && timeout.is_some_and(|at| at > self.now + LONGEST_PAUSE) {
             return Err("a stop is owed, but no node is asked for it".into());
+        }
+        let is_late = timeout.is_none_or(|at| at > self.now + REPEAT);
+        if is_late && self.accounts.iter().any(|it| it.is_stop_repeated(B::ANSWERS_WRITE)) {
+            return Err("a stop is not repeated".into());
         }
         Ok(())
     }

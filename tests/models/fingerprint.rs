@@ -55,6 +55,8 @@ impl Merge {
             hash: 0,
             is_earliest: false,
             is_instant: false,
+            is_count: false,
+            counts: Vec::new(),
         };
         reader.read(text.as_bytes());
         reader.hash
@@ -86,6 +88,9 @@ struct Reader {
     is_earliest: bool,
     /// It belongs to an `Instant`.
     is_instant: bool,
+    /// It is the count of a position. Only which ones are equal matters: they are numbered.
+    is_count: bool,
+    counts: Vec<u64>,
 }
 
 impl Reader {
@@ -132,6 +137,7 @@ impl Reader {
             if word != b"micros" {
                 self.is_earliest = self.earliest.contains(&hash);
             }
+            self.is_count = word == b"count";
             return self.skipped.contains(&hash);
         }
         if self.is_instant {
@@ -145,6 +151,11 @@ impl Reader {
             self.hash = mixed(self.hash, distance as u64);
         } else if hash == INSTANT {
             self.is_instant = true;
+        } else if std::mem::take(&mut self.is_count) {
+            let known = self.counts.iter().position(|&count| count == hash);
+            let number = known.unwrap_or(self.counts.len());
+            self.counts.extend(known.is_none().then_some(hash));
+            self.hash = mixed(self.hash, number as u64);
         } else {
             self.hash = mixed(self.hash, hash);
         }

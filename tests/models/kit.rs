@@ -82,14 +82,16 @@ impl Sent {
 pub(crate) struct Reply {
     pub(crate) node: NodeId,
     pub(crate) mode: Mode,
-    /// Count and rotation of a position node; a velocity node turns at 3 rps.
+    /// Count and rotation of a position node.
     pub(crate) place: (i16, i16),
+    /// Whether a velocity node turns, at 3 rps.
+    pub(crate) is_moving: bool,
 }
 
 impl Reply {
     pub(crate) fn bytes<B: Kit>(&self) -> Vec<u8> {
         let measured = match self.mode {
-            Mode::Velocity => Target::Velocity(B::speed(3.0)),
+            Mode::Velocity => Target::Velocity(B::speed(3.0 * f32::from(self.is_moving))),
             Mode::Position => Target::Position(B::place(Position::new(self.place.0, self.place.1))),
         };
         B::answer(self.node, measured)

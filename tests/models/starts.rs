@@ -1,7 +1,7 @@
 //! The worlds of the motor bus, and their initial states.
 
 use super::{
-    action::{Action, Call, Exchange, Fate, Menu, Wait},
+    action::{Action, Answer, Call, Exchange, Fate, Menu, Wait},
     bus::Bus,
     names::*,
 };
@@ -77,8 +77,17 @@ pub(crate) fn small_steps<B: Kit>(run: &mut Run) {
         let stop = [Action::Send(Fate::Arrives), Action::Call(Call::Stop(NodeId::N1))];
         let asked = known.clone().after(&stop);
         run.world(&format!("stop during a READ, {name}"), Depth(2, 6), asked);
-        let owed = known.under_set_point().after(&stop[1..]);
+        let moving = known.under_set_point();
+        let owed = moving.clone().after(&stop[1..]);
         run.world(&format!("stop owed, {name}"), Depth(2, 6), owed);
+        let late = [
+            Action::Switch(NodeId::N1),
+            Action::Send(Fate::Arrives),
+            Action::Answer(Answer::Late),
+            Action::Wait(Wait::Deadline),
+        ];
+        let other = moving.after(&late);
+        run.world(&format!("late answer in the other mode, {name}"), Depth(2, 4), other);
     }
     let known = Bus::<B>::known(BOTH, direct(), menu);
     run.world("known, two nodes", Depth(2, 4), known);

@@ -477,9 +477,11 @@ impl<B: Board> Stop<B> {
         self.written_at = None;
     }
 
-    /// Keeps the position of an answer to hold, if it was requested after the stop.
+    /// Keeps the position of an answer to hold, if it was requested after the stop and the stop is
+    /// owed: a velocity node that is still has none, and may just be in doubt.
     fn measure(&mut self, status: &Status<B>, now: Instant) {
-        if let (Status::Position(position), None, true) = (status, self.hold, self.is_asked) {
+        let is_due = self.is_asked && self.stage == Stage::Owed;
+        if let (Status::Position(position), None, true) = (status, self.hold, is_due) {
             (self.hold, self.measured_at, self.writes) = (Some(*position), Some(now), 0);
         }
     }
