@@ -60,6 +60,13 @@ pub enum DriveError<E> {
     /// The robot refused a calibration, or answered none of the attempts.
     #[cfg(feature = "ucp")]
     Calibration(ucp::host::CalibrationFailure),
+    /// The robot was not seen to stand still (ruling U16): it sends
+    /// [no reports](ucp::host::StopProgress::NoReports), is
+    /// [still moving](ucp::host::StopProgress::StillMoving), or was
+    /// [not told to stop](ucp::host::StopProgress::NotAsked). **It may be moving.** The host
+    /// repeats the stop as long as the driver is called.
+    #[cfg(feature = "ucp")]
+    NoStandstill(ucp::host::StopProgress),
 }
 
 /// The operation that timed out.
@@ -121,6 +128,10 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
             }
             #[cfg(feature = "ucp")]
             Self::Rover(error) => error.fmt(f),
+            #[cfg(feature = "ucp")]
+            Self::NoStandstill(progress) => {
+                write!(f, "the robot was not seen to stand still: {progress}")
+            }
             #[cfg(feature = "ucp")]
             Self::Calibration(failure) => {
                 let ucp::host::CalibrationFailure { step, kind, cause, attempts, .. } = failure;

@@ -101,7 +101,7 @@ fn a_drive_whose_port_fails_on_the_way_ends_with_a_stop_and_returns_the_error() 
     ];
     for fault in faults {
         for is_async in BOTH {
-            let mut rover = host();
+            let (_, mut rover, _robot) = rover(|_| ());
             rover.service().unwrap();
             fault(rover.port_mut());
             let driven = call!(is_async, rover, drive_for, drive_for_async(50, 0, ms(50)));

@@ -57,6 +57,8 @@ mod rover_host;
 mod rover_rig;
 #[cfg(feature = "ucp")]
 mod rover_robot;
+#[cfg(feature = "ucp")]
+mod rover_standstill;
 #[cfg(all(unix, feature = "serialport"))]
 mod serial_port;
 mod slow_port;

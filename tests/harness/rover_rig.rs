@@ -32,6 +32,11 @@ pub(crate) const MAG: CalibrationKind = CalibrationKind::Magnetometer;
 /// Every possible fate of a frame that did not reach the line.
 pub(crate) const EVERY: [Unsent; 3] = [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed];
 
+/// How many copies of a motor command follow a frame that had such a fate.
+pub(crate) fn copies(unsent: Unsent) -> usize {
+    if unsent == Unsent::Untouched { 1 } else { 2 }
+}
+
 pub(crate) fn ms(millis: u64) -> Instant {
     Instant::from_millis(millis)
 }
@@ -140,11 +145,17 @@ pub(crate) fn quiet_config() -> HostConfig {
     config
 }
 
-/// A host without pings that begins as hosts do.
-pub(crate) fn fresh_host() -> Host {
+/// A host without pings whose robot need not be heard.
+fn unheard_host(sends_first_stop: bool) -> Host {
     let mut config = quiet_config();
-    config.sends_first_stop = true;
+    config.sends_first_stop = sends_first_stop;
+    config.link_timeout = Duration::from_millis(3_600_000);
     Host::new(config, ms(0))
+}
+
+/// The same, which begins as hosts do.
+pub(crate) fn fresh_host() -> Host {
+    unheard_host(true)
 }
 
 /// A host that has sent its first frame.
@@ -165,9 +176,9 @@ pub(crate) fn begins(kind: CalibrationKind) -> RobotEvent {
     RobotEvent::CalibrationStart { kind, repeated: false }
 }
 
-/// A host without pings and without the first stop, so that a test sees only what it requests.
+/// The same without the first stop, so that a test sees only what it requests.
 pub(crate) fn quiet_host() -> Host {
-    Host::new(quiet_config(), ms(0))
+    unheard_host(false)
 }
 
 /// A robot that requests nothing.

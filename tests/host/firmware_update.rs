@@ -97,7 +97,7 @@ fn one_more_stop_precedes_an_update_request() {
 #[test]
 fn an_update_request_waits_for_a_stop_that_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let stops = if unsent == Unsent::CutOff { vec![2, 2] } else { vec![2] };
+        let stops = vec![2; copies(unsent)];
         // The stop is lost before the request, or along with it.
         for frames in [1, 2] {
             let mut host = driving();

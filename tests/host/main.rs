@@ -16,6 +16,7 @@ mod rig;
 mod robustness;
 mod settings;
 mod standstill;
+mod stop_progress;
 mod unsent_messages;
 mod unsent_motor_commands;
 mod with_a_robot;

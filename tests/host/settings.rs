@@ -126,7 +126,7 @@ fn each_time_of_a_host_has_a_setting_of_its_own() {
     host.drive(go(1), ms(1000)).unwrap();
     sent(&mut host, ms(1000));
     host.drive(go(2), ms(1001)).unwrap();
-    assert_eq!(speeds(&wait(&mut host, ms(1100))), [(1_030_000, 2)]);
+    assert_eq!(speeds(&wait(&mut host, ms(1039))), [(1_030_000, 2)]);
 }
 
 #[test]

@@ -65,8 +65,9 @@ fn motion(frame: &[u8]) -> Option<(i16, i16)> {
 const TIMEOUT: Duration = Duration::from_millis(500);
 
 proptest! {
-    /// Every frame handed out is zero, or the application's last command if less than 500 ms old;
-    /// and after every round on a working line, so is the command that the robot has.
+    /// Every frame handed out is zero, or the application's last command if less than 500 ms old,
+    /// from a host that has heard the robot in the last 500 ms; and after every round on a working
+    /// line, so is the command that the robot has.
     #[test]
     fn a_hosts_command_is_zero_500_ms_after_the_applications_last_call(
         acts in vec(act(), 1..80),
@@ -78,21 +79,30 @@ proptest! {
         config.ping_period = config.ping_period.filter(|_| pings);
         let mut host = Host::new(config, now);
         let mut wanted = ((0, 0), now);
-        let mut is_first = true;
+        let (mut heard, mut is_lost, mut is_first) = (now, false, true);
         for act in acts {
             match act {
                 Act::Drive(speed, angular) => {
-                    host.drive(MotorControl::new(speed, angular).unwrap(), now).unwrap();
-                    wanted = ((speed, angular), now);
+                    let driven = host.drive(MotorControl::new(speed, angular).unwrap(), now);
+                    prop_assert_eq!(driven.is_err(), is_lost && (speed, angular) != (0, 0));
+                    if driven.is_ok() {
+                        wanted = ((speed, angular), now);
+                    }
                 }
                 Act::Stop => {
                     host.stop(now);
                     wanted = ((0, 0), now);
                 }
                 Act::Sleep(micros) => now += Duration::from_micros(micros),
-                Act::Hear(which) => host.handle_input(&said(which), now),
+                Act::Hear(which) => {
+                    host.handle_input(&said(which), now);
+                    (heard, is_lost) = (now, false);
+                }
                 Act::Round(fates) => {
                     host.handle_timeout(now);
+                    if now - heard >= TIMEOUT {
+                        (wanted.0, is_lost) = ((0, 0), true);
+                    }
                     let mut fates = fates.into_iter();
                     let (mut told, mut failed) = (None, false);
                     while let Some(frame) = host.poll_transmit(now).map(<[u8]>::to_vec) {
@@ -146,7 +156,8 @@ proptest! {
         for act in acts {
             match act {
                 Act::Drive(speed, angular) => {
-                    host.drive(MotorControl::new(speed, angular).unwrap(), now).unwrap();
+                    // Refused while the robot is not heard.
+                    let _ = host.drive(MotorControl::new(speed, angular).unwrap(), now);
                 }
                 Act::Stop => host.stop(now),
                 Act::Sleep(micros) => now += Duration::from_micros(micros),

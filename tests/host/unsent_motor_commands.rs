@@ -1,5 +1,5 @@
 //! Motor commands and stops that did not reach the line: due again at once, twice after a cut-off
-//! frame, and never too late (U16).
+//! frame or a failed flush, and never too late (U16).
 
 use crate::rig::*;
 
@@ -11,9 +11,8 @@ fn a_failed_write_or_a_discarded_stop_makes_the_stop_due_again() {
         host.stop(ms(31));
         assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
         host.handle_unsent(unsent, ms(40));
-        let twice = usize::from(unsent == Unsent::CutOff);
         let frames = sent(&mut host, ms(40));
-        assert_eq!(frames.len(), 1 + twice, "{unsent:?}");
+        assert_eq!(frames.len(), copies(unsent), "{unsent:?}");
         assert!(frames.iter().all(|frame| speed(frame) == Some(0)));
         assert_eq!(host.poll_timeout(), Some(ms(140)), "and then every 100 ms");
     }
@@ -66,10 +65,9 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
         assert!(host.is_stop_sent());
         host.handle_unsent(unsent, ms(20));
         assert!(!host.is_stop_sent(), "{unsent:?}");
-        let copies = if unsent == Unsent::CutOff { 2 } else { 1 };
-        for copy in 1..=copies {
+        for copy in 1..=copies(unsent) {
             assert_eq!(host.poll_transmit(ms(20)).and_then(speed), Some(0));
-            assert_eq!(host.is_stop_sent(), copy == copies, "{unsent:?}");
+            assert_eq!(host.is_stop_sent(), copy == copies(unsent), "{unsent:?}");
         }
         assert_eq!(host.poll_transmit(ms(20)), None);
     }
@@ -83,7 +81,7 @@ fn a_stop_requested_after_the_failure_is_sent_at_once_and_alone() {
         host.handle_unsent(unsent, ms(35));
         host.stop(ms(36));
         let frames = sent(&mut host, ms(36));
-        assert_eq!(frames.len(), if unsent == Unsent::CutOff { 2 } else { 1 });
+        assert_eq!(frames.len(), copies(unsent));
         assert!(frames.iter().all(|frame| speed(frame) == Some(0)), "{unsent:?}");
         assert!(host.is_stop_sent());
     }
@@ -98,9 +96,8 @@ fn the_first_frame_is_zero_however_often_it_does_not_reach_the_line() {
             assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(0), "{unsent:?}");
             host.handle_unsent(unsent, ms(at));
         }
-        let copies = if unsent == Unsent::CutOff { 2 } else { 1 };
         let speeds: Vec<_> = sent(&mut host, ms(10)).iter().filter_map(|it| speed(it)).collect();
-        assert_eq!(speeds, [&vec![0; copies][..], &[40]].concat(), "{unsent:?}");
+        assert_eq!(speeds, [&vec![0; copies(unsent)][..], &[40]].concat(), "{unsent:?}");
     }
 }
 
@@ -114,14 +111,14 @@ fn a_first_frame_that_may_not_have_been_flushed_comes_first_again() {
     let speeds = |host: &mut Host, now| -> Vec<_> {
         sent(host, now).iter().filter_map(|frame| speed(frame)).collect()
     };
-    assert_eq!(speeds(&mut host, ms(2)), [0, 40]);
+    assert_eq!(speeds(&mut host, ms(2)), [0, 0, 40]);
     // The flush may fail repeatedly.
     host.handle_unsent(Unsent::Unflushed, ms(3));
-    assert_eq!(speeds(&mut host, ms(3)), [0, 40]);
+    assert_eq!(speeds(&mut host, ms(3)), [0, 0, 40]);
     // The next round shows that it was flushed.
     assert_eq!(speeds(&mut host, ms(103)), [40]);
     host.handle_unsent(Unsent::Unflushed, ms(104));
-    assert_eq!(speeds(&mut host, ms(104)), [40]);
+    assert_eq!(speeds(&mut host, ms(104)), [40, 40]);
 }
 
 #[test]
@@ -129,12 +126,15 @@ fn the_first_frame_is_zero_even_when_its_flush_and_that_of_a_command_fail() {
     let mut host = fresh_host();
     host.drive(go(60), ms(0)).unwrap();
     for at in 0..5 {
-        assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(0));
+        for _ in 0..if at == 0 { 1 } else { 2 } {
+            assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(0));
+        }
         assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(60));
         // Nothing of either has left, or the robot has received both.
         host.handle_unsent(Unsent::Unflushed, ms(at));
     }
     // A command refused by the port is not the first frame, which the port did take.
+    assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(0));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(0));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(60));
     host.handle_unsent(Unsent::Untouched, ms(5));
@@ -176,17 +176,19 @@ fn heard_by_a_simple_receiver(line: &[u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn behind_any_frame_that_was_cut_off_a_stop_reaches_a_simple_receiver() {
+fn behind_any_frame_that_was_cut_off_or_not_flushed_a_stop_reaches_a_simple_receiver() {
     // The longest frame of a host, a motor command and the shortest frame, cut at every byte.
     for frame in [
         bytes(Biases::new(imu_bias(), mag_bias())),
         go(90).frame(0xFD).as_bytes().to_vec(),
         bytes(Ping {}),
     ] {
-        for cut in 2..frame.len() {
+        for (cut, unsent) in
+            (2..frame.len()).flat_map(|cut| [(cut, Unsent::CutOff), (cut, Unsent::Unflushed)])
+        {
             let mut host = begun();
             host.stop(ms(1));
-            host.handle_unsent(Unsent::CutOff, ms(1));
+            host.handle_unsent(unsent, ms(1));
             let stops = sent(&mut host, ms(1)).concat();
             let heard = heard_by_a_simple_receiver(&[&frame[..cut], &stops].concat());
             let last = heard.last().unwrap_or_else(|| panic!("{cut}: nothing"));
@@ -222,13 +224,13 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     sent(&mut host, ms(32));
     host.handle_unsent(Unsent::Unflushed, ms(33));
     assert_eq!(copies(&mut host, ms(33)), 2);
-    // Both have left; the port has only lost later frames.
+    // Both have left; the port has only refused a later frame.
     let mut host = cut();
     sent(&mut host, ms(31));
     sent(&mut host, ms(40));
     host.stop(ms(50));
     sent(&mut host, ms(50));
-    host.handle_unsent(Unsent::Unflushed, ms(50));
+    host.handle_unsent(Unsent::Untouched, ms(50));
     assert_eq!(copies(&mut host, ms(51)), 1);
 }
 

@@ -49,7 +49,8 @@ fn unplugging_stops_the_robot_and_is_reported_and_replugging_resumes() {
     rig.host.set_network_state(NetworkState::Connected, rig.now).unwrap();
     let drive_for = |rig: &mut Rig, millis: u32| {
         for _ in 0..millis / 50 {
-            rig.host.drive(go(70), rig.now).unwrap();
+            let is_refused = rig.host.drive(go(70), rig.now) == Err(CommandError::LinkDown);
+            assert_eq!(is_refused, rig.host.link() == Link::Down);
             rig.run_for(50);
         }
     };

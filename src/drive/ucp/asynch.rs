@@ -54,7 +54,8 @@ where
         self.service_async().await
     }
 
-    /// Drives for `span`, then stops, and returns when the stop is on the line.
+    /// Drives for `span`, then stops, and waits until the robot is seen to stand still, for at most
+    /// [`COAST`](crate::ucp::host::COAST).
     ///
     /// If the future is dropped, the stop is due, and the next call sends it. **If there is no next
     /// call, only the robot's watchdog stops it**, and that of a vendor robot waits for silence on
@@ -62,8 +63,9 @@ where
     ///
     /// # Errors
     ///
-    /// The errors of [`stop_async`](Self::stop_async); otherwise [`DriveError::Rover`] and port
-    /// errors.
+    /// The errors of [`stop_async`](Self::stop_async), then those of
+    /// [`await_standstill_async`](Self::await_standstill_async), whatever else failed before;
+    /// otherwise [`DriveError::Rover`] and port errors.
     pub async fn drive_for_async(
         &mut self,
         speed: i16,
@@ -75,12 +77,17 @@ where
         let driven = guard.0.hold_command_async(speed, angular, span).await;
         drop(guard);
         self.send_stop_async().await?;
+        let deadline = self.coast_deadline();
+        self.await_standstill_async(deadline).await?;
         driven
     }
 
     /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
     /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
-    /// is called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    /// is called; see [`Host::stop`]. A robot does not answer a stop: whether it obeys is in its
+    /// reports, see [`await_standstill_async`](Self::await_standstill_async).
+    ///
+    /// After a failed flush, two whole copies are flushed before this returns `Ok`.
     ///
     /// # Errors
     ///
@@ -89,6 +96,25 @@ where
     pub async fn stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop();
         self.send_stop_async().await
+    }
+
+    /// Waits until the robot, which was told to stop, is seen to stand still: three reports in a
+    /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less
+    /// ([`Host::stop_progress`]). Continues through errors of the port. For a rover that coasts,
+    /// set `deadline` at least [`COAST`](crate::ucp::host::COAST) from now.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::NoStandstill`] at `deadline`, and at once if the latest command is to move;
+    /// [`DriveError::Timeout`] if the stop has not left by then; port errors, if the port still
+    /// fails at `deadline`. **The robot may be moving.** The stop is repeated as long as the driver
+    /// is called.
+    pub async fn await_standstill_async(
+        &mut self,
+        deadline: Instant,
+    ) -> Result<(), DriveError<P::Error>> {
+        let standing = self.until_through_errors_async(deadline, Self::standing).await?;
+        standing.unwrap_or_else(|| Err(self.no_standstill()))
     }
 
     /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
@@ -162,15 +188,23 @@ where
     /// Runs until the stop has left, through errors of the port.
     async fn send_stop_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
+        let left = self.until_through_errors_async(deadline, Self::stopped).await?;
+        left.ok_or(DriveError::Timeout(Operation::Stop))
+    }
+
+    /// Runs until `done` returns a value; `None` at `deadline`. A port that fails ends it only
+    /// then.
+    async fn until_through_errors_async<T>(
+        &mut self,
+        deadline: Instant,
+        mut done: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            match self.until_with_async(deadline, Needs::HalfPort, Self::stopped).await {
-                Ok(Some(())) => return Ok(()),
-                Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
+            match self.until_with_async(deadline, Needs::HalfPort, &mut done).await {
                 Err(error) if self.now() >= deadline => return Err(error),
                 // If the port fails at once, pause before the next attempt.
-                Err(_) => {
-                    self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
-                }
+                Err(_) => self.clock.delay_us(Self::ERROR_NAP.as_micros()).await,
+                found => return found,
             }
         }
     }

@@ -45,11 +45,14 @@ where
         self.service()
     }
 
-    /// Drives for `span`, then stops, and returns when the stop is on the line.
+    /// Drives for `span`, then stops, and waits until the robot is seen to stand still, for at most
+    /// [`COAST`](crate::ucp::host::COAST).
     ///
     /// # Errors
     ///
-    /// The errors of [`stop`](Self::stop); otherwise [`DriveError::Rover`] and port errors.
+    /// The errors of [`stop`](Self::stop), then those of
+    /// [`await_standstill`](Self::await_standstill), whatever else failed before; otherwise
+    /// [`DriveError::Rover`] and port errors.
     pub fn drive_for(
         &mut self,
         speed: i16,
@@ -59,12 +62,17 @@ where
         self.command(speed, angular)?;
         let driven = self.hold_command(speed, angular, span);
         self.stop()?;
+        let deadline = self.coast_deadline();
+        self.await_standstill(deadline)?;
         driven
     }
 
     /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
     /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
-    /// is called; see [`Host::stop`]. A robot does not answer a stop: watch its reports.
+    /// is called; see [`Host::stop`]. A robot does not answer a stop: whether it obeys is in its
+    /// reports, see [`await_standstill`](Self::await_standstill).
+    ///
+    /// After a failed flush, two whole copies are flushed before this returns `Ok`.
     ///
     /// # Errors
     ///
@@ -73,6 +81,22 @@ where
     pub fn stop(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop();
         self.send_stop()
+    }
+
+    /// Waits until the robot, which was told to stop, is seen to stand still: three reports in a
+    /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less
+    /// ([`Host::stop_progress`]). Continues through errors of the port. For a rover that coasts,
+    /// set `deadline` at least [`COAST`](crate::ucp::host::COAST) from now.
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::NoStandstill`] at `deadline`, and at once if the latest command is to move;
+    /// [`DriveError::Timeout`] if the stop has not left by then; port errors, if the port still
+    /// fails at `deadline`. **The robot may be moving.** The stop is repeated as long as the driver
+    /// is called.
+    pub fn await_standstill(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
+        let standing = self.until_through_errors(deadline, Self::standing)?;
+        standing.unwrap_or_else(|| Err(self.no_standstill()))
     }
 
     /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
@@ -146,10 +170,19 @@ where
     /// Runs until the stop has left, through errors of the port.
     fn send_stop(&mut self) -> Result<(), DriveError<P::Error>> {
         let deadline = self.stop_deadline();
+        let left = self.until_through_errors(deadline, Self::stopped)?;
+        left.ok_or(DriveError::Timeout(Operation::Stop))
+    }
+
+    /// Runs until `done` returns a value; `None` at `deadline`. A port that fails ends it only
+    /// then.
+    fn until_through_errors<T>(
+        &mut self,
+        deadline: Instant,
+        mut done: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            match self.until_with(deadline, Needs::HalfPort, Self::stopped) {
-                Ok(Some(())) => return Ok(()),
-                Ok(None) => return Err(DriveError::Timeout(Operation::Stop)),
+            match self.until_with(deadline, Needs::HalfPort, &mut done) {
                 Err(error) if self.now() >= deadline => return Err(error),
                 // If the port fails at once, pause before the next attempt.
                 Err(_) => {
@@ -157,6 +190,7 @@ where
                     let until = self.on_clock(until);
                     self.clock.idle_until(until);
                 }
+                found => return found,
             }
         }
     }

@@ -1,11 +1,14 @@
 //! High-level rover-link calls: the common part of the blocking and the async ones.
 
-use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
+use crate::drive::{clock::Clock, driver::Driver, error::DriveError, error::Operation};
 use crate::{
     time::{Duration, Instant},
     ucp::{
         MotorControl,
-        host::{BiasStore, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport},
+        host::{
+            BiasStore, COAST, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport,
+            StopProgress,
+        },
         message::CalibrationKind,
         robot::{Robot, RobotEvent},
     },
@@ -41,6 +44,28 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     pub(super) fn stopped(&mut self) -> Option<()> {
         self.drop_routine();
         (self.role.is_stop_sent() && self.is_sent()).then_some(())
+    }
+
+    pub(super) fn coast_deadline(&mut self) -> Instant {
+        self.now() + COAST
+    }
+
+    /// `Ok` once the robot stands still; an error if it was not even told to.
+    pub(super) fn standing<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
+        self.drop_routine();
+        match self.role.stop_progress() {
+            StopProgress::StandingStill => Some(Ok(())),
+            StopProgress::NotAsked => Some(Err(DriveError::NoStandstill(StopProgress::NotAsked))),
+            _ => None,
+        }
+    }
+
+    /// Why the robot was not seen to stand still in time.
+    pub(super) fn no_standstill<E>(&self) -> DriveError<E> {
+        match self.role.stop_progress() {
+            StopProgress::Due => DriveError::Timeout(Operation::Stop),
+            progress => DriveError::NoStandstill(progress),
+        }
     }
 
     /// Removes reports and pongs from the events: the host has the latest report and counts both.

@@ -28,6 +28,7 @@ pub enum HostEvent {
     /// [`LinkDown`](Self::LinkDown).
     LinkUp,
     /// No valid frame of a robot has arrived within the link timeout, since the last one or at all.
+    /// A robot that was told to move is told to stand still (ruling U16).
     LinkDown,
     /// The robot has answered a ping.
     Pong {
@@ -194,6 +195,8 @@ pub enum CommandError {
     Moving,
     /// A firmware update is in progress: the frame would end up in it.
     Updating,
+    /// The [link](super::Link) is down: a robot that is not heard is not driven (ruling U16).
+    LinkDown,
 }
 
 impl fmt::Display for CommandError {
@@ -207,6 +210,7 @@ impl fmt::Display for CommandError {
             }
             Self::Moving => f.write_str("stop the robot before a firmware update"),
             Self::Updating => f.write_str("a firmware update is in progress"),
+            Self::LinkDown => f.write_str("the robot is not heard"),
         }
     }
 }

@@ -8,6 +8,7 @@
 //! | `state` | what a received frame means |
 //! | `send` | which frame goes next, and what a frame that did not leave means |
 //! | `motor` | motor commands, the dead-man and stops (U10, U16) |
+//! | `standstill` | whether the robot was seen to obey a stop (U16) |
 //! | `ping`, `link` | whether the robot is there (U10, U12) |
 //! | `calibration`, `results`, `bias` | calibrations and their results (U11, U15) |
 
@@ -22,6 +23,7 @@ mod ping;
 mod results;
 mod role;
 mod send;
+mod standstill;
 mod state;
 mod statistics;
 
@@ -33,4 +35,5 @@ pub use event::{
 };
 pub use link::Link;
 pub use role::Host;
+pub use standstill::{COAST, StopProgress};
 pub use statistics::HostStatistics;

@@ -1,6 +1,9 @@
 //! The motor command: the latest wins, is repeated, and does not outlive its application.
 
-use super::config::HostConfig;
+use super::{
+    config::HostConfig,
+    standstill::{Standstill, StopProgress},
+};
 use crate::{
     endpoint::Unsent,
     time::{Instant, earliest, reached},
@@ -19,10 +22,26 @@ pub(super) struct Motor {
     dead_man: Option<Instant>,
     first: First,
     copies: Copies,
+    stop: Stop,
+    standstill: Standstill,
 }
 
-/// Motor commands after a frame that was cut off: two, the second right behind the first, because
-/// the robot may take the first for the rest of that frame (ruling U16).
+/// How far the stop handed out last has got.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Stop {
+    /// Handed out.
+    Out,
+    /// The port has taken all of it, and will tell when it has been flushed.
+    Taken,
+    /// Handed out, and so have all other frames: the port is being flushed.
+    Flushing,
+    /// Flushed, or there is none.
+    Done,
+}
+
+/// Motor commands after a frame that was cut off, as one may have been whose flush failed: two, the
+/// second right behind the first, because the robot may take the first for the rest of that frame
+/// (ruling U16).
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Copies {
     /// One frame is enough.
@@ -51,13 +70,14 @@ impl Copies {
         }
     }
 
-    /// Handles a frame that did not reach the line. A failed flush may have lost everything handed
-    /// out since the last one; a copy that the port has not touched is due again with the command.
+    /// Handles a frame that did not reach the line. A failed flush may have lost any part of what was
+    /// handed out since the last one, the end of a frame included; a copy that the port has not
+    /// touched is due again with the command.
     const fn unsent(self, unsent: Unsent) -> Self {
         match (unsent, self) {
-            (Unsent::CutOff, _) => Self::BOTH,
-            (_, Self::None) => Self::None,
-            (Unsent::Unflushed, _) | (Unsent::Untouched, Self::Due(_)) => Self::BOTH,
+            (Unsent::CutOff | Unsent::Unflushed, _) | (Unsent::Untouched, Self::Due(_)) => {
+                Self::BOTH
+            }
             (Unsent::Untouched, _) => self,
         }
     }
@@ -85,7 +105,16 @@ impl Motor {
         } else {
             (None, None, First::Done)
         };
-        Self { latest, sent: None, due, dead_man: None, first, copies: Copies::None }
+        Self {
+            latest,
+            sent: None,
+            due,
+            dead_man: None,
+            first,
+            copies: Copies::None,
+            stop: Stop::Done,
+            standstill: Standstill::Untold,
+        }
     }
 
     /// The latest command, already halted if the application has gone silent.
@@ -101,6 +130,19 @@ impl Motor {
             && !self.copies.are_due()
     }
 
+    /// Progress of the latest stop, whoever asked for it.
+    pub(super) fn stop_progress(&self) -> StopProgress {
+        match self.latest {
+            Some(latest) if latest.stands_still() => self.standstill.progress(),
+            _ => StopProgress::NotAsked,
+        }
+    }
+
+    /// The watch over a stop, to take in reports.
+    pub(super) const fn standstill(&mut self) -> &mut Standstill {
+        &mut self.standstill
+    }
+
     /// Whether an update may begin: the robot has been told to stand still, or this host has sent
     /// it no command at all.
     pub(super) fn allows_update(&self) -> bool {
@@ -114,6 +156,10 @@ impl Motor {
 
     pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
         let still = command.stands_still();
+        // A stop joins the one before.
+        if !still {
+            self.expect_stop();
+        }
         self.latest = Some(command);
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
@@ -129,13 +175,31 @@ impl Motor {
 
     /// Halts when the application has been silent for too long; returns whether that happened now.
     pub(super) fn expire(&mut self, now: Instant) -> bool {
+        self.standstill.expire(now);
         let silent = reached(self.dead_man, now);
         if silent {
-            self.dead_man = None;
-            self.latest = self.latest.as_ref().map(MotorControl::halted);
-            self.due = Some(now);
+            self.halt(now);
         }
         silent
+    }
+
+    /// Halts when the robot is no longer heard.
+    pub(super) fn lose_link(&mut self, now: Instant) {
+        // It moves only under a dead-man.
+        if self.dead_man.is_some() {
+            self.halt(now);
+        }
+    }
+
+    fn halt(&mut self, now: Instant) {
+        self.dead_man = None;
+        self.latest = self.latest.as_ref().map(MotorControl::halted);
+        self.due = Some(now);
+    }
+
+    /// None of the motor commands so far is a stop that has left.
+    fn expect_stop(&mut self) {
+        (self.stop, self.standstill) = (Stop::Done, Standstill::Untold);
     }
 
     /// The command to send now, if any.
@@ -144,6 +208,9 @@ impl Motor {
         let command = if self.first == First::Due { latest.halted() } else { latest };
         self.copies = self.copies.take();
         self.sent = Some((command, now));
+        if latest.stands_still() {
+            self.stop = Stop::Out;
+        }
         // A command that waits behind the first frame is sent right after it.
         let goes_on = self.copies.are_due() || command != latest;
         self.due = Some(if goes_on { now } else { now + config.command_period });
@@ -159,9 +226,12 @@ impl Motor {
     }
 
     /// Begins a round: a request for a frame shows that the previous round has been flushed.
-    pub(super) fn begin_round(&mut self) {
+    pub(super) fn begin_round(&mut self, now: Instant) {
         if self.copies == Copies::Flushing {
             self.copies = Copies::None;
+        }
+        if self.stop == Stop::Flushing {
+            self.left(now);
         }
     }
 
@@ -173,12 +243,38 @@ impl Motor {
         if self.copies == Copies::Out {
             self.copies = Copies::Flushing;
         }
+        if self.stop == Stop::Out {
+            self.stop = Stop::Flushing;
+        }
+    }
+
+    /// The port has taken all of the last frame, a motor command.
+    pub(super) fn taken(&mut self) {
+        if self.stop == Stop::Out {
+            self.stop = Stop::Taken;
+        }
+    }
+
+    /// All that the port has taken has left.
+    pub(super) fn flushed(&mut self, now: Instant) {
+        if self.stop == Stop::Taken {
+            self.left(now);
+        }
+    }
+
+    /// The last stop has left, and so has all before it.
+    fn left(&mut self, now: Instant) {
+        self.stop = Stop::Done;
+        if self.is_stop_sent() {
+            self.standstill.tell(now);
+        }
     }
 
     /// Handles a frame that did not reach the line: whatever the robot was told before, the latest
     /// command is due at once. `was_last` means that the frame was a motor command.
     pub(super) fn unsent(&mut self, unsent: Unsent, was_last: bool, now: Instant) {
         self.sent = None;
+        self.expect_stop();
         let is_lost = match self.first {
             First::Out | First::Flushing => was_last || unsent == Unsent::Unflushed,
             First::Followed => unsent == Unsent::Unflushed,

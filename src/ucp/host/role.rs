@@ -7,6 +7,7 @@ use super::{
     config::HostConfig,
     event::{CalibrationFailure, CalibrationStep, CommandError, HostEvent, ReceivedReport},
     link::Link,
+    standstill::StopProgress,
     statistics::HostStatistics,
 };
 use crate::{
@@ -36,9 +37,12 @@ use crate::{
 /// * **Stops (U16).** Motor frames are never answered, so a stop is done when
 ///   [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since.
 ///   [`handle_unsent`](Endpoint::handle_unsent) makes every motor command due again, twice after a
-///   frame that was cut off, because the robot may take the first for the rest of that frame.
+///   frame that was cut off or whose flush failed, because the robot may take the first for the
+///   rest of that frame. Whether the robot obeys is in its reports:
+///   [`stop_progress`](Self::stop_progress).
 /// * **Link (U10).** Pings are sent every 200 ms. The link goes up with the first valid frame from
-///   a robot, and down after 500 ms without one.
+///   a robot, and down after 500 ms without one. While it is down, speed and turn 0 are sent, and
+///   commands to move are refused.
 /// * **Reports (U9).** Each report is an event, and the [latest](Self::last_report) is kept.
 ///   Missing reports are counted by their index. Counting restarts after a lost link and when the
 ///   robot asks for its biases, which it does at boot and then once a second until it has them:
@@ -113,10 +117,14 @@ impl<S: BiasStore> Host<S> {
     ///
     /// # Errors
     ///
-    /// [`CommandError::Updating`] during a firmware update.
+    /// [`CommandError::Updating`] during a firmware update, and [`CommandError::LinkDown`] for a
+    /// command to move while the robot is not heard.
     pub fn drive(&mut self, command: MotorControl, now: Instant) -> Result<(), CommandError> {
         if self.state.update != Update::None {
             return Err(CommandError::Updating);
+        }
+        if self.state.link == Link::Down && !command.stands_still() {
+            return Err(CommandError::LinkDown);
         }
         self.state.motor.command(command, now, &self.state.config);
         Ok(())
@@ -141,6 +149,21 @@ impl<S: BiasStore> Host<S> {
     #[must_use]
     pub fn is_stop_sent(&self) -> bool {
         self.state.motor.is_stop_sent()
+    }
+
+    /// Whether the robot was seen to obey the latest stop, given by [`stop`](Self::stop), by a
+    /// command to stand still, by the dead-man, by a link that went down or as the first frame
+    /// (ruling U16).
+    ///
+    /// [`StopProgress::StandingStill`] takes three reports in a row that show all four wheels at
+    /// 2 rpm or less. Both report layouts have wheel speeds, so both count. A report counts if it
+    /// began to arrive after the stop had been flushed: that is when
+    /// [`handle_flushed`](Endpoint::handle_flushed) was called, or, by a driver that never calls
+    /// it, when the next round began. A wheel that moves again, or 500 ms without a report
+    /// ([`HostConfig::link_timeout`]), ends it.
+    #[must_use]
+    pub fn stop_progress(&self) -> StopProgress {
+        self.state.motor.stop_progress()
     }
 
     /// The settings.
@@ -321,6 +344,14 @@ impl<S: BiasStore> Endpoint for Host<S> {
         self.receive(bytes);
     }
 
+    /// Reports among the bytes count as received at `since` where it matters whether a stop was
+    /// before them (U16), and otherwise at `now`.
+    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
+        self.state.old_since = Some(since);
+        self.handle_input(bytes, now);
+        self.state.old_since = None;
+    }
+
     fn handle_timeout(&mut self, now: Instant) {
         while self.inbox.settle(now) {
             self.receive(&[]);
@@ -341,6 +372,14 @@ impl<S: BiasStore> Endpoint for Host<S> {
 
     fn wire_time(&self, bytes: usize) -> Duration {
         wire_time(bytes, self.state.config.baud)
+    }
+
+    fn handle_taken(&mut self, _: Instant) {
+        self.state.taken();
+    }
+
+    fn handle_flushed(&mut self, now: Instant) {
+        self.state.motor.flushed(now);
     }
 
     /// Whether it is a motor command that moves the robot and is no longer the latest.

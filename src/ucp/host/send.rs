@@ -23,7 +23,7 @@ use crate::{
 impl<S: BiasStore> State<S> {
     /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
-        self.motor.begin_round();
+        self.motor.begin_round(now);
         let Some(outgoing) = self.next(now) else {
             self.motor.end_round();
             return None;
@@ -109,6 +109,13 @@ impl<S: BiasStore> State<S> {
             self.events.push_frequent(HostEvent::BiasesSent);
         }
         Some(Biases::new(imu, mag))
+    }
+
+    /// The port has taken all of the frame handed out last.
+    pub(super) fn taken(&mut self) {
+        if matches!(self.last, Some(Outgoing::Motor(_))) {
+            self.motor.taken();
+        }
     }
 
     /// Whether the frame handed out last is a motor command that moves the robot, and is no longer

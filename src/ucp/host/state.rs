@@ -17,7 +17,7 @@ use super::{
 use crate::{
     events::Events,
     stats::count,
-    time::{Duration, Instant, reached},
+    time::{Duration, Instant, reached, wire_time},
     ucp::{
         body::{ImuBias, MagBias, Pong, SetNetworkState},
         codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
@@ -66,6 +66,8 @@ pub(super) struct State<S> {
     pub(super) network_due: Option<Instant>,
     /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
+    /// While old bytes are taken in: the earliest time at which they may have arrived.
+    pub(super) old_since: Option<Instant>,
 }
 
 /// Progress of a firmware update.
@@ -109,6 +111,7 @@ impl<S: BiasStore> State<S> {
             biases_told: false,
             network_due: None,
             last: None,
+            old_since: None,
         }
     }
 
@@ -225,7 +228,7 @@ impl<S: BiasStore> State<S> {
             Message::CalibrationEndAck(ack) => {
                 self.acknowledge(CalibrationStep::End, ack.kind(), ack.err(), at);
             }
-            Message::Report(report) => self.report(&report, frame.index()),
+            Message::Report(report) => self.report(&report, frame, at),
             Message::ImuBias(bias) => self.imu_result(*bias, at),
             Message::MagBias(bias) => self.mag_result(*bias, at),
             Message::BiasRequest(_) => self.bias_request(at),
@@ -259,7 +262,8 @@ impl<S: BiasStore> State<S> {
         self.events.push_frequent(HostEvent::Pong { round_trip, err });
     }
 
-    fn report(&mut self, report: &Report<'_>, index: u8) {
+    fn report(&mut self, report: &Report<'_>, frame: &Frame, at: Instant) {
+        let index = frame.index();
         let lost = match self.last_index.replace(index) {
             Some(last) if last == index => {
                 count(&mut self.stats.reports_repeated);
@@ -271,6 +275,10 @@ impl<S: BiasStore> State<S> {
         count(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
+        let at = self.old_since.map_or(at, |since| at.min(since));
+        let on_line = wire_time(frame.as_bytes().len(), self.config.baud);
+        let until = at + self.config.link_timeout;
+        self.motor.standstill().report(report.telemetry.rpm, at, on_line, until);
         (self.last_report, self.is_report_new) = (Some(report), true);
         self.events.push_frequent(HostEvent::Report(report));
     }
@@ -392,13 +400,6 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn expire(&mut self, now: Instant) {
         self.expire_command(now);
-        if reached(self.link_until, now) {
-            self.link_until = None;
-            self.link = Link::Down;
-            self.last_index = None;
-            count(&mut self.stats.links_lost);
-            self.events.push_latest(HostEvent::LinkDown, is_link);
-        }
         if self.ping.expire(now, &self.config) {
             count(&mut self.stats.pings_lost);
         }
@@ -408,10 +409,19 @@ impl<S: BiasStore> State<S> {
         }
     }
 
+    /// Ends a command whose application has gone silent, or whose robot is no longer heard (U10).
     pub(super) fn expire_command(&mut self, now: Instant) {
         if self.motor.expire(now) {
             count(&mut self.stats.dead_man);
             self.events.push(HostEvent::DeadMan);
+        }
+        if reached(self.link_until, now) {
+            self.link_until = None;
+            self.link = Link::Down;
+            self.last_index = None;
+            self.motor.lose_link(now);
+            count(&mut self.stats.links_lost);
+            self.events.push_latest(HostEvent::LinkDown, is_link);
         }
     }
 }

@@ -1,0 +1,105 @@
+//! Whether the robot obeys a stop: what its reports show once the stop has been flushed (U16).
+
+use core::fmt;
+
+use crate::time::{Duration, Instant};
+
+/// Time in which a rover is seen to stand still after its stop, 2 s: for one that coasts.
+/// `Driver::drive_for` waits that long.
+pub const COAST: Duration = Duration::from_millis(2000);
+
+/// Reports in a row that must show all wheels still: one alone may show wheels that are just
+/// reversing.
+const STILL_REPORTS: u8 = 3;
+
+/// Fastest turn of a wheel that stands still, rpm.
+const STILL_RPM: u16 = 2;
+
+/// Progress of a stop, see [`Host::stop_progress`](super::Host::stop_progress).
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum StopProgress {
+    /// The latest command, if any, is to move, however slowly.
+    NotAsked,
+    /// The stop has not been flushed yet, or not as often as needed.
+    Due,
+    /// The stop has been flushed, and no report has arrived since, or none within the
+    /// [link timeout](super::HostConfig::link_timeout). **The robot may be moving.**
+    NoReports,
+    /// Reports have arrived since, but the latest three do not all show every wheel at standstill.
+    /// **The robot may be moving.**
+    StillMoving {
+        /// The wheel speeds of the latest report, rpm.
+        rpm: [i16; 4],
+    },
+    /// The latest three reports, all received since, show every wheel at 2 rpm or less.
+    StandingStill,
+}
+
+impl fmt::Display for StopProgress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAsked => f.write_str("it was not told to stop"),
+            Self::Due => f.write_str("the stop has not been sent yet"),
+            Self::NoReports => f.write_str("it was told to stop, but sends no reports"),
+            Self::StillMoving { rpm: [front_left, front_right, back_left, back_right] } => write!(
+                f,
+                "it was told to stop, but its wheels turn, at {front_left}, {front_right}, \
+                 {back_left} and {back_right} rpm"
+            ),
+            Self::StandingStill => f.write_str("it stands still"),
+        }
+    }
+}
+
+/// The watch over the wheels of a robot that has been told to stand still.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Standstill {
+    /// Nothing counts yet: the stop has not been flushed.
+    Untold,
+    /// The stop was flushed at this time: reports that begin later count.
+    Told(Instant),
+    /// The latest report that counts, how many in a row have shown a standstill, and until when
+    /// this says something.
+    Reported { rpm: [i16; 4], still: u8, until: Instant },
+}
+
+impl Standstill {
+    /// The stop has been flushed. A repetition changes nothing.
+    pub(super) const fn tell(&mut self, now: Instant) {
+        if matches!(self, Self::Untold) {
+            *self = Self::Told(now);
+        }
+    }
+
+    /// Takes in the wheel speeds of a report that arrived at `at`, has taken `on_line`, and says
+    /// something `until` then.
+    pub(super) fn report(&mut self, rpm: [i16; 4], at: Instant, on_line: Duration, until: Instant) {
+        let before = match *self {
+            Self::Told(told) if at - told >= on_line => 0,
+            Self::Reported { still, .. } => still,
+            _ => return,
+        };
+        // Turning on the spot is also motion: every wheel counts.
+        let is_still = rpm.iter().all(|wheel| wheel.unsigned_abs() <= STILL_RPM);
+        let still = if is_still { before.saturating_add(1).min(STILL_REPORTS) } else { 0 };
+        *self = Self::Reported { rpm, still, until };
+    }
+
+    /// Forgets the reports once there have been none for too long.
+    pub(super) fn expire(&mut self, now: Instant) {
+        match *self {
+            Self::Reported { until, .. } if until <= now => *self = Self::Told(now),
+            _ => {}
+        }
+    }
+
+    pub(super) const fn progress(&self) -> StopProgress {
+        match *self {
+            Self::Untold => StopProgress::Due,
+            Self::Told(_) => StopProgress::NoReports,
+            Self::Reported { still: STILL_REPORTS, .. } => StopProgress::StandingStill,
+            Self::Reported { rpm, .. } => StopProgress::StillMoving { rpm },
+        }
+    }
+}

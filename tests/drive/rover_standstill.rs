@@ -1,0 +1,137 @@
+//! A rover is seen to stand still after its stop, or the call says why not (U16).
+
+use axlewire::ucp::host::{COAST, CommandError, StopProgress};
+
+use crate::rig::*;
+
+/// A rover whose wheels turn on for this long after a stop.
+fn coasting(span: Duration) -> (World, Rover, Running<Robot>) {
+    let (world, rover, robot) = rover(|_| ());
+    let (time, actor, mut still_at) = (world.clone(), robot.clone(), at_ms(0));
+    world.add(move || {
+        let (Ok(mut robot), now) = (actor.try_borrow_mut(), time.now()) else { return };
+        if robot.role().command(now).speed() != 0 {
+            still_at = now + span;
+        }
+        let rpm = if now < still_at { [-3; 4] } else { [2; 4] };
+        robot.role_mut().set_telemetry(&Telemetry { rpm, ..Telemetry::default() }, now);
+    });
+    (world, rover, robot)
+}
+
+fn not_still(progress: StopProgress) -> Result<(), DriveError<Unplugged>> {
+    Err(DriveError::NoStandstill(progress))
+}
+
+#[test]
+fn a_drive_of_a_rover_that_coasts_for_1500_ms_ends_when_it_stands() {
+    for is_async in BOTH {
+        let (world, mut rover, _robot) = coasting(ms(1500));
+        assert_eq!(call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(300))), Ok(()));
+        // Three reports later.
+        assert!((1840..1890).contains(&(world.now_us() / 1000)), "{:?}", world.now());
+        assert_eq!(rover.role().stop_progress(), StopProgress::StandingStill);
+    }
+}
+
+#[test]
+fn a_drive_of_a_rover_that_never_stops_fails_after_2_s_and_repeats_the_stop_all_the_while() {
+    for is_async in BOTH {
+        let (world, mut rover, robot) = coasting(ms(1_000_000));
+        let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(300)));
+        assert_eq!(driven, not_still(StopProgress::StillMoving { rpm: [-3; 4] }));
+        assert!(
+            (0..10).contains(&(world.now() - (at_ms(300) + COAST)).as_micros().div_euclid(1000))
+        );
+        assert_eq!(robot.borrow().role().command(world.now()), MotorControl::STOP);
+        let text = "the robot was not seen to stand still: it was told to stop, but its wheels \
+                    turn, at -3, -3, -3 and -3 rpm";
+        assert_eq!(driven.unwrap_err().to_string(), text);
+    }
+}
+
+#[test]
+fn a_rover_without_reports_is_no_success_at_the_deadline() {
+    for is_async in BOTH {
+        // It hears everything, and answers pings.
+        let world = World::default();
+        let (near, far) = Port::pair(&world, BYTE_US);
+        let _robot = run(Robot::new(RobotConfig::default(), at_ms(0)), far);
+        let mut rover = on(Host::new(HostConfig::default(), at_ms(0)), near);
+        call!(is_async, rover, stop, stop_async()).unwrap();
+        let deadline = at_ms(900);
+        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        assert_eq!((waited, world.now()), (not_still(StopProgress::NoReports), deadline));
+        let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(300)));
+        assert_eq!(driven, not_still(StopProgress::NoReports));
+    }
+}
+
+#[test]
+fn without_a_stop_the_wait_for_a_standstill_ends_at_once() {
+    for is_async in BOTH {
+        let (world, mut rover, _robot) = coasting(ms(0));
+        rover.drive(1, 0).unwrap();
+        let deadline = at_ms(5000);
+        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        assert_eq!(waited, not_still(StopProgress::NotAsked));
+        assert!(world.now() < at_ms(10));
+    }
+}
+
+#[test]
+fn the_wait_for_a_standstill_goes_through_errors_of_the_port_and_ends_with_the_last() {
+    for (is_async, is_gone) in BOTH.into_iter().flat_map(|it| BOTH.map(|gone| (it, gone))) {
+        let (world, mut rover, _robot) = coasting(ms(100));
+        rover.drive(40, 0).unwrap();
+        rover.run_until(at_ms(100), |_, _, _| ()).unwrap();
+        rover.stop().unwrap();
+        rover.port_mut().reads.extend([Step::Error, Step::Error]);
+        rover.port().unplugged.set(is_gone);
+        let deadline = at_ms(1000);
+        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        assert_eq!(waited, if is_gone { Err(GONE) } else { Ok(()) });
+        assert_eq!(world.now() >= deadline, is_gone);
+    }
+}
+
+#[test]
+fn a_dropped_wait_for_a_standstill_goes_on_in_the_next() {
+    let (world, mut rover, robot) = coasting(ms(150));
+    assert!(world.poll_times(6000, rover.drive_for_async(40, 0, ms(100))).is_none(), "it coasts");
+    assert!(robot.borrow().role().command(world.now()).stands_still());
+    let mut waits = 0;
+    while world.poll_times(50, rover.await_standstill_async(at_ms(5000))).is_none() {
+        waits += 1;
+    }
+    assert!(waits > 3 && world.now() < at_ms(400), "{waits}, {:?}", world.now());
+}
+
+#[test]
+fn after_a_failed_flush_a_stop_is_ok_once_two_whole_copies_are_flushed() {
+    for is_async in BOTH {
+        for failures in 1..4 {
+            let mut rover = host();
+            rover.drive(60, 0).unwrap();
+            let before = rover.port().written.len();
+            rover.port_mut().flushes.extend(vec![Step::Error; failures]);
+            call!(is_async, rover, stop, stop_async()).unwrap();
+            let (port, stop) = (rover.port(), [0xFD, 0xFF, 20, 0, 2]);
+            let stops = port.written[before..].windows(5).filter(|bytes| **bytes == stop);
+            assert_eq!((stops.count(), port.flushed_bytes), (1 + 2 * failures, port.written.len()));
+        }
+    }
+}
+
+#[test]
+fn a_drive_ends_when_the_robot_is_no_longer_heard() {
+    for is_async in BOTH {
+        let mut rover = host();
+        assert_eq!(
+            call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(5000))),
+            not_still(StopProgress::NoReports)
+        );
+        assert!(rover.now() < at_ms(510) + COAST);
+        assert_eq!(rover.drive(40, 0), Err(DriveError::Rover(CommandError::LinkDown)));
+    }
+}
