@@ -7,7 +7,7 @@ use axlewire::{
     time::{Duration, Instant},
     ucp::{
         Host, MotorControl,
-        host::{HostConfig, HostEvent, HostStatistics, Link},
+        host::{HostConfig, HostEvent, HostStatistics, Link, STILL_REPORTS, StopProgress},
     },
 };
 
@@ -29,14 +29,6 @@ const LINK_PATIENCE: Duration = Duration::from_millis(2000);
 /// Time allowed for the wheels to come to rest after the first stop.
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
 
-/// Number of stops sent before a report counts: motor frames are not acknowledged (ruling U16), so
-/// any may be lost.
-const STOPS: u32 = 3;
-
-/// Number of consecutive reports with all wheels at rest. A single one may show a wheel that is
-/// changing direction.
-const STILL_REPORTS: u32 = 3;
-
 /// Longest interval between two calls of the host: well under its dead-man timeout of 500 ms.
 pub(crate) const CALL_PERIOD: Duration = Duration::from_millis(50);
 
@@ -52,8 +44,6 @@ pub(crate) struct Rover {
     session: Session<Host>,
     /// The host's dead-man has stopped the robot.
     pub(crate) has_dead_man_fired: bool,
-    /// Number of consecutive reports with all wheels at rest.
-    still_reports: u32,
     pings: Pings,
     /// Others have sent pings on this line.
     has_others: bool,
@@ -78,13 +68,7 @@ impl Rover {
         let mut config = config;
         config.baud = args.baud_for(Protocol::Ucp);
         let session = Session::new(line, |now| Host::new(config, now));
-        Self {
-            session,
-            has_dead_man_fired: false,
-            still_reports: 0,
-            pings: Pings::default(),
-            has_others: false,
-        }
+        Self { session, has_dead_man_fired: false, pings: Pings::default(), has_others: false }
     }
 
     /// Tells that others have sent pings on this line.
@@ -145,15 +129,7 @@ impl Rover {
         };
         while let Some(event) = next {
             react(&event);
-            match event {
-                // Turning on the spot is also motion: every wheel counts.
-                HostEvent::Report(report) if report.telemetry.rpm == [0; 4] => {
-                    self.still_reports = self.still_reports.saturating_add(1);
-                }
-                HostEvent::Report(_) => self.still_reports = 0,
-                HostEvent::DeadMan => self.has_dead_man_fired = true,
-                _ => {}
-            }
+            self.has_dead_man_fired |= event == HostEvent::DeadMan;
             next = self.session.poll_event();
         }
         let now = self.now();
@@ -175,31 +151,30 @@ impl Rover {
         mark.open.is_some_and(|open| since > open)
     }
 
-    /// Repeats the stop until the robot's reports show all wheels at rest. Only those count that
-    /// came after the robot had heard of it: after its answer to a ping behind it. Failures of the
-    /// port and of the link do not end it early, and neither do signals.
+    /// Repeats the stop until the robot is seen to stand still (ruling U16), by reports that came
+    /// after it had heard of the stop: a network may hold back stop and reports for a while.
+    /// Failures of the port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
-        let (begin, before) = (self.now(), *self.host().statistics());
-        let (sent, reports) = (before.commands, before.reports);
+        let (begin, before) = (self.now(), self.host().statistics().commands);
         let mut awake = Awake::new(begin);
-        // When enough stops had been sent.
-        let (mut told, mut has_heard) = (None, false);
+        // When the stop was flushed, and the number of reports before the robot had heard of it.
+        let (mut told, mut unheard) = (None, None);
         self.host_mut().stop(begin);
         let failure = loop {
             let until = self.now() + CALL_PERIOD;
             let result = self.round(until);
-            let now = self.now();
-            if told.is_none() && self.host().statistics().commands.saturating_sub(sent) >= STOPS {
+            let (now, progress) = (self.now(), self.host().stop_progress());
+            if told.is_none() && progress != StopProgress::Due {
                 told = Some(self.mark());
             }
             let must_have_heard =
                 |mark: &Mark| self.has_heard(mark) || now - mark.at >= LONGEST_TRIP;
-            if !has_heard && told.as_ref().is_some_and(must_have_heard) {
-                // Earlier reports do not count.
-                (has_heard, self.still_reports) = (true, 0);
+            let reports = self.host().statistics().reports;
+            if unheard.is_none() && told.as_ref().is_some_and(must_have_heard) {
+                unheard = Some(reports);
             }
-            let is_told = has_heard && self.host().is_stop_sent();
-            if result.is_ok() && is_told && self.still_reports >= STILL_REPORTS {
+            let is_news = unheard.is_some_and(|before| reports - before >= STILL_REPORTS.into());
+            if result.is_ok() && is_news && progress == StopProgress::StandingStill {
                 return Ok(());
             }
             if awake.time(self.now()) >= STOP_PATIENCE {
@@ -212,20 +187,14 @@ impl Rover {
         if let Some(failure) = failure {
             return Err(failure.while_moving(OUT_OF_REACH));
         }
-        let seen = self.host().statistics();
-        let sent = seen.commands.saturating_sub(sent);
-        let reports = seen.reports.saturating_sub(reports);
-        Err(Failure::Failed(match self.host().link() {
-            Link::Up if reports == 0 => {
-                format!("the robot was told {sent} times to stop, but reports nothing any more")
+        let sent = self.host().statistics().commands.saturating_sub(before);
+        let told = format!("the robot was told {sent} times to stop");
+        Err(Failure::Failed(match (self.host().link(), self.host().stop_progress()) {
+            (Link::Up, StopProgress::StillMoving { .. }) => {
+                format!("{told}, but its wheels are still turning")
             }
-            Link::Up => {
-                format!("the robot was told {sent} times to stop, but its wheels are still turning")
-            }
-            _ => format!(
-                "the robot was told {sent} times to stop and is no longer heard: it may be \
-                 moving"
-            ),
+            (Link::Up, _) => format!("{told}, but sends no reports: it may be moving"),
+            _ => format!("{told} and is no longer heard: it may be moving"),
         }))
     }
 

@@ -35,5 +35,5 @@ pub use event::{
 };
 pub use link::Link;
 pub use role::Host;
-pub use standstill::{COAST, StopProgress};
+pub use standstill::{COAST, STILL_REPORTS, StopProgress};
 pub use statistics::HostStatistics;

@@ -57,13 +57,13 @@ fn a_rover_is_at_rest_once_every_wheel_has_been_still_for_three_reports() {
 }
 
 #[test]
-fn a_stop_is_sent_three_times_and_heard_before_a_report_counts() {
+fn a_stop_is_heard_before_a_report_counts() {
     let line = played::rover(|_| {});
     let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
     assert!(rover.find(|| false).unwrap());
     let before = line.state.borrow().commands.len();
     rover.stop().unwrap();
-    assert!(line.state.borrow().commands.len() >= before + 3);
+    assert!(line.state.borrow().commands.len() >= before + 2, "until the next ping");
     assert!(rover.host().is_stop_sent());
     let text = rover.describe().unwrap();
     assert!(text.starts_with("rpm    0    0    0    0  heading  90 deg  "), "{text}");
@@ -74,7 +74,7 @@ fn reports_from_before_a_stop_was_heard_do_not_show_that_it_stands_still() {
     // It stands still until it has heard of the stop, and then turns.
     let mut pings = None;
     let line = played::rover(move |rover| {
-        if rover.commands.len() >= STOPS as usize {
+        if rover.commands.len() >= 2 {
             let before = *pings.get_or_insert(rover.pings);
             rover.wheels = (rover.pings > before).then_some([9; 4]);
         }
@@ -100,7 +100,7 @@ fn reports_from_before_a_stop_was_heard_do_not_count_towards_those_behind_it() {
             state.is_dumb = answered < 3;
             return pong.as_bytes().to_vec();
         }
-        state.is_dumb |= answered == 0 && state.commands.len() >= STOPS as usize;
+        state.is_dumb |= answered == 0 && state.commands.len() >= 3;
         said
     });
     let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
@@ -262,7 +262,7 @@ fn commands_from_before_a_stop_are_no_stops() {
     });
     let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
     assert!(rover.find(|| false).unwrap());
-    while line.state.borrow().commands.len() < 2 * STOPS as usize {
+    while line.state.borrow().commands.len() < 6 {
         let now = rover.now();
         rover.host_mut().drive(motor_control(30, 0).unwrap(), now).unwrap();
         rover.round(now + CALL_PERIOD).unwrap();
@@ -270,7 +270,7 @@ fn commands_from_before_a_stop_are_no_stops() {
     let before = line.state.borrow().commands.len();
     rover.stop().unwrap();
     let stops = line.state.borrow().commands[before..].to_vec();
-    assert!(stops.len() >= STOPS as usize, "{stops:?}");
+    assert!(!stops.is_empty() && stops.iter().all(|it| *it == (0, 0)), "{stops:?}");
 }
 
 #[test]
