@@ -109,7 +109,7 @@
 //!   are kept.
 //! * **U9** `index` is a wrapping counter per sender; a gap in it is never an error.
 //! * **U10** [`Host`] repeats the latest motor command every 100 ms, and sends zero when its
-//!   application has been silent for 500 ms. [`Robot`] stands still 500 ms after the last *valid*
+//!   application has been silent for 500 ms, or the robot has not been heard for as long. [`Robot`] stands still 500 ms after the last *valid*
 //!   motor command; the vendor firmware accepts any byte instead. Reports come every 20 ms, and the
 //!   link is lost after 500 ms without a valid frame.
 //! * **U11** A calibration's start and end are acknowledged at once. Its result and the robot's
@@ -130,11 +130,15 @@
 //!   or in an event queue that had room. Half of each queue is reserved for rare events.
 //! * **U16** Motor frames are never answered, so a stop is done when it has been flushed:
 //!   [`Host::is_stop_sent`]. A frame that did not reach the line makes the motor command due again,
-//!   twice if the frame was cut off. The first frame of a host is a zero motor command, because a
+//!   twice if the frame was cut off or its flush failed. Whether the robot obeys is in its reports:
+//!   [`Host::stop_progress`], and `await_standstill` of a driver. A robot that has not been heard
+//!   for 500 ms is told to stand still, and commands to move are refused until it is heard again
+//!   ([`CommandError::LinkDown`]). The first frame of a host is a zero motor command, because a
 //!   vendor robot keeps driving while any byte arrives: a restarted host that only pings would keep
 //!   it moving. To disable this for hosts that only listen, clear [`HostConfig::sends_first_stop`].
 //!
 //! [`BiasStore`]: host::BiasStore
+//! [`CommandError::LinkDown`]: host::CommandError::LinkDown
 //! [`HostConfig::low_ids_only`]: host::HostConfig::low_ids_only
 //! [`HostConfig::sends_first_stop`]: host::HostConfig::sends_first_stop
 //! [`OtaRequest`]: message::OtaRequest

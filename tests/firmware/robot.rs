@@ -55,7 +55,8 @@ fn event_when(
         let now = rover.now();
         assert!(now < end, "timed out waiting for: {what}");
         if let Some(command) = command {
-            rover.role_mut().drive(command, now).unwrap();
+            // Refused until the board is heard.
+            let _ = rover.role_mut().drive(command, now);
         }
         let event = rover.next_event((now + Duration::from_millis(50)).min(end)).unwrap();
         if event.is_some_and(|event| done(&event)) {

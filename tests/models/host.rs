@@ -90,14 +90,14 @@ impl Acts<HostSide> for Site {
 
     fn hand_out(&mut self) -> Result<bool, String> {
         let (shelf, now) = (self.role.store().clone(), self.now);
-        self.step.is_halted |= self.account.motion.expire(now);
+        self.step.is_halted |= self.account.expire_command(now);
         let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
         self.account.frame(frame, &shelf, now)?;
         Ok(true)
     }
 
     fn expire(&mut self) {
-        self.step.is_halted |= self.account.motion.expire(self.now);
+        self.step.is_halted |= self.account.expire_command(self.now);
         self.account.expire(self.now);
     }
 

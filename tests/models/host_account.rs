@@ -137,12 +137,20 @@ impl Account {
         }
     }
 
+    /// The application has been silent, or the robot was not heard, for 500 ms; returns whether
+    /// the former is new.
+    pub(crate) fn expire_command(&mut self, now: Instant) -> bool {
+        let is_silent = self.motion.expire(now);
+        if self.link_until.is_some_and(|at| at <= now) {
+            (self.link, self.link_until) = (Link::Down, None);
+            self.motion.halt();
+        }
+        is_silent
+    }
+
     /// The driver looks at the clock.
     pub(crate) fn expire(&mut self, now: Instant) {
         let is_reached = |at: Option<Instant>| at.is_some_and(|at| at <= now);
-        if is_reached(self.link_until) {
-            (self.link, self.link_until) = (Link::Down, None);
-        }
         if is_reached(self.ping_until) {
             self.ping_until = None;
         }

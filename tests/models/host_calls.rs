@@ -1,6 +1,6 @@
 //! The calls of a host's application, and those that are refused.
 
-use axlewire::ucp::host::CommandError;
+use axlewire::ucp::host::{CommandError, Link};
 
 use super::{
     host::{Call, Site, VERSION, command},
@@ -21,7 +21,9 @@ impl Site {
                 if result.is_ok() {
                     self.account.motion.call(command(number), now);
                 }
-                (result, is_updating.then_some(CommandError::Updating))
+                let is_lost = self.account.link == Link::Down && !command(number).stands_still();
+                let lost = is_lost.then_some(CommandError::LinkDown);
+                (result, is_updating.then_some(CommandError::Updating).or(lost))
             }
             Call::Calibrate(step, kind) => {
                 let result = match step {

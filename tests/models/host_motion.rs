@@ -28,7 +28,8 @@ pub(crate) struct Motion {
     pub(crate) is_called: bool,
     gap_until: Instant,
     repeat_at: Instant,
-    /// Number of motor frames sent of the two after a cut-off frame, until both are flushed.
+    /// Number of motor frames sent of the two after a cut-off frame or a failed flush, until both
+    /// are flushed.
     behind_cut: Option<u8>,
     /// The last frame of any kind was a motor frame.
     is_motor_last: bool,
@@ -66,9 +67,14 @@ impl Motion {
     pub(crate) fn expire(&mut self, now: Instant) -> bool {
         let is_silent = self.dead_man.is_some_and(|at| at <= now);
         if is_silent {
-            (self.wanted, self.dead_man) = (self.wanted.map(halted), None);
+            self.halt();
         }
         is_silent
+    }
+
+    /// The application is silent, or the robot is no longer heard.
+    pub(crate) fn halt(&mut self) {
+        (self.wanted, self.dead_man) = (self.wanted.map(halted), None);
     }
 
     /// The latest time for the next motor frame.
@@ -146,7 +152,8 @@ impl Motion {
         self.behind_cut = self.behind_cut.filter(|&out| out < 2);
     }
 
-    /// Whatever the robot was told before is sent again, twice after half a frame (U16).
+    /// Whatever the robot was told before is sent again, twice after half a frame or a failed flush
+    /// (U16).
     pub(crate) fn unsent(&mut self, unsent: Unsent) {
         self.told = None;
         self.greeting = match (self.greeting, unsent) {
@@ -156,9 +163,7 @@ impl Motion {
             (as_before, _) => as_before,
         };
         self.behind_cut = match (unsent, self.behind_cut) {
-            (Unsent::CutOff, _) => Some(0),
-            // The state of unflushed frames is unknown.
-            (Unsent::Unflushed, Some(_)) => Some(0),
+            (Unsent::CutOff | Unsent::Unflushed, _) => Some(0),
             (Unsent::Untouched, Some(out)) if self.is_motor_last => Some(out.saturating_sub(1)),
             (_, as_before) => as_before,
         };

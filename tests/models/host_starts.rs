@@ -186,7 +186,7 @@ fn hosts_that_differ_in_time_and_counters_alone_have_the_same_fingerprint() {
     let later = silent.clone().after(&[Act::Run(1_000)]);
     assert_ne!(format!("{:?}", silent.role), format!("{:?}", later.role));
     assert_eq!(silent.fingerprint(), later.fingerprint());
-    for act in [Act::Call(Go(1)), Act::Call(Stop), Act::Call(Show(1)), Act::One, Act::Wait(1_000)] {
+    for act in [Act::Call(Stop), Act::Call(Show(1)), Act::One, Act::Wait(1_000)] {
         let other = silent.clone().after(&[act]);
         let is_new = other.fingerprint() != silent.fingerprint();
         // A poll without a result changes nothing.

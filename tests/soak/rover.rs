@@ -4,7 +4,7 @@ use axlewire::{
     sim::RoverNode,
     ucp::{
         Host, MotorControl, Robot,
-        host::{HostConfig, HostEvent},
+        host::{CommandError, HostConfig, HostEvent},
         robot::RobotConfig,
     },
 };
@@ -171,7 +171,8 @@ impl Link {
             }
         }
         if let Order::Drive(command) = self.order {
-            self.line.head_mut().role.drive(command, now).unwrap();
+            let driven = self.line.head_mut().role.drive(command, now);
+            assert!(matches!(driven, Ok(()) | Err(CommandError::LinkDown)), "{driven:?}");
         }
     }
 

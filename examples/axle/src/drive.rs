@@ -27,8 +27,8 @@ use crate::{
 /// Ctrl-Z, Ctrl-\, a kill without -9; not those of a crash, nor 32 and 33, which belong to the C
 /// library, nor SIGXFSZ, which only ends a recording), the tool repeats the stop until the reports
 /// show that all wheels have stopped; a second Ctrl-C does not cut this short. If the robot is no
-/// longer heard, it may be moving: the tool says so, and the exit code is 1. After Ctrl-Z and fg
-/// nothing moves again, and the exit code is 1.
+/// longer heard, or sends no reports, it may be moving: the tool says so, and the exit code is 1.
+/// After Ctrl-Z and fg nothing moves again, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
 pub(crate) struct Args {

@@ -28,7 +28,7 @@ use crate::{
 /// holds the position read at that moment), and repeats the stop until each has confirmed it twice
 /// and was measured at rest. Silent ids are listed and are not a failure, as long as one node
 /// answers. Rover: sends zero motor commands every 100 ms until the reports show that all wheels
-/// have stopped.
+/// have stopped; a robot without reports may be moving, and is a failure.
 ///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
 /// within about 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.

@@ -93,8 +93,8 @@ fn spin_tokio_stops_the_motor_at_ctrl_c() {
 fn rover_drives_prints_reports_and_stops() {
     let (sim, port) = sim("ucp");
     let lines = start(env!("CARGO_BIN_EXE_rover"), &port).success();
-    let (last, reports) = lines.split_last().unwrap();
-    assert_eq!(last, "told to stop");
+    let (reports, last) = lines.split_at(lines.len() - 2);
+    assert_eq!(last, ["told to stop", "standing still"]);
     assert!(reports.len() > 5, "{reports:?}");
     assert!(reports.iter().all(|line| line.contains(" rpm, ")), "{reports:?}");
     assert!(!reports.last().unwrap().starts_with("[0, 0, 0, 0] rpm"), "{reports:?}");

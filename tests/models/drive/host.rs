@@ -57,16 +57,23 @@ pub(super) enum Told {
 
 pub(super) type Outcome = Result<(), Told>;
 
-/// A robot that answers pings.
+/// A robot that answers pings, and motor commands with a report of its wheels.
 struct Rover;
 
 impl Peer for Rover {
     fn hear(&mut self, frame: &[u8], _: u64) -> Option<(u64, Vec<u8>)> {
-        (frame[4] == 1).then(|| {
-            let mut pong = vec![0xFD, 0xFF, 5, 0, 1, frame[5], 0];
-            pong.extend(crc(&pong).to_le_bytes());
-            (500, pong)
-        })
+        let mut answer = vec![0xFD, 0xFF, 5, 0, 1, 0, 0];
+        match frame[4] {
+            1 => {}
+            2 => {
+                (answer[2], answer[4]) = (40, 5);
+                answer.resize(42, 0);
+                answer[8] = frame[6];
+            }
+            _ => return None,
+        }
+        answer.extend(crc(&answer).to_le_bytes());
+        Some((500, answer))
     }
 }
 

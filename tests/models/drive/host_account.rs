@@ -3,6 +3,8 @@
 
 use std::hash::Hash;
 
+use axlewire::ucp::host::{COAST, Link};
+
 use super::{
     host::{Call, HostLife, IDLE, Outcome, SPAN, TIMEOUT_US, Told},
     wire::Taken,
@@ -21,7 +23,7 @@ pub(crate) struct Account {
     is_begun: bool,
     /// The last motor command was a stop, and has left.
     is_still: bool,
-    /// Zero commands still to be sent after a cut-off frame.
+    /// Zero commands still to be sent after a cut-off frame or a failed flush.
     copies: u8,
 }
 
@@ -39,6 +41,8 @@ pub(super) struct Before {
     stalls: u64,
     faults: usize,
     is_whole: bool,
+    is_lost: bool,
+    links_lost: u32,
 }
 
 /// The speed commanded by a frame.
@@ -55,6 +59,8 @@ impl<P: Wired> HostLife<P> {
             stalls: line.stalls(),
             faults: line.faults(),
             is_whole: line.wire.open.is_empty() && self.driver.unsent().is_empty(),
+            is_lost: self.driver.role().link() == Link::Down,
+            links_lost: self.driver.role().statistics().links_lost,
         }
     }
 
@@ -67,16 +73,24 @@ impl<P: Wired> HostLife<P> {
         if let Some(broken) = self.line.line().broken.take() {
             return Err(broken);
         }
+        if before.is_lost && matches!(call, Call::Drive(_) | Call::DriveFor) {
+            let is_refused = outcome == Err(Told::Other);
+            return if is_refused { Ok(()) } else { Err("it drives unheard".into()) };
+        }
         self.check_offers(call, &before)?;
         if call == Call::Discard {
             return Ok(());
         }
         let line = self.line.line();
         line.is_left_in_order(self.driver.unsent())?;
+        let has_lost = self.driver.role().statistics().links_lost > before.links_lost;
+        let is_clear = before.faults == 0 && before.is_whole && !has_lost;
+        // Three reports, each in answer to a command.
+        let coast_us = if is_clear { 40_000 } else { u64::from(COAST.as_micros()) };
         let bound_us = match call {
             Call::Idle => u64::from(IDLE.as_micros()),
             Call::Stop => STOP_US,
-            Call::DriveFor => STOP_US + u64::from(SPAN.as_micros()),
+            Call::DriveFor => STOP_US + u64::from(SPAN.as_micros()) + coast_us,
             Call::Ping => 60_000,
             _ => 0,
         };
@@ -109,7 +123,6 @@ impl<P: Wired> HostLife<P> {
         if call == Call::DriveFor && is_early && outcome.is_ok() {
             return Err(format!("Ok of a drive that failed with {first:?}"));
         }
-        let is_clear = before.faults == 0 && before.is_whole;
         if is_clear && outcome.is_err() && call != Call::Ping {
             return Err(format!("{outcome:?} without a cause"));
         }

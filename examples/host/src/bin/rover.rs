@@ -7,7 +7,10 @@ use std::{env, error::Error, io};
 use axlewire::{
     drive::{DriveError, Driver, SerialPort, StdClock},
     time::Duration,
-    ucp::{BAUD, Host, host::HostConfig},
+    ucp::{
+        BAUD, Host,
+        host::{COAST, HostConfig},
+    },
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -19,11 +22,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Whatever has happened. An error here means that the rover may be driving: say so.
     rover.stop()?;
     println!("told to stop");
-    driven?;
-    match rover.role().last_report() {
-        Some(_) => Ok(()),
-        None => Err("no robot answers".into()),
+    if rover.role().last_report().is_none() {
+        return Err("no robot answers".into());
     }
+    let deadline = rover.now() + COAST;
+    rover.await_standstill(deadline)?;
+    println!("standing still");
+    Ok(driven?)
 }
 
 fn drive(rover: &mut Driver<Host, SerialPort, StdClock>) -> Result<(), DriveError<io::Error>> {

@@ -7,7 +7,7 @@ use axlewire::{
     time::Duration,
     ucp::{
         Host,
-        host::{HostConfig, MemoryStore},
+        host::{COAST, HostConfig, MemoryStore},
         message::CalibrationKind,
     },
 };
@@ -169,7 +169,7 @@ where
                 let span = MS(u32::from(ms) % 1500);
                 self.asked.push((speed.into(), 3));
                 let done = call!(self.rig, how, drive_for, drive_for_async(speed.into(), 3, span));
-                self.rig.end(&before, span + MS(200), done.as_ref());
+                self.rig.end(&before, span + MS(200) + COAST, done.as_ref());
                 if matches!(done, Some(Ok(()))) {
                     self.check_stopped();
                 }

@@ -5,6 +5,7 @@ use axlewire::{
     endpoint::Unsent,
     ucp::{
         Host, MotorControl, Robot,
+        host::Link as State,
         message::{CalibrationKind, ImuBias, MagBias},
     },
 };
@@ -122,7 +123,11 @@ impl Link {
         let Ok(command) = MotorControl::new(speed, angular) else {
             return assert!(!in_range(speed) || !in_range(angular));
         };
-        self.host.drive(command, self.now).expect("no update is in progress");
+        let is_refused = self.host.link() == State::Down && (speed, angular) != (0, 0);
+        assert_eq!(self.host.drive(command, self.now).is_err(), is_refused, "unheard (U16)");
+        if is_refused {
+            return;
+        }
         self.wanted = Some(((speed, angular), self.now));
         self.has_stopped = (speed, angular) == (0, 0);
     }
