@@ -26,7 +26,7 @@ pub(super) struct Motor {
     standstill: Standstill,
 }
 
-/// How far the stop handed out last has got.
+/// How far the stop handed out last has got, until one has been flushed.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 enum Stop {
     /// Handed out.
@@ -208,7 +208,8 @@ impl Motor {
         let command = if self.first == First::Due { latest.halted() } else { latest };
         self.copies = self.copies.take();
         self.sent = Some((command, now));
-        if latest.stands_still() {
+        // A repetition tells nothing new.
+        if latest.stands_still() && self.standstill.is_untold() {
             self.stop = Stop::Out;
         }
         // A command that waits behind the first frame is sent right after it.

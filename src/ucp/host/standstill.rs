@@ -65,11 +65,13 @@ pub(super) enum Standstill {
 }
 
 impl Standstill {
-    /// The stop has been flushed. A repetition changes nothing.
+    pub(super) const fn is_untold(&self) -> bool {
+        matches!(self, Self::Untold)
+    }
+
+    /// The stop has been flushed.
     pub(super) const fn tell(&mut self, now: Instant) {
-        if matches!(self, Self::Untold) {
-            *self = Self::Told(now);
-        }
+        *self = Self::Told(now);
     }
 
     /// Takes in the wheel speeds of a report that arrived at `at`, has taken `on_line`, and says

@@ -164,6 +164,7 @@ fn host() {
             4 => keep(driver.start_calibration(kind, now())),
             5 => keep(driver.end_calibration(kind, now())),
             6 => keep(driver.drive_for(any(0), any(0), duration())),
+            7 => keep(driver.await_standstill(now())),
             _ => turn(&mut driver),
         }
     }

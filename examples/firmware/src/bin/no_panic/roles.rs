@@ -102,6 +102,7 @@ fn host<S: BiasStore>(store: S) {
             9 => keep((host.statistics(), host.counters(), host.config().calibration_bound())),
             10 => keep(host.store_mut().load()),
             11 => keep((host.take_report(), host.is_stop_sent(), host.calibration_outcome())),
+            12 => keep(host.stop_progress()),
             _ => turn(&mut host),
         }
     }
