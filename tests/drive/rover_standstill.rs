@@ -51,19 +51,21 @@ fn a_drive_of_a_rover_that_never_stops_fails_after_2_s_and_repeats_the_stop_all_
 }
 
 #[test]
-fn a_rover_without_reports_is_no_success_at_the_deadline() {
-    for is_async in BOTH {
-        // It hears everything, and answers pings.
-        let world = World::default();
-        let (near, far) = Port::pair(&world, BYTE_US);
-        let _robot = run(Robot::new(RobotConfig::default(), at_ms(0)), far);
+fn a_rover_without_reports_is_no_success_at_the_deadline_and_one_that_is_not_heard_is_not_driven() {
+    for (is_async, is_heard) in BOTH.into_iter().flat_map(|it| BOTH.map(|heard| (it, heard))) {
+        // It hears everything, and at most answers pings.
+        let (near, far) = Port::pair(&World::default(), BYTE_US);
+        let _robot = is_heard.then(|| run(Robot::new(RobotConfig::default(), at_ms(0)), far));
         let mut rover = on(Host::new(HostConfig::default(), at_ms(0)), near);
         call!(is_async, rover, stop, stop_async()).unwrap();
-        let deadline = at_ms(900);
+        let deadline = at_ms(400);
         let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
-        assert_eq!((waited, world.now()), (not_still(StopProgress::NoReports), deadline));
-        let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(300)));
+        assert_eq!((waited, rover.now()), (not_still(StopProgress::NoReports), deadline));
+        let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(5000)));
         assert_eq!(driven, not_still(StopProgress::NoReports));
+        assert_eq!(rover.now() < at_ms(510) + COAST, !is_heard);
+        let unheard = Err(DriveError::Rover(CommandError::LinkDown));
+        assert_eq!(rover.drive(40, 0), if is_heard { Ok(()) } else { unheard });
     }
 }
 
@@ -120,18 +122,5 @@ fn after_a_failed_flush_a_stop_is_ok_once_two_whole_copies_are_flushed() {
             let stops = port.written[before..].windows(5).filter(|bytes| **bytes == stop);
             assert_eq!((stops.count(), port.flushed_bytes), (1 + 2 * failures, port.written.len()));
         }
-    }
-}
-
-#[test]
-fn a_drive_ends_when_the_robot_is_no_longer_heard() {
-    for is_async in BOTH {
-        let mut rover = host();
-        assert_eq!(
-            call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(5000))),
-            not_still(StopProgress::NoReports)
-        );
-        assert!(rover.now() < at_ms(510) + COAST);
-        assert_eq!(rover.drive(40, 0), Err(DriveError::Rover(CommandError::LinkDown)));
     }
 }

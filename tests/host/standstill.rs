@@ -1,4 +1,4 @@
-//! Whatever happens, the command is zero 500 ms after the last sign of life (U10, U16).
+//! Whatever happens, the command is zero 500 ms after the last sign of life of either end (U10, U16).
 
 use proptest::{collection::vec, prelude::*};
 
@@ -69,7 +69,7 @@ proptest! {
     /// from a host that has heard the robot in the last 500 ms; and after every round on a working
     /// line, so is the command that the robot has.
     #[test]
-    fn a_hosts_command_is_zero_500_ms_after_the_applications_last_call(
+    fn a_hosts_command_is_zero_500_ms_after_the_applications_last_call_or_the_robots_last_frame(
         acts in vec(act(), 1..80),
         start in start(),
         pings in any::<bool>(),
