@@ -99,7 +99,7 @@ fn reports_that_have_ceased_for_500_ms_show_nothing() {
     let mut host = Host::new(quiet_config(), ms(0));
     host.stop(ms(0));
     assert_eq!((sent(&mut host, ms(0)).len(), sent(&mut host, ms(10)).len()), (1, 0));
-    [20, 40, 60].map(|at| host.handle_input(&wheels([0; 4]), ms(at)));
+    [20, 40, 60].into_iter().for_each(|at| host.handle_input(&wheels([0; 4]), ms(at)));
     // Pings may still be answered.
     host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(400));
     wait(&mut host, us(559_999));
