@@ -181,7 +181,8 @@ fn each_node_under_an_order_is_stopped_whatever_its_id_and_its_mode() {
                 Mode::Velocity => write(node, 0.0),
                 Mode::Position => hold(node, Position::new(7, 3)),
             };
-            assert_eq!(writes(&desk.packets(9)), [stop.clone(), stop], "{node}, {mode}");
+            let written = writes(&desk.until(node, StopProgress::Confirmed));
+            assert_eq!(written, [stop.clone(), stop], "{node}, {mode}");
         }
     }
 }

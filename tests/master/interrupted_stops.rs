@@ -3,11 +3,11 @@
 use crate::rig::*;
 
 #[test]
-fn what_was_paid_before_a_mode_was_in_doubt_does_not_count() {
+fn what_was_confirmed_before_a_mode_was_in_doubt_does_not_count() {
     let mut desk = Desk::stopping(manual(), N1);
     let zero = write(NodeId::N1, 0.0);
     assert_eq!(desk.packets(2), [zero.clone(), read(NodeId::N1)]);
-    // One half is paid. Then the node answers in the other mode, and again in its own.
+    // One half is confirmed. Then the node answers in the other mode, and again in its own.
     desk.answer(NodeId::N1, Answer::Position(turns(-3)));
     assert_eq!(desk.packets(2), [zero.clone(), read(NodeId::N1)]);
     assert!(desk.master.is_mode_in_doubt(NodeId::N1));
@@ -19,8 +19,7 @@ fn what_was_paid_before_a_mode_was_in_doubt_does_not_count() {
         assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed, "{count}");
         assert_eq!(desk.packets(1), [packet]);
     }
-    // Not moving, so it stands still at once.
-    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
 }
 
 #[test]
@@ -32,7 +31,7 @@ fn a_position_from_before_a_mode_was_in_doubt_is_not_held() {
     assert!(desk.master.is_mode_in_doubt(NodeId::N3));
     // It has moved on.
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
-    let written = writes(&desk.packets(9));
+    let written = writes(&desk.until(NodeId::N3, StopProgress::Confirmed));
     assert_eq!(written, [hold(NodeId::N3, turns(40)), hold(NodeId::N3, turns(40))]);
 }
 
@@ -85,40 +84,49 @@ fn a_position_is_held_for_20_ms_after_it_was_measured_and_twice_as_long_each_tim
 }
 
 #[test]
-fn the_search_pauses_for_its_share_of_an_exchange_and_the_gap_after_it() {
+fn a_busy_line_is_searched_for_its_share_and_an_idle_one_all_the_time() {
     for (gap_us, share_pct, counts_as) in
         [(0, 5, 5), (1000, 5, 5), (0, 50, 50), (0, 51, 50), (1000, 255, 50), (0, 1, 1)]
     {
         let mut config = direct();
         (config.turnaround_gap, config.recovery_share_pct) = (US(gap_us), share_pct);
-        let mut desk = Desk::losing(config);
-        // Nobody else is there: only the search sends.
-        desk.turn();
-        let asked = desk.now;
-        desk.silence();
-        desk.turn();
         // READ, window and answer.
         let exchange = 80 + 500 + 160 + gap_us;
-        assert_eq!((desk.now - asked).as_micros(), exchange * 100 / counts_as, "{share_pct} %");
+        let mut desk = Desk::losing(config);
+        // Nobody else is there: only the guard is waited for.
+        let reads = desk.follow(NodeId::N1, MS(20), |_| Answer::Silence);
+        for pair in reads.windows(2) {
+            assert_eq!(pair[1].0 - pair[0].0, 740 + 500, "{share_pct} %");
+        }
+        let mut desk = Desk::with_nodes(config, &[N1, N3]);
+        desk.lose(NodeId::N1);
+        let reads = desk.follow(NodeId::N1, MS(500), |_| Answer::Silence);
+        for pair in reads.windows(2) {
+            // The READ of the other node that is under way goes on.
+            let (pause, most) = (exchange * 100 / counts_as, 2 * (340 + gap_us));
+            let between = pair[1].0 - pair[0].0;
+            assert!((pause..=pause + most).contains(&between), "{share_pct} %: {between} us");
+        }
+        assert!(reads.len() > 2, "{share_pct} %");
     }
 }
 
 #[test]
 fn a_search_at_0_percent_looks_only_for_nodes_that_are_owed_a_stop_and_for_these_at_1_percent() {
     let config = with(direct(), |config| config.recovery_share_pct = 0);
-    let mut desk = Desk::losing(config);
+    let desk = Desk::losing(config);
     assert_eq!(desk.master.poll_timeout(), None, "it was never told to move");
+    let mut desk = Desk::with_nodes(config, &[N1, N3]);
+    desk.lose(NodeId::N1);
+    desk.run(MS(1));
     desk.master.stop(NodeId::N1, desk.now);
-    let zero = write(NodeId::N1, 0.0);
-    // One attempt at once, blind; then the search.
-    let mut asked = vec![];
-    for _ in 0..3 {
-        let (blind, packet) = (desk.packet(), desk.packet());
-        assert_eq!((blind, packet), (zero.clone(), read(NodeId::N1)));
-        asked.push(desk.now);
-        desk.silence();
-    }
-    assert_eq!((asked[2] - asked[1]).as_micros(), (80 + 500 + 160) * 100);
+    let sent = desk.follow(NodeId::N1, MS(500), |_| Answer::Silence);
+    assert_eq!(sent[..2], [(0, write(NodeId::N1, 0.0)), (0, read(NodeId::N1))], "at once");
+    let asked: Vec<_> = sent.iter().filter(|it| it.1[0] == READ).map(|it| it.0).collect();
+    // Then the search.
+    let pauses = asked[1..].windows(2).map(|pair| pair[1] - pair[0]);
+    let is_kept = |pause| (74_000..75_000).contains(&pause);
+    assert!(asked.len() > 4 && pauses.into_iter().all(is_kept), "{asked:?}");
 }
 
 fn armed() -> MasterConfig {

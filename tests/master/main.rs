@@ -5,6 +5,7 @@
 
 mod answer_windows;
 mod any_line;
+mod blind_stops;
 mod boards;
 mod dead_man;
 mod discovery;

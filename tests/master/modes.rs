@@ -185,11 +185,11 @@ fn a_stop_waits_for_the_mode_and_is_then_written_in_it() {
 }
 
 #[test]
-fn what_was_written_in_doubt_does_not_pay_the_stop() {
+fn what_was_written_in_doubt_does_not_confirm_the_stop() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.answer(NodeId::N1, Answer::Position(turns(7)));
     desk.master.stop(NodeId::N1, desk.now);
-    let sent = desk.packets(99);
+    let sent = desk.until(NodeId::N1, StopProgress::Confirmed);
     let hold = hold(NodeId::N1, turns(7));
     let read = read(NodeId::N1);
     let in_doubt = [write(NodeId::N1, 0.0), read.clone(), hold.clone(), read.clone()];
@@ -200,7 +200,7 @@ fn what_was_written_in_doubt_does_not_pay_the_stop() {
 }
 
 #[test]
-fn what_was_written_in_doubt_does_not_pay_the_stop_of_a_node_that_is_in_its_old_mode() {
+fn what_was_written_in_doubt_does_not_confirm_the_stop_of_a_node_that_is_in_its_old_mode() {
     let mut desk = Desk::with_nodes(manual(), &[N1]);
     desk.answer(NodeId::N1, Answer::Position(turns(7)));
     desk.master.stop(NodeId::N1, desk.now);
@@ -209,7 +209,8 @@ fn what_was_written_in_doubt_does_not_pay_the_stop_of_a_node_that_is_in_its_old_
     desk.answer(NodeId::N1, Answer::Velocity(0.0));
     assert_eq!(desk.packets(1), std::slice::from_ref(&read));
     assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
-    assert_eq!(desk.packets(99), [zero.clone(), read.clone(), zero, read]);
+    let sent = desk.until(NodeId::N1, StopProgress::Confirmed);
+    assert_eq!(sent, [zero.clone(), read.clone(), zero, read]);
     assert_eq!(desk.news().first(), Some(&MasterEvent::Stopped { node: NodeId::N1 }));
 }
 
@@ -220,20 +221,24 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
         (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
     ] {
         let config = with(direct(), |config| config.stops_abnormal = false);
-        let mut desk = Desk::with_nodes(config, &[N1]);
+        // The other node keeps the line busy.
+        let mut desk = Desk::with_nodes(config, &[N1, N3]);
         desk.answer(NodeId::N1, Answer::Position(turns(-7)));
-        desk.packets(1);
+        while !desk.master.is_mode_in_doubt(NodeId::N1) {
+            desk.exchange();
+        }
         desk.answer(NodeId::N1, Answer::Silence);
         if has_stop {
             desk.master.stop(NodeId::N1, desk.now);
         }
-        assert_eq!(kinds(&desk.packets(5)), [(READ, 1); 5]);
-        assert!(!desk.news().contains(&event));
-        assert_eq!(kinds(&desk.packets(1)), [(READ, 1)]);
-        assert!(desk.news().contains(&event), "after the sixth");
-        let begin = desk.now;
-        assert_eq!(kinds(&desk.packets(20)), [(READ, 1); 20]);
-        assert!(desk.now - begin > US(19 * 14_000), "faster than the search rate");
+        let mut asked = 0;
+        while !desk.news().contains(&event) {
+            asked += u8::from(kind(&desk.exchange().unwrap()) == (READ, 1));
+        }
+        assert_eq!(asked, 6);
+        let reads = desk.follow(NodeId::N1, MS(300), |_| Answer::Silence);
+        assert!((10..=21).contains(&reads.len()), "the search rate: {}", reads.len());
+        assert!(reads.iter().all(|it| it.1 == read(NodeId::N1)));
         assert_eq!(desk.news(), [], "reported once");
     }
 }
@@ -328,6 +333,27 @@ fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
     let stopped = MasterEvent::Stopped { node: NodeId::N1 };
     assert_eq!(desk.news().iter().filter(|event| **event == stopped).count(), 2);
+}
+
+#[test]
+fn a_release_before_the_mode_is_settled_hides_no_changed_mode() {
+    // Paid and still, its 0 rps is repeated; the switch is moved at rest.
+    for at_read in [0, 1, 2] {
+        let mut desk = Desk::stopping(direct(), N1);
+        desk.until(NodeId::N1, StopProgress::StandingStill);
+        desk.answer(NodeId::N1, Answer::Position(turns(40)));
+        let mut reads = 0;
+        while reads < 3 {
+            if reads == at_read {
+                desk.master.release(NodeId::N1);
+            }
+            reads += u8::from(desk.exchange().unwrap()[0] == READ);
+        }
+        assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
+        let written = writes(&desk.run(MS(100)));
+        assert!(written.contains(&hold(NodeId::N1, turns(40))), "{at_read}: it goes to 0");
+        assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    }
 }
 
 #[test]

@@ -209,6 +209,49 @@ impl Desk {
         sent
     }
 
+    /// Runs until the stop of a node has come this far; returns the packets.
+    pub(crate) fn until(&mut self, node: NodeId, progress: StopProgress) -> Vec<Vec<u8>> {
+        let mut sent = vec![];
+        while self.master.stop_progress(node) != progress {
+            sent.push(self.exchange().expect("nothing is sent"));
+            assert!(sent.len() < 10_000, "never {progress:?}");
+        }
+        sent
+    }
+
+    /// Runs for this long while a node answers by the time since the call, in microseconds; returns
+    /// what it was sent, and when.
+    pub(crate) fn follow(
+        &mut self,
+        node: NodeId,
+        span: Duration,
+        motor: impl Fn(u32) -> Answer,
+    ) -> Vec<(u32, Vec<u8>)> {
+        let (begin, mut sent) = (self.now, vec![]);
+        let is_over = |at: Instant| at - begin >= span;
+        while !is_over(self.now) {
+            let at = (self.now - begin).as_micros();
+            if let Some(packet) = self.master.poll_transmit(self.now).map(<[u8]>::to_vec) {
+                self.is_behind_write = packet[0] == WRITE;
+                self.answer(node, motor(at));
+                if packet[0] == READ {
+                    let wait = self.answer_us();
+                    self.reply(&packet, wait);
+                }
+                if packet[1] == node.get() {
+                    sent.push((at, packet));
+                }
+                self.keep_events();
+            } else if self.master.poll_timeout().is_none_or(is_over) {
+                break;
+            } else {
+                self.expire();
+            }
+        }
+        self.now = self.now.max(begin + span);
+        sent
+    }
+
     /// A node goes silent; runs until it is abnormal.
     pub(crate) fn lose(&mut self, node: NodeId) {
         self.answer(node, Answer::Silence);

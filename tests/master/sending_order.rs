@@ -49,7 +49,7 @@ fn between_two_exchanges_for_one_stop_the_cycle_reads_the_next_node() {
     desk.master.stop(NodeId::N1, desk.now);
     let sent = kinds(&desk.packets(5));
     assert_eq!(sent, [(WRITE, 1), (READ, 1), (WRITE, 1), (READ, 2), (READ, 1)]);
-    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
 }
 
 #[test]

@@ -1,80 +1,135 @@
-//! Standstill is measured, separately from a paid stop (I12).
-
-use axlewire::ikeya::PositionResponse;
+//! A stop is done when the motor is seen to be still: two answers at least 20 ms apart (I12).
 
 use crate::rig::*;
 
+const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 const STILL_1: MasterEvent = MasterEvent::StandingStill { node: NodeId::N1 };
 const STILL_3: MasterEvent = MasterEvent::StandingStill { node: NodeId::N3 };
 
-/// A node known only by this answer, which has paid its stop.
-fn paid_by(answer: Answer) -> Desk {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.answer(NodeId::N1, answer);
-    desk.master.stop(NodeId::N1, desk.now);
-    desk.packets(4);
-    desk
+fn place(counts: i32) -> Position {
+    Position::from_counts(counts).unwrap()
+}
+
+/// A node whose stop has just been confirmed, and the time of its first answer behind a stop WRITE.
+/// Its next READ is under way and may be answered within 100 ms.
+fn asked_again(node: (NodeId, Mode), answer: &[u8]) -> (Desk, Instant) {
+    let config = with(manual(), |config| config.reply_timeout = MS(100));
+    let mut desk = Desk::stopping(config, node);
+    if node == N3 {
+        desk.turn_with(450, answer);
+    }
+    desk.turn_with(450, answer);
+    let first = desk.now;
+    desk.turn_with(450, answer);
+    assert_eq!(desk.news(), [MasterEvent::Stopped { node: node.0 }]);
+    desk.master.read(node.0, desk.now).unwrap();
+    desk.turn();
+    (desk, first)
+}
+
+/// Whether a node is said to be still within a second after its stop, and to be still moving in the
+/// three seconds after the stop.
+fn seen(node: (NodeId, Mode), motor: impl Fn(u32) -> Answer) -> (bool, bool) {
+    let mut desk = Desk::stopping(direct(), node);
+    let begin = desk.now;
+    desk.follow(node.0, MS(1000), &motor);
+    let is_still = desk.master.stop_progress(node.0) == StopProgress::StandingStill;
+    // `follow` counts from its call.
+    let offset = (desk.now - begin).as_micros();
+    desk.follow(node.0, MS(2000), |at| motor(offset + at));
+    let still_moving = |it: &MasterEvent| matches!(it, MasterEvent::StillMoving { .. });
+    (is_still, desk.news().iter().any(still_moving))
 }
 
 #[test]
 fn a_speed_below_a_twentieth_of_a_turn_per_second_is_a_standstill_in_either_direction() {
     let (below, limit) = (0.05_f32.next_down(), 0.05);
-    for (speed, is_still) in [
-        (0.0, true),
-        (-0.0, true),
-        (below, true),
-        (-below, true),
-        (limit, false),
-        (-limit, false),
-        (3.0, false),
-        (-3.0, false),
-    ] {
-        let mut desk = paid_by(Answer::Velocity(speed));
-        let news = desk.news();
-        let stopped = MasterEvent::Stopped { node: NodeId::N1 };
-        assert_eq!(news[0], stopped);
-        assert_eq!(news[1..] == [STILL_1], is_still, "{speed}: {news:?}");
-        assert_eq!(news.len(), 1 + usize::from(is_still));
-        let progress = desk.master.stop_progress(NodeId::N1);
-        assert_eq!(progress == StopProgress::StandingStill, is_still);
-        assert_eq!(progress == StopProgress::Confirmed, !is_still);
+    for speed in [0.0, -0.0, 0.04, below, -below] {
+        assert_eq!(seen(N1, |_| Answer::Velocity(speed)), (true, false), "{speed}");
+    }
+    for speed in [limit, -limit, 3.0, -3.0] {
+        assert_eq!(seen(N1, |_| Answer::Velocity(speed)), (false, true), "{speed}");
     }
 }
 
 #[test]
+fn one_still_answer_alone_is_no_standstill_and_two_19_ms_apart_are_none_either() {
+    for (pause_us, is_still) in [(1000, false), (19_000, false), (19_999, false), (20_000, true)] {
+        let answer = velocity(NodeId::N1, 0.0);
+        let (mut desk, first) = asked_again(N1, &answer);
+        desk.now = first + US(pause_us);
+        desk.hear(0, &answer);
+        assert_eq!(desk.news() == [STILL_1], is_still, "{pause_us} us");
+    }
+}
+
+#[test]
+fn a_motor_that_moves_between_two_still_answers_is_not_still() {
+    let ms = |at: u32| at / 1000;
+    // Still for 19 ms at a time; held by a load and jerking every 15 ms.
+    assert_eq!(seen(N1, |at| Answer::Velocity(f32::from(ms(at) % 40 >= 19))), (false, true));
+    let jerk = |at| Answer::Velocity(if ms(at) % 15 < 2 { -0.2 } else { 0.0 });
+    assert_eq!(seen(N1, jerk), (false, true));
+    // Reversing through 0 at the moment of the stop, it comes to rest only after 600 ms.
+    let reversing = |at: u32| match at {
+        0..=100_000 => (at as f32 - 1_000.0) / -20_000.0,
+        100_001..=600_000 => -5.0 + (at as f32 - 100_000.0) / 100_000.0,
+        _ => 0.0,
+    };
+    let mut desk = Desk::stopping(direct(), N1);
+    desk.follow(NodeId::N1, MS(590), |at| Answer::Velocity(reversing(at)));
+    assert_eq!(desk.news(), [STOPPED_1]);
+    assert_eq!(seen(N1, |at| Answer::Velocity(reversing(at))), (true, false));
+}
+
+#[test]
+fn of_a_node_whose_answers_are_frozen_nothing_can_be_seen() {
+    assert_eq!(seen(N1, |_| Answer::Velocity(5.0)), (false, true));
+    // Frozen at a standstill or at a position, it may run: the library cannot know.
+    assert_eq!(seen(N1, |_| Answer::Velocity(0.0)), (true, false));
+    assert_eq!(seen(N3, |_| Answer::Position(turns(40))), (true, false));
+}
+
+#[test]
+fn a_position_node_that_hunts_by_10_counts_is_still_and_one_that_creeps_on_is_not() {
+    let hunt = |at: u32| Answer::Position(place(8190 + 10 * (at as i32 / 7000 % 2)));
+    assert_eq!(seen(N3, hunt), (true, false));
+    // Half a turn per second, and 0.04 turns per second.
+    assert_eq!(seen(N3, |at| Answer::Position(place(at as i32 / 250))), (false, true));
+    assert_eq!(seen(N3, |at| Answer::Position(place(at as i32 / 3051))), (true, false));
+}
+
+#[test]
 fn a_nan_speed_is_not_a_standstill() {
-    let mut desk = paid_by(Answer::Velocity(3.0));
+    let mut desk = Desk::stopping(manual(), N1);
+    desk.answer(NodeId::N1, Answer::Velocity(3.0));
+    desk.until(NodeId::N1, StopProgress::Confirmed);
     desk.news();
-    for bits in [0x7FC0_0000_u32, 0x7F80_0000, 0xFF80_0000] {
-        desk.master.read(NodeId::N1, desk.now).unwrap();
+    for bits in [0x7FC0_0000_u32, 0x7F80_0000, 0xFF80_0000].repeat(3) {
         desk.turn();
         let [a, b, c, d] = bits.to_le_bytes();
         let mut answer = vec![0x55, 1, a, b, c, d];
         answer.extend(axlewire::crc16::compute(&answer).to_le_bytes());
-        desk.hear(290, &answer);
+        desk.hear(450, &answer);
     }
     assert_eq!(desk.news(), []);
 }
 
 #[test]
-fn standstill_is_reported_once_and_only_when_true() {
-    let mut desk = paid_by(Answer::Velocity(3.0));
-    desk.news();
+fn standstill_is_reported_once() {
+    let mut desk = Desk::stopping(direct(), N1);
+    desk.answer(NodeId::N1, Answer::Velocity(3.0));
     let mut told = vec![];
-    for speed in [2.0, 1.0, 0.01, 0.0, 4.0, 0.0] {
+    for speed in [3.0, 2.0, 0.0, 0.0, 4.0, 0.0] {
         desk.answer(NodeId::N1, Answer::Velocity(speed));
-        desk.master.read(NodeId::N1, desk.now).unwrap();
-        // The stop is repeated before each READ.
-        assert_eq!(desk.packets(2), [write(NodeId::N1, 0.0), read(NodeId::N1)]);
+        desk.run(MS(15));
         told.push(desk.news());
     }
-    let expected = [vec![], vec![], vec![STILL_1], vec![], vec![], vec![]];
-    assert_eq!(told, expected);
+    assert_eq!(told, [vec![STOPPED_1], vec![], vec![], vec![STILL_1], vec![], vec![]]);
 }
 
 #[test]
 fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
-    let place = |counts: i32| Position::from_counts(counts).unwrap();
     for (pause_us, way, is_still) in [
         (20_000, 8, true),
         (20_000, -8, true),
@@ -83,16 +138,9 @@ fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
         (19_999, 0, false),
         (60_000, 0, true),
     ] {
-        let mut desk = Desk::stopping_at(manual(), place(8190));
-        assert_eq!(desk.packets(9).len(), 5);
-        assert_eq!(desk.news(), [MasterEvent::Stopped { node: NodeId::N3 }]);
-        let paid = desk.now;
-        desk.master.read(NodeId::N3, desk.now).unwrap();
-        desk.now = paid + US(pause_us - 450);
-        desk.turn();
-        let answer = PositionResponse::new(NodeId::N3, place(8190 + way));
-        desk.hear(450, answer.as_bytes());
-        assert_eq!(desk.now - paid, US(pause_us));
+        let (mut desk, first) = asked_again(N3, &position(NodeId::N3, place(8190)));
+        desk.now = first + US(pause_us);
+        desk.hear(0, &position(NodeId::N3, place(8190 + way)));
         assert_eq!(desk.news() == [STILL_3], is_still, "{way} counts in {pause_us} us");
     }
 }
@@ -101,27 +149,127 @@ fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
 fn a_slow_shaft_is_compared_with_where_it_was_20_ms_ago_and_not_with_its_last_reading() {
     let mut desk = Desk::stopping(direct(), N3);
     // 4 counts per millisecond: half a turn per second.
-    for millis in 0..200 {
-        let at = Position::from_counts(4 * millis).unwrap();
-        desk.answer(NodeId::N3, Answer::Position(at));
-        desk.run(MS(1));
-    }
-    let stopped = MasterEvent::Stopped { node: NodeId::N3 };
-    assert_eq!(desk.news(), [stopped]);
+    desk.follow(NodeId::N3, MS(200), |at| Answer::Position(place(at as i32 / 250)));
+    assert_eq!(desk.news(), [MasterEvent::Stopped { node: NodeId::N3 }]);
     desk.run(MS(45));
     assert_eq!(desk.news(), [STILL_3]);
 }
 
 #[test]
-fn a_new_set_point_ends_the_watch_for_standstill() {
-    let mut desk = paid_by(Answer::Velocity(3.0));
+fn a_set_point_between_confirmed_and_still_ends_the_repeats_and_the_watch_for_standstill() {
+    let mut desk = Desk::stopping(manual(), N1);
+    desk.answer(NodeId::N1, Answer::Velocity(3.0));
+    desk.until(NodeId::N1, StopProgress::Confirmed);
     desk.news();
     desk.master.set_velocity(NodeId::N1, rps(3.0), desk.now).unwrap();
-    desk.packets(1);
-    desk.answer(NodeId::N1, Answer::Velocity(0.0));
-    desk.master.read(NodeId::N1, desk.now).unwrap();
-    assert_eq!(desk.packets(2).len(), 1, "one answered READ");
-    assert_eq!(desk.news(), []);
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::NotAsked);
-    assert!(desk.master.poll_event().is_none());
+    desk.answer(NodeId::N1, Answer::Velocity(0.0));
+    let sent = desk.follow(NodeId::N1, MS(3000), |_| Answer::Velocity(0.0));
+    assert_eq!(sent, [(0, write(NodeId::N1, 3.0))]);
+    assert_eq!(desk.news(), []);
+}
+
+#[test]
+fn a_stop_is_repeated_every_20_ms_until_the_node_is_still_whatever_the_polling() {
+    for polling in [Polling::Fastest, Polling::Every(MS(1000)), Polling::Manual] {
+        for (node, is_released) in [(N1, false), (N3, false), (N1, true)] {
+            let config = with(direct(), |config| config.polling = polling);
+            let mut desk = Desk::stopping(config, node);
+            // Under way for 300 ms.
+            let motor = |at: u32| match node.1 {
+                Mode::Velocity => Answer::Velocity(if at < 300_000 { 3.0 } else { 0.0 }),
+                Mode::Position => Answer::Position(place(at.min(300_000) as i32 / 100)),
+            };
+            let writes = |sent: Vec<(u32, Vec<u8>)>| -> Vec<u32> {
+                sent.into_iter().filter(|it| it.1[0] == WRITE).map(|it| it.0).collect()
+            };
+            let mut sent = writes(desk.follow(node.0, MS(299), motor));
+            if is_released {
+                desk.master.release(node.0);
+            }
+            let more = writes(desk.follow(node.0, MS(2), |at| motor(299_000 + at)));
+            sent.extend(more.into_iter().map(|at| 299_000 + at));
+            let gaps = sent.windows(2).map(|pair| pair[1] - pair[0]);
+            assert!(gaps.max() <= Some(20_500), "{polling:?}, {node:?}: {sent:?}");
+            desk.until(node.0, StopProgress::StandingStill);
+            // Then its target is a set-point like any other.
+            let sent = writes(desk.follow(node.0, MS(1500), |_| motor(400_000)));
+            let most = match polling {
+                _ if is_released => 0..=0,
+                Polling::Fastest => 1000..=5000,
+                Polling::Every(_) => 1..=2,
+                Polling::Manual => 0..=0,
+            };
+            assert!(most.contains(&sent.len()), "{polling:?}, {node:?}: {sent:?}");
+        }
+    }
+}
+
+#[test]
+fn a_stop_of_a_node_that_misses_its_reads_is_written_every_20_ms_behind_an_adapter_too() {
+    let config = with(MasterConfig::usb_adapter(), |config| config.polling = Polling::Manual);
+    let mut desk = Desk::stopping(config, N1);
+    let mut begin = desk.now;
+    let mut written = 0;
+    while desk.master.health(NodeId::N1) != Some(Health::Abnormal) {
+        let packet = desk.packet();
+        if packet[0] == WRITE {
+            // At most a window is under way.
+            assert!(desk.now - begin <= US(20_000 + 400), "{:?}", desk.now - begin);
+            (begin, written) = (desk.now, written + 1);
+        } else {
+            desk.silence();
+        }
+    }
+    assert!(written > 3);
+}
+
+#[test]
+fn a_motor_that_coasts_on_is_told_once_and_again_when_it_is_stopped_again() {
+    let status = Status::Velocity(3.0);
+    let told = [MasterEvent::StillMoving { node: NodeId::N1, status }];
+    for (coast, is_asked_often) in [(2000, false), (300, false), (2000, true)] {
+        let config = with(manual(), |config| config.coast = MS(coast));
+        let mut desk = Desk::stopping(config, N1);
+        desk.answer(NodeId::N1, Answer::Velocity(3.0));
+        desk.until(NodeId::N1, StopProgress::Confirmed);
+        desk.news();
+        let run = |desk: &mut Desk, ms: u32| {
+            for _ in 0..ms / 20 {
+                if is_asked_often {
+                    desk.master.stop(NodeId::N1, desk.now);
+                }
+                desk.follow(NodeId::N1, MS(20), |_| Answer::Velocity(3.0));
+            }
+        };
+        run(&mut desk, coast - 20);
+        assert_eq!(desk.news(), []);
+        assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
+        run(&mut desk, 40);
+        assert_eq!(desk.news(), told, "an application that stops often postpones nothing");
+        if !is_asked_often {
+            assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StillMoving);
+            run(&mut desk, 10_000);
+            assert_eq!(desk.news(), [], "told once");
+            desk.master.stop(NodeId::N1, desk.now);
+            assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
+        }
+        run(&mut desk, coast - 40);
+        assert_eq!(desk.news(), []);
+        run(&mut desk, 80);
+        assert_eq!(desk.news(), told);
+        // It is stopped further, and comes to rest after all.
+        desk.follow(NodeId::N1, MS(50), |_| Answer::Velocity(0.0));
+        assert_eq!(desk.news(), [STILL_1]);
+    }
+}
+
+#[test]
+fn a_stop_that_joins_a_released_one_is_repeated_like_any_other() {
+    let mut desk = Desk::stopping(direct(), N1);
+    desk.until(NodeId::N1, StopProgress::Confirmed);
+    desk.master.release(NodeId::N1);
+    desk.master.stop(NodeId::N1, desk.now);
+    desk.until(NodeId::N1, StopProgress::StandingStill);
+    assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(0.0))));
 }

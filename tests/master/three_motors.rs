@@ -54,13 +54,18 @@ fn two_boards(mut config: MasterConfig) -> Boards {
 }
 
 #[test]
-fn the_answer_of_a_stop_write_pays_for_it() {
+fn the_answer_of_a_stop_write_confirms_it() {
     let mut boards = two_boards(manual());
     boards.master.stop(NodeId::N8, boards.now);
     let stop = WriteRequest::velocity(NodeId::N8, [rps(0.0); 3]).as_bytes().to_vec();
-    let sent: Vec<_> = core::iter::from_fn(|| boards.exchange()).collect();
-    assert_eq!(sent, [stop.clone(), stop]);
+    for _ in 0..2 {
+        assert!(boards.master.stops_owed().contains(NodeId::N8));
+        assert_eq!(boards.exchange(), Some(stop.clone()));
+    }
     assert!(boards.events.contains(&MasterEvent::Stopped { node: NodeId::N8 }));
+    assert_eq!(boards.exchange(), Some(stop), "and once more, 20 ms later");
+    assert!(boards.events.contains(&MasterEvent::StandingStill { node: NodeId::N8 }));
+    assert_eq!(boards.exchange(), None);
 }
 
 #[test]
@@ -98,7 +103,11 @@ fn turning_on_the_spot_is_not_a_standstill() {
         let mut boards = two_boards(manual());
         boards.speeds = speeds;
         boards.master.stop(NodeId::N1, boards.now);
-        while boards.exchange().is_some() {}
+        let mut sent = 0;
+        while sent < 50 && boards.exchange().is_some() {
+            sent += 1;
+        }
+        assert_eq!(sent < 50, is_still, "repeated until it stands");
         let is_still_told =
             |event: &&MasterEvent<_>| matches!(event, MasterEvent::StandingStill { .. });
         let told = boards.events.iter().filter(is_still_told).count();
@@ -123,19 +132,15 @@ fn all_three_positions_have_to_stay_within_8_counts() {
             now += MS(25);
             let answer = PositionResponse::new(NodeId::N1, places.map(place));
             master.handle_input(answer.as_bytes(), now);
-            (sent, now)
+            sent
         };
         let mut config = *master.config();
         config.reply_timeout = MS(30);
         master = Master::new(config, T0);
         master.stop(NodeId::N1, T0);
-        for expected in [READ, WRITE, WRITE] {
-            assert_eq!(answer(&mut master, [0; 3]).0, Some(expected));
+        for (expected, places) in [(READ, [0; 3]), (WRITE, [0; 3]), (WRITE, moved)] {
+            assert_eq!(answer(&mut master, places), Some(expected));
         }
-        // The answer that paid the stop is compared with the next one.
-        let (_, at) = answer(&mut master, [0; 3]);
-        master.read(NodeId::N1, at).unwrap();
-        assert_eq!(answer(&mut master, moved).0, Some(WRITE), "the hold is repeated");
         let events = core::iter::from_fn(|| master.poll_event());
         let told = events.filter(|it| matches!(it, MasterEvent::StandingStill { .. })).count();
         assert_eq!(told == 1, is_still, "{moved:?}");
@@ -266,6 +271,23 @@ fn a_position_is_held_right_behind_its_read_however_many_set_points_wait() {
             assert!(busy.boards.now - begin < busy.boards.master.stop_bound());
         }
     }
+}
+
+#[test]
+fn a_board_that_coasts_is_stopped_every_20_ms_and_a_round_however_many_set_points_wait() {
+    let mut busy = Busy::new(direct(), 700);
+    busy.boards.master.stop(NodeId::N1, busy.boards.now);
+    let mut written_at = None;
+    let begin = busy.boards.now;
+    while busy.boards.now - begin < MS(1000) {
+        if kind(&busy.exchange()) == (WRITE, 1) {
+            let pause = written_at.map_or(Duration::ZERO, |at| busy.boards.now - at);
+            // At most 24 exchanges of 700 us go first.
+            assert!(pause <= US(20_000 + 25 * 700), "{pause:?}");
+            written_at = Some(busy.boards.now);
+        }
+    }
+    assert_eq!(busy.boards.master.stop_progress(NodeId::N1), StopProgress::Confirmed);
 }
 
 #[test]

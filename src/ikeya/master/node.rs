@@ -57,8 +57,8 @@ pub(super) enum Reason {
     SpeedStop,
     /// A stop WRITE for any node that is online.
     Stop,
-    /// A stop WRITE that nothing else has a turn for: blind, to a velocity node that is not online,
-    /// or to a node that is not still while its cycle takes long. Only where a WRITE is silent.
+    /// A stop WRITE to a node that has had none for 20 ms and is not seen to be still; blind to a
+    /// velocity node that is not online, if a WRITE is silent.
     Repeat,
     /// A READ that a stop or a mode in doubt is waiting for.
     StopRead,
@@ -288,8 +288,12 @@ impl<B: Board> Node<B> {
             }
             Reason::SpeedStop => matches!(self.stop_write(), Some(Target::Velocity(_))),
             Reason::Stop => self.stop_write().is_some(),
-            Reason::Repeat if B::ANSWERS_WRITE || self.mode.is_in_doubt() => false,
-            Reason::Repeat if is_online => self.order.coasting().is_some(),
+            Reason::Repeat if self.mode.is_in_doubt() => false,
+            // Its first WRITE is for another reason.
+            Reason::Repeat if is_online => {
+                self.order.stop_unseen().is_some_and(|stop| stop.repeat_at().is_some())
+            }
+            Reason::Repeat if B::ANSWERS_WRITE => false,
             Reason::Repeat => {
                 stop.is_some() && matches!(self.stop_target(), Some(Target::Velocity(_)))
             }
@@ -297,7 +301,7 @@ impl<B: Board> Node<B> {
                 self.mode.is_in_doubt() || (stop.is_some() && self.stop_write().is_none())
             }
             Reason::LostStop | Reason::Search if is_online => false,
-            Reason::LostStop => self.awaits_lost_stop(config),
+            Reason::LostStop => self.awaits_lost_stop(),
             Reason::SetPoint => !self.mode.is_in_doubt() && self.order.is_new(),
             Reason::Search => {
                 let is_sought = config.recovery_share_pct > 0;
@@ -318,7 +322,10 @@ impl<B: Board> Node<B> {
             {
                 None
             }
-            Reason::Repeat => self.order.stop().and_then(Stop::repeat_at),
+            Reason::Repeat => {
+                let guard = self.guarded_until.filter(|_| B::ANSWERS_WRITE);
+                self.order.stop().and_then(Stop::repeat_at).max(guard)
+            }
             Reason::Cycle if !self.is_wanted() => self.cycle_at(config).max(self.guarded_until),
             _ => self.guarded_until,
         }
@@ -336,10 +343,20 @@ impl<B: Board> Node<B> {
         }
     }
 
-    /// Whether it is owed a stop and has attempts left of those made at once while it is not
-    /// online: one, or those of a READ if the node has never been heard.
-    fn awaits_lost_stop(&self, config: &MasterConfig) -> bool {
-        let limit = if self.health.is_none() { config.attempts.max(1) } else { 1 };
+    /// Whether it was heard before, is owed a stop, and has not had the attempt that is made at once
+    /// while it is not online.
+    fn awaits_lost_stop(&self) -> bool {
+        self.is_abnormal() && self.has_attempts(1)
+    }
+
+    /// Whether it was never heard, is owed a stop, and has attempts left of those made at any search
+    /// rate: those of a READ.
+    pub(super) fn awaits_first_answer(&self, config: &MasterConfig) -> bool {
+        self.health.is_none() && self.has_attempts(config.attempts.max(1))
+    }
+
+    /// Whether it is owed a stop and has had fewer attempts than this while it was not online.
+    fn has_attempts(&self, limit: u8) -> bool {
         self.order.stop_owed().is_some_and(|stop| stop.lost_attempts() < limit)
     }
 

@@ -101,8 +101,7 @@ impl<B: Board> Order<B> {
     ) -> bool {
         let (hold, measured_at) = match (&mut self.state, measured) {
             (State::Stop(stop), _) if stop.stage != Stage::Still => {
-                // The application waits anew.
-                (stop.confirmed_at, stop.is_told) = (now, false);
+                stop.join(now);
                 return self.end_confirmation();
             }
             _ if !is_certain => (None, None),
@@ -236,6 +235,11 @@ impl<B: Board> Order<B> {
     /// The stop, unless it is confirmed.
     pub(super) fn stop_owed(&self) -> Option<&Stop<B>> {
         self.stop().filter(|stop| stop.stage == Stage::Owed)
+    }
+
+    /// The stop, unless the node is seen to be still.
+    pub(super) fn stop_unseen(&self) -> Option<&Stop<B>> {
+        self.stop().filter(|stop| stop.stage != Stage::Still)
     }
 
     /// The stop, if it is confirmed and the node not still.
@@ -470,8 +474,17 @@ impl<B: Board> Stop<B> {
         self.written_at = Some(now);
     }
 
+    /// The application asks again: it is told again, `coast` later, that the node still moves. Asking
+    /// often must not postpone that.
+    fn join(&mut self, now: Instant) {
+        self.is_released = false;
+        if core::mem::take(&mut self.is_told) {
+            self.confirmed_at = now;
+        }
+    }
+
     fn take_back_write(&mut self) {
-        self.is_new = true;
+        self.is_new = self.stage != Stage::Owed;
         let was_written = core::mem::take(&mut self.is_written);
         self.writes = self.writes.saturating_sub(was_written.into());
         self.written_at = None;

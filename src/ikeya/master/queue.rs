@@ -7,6 +7,8 @@
 //! else is. Reading a position and holding it is one turn: the WRITE directly follows the answer,
 //! even where it is an exchange of its own (three motors). So no node can starve the others:
 //!
+//! * a stop that is repeated blind, or because it is 20 ms old, has one silent WRITE behind each
+//!   exchange;
 //! * a stop of an online velocity node is sent right after the exchange in progress and at most
 //!   seven other stop WRITEs; a stop of a position node is read after at most 16 more exchanges,
 //!   with three motors 24, and written next;
@@ -46,6 +48,8 @@ pub(super) struct Queue {
     had_stop: u8,
     /// Nodes that have had their new set-point in this round, one bit each.
     had_set_point: u8,
+    /// Nodes that have had a stop repeated since the last exchange, one bit each.
+    had_repeat: u8,
     discovery: Option<Discovery>,
     /// Time before which no abnormal node is searched for.
     search_at: Option<Instant>,
@@ -129,6 +133,8 @@ impl Queue {
             .or_else(|| self.urgent(view, Round::Next))
             // An idle line belongs to the search.
             .or_else(|| self.search(view))
+            // With nobody to be asked, a stop is repeated without an exchange in between.
+            .or_else(|| self.next_of(Reason::Repeat, self.stop + 1, view, Round::Same, 0))
     }
 
     /// The next urgent request: for a stop, a mode in doubt or a new set-point.
@@ -148,9 +154,11 @@ impl Queue {
         self.discovery_or_cycle(view).or(sought)
     }
 
-    /// The next request of the search, at the search rate.
+    /// The next request of the search, at the search rate, or with every round until each id that is
+    /// owed a stop and was never heard has had its attempts: its motor may be running.
     fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
         let is_time = self.search_at.is_none_or(|at| view.now >= at);
+        let is_time = is_time || view.nodes.iter().any(|it| it.awaits_first_answer(view.config));
         is_time.then(|| self.search(view)).flatten()
     }
 
@@ -186,9 +194,21 @@ impl Queue {
         view: View<'_, B>,
         round: Round,
     ) -> Option<Choice<B>> {
+        self.next_of(reason, first, view, round, self.served::<B>(reason, round))
+    }
+
+    /// The same, but for those that have been `served`, one bit each.
+    fn next_of<B: Board>(
+        &self,
+        reason: Reason,
+        first: usize,
+        view: View<'_, B>,
+        round: Round,
+        served: u8,
+    ) -> Option<Choice<B>> {
         for step in 0..8 {
             let index = (first + step) & 7;
-            if self.has::<B>(index, reason, round) {
+            if served >> index & 1 == 0 {
                 let request = self.request(index, reason, view, round);
                 if request.is_some() {
                     return request;
@@ -215,19 +235,19 @@ impl Queue {
         })
     }
 
-    /// Whether it is this node's turn; a regular request is always for the next round. A stop WRITE
-    /// is followed by a READ before it is repeated, so it needs no turn of its own unless it is
-    /// answered.
-    fn has<B: Board>(&self, index: usize, reason: Reason, round: Round) -> bool {
-        let had = match reason {
-            _ if round == Round::Next => 0,
-            Reason::SpeedStop | Reason::Stop | Reason::Repeat if !B::ANSWERS_WRITE => 0,
-            Reason::SetPoint => self.had_set_point,
+    /// Nodes that have had their turn, one bit each; a regular request is always for the next round.
+    /// A stop WRITE is followed by a READ before it is repeated, so it needs no turn of its own
+    /// unless it is answered; on a slow line a READ has to be waited for.
+    const fn served<B: Board>(&self, reason: Reason, round: Round) -> u8 {
+        match (reason, round) {
+            (Reason::Repeat, _) if !B::ANSWERS_WRITE => self.had_repeat,
+            (_, Round::Next) => 0,
+            (Reason::SpeedStop | Reason::Stop, _) if !B::ANSWERS_WRITE => 0,
+            (Reason::SetPoint, _) => self.had_set_point,
             // Directly behind its READ.
-            Reason::Hold => 0,
+            (Reason::Hold, _) => 0,
             _ => self.had_stop,
-        };
-        had >> index & 1 == 0
+        }
     }
 
     /// Advances the turns past a request that has been handed out, to a node that `is_lost` or not.
@@ -242,6 +262,11 @@ impl Queue {
     ) {
         let index = index_of(choice.node);
         let is_exchange = choice.request.is_exchange();
+        self.had_repeat = match choice.reason {
+            _ if is_exchange => 0,
+            Reason::Repeat => self.had_repeat | 1 << index,
+            _ => self.had_repeat,
+        };
         // A silent WRITE of the cycle is followed by its READ; only the READ ends the round.
         if choice.round == Round::Next && is_exchange {
             (self.had_stop, self.had_set_point) = (0, 0);
@@ -277,8 +302,14 @@ impl Queue {
         }
     }
 
+    /// WRITEs have not left, or nobody knows: each may be repeated before the next exchange.
+    pub(super) const fn take_back_writes(&mut self) {
+        self.had_repeat = 0;
+    }
+
     /// A request for this reason has not left: it is due again.
     pub(super) fn take_back(&mut self, reason: Reason) {
+        self.take_back_writes();
         if reason == Reason::Search {
             self.search_at = None;
         }

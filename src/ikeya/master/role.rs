@@ -334,6 +334,7 @@ impl<B: Board> Master<B> {
             // It is unknown which of the latest WRITEs have left: send all of them again, and do
             // not count an answer that comes now for any of them.
             self.nodes.iter_mut().for_each(Node::take_back_write);
+            self.queue.take_back_writes();
             return;
         }
         let taken_back = self.line.take_back(unsent, &self.config, &mut self.statistics, now);
