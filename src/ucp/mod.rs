@@ -109,9 +109,9 @@
 //!   are kept.
 //! * **U9** `index` is a wrapping counter per sender; a gap in it is never an error.
 //! * **U10** [`Host`] repeats the latest motor command every 100 ms, and sends zero when its
-//!   application has been silent for 500 ms, or the robot has not been heard for as long. [`Robot`] stands still 500 ms after the last *valid*
-//!   motor command; the vendor firmware accepts any byte instead. Reports come every 20 ms, and the
-//!   link is lost after 500 ms without a valid frame.
+//!   application has been silent for 500 ms, or the robot has not been heard for as long. [`Robot`]
+//!   stands still 500 ms after the last *valid* motor command; the vendor firmware accepts any byte
+//!   instead. Reports come every 20 ms, and the link is lost after 500 ms without a valid frame.
 //! * **U11** A calibration's start and end are acknowledged at once. Its result and the robot's
 //!   request for biases at boot are repeated every 1000 ms until answered. The host keeps the
 //!   results in a [`BiasStore`], and sends those stored at the moment of sending.

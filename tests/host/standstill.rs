@@ -1,4 +1,4 @@
-//! Whatever happens, the command is zero 500 ms after the last sign of life of either end (U10, U16).
+//! Whatever happens, the command is zero 500 ms after the last sign of life of either end (U16).
 
 use proptest::{collection::vec, prelude::*};
 

@@ -70,8 +70,8 @@ impl Copies {
         }
     }
 
-    /// Handles a frame that did not reach the line. A failed flush may have lost any part of what was
-    /// handed out since the last one, the end of a frame included; a copy that the port has not
+    /// Handles a frame that did not reach the line. A failed flush may have lost any part of what
+    /// was handed out since the last one, the end of a frame included; a copy that the port has not
     /// touched is due again with the command.
     const fn unsent(self, unsent: Unsent) -> Self {
         match (unsent, self) {

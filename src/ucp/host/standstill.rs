@@ -8,8 +8,8 @@ use crate::time::{Duration, Instant};
 /// `Driver::drive_for` waits that long.
 pub const COAST: Duration = Duration::from_millis(2000);
 
-/// Number of reports in a row that must show all wheels still, 3: one alone may show wheels that are
-/// just reversing.
+/// Number of reports in a row that must show all wheels still, 3: one alone may show wheels that
+/// are just reversing.
 pub const STILL_REPORTS: u8 = 3;
 
 /// Fastest turn of a wheel that stands still, rpm.
