@@ -269,66 +269,65 @@ impl<B: Board> Node<B> {
         self.health == Some(Health::Abnormal)
     }
 
-    /// Whether a request for this reason is due now.
-    pub(super) fn is_due(&self, reason: Reason, config: &MasterConfig, now: Instant) -> bool {
-        self.wants(reason, config) && self.earliest(reason, config).is_none_or(|at| now >= at)
-    }
-
-    /// Whether a request for this reason is to be sent, now or later.
+    /// Earliest time of a request for this reason; `None` if there is none to send.
     #[inline(never)]
-    pub(super) fn wants(&self, reason: Reason, config: &MasterConfig) -> bool {
-        let is_online = self.is_online();
-        let stop = self.order.stop_owed();
-        match reason {
-            Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::StopRead if !is_online => {
-                false
+    pub(super) fn due_at(
+        &self,
+        reason: Reason,
+        config: &MasterConfig,
+        now: Instant,
+    ) -> Option<Instant> {
+        let (stop, write) = (self.order.stop_owed(), self.stop_write());
+        let (is_online, is_in_doubt) = (self.is_online(), self.mode.is_in_doubt());
+        // An answered WRITE waits, like a READ, until no late answer can arrive.
+        let write_at = self.guarded_until.filter(|_| B::ANSWERS_WRITE);
+        let mut at = self.guarded_until;
+        let is_wanted = match reason {
+            Reason::Hold | Reason::SpeedStop | Reason::Stop => {
+                at = write_at;
+                is_online
+                    && match reason {
+                        Reason::Hold => write.is_some() && stop.is_some_and(Stop::is_measured),
+                        Reason::SpeedStop => matches!(write, Some(Target::Velocity(_))),
+                        _ => write.is_some(),
+                    }
             }
-            Reason::Hold => {
-                stop.is_some_and(|stop| stop.is_measured()) && self.stop_write().is_some()
-            }
-            Reason::SpeedStop => matches!(self.stop_write(), Some(Target::Velocity(_))),
-            Reason::Stop => self.stop_write().is_some(),
-            Reason::Repeat if self.mode.is_in_doubt() => false,
-            // Its first WRITE is for another reason.
-            Reason::Repeat if is_online => {
-                self.order.stop_unseen().is_some_and(|stop| stop.repeat_at().is_some())
-            }
-            Reason::Repeat if B::ANSWERS_WRITE => false,
             Reason::Repeat => {
-                stop.is_some() && matches!(self.stop_target(), Some(Target::Velocity(_)))
+                let repeat_at = self.order.stop_unseen().and_then(Stop::repeat_at);
+                at = repeat_at.max(write_at);
+                // The first WRITE to a node that is online has another reason.
+                let is_due = match is_online {
+                    true => repeat_at.is_some(),
+                    false => {
+                        let is_blind = matches!(self.stop_target(), Some(Target::Velocity(_)));
+                        !B::ANSWERS_WRITE && stop.is_some() && is_blind
+                    }
+                };
+                is_due && !is_in_doubt
             }
-            Reason::StopRead => {
-                self.mode.is_in_doubt() || (stop.is_some() && self.stop_write().is_none())
-            }
-            Reason::LostStop | Reason::Search if is_online => false,
+            Reason::StopRead => is_online && (is_in_doubt || stop.is_some() && write.is_none()),
             Reason::LostStop => self.awaits_lost_stop(),
-            Reason::SetPoint => !self.mode.is_in_doubt() && self.order.is_new(),
+            Reason::SetPoint => {
+                at = write_at;
+                self.order.is_new() && !is_in_doubt
+            }
             Reason::Search => {
-                let is_sought = config.recovery_share_pct > 0;
-                stop.is_some() || (self.is_abnormal() && is_sought)
+                let is_sought = self.is_abnormal() && config.recovery_share_pct > 0;
+                !is_online && (stop.is_some() || is_sought)
             }
-            Reason::Cycle => is_online && self.is_in_cycle(config),
+            Reason::Cycle => {
+                let is_wanted = self.is_wanted();
+                if !is_wanted {
+                    at = self.cycle_at(config).max(at);
+                }
+                let is_polled = is_wanted
+                    || config.polling != Polling::Manual
+                    || self.order.coasting().is_some();
+                is_online && is_polled && stop.is_none() && !is_in_doubt
+            }
             Reason::Discovery => true,
-        }
-    }
-
-    /// Earliest time of a request for this reason.
-    #[inline(never)]
-    pub(super) fn earliest(&self, reason: Reason, config: &MasterConfig) -> Option<Instant> {
-        match reason {
-            // An answered WRITE waits, like a READ, until no late answer can arrive.
-            Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::SetPoint
-                if !B::ANSWERS_WRITE =>
-            {
-                None
-            }
-            Reason::Repeat => {
-                let guard = self.guarded_until.filter(|_| B::ANSWERS_WRITE);
-                self.order.stop().and_then(Stop::repeat_at).max(guard)
-            }
-            Reason::Cycle if !self.is_wanted() => self.cycle_at(config).max(self.guarded_until),
-            _ => self.guarded_until,
-        }
+        };
+        is_wanted.then(|| at.unwrap_or(now))
     }
 
     /// Its turn in the cycle; `None` for at once. Until it is still after a stop, it is read every
@@ -358,13 +357,6 @@ impl<B: Board> Node<B> {
     /// Whether it is owed a stop and has had fewer attempts than this while it was not online.
     fn has_attempts(&self, limit: u8) -> bool {
         self.order.stop_owed().is_some_and(|stop| stop.lost_attempts() < limit)
-    }
-
-    /// Whether it takes part in the cycle: to be read, or to have its set-point repeated.
-    fn is_in_cycle(&self, config: &MasterConfig) -> bool {
-        let is_polled = self.is_wanted() || config.polling != Polling::Manual;
-        let is_polled = is_polled || self.order.coasting().is_some();
-        is_polled && self.order.stop_owed().is_none() && !self.mode.is_in_doubt()
     }
 
     /// Whether it is to be read regardless of the polling.

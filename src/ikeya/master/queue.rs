@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     ikeya::{board::Board, units::NodeId},
-    time::{Duration, Instant},
+    time::{Duration, Instant, reached},
 };
 
 /// Share of line time for nodes that are owed a stop when no others are searched for, percent.
@@ -115,11 +115,10 @@ impl Queue {
                     (Reason::Cycle, Some(_)) => self.cycle_first > 0,
                     _ => true,
                 };
-                if !is_on || !node.wants(reason, view.config) {
-                    continue;
+                let due_at = node.due_at(reason, view.config, view.now);
+                if let Some(at) = due_at.filter(|_| is_on) {
+                    earliest = Some(earliest.unwrap_or(at).min(at));
                 }
-                let at = node.earliest(reason, view.config).unwrap_or(view.now);
-                earliest = Some(earliest.unwrap_or(at).min(at));
             }
         }
         earliest
@@ -165,15 +164,15 @@ impl Queue {
     /// The next request of the search. Nodes that were heard before and are owed a stop have every
     /// other turn.
     fn search<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
-        let one = |is_lost: bool| {
-            let last = if is_lost { self.searched_lost } else { self.searched };
-            (1..=8).find_map(|step| {
-                let index = (last + step) & 7;
-                let is_one = view.nodes[index].is_lost() == is_lost;
-                is_one.then(|| self.request(index, Reason::Search, view, Round::Next)).flatten()
-            })
-        };
-        one(!self.was_lost).or_else(|| one(self.was_lost))
+        let is_lost = |index: usize| u8::from(view.nodes[index].is_lost()) << index;
+        let lost = (0..8).fold(0, |lost, index| lost | is_lost(index));
+        let mut turns = [(self.searched_lost, !lost), (self.searched, lost)];
+        if self.was_lost {
+            turns.reverse();
+        }
+        turns.into_iter().find_map(|(last, others)| {
+            self.next_of(Reason::Search, last + 1, view, Round::Next, others)
+        })
     }
 
     fn discovery_or_cycle<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
@@ -227,7 +226,7 @@ impl Queue {
         round: Round,
     ) -> Option<Choice<B>> {
         let node = &view.nodes[index & 7];
-        node.is_due(reason, view.config, view.now).then(|| Choice {
+        reached(node.due_at(reason, view.config, view.now), view.now).then(|| Choice {
             node: NodeId::ALL[index & 7],
             request: node.request(reason),
             reason,
