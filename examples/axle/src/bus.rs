@@ -4,7 +4,7 @@ use std::time;
 
 use axlewire::{
     ikeya::{
-        Master, Mode, NodeId, Status,
+        Master, Mode, NodeId, Status, Target,
         board::OneMotor,
         master::{Cause, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress},
     },
@@ -17,7 +17,7 @@ use crate::{
     failure::Failure,
     line::Line,
     session::Session,
-    signals::{ABSENCE, Signals},
+    signals::{ABSENCE, DEAD_MAN, Signals},
 };
 
 pub(crate) use crate::boards::Boards;
@@ -36,9 +36,6 @@ const LOOK_PERIOD: Duration = Duration::from_millis(50);
 /// Minimum time allowed for nodes that answer to confirm a stop. A slow line gets more:
 /// [`Master::stop_bound`].
 const STOP_PATIENCE: Duration = Duration::from_millis(3000);
-
-/// Time allowed for nodes to answer; after it they are stopped by their last known status.
-const REFRESH: Duration = Duration::from_millis(200);
 
 /// Pause after a port failure during a stop, before the stop continues.
 const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
@@ -141,22 +138,6 @@ impl<B: Boards> Bus<B> {
         (at > since && !self.master().is_mode_in_doubt(node)).then_some(status)
     }
 
-    /// Reads these nodes now, so that no decision uses an old mode or position, and waits for their
-    /// answers, but not for long.
-    pub(crate) fn refresh(&mut self, nodes: NodeSet) {
-        let start = self.now();
-        for node in nodes.iter() {
-            // One that is refused is not known either.
-            let _ = self.master_mut().read(node, start);
-        }
-        let end = start + REFRESH;
-        while self.now() < end && !nodes.iter().all(|node| self.fresh(node, start).is_some()) {
-            if self.round(end).is_err() {
-                return;
-            }
-        }
-    }
-
     pub(crate) fn new(line: Line, config: MasterConfig) -> Self {
         let session = Session::new(line, |now| Master::new(config, now));
         Self { session, baud: config.baud, has_dead_man_fired: false }
@@ -222,6 +203,55 @@ impl<B: Boards> Bus<B> {
 
     pub(crate) fn is_online(&self, node: NodeId) -> bool {
         matches!(self.master().health(node), Some(Health::Online | Health::Suspect(_)))
+    }
+
+    /// Commands a node, unless the master refuses it.
+    pub(crate) fn command(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+        now: Instant,
+    ) -> Result<(), Failure> {
+        match target {
+            Target::Velocity(velocity) => self.master_mut().set_velocity(node, velocity, now),
+            Target::Position(position) => self.master_mut().set_position(node, position, now),
+        }
+        .map_err(|error| Failure::Failed(error.to_string()))
+    }
+
+    /// Fails if a node no longer follows this command.
+    pub(crate) fn check_follows(&self, node: NodeId, target: Target<B>) -> Result<(), Failure> {
+        let refuse = |line: String| Err(Failure::Failed(line));
+        match self.master().mode(node) {
+            _ if !self.is_online(node) => refuse(format!("node {node} no longer answers")),
+            Some(mode) if mode != target.mode() => {
+                refuse(format!("node {node} has changed to {mode} mode"))
+            }
+            _ if self.master().is_mode_in_doubt(node) => {
+                let other = match target.mode() {
+                    Mode::Velocity => Mode::Position,
+                    Mode::Position => Mode::Velocity,
+                };
+                refuse(format!("node {node} has answered in {other} mode"))
+            }
+            _ if self.has_dead_man_fired => refuse(DEAD_MAN.to_owned()),
+            _ if self.master().set_point(node) != Some(target) => {
+                refuse(format!("node {node} has lost its command"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Stops these nodes; fails if one of them is not at rest then.
+    pub(crate) fn halt_all(&mut self, nodes: NodeSet) -> Result<(), Failure> {
+        let failure = self.stop(nodes).err();
+        let complaints: Vec<_> = nodes.iter().filter_map(|node| self.complaint(node)).collect();
+        let complaint = complaints.join("; ");
+        match failure {
+            _ if complaint.is_empty() => Ok(()),
+            Some(failure) => Err(failure.while_moving(&complaint)),
+            None => Err(Failure::Failed(complaint)),
+        }
     }
 
     /// Stops these nodes and waits until the outcome of each is known. Port failures do not end the

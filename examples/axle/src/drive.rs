@@ -4,7 +4,7 @@ use std::fmt;
 
 use axlewire::{
     time::{Duration, Instant},
-    ucp::{MotorControl, Telemetry, host::Link},
+    ucp::{MotorControl, Telemetry},
 };
 use serde::Serialize;
 
@@ -174,9 +174,7 @@ impl Drive {
             if self.rover.has_dead_man_fired {
                 return Err(Failure::Failed(DEAD_MAN.to_owned()));
             }
-            if self.rover.host().link() == Link::Down {
-                return Err(Failure::Failed("the robot is no longer heard".to_owned()));
-            }
+            self.rover.check_heard()?;
             if now >= end {
                 break;
             }

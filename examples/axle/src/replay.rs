@@ -16,17 +16,21 @@ use crate::{
 ///
 /// Sends what one side of the line sent, frame by frame, and shows both sides. Bytes between frames
 /// are not sent. Raw bytes have no times: their frames follow each other at --every. No frame is
-/// sent faster than --baud allows. A robot is told to stop first, and every 0.1 s until the first
-/// motor command of the capture (ruling U16): it would drive on while it hears anything.
+/// sent faster than --baud allows.
 ///
-/// If the frames command motors or a rover, --move is needed. Then the modes of all nodes that are
-/// commanded are read first, and nothing is sent if a node does not answer, if it is not in the
-/// mode that it had in the capture, or if it would get more than --max-rps or go farther than
-/// --max-turns: a speed looks like a far position, and the reverse. A capture of several lines is
-/// refused, and so is one in which a commanded node changes its mode. At the end, on every error
-/// and on every signal that can be caught, what was commanded is stopped. Firmware updates, motor
-/// commands out of range, bodies of a wrong length and frames inside others are refused (rulings U7
-/// and U13).
+/// Frames that command motors or a rover need --move, and are given to a master or a host, which
+/// sends them or refuses them. Before, the modes of all nodes that are commanded are read, and
+/// nothing is sent if a node does not answer, if it is not in the mode that it had in the capture,
+/// or if it would get more than --max-rps or go farther than --max-turns: a speed looks like a far
+/// position, and the reverse. The master also reads each node every 0.1 s and repeats its latest
+/// command; it leaves out READs of nodes that do not answer. The host tells a robot to stop first,
+/// repeats each command every 0.1 s (ruling U16), and tells it to stop 0.5 s after the latest one. A
+/// node that turns or falls silent and a robot that is no longer heard end the replay. At the end,
+/// on every error and on every signal that can be caught, what was commanded is stopped.
+///
+/// A capture of several lines is refused, and so is one in which a commanded node changes its mode.
+/// Firmware updates, motor commands out of range, bodies of a wrong length and frames hidden in
+/// others, also in those of a device, are refused (rulings I3, U7 and U13).
 ///
 /// The capture is held in memory: 4 to 40 times its size, most for the short packets of a bus.
 #[derive(Debug, clap::Args)]
@@ -140,6 +144,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         protocol,
         side: args.side,
         frames: frames.into_iter().map(|(_, due)| due).collect(),
+        reads_back: false,
         linger_us: LINGER_US,
         limits: args.limits,
         is_json: args.json,

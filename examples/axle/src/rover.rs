@@ -64,7 +64,7 @@ impl Rover {
     }
 
     /// The same with these settings, but for the speed, which is that of the line.
-    fn with(config: HostConfig, line: Line, args: &args::PortArgs) -> Self {
+    pub(crate) fn with(config: HostConfig, line: Line, args: &args::PortArgs) -> Self {
         let mut config = config;
         config.baud = args.baud_for(Protocol::Ucp);
         let session = Session::new(line, |now| Host::new(config, now));
@@ -91,6 +91,25 @@ impl Rover {
 
     pub(crate) const fn host_mut(&mut self) -> &mut Host {
         self.session.role_mut()
+    }
+
+    /// Whether the robot has been told what to do (ruling U16), and something else may be said.
+    pub(crate) fn is_told(&self) -> bool {
+        let drives = self.host().command().is_some_and(|command| !command.stands_still());
+        self.session.is_clear() && (drives || self.host().is_stop_sent())
+    }
+
+    /// Sends a frame that is not the host's; `false` if it did not leave whole.
+    pub(crate) fn interject(&mut self, frame: &[u8]) -> Result<bool, Failure> {
+        self.session.interject(frame)
+    }
+
+    /// Fails if the robot is no longer heard (ruling U10).
+    pub(crate) fn check_heard(&self) -> Result<(), Failure> {
+        match self.host().link() {
+            Link::Down => Err(Failure::Failed("the robot is no longer heard".to_owned())),
+            _ => Ok(()),
+        }
     }
 
     /// Waits until the robot is heard; `false` if `is_over` returns `true` first.

@@ -7,9 +7,10 @@ use std::{
 
 use axlewire::{
     drive::{DriveError, Driver},
-    endpoint::Endpoint,
+    endpoint::{Endpoint, Unsent},
     time::{Duration, Instant},
 };
+use embedded_io::Write;
 
 use crate::{
     clock,
@@ -74,6 +75,28 @@ impl<R: Endpoint> Session<R> {
         }
     }
 
+    /// Whether the port has all of the role's latest frame.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.driver.unsent().is_empty()
+    }
+
+    /// Sends a frame that is not the role's, between two of its own; `false` if it did not leave
+    /// whole.
+    pub(crate) fn interject(&mut self, frame: &[u8]) -> Result<bool, Failure> {
+        if !self.is_clear() {
+            return Ok(false);
+        }
+        let (now, port) = (self.now(), self.driver.port_mut());
+        match port.write_all(frame).and_then(|()| port.flush()) {
+            Ok(()) => Ok(true),
+            Err(error) => {
+                // The other end may take the role's next frame for the rest of this one.
+                self.role_mut().handle_unsent(Unsent::CutOff, now);
+                self.judge(DriveError::Port(error)).map_or(Ok(false), Err)
+            }
+        }
+    }
+
     /// The next event in the queue.
     pub(crate) fn poll_event(&mut self) -> Option<R::Event> {
         self.driver.poll_event()
@@ -98,7 +121,10 @@ impl<R: Endpoint> Session<R> {
 
 #[cfg(test)]
 mod tests {
-    use axlewire::ikeya::{Master, master::MasterConfig};
+    use axlewire::{
+        ikeya::{Master, master::MasterConfig},
+        ucp::{Host, host::HostConfig},
+    };
     use embedded_io::{ErrorType, Read, ReadReady, Write};
 
     use super::*;
@@ -167,6 +193,20 @@ mod tests {
             let until = session.now() + PATIENCE;
             session.round(until).unwrap();
         }
+    }
+
+    #[test]
+    fn a_frame_between_those_of_a_role_is_lost_if_it_does_not_leave_and_the_role_knows() {
+        clock::play();
+        let line = Line::new("stuck", Stuck { start: clock::now(), open: 0..100 }, true);
+        let mut session = Session::new(line, |now| Host::new(HostConfig::default(), now));
+        let now = session.now();
+        session.round(now).unwrap();
+        assert!(session.interject(&[1]).unwrap() && session.role().is_stop_sent());
+        clock::sleep(Span::from_millis(150));
+        assert!(!session.interject(&[1]).unwrap() && !session.role().is_stop_sent());
+        clock::sleep(STUCK);
+        assert!(session.interject(&[1]).is_err());
     }
 
     #[test]

@@ -140,40 +140,6 @@ fn a_status_does_not_count_if_another_answer_has_put_the_mode_in_doubt() {
 }
 
 #[test]
-fn a_refresh_asks_each_node_even_if_nothing_else_does() {
-    let line = turning(|_, _| {});
-    let mut config = complete(MasterConfig::usb_adapter(), &PortArgs::new(None), &line.line);
-    (config.nodes, config.polling) = (both(), Polling::Manual);
-    let mut bus: Bus = Bus::new(line.line.clone(), config);
-    assert!(bus.discover(&Signals::none()).unwrap());
-    let before = line.said().len();
-    bus.refresh(both());
-    assert_eq!(line.said()[before..], [Said::Read(1), Said::Read(2)]);
-}
-
-#[test]
-fn a_refresh_learns_what_the_nodes_have_become() {
-    let signals = Signals::none();
-    let line = turning(|_, _| {});
-    let mut bus = on(&line.line, both());
-    assert!(bus.discover(&signals).unwrap());
-    for node in &mut line.state.borrow_mut().nodes {
-        (node.mode, node.counts, node.rps) = match node.mode {
-            Mode::Velocity => (Mode::Position, 7, 0.0),
-            Mode::Position => (Mode::Velocity, 0, 0.5),
-        };
-    }
-    let begin = clock::now();
-    bus.refresh(both());
-    assert!(clock::since(begin) < time::Duration::from_millis(150), "{:?}", clock::since(begin));
-    assert_eq!(bus.master().mode(NodeId::N1), Some(Mode::Position));
-    assert_eq!(bus.master().mode(NodeId::N2), Some(Mode::Velocity));
-    line.state.borrow_mut().nodes[0].is_dumb = true;
-    bus.refresh(both());
-    assert!(clock::since(begin) < time::Duration::from_millis(800), "not for long");
-}
-
-#[test]
 fn all_nodes_are_stopped_each_in_its_mode_and_confirm_it_twice() {
     let line = turning(|_, _| {});
     let mut bus = on(&line.line, NodeSet::ALL);

@@ -1,5 +1,6 @@
 //! An open line: the port of a driver, and the clock that waits for its bytes.
 
+mod tap;
 mod tcp;
 mod wire;
 
@@ -22,6 +23,7 @@ use crate::{
     failure::Failure,
     pcapng::{Background, Direction, Recording},
 };
+use tap::Tap;
 use tcp::TcpPort;
 pub(crate) use wire::Wire;
 
@@ -75,8 +77,13 @@ impl Line {
         Self { recording: recording.cloned(), ..self }
     }
 
+    /// The same line, whose bytes are also told.
+    pub(crate) fn tapped(self, tell: impl FnMut(Direction, &[u8]) + 'static) -> Self {
+        Self { wire: Rc::new(RefCell::new(Tap { wire: self.wire, tell })), ..self }
+    }
+
     /// The same line, whose bytes go through `tap`.
-    #[cfg(any(test, all(unix, feature = "dashboard")))]
+    #[cfg(test)]
     pub(crate) fn through<W: Wire + 'static>(
         self,
         tap: impl FnOnce(Rc<RefCell<dyn Wire>>) -> W,

@@ -3,9 +3,8 @@
 use core::fmt;
 
 use axlewire::{
-    crc16,
     encode::Encode,
-    ikeya::{self, Mode, NodeId, Position, Rps, Status, three},
+    ikeya::{self, Mode, NodeId, Position, Rps, Status, Target, three},
     stream::{Frames, Framing},
     ucp::{self, Body, Message, MotorControl},
 };
@@ -42,21 +41,18 @@ pub(crate) enum Effect {
     Ask(NodeId),
     /// Commands the motors of a node.
     Write(Box<Write>),
-    /// Drives a rover.
-    Drive,
-    /// Tells a rover to stand still.
-    Stand,
+    /// Commands the wheels of a rover.
+    Wheels(MotorControl),
 }
 
 impl Effect {
     /// Whether something moves because of it.
     pub(crate) const fn moves(&self) -> bool {
-        matches!(self, Self::Write(_) | Self::Drive)
-    }
-
-    /// Whether it is a motor command for a rover.
-    pub(crate) const fn is_for_wheels(&self) -> bool {
-        matches!(self, Self::Drive | Self::Stand)
+        match self {
+            Self::Write(_) => true,
+            Self::Wheels(command) => !command.stands_still(),
+            Self::Ask(_) | Self::Nothing => false,
+        }
     }
 }
 
@@ -126,8 +122,7 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
             Ok(command) if command.frame(frame.index()).as_bytes() != frame.as_bytes() => {
                 Err("a motor command with values that no host sends (ruling U7)".to_owned())
             }
-            Ok(command) if command.stands_still() => commander(Effect::Stand),
-            Ok(_) => commander(Effect::Drive),
+            Ok(command) => commander(Effect::Wheels(command)),
             Err(_) if command.starts_update() => {
                 Err("a motor command that starts a firmware update (ruling U7)".to_owned())
             }
@@ -159,56 +154,6 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
     }
 }
 
-/// The number, from 0, of the first of these frames for a robot in which another one begins: what a
-/// shipped robot takes if it has lost its place, by noise or by a frame with an unknown id.
-///
-/// Its receiver ignores the high byte of `len` and takes any body of an id from 1 to 10 (ruling
-/// U13). The other frame may go on in what is sent next: in the next frame, or in a stop, which the
-/// tool sends on its own, in front of any frame and behind the last.
-pub(crate) fn hidden_frame<'a>(frames: impl IntoIterator<Item = &'a [u8]>) -> Option<usize> {
-    let frames: Vec<_> = frames.into_iter().collect();
-    let mut left = CONTINUATIONS;
-    frames.iter().enumerate().position(|(number, frame)| {
-        let behind = frames.get(number + 1..).unwrap_or_default();
-        let begins = frame.iter().enumerate().skip(1).filter(|(_, byte)| **byte == 0xFD);
-        let mut begun = begins.map(|(at, _)| frame.get(at..).unwrap_or_default().to_vec());
-        begun.any(|mut begun| becomes_a_frame(&mut begun, behind, &mut left))
-    })
-}
-
-/// Maximum number of continuations to try. A capture with more is certainly hiding something.
-const CONTINUATIONS: u32 = 1_000_000;
-
-/// Whether these bytes, with what may be sent behind them, begin with a frame that a shipped robot
-/// takes.
-fn becomes_a_frame(begun: &mut Vec<u8>, behind: &[&[u8]], left: &mut u32) -> bool {
-    let is = |at: usize, fits: fn(u8) -> bool| begun.get(at).is_none_or(|&byte| fits(byte));
-    let is_header = is(0, |sync| sync == 0xFD)
-        && is(1, |sync| sync == 0xFF)
-        && is(2, |len| (4..=127).contains(&len))
-        && is(4, |id| (1..=10).contains(&id));
-    if !is_header {
-        return false;
-    }
-    let whole = begun.get(2).map_or(usize::MAX, |&len| 4 + usize::from(len));
-    if let Some(frame) = begun.get(..whole) {
-        return crc16::check(frame);
-    }
-    if *left == 0 {
-        return true;
-    }
-    *left -= 1;
-    let (stop, len) = (MotorControl::STOP.frame(0), begun.len());
-    let mut goes_on = |next: &[u8], behind: &[&[u8]]| {
-        begun.extend_from_slice(next);
-        let becomes_one = becomes_a_frame(begun, behind, left);
-        begun.truncate(len);
-        becomes_one
-    };
-    goes_on(stop.as_bytes(), behind)
-        || behind.split_first().is_some_and(|(next, behind)| goes_on(next, behind))
-}
-
 impl From<Write> for Effect {
     fn from(write: Write) -> Self {
         Self::Write(write.into())
@@ -216,55 +161,66 @@ impl From<Write> for Effect {
 }
 
 impl Write {
-    /// Checks the command for its node, which is at `status`. `meant` is the mode that it was meant
-    /// for, if that is known.
-    pub(crate) fn check<B: Boards>(
+    /// The command for its node, which is at `status`, if it is within the limits. `meant` is the
+    /// mode that it was meant for, if that is known.
+    pub(crate) fn target<B: Boards>(
         &self,
         status: Status<B>,
         meant: Option<Mode>,
         limits: &Limits,
-    ) -> Result<(), String> {
+    ) -> Result<Target<B>, String> {
         let (node, mode) = (self.node, status.mode());
         if let Some(meant) = meant.filter(|meant| *meant != mode) {
             return Err(format!(
                 "node {node} is in {mode} mode, but a command is for {meant} mode"
             ));
         }
-        let Some(positions) = B::positions(status) else {
-            return self.check_speeds(limits.max_rps.get());
+        let target = match B::positions(status) {
+            Some(here) => B::position(self.near(&here, limits.max_turns)?).map(Target::Position),
+            None => B::velocity(&self.slow(limits.max_rps)?).map(Target::Velocity),
         };
-        for (from, to) in positions.iter().zip(&self.positions) {
-            let (from, to) = (from.revolutions(), to.revolutions());
-            if (to - from).abs() > limits.max_turns {
-                return Err(format!(
-                    "{to:.4} turns for node {node}, which is at {from:.4}, is farther than \
-                     --max-turns {}: a speed, or a typo?",
-                    limits.max_turns
-                ));
-            }
-        }
-        Ok(())
+        target.ok_or_else(|| format!("node {node} has another number of motors"))
     }
 
-    fn check_speeds(&self, max_rps: f32) -> Result<(), String> {
-        for &rps in &self.speeds {
-            if rps.is_nan() || rps.abs() > max_rps {
-                let node = self.node;
+    /// The positions, if they are near enough to `here`.
+    fn near(&self, here: &[Position], max_turns: f64) -> Result<&[Position], String> {
+        for (from, to) in here.iter().zip(&self.positions) {
+            let (from, to) = (from.revolutions(), to.revolutions());
+            if (to - from).abs() > max_turns {
                 return Err(format!(
-                    "{rps:?} rps for node {node} is more than --max-rps {max_rps}: a position, or \
-                     a typo?"
+                    "{to:.4} turns for node {}, which is at {from:.4}, is farther than \
+                     --max-turns {max_turns}: a speed, or a typo?",
+                    self.node
                 ));
             }
         }
-        Ok(())
+        Ok(&self.positions)
+    }
+
+    /// The speeds, if they are slow enough.
+    fn slow(&self, max_rps: Rps) -> Result<Vec<Rps>, String> {
+        let slow = |&rps: &f32| {
+            let within = Rps::new(rps).ok().filter(|rps| rps.get().abs() <= max_rps.get());
+            within.ok_or_else(|| {
+                format!(
+                    "{rps:?} rps for node {} is more than --max-rps {}: a position, or a typo?",
+                    self.node,
+                    max_rps.get()
+                )
+            })
+        };
+        self.speeds.iter().map(slow).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use axlewire::ikeya::{
-        WriteRequest,
-        board::{OneMotor, ThreeMotors},
+    use axlewire::{
+        crc16,
+        ikeya::{
+            WriteRequest,
+            board::{OneMotor, ThreeMotors},
+        },
     };
 
     use super::*;
@@ -294,31 +250,31 @@ mod tests {
     #[test]
     fn a_command_for_the_other_mode_is_refused_if_that_is_known() {
         let at = Status::<OneMotor>::Position(Position::new(0, 0));
-        let error = velocity(1.0).check(at, Some(Mode::Velocity), &limits()).unwrap_err();
+        let error = velocity(1.0).target(at, Some(Mode::Velocity), &limits()).unwrap_err();
         assert_eq!(error, "node 3 is in position mode, but a command is for velocity mode");
         let still = Status::<OneMotor>::Velocity(0.0);
-        velocity(1.0).check(still, Some(Mode::Velocity), &limits()).unwrap();
-        velocity(1.0).check(still, None, &limits()).unwrap();
+        velocity(1.0).target(still, Some(Mode::Velocity), &limits()).unwrap();
+        velocity(1.0).target(still, None, &limits()).unwrap();
     }
 
     #[test]
     fn a_speed_that_a_position_node_would_take_for_a_place_is_too_far() {
         let at = Status::<OneMotor>::Position(Position::new(0, 0));
-        let error = velocity(1.0).check(at, None, &limits()).unwrap_err();
+        let error = velocity(1.0).target(at, None, &limits()).unwrap_err();
         assert!(error.starts_with("16256.0000 turns for node 3, which is at 0.0000"), "{error}");
         let near = write(&WriteRequest::position(NodeId::N3, Position::new(0, -100)));
-        near.check(at, None, &limits()).unwrap();
+        near.target(at, None, &limits()).unwrap();
         let far = write(&WriteRequest::position(NodeId::N3, Position::new(1, 100)));
-        far.check(at, None, &limits()).unwrap_err();
+        far.target(at, None, &limits()).unwrap_err();
     }
 
     #[test]
     fn a_speed_above_the_limit_or_none_at_all_is_refused() {
         let still = Status::<OneMotor>::Velocity(0.0);
-        velocity(-20.0).check(still, None, &limits()).unwrap();
-        velocity(-20.1).check(still, None, &limits()).unwrap_err();
+        velocity(-20.0).target(still, None, &limits()).unwrap();
+        velocity(-20.1).target(still, None, &limits()).unwrap_err();
         let nan = write(&WriteRequest::position(NodeId::N1, Position::new(0, 0x7FC0)));
-        nan.check(still, None, &limits()).unwrap_err();
+        nan.target(still, None, &limits()).unwrap_err();
     }
 
     #[test]
@@ -326,7 +282,7 @@ mod tests {
         let check =
             |packet: &three::WriteRequest, status| match of(Protocol::Ikeya3, packet.as_bytes()) {
                 Ok((Side::Commander, Effect::Write(write))) => {
-                    write.check::<ThreeMotors>(status, None, &limits())
+                    write.target::<ThreeMotors>(status, None, &limits())
                 }
                 other => panic!("{other:?}"),
             };
@@ -352,12 +308,11 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_is_a_write_or_a_drive_and_what_is_for_wheels_a_drive_or_a_stop() {
-        let write = Effect::from(velocity(0.0));
-        let all =
-            [&write, &Effect::Drive, &Effect::Stand, &Effect::Ask(NodeId::N1), &Effect::Nothing];
-        assert_eq!(all.map(Effect::moves), [true, true, false, false, false]);
-        assert_eq!(all.map(Effect::is_for_wheels), [false, true, true, false, false]);
+    fn what_moves_is_a_write_or_a_motor_command_that_is_not_zero() {
+        let drive = Effect::Wheels(MotorControl::new(0, 1).unwrap());
+        let stand = Effect::Wheels(MotorControl::STOP);
+        let all = [velocity(0.0).into(), drive, stand, Effect::Ask(NodeId::N1), Effect::Nothing];
+        assert_eq!(all.map(|effect| effect.moves()), [true, true, false, false, false]);
     }
 
     #[test]
@@ -375,7 +330,8 @@ mod tests {
         }
         let mut lamp = [0; 16];
         lamp[4] = 100;
-        assert_eq!(frame(2, &lamp), Ok((Side::Commander, Effect::Stand)));
+        let lit = MotorControl::STOP.with_front_led(true);
+        assert_eq!(frame(2, &lamp), Ok((Side::Commander, Effect::Wheels(lit))));
         assert!(frame(9, &[1, 0]).unwrap_err().contains("firmware update"));
         for (id, len) in [(1, 2), (2, 15), (3, 0), (5, 1), (8, 5), (10, 2)] {
             let error = frame(id, &vec![0; len]).unwrap_err();
@@ -385,95 +341,6 @@ mod tests {
         let ping = [0xFD, 0xFF, 0x04, 0x00, 0x01, 0x00, 0x01, 0x42];
         let nested = frame(0x40, &ping).unwrap_err();
         assert!(nested.contains("(ruling U13): FD FF at byte 6"), "{nested}");
-    }
-
-    #[test]
-    fn what_is_sent_hides_no_frame_for_a_robot_that_has_lost_its_place() {
-        let sealed = |body: &[u8]| [body, &crc16::compute(body).to_le_bytes()].concat();
-        let hidden = |frames: &[&[u8]]| hidden_frame(frames.iter().copied());
-        let (ping, update) = ([0xFD, 0xFF, 4, 0, 1, 0], [0xFD, 0xFF, 6, 0, 9, 0, 40, 0]);
-        let (ping, whole_update) = (sealed(&ping), sealed(&update));
-        // Biases hold any bytes: three that are -3, for example, are FD FF each.
-        let biases = |at: usize, hidden: &[u8]| {
-            let mut frame = [0xEE; 25];
-            frame[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
-            frame[at..at + hidden.len()].copy_from_slice(hidden);
-            sealed(&frame)
-        };
-        let harmless = biases(6, &[0xFD, 0xFF].repeat(3));
-        assert_eq!(hidden(&[&ping, &harmless, &ping, &whole_update]), None);
-        for at in 6..=15 {
-            assert_eq!(hidden(&[&ping, &harmless, &biases(at, &whole_update)]), Some(2));
-        }
-        // The robot ignores the high byte of the length.
-        for (at, value, is_taken) in
-            [(3, 1, true), (4, 0, false), (4, 10, true), (4, 11, false), (2, 3, false)]
-        {
-            let mut other = update;
-            other[at] = value;
-            let found = hidden(&[&biases(6, &sealed(&other))]);
-            assert_eq!(found, is_taken.then_some(0), "{other:02X?}");
-        }
-        // One of 31 bytes that ends in the next frame: 8 of them here, and 23 there.
-        let first = biases(19, &[0xFD, 0xFF, 27, 0, 1, 0]);
-        let next = biases(6, &[]);
-        let crc = crc16::compute(&[&first[19..], &next[..21]].concat());
-        let next = biases(21, &crc.to_le_bytes());
-        assert_eq!(hidden(&[&ping, &first, &next]), Some(1));
-        assert_eq!(hidden(&[&ping, &first, &ping, &next]), None);
-    }
-
-    #[test]
-    fn a_frame_that_a_stop_of_the_tool_would_complete_is_hidden() {
-        // The end of these biases and the front of a stop are a motor command.
-        let mut biases = [0; 27];
-        biases[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
-        biases[9..15].copy_from_slice(&[0xFD, 0xFF, 20, 0, 2, 0]);
-        biases[15] = 100;
-        let stop = MotorControl::STOP.frame(0);
-        let stop = stop.as_bytes();
-        let ping = [0xFD, 0xFF, 4, 0, 1, 0, 1, 0x42];
-        // What is taken for its CRC is in the stop, so the CRC of the biases has to fit.
-        let fits = (0..1_u32 << 20).find(|free| {
-            [biases[6], biases[7], biases[8], _] = free.to_le_bytes();
-            let crc = crc16::compute(&biases[..25]);
-            biases[25..].copy_from_slice(&crc.to_le_bytes());
-            crc16::check(&[&biases[9..], &stop[..6]].concat())
-        });
-        assert!(fits.is_some());
-        for frames in [vec![&biases[..]], vec![&ping, &biases, &ping], vec![&biases[..], &ping]] {
-            let number = frames.iter().position(|frame| *frame == biases);
-            assert_eq!(hidden_frame(frames.iter().copied()), number);
-        }
-        // With another value in front of it, it has the wrong CRC.
-        biases[6] ^= 1;
-        let crc = crc16::compute(&biases[..25]);
-        biases[25..].copy_from_slice(&crc.to_le_bytes());
-        assert_eq!(hidden_frame([&biases[..], &ping]), None);
-    }
-
-    #[test]
-    fn a_capture_with_endless_ways_to_go_on_is_refused_in_bounded_work() {
-        // Each has a header of 127 bytes at its end, behind which 8 bytes follow again and again.
-        let mut biases = [0xEE; 25];
-        biases[..6].copy_from_slice(&[0xFD, 0xFF, 23, 0, 8, 0]);
-        biases[20..].copy_from_slice(&[0xFD, 0xFF, 127, 0, 1]);
-        let biases = [&biases[..], &crc16::compute(&biases).to_le_bytes()].concat();
-        let ping = [0xFD, 0xFF, 4, 0, 1, 0, 1, 0x42];
-        let mut frames = vec![&biases[..]];
-        frames.extend([&ping[..]; 16]);
-        let many: Vec<_> = frames.iter().copied().cycle().take(100_000).collect();
-        assert_eq!(hidden_frame(frames), None);
-        assert!(hidden_frame(many).is_some_and(|number| number > 17));
-    }
-
-    #[test]
-    fn zero_moves_nothing_on_a_rover_and_something_on_a_bus() {
-        assert_eq!(frame(2, &[0; 16]), Ok((Side::Commander, Effect::Stand)));
-        let mut slow = [0; 16];
-        slow[2] = 1;
-        assert_eq!(frame(2, &slow), Ok((Side::Commander, Effect::Drive)));
-        assert!(matches!(velocity(0.0), Write { node: NodeId::N3, .. }));
     }
 
     #[test]

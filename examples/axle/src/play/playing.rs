@@ -1,26 +1,36 @@
-//! Sends the frames of a plan, and stops what they have moved.
+//! Plays the frames of a plan at their times, and stops what they have moved.
 
 use std::collections::VecDeque;
 
 use axlewire::{
-    ikeya::{Mode, NodeId},
-    time::Duration,
+    ikeya::{self, Mode, three},
+    time::{Duration, Instant, wire_time},
 };
 
 use super::{
-    effect::{Limits, Side},
-    player::{Due, Part, Player},
+    effect::{Effect, Limits, Side},
+    lister::Lister,
 };
 use crate::{
     args::Protocol,
     bus::MasterArgs,
     failure::{Failure, guarded},
     line::Line,
-    listing::{Modes, Style, TimeColumn},
-    session::Session,
-    signals::Signals,
+    listing::Modes,
+    signals::{Attendance, Signals},
     teller::Teller,
 };
+
+/// A frame and when to send it.
+#[derive(Clone, Debug)]
+pub(crate) struct Due {
+    /// After the beginning, microseconds.
+    pub(crate) after_us: u64,
+    pub(crate) bytes: Box<[u8]>,
+    /// For a WRITE, the mode that it was meant for, if that is known.
+    pub(crate) meant: Option<Mode>,
+    pub(crate) effect: Effect,
+}
 
 /// What to send, and how.
 pub(crate) struct Plan<'a> {
@@ -28,46 +38,67 @@ pub(crate) struct Plan<'a> {
     pub(crate) protocol: Protocol,
     pub(crate) side: Side,
     pub(crate) frames: VecDeque<Due>,
+    /// Whether a READ goes behind each WRITE.
+    pub(crate) reads_back: bool,
     /// How long to listen after the last frame, microseconds; motors keep moving meanwhile.
     pub(crate) linger_us: u64,
     pub(crate) limits: Limits,
     pub(crate) is_json: bool,
 }
 
-/// Longest interval between two rounds.
-const CALL_PERIOD: Duration = Duration::from_millis(50);
+/// Who speaks on the line: decides whether what is due may leave, and when.
+pub(super) trait Voice: Sized {
+    /// Prepares for a plan; `None` if a signal came first. Nothing moves yet.
+    fn prepare(plan: &Plan<'_>, line: Line, signals: &Signals) -> Result<Option<Self>, Failure>;
 
-/// Sends the frames, then stops what they have moved, whatever happened: `stop` gets the modes in
-/// which the nodes have answered last.
-pub(super) fn play(
-    plan: Plan<'_>,
-    line: &Line,
-    modes: Modes,
-    signals: &Signals,
-    moves: bool,
-    stop: impl FnOnce(Modes) -> Result<Vec<String>, Failure>,
-) -> Result<(), Failure> {
-    let style = match plan.is_json {
-        true => Style::Json,
-        false => Style::text(plan.protocol.number(), TimeColumn::Relative),
+    /// The modes of the nodes, as far as they are known.
+    fn modes(&self) -> Modes {
+        Modes::default()
+    }
+
+    fn now(&mut self) -> Instant;
+
+    /// Whether it can take another frame.
+    fn is_free(&self) -> bool;
+
+    /// Takes a frame that is due; fails if it may not be sent. `false` if it did not leave whole.
+    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure>;
+
+    /// Fails if something does not follow its command any more.
+    fn check(&self) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Runs until then, or until something happens.
+    fn round(&mut self, until: Instant) -> Result<(), Failure>;
+
+    /// Stops what was commanded, and says so.
+    fn stop(self) -> Result<Vec<String>, Failure>;
+}
+
+/// Longest interval between two rounds, and the one in which a frame waits until it is taken.
+const CALL_PERIOD: Duration = Duration::from_millis(50);
+const WAIT_PERIOD: Duration = Duration::from_millis(1);
+
+/// Pause between a frame and its answer (ruling I9 asks for 50 us at least).
+const TURNAROUND: Duration = Duration::from_micros(200);
+
+/// Sends the frames, then stops what they have moved, whatever happened.
+pub(super) fn play<V: Voice>(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
+    let (lister, line) = Lister::tap(&plan, line);
+    let Some(voice) = V::prepare(&plan, line.clone(), signals)? else {
+        return signals.interrupted();
     };
-    let baud = plan.bus.line().baud_for(plan.protocol);
-    let holds_rover = plan.protocol == Protocol::Ucp && plan.side == Side::Commander;
-    let has_echo = plan.bus.config().removes_echo;
-    let Plan { protocol, frames: due, linger_us, .. } = plan;
-    let part = Part { protocol, baud, due, linger_us, holds_rover, has_echo, modes };
-    let mut session = Session::new(line.clone(), |now| Player::new(part, style, now));
-    let mut teller = Teller::new();
-    let played = guarded(|| until_over(&mut session, &mut teller, signals));
-    let (lost, left) = (session.role().lost, session.role().left());
-    let last = guarded(|| Ok(session.role_mut().finish()));
-    if let Ok(Some(lines)) = last {
+    lister.begin(voice.modes());
+    let moves = plan.frames.iter().any(|due| due.effect.moves());
+    let mut playing = Playing { voice, lister, teller: Teller::new(), lost: 0, plan };
+    let played = guarded(|| playing.until_over(signals));
+    let Playing { voice, lister, mut teller, lost, plan } = playing;
+    if let Some(lines) = lister.end() {
         let _ = teller.say(lines);
     }
-    let seen = session.role().seen();
-    drop(session);
     // In any case, stop first and report errors afterwards.
-    let stopped = stop(seen);
+    let stopped = voice.stop();
     for line in stopped.iter().flatten() {
         // If the output fails, what moved has stopped all the same.
         let _ = teller.say(line.clone());
@@ -76,6 +107,7 @@ pub(super) fn play(
     stopped?;
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
+    let left = plan.frames.len();
     for (count, what) in [(lost, "did not leave whole"), (left, "not sent: interrupted")] {
         if count > 0 {
             let frames = if count == 1 { "frame" } else { "frames" };
@@ -85,30 +117,69 @@ pub(super) fn play(
     told.and_then(|()| line.check_recording())
 }
 
-fn until_over(
-    session: &mut Session<Player>,
-    teller: &mut Teller,
-    signals: &Signals,
-) -> Result<(), Failure> {
-    while !signals.is_raised() {
-        let now = session.now();
-        session.role_mut().check(now)?;
-        if session.role().is_over(now) {
-            break;
-        }
-        if let Some(lines) = session.round(now + CALL_PERIOD)? {
-            teller.say(lines)?;
-        }
-        if let Some((node, now, meant)) = session.role().turncoat() {
-            return Err(turned(node, now, meant));
-        }
-    }
-    Ok(())
+struct Playing<'a, V> {
+    voice: V,
+    lister: Lister,
+    teller: Teller,
+    /// Frames that did not leave whole. They are not sent again: they would come late.
+    lost: usize,
+    /// With the frames that are left.
+    plan: Plan<'a>,
 }
 
-/// A node that may have taken its commands for something else.
-pub(super) fn turned(node: NodeId, now: Mode, meant: Mode) -> Failure {
-    Failure::Failed(format!(
-        "node {node} has changed to {now} mode: it may have taken commands for {meant} mode"
-    ))
+impl<V: Voice> Playing<'_, V> {
+    /// Sends each frame at its time, until the time to listen is over, a signal comes, or the voice
+    /// refuses one.
+    fn until_over(&mut self, signals: &Signals) -> Result<(), Failure> {
+        let start = self.voice.now();
+        let mut attendance = Attendance::new(start);
+        let (mut end, mut free_at) = (after(start, self.plan.linger_us), start);
+        while !signals.is_raised() {
+            let now = self.voice.now();
+            // First: what was due during an absence is out of date.
+            attendance.check(now)?;
+            self.voice.check()?;
+            let at = match self.plan.frames.front() {
+                None if now >= end => break,
+                None => end,
+                Some(due) => free_at.max(after(start, due.after_us)),
+            };
+            let mut until = at.min(now + CALL_PERIOD);
+            if now >= at && !self.plan.frames.is_empty() {
+                until = now + WAIT_PERIOD;
+                if self.voice.is_free()
+                    && let Some(due) = self.plan.frames.pop_front()
+                {
+                    self.lost += usize::from(!self.voice.give(&due, now)?);
+                    end = after(now, self.plan.linger_us);
+                    free_at = now + self.line_time(&due);
+                    until = now;
+                }
+            }
+            self.voice.round(until)?;
+            if let Some(lines) = self.lister.lines() {
+                self.teller.say(lines)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// How long the line is in use for a frame and its answer; boards with three motors answer
+    /// commands too (ruling I10).
+    fn line_time(&self, due: &Due) -> Duration {
+        let answer = match (self.plan.protocol, &due.effect) {
+            (Protocol::Ikeya, Effect::Ask(_)) => size_of::<ikeya::VelocityResponse>(),
+            (Protocol::Ikeya3, Effect::Ask(_) | Effect::Write(_)) => {
+                size_of::<three::VelocityResponse>()
+            }
+            _ => 0,
+        };
+        let turnaround = if answer > 0 { TURNAROUND } else { Duration::ZERO };
+        let baud = self.plan.bus.line().baud_for(self.plan.protocol);
+        wire_time(due.bytes.len() + answer, baud) + turnaround
+    }
+}
+
+fn after(start: Instant, micros: u64) -> Instant {
+    Instant::from_micros(start.as_micros() + micros)
 }

@@ -161,3 +161,24 @@ fn where_the_recording_program_has_sent_something_what_it_heard_of_it_is_left_ou
     let only: [(u64, Option<Direction>, &[u8]); 2] = [(0, heard, &read), (1, heard, &read)];
     assert_eq!(frames(&capture("heard", &only), "").unwrap().len(), 2);
 }
+
+#[test]
+fn without_move_nothing_leaves_that_any_receiver_could_take_for_a_command() {
+    // The answers of a three-motor board, one of which is a WRITE for a node with one motor.
+    let answer = |payload: &[u8]| {
+        let frame = [&[0x55, 1][..], payload].concat();
+        [&frame[..], &axlewire::crc16::compute(&frame).to_le_bytes()].concat()
+    };
+    let fast = WriteRequest::velocity(NodeId::N1, Rps::new(19.0).unwrap());
+    let hidden = answer(&[&[0; 2], &fast.as_bytes()[..], &[0; 2]].concat());
+    let harmless = answer(&[0; 12]);
+    let raw = file("hidden", &[&harmless[..], &hidden].concat());
+    for protocol in ["ikeya-3 --move", "ikeya-3"] {
+        let args = parsed(&raw, &format!("-P {protocol} --as device"));
+        let says = "another frame is hidden in frame 2, and a motor may take it (ruling I3): \
+                    nothing is sent";
+        assert_eq!(run(&args).unwrap_err().to_string(), says);
+    }
+    let args = parsed(&file("harmless", &harmless), "-P ikeya-3 --as device");
+    assert!(!run(&args).unwrap_err().to_string().contains("hidden"), "no such port");
+}

@@ -4,13 +4,11 @@ mod message;
 
 use std::collections::VecDeque;
 
-use axlewire::ikeya;
-
 use crate::{
     args, bus,
     failure::Failure,
     help::MOTION_HELP,
-    play::{self, Due, Effect, Limits, Plan, Side},
+    play::{self, Due, Limits, Plan, Side},
 };
 use message::Message;
 pub(crate) use message::{Kind, Network};
@@ -18,14 +16,18 @@ pub(crate) use message::{Kind, Network};
 /// Send one message, and show what is said on the line
 ///
 /// The message is sent once, or --count times every --every seconds, and the line is shown for
-/// --for seconds more. Before a WRITE, the mode of its node is read. A node that does not answer,
-/// or is in the other mode, gets none, and none gets a speed above --max-rps or a position farther
-/// away than --max-turns. Behind each WRITE goes a READ, and a node that answers in the other mode
-/// gets no more commands. Before a motor command that is not zero, a robot must be heard.
+/// --for seconds more. A command is given to a master or a host, which sends it or refuses it.
+/// Before a WRITE, the mode of its node is read. A node that does not answer, or is in the other
+/// mode, gets none, and none gets a speed above --max-rps or a position farther away than
+/// --max-turns. Behind each WRITE goes a READ, and another one every 0.1 s with the latest WRITE
+/// before it; a node that answers in the other mode, or not at all, gets no more commands. Before a
+/// motor command that is not zero, a robot must be heard; the host repeats the latest every 0.1 s,
+/// for 0.5 s.
 ///
 /// At the end, on every error and on every signal that can be caught, what was commanded is
-/// stopped, as by `axle spin` and `axle drive`. Firmware updates, motor commands out of range and
-/// bodies of a wrong length are refused (rulings U7 and U13), also as hex digits.
+/// stopped, as by `axle spin` and `axle drive`. Firmware updates, motor commands out of range,
+/// bodies of a wrong length and frames hidden in others are refused (rulings I3, U7 and U13), also
+/// as hex digits.
 ///
 /// Frames follow each other no faster than --baud allows. A robot is told to stop by the first
 /// frame, and every 0.1 s until a motor command of yours goes out (ruling U16): it would drive on
@@ -69,15 +71,12 @@ struct Times {
     json: bool,
 }
 
-/// Time from a WRITE to the READ after it, microseconds.
-const READ_AFTER_US: u64 = 2000;
-
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     play::run(plan(args)?)
 }
 
-/// The message, repeated as requested, and a READ after each WRITE.
+/// The message, repeated as requested.
 fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
     let (protocol, meant) = (args.message.protocol(), args.message.mode());
     let (first, times) = (args.message.bytes(0).map_err(Failure::Usage)?, &args.times);
@@ -92,18 +91,13 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         let bytes = args.message.bytes(at as u8).map_err(Failure::Usage)?;
         let after_us = u64::from(at) * times.every;
         frames.push_back(Due { after_us, bytes: bytes.into(), meant, effect: effect.clone() });
-        if let Effect::Write(write) = &effect {
-            // A node may start anew in the other mode, and only its answers tell.
-            let bytes = ikeya::ReadRequest::new(write.node).as_bytes()[..].into();
-            let after_us = after_us + READ_AFTER_US.min(times.every / 2);
-            frames.push_back(Due { after_us, bytes, meant: None, effect: Effect::Ask(write.node) });
-        }
     }
     Ok(Plan {
         bus: &args.bus,
         protocol,
         side,
         frames,
+        reads_back: true,
         linger_us: times.linger_us,
         limits: times.limits,
         is_json: times.json,

@@ -109,24 +109,6 @@ fn a_message_is_sent_as_often_and_at_the_intervals_that_were_asked_for() {
 }
 
 #[test]
-fn behind_each_write_goes_a_read_of_the_same_node() {
-    for (every, after) in [("0.1", 2000), ("0.002", 1000), ("0", 0)] {
-        let args = parsed(&format!("-c 2 --every {every} ikeya velocity 3 1"));
-        let frames = plan(&args).unwrap().frames;
-        let every = args.times.every;
-        let at: Vec<_> = frames.iter().map(|due| due.after_us).collect();
-        assert_eq!(at, [0, after, every, every + after]);
-        for (write, read) in [(0, 1), (2, 3)] {
-            assert!(
-                matches!(&frames[write].effect, Effect::Write(write) if write.node == NodeId::N3)
-            );
-            assert_eq!(frames[read].effect, Effect::Ask(NodeId::N3));
-            assert_eq!(*frames[read].bytes, ReadRequest::new(NodeId::N3).as_bytes()[..]);
-        }
-    }
-}
-
-#[test]
 fn a_frame_of_the_other_side_is_refused() {
     let device = frame(5, 0, &[0; 36]).iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     let refused = |words: &str| plan(&parsed(words)).err().map(|it| it.to_string());

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use axlewire::{
-    ikeya::{Mode, NodeId, Target},
+    ikeya::{NodeId, Target},
     time::{Duration, Instant},
 };
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::{
     bus::{Boards, Bus},
     failure::{Failure, guarded},
     report::{Form, Outcome},
-    signals::{Attendance, DEAD_MAN, Signals},
+    signals::{Attendance, Signals},
     teller::Teller,
     watch::moving::Page,
 };
@@ -95,7 +95,7 @@ impl<B: Boards> Spin<B> {
 
     /// Commands the motor and watches it until the time is up or a signal comes.
     fn spin(&mut self, target: Target<B>, micros: u64, signals: &Signals) -> Result<(), Failure> {
-        self.command(target)?;
+        self.bus.command(self.node, target, self.start)?;
         let end = Instant::from_micros(self.start.as_micros() + micros);
         let mut print_at = self.start + PRINT_PERIOD;
         let mut attendance = Attendance::new(self.start);
@@ -103,7 +103,7 @@ impl<B: Boards> Spin<B> {
             let now = self.bus.now();
             // First: an absence also makes the other checks fail.
             attendance.check(now)?;
-            self.check_follows(target)?;
+            self.bus.check_follows(self.node, target)?;
             if now >= end {
                 return self.check_reached(target);
             }
@@ -115,40 +115,6 @@ impl<B: Boards> Spin<B> {
             }
         }
         Ok(())
-    }
-
-    /// The master refuses a target for any mode other than the last one reported.
-    fn command(&mut self, target: Target<B>) -> Result<(), Failure> {
-        let (master, node) = (self.bus.master_mut(), self.node);
-        match target {
-            Target::Velocity(rps) => master.set_velocity(node, rps, self.start),
-            Target::Position(position) => master.set_position(node, position, self.start),
-        }
-        .map_err(|error| Failure::Failed(error.to_string()))
-    }
-
-    /// Fails if the node no longer follows its command.
-    fn check_follows(&self, target: Target<B>) -> Result<(), Failure> {
-        let (bus, node) = (&self.bus, self.node);
-        let refuse = |line: String| Err(Failure::Failed(line));
-        match bus.master().mode(node) {
-            _ if !bus.is_online(node) => refuse(format!("node {node} no longer answers")),
-            Some(mode) if mode != target.mode() => {
-                refuse(format!("node {node} has changed to {mode} mode"))
-            }
-            _ if bus.master().is_mode_in_doubt(node) => {
-                let other = match target.mode() {
-                    Mode::Velocity => Mode::Position,
-                    Mode::Position => Mode::Velocity,
-                };
-                refuse(format!("node {node} has answered in {other} mode"))
-            }
-            _ if bus.has_dead_man_fired => refuse(DEAD_MAN.to_owned()),
-            _ if bus.master().set_point(node) != Some(target) => {
-                refuse(format!("node {node} has lost its command"))
-            }
-            _ => Ok(()),
-        }
     }
 
     /// Checks at the end that the motor has reached its target.
@@ -170,17 +136,13 @@ impl<B: Boards> Spin<B> {
     /// Stops the motor and waits until it is at rest (rulings I6, I12).
     fn stop(&mut self) -> Result<(), Failure> {
         self.page.stopping();
-        let failure = self.bus.stop(self.node.into()).err();
+        let halted = self.bus.halt_all(self.node.into());
         self.left = self.page.leave();
-        let Some(complaint) = self.bus.complaint(self.node) else {
+        if halted.is_ok() {
             // If the output fails, the motor has stopped all the same.
             drop(self.say_status(true));
-            return Ok(());
-        };
-        Err(match failure {
-            Some(failure) => failure.while_moving(&complaint),
-            None => Failure::Failed(complaint),
-        })
+        }
+        halted
     }
 
     fn say_status(&mut self, is_stopped: bool) -> Result<(), Failure> {

@@ -2,9 +2,7 @@
 //! without ever waiting for it, and the keys that stop raise the same flag as Ctrl-C.
 
 use std::{
-    cell::RefCell,
     io,
-    rc::Rc,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -15,7 +13,6 @@ use std::{
 };
 
 use axlewire::stream::Framing;
-use embedded_io::{ErrorType, Read, ReadReady, Write};
 
 use super::{
     dashboard::Dashboard,
@@ -25,12 +22,7 @@ use super::{
     page::{Role, View},
     screen::{self, Sink},
 };
-use crate::{
-    args::Protocol,
-    failure::Failure,
-    line::{Line, Wire},
-    signals::Signals,
-};
+use crate::{args::Protocol, failure::Failure, line::Line, pcapng::Direction, signals::Signals};
 
 /// Number of updates that may wait for the page: more than a second of a full bus.
 const QUEUE: usize = 16 * 1024;
@@ -118,7 +110,7 @@ impl Live {
 
     /// The same line; the page is told of its bytes. With `has_echo`, the line hears what it sends.
     pub(crate) fn tap(&self, line: Line, has_echo: bool) -> Line {
-        line.through(|wire| Tap { wire, tell: self.tell.clone(), has_echo })
+        self.tell.clone().tap(line, has_echo)
     }
 
     /// Adds a line to the log of the page.
@@ -196,6 +188,15 @@ impl Tell {
             self.lost.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         }
     }
+
+    /// The same line, whose bytes are told once, whether or not it hears what it sends.
+    fn tap(self, line: Line, has_echo: bool) -> Line {
+        line.tapped(move |direction, bytes| match direction {
+            Direction::In => self.tell(What::Bytes(Source::Received, bytes.into())),
+            Direction::Out if has_echo => {}
+            Direction::Out => self.tell(What::Bytes(Source::Sent, bytes.into())),
+        })
+    }
 }
 
 /// The thread of the page.
@@ -236,53 +237,6 @@ impl Looker {
         }
         dashboard.leave();
         Ok(())
-    }
-}
-
-/// A port whose bytes are also told.
-struct Tap {
-    wire: Rc<RefCell<dyn Wire>>,
-    tell: Tell,
-    has_echo: bool,
-}
-
-impl Wire for Tap {
-    fn wait(&mut self, patience: Duration) -> io::Result<bool> {
-        self.wire.borrow_mut().wait(patience)
-    }
-}
-
-impl ErrorType for Tap {
-    type Error = io::Error;
-}
-
-impl ReadReady for Tap {
-    fn read_ready(&mut self) -> io::Result<bool> {
-        self.wire.borrow_mut().read_ready()
-    }
-}
-
-impl Read for Tap {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let count = self.wire.borrow_mut().read(buffer)?;
-        let bytes = buffer.get(..count).unwrap_or_default();
-        self.tell.tell(What::Bytes(Source::Received, bytes.into()));
-        Ok(count)
-    }
-}
-
-impl Write for Tap {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let count = self.wire.borrow_mut().write(bytes)?;
-        if !self.has_echo {
-            let sent = bytes.get(..count).unwrap_or_default();
-            self.tell.tell(What::Bytes(Source::Sent, sent.into()));
-        }
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.wire.borrow_mut().flush()
     }
 }
 

@@ -48,10 +48,12 @@ fn a_recording_is_sent_again_and_what_it_moves_is_stopped() {
     let commands = |path: &str| -> Vec<_> {
         let (events, _) = decoded(path);
         let sent = events.into_iter().filter(|event| event["message"] == "write");
-        sent.map(|event| event["bytes"].clone()).collect()
+        let mut sent: Vec<_> = sent.map(|event| event["bytes"].clone()).collect();
+        // Masters repeat their commands.
+        sent.dedup();
+        sent
     };
-    // In between come the stops of the end.
-    assert!(commands(&again).starts_with(&commands(&path)));
+    assert_eq!(commands(&again), commands(&path));
     let turning = sim.lines().iter().filter(|line| line.ends_with("command 2.00 rps")).count();
     assert_eq!(turning, 2);
 }
@@ -142,20 +144,21 @@ fn a_frame_hidden_in_another_one_is_not_sent() {
 }
 
 #[test]
-fn what_would_be_a_hidden_frame_for_a_robot_is_none_for_a_host_or_a_motor() {
+fn a_hidden_frame_is_one_in_the_answers_of_a_device_too_and_none_in_a_command_to_a_role() {
     let update = [0xFD, 0xFF, 0x06, 0x00, 0x09, 0x00, 0x28, 0x00, 0x9C, 0x23];
     let sealed = |begin: &[u8]| {
         let frame = [begin, &update, &[0; 2]].concat();
         [&frame[..], &crc16::compute(&frame).to_le_bytes()].concat()
     };
     let (result, write) = (sealed(&[0xFD, 0xFF, 16, 0, 6, 0]), sealed(&[0xBB, 0x01]));
-    for (bytes, options) in
-        [(&result, "--protocol ucp --as device"), (&write, "--protocol ikeya-3 --move")]
-    {
+    for (bytes, options, expected) in [
+        (&result, "--protocol ucp --as device", "another frame is hidden in frame 1, and a "),
+        (&write, "--protocol ikeya-3 --move", "cannot use port \"/nowhere\""),
+    ] {
         let path = file("no_robot.bin", bytes);
         let replay = format!("replay {} {options} -p /nowhere", path.to_str().unwrap());
         let error = Process::start(&replay).complaint(1);
-        assert!(error.contains("/nowhere"), "{error}");
+        assert!(error.starts_with(expected), "{error}");
     }
 }
 
@@ -172,19 +175,6 @@ fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
 }
 
 #[test]
-fn an_echo_in_the_recording_is_not_sent() {
-    let line = played::bus(&[Node::velocity(1)], |_, _| {});
-    let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
-    let answer = *VelocityResponse::new(NodeId::N1, Rps::ZERO).as_bytes();
-    let packets: [Packet<'_>; 3] = [(0, 2, &write), (10, 1, &write), (20, 1, &answer)];
-    let path = file("echo.pcapng", &PcapNg::new(147, &packets).0);
-    let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
-    Process::start(&replay).success();
-    let said = speeds(&line.said());
-    assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 1, "{said:?}");
-}
-
-#[test]
 fn a_speed_above_the_limit_is_found_before_anything_is_sent() {
     let line = played::bus(&[Node::velocity(1)], |_, _| {});
     let path = capture(&[1.0, 2.0, 25.0], true);
@@ -196,19 +186,16 @@ fn a_speed_above_the_limit_is_found_before_anything_is_sent() {
 
 #[test]
 fn the_pace_is_that_of_the_capture_or_faster() {
-    let path = capture(&[1.0; 9], true);
+    let speeds = [1_u8, 2, 3, 4, 5, 6, 7, 8, 9].map(f32::from);
+    let path = capture(&speeds, true);
     for (factor, least_ms) in [(1, 400), (4, 100)] {
         let line = played::bus(&[Node::velocity(1)], |_, _| {});
         let replay = format!("replay {path} --move --speed {factor} -p {}", line.path);
         Process::start(&replay).success();
         let bus = line.lock();
-        let at: Vec<_> = bus
-            .said
-            .iter()
-            .filter(|(said, _)| *said == Said::Write(1, 1.0, 133_169_152))
-            .map(|(_, at)| *at)
-            .collect();
-        assert_eq!(at.len(), 9);
+        let is_of = |said: &Said, rps| matches!(said, Said::Write(1, it, _) if *it == rps);
+        let first = |rps| bus.said.iter().find(|(said, _)| is_of(said, rps)).unwrap().1;
+        let at = speeds.map(first);
         let took = (at[8] - at[0]).as_millis();
         assert!((least_ms - 20..3 * least_ms).contains(&took), "{took} ms");
     }

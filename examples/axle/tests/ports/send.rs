@@ -238,7 +238,6 @@ fn frames_that_a_signal_keeps_from_being_sent_are_counted() {
     let line = played::bus(&[Node::velocity(1)], |_, _| {});
     let args = format!("send -p {} -c 1000 --every 10 ikeya velocity 1 2", line.path);
     let send = Process::start(&args);
-    // The READ behind the WRITE.
     wait_until("a command and a READ", || {
         let said = line.said();
         said.iter().rposition(|said| *said == Said::Read(1))
@@ -247,7 +246,7 @@ fn frames_that_a_signal_keeps_from_being_sent_are_counted() {
     });
     send.signal("INT");
     let error = send.complaint(1);
-    let expected = "1998 frames not sent: interrupted; what was commanded is stopped and \
+    let expected = "999 frames not sent: interrupted; what was commanded is stopped and \
                     at rest";
     assert_eq!(error, expected);
 }
@@ -356,7 +355,8 @@ fn a_stop_is_repeated_until_it_is_confirmed() {
     let line = played::bus(&[Node::velocity(1)], |_, _| {});
     Process::start(&format!("send -p {} --for 0.1 ikeya velocity 1 2", line.path)).success();
     let said = line.said();
-    assert_eq!(speeds(&said)[0], 2.0);
-    assert!(speeds(&said)[1..].iter().all(|&rps| rps == 0.0), "{said:?}");
+    let mut speeds = speeds(&said);
+    speeds.dedup();
+    assert_eq!(speeds, [2.0, 0.0], "{said:?}");
     assert!(confirmable_stops(&said, 1) >= 2, "{said:?}");
 }

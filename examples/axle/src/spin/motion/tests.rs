@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use axlewire::ikeya::{Position, Rps, Status, board::OneMotor, master::MasterConfig};
+use axlewire::ikeya::{Mode, Position, Rps, Status, board::OneMotor, master::MasterConfig};
 use serde_json::Value;
 
 use super::{super::goal::Goal, *};
@@ -11,6 +11,7 @@ use crate::{
     bus, clock,
     line::Line,
     played::{self, BusState, Node, Played, Said},
+    signals::DEAD_MAN,
 };
 
 const TURNS: i32 = 8192;
@@ -141,10 +142,10 @@ fn a_node_that_does_not_follow_is_told_with_what_it_does() {
     let line = played::bus(&[Node::velocity(1)], |_, _| {});
     let refusal = |change: &dyn Fn(&mut Spin<OneMotor>)| {
         let (mut spin, _) = ready(&line);
-        spin.command(speed(2.0)).unwrap();
-        spin.check_follows(speed(2.0)).unwrap();
+        spin.bus.command(spin.node, speed(2.0), spin.start).unwrap();
+        spin.bus.check_follows(spin.node, speed(2.0)).unwrap();
         change(&mut spin);
-        let refusal = spin.check_follows(speed(2.0)).unwrap_err().to_string();
+        let refusal = spin.bus.check_follows(spin.node, speed(2.0)).unwrap_err().to_string();
         spin.stop().unwrap();
         refusal
     };
@@ -167,13 +168,13 @@ fn a_mode_in_doubt_is_told_with_the_mode_of_the_answer() {
         }
     });
     let (mut spin, _) = ready(&line);
-    spin.command(speed(2.0)).unwrap();
+    spin.bus.command(spin.node, speed(2.0), spin.start).unwrap();
     let end = spin.bus.now() + Duration::from_millis(2000);
     while !spin.bus.master().is_mode_in_doubt(NodeId::N1) && spin.bus.now() < end {
         let soon = spin.bus.now() + Duration::from_millis(5);
         spin.bus.round(soon).unwrap();
     }
-    let error = spin.check_follows(speed(2.0)).unwrap_err().to_string();
+    let error = spin.bus.check_follows(spin.node, speed(2.0)).unwrap_err().to_string();
     assert_eq!(error, "node 1 has answered in position mode");
 }
 

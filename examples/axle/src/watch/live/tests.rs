@@ -1,6 +1,7 @@
 //! The end of a page, and what it is told.
 
 use axlewire::ucp::Ucp;
+use embedded_io::{Read, Write};
 
 use super::*;
 use crate::played;
@@ -58,7 +59,7 @@ fn each_byte_is_told_once_whether_or_not_the_line_hears_what_it_sends() {
             said if has_echo => [said, &[7]].concat(),
             _ => vec![7],
         });
-        let mut line = line.line.through(|wire| Tap { wire, tell, has_echo });
+        let mut line = tell.tap(line.line, has_echo);
         assert_eq!(line.write(&[1, 2, 3]).unwrap(), 3);
         line.read(&mut [0; 8]).unwrap();
         let told: Vec<_> = queue
@@ -105,7 +106,7 @@ fn looks_on_too_slowly() {
 fn a_flush_of_a_tapped_line_is_one_of_its_port() {
     let played = played::played((), |(), _| Vec::new());
     let (tell, _queue) = Tell::to_memory();
-    let mut line = played.line.through(|wire| Tap { wire, tell, has_echo: false });
+    let mut line = tell.tap(played.line, false);
     assert!(line.flush().is_ok());
     played.is_gone.set(true);
     assert!(line.flush().is_err());

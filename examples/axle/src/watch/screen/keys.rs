@@ -53,7 +53,8 @@ fn pass_on(mut input: impl Read, keys: &SyncSender<u8>, sink: &Sink) {
             // No more keys can come.
             Ok(0) | Err(_) => return stop(),
         }
-        let [key] = key;
+        // With Caps Lock the keys are the same.
+        let key = key[0].to_ascii_lowercase();
         if matches!(key, b' ' | b's' | b'q' | ESCAPE) {
             stop();
         }
@@ -89,11 +90,11 @@ mod tests {
 
     #[test]
     fn each_of_the_stop_keys_stops_and_no_other() {
-        for key in [b" ", b"s", b"q", b"\x1b"] {
+        for key in [b" ", b"s", b"q", b"S", b"Q", b"\x1b"] {
             assert!(is_stopped_by(key), "{key:?}");
         }
         assert!(is_stopped_by(b"ppf?q"));
-        assert!(!is_stopped_by(b"pfr?x"));
+        assert!(!is_stopped_by(b"pfr?xPFRX"));
     }
 
     #[test]

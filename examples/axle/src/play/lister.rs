@@ -1,0 +1,202 @@
+//! The listing of what is sent and received.
+
+use std::{
+    cell::RefCell,
+    collections::VecDeque,
+    rc::Rc,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use super::playing::Plan;
+use crate::{
+    args::Protocol,
+    clock,
+    decode::{self, Sheet, Stream},
+    line::Line,
+    listing::{Modes, Style, TimeColumn},
+    pcapng::Direction,
+};
+
+/// Lists what is sent and received on a line, once it is asked to.
+pub(super) struct Lister(Rc<RefCell<Lists>>);
+
+struct Lists {
+    is_on: bool,
+    sheet: Sheet,
+    sent: Box<dyn Stream>,
+    received: Box<dyn Stream>,
+    /// Sent bytes that the line will echo, if it does.
+    echo: Option<VecDeque<u8>>,
+    start: std::time::Instant,
+    /// The system's time at the start, microseconds since 1970.
+    epoch_us: u64,
+}
+
+impl Lister {
+    /// The same line, whose bytes are listed.
+    pub(super) fn tap(plan: &Plan<'_>, line: Line) -> (Self, Line) {
+        let style = match plan.is_json {
+            true => Style::Json,
+            false => Style::text(plan.protocol.number(), TimeColumn::Relative),
+        };
+        let has_echo = plan.bus.config().removes_echo;
+        let lists = Rc::new(RefCell::new(Lists::new(plan.protocol, style, has_echo)));
+        let tapped = Rc::clone(&lists);
+        let line = line.tapped(move |direction, bytes| tapped.borrow_mut().take(direction, bytes));
+        (Self(lists), line)
+    }
+
+    /// Lists what is said from now on, with what is known of the modes of the nodes.
+    pub(super) fn begin(&self, modes: Modes) {
+        let mut lists = self.0.borrow_mut();
+        (lists.is_on, lists.sheet.modes) = (true, modes);
+    }
+
+    /// Lists what is held back, and nothing that is said from now on.
+    pub(super) fn end(&self) -> Option<String> {
+        let lists = &mut *self.0.borrow_mut();
+        lists.is_on = false;
+        lists.received.finish(&mut lists.sheet);
+        lists.sent.finish(&mut lists.sheet);
+        lists.lines()
+    }
+
+    /// Finished lines.
+    pub(super) fn lines(&self) -> Option<String> {
+        self.0.borrow_mut().lines()
+    }
+}
+
+impl Lists {
+    fn new(protocol: Protocol, style: Style, has_echo: bool) -> Self {
+        let mut sheet = Sheet::new(Some(style));
+        style.titles(&mut sheet.out);
+        Self {
+            is_on: false,
+            sheet,
+            sent: decode::stream_of(protocol, Direction::Out),
+            received: decode::stream_of(protocol, Direction::In),
+            echo: has_echo.then(VecDeque::new),
+            start: clock::now(),
+            epoch_us: SystemTime::now()
+                .duration_since(UNIX_EPOCH)
+                .map_or(0, |since| since.as_micros() as u64),
+        }
+    }
+
+    fn take(&mut self, direction: Direction, bytes: &[u8]) {
+        let (mut bytes, stream) = match direction {
+            Direction::Out => {
+                self.echo.iter_mut().for_each(|echo| echo.extend(bytes));
+                (bytes, &mut self.sent)
+            }
+            Direction::In => (bytes, &mut self.received),
+        };
+        if let (Direction::In, Some(echo)) = (direction, &mut self.echo) {
+            let same = echo.iter().zip(bytes).take_while(|(sent, heard)| sent == heard).count();
+            echo.drain(..same);
+            bytes = bytes.get(same..).unwrap_or_default();
+            if !bytes.is_empty() {
+                // Damaged, or other bytes came first: the rest is shown unchanged.
+                echo.clear();
+            }
+        }
+        if self.is_on && !bytes.is_empty() {
+            let micros = self.epoch_us + clock::since(self.start).as_micros() as u64;
+            stream.feed(bytes, Some(micros), &mut self.sheet);
+        }
+    }
+
+    fn lines(&mut self) -> Option<String> {
+        if self.sheet.out.0.is_empty() {
+            return None;
+        }
+        let lines = String::from_utf8_lossy(&self.sheet.out.0).trim_end().to_owned();
+        self.sheet.out.0.clear();
+        Some(lines)
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use axlewire::ikeya::{NodeId, Position, PositionResponse, ReadRequest};
+
+    use super::*;
+
+    fn lists(column: TimeColumn, has_echo: bool) -> Lists {
+        let mut lists = Lists::new(Protocol::Ikeya, Style::text("node", column), has_echo);
+        lists.is_on = true;
+        lists
+    }
+
+    fn read(node: NodeId) -> [u8; 4] {
+        *ReadRequest::new(node).as_bytes()
+    }
+
+    fn answer() -> [u8; 8] {
+        *PositionResponse::new(NodeId::N1, Position::new(0, 0)).as_bytes()
+    }
+
+    fn all(lists: Lists) -> String {
+        Lister(Rc::new(RefCell::new(lists))).end().unwrap()
+    }
+
+    #[test]
+    fn an_echo_is_taken_out_once_and_an_answer_behind_it_is_shown() {
+        for (has_echo, reads) in [(true, 1), (false, 2)] {
+            let mut lists = lists(TimeColumn::None, has_echo);
+            lists.take(Direction::Out, &read(NodeId::N1));
+            // It may come in pieces.
+            lists.take(Direction::In, &read(NodeId::N1)[..2]);
+            lists.take(Direction::In, &read(NodeId::N1)[2..]);
+            lists.take(Direction::In, &answer());
+            let text = all(lists);
+            let count = |name: &str| text.matches(name).count();
+            assert_eq!((count("read_request"), count("position_response")), (reads, 1), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_echo_behind_a_damaged_or_a_lost_one_is_taken_out_again() {
+        let [first, second] = [NodeId::N1, NodeId::N2].map(read);
+        let damaged = [first[0], !first[1], first[2], first[3]];
+        for comes_back in [&damaged[..], &[0x11]] {
+            let mut lists = lists(TimeColumn::None, true);
+            lists.take(Direction::Out, &first);
+            lists.take(Direction::In, comes_back);
+            lists.take(Direction::Out, &second);
+            lists.take(Direction::In, &second);
+            let text = all(lists);
+            assert_eq!(text.matches("read_request").count(), 2, "those sent: {text}");
+        }
+    }
+
+    #[test]
+    fn each_line_has_its_time_and_the_last_one_comes_at_the_end() {
+        let _ = crate::played::silence(true);
+        let mut lists = lists(TimeColumn::Relative, false);
+        let mut later = |millis, bytes: &[u8]| {
+            clock::sleep(std::time::Duration::from_millis(millis));
+            lists.take(Direction::In, bytes);
+        };
+        later(10, &answer());
+        later(25, &answer());
+        later(5, &[0x55, 1, 2]);
+        let text = all(lists);
+        let times: Vec<_> = text.lines().map(|line| line.split_whitespace().next()).collect();
+        assert_eq!(times, ["time", "0.000000", "0.025000", "0.030000"].map(Some), "{text}");
+    }
+
+    #[test]
+    fn what_is_said_before_the_first_frame_and_while_all_is_stopped_is_not_listed() {
+        let mut lists = lists(TimeColumn::None, false);
+        lists.is_on = false;
+        lists.take(Direction::Out, &read(NodeId::N1));
+        let lister = Lister(Rc::new(RefCell::new(lists)));
+        lister.begin(Modes::default());
+        lister.0.borrow_mut().take(Direction::Out, &read(NodeId::N2));
+        assert_eq!(lister.end().unwrap().lines().count(), 2, "the titles and one frame");
+        lister.0.borrow_mut().take(Direction::In, &answer());
+        assert_eq!(lister.lines(), None);
+    }
+}

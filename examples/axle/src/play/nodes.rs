@@ -1,0 +1,148 @@
+//! The commanded nodes of a bus, and the master that commands them.
+
+use std::collections::VecDeque;
+
+use axlewire::{
+    ikeya::{
+        Mode, NodeId, Target,
+        master::{NodeSet, Polling},
+    },
+    time::{Duration, Instant},
+};
+
+use super::{
+    effect::Effect,
+    playing::{Due, Plan, Voice},
+};
+use crate::{
+    bus::{self, Boards, Bus},
+    failure::Failure,
+    line::Line,
+    listing::Modes,
+    signals::Signals,
+};
+
+/// Period at which the master reads each node, besides the READs of the plan, and repeats its
+/// latest command: a node that turns or falls silent gets no more.
+const WATCH_PERIOD: Duration = Duration::from_millis(100);
+
+/// The nodes that a plan commands, and their master.
+pub(super) struct Nodes<B: Boards> {
+    bus: Bus<B>,
+    /// The nodes, each with its mode before the first command.
+    nodes: Vec<(NodeId, Mode)>,
+    /// What the commands of the plan are in these modes, in their order.
+    targets: VecDeque<Target<B>>,
+    /// The latest command of each node.
+    given: Vec<(NodeId, Target<B>)>,
+    reads_back: bool,
+    is_json: bool,
+}
+
+impl<B: Boards> Voice for Nodes<B> {
+    /// Reads the modes, and checks each command against that of its node.
+    fn prepare(plan: &Plan<'_>, line: Line, signals: &Signals) -> Result<Option<Self>, Failure> {
+        let node = |due: &Due| match &due.effect {
+            Effect::Write(write) => Some((write.node, true)),
+            Effect::Ask(node) => Some((*node, false)),
+            _ => None,
+        };
+        let named: Vec<_> = plan.frames.iter().filter_map(node).collect();
+        let commanded: NodeSet =
+            named.iter().filter_map(|(node, is_write)| is_write.then_some(*node)).collect();
+        let mut config = bus::complete(plan.bus.config(), plan.bus.line(), &line);
+        config.nodes = named.into_iter().map(|(node, _)| node).collect();
+        config.polling = Polling::Every(WATCH_PERIOD);
+        let mut bus = Bus::new(line, config);
+        if !bus.discover(signals)? {
+            return Ok(None);
+        }
+        let mut nodes = Vec::new();
+        for node in commanded.iter() {
+            let Some(status) = bus.read(node, signals)? else {
+                if signals.is_raised() {
+                    return Ok(None);
+                }
+                let line =
+                    format!("node {node} does not answer: without its mode, nothing is sent to it");
+                return Err(Failure::Failed(line));
+            };
+            nodes.push((node, status.mode()));
+        }
+        let mut targets = VecDeque::new();
+        for due in &plan.frames {
+            if let Effect::Write(write) = &due.effect
+                && let Some(status) = bus.status(write.node)
+            {
+                let target = write.target(status, due.meant, &plan.limits);
+                targets.push_back(target.map_err(Failure::Failed)?);
+            }
+        }
+        let Plan { reads_back, is_json, .. } = *plan;
+        Ok(Some(Self { bus, nodes, targets, given: Vec::new(), reads_back, is_json }))
+    }
+
+    fn modes(&self) -> Modes {
+        let mut modes = Modes::default();
+        self.nodes.iter().for_each(|(node, mode)| modes.learn(*node, *mode));
+        modes
+    }
+
+    fn now(&mut self) -> Instant {
+        self.bus.now()
+    }
+
+    /// Whether the latest commands have left: none replaces one that waits.
+    fn is_free(&self) -> bool {
+        self.given.iter().all(|(node, _)| self.bus.master().is_set_point_sent(*node))
+    }
+
+    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure> {
+        let asked = match &due.effect {
+            Effect::Write(write) => {
+                let Some(target) = self.targets.pop_front() else { return Ok(false) };
+                self.bus.command(write.node, target, now)?;
+                self.given.retain(|(node, _)| *node != write.node);
+                self.given.push((write.node, target));
+                Some(write.node).filter(|_| self.reads_back)
+            }
+            Effect::Ask(node) => Some(*node),
+            _ => None,
+        };
+        if let Some(node) = asked {
+            // The master looks for a node that does not answer on its own.
+            let _ = self.bus.master_mut().read(node, now);
+        }
+        Ok(true)
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        self.given.iter().try_for_each(|(node, target)| self.bus.check_follows(*node, *target))
+    }
+
+    fn round(&mut self, until: Instant) -> Result<(), Failure> {
+        let now = self.bus.now();
+        self.bus.master_mut().keep_alive(now);
+        self.bus.round(until)
+    }
+
+    fn stop(mut self) -> Result<Vec<String>, Failure> {
+        let all: NodeSet = self.nodes.iter().map(|(node, _)| *node).collect();
+        self.bus.halt_all(all)?;
+        let told = self.nodes.iter().map(|&(node, meant)| {
+            let status = self.bus.status(node);
+            match status.map(|status| status.mode()).filter(|mode| *mode != meant) {
+                Some(mode) => Err(Failure::Failed(format!(
+                    "node {node} has changed to {mode} mode: it may have taken commands for \
+                     {meant} mode"
+                ))),
+                None if self.is_json => Ok(format!("{{\"event\":\"stopped\",\"node\":{node}}}")),
+                None => {
+                    let status = status.map(B::describe).unwrap_or_default();
+                    Ok(format!("node {node}: {status}, stopped and confirmed"))
+                }
+            }
+        });
+        told.collect()
+    }
+}

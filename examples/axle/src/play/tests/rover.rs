@@ -1,0 +1,106 @@
+//! Frames for a rover.
+
+use axlewire::ucp::{Body, MotorControl, message::Ping};
+
+use super::*;
+
+const ROVER: Run = Run { protocol: Protocol::Ucp, ..BUS };
+
+fn drive() -> Vec<u8> {
+    MotorControl::new(30, 0).unwrap().frame(0).as_bytes().to_vec()
+}
+
+#[test]
+fn a_rover_that_was_driven_is_stopped_and_one_that_is_asked_is_stopped_first() {
+    let (drive, ping) = (drive(), Ping {}.frame(0));
+    let line = played::rover(|_| {});
+    ROVER.on(&line, &[(0, &drive), (50, &drive), (150, &drive)], &Signals::none()).unwrap();
+    let commands = line.state.borrow().commands.clone();
+    let driven: Vec<_> = commands.iter().filter(|command| **command == (30, 0)).collect();
+    assert_eq!(driven.len(), 2, "at once, and the repetition of a host: {commands:?}");
+    assert!(commands.iter().rev().take(3).all(|command| *command == (0, 0)), "{commands:?}");
+
+    for (side, stops) in [(Side::Commander, 1), (Side::Device, 0)] {
+        let line = played::rover(|_| {});
+        Run { side, ..ROVER }.on(&line, &[(0, ping.as_bytes())], &Signals::none()).unwrap();
+        let state = line.state.borrow();
+        assert_eq!(state.commands, [(0, 0)].repeat(stops), "{side}");
+        assert_eq!(state.pings, 1);
+    }
+}
+
+#[test]
+fn a_rover_is_told_to_stop_every_100_ms_until_its_first_motor_command() {
+    let ping = Ping {}.frame(7);
+    let drive = MotorControl::new(10, 0).unwrap().with_front_led(true).frame(3);
+    let line = played::rover(|_| {});
+    let frames: [(u64, &[u8]); 3] =
+        [(50, ping.as_bytes()), (350, drive.as_bytes()), (400, ping.as_bytes())];
+    ROVER.on(&line, &frames, &Signals::none()).unwrap();
+    let state = line.state.borrow();
+    let first = state.commands.iter().position(|command| *command == (10, 0)).unwrap();
+    // The host needs up to 100 ms to hear the robot.
+    assert!((4..=6).contains(&first), "{:?}", state.commands);
+    assert_eq!(state.lamps[first], 100);
+    // Until it stops, the lamp stays as it was.
+    assert!(state.lamps[first..].iter().all(|lamp| *lamp == 100));
+}
+
+#[test]
+fn a_rover_whose_plan_falls_silent_is_told_to_stop_as_by_any_host() {
+    let drive = drive();
+    let line = played::rover(|_| {});
+    let run = Run { linger_ms: 1500, ..ROVER };
+    run.on(&line, &[(0, &drive)], &Signals::none()).unwrap();
+    let commands = line.state.borrow().commands.clone();
+    let driven = commands.iter().filter(|command| **command == (30, 0)).count();
+    assert!((5..=6).contains(&driven), "for 500 ms: {commands:?}");
+    assert!(commands.len() >= 15, "{commands:?}");
+}
+
+#[test]
+fn a_rover_that_is_no_longer_heard_is_told_to_stop_and_gets_no_more_commands() {
+    let drive = drive();
+    let line = played::rover(|rover| rover.is_dumb |= rover.commands.len() >= 20);
+    let frames: Vec<_> = (0..300).map(|at| (at * 40, &drive[..])).collect();
+    let begin = clock::now();
+    let error = ROVER.on(&line, &frames, &Signals::none()).unwrap_err();
+    assert!(error.ends_with(" to stop and is no longer heard: it may be moving"), "{error}");
+    let commands = line.state.borrow().commands.clone();
+    let driven = commands.iter().filter(|command| **command == (30, 0)).count();
+    assert!(driven <= 20 + 7, "{driven} moving frames in all");
+    assert!(commands.ends_with(&[(0, 0)].repeat(20)), "{commands:?}");
+    assert!(clock::since(begin).as_secs() < 7, "{:?}", clock::since(begin));
+}
+
+#[test]
+fn what_was_due_during_an_absence_is_not_sent() {
+    let drive = drive();
+    let line = played::rover(|rover| {
+        if rover.commands.last() == Some(&(30, 0)) && rover.pings < 1000 {
+            rover.pings = 1000;
+            clock::sleep(std::time::Duration::from_millis(600));
+        }
+    });
+    let fast = MotorControl::new(60, 0).unwrap().frame(0);
+    let frames: [(u64, &[u8]); 2] = [(0, &drive), (300, fast.as_bytes())];
+    let error = ROVER.on(&line, &frames, &Signals::none()).unwrap_err();
+    assert!(error.starts_with("the tool did not run for 0.6 s (suspended?); "), "{error}");
+    assert!(!line.state.borrow().commands.contains(&(60, 0)));
+}
+
+#[test]
+fn a_signal_ends_it_and_what_was_not_sent_is_counted() {
+    let drive = drive();
+    let signals = Signals::none();
+    signals.raise();
+    let line = played::rover(|_| {});
+    let error = ROVER.on(&line, &[(0, &drive)], &signals).unwrap_err();
+    assert_eq!(error, "interrupted before anything moved");
+    let ping = Ping {}.frame(0);
+    let line = played::rover(|_| {});
+    let frames: [(u64, &[u8]); 2] = [(0, ping.as_bytes()), (1, ping.as_bytes())];
+    let error = ROVER.on(&line, &frames, &signals).unwrap_err();
+    assert_eq!(error, "2 frames not sent: interrupted; nothing moves");
+    assert!(!line.state.borrow().commands.contains(&(30, 0)));
+}

@@ -1,0 +1,76 @@
+//! The line of a rover, and the host that commands it.
+
+use axlewire::{time::Instant, ucp::host::HostConfig};
+
+use super::{
+    effect::Effect,
+    playing::{Due, Plan, Voice},
+};
+use crate::{failure::Failure, line::Line, rover::Rover, signals::Signals};
+
+/// A rover. Its host tells it to stand still before the first frame and until the first command
+/// (ruling U16); what is no motor command leaves between the frames of the host.
+pub(super) struct Wheels {
+    rover: Rover,
+    /// Whether the plan drives it.
+    drives: bool,
+    is_json: bool,
+}
+
+impl Voice for Wheels {
+    /// Waits until the robot is heard, if the plan drives it.
+    fn prepare(plan: &Plan<'_>, line: Line, signals: &Signals) -> Result<Option<Self>, Failure> {
+        let drives = plan.frames.iter().any(|due| due.effect.moves());
+        let mut config = HostConfig::default();
+        // What else is said to the robot is a matter of the plan.
+        config.low_ids_only = true;
+        config.ping_period = config.ping_period.filter(|_| drives);
+        let mut rover = Rover::with(config, line, plan.bus.line());
+        if drives && !rover.find(|| signals.is_raised())? {
+            return Ok(None);
+        }
+        Ok(Some(Self { rover, drives, is_json: plan.is_json }))
+    }
+
+    fn now(&mut self) -> Instant {
+        self.rover.now()
+    }
+
+    /// Whether the robot has been told what to do.
+    fn is_free(&self) -> bool {
+        self.rover.is_told()
+    }
+
+    fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure> {
+        match due.effect {
+            Effect::Wheels(command) => match self.rover.host_mut().drive(command, now) {
+                Ok(()) => Ok(true),
+                Err(error) => Err(Failure::Failed(error.to_string())),
+            },
+            _ => {
+                self.rover.others_have_pinged();
+                self.rover.interject(&due.bytes)
+            }
+        }
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        if self.drives { self.rover.check_heard() } else { Ok(()) }
+    }
+
+    fn round(&mut self, until: Instant) -> Result<(), Failure> {
+        self.rover.round(until)
+    }
+
+    fn stop(mut self) -> Result<Vec<String>, Failure> {
+        if !self.drives {
+            return Ok(Vec::new());
+        }
+        self.rover.stop()?;
+        let report = self.rover.describe().unwrap_or_default();
+        Ok(vec![match self.is_json {
+            true => "{\"event\":\"stopped\"}".to_owned(),
+            false => format!("robot: {report}, stopped"),
+        }])
+    }
+}
