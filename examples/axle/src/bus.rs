@@ -205,6 +205,11 @@ impl<B: Boards> Bus<B> {
         matches!(self.master().health(node), Some(Health::Online | Health::Suspect(_)))
     }
 
+    /// Sends a packet that is not the master's; `false` if it did not leave whole.
+    pub(crate) fn interject(&mut self, packet: &[u8]) -> Result<bool, Failure> {
+        self.session.interject(packet)
+    }
+
     /// Commands a node, unless the master refuses it.
     pub(crate) fn command(
         &mut self,

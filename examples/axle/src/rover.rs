@@ -95,8 +95,8 @@ impl Rover {
 
     /// Whether the robot has been told what to do (ruling U16), and something else may be said.
     pub(crate) fn is_told(&self) -> bool {
-        let drives = self.host().command().is_some_and(|command| !command.stands_still());
-        self.session.is_clear() && (drives || self.host().is_stop_sent())
+        let is_stop = self.host().command().is_some_and(|command| command.stands_still());
+        self.session.is_clear() && (!is_stop || self.host().is_stop_sent())
     }
 
     /// Sends a frame that is not the host's; `false` if it did not leave whole.

@@ -18,7 +18,7 @@ use crate::{
     line::{Line, LineClock},
 };
 
-/// Longest wait for bytes, so that signals are noticed in time.
+/// Longest wait for bytes, so that signals are noticed in time: well under the dead-man timeouts.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Time after which a port that accepts no byte has failed. Until then it may recover.

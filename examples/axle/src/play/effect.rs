@@ -80,28 +80,30 @@ pub(crate) struct Limits {
 pub(crate) fn of(protocol: Protocol, bytes: &[u8]) -> Result<(Side, Effect), String> {
     match protocol {
         Protocol::Ikeya => Ok(match whole::<ikeya::BothDirections>(bytes)? {
-            ikeya::Packet::Request(ikeya::Request::Read(read)) => {
-                (Side::Commander, Effect::Ask(read.id()))
-            }
+            ikeya::Packet::Request(ikeya::Request::Read(read)) => ask(read.id()),
             ikeya::Packet::Request(ikeya::Request::Write(write)) => {
-                let (speeds, positions) = (vec![write.as_velocity()], vec![write.as_position()]);
-                (Side::Commander, Write { node: write.id(), speeds, positions }.into())
+                command(write.id(), &[write.as_velocity()], &[write.as_position()])
             }
             ikeya::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
         Protocol::Ikeya3 => Ok(match whole::<three::BothDirections>(bytes)? {
-            three::Packet::Request(three::Request::Read(read)) => {
-                (Side::Commander, Effect::Ask(read.id()))
-            }
+            three::Packet::Request(three::Request::Read(read)) => ask(read.id()),
             three::Packet::Request(three::Request::Write(write)) => {
-                let (speeds, positions) =
-                    (write.as_velocity().to_vec(), write.as_position().to_vec());
-                (Side::Commander, Write { node: write.id(), speeds, positions }.into())
+                command(write.id(), &write.as_velocity(), &write.as_position())
             }
             three::Packet::Response(_) => (Side::Device, Effect::Nothing),
         }),
         Protocol::Ucp => of_frame(whole::<ucp::Ucp>(bytes)?),
     }
+}
+
+const fn ask(node: NodeId) -> (Side, Effect) {
+    (Side::Commander, Effect::Ask(node))
+}
+
+fn command(node: NodeId, speeds: &[f32], positions: &[Position]) -> (Side, Effect) {
+    let write = Write { node, speeds: speeds.into(), positions: positions.into() };
+    (Side::Commander, Effect::Write(write.into()))
 }
 
 /// The frame that these bytes are, all of them.
@@ -151,12 +153,6 @@ fn of_frame(frame: &ucp::Frame) -> Result<(Side, Effect), String> {
             Err(error) => Err(format!("a frame that harms shipped robots (ruling U13): {error}")),
         },
         _ => Err("a message that this version does not know".to_owned()),
-    }
-}
-
-impl From<Write> for Effect {
-    fn from(write: Write) -> Self {
-        Self::Write(write.into())
     }
 }
 
@@ -311,7 +307,8 @@ mod tests {
     fn what_moves_is_a_write_or_a_motor_command_that_is_not_zero() {
         let drive = Effect::Wheels(MotorControl::new(0, 1).unwrap());
         let stand = Effect::Wheels(MotorControl::STOP);
-        let all = [velocity(0.0).into(), drive, stand, Effect::Ask(NodeId::N1), Effect::Nothing];
+        let write = Effect::Write(velocity(0.0).into());
+        let all = [write, drive, stand, Effect::Ask(NodeId::N1), Effect::Nothing];
         assert_eq!(all.map(|effect| effect.moves()), [true, true, false, false, false]);
     }
 

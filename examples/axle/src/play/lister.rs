@@ -86,20 +86,21 @@ impl Lists {
 
     fn take(&mut self, direction: Direction, bytes: &[u8]) {
         let (mut bytes, stream) = match direction {
-            Direction::Out => {
-                self.echo.iter_mut().for_each(|echo| echo.extend(bytes));
-                (bytes, &mut self.sent)
-            }
+            Direction::Out => (bytes, &mut self.sent),
             Direction::In => (bytes, &mut self.received),
         };
-        if let (Direction::In, Some(echo)) = (direction, &mut self.echo) {
-            let same = echo.iter().zip(bytes).take_while(|(sent, heard)| sent == heard).count();
-            echo.drain(..same);
-            bytes = bytes.get(same..).unwrap_or_default();
-            if !bytes.is_empty() {
-                // Damaged, or other bytes came first: the rest is shown unchanged.
-                echo.clear();
+        match &mut self.echo {
+            Some(echo) if direction == Direction::Out => echo.extend(bytes),
+            Some(echo) => {
+                let same = echo.iter().zip(bytes).take_while(|(sent, heard)| sent == heard).count();
+                echo.drain(..same);
+                bytes = bytes.get(same..).unwrap_or_default();
+                if !bytes.is_empty() {
+                    // Damaged, or other bytes came first: the rest is shown unchanged.
+                    echo.clear();
+                }
             }
+            None => {}
         }
         if self.is_on && !bytes.is_empty() {
             let micros = self.epoch_us + clock::since(self.start).as_micros() as u64;
@@ -108,12 +109,8 @@ impl Lists {
     }
 
     fn lines(&mut self) -> Option<String> {
-        if self.sheet.out.0.is_empty() {
-            return None;
-        }
-        let lines = String::from_utf8_lossy(&self.sheet.out.0).trim_end().to_owned();
-        self.sheet.out.0.clear();
-        Some(lines)
+        let lines = std::mem::take(&mut self.sheet.out.0);
+        (!lines.is_empty()).then(|| String::from_utf8_lossy(&lines).trim_end().to_owned())
     }
 }
 

@@ -10,7 +10,6 @@ mod hidden;
 mod lister;
 mod nodes;
 mod playing;
-mod raw;
 mod wheels;
 
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
@@ -20,7 +19,6 @@ pub(crate) use effect::{Limits, Side, of as effect_of};
 use nodes::Nodes;
 use playing::play;
 pub(crate) use playing::{Due, Plan};
-use raw::Raw;
 use wheels::Wheels;
 
 /// Sends the frames of a plan.
@@ -34,12 +32,10 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
 }
 
 fn play_on(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
-    let moves = plan.frames.iter().any(|due| due.effect.moves());
     match plan.protocol {
-        Protocol::Ucp if plan.side == Side::Commander => play::<Wheels>(plan, line, signals),
-        Protocol::Ikeya if moves => play::<Nodes<OneMotor>>(plan, line, signals),
-        Protocol::Ikeya3 if moves => play::<Nodes<ThreeMotors>>(plan, line, signals),
-        _ => play::<Raw>(plan, line, signals),
+        Protocol::Ikeya => play::<Nodes<OneMotor>>(plan, line, signals),
+        Protocol::Ikeya3 => play::<Nodes<ThreeMotors>>(plan, line, signals),
+        Protocol::Ucp => play::<Wheels>(plan, line, signals),
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use axlewire::{
     ikeya::{
-        Mode, NodeId, Target,
+        NodeId, Target,
         master::{NodeSet, Polling},
     },
     time::{Duration, Instant},
@@ -26,11 +26,13 @@ use crate::{
 /// latest command: a node that turns or falls silent gets no more.
 const WATCH_PERIOD: Duration = Duration::from_millis(100);
 
-/// The nodes that a plan commands, and their master.
+/// The nodes that a plan commands, and their master. Without any, the master is silent, and what
+/// the plan has leaves as it is.
 pub(super) struct Nodes<B: Boards> {
     bus: Bus<B>,
-    /// The nodes, each with its mode before the first command.
-    nodes: Vec<(NodeId, Mode)>,
+    nodes: NodeSet,
+    /// Their modes before the first command.
+    modes: Modes,
     /// What the commands of the plan are in these modes, in their order.
     targets: VecDeque<Target<B>>,
     /// The latest command of each node.
@@ -48,17 +50,17 @@ impl<B: Boards> Voice for Nodes<B> {
             _ => None,
         };
         let named: Vec<_> = plan.frames.iter().filter_map(node).collect();
-        let commanded: NodeSet =
+        let nodes: NodeSet =
             named.iter().filter_map(|(node, is_write)| is_write.then_some(*node)).collect();
         let mut config = bus::complete(plan.bus.config(), plan.bus.line(), &line);
         config.nodes = named.into_iter().map(|(node, _)| node).collect();
         config.polling = Polling::Every(WATCH_PERIOD);
         let mut bus = Bus::new(line, config);
-        if !bus.discover(signals)? {
+        if !nodes.is_empty() && !bus.discover(signals)? {
             return Ok(None);
         }
-        let mut nodes = Vec::new();
-        for node in commanded.iter() {
+        let mut modes = Modes::default();
+        for node in nodes.iter() {
             let Some(status) = bus.read(node, signals)? else {
                 if signals.is_raised() {
                     return Ok(None);
@@ -67,7 +69,7 @@ impl<B: Boards> Voice for Nodes<B> {
                     format!("node {node} does not answer: without its mode, nothing is sent to it");
                 return Err(Failure::Failed(line));
             };
-            nodes.push((node, status.mode()));
+            modes.learn(node, status.mode());
         }
         let mut targets = VecDeque::new();
         for due in &plan.frames {
@@ -79,13 +81,11 @@ impl<B: Boards> Voice for Nodes<B> {
             }
         }
         let Plan { reads_back, is_json, .. } = *plan;
-        Ok(Some(Self { bus, nodes, targets, given: Vec::new(), reads_back, is_json }))
+        Ok(Some(Self { bus, nodes, modes, targets, given: Vec::new(), reads_back, is_json }))
     }
 
     fn modes(&self) -> Modes {
-        let mut modes = Modes::default();
-        self.nodes.iter().for_each(|(node, mode)| modes.learn(*node, *mode));
-        modes
+        self.modes
     }
 
     fn now(&mut self) -> Instant {
@@ -99,6 +99,7 @@ impl<B: Boards> Voice for Nodes<B> {
 
     fn give(&mut self, due: &Due, now: Instant) -> Result<bool, Failure> {
         let asked = match &due.effect {
+            _ if self.nodes.is_empty() => return self.bus.interject(&due.bytes),
             Effect::Write(write) => {
                 let Some(target) = self.targets.pop_front() else { return Ok(false) };
                 self.bus.command(write.node, target, now)?;
@@ -127,12 +128,14 @@ impl<B: Boards> Voice for Nodes<B> {
     }
 
     fn stop(mut self) -> Result<Vec<String>, Failure> {
-        let all: NodeSet = self.nodes.iter().map(|(node, _)| *node).collect();
-        self.bus.halt_all(all)?;
-        let told = self.nodes.iter().map(|&(node, meant)| {
+        if !self.nodes.is_empty() {
+            self.bus.halt_all(self.nodes)?;
+        }
+        let told = self.nodes.iter().map(|node| {
             let status = self.bus.status(node);
-            match status.map(|status| status.mode()).filter(|mode| *mode != meant) {
-                Some(mode) => Err(Failure::Failed(format!(
+            let modes = status.map(|status| status.mode()).zip(self.modes.of(node));
+            match modes.filter(|(mode, meant)| mode != meant) {
+                Some((mode, meant)) => Err(Failure::Failed(format!(
                     "node {node} has changed to {mode} mode: it may have taken commands for \
                      {meant} mode"
                 ))),

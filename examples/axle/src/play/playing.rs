@@ -76,8 +76,7 @@ pub(super) trait Voice: Sized {
     fn stop(self) -> Result<Vec<String>, Failure>;
 }
 
-/// Longest interval between two rounds, and the one in which a frame waits until it is taken.
-const CALL_PERIOD: Duration = Duration::from_millis(50);
+/// Interval in which a frame that is due waits until it is taken.
 const WAIT_PERIOD: Duration = Duration::from_millis(1);
 
 /// Pause between a frame and its answer (ruling I9 asks for 50 us at least).
@@ -144,7 +143,7 @@ impl<V: Voice> Playing<'_, V> {
                 None => end,
                 Some(due) => free_at.max(after(start, due.after_us)),
             };
-            let mut until = at.min(now + CALL_PERIOD);
+            let mut until = at;
             if now >= at && !self.plan.frames.is_empty() {
                 until = now + WAIT_PERIOD;
                 if self.voice.is_free()
@@ -164,14 +163,11 @@ impl<V: Voice> Playing<'_, V> {
         Ok(())
     }
 
-    /// How long the line is in use for a frame and its answer; boards with three motors answer
-    /// commands too (ruling I10).
+    /// How long the line is in use for a frame and its answer. A master knows that on its own.
     fn line_time(&self, due: &Due) -> Duration {
         let answer = match (self.plan.protocol, &due.effect) {
             (Protocol::Ikeya, Effect::Ask(_)) => size_of::<ikeya::VelocityResponse>(),
-            (Protocol::Ikeya3, Effect::Ask(_) | Effect::Write(_)) => {
-                size_of::<three::VelocityResponse>()
-            }
+            (_, Effect::Ask(_)) => size_of::<three::VelocityResponse>(),
             _ => 0,
         };
         let turnaround = if answer > 0 { TURNAROUND } else { Duration::ZERO };

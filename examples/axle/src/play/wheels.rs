@@ -3,13 +3,14 @@
 use axlewire::{time::Instant, ucp::host::HostConfig};
 
 use super::{
-    effect::Effect,
+    effect::{Effect, Side},
     playing::{Due, Plan, Voice},
 };
 use crate::{failure::Failure, line::Line, rover::Rover, signals::Signals};
 
 /// A rover. Its host tells it to stand still before the first frame and until the first command
-/// (ruling U16); what is no motor command leaves between the frames of the host.
+/// (ruling U16); what is no motor command leaves between the frames of the host. In the place of a
+/// robot, the host is silent.
 pub(super) struct Wheels {
     rover: Rover,
     /// Whether the plan drives it.
@@ -22,7 +23,8 @@ impl Voice for Wheels {
     fn prepare(plan: &Plan<'_>, line: Line, signals: &Signals) -> Result<Option<Self>, Failure> {
         let drives = plan.frames.iter().any(|due| due.effect.moves());
         let mut config = HostConfig::default();
-        // What else is said to the robot is a matter of the plan.
+        // What else is said is a matter of the plan.
+        config.sends_first_stop = plan.side == Side::Commander;
         config.low_ids_only = true;
         config.ping_period = config.ping_period.filter(|_| drives);
         let mut rover = Rover::with(config, line, plan.bus.line());

@@ -175,16 +175,6 @@ fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
 }
 
 #[test]
-fn a_speed_above_the_limit_is_found_before_anything_is_sent() {
-    let line = played::bus(&[Node::velocity(1)], |_, _| {});
-    let path = capture(&[1.0, 2.0, 25.0], true);
-    let replay = Process::start(&format!("replay {path} --move -p {}", line.path));
-    let error = replay.complaint(1);
-    assert!(error.starts_with("25.0 rps for node 1 is more than --max-rps 20"), "{error}");
-    assert!(speeds(&line.said()).is_empty());
-}
-
-#[test]
 fn the_pace_is_that_of_the_capture_or_faster() {
     let speeds = [1_u8, 2, 3, 4, 5, 6, 7, 8, 9].map(f32::from);
     let path = capture(&speeds, true);

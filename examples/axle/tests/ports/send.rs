@@ -266,21 +266,6 @@ fn a_node_that_hears_but_is_not_heard_any_more_is_stopped() {
 }
 
 #[test]
-fn a_node_that_starts_anew_in_the_other_mode_gets_no_more_commands() {
-    let line = played::bus(&[Node::velocity(1)], |said, bus| {
-        let said = bus.said.iter().filter(|(before, _)| *before == said).count();
-        if said == 3 && matches!(bus.said.last(), Some((Said::Write(..), _))) {
-            bus.nodes[0] = Node { follows: false, ..Node::position(1, 4096) };
-        }
-    });
-    let args = format!("send -p {} -c 20 --every 0.05 ikeya velocity 1 1", line.path);
-    let error = Process::start(&args).complaint(1);
-    assert!(error.starts_with("node 1 has changed to position mode: "), "{error}");
-    let said = speeds(&line.said());
-    assert_eq!(said.iter().filter(|&&rps| rps == 1.0).count(), 3, "{said:?}");
-}
-
-#[test]
 fn a_node_that_turns_to_position_mode_is_held_where_it_is_even_if_its_answers_are_lost() {
     for lost in [0, 20] {
         let (mut writes, mut mute) = (0, 0);
@@ -309,19 +294,6 @@ fn a_node_that_turns_to_position_mode_is_held_where_it_is_even_if_its_answers_ar
             assert!(matches!(said, Said::Write(_, _, 4096)), "{lost}: {said:?}");
         }
     }
-}
-
-#[test]
-fn a_node_that_does_not_answer_any_more_gets_no_more_commands() {
-    let line = played::bus(&[Node::velocity(1)], |said, bus| {
-        bus.nodes[0].is_dumb |= matches!(said, Said::Write(..));
-    });
-    let args = format!("send -p {} -c 100 --every 0.05 ikeya velocity 1 5", line.path);
-    let error = Process::start(&args).complaint(1);
-    assert!(error.ends_with("it may be moving"), "{error}");
-    let said = speeds(&line.said());
-    assert!(said.iter().filter(|&&rps| rps == 5.0).count() <= 5, "{said:?}");
-    assert_eq!(line.lock().nodes[0].rps, 0.0);
 }
 
 #[test]
