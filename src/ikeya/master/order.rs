@@ -233,6 +233,7 @@ impl<B: Board> Order<B> {
     }
 
     /// The stop, unless it is confirmed.
+    #[inline(never)]
     pub(super) fn stop_owed(&self) -> Option<&Stop<B>> {
         self.stop().filter(|stop| stop.stage == Stage::Owed)
     }
