@@ -4,7 +4,7 @@
 use super::{
     action::Call,
     master::{Outcome, SPAN, target},
-    node::{is_paid, progress, stop_payload},
+    node::{is_stop, progress},
     *,
 };
 use crate::names::*;
@@ -23,8 +23,7 @@ pub(crate) struct Account {
 
 impl Account {
     pub(super) fn digest(&self, node: &Node, line: &DrivenLine) -> impl std::hash::Hash + use<> {
-        let stop = stop_payload(node.mode);
-        let paid = self.owed_from.map(|from| progress(&node.log[from..], stop, line.now_us));
+        let paid = self.owed_from.map(|from| progress(&node.log[from..], node.mode, line.now_us));
         let sign_us = (line.role_now().as_micros() - self.sign_us).min(100_000);
         (paid, self.is_stop_offered, self.allowed, sign_us)
     }
@@ -37,6 +36,8 @@ pub(super) struct Before {
     log: usize,
     /// The role refuses this call's set-point.
     pub(super) is_refused: bool,
+    /// The node is owed nothing but to become still: a stop joins that.
+    is_coasting: bool,
     /// Nothing prevents the call from succeeding.
     pub(super) is_clear: bool,
     /// The same, except for transient errors.
@@ -60,7 +61,8 @@ impl<P: Wired> MasterLife<P> {
         };
         let is_whole = line.wire.open.is_empty() && self.driver.unsent().is_empty();
         let answers = node.answers.len();
-        let is_there = !node.is_gone && is_online(&self.driver) && line.inbox.is_empty();
+        let is_there =
+            !node.is_gone && !node.is_deaf && is_online(&self.driver) && line.inbox.is_empty();
         let faults = line.faults();
         let stalls = line.stalls();
         let now = line.role_now();
@@ -80,6 +82,7 @@ impl<P: Wired> MasterLife<P> {
             log: node.log.len(),
             is_refused: number
                 .is_some_and(|number| role.check(N1, &target(node.mode, number)).is_err()),
+            is_coasting: role.coasting().contains(N1),
             is_clear: is_there && is_whole && faults == 0 && answers == 0,
             is_passable: is_there && answers <= 1 && faults <= 4 && stalls == 0,
             is_due,
@@ -99,7 +102,8 @@ impl<P: Wired> MasterLife<P> {
         }
         let is_stop = matches!(call, Call::Stop | Call::StopAll);
         let is_drive = call == Call::DriveFor && !before.is_refused;
-        if (is_stop || is_drive) && self.account.owed_from.is_none() {
+        let is_new = is_stop && !before.is_coasting || is_drive;
+        if is_new && self.account.owed_from.is_none() {
             self.account.owed_from = Some(before.log);
             self.account.is_stop_offered = false;
         }
@@ -141,7 +145,7 @@ impl<P: Wired> MasterLife<P> {
                 continue;
             }
             let payload = &offer.frame[2..6];
-            if payload == stop_payload(mode) {
+            if is_stop(mode, payload) {
                 (self.account.is_stop_offered, is_stopping) = (true, true);
                 continue;
             }
@@ -165,10 +169,9 @@ impl<P: Wired> MasterLife<P> {
     fn check_debt(&mut self, before: &Before) -> Result<(), String> {
         let is_owed = self.driver.role().stops_owed().contains(N1);
         let (node, line) = (self.node.borrow(), self.line.line());
-        let stop = stop_payload(node.mode);
         match self.account.owed_from {
             Some(from) if !is_owed => {
-                if !is_paid(&node.log[from..], stop, line.now_us) {
+                if progress(&node.log[from..], node.mode, line.now_us).0 < 2 {
                     let log = &node.log[from..];
                     return Err(format!("the stop is forgotten; the node's log: {log:?}"));
                 }

@@ -25,8 +25,10 @@ pub(crate) enum Fault {
     Flush(Flushing),
     Pin(Pinning),
     Answer(Answer),
-    /// The node loses power, or gets it back.
+    /// The node loses power, and with it its command, or gets it back.
     Power,
+    /// From now on, WRITEs reach the node damaged, or no longer.
+    Deaf,
 }
 
 /// Time passes without a call.
@@ -71,8 +73,9 @@ impl Fault {
             (Self::Flush(flushing), _) => line.flushes.push_back(flushing),
             (Self::Pin(pinning), _) => line.pins.push_back(pinning),
             (Self::Answer(answer), Some(node)) => node.answers.push_back(answer),
-            (Self::Power, Some(node)) => node.is_gone = !node.is_gone,
-            (Self::Answer(_) | Self::Power, None) => {}
+            (Self::Power, Some(node)) => (node.is_gone, node.told) = (!node.is_gone, None),
+            (Self::Deaf, Some(node)) => node.is_deaf = !node.is_deaf,
+            (Self::Answer(_) | Self::Power | Self::Deaf, None) => {}
         }
     }
 
@@ -80,7 +83,8 @@ impl Fault {
     pub(crate) fn of_port(has_pin: bool, is_async: bool) -> Vec<Self> {
         use {Flushing as F, Reading as R, Writing as W};
         let mut faults = vec![Self::CutOff, Self::Late];
-        faults.extend([W::One, W::Half, W::Error, W::Zero, W::Slow, W::Stall].map(Self::Write));
+        faults.extend([W::One, W::Half, W::Part, W::Error].map(Self::Write));
+        faults.extend([W::Zero, W::Slow, W::Stall].map(Self::Write));
         faults.extend([R::One, R::Error, R::Zero].map(Self::Read));
         faults.extend([R::ErrorAfterWrite, R::ErrorLater].map(Self::Read));
         faults.extend((!is_async).then_some(Self::Read(R::ReadyError)));
@@ -113,8 +117,8 @@ impl Setup {
         if waiting < if self.is_deep { 2 } else { 1 } {
             let mut faults = Fault::of_port(self.has_pin, self.is_async);
             use Answer as A;
-            faults.extend([A::Late, A::Lost, A::Damaged, A::CutOff].map(Fault::Answer));
-            faults.push(Fault::Power);
+            faults.extend([A::Late, A::Lost, A::Damaged, A::CutOff, A::Other].map(Fault::Answer));
+            faults.extend([Fault::Power, Fault::Deaf]);
             actions.extend(faults.into_iter().map(Action::Fault));
         }
         if waiting == 0 {

@@ -5,6 +5,8 @@
 pub(crate) enum Writing {
     One,
     Half,
+    /// The same, and returns only shortly before the rest would be too late.
+    Part,
     Error,
     Zero,
     /// Returns, with one byte taken, after longer than any pause inside a frame.

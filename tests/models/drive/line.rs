@@ -21,6 +21,11 @@ pub(crate) trait Peer {
     /// Receives a frame; returns the delay of the answer after its end, microseconds, and the
     /// answer.
     fn hear(&mut self, frame: &[u8], end_us: u64) -> Option<(u64, Vec<u8>)>;
+
+    /// When its last answer arrives that puts its mode in doubt.
+    fn doubts_us(&self) -> u64 {
+        0
+    }
 }
 
 pub(crate) struct DrivenLine {

@@ -2,7 +2,6 @@
 
 use std::{
     cell::RefCell,
-    collections::VecDeque,
     hash::{DefaultHasher, Hash, Hasher},
     rc::Rc,
 };
@@ -21,6 +20,8 @@ pub(super) const N1: NodeId = NodeId::N1;
 /// Duration of a [`Call::Idle`]: longer than an exchange, its guard and one more.
 pub(super) const IDLE: Duration = Duration::from_millis(5);
 pub(super) const SPAN: Duration = Duration::from_millis(4);
+/// Shorter than the time that a fingerprint remembers.
+pub(super) const COAST: Duration = Duration::from_millis(60);
 
 pub(crate) struct MasterLife<P> {
     pub(super) setup: Setup,
@@ -35,6 +36,7 @@ pub(crate) struct MasterLife<P> {
 pub(super) enum Told {
     Failure(Failure),
     Owed,
+    Moving,
     /// Refused, timed out, not read.
     Other,
 }
@@ -51,6 +53,7 @@ pub(super) fn target(mode: Mode, number: u8) -> Target<OneMotor> {
 fn told<T, P: Wired>(result: Result<T, DriveError<P::Error>>) -> Outcome {
     result.map(drop).map_err(|error| match error {
         DriveError::StopsOwed(_) => Told::Owed,
+        DriveError::StillMoving(_) => Told::Moving,
         error => failure::<P>(error).map_or(Told::Other, Told::Failure),
     })
 }
@@ -151,13 +154,14 @@ impl<P: Wired> Life for MasterLife<P> {
     type Action = Action;
 
     fn begin(setup: Setup) -> Self {
-        let node = Node { mode: setup.mode, answers: VecDeque::new(), is_gone: false, log: vec![] };
+        let node = Node::new(setup.mode);
         let node = Rc::new(RefCell::new(node));
         let ear = Box::new(Ear(node.clone()));
         let line = DrivenLine::new(Wire::new(SPEECH), ear, P::HAS_PIN);
         let line = Shared(Rc::new(RefCell::new(line)));
         let mut config = MasterConfig::direct();
-        config.nodes = [N1].into_iter().collect();
+        config.nodes = N1.into();
+        config.coast = COAST;
         config.polling = Polling::Every(Duration::from_millis(1));
         config.dead_man = setup.dead_man_ms.map(Duration::from_millis);
         let driver = Driver::with(|now| Master::new(config, now), P::plug(&line), line.clone());
@@ -186,10 +190,11 @@ impl<P: Wired> Life for MasterLife<P> {
     fn fingerprint(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         let merge = Merge { now: self.line.line().role_now(), skipped: SKIPPED };
-        merge.fingerprint(&self.driver).hash(&mut hasher);
-        self.line.line().hash(&mut hasher);
         let node = self.node.borrow();
-        (&node.answers, node.is_gone).hash(&mut hasher);
+        let place = Position::new(node.count, 1);
+        merge.fingerprint(&(&self.driver, place)).hash(&mut hasher);
+        self.line.line().hash(&mut hasher);
+        (&node.answers, node.is_gone, node.is_deaf, node.told).hash(&mut hasher);
         self.account.digest(&node, &self.line.line()).hash(&mut hasher);
         hasher.finish()
     }

@@ -21,13 +21,13 @@ use crate::{
     run::{Depth, Run},
 };
 use {
-    action::{Action, Call, Fault, Setup},
+    action::{Action, Call, Fault, Pass, Setup},
     checks::STALL_US,
     fault::{Failure, Flushing, Pinning, Reading, Writing},
     line::{DrivenLine, Peer, Shared},
     master::{MasterLife, N1},
-    node::{Node, target_payload},
-    port::{Pin, Wired, failure},
+    node::{Answer, Node, target_payload},
+    port::{PART_US, Pin, Wired, failure},
     replay::{Life, Replay},
     task::{End, guarded},
     wire::{Shape, Speech, Wire},
@@ -35,6 +35,8 @@ use {
 
 const KNOWN: Action = Action::Call(Call::Discover);
 const SET: Action = Action::Call(Call::Set(1));
+const SERVICE: Action = Action::Call(Call::Service);
+const TO_DEADLINE: Action = Action::Pass(Pass::Deadline);
 /// The next packet will be cut off: a set-point, or the READ that is due.
 const CUT: [Action; 4] = [KNOWN, SET, Action::Fault(Fault::CutOff), Action::Call(Call::Set(2))];
 
@@ -59,6 +61,9 @@ fn master(run: &mut Run, is_async: bool) {
     worlds::<WithPin>(run, setup, depth, &[("cut off", &CUT)]);
     worlds::<WithPin>(run, setup, less, &[("fresh", &[]), ("known", &[KNOWN])]);
     worlds::<Shared>(run, setup, less, &[("commanded", &[KNOWN, SET]), ("cut off", &CUT)]);
+    // A late answer in the other mode is about to arrive.
+    let late = [KNOWN, SET, Action::Fault(Fault::Answer(Answer::Other)), SERVICE, TO_DEADLINE];
+    worlds::<Shared>(run, setup, Depth(2, 3), &[("late answer in the other mode", &late)]);
     let position = Setup { mode: Mode::Position, ..setup };
     worlds::<WithPin>(run, position, depth, &[("commanded", &[KNOWN, SET])]);
     let dead_man = Setup { dead_man_ms: Some(3), ..setup };

@@ -14,15 +14,16 @@ pub(crate) const SPEECH: Speech =
     Speech { shape, moves, byte_us: BYTE_US, pause_us: 5 * BYTE_US, needs_silence: true };
 
 fn moves(frame: &[u8]) -> bool {
-    let stops = [Mode::Velocity, Mode::Position].map(stop_payload);
-    frame[0] == 0xBB && !stops.iter().any(|stop| frame[2..6] == *stop)
+    let is_of = |mode| is_stop(mode, &frame[2..6]);
+    frame[0] == 0xBB && !is_of(Mode::Velocity) && !is_of(Mode::Position)
 }
 
-/// The payload of a stop: 0 rps, or the node's position, count 7 and rotation 1.
-pub(crate) const fn stop_payload(mode: Mode) -> [u8; 4] {
+/// Whether this is the payload of a stop: 0 rps, or the node's own rotation, 1, which read as a speed
+/// is as good as 0 rps.
+pub(crate) fn is_stop(mode: Mode, payload: &[u8]) -> bool {
     match mode {
-        Mode::Velocity => [0; 4],
-        Mode::Position => [7, 0, 1, 0],
+        Mode::Velocity => payload == [0; 4] || payload[2..] == [1, 0],
+        Mode::Position => payload[2..] == [1, 0],
     }
 }
 
@@ -41,6 +42,8 @@ pub(crate) enum Answer {
     Lost,
     Damaged,
     CutOff,
+    /// A little late, and in the other mode.
+    Other,
 }
 
 /// What a node has received and sent, in order.
@@ -58,7 +61,30 @@ pub(crate) struct Node {
     pub(crate) answers: VecDeque<Answer>,
     /// Without power.
     pub(crate) is_gone: bool,
+    /// Every WRITE reaches it damaged, every READ whole.
+    pub(crate) is_deaf: bool,
+    /// The last command that it has accepted, if it moves the motor.
+    pub(crate) told: Option<[u8; 4]>,
+    /// Where its shaft is: elsewhere at each answer, while a position node is told to move.
+    pub(crate) count: i16,
+    /// When the last answer in the other mode arrives.
+    other_us: u64,
     pub(crate) log: Vec<Entry>,
+}
+
+impl Node {
+    pub(crate) const fn new(mode: Mode) -> Self {
+        Self {
+            mode,
+            answers: VecDeque::new(),
+            is_gone: false,
+            is_deaf: false,
+            told: None,
+            count: 7,
+            other_us: 0,
+            log: Vec::new(),
+        }
+    }
 }
 
 pub(crate) type SharedNode = Rc<RefCell<Node>>;
@@ -73,41 +99,54 @@ impl Peer for Ear {
             return None;
         }
         if frame[0] == 0xBB {
-            node.log.push(Entry::Wrote([frame[2], frame[3], frame[4], frame[5]]));
+            let payload = [frame[2], frame[3], frame[4], frame[5]];
+            node.log.push(Entry::Wrote(payload));
+            if !node.is_deaf {
+                node.told = Some(payload).filter(|it| !is_stop(node.mode, it));
+            }
             return None;
         }
-        let mut bytes = match node.mode {
-            Mode::Velocity => {
-                VelocityResponse::new(NodeId::N1, Rps::new(3.0).unwrap()).as_bytes().to_vec()
-            }
-            Mode::Position => {
-                PositionResponse::new(NodeId::N1, Position::new(7, 1)).as_bytes().to_vec()
-            }
+        let answer = node.answers.pop_front();
+        let is_turning = node.mode == Mode::Velocity;
+        node.count += if node.told.is_some() && !is_turning { 10 } else { 0 };
+        let mut bytes = if is_turning == (answer != Some(Answer::Other)) {
+            let speed = f32::from_le_bytes(node.told.filter(|_| is_turning).unwrap_or_default());
+            VelocityResponse::new(NodeId::N1, Rps::new(speed).unwrap()).as_bytes().to_vec()
+        } else {
+            let place = Position::new(node.count, 1);
+            PositionResponse::new(NodeId::N1, place).as_bytes().to_vec()
         };
         let mut after_us = 50;
-        let answer = node.answers.pop_front();
         match answer {
             None => {}
+            Some(Answer::Other) => after_us = 600,
             Some(Answer::Late) => after_us = 800,
             Some(Answer::Lost) => bytes.clear(),
             Some(Answer::Damaged) => bytes[4] ^= 0x10,
             Some(Answer::CutOff) => bytes.truncate(5),
         }
         let arrival_us = end_us + after_us + BYTE_US * bytes.len() as u64;
+        if answer == Some(Answer::Other) {
+            node.other_us = arrival_us;
+        }
         node.log.push(match answer {
             None => Entry::Answered(arrival_us),
             Some(_) => Entry::Failed,
         });
         Some((after_us, bytes))
     }
+
+    fn doubts_us(&self) -> u64 {
+        self.0.borrow().other_us
+    }
 }
 
 /// Number of stop WRITEs each followed by an answer, and whether a WRITE waits for its answer.
-pub(crate) fn progress(log: &[Entry], stop: [u8; 4], now_us: u64) -> (u8, bool) {
+pub(crate) fn progress(log: &[Entry], mode: Mode, now_us: u64) -> (u8, bool) {
     let (mut pairs, mut is_written) = (0, false);
     for entry in log {
         match *entry {
-            Entry::Wrote(payload) => is_written = payload == stop,
+            Entry::Wrote(payload) => is_written = is_stop(mode, &payload),
             Entry::Answered(at_us) if is_written && at_us <= now_us && pairs < 2 => {
                 (pairs, is_written) = (pairs + 1, false);
             }
@@ -115,11 +154,6 @@ pub(crate) fn progress(log: &[Entry], stop: [u8; 4], now_us: u64) -> (u8, bool) 
         }
     }
     (pairs, is_written)
-}
-
-/// Two of them, according to the node's log.
-pub(crate) fn is_paid(log: &[Entry], stop: [u8; 4], now_us: u64) -> bool {
-    progress(log, stop, now_us).0 >= 2
 }
 
 /// A packet of a master as documented: a header, an id, the payload of a WRITE, the CRC.

@@ -3,7 +3,7 @@
 use super::{
     account::Before,
     action::Call,
-    master::{IDLE, Outcome, SPAN, Told},
+    master::{COAST, IDLE, Outcome, SPAN, Told},
     node::Entry,
     *,
 };
@@ -32,8 +32,8 @@ impl<P: Wired> MasterLife<P> {
         let bound = match call {
             Call::Idle => IDLE,
             Call::Set(_) | Call::Read | Call::Discover => self.send_bound(),
-            Call::Stop | Call::StopAll => role.stop_bound(),
-            Call::DriveFor => self.send_bound() + SPAN + role.stop_bound(),
+            Call::Stop | Call::StopAll => role.stop_bound() + COAST,
+            Call::DriveFor => self.send_bound() + SPAN + role.stop_bound() + COAST,
             Call::Service | Call::Discard | Call::KeepAlive => Duration::ZERO,
         };
         let took_us = line.now_us - before.begun_us;
@@ -59,6 +59,17 @@ impl<P: Wired> MasterLife<P> {
         let first = line.first_failure();
         let is_owed = self.driver.role().stops_owed().contains(N1);
         let took_us = line.now_us - before.begun_us;
+        let is_stop = matches!(call, Call::Stop | Call::StopAll | Call::DriveFor);
+        let told = self.node.borrow().told;
+        if let (true, Ok(()), Some(told)) = (is_stop, outcome, told) {
+            return Err(format!("Ok of {call:?}, but the node obeys {told:?}"));
+        }
+        if outcome == Err(Told::Moving) {
+            let is_early = took_us < u64::from(COAST.as_micros());
+            if is_early || is_owed || !self.driver.role().coasting().contains(N1) {
+                return Err("StillMoving too early".into());
+            }
+        }
         match call {
             Call::Stop | Call::StopAll => {
                 let bound_us = u64::from(self.driver.role().stop_bound().as_micros());
@@ -70,8 +81,8 @@ impl<P: Wired> MasterLife<P> {
                     Err(Told::Failure(_) | Told::Other) => {
                         return Err(format!("a stop ends with {outcome:?}"));
                     }
-                    Err(Told::Owed) if before.is_passable => {
-                        return Err("StopsOwed without a cause".into());
+                    Err(Told::Owed | Told::Moving) if before.is_passable => {
+                        return Err(format!("{outcome:?} without a cause"));
                     }
                     _ => {}
                 }
@@ -86,7 +97,7 @@ impl<P: Wired> MasterLife<P> {
                     .first()
                     .is_some_and(|&(at_us, _)| at_us < before.begun_us + span_us);
                 // A set-point that is refused after all fails before anything else.
-                let is_told = matches!(outcome, Err(Told::Owed | Told::Other));
+                let is_told = matches!(outcome, Err(Told::Owed | Told::Moving | Told::Other));
                 if is_early && !is_told && first.map(Told::Failure) != outcome.err() {
                     return Err(format!("{outcome:?} of a drive that failed with {first:?}"));
                 }

@@ -154,6 +154,14 @@ impl Shared {
             }
         }
         let (now_us, role_us) = (line.now_us, line.role_now().as_micros());
+        // What has arrived has been taken in before the rest is offered.
+        let (doubts_us, next_us) = (line.peer.doubts_us(), line.readable_us());
+        if line.wire.goes_on_with(bytes) && line.wire.open[0] == 0xBB {
+            let is_heard = doubts_us <= now_us && next_us > doubts_us;
+            if doubts_us > line.wire.begun_us && is_heard {
+                line.object("the rest of a WRITE is offered after an answer in the other mode");
+            }
+        }
         if let Err(invariant) = line.wire.offer(bytes, now_us, role_us) {
             line.object(&invariant);
         }
@@ -172,7 +180,7 @@ impl Shared {
         let count = match writing {
             None => bytes.len(),
             Some(Writing::One | Writing::Slow) => 1,
-            Some(Writing::Half) => bytes.len().div_ceil(2),
+            Some(Writing::Half | Writing::Part) => bytes.len().div_ceil(2),
             Some(Writing::Error | Writing::Stall) => return Err(Broken(line.fail(Failure::Port))),
             Some(Writing::Zero) => {
                 line.failed(Failure::WriteZero);
@@ -267,6 +275,8 @@ impl embedded_io::Read for Shared {
 }
 
 pub(super) const SECOND_US: u64 = 1_000_000;
+/// Half a WRITE, and most of a pause.
+pub(super) const PART_US: u64 = 150;
 
 impl embedded_io::Write for Shared {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
@@ -274,6 +284,7 @@ impl embedded_io::Write for Shared {
         let writing = self.begin_write(bytes);
         let end_us = match writing {
             Some(Writing::Slow) => self.line().wire.too_late_us(begun_us),
+            Some(Writing::Part) => begun_us + PART_US,
             Some(Writing::Stall) => begun_us + SECOND_US,
             _ => begun_us,
         };

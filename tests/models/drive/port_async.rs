@@ -117,6 +117,7 @@ impl embedded_io_async::Write for Shared {
                 let late_us = self.line().wire.too_late_us(begun_us);
                 self.sleep_until(late_us).await;
             }
+            Some(Writing::Part) => self.sleep_until(begun_us + PART_US).await,
             Some(Writing::Stall) => self.sleep_until(u64::MAX).await,
             _ => {}
         }

@@ -52,7 +52,9 @@ pub(crate) struct Wire {
     is_outdated: bool,
     /// When the last byte has left.
     last_us: u64,
-    /// The same if each byte had left when its write began. The truth, unknown to a driver, lies
+    /// When the first write of the open frame began.
+    pub(crate) begun_us: u64,
+    /// The same as `last_us` if each byte had left when its write began. The truth, unknown to a driver, lies
     /// between.
     early_us: u64,
     /// The frame may have paused too long.
@@ -77,6 +79,7 @@ impl Wire {
             is_moving: false,
             is_outdated: false,
             last_us: 0,
+            begun_us: 0,
             early_us: 0,
             is_doubtful: false,
             is_noisy: false,
@@ -173,7 +176,7 @@ impl Wire {
         self.is_given_up = false;
         self.last_us = end_us;
         if self.open.is_empty() {
-            (self.early_us, self.is_doubtful) = (begun_us, false);
+            (self.begun_us, self.early_us, self.is_doubtful) = (begun_us, begun_us, false);
         }
         self.is_doubtful |= !self.open.is_empty() && self.may_be_late(at_us);
         self.early_us = self.early_us.max(begun_us) + self.speech.byte_us * bytes.len() as u64;
