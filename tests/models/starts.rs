@@ -83,6 +83,7 @@ pub(crate) fn small_steps<B: Kit>(run: &mut Run) {
         let late = [
             Action::Switch(NodeId::N1),
             Action::Send(Fate::Arrives),
+            Action::Send(Fate::Arrives),
             Action::Answer(Answer::Late),
             Action::Wait(Wait::Deadline),
         ];

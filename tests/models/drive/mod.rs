@@ -62,7 +62,8 @@ fn master(run: &mut Run, is_async: bool) {
     worlds::<WithPin>(run, setup, less, &[("fresh", &[]), ("known", &[KNOWN])]);
     worlds::<Shared>(run, setup, less, &[("commanded", &[KNOWN, SET]), ("cut off", &CUT)]);
     // A late answer in the other mode is about to arrive.
-    let late = [KNOWN, SET, Action::Fault(Fault::Answer(Answer::Other)), SERVICE, TO_DEADLINE];
+    let other = Action::Fault(Fault::Answer(Answer::Other));
+    let late = [KNOWN, SET, other, TO_DEADLINE, SERVICE, TO_DEADLINE];
     worlds::<Shared>(run, setup, Depth(2, 3), &[("late answer in the other mode", &late)]);
     let position = Setup { mode: Mode::Position, ..setup };
     worlds::<WithPin>(run, position, depth, &[("commanded", &[KNOWN, SET])]);

@@ -154,11 +154,10 @@ impl Shared {
             }
         }
         let (now_us, role_us) = (line.now_us, line.role_now().as_micros());
-        // What has arrived has been taken in before the rest is offered.
-        let (doubts_us, next_us) = (line.peer.doubts_us(), line.readable_us());
-        if line.wire.goes_on_with(bytes) && line.wire.open[0] == 0xBB {
-            let is_heard = doubts_us <= now_us && next_us > doubts_us;
-            if doubts_us > line.wire.begun_us && is_heard {
+        // What has arrived is taken in before the rest is offered, unless the port fails.
+        if line.wire.goes_on_with(bytes) && line.wire.open[0] == 0xBB && line.failures.is_empty() {
+            let doubts_us = line.peer.doubts_us();
+            if (line.wire.begun_us + 1..=now_us).contains(&doubts_us) {
                 line.object("the rest of a WRITE is offered after an answer in the other mode");
             }
         }
