@@ -64,8 +64,9 @@ pub(crate) struct Account {
     pub(crate) coasting_since: Option<Instant>,
     /// It was seen to be still.
     pub(crate) is_still: bool,
-    /// When the last stop WRITE was sent.
+    /// When the last stop WRITE was sent, and whether anybody was asked since.
     pub(crate) stopped_at: Option<Instant>,
+    pub(crate) was_asked_since: bool,
     /// The position that the node was told to hold, and whether another one is allowed.
     hold: Option<Position>,
     pub(crate) may_hold_anew: bool,
@@ -106,12 +107,13 @@ impl Account {
         }
     }
 
-    /// The application asks for a stop; it joins one whose node is not still yet.
-    pub(crate) fn stop(&mut self, now: Instant) {
+    /// The application asks for a stop; it joins one whose node is not still yet. If it was told
+    /// that the node still moves, that begins anew.
+    pub(crate) fn stop(&mut self, is_told: bool, now: Instant) {
         match self.coasting_since {
-            Some(_) => {
+            Some(since) => {
                 self.drop_target();
-                self.coasting_since = Some(now);
+                self.coasting_since = Some(if is_told { now } else { since });
             }
             None => self.owe(),
         }
@@ -181,7 +183,7 @@ impl Account {
             (self.hold, self.may_hold_anew) = (Some(place), false);
         }
         (self.is_target_new, self.was_written) = (false, true);
-        self.stopped_at = self.is_halted.then_some(at);
+        (self.stopped_at, self.was_asked_since) = (self.is_halted.then_some(at), false);
         if self.is_owed {
             (self.is_stop_written, self.is_stop_due) = (true, false);
         } else if self.confirm == Confirm::AfterWrite {

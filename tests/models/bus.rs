@@ -4,6 +4,8 @@
 //! an answer that may be late. An answer later than its deadline plus `late_guard` is lost: the
 //! protocol has no sequence numbers by which a master could distinguish it from the next one.
 
+use axlewire::ikeya::master::StopProgress;
+
 use super::{
     account::{Account, Confirm},
     action::{Action, Answer, Call, Exchange, Fate, Menu},
@@ -119,15 +121,18 @@ impl<B: Kit> Bus<B> {
             Call::Set(node) => self.set(node)?,
             Call::Stop(node) => {
                 self.expire_orders();
+                let is_told = self.is_told_moving(node);
                 self.master.stop(node, now);
                 self.alive_at = now;
-                self.account(node).stop(now);
+                self.account(node).stop(is_told, now);
             }
             Call::StopAll => {
                 self.expire_orders();
+                let are_told = NodeId::ALL.map(|node| self.is_told_moving(node));
                 self.master.stop_all(now);
                 self.alive_at = now;
-                self.accounts.iter_mut().for_each(|account| account.stop(now));
+                let accounts = self.accounts.iter_mut().zip(are_told);
+                accounts.for_each(|(account, is_told)| account.stop(is_told, now));
             }
             Call::Release(node) => {
                 self.master.release(node);
@@ -149,6 +154,10 @@ impl<B: Kit> Bus<B> {
             }
         }
         Ok(())
+    }
+
+    fn is_told_moving(&self, node: NodeId) -> bool {
+        self.master.stop_progress(node) == StopProgress::StillMoving
     }
 
     /// A new set-point in the mode assumed by the application. A refused one has the number of the

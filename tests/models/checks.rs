@@ -36,14 +36,16 @@ impl<B: Kit> Bus<B> {
                     ));
                 }
                 (account.waits, account.cycle_waits) = (0, 0);
+                account.was_asked_since |= is_exchange;
                 continue;
             }
-            let is_recent = account.stopped_at.is_some_and(|at| now < at + REPEAT);
-            if account.is_stop_repeated(B::ANSWERS_WRITE)
-                && is_exchange
-                && !B::ANSWERS_WRITE
-                && !is_recent
-            {
+            // One that was taken back is new, and has its turn like a set-point.
+            let is_late = match account.stopped_at {
+                Some(at) => now >= at + REPEAT && account.was_asked_since && !B::ANSWERS_WRITE,
+                None => !account.is_online(),
+            };
+            account.was_asked_since |= is_exchange;
+            if is_exchange && is_late && account.is_stop_repeated(B::ANSWERS_WRITE) {
                 return Err(format!("a READ of node {} before a stop is repeated", sent.node));
             }
             if !is_exchange || !account.is_askable(now) {
