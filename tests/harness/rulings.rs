@@ -92,6 +92,8 @@ struct Measured {
 pub(crate) struct Seen {
     pub(crate) mode: Option<Mode>,
     pub(crate) is_owed: bool,
+    /// Its stop is confirmed, but it is not seen to be still.
+    pub(crate) is_coasting: bool,
     pub(crate) is_in_doubt: bool,
     pub(crate) is_abnormal: bool,
 }
@@ -135,7 +137,7 @@ impl Node {
     }
 
     pub(crate) fn stop(&mut self, now: Instant) {
-        if !self.seen.is_owed {
+        if !self.seen.is_owed && !self.seen.is_coasting {
             self.owe(now);
         }
     }

@@ -21,8 +21,32 @@ pub(super) struct Nodes {
     /// Whether each node answers, and whether in position mode.
     pub(super) is_there: [bool; 8],
     pub(super) is_position: [bool; 8],
+    /// Whether WRITEs reach each node damaged, although READs do not.
+    pub(super) is_deaf: [bool; 8],
     pub(super) log: [Vec<Heard>; 8],
-    count: u16,
+    /// The last WRITE that each has accepted in its mode.
+    told: [[u8; 4]; 8],
+    /// Where each shaft is in turn 3: elsewhere at each answer, while it is told to move.
+    counts: [i16; 8],
+}
+
+impl Nodes {
+    /// Moves a mode switch: the command is forgotten.
+    pub(super) fn switch(&mut self, index: usize, is_position: bool) {
+        if self.is_position[index] != is_position {
+            (self.is_position[index], self.told[index]) = (is_position, [0, 0, 3, 0]);
+        }
+    }
+
+    /// Whether the last command of a node is to stand still: a small speed, or a position of its own
+    /// in turn 3, where no set-point is.
+    pub(super) fn is_told_to_stop(&self, index: usize) -> bool {
+        let told = self.told[index];
+        match self.is_position[index] {
+            true => told[2..] == [3, 0] && told[1] < 0x80,
+            false => f32::from_le_bytes(told).abs() < 0.05,
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default)]
@@ -62,15 +86,22 @@ impl Bus {
         if is_write {
             let payload = [packet[2], packet[3], packet[4], packet[5]];
             nodes.log[index].push(Heard::Write(payload));
+            if nodes.is_there[index] && !nodes.is_deaf[index] {
+                nodes.told[index] = payload;
+            }
             return Vec::new();
         }
         if !nodes.is_there[index] {
             return Vec::new();
         }
-        nodes.count = (nodes.count + 1) % 8000;
-        let [low, high] = nodes.count.to_le_bytes();
-        // A position in turn 3, or the same bits as a small speed.
-        let payload = [low, high, 3, 0];
+        let payload = if nodes.is_position[index] {
+            let step = if nodes.is_told_to_stop(index) { 0 } else { 10 };
+            nodes.counts[index] = (nodes.counts[index] + step) % 8000;
+            let [low, high] = nodes.counts[index].to_le_bytes();
+            [low, high, 3, 0]
+        } else {
+            nodes.told[index]
+        };
         nodes.log[index].push(Heard::Answered(payload));
         let header = if nodes.is_position[index] { 0x56 } else { 0x55 };
         let mut answer = [&[header, packet[1]][..], &payload, &[0, 0]].concat();

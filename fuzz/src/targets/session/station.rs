@@ -31,6 +31,8 @@ pub(super) struct Station<B: Kit> {
     requests: u32,
     answers: u32,
     place: Position,
+    /// It was turning when it last heard something.
+    is_moving: bool,
 }
 
 impl<B: Kit> Station<B> {
@@ -48,6 +50,7 @@ impl<B: Kit> Station<B> {
             requests: 0,
             answers: 0,
             place: Position::default(),
+            is_moving: false,
         }
     }
 
@@ -68,7 +71,8 @@ impl<B: Kit> Station<B> {
         now: Instant,
     ) -> bool {
         self.place = place;
-        self.slave.set_velocity(B::speed(3.0));
+        self.is_moving = !self.is_stopped(None, now);
+        self.slave.set_velocity(B::speed(3.0 * f32::from(self.is_moving)));
         self.slave.set_position(B::place(place));
         for found in self.ears.take(&piece.bytes) {
             let Found::Sent(number) = found else { return false };
@@ -107,7 +111,8 @@ impl<B: Kit> Station<B> {
         self.answers += 1;
         assert!(self.answers <= self.requests, "an answer without a request");
         let place = (self.place.count(), self.place.rotation());
-        let reply = Reply { node: self.id, mode: self.slave.mode(), place };
+        let (mode, is_moving) = (self.slave.mode(), self.is_moving);
+        let reply = Reply { node: self.id, mode, place, is_moving };
         assert_eq!(answer, reply.bytes::<B>(), "not what was measured");
         Some((answer, reply))
     }

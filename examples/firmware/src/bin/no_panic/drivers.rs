@@ -7,7 +7,7 @@ use axlewire::{
     ikeya::{
         self, Master, Mode, NodeId, Position, Rps, Slave,
         board::{Board, OneMotor, ThreeMotors},
-        master::{MasterConfig, NodeSet},
+        master::MasterConfig,
         slave::SlaveConfig,
     },
     io::{FrameReader, FrameWriter},
@@ -127,7 +127,6 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
             4 => keep(driver.stop_all()),
             5 => keep(driver.read(node)),
             6 => keep(driver.drive_for(node, any(velocity), duration())),
-            7 => keep(driver.await_standstill(any(NodeSet::ALL), now())),
             _ => turn(&mut driver),
         }
     }

@@ -23,7 +23,9 @@ where
 
     /// Notes since when stops are owed.
     pub(super) fn follow(&mut self, logs: &[usize; 8]) {
-        let owed = self.rig.driver.role().stops_owed();
+        let role = self.rig.driver.role();
+        let owed = role.stops_owed();
+        self.coasting = role.coasting();
         for node in NodeId::ALL {
             let since = &mut self.owed_from[index(node)];
             match owed.contains(node) {
@@ -74,7 +76,8 @@ where
         assert!(log.contains(&Heard::Answered(payload)), "{status:?} was not answered: {log:?}");
     }
 
-    /// `Ok` means that two stop WRITEs have each been followed by an answer (I12).
+    /// `Ok` means that two stop WRITEs have each been followed by an answer, and that the last
+    /// command which the node has accepted is a stop (I12).
     pub(super) fn check_stop<E: core::fmt::Debug>(
         &mut self,
         nodes: NodeSet,
@@ -86,7 +89,18 @@ where
         match done {
             Some(Ok(())) => {
                 assert!(owed.is_empty(), "Ok, but {owed:?} are owed a stop");
-                nodes.iter().for_each(|node| self.check_paid(node, logs[index(node)]));
+                for node in nodes.iter() {
+                    // A call joins a stop that is confirmed.
+                    if !self.coasting.contains(node) {
+                        self.check_paid(node, logs[index(node)]);
+                    }
+                    self.check_obeyed(node);
+                }
+            }
+            Some(Err(DriveError::StillMoving(told))) => {
+                let is_deaf = self.peer.0.borrow().is_deaf;
+                let moves = told.iter().any(|node| is_deaf[index(node)]);
+                assert!(moves || !told.is_empty() && !is_calm, "{told:?} obey, but still move");
             }
             Some(Err(DriveError::StopsOwed(told))) => {
                 assert!(!told.is_empty(), "an error without a node");
@@ -98,6 +112,11 @@ where
             Some(Err(other)) => panic!("{other:?} from a stop"),
             None => {}
         }
+    }
+
+    pub(super) fn check_obeyed(&self, node: NodeId) {
+        let is_told = self.peer.0.borrow().is_told_to_stop(index(node));
+        assert!(is_told, "Ok, but node {node} obeys another command");
     }
 
     pub(super) fn check_paid(&self, node: NodeId, begun: usize) {

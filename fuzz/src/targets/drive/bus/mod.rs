@@ -35,23 +35,58 @@ struct Setup {
 #[derive(Arbitrary, Clone, Copy, Debug)]
 enum Do {
     Service,
-    NextEvent { ms: u8 },
-    RunUntil { ms: u8 },
+    NextEvent {
+        ms: u8,
+    },
+    RunUntil {
+        ms: u8,
+    },
     Discover,
-    SetVelocity { node: NodeId, rps: i8 },
-    SetPosition { node: NodeId, turns: i8 },
-    DriveFor { node: NodeId, rps: i8, ms: u8 },
-    Read { node: NodeId },
-    Stop { node: NodeId },
+    SetVelocity {
+        node: NodeId,
+        rps: i8,
+    },
+    SetPosition {
+        node: NodeId,
+        turns: i8,
+    },
+    DriveFor {
+        node: NodeId,
+        rps: i8,
+        ms: u8,
+    },
+    Read {
+        node: NodeId,
+    },
+    Stop {
+        node: NodeId,
+    },
     StopAll,
-    AwaitStandstill { ms: u8 },
+    /// From now on, WRITEs reach these nodes damaged, one bit each.
+    Deafen {
+        nodes: u8,
+    },
     Discard,
-    Fault { call: Call, fault: Fault },
+    Fault {
+        call: Call,
+        fault: Fault,
+    },
     Heal,
-    Pass { units: u16 },
-    Noise { bytes: [u8; 3] },
-    Switch { node: NodeId, is_there: bool, is_position: bool },
-    Request { node: NodeId, rps: Option<i8> },
+    Pass {
+        units: u16,
+    },
+    Noise {
+        bytes: [u8; 3],
+    },
+    Switch {
+        node: NodeId,
+        is_there: bool,
+        is_position: bool,
+    },
+    Request {
+        node: NodeId,
+        rps: Option<i8>,
+    },
 }
 
 pub(crate) fn bus(data: &[u8], tally: &mut Tally) {
@@ -71,24 +106,31 @@ where
     <P as embedded_io::ErrorType>::Error: core::fmt::Debug,
 {
     let begin_us = if setup.wraps { u64::MAX / 2 - 20_000 } else { 0 };
-    let bits = |bits: u8| core::array::from_fn(|node| bits >> node & 1 == 1);
     let peer = Bus::default();
-    (peer.0.borrow_mut().is_there, peer.0.borrow_mut().is_position) =
-        (bits(setup.is_there), bits(setup.is_position));
+    peer.0.borrow_mut().is_there = bits(setup.is_there);
+    for (index, is_position) in bits(setup.is_position).into_iter().enumerate() {
+        peer.0.borrow_mut().switch(index, is_position);
+    }
     if setup.is_slave {
         return slave::slave::<P>(u, begin_us, tally);
     }
     let mut config = MasterConfig::direct();
     config.polling = [Polling::Fastest, Polling::Every(Duration::from_millis(5)), Polling::Manual]
         [usize::from(setup.polling % 3)];
+    config.coast = COAST;
     config.dead_man = setup.dead_man.then_some(Duration::from_millis(50));
     if setup.knows_nodes {
         let is_there = |id: &NodeId| setup.is_there >> (id.get() - 1) & 1 == 1;
         config.nodes = NodeId::ALL.into_iter().filter(is_there).collect();
     }
     let rig = Rig::new(begin_us, 20, peer.peer(), |now| Master::new(config, now));
-    let mut life =
-        BusLife::<P> { rig, peer, was_position: bits(setup.is_position), owed_from: [None; 8] };
+    let mut life = BusLife::<P> {
+        rig,
+        peer,
+        was_position: bits(setup.is_position),
+        owed_from: [None; 8],
+        coasting: NodeSet::NONE,
+    };
     for _ in 0..40 {
         if u.is_empty() || life.rig.world.calls() > ENOUGH {
             break;
@@ -107,6 +149,15 @@ struct BusLife<P: Wired> {
     was_position: [bool; 8],
     /// Length of each node's log when its stop became owed.
     owed_from: [Option<usize>; 8],
+    /// Nodes whose stop was confirmed, but that were not still, after the last call.
+    coasting: NodeSet,
+}
+
+/// Time in which a motor may come to rest.
+const COAST: Duration = Duration::from_millis(50);
+
+fn bits(bits: u8) -> [bool; 8] {
+    core::array::from_fn(|node| bits >> node & 1 == 1)
 }
 
 const MS: fn(u32) -> Duration = Duration::from_millis;
@@ -126,7 +177,7 @@ where
     fn perform(&mut self, what: Do, how: How) -> u8 {
         let (before, logs) = (self.rig.begin(), self.logs());
         let bound = self.rig.driver.role().read_bound().saturating_mul(4);
-        let stop_bound = self.rig.driver.role().stop_bound();
+        let stop_bound = self.rig.driver.role().stop_bound() + COAST;
         // Nothing is in the way of a stop: no fault is planned, and every id on the bus answers.
         let is_calm = self.rig.is_clean() && self.peer.0.borrow().is_there == [true; 8];
         let by = |ms: u8, rig: &mut Rig<Master, P>| rig.driver.now() + MS(ms.into());
@@ -167,7 +218,7 @@ where
                 4
             }
             Do::SetPosition { node, turns } => {
-                let to = Position::new(5, turns.into());
+                let to = Position::new(-5, turns.into());
                 let done = call!(self.rig, how, set_position, set_position_async(node, to));
                 self.rig.end(&before, bound, done.as_ref());
                 self.check_set(done, WriteRequest::position(node, to).as_bytes(), &before);
@@ -179,6 +230,7 @@ where
                 self.rig.end(&before, bound + span + stop_bound, done.as_ref());
                 if done.is_some_and(|done| done.is_ok()) {
                     self.follow(&logs);
+                    self.check_obeyed(node);
                     assert!(!self.rig.driver.role().stops_owed().contains(node));
                     self.check_paid(node, logs[index(node)]);
                 }
@@ -203,15 +255,8 @@ where
                 self.check_stop(nodes, done, &logs, is_calm);
                 9
             }
-            Do::AwaitStandstill { ms } => {
-                let by = by(ms, &mut self.rig);
-                let done = call!(
-                    self.rig,
-                    how,
-                    await_standstill,
-                    await_standstill_async(NodeSet::ALL, by)
-                );
-                self.rig.end(&before, MS(ms.into()), done.as_ref());
+            Do::Deafen { nodes } => {
+                self.peer.0.borrow_mut().is_deaf = bits(nodes);
                 10
             }
             Do::Discard => {
@@ -239,7 +284,7 @@ where
             Do::Switch { node, is_there, is_position } => {
                 let mut nodes = self.peer.0.borrow_mut();
                 nodes.is_there[index(node)] = is_there;
-                nodes.is_position[index(node)] = is_position;
+                nodes.switch(index(node), is_position);
                 self.was_position[index(node)] |= is_position;
                 16
             }

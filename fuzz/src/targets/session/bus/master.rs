@@ -3,8 +3,8 @@
 use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{
-        NodeId,
-        master::{Health, MasterEvent},
+        Mode, NodeId,
+        master::{Health, MasterEvent, StopProgress},
     },
 };
 
@@ -53,6 +53,8 @@ impl<B: Kit> Session<B> {
     /// Hands bytes to the master; it takes only answers that were sent.
     fn hear(&mut self, bytes: &[u8]) {
         self.given += bytes.len() as u64;
+        let is_still = |it: &Self, id| it.master.stop_progress(id) == StopProgress::StandingStill;
+        let were_still = NodeId::ALL.map(|id| is_still(self, id));
         let before = self.master.counters().frames;
         self.master.handle_input(bytes, self.now);
         let counters = self.master.counters();
@@ -71,14 +73,21 @@ impl<B: Kit> Session<B> {
             self.unheard.clear();
         }
         self.follow();
+        for station in &self.stations {
+            let is_news = is_still(self, station.id) && !were_still[index(station.id)];
+            let is_turning = station.slave.mode() == Mode::Velocity;
+            let is_stopped = station.is_stopped(None, self.now);
+            assert!(!is_news || !is_turning || is_stopped, "still, but it obeys a set-point");
+        }
     }
 
     pub(super) fn follow(&mut self) {
-        let owed = self.master.stops_owed();
+        let (owed, coasting) = (self.master.stops_owed(), self.master.coasting());
         for (node, id) in self.model.iter_mut().zip(NodeId::ALL) {
             let seen = Seen {
                 mode: self.master.mode(id),
                 is_owed: owed.contains(id),
+                is_coasting: coasting.contains(id),
                 is_in_doubt: self.master.is_mode_in_doubt(id),
                 is_abnormal: self.master.health(id) == Some(Health::Abnormal),
             };
