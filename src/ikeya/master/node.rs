@@ -348,10 +348,13 @@ impl<B: Board> Node<B> {
         self.is_abnormal() && self.has_attempts(1)
     }
 
-    /// Whether it was never heard, is owed a stop, and has attempts left of those made at any search
-    /// rate: those of a READ.
-    pub(super) fn awaits_first_answer(&self, config: &MasterConfig) -> bool {
-        self.health.is_none() && self.has_attempts(config.attempts.max(1))
+    /// Whether it is owed a stop that needs its answer, and is asked at any search rate: a node that
+    /// was heard before and gets no stop blind, or one that never was and has attempts left.
+    pub(super) fn is_sought_first(&self, config: &MasterConfig) -> bool {
+        if self.health.is_none() {
+            return self.has_attempts(config.attempts.max(1));
+        }
+        self.is_lost() && (B::ANSWERS_WRITE || self.mode.on_record() == Some(Mode::Position))
     }
 
     /// Whether it is owed a stop and has had fewer attempts than this while it was not online.

@@ -153,11 +153,11 @@ impl Queue {
         self.discovery_or_cycle(view).or(sought)
     }
 
-    /// The next request of the search, at the search rate, or with every round until each id that is
-    /// owed a stop and was never heard has had its attempts: its motor may be running.
+    /// The next request of the search, at the search rate, or with every round while a node that gets
+    /// no stop blind is owed one: its motor may be running.
     fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
         let is_time = self.search_at.is_none_or(|at| view.now >= at);
-        let is_time = is_time || view.nodes.iter().any(|it| it.awaits_first_answer(view.config));
+        let is_time = is_time || view.nodes.iter().any(|it| it.is_sought_first(view.config));
         is_time.then(|| self.search(view)).flatten()
     }
 
