@@ -1,12 +1,13 @@
-//! An episode on a bus: up to three motors, a plug that may be loose, and a stop.
+//! An episode on a bus, direct or behind a USB adapter: up to eight motors, a plug that may be loose,
+//! and a stop.
 
 use axlewire::{
     ikeya::{
-        Master, Mode, NodeId, Position, Rps, Slave,
+        Master, Mode, NodeId, Position, Rps, Slave, Target,
         master::{MasterConfig, Polling, StopProgress},
         slave::SlaveConfig,
     },
-    sim::{Motor, MotorNode},
+    sim::{Input, Motor, MotorNode},
 };
 
 use super::*;
@@ -25,25 +26,40 @@ type Bus = Line<Master, MotorNode>;
 
 struct Episode {
     bus: Bus,
-    nodes: Vec<(NodeId, Mode)>,
+    is_adapter: bool,
+    nodes: Vec<Present>,
+}
+
+/// A node that is on the bus. The others are silent, but the master does not know that.
+struct Present {
+    node: NodeId,
+    mode: Mode,
+    /// Its set-point.
+    target: Option<Target>,
 }
 
 impl Episode {
     fn new(seed: u64, rng: &mut Rng) -> Self {
-        let nodes: Vec<_> = NodeId::ALL
-            .into_iter()
-            .take(1 + rng.below(3) as usize)
-            .map(|node| (node, if rng.chance(0.5) { Mode::Velocity } else { Mode::Position }))
-            .collect();
-        let mut config = MasterConfig::direct();
-        config.nodes = nodes.iter().map(|(node, _)| *node).collect();
+        let mut ids = NodeId::ALL;
+        for last in (1..8).rev() {
+            ids.swap(last, rng.below(last as u64 + 1) as usize);
+        }
+        let nodes = ids.into_iter().take(1 + rng.below(8) as usize).map(|node| Present {
+            node,
+            mode: if rng.chance(0.5) { Mode::Velocity } else { Mode::Position },
+            target: None,
+        });
+        let nodes: Vec<_> = nodes.collect();
+        let is_adapter = rng.chance(0.5);
+        let mut config =
+            if is_adapter { MasterConfig::usb_adapter() } else { MasterConfig::direct() };
         config.polling = match rng.below(3) {
             0 => Polling::Fastest,
             1 => Polling::Every(Duration::from_millis(5)),
             _ => Polling::Manual,
         };
         let mut bus = Bus::new(500_000, seed, Master::new(config, Instant::from_micros(0)));
-        for &(node, mode) in &nodes {
+        for &Present { node, mode, .. } in &nodes {
             let slave = Slave::new(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
             let motor = Motor::new()
                 .with_time_constant(TIME_CONSTANT)
@@ -52,15 +68,28 @@ impl Episode {
             bus.timing_mut(Who::Tail(tail)).latency = Duration::from_micros(rng.below(50) as u32);
         }
         // An answer is never later than the 500 us that the master waits: 4 times 60, 50 and 150.
-        *bus.pair_mut(Direction::ToTails) = faults(rng, 60);
-        *bus.pair_mut(Direction::ToHead) = faults(rng, 60);
+        let noise = rng.below(3);
+        for direction in [Direction::ToTails, Direction::ToHead] {
+            let faults = faults(rng, 60);
+            let (delay, jitter) = (faults.delay, faults.jitter);
+            let pair = bus.pair_mut(direction);
+            (*pair, pair.delay, pair.jitter) = match noise {
+                0 => (Faults::CLEAN, delay, jitter),
+                1 => (Faults::noise(1e-3), delay, jitter),
+                _ => (faults, delay, jitter),
+            };
+        }
         bus.timing_mut(Who::Head).latency = Duration::from_micros(rng.below(150) as u32);
-        Self { bus, nodes }
+        if is_adapter {
+            let wait = Duration::from_micros(rng.below(16_001) as u32);
+            bus.timing_mut(Who::Head).input = Input::AfterFirst { wait, at_most: 62 };
+        }
+        Self { bus, is_adapter, nodes }
     }
 
     /// Discovers the nodes through the noise.
     fn discover(&mut self) {
-        while self.nodes.iter().any(|(node, _)| self.bus.head().mode(*node).is_none()) {
+        while self.nodes.iter().any(|it| self.bus.head().mode(it.node).is_none()) {
             if !self.bus.head().is_discovering() {
                 let now = self.bus.now();
                 self.bus.head_mut().discover(now);
@@ -83,28 +112,46 @@ impl Episode {
     /// Starts all nodes. A command may be refused if a node has just missed three answers.
     fn command(&mut self, rng: &mut Rng) {
         let now = self.bus.now();
-        for &(node, mode) in &self.nodes {
+        for it in &mut self.nodes {
             let way = (2.0 * part(rng) - 1.0) * FASTEST_RPS;
             let master = self.bus.head_mut();
-            let _ = match mode {
-                Mode::Velocity => master.set_velocity(node, Rps::new(way as f32).unwrap(), now),
+            let (target, given) = match it.mode {
+                Mode::Velocity => {
+                    let rps = Rps::new(way as f32).unwrap();
+                    (Target::Velocity(rps), master.set_velocity(it.node, rps, now))
+                }
                 Mode::Position => {
-                    let target = Position::from_revolutions(way * 10.0).unwrap();
-                    master.set_position(node, target, now)
+                    let to = Position::from_revolutions(way * 10.0).unwrap();
+                    (Target::Position(to), master.set_position(it.node, to, now))
                 }
             };
+            it.target = given.is_ok().then_some(target);
         }
     }
 
-    /// Requests the readings that show a standstill: with [`Polling::Manual`] nothing else does.
-    fn read_stopped(&mut self) {
-        let now = self.bus.now();
-        for &(node, _) in &self.nodes {
-            if self.bus.head().stop_progress(node) == StopProgress::Confirmed {
-                // Refused while it is not online.
-                let _ = self.bus.head_mut().read(node, now);
+    /// Whether a node is under its set-point, and not there yet.
+    fn is_commanded(&self, tail: usize) -> bool {
+        let command = self.bus.tail(tail).slave().command(self.bus.now());
+        match command {
+            None => false,
+            Some(Target::Velocity(speed)) => speed.get().abs() >= 0.05,
+            Some(Target::Position(to)) => {
+                command == self.nodes[tail].target && to != self.motor(tail).position()
             }
         }
+    }
+
+    /// Time in which the search finds each of these nodes again: two windows for each and as much for
+    /// the nodes that answer, and four windows for what is in progress.
+    fn search_ms(&self, silent: usize) -> f64 {
+        let window_ms = if self.is_adapter { 20.4 } else { 0.8 };
+        4.0 * window_ms * (silent + 1) as f64 + 1.0
+    }
+
+    /// Number of bytes that it and the master could not read.
+    fn damage(&self, tail: usize) -> u64 {
+        let master = self.bus.head().counters();
+        self.bus.tail(tail).slave().counters().skipped() + master.skipped()
     }
 
     fn motor(&self, tail: usize) -> &Motor {
@@ -119,8 +166,10 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
     episode.command(&mut rng);
     episode.pass(1 + rng.below(200) as u32);
 
-    // A plug that falls out before, at or after the stop, and is plugged in again.
-    let loose = rng.chance(0.3).then(|| rng.below(episode.nodes.len() as u64) as usize);
+    // A cable to some of the nodes that falls out before, at or after the stop, and is plugged in
+    // again.
+    let share = if rng.chance(0.5) { 0.0 } else { part(&mut rng) };
+    let loose: Vec<bool> = episode.nodes.iter().map(|_| rng.chance(share)).collect();
     let out_at = episode.bus.now() + millis(&mut rng, 0, 60);
     let in_at = out_at + millis(&mut rng, 0, 300);
     let stop_at = episode.bus.now() + millis(&mut rng, 0, 100);
@@ -128,36 +177,58 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
     let bound = episode.bus.head().stop_bound();
     let end = stop_at.max(in_at) + bound + Duration::from_millis(600);
     let mut watches: Vec<Watch> = episode.nodes.iter().map(|_| Watch::default()).collect();
-    let mut is_stopped = false;
-    while episode.bus.now() < end {
+    let (mut is_stopped, mut is_over) = (false, false);
+    while !is_over && episode.bus.now() < end {
         let now = episode.bus.now();
-        if let Some(tail) = loose {
+        for (tail, _) in loose.iter().enumerate().filter(|(_, is_loose)| **is_loose) {
             episode.bus.stub_mut(Who::Tail(tail)).unplugged = (out_at..in_at).contains(&now);
         }
         if !is_stopped && now >= stop_at {
             is_stopped = true;
             episode.bus.head_mut().stop_all(now);
         }
-        if is_stopped {
-            episode.read_stopped();
-        }
         episode.pass(1);
+        is_over = is_stopped && episode.bus.now() >= in_at;
         for (tail, watch) in watches.iter_mut().enumerate() {
-            let progress = episode.bus.head().stop_progress(episode.nodes[tail].0);
-            watch.has_stood |= progress == StopProgress::StandingStill;
-            let from = if loose == Some(tail) { stop_at.max(in_at) } else { stop_at };
+            let progress = episode.bus.head().stop_progress(episode.nodes[tail].node);
+            let is_still = progress == StopProgress::StandingStill;
+            let is_commanded = episode.is_commanded(tail);
+            watch.is_ok_wrong |= is_still && is_commanded;
+            watch.has_stood |= is_still;
+            let from = if loose[tail] { stop_at.max(in_at) } else { stop_at };
             watch.look(episode.motor(tail), episode.bus.now(), from);
+            if loose[tail] && is_stopped && stop_at <= in_at && episode.bus.now() >= in_at {
+                watch.back(is_commanded, episode.damage(tail), episode.bus.now() - in_at);
+            }
+            is_over &= is_still && episode.motor(tail).velocity().get().abs() < 0.05;
         }
     }
+    let silent = loose.iter().filter(|is_loose| **is_loose).count();
     let bound_ms = f64::from(bound.as_micros()) / 1e3;
-    let runs = episode.nodes.iter().zip(&watches).map(|(&(node, mode), watch)| {
+    let runs = episode.nodes.iter().zip(&watches).map(|(&Present { node, mode, .. }, watch)| {
+        let back_ms = match mode {
+            Mode::Velocity => 50.0,
+            Mode::Position => episode.search_ms(silent),
+        };
+        let cable = watch.damage.map(|(before, after)| {
+            let is_damaged = before != after;
+            let bound_ms = if is_damaged { bound_ms + back_ms } else { back_ms };
+            Cable { time_ms: watch.back_ms, bound_ms, is_damaged }
+        });
+        let bound_ms = bound_ms + cable.map_or(0.0, |_| back_ms);
         // A node that has since become abnormal is owed another stop.
         let progress = episode.bus.head().stop_progress(node);
         let is_good = watch.has_stood && progress != StopProgress::NotAsked;
         let complaint = (!is_good).then(|| format!("node {node} is {progress:?} at the end"));
-        let (kind, time_bound_ms, fastest) = match mode {
-            Mode::Velocity => ("bus, velocity", bound_ms + RUN_OUT_MS, FASTEST_RPS),
-            Mode::Position => ("bus, position", bound_ms, POSITION_RPS),
+        let kind = match (episode.is_adapter, mode) {
+            (false, Mode::Velocity) => "bus, velocity",
+            (false, Mode::Position) => "bus, position",
+            (true, Mode::Velocity) => "adapter, velocity",
+            (true, Mode::Position) => "adapter, position",
+        };
+        let (time_bound_ms, fastest) = match mode {
+            Mode::Velocity => (bound_ms + RUN_OUT_MS, FASTEST_RPS),
+            Mode::Position => (bound_ms, POSITION_RPS),
         };
         Run {
             kind,
@@ -167,6 +238,8 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
             way: watch.way,
             way_bound: fastest * (bound_ms + f64::from(TIME_CONSTANT.as_micros()) / 1e3) / 1e3,
             unit: "turns",
+            cable,
+            is_ok_wrong: watch.is_ok_wrong,
             complaint,
         }
     });
@@ -181,6 +254,13 @@ struct Watch {
     way: f64,
     /// The master has seen it at standstill.
     has_stood: bool,
+    /// It was wrong about that.
+    is_ok_wrong: bool,
+    /// What was damaged before the cable came back, and before the stop arrived; and when that was,
+    /// in ms, if the node was under a set-point until then.
+    damage: Option<(u64, u64)>,
+    back_ms: f64,
+    is_back: bool,
 }
 
 impl Watch {
@@ -194,5 +274,15 @@ impl Watch {
         if motor.velocity().get().abs() >= 0.05 {
             self.time_ms = f64::from((now - from).as_micros()) / 1e3;
         }
+    }
+
+    /// The cable has been back for so long.
+    fn back(&mut self, is_commanded: bool, damage: u64, since: Duration) {
+        if !self.is_back && (is_commanded || self.damage.is_some()) {
+            let before = self.damage.map_or(damage, |(before, _)| before);
+            self.damage = Some((before, damage));
+            self.back_ms = f64::from(since.as_micros()) / 1e3;
+        }
+        self.is_back |= !is_commanded;
     }
 }

@@ -22,7 +22,7 @@ use axlewire::{
     sim::{Direction, Faults, Line, Rng, Who},
     time::{Duration, Instant},
 };
-use results::{Run, Table};
+use results::{Cable, Run, Table};
 
 /// Seeds of the quick run.
 const QUICK: std::ops::Range<u64> = 0..20;

@@ -71,6 +71,8 @@ pub(crate) fn episode(seed: u64) -> Vec<Run> {
         way,
         way_bound: FASTEST_M_PER_S * (BOUND_MS + 150.0) / 1e3,
         unit: "metres",
+        cable: None,
+        is_ok_wrong: false,
         complaint: None,
     }]
 }
