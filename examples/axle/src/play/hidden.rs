@@ -4,7 +4,7 @@ use axlewire::crc16;
 
 use super::{
     effect::{Effect, Side},
-    playing::{Due, Plan},
+    plan::{Due, Plan},
 };
 use crate::{args::Protocol, failure::Failure};
 

@@ -7,7 +7,7 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use super::playing::Plan;
+use super::plan::Plan;
 use crate::{
     args::Protocol,
     clock,

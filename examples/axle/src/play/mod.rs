@@ -9,6 +9,7 @@ mod effect;
 mod hidden;
 mod lister;
 mod nodes;
+mod plan;
 mod playing;
 mod wheels;
 
@@ -17,8 +18,8 @@ use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals};
 pub(crate) use effect::{Limits, Side, of as effect_of};
 use nodes::Nodes;
+pub(crate) use plan::{Due, Plan};
 use playing::play;
-pub(crate) use playing::{Due, Plan};
 use wheels::Wheels;
 
 /// Sends the frames of a plan.

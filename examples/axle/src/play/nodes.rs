@@ -12,7 +12,8 @@ use axlewire::{
 
 use super::{
     effect::Effect,
-    playing::{Due, Plan, Voice},
+    plan::{Due, Plan},
+    playing::Voice,
 };
 use crate::{
     bus::{self, Boards, Bus},

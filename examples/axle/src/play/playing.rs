@@ -1,50 +1,23 @@
 //! Plays the frames of a plan at their times, and stops what they have moved.
 
-use std::collections::VecDeque;
-
 use axlewire::{
-    ikeya::{self, Mode, three},
+    ikeya::{self, three},
     time::{Duration, Instant, wire_time},
 };
 
 use super::{
-    effect::{Effect, Limits, Side},
+    effect::Effect,
     lister::Lister,
+    plan::{Due, Plan},
 };
 use crate::{
     args::Protocol,
-    bus::MasterArgs,
     failure::{Failure, guarded},
     line::Line,
     listing::Modes,
     signals::{Attendance, Signals},
     teller::Teller,
 };
-
-/// A frame and when to send it.
-#[derive(Clone, Debug)]
-pub(crate) struct Due {
-    /// After the beginning, microseconds.
-    pub(crate) after_us: u64,
-    pub(crate) bytes: Box<[u8]>,
-    /// For a WRITE, the mode that it was meant for, if that is known.
-    pub(crate) meant: Option<Mode>,
-    pub(crate) effect: Effect,
-}
-
-/// What to send, and how.
-pub(crate) struct Plan<'a> {
-    pub(crate) bus: &'a MasterArgs,
-    pub(crate) protocol: Protocol,
-    pub(crate) side: Side,
-    pub(crate) frames: VecDeque<Due>,
-    /// Whether a READ goes behind each WRITE.
-    pub(crate) reads_back: bool,
-    /// How long to listen after the last frame, microseconds; motors keep moving meanwhile.
-    pub(crate) linger_us: u64,
-    pub(crate) limits: Limits,
-    pub(crate) is_json: bool,
-}
 
 /// Who speaks on the line: decides whether what is due may leave, and when.
 pub(super) trait Voice: Sized {

@@ -4,7 +4,8 @@ use axlewire::{time::Instant, ucp::host::HostConfig};
 
 use super::{
     effect::{Effect, Side},
-    playing::{Due, Plan, Voice},
+    plan::{Due, Plan},
+    playing::Voice,
 };
 use crate::{failure::Failure, line::Line, rover::Rover, signals::Signals};
 

@@ -1,0 +1,33 @@
+//! What to send, and when.
+
+use std::collections::VecDeque;
+
+use axlewire::ikeya::Mode;
+
+use super::effect::{Effect, Limits, Side};
+use crate::{args::Protocol, bus::MasterArgs};
+
+/// A frame and when to send it.
+#[derive(Clone, Debug)]
+pub(crate) struct Due {
+    /// After the beginning, microseconds.
+    pub(crate) after_us: u64,
+    pub(crate) bytes: Box<[u8]>,
+    /// For a WRITE, the mode that it was meant for, if that is known.
+    pub(crate) meant: Option<Mode>,
+    pub(crate) effect: Effect,
+}
+
+/// What to send, and how.
+pub(crate) struct Plan<'a> {
+    pub(crate) bus: &'a MasterArgs,
+    pub(crate) protocol: Protocol,
+    pub(crate) side: Side,
+    pub(crate) frames: VecDeque<Due>,
+    /// Whether a READ goes behind each WRITE.
+    pub(crate) reads_back: bool,
+    /// How long to listen after the last frame, microseconds; motors keep moving meanwhile.
+    pub(crate) linger_us: u64,
+    pub(crate) limits: Limits,
+    pub(crate) is_json: bool,
+}
