@@ -113,10 +113,10 @@
 //!   mode changes and the set-point ends. While in doubt, nothing is written or confirmed,
 //!   set-points are refused, and a stop waits, unless it holds a position, measured after the stop
 //!   was requested, that a velocity node would read as standstill (rotation 0..=12287). Six
-//!   exchanges without a decision produce an event, and the node is then read at the search rate.
-//!   A WRITE of which only a part has left when a doubt arises is given up. A mode that changes
-//!   owes a stop to every node that has ever had a WRITE, whatever was stopped or released since:
-//!   a repeated 0 rps may have been read as "go to 0".
+//!   exchanges without a decision produce an event, and the node is then read at the search rate. A
+//!   WRITE of which only a part has left when a doubt arises is given up. A mode that changes owes
+//!   a stop to every node that has ever had a WRITE, whatever was stopped or released since: a
+//!   repeated 0 rps may have been read as "go to 0".
 //! * **I12** A stop is owed from the call until the node is *seen to be still*. It is *confirmed*
 //!   once two stop WRITEs have each been followed by an answer from the node in its mode; until
 //!   then set-points are refused. The node is *still* once two answers behind a stop WRITE, at

@@ -1,4 +1,5 @@
-//! Stops through a driver: `Ok` only for a motor that is still, and `drive_for` ends with one (I12).
+//! Stops through a driver: `Ok` only for a motor that is still, and `drive_for` ends with one
+//! (I12).
 
 use crate::rig::*;
 

@@ -70,7 +70,8 @@ pub(crate) struct Account {
     /// The position that the node was told to hold, and whether another one is allowed.
     hold: Option<Position>,
     pub(crate) may_hold_anew: bool,
-    /// How often the node has measured a position for this stop, and when the last ones were heard.
+    /// How often the node has measured a position for this stop, and when the last ones were
+    /// heard.
     places_heard: u32,
     places_heard_at: [Option<(i16, Instant)>; 4],
     pub(crate) confirm: Confirm,

@@ -77,7 +77,8 @@ impl Read for Flaky {
 impl Write for Flaky {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         check(self.faults().write)?;
-        // Without the time on the line, a bus that is read as fast as possible would stop the clock.
+        // Without the time on the line, a bus that is read as fast as possible would stop the
+        // clock.
         clock::sleep(Duration::from_micros(20 * bytes.len() as u64));
         self.wire.borrow_mut().write(bytes)
     }

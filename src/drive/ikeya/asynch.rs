@@ -46,8 +46,8 @@ where
     /// and port errors, even if only its receiver failed. After any of them but a refusal the
     /// command is withdrawn: neither it nor its rest is sent later, and **the node is owed a stop**
     /// (ruling I12), because it may have heard the command. Keep calling the driver, or call
-    /// [`stop_async`](Self::stop_async), until the stop is confirmed: until then, set-points are refused
-    /// with [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
+    /// [`stop_async`](Self::stop_async), until the stop is confirmed: until then, set-points are
+    /// refused with [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
     pub async fn set_velocity_async(
         &mut self,
         node: NodeId,
@@ -122,8 +122,8 @@ where
     ///
     /// # Errors
     ///
-    /// Those of [`stop_async`](Self::stop_async), with all nodes that they concern. The stops owed include
-    /// ids that have never answered: only you know whether they
+    /// Those of [`stop_async`](Self::stop_async), with all nodes that they concern. The stops owed
+    /// include ids that have never answered: only you know whether they
     /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
     pub async fn stop_all_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();

@@ -38,8 +38,8 @@ pub struct MasterConfig {
     /// When nodes are read.
     pub polling: Polling,
     /// Search rate: share of line time spent on finding abnormal nodes while online nodes have
-    /// requests due, percent. An idle line is searched all the time. 0 searches only for nodes that
-    /// are owed a stop, at 1 %; more than 50 counts as 50 (I13).
+    /// requests due, percent. An idle line is searched all the time. 0 searches only for nodes
+    /// that are owed a stop, at 1 %; more than 50 counts as 50 (I13).
     pub recovery_share_pct: u8,
     /// Whether this is a 2-wire line whose adapter hears its own bytes: the echo is then removed.
     pub removes_echo: bool,
@@ -74,8 +74,8 @@ pub enum Polling {
     Fastest,
     /// Each node once per period; its set-point is repeated at the same rate.
     Every(Duration),
-    /// Only on request; a set-point is then sent when it is given and with each read. A node that is
-    /// owed a stop is read and stopped in any case, until it is still (I12).
+    /// Only on request; a set-point is then sent when it is given and with each read. A node that
+    /// is owed a stop is read and stopped in any case, until it is still (I12).
     Manual,
 }
 

@@ -342,14 +342,15 @@ impl<B: Board> Node<B> {
         }
     }
 
-    /// Whether it was heard before, is owed a stop, and has not had the attempt that is made at once
-    /// while it is not online.
+    /// Whether it was heard before, is owed a stop, and has not had the attempt that is made at
+    /// once while it is not online.
     fn awaits_lost_stop(&self) -> bool {
         self.is_abnormal() && self.has_attempts(1)
     }
 
-    /// Whether it is owed a stop that needs its answer, and is asked at any search rate: a node that
-    /// was heard before and gets no stop blind, or one that never was and has attempts left.
+    /// Whether it is owed a stop that needs its answer, and is asked at any search rate: a node
+    /// that was heard before and gets no stop blind, or one that never was and has attempts
+    /// left.
     pub(super) fn is_sought_first(&self, config: &MasterConfig) -> bool {
         if self.health.is_none() {
             return self.has_attempts(config.attempts.max(1));
@@ -367,9 +368,9 @@ impl<B: Board> Node<B> {
         self.attempt > 0 || self.is_asked || self.order.awaits_confirmation()
     }
 
-    /// Its request for this reason. In the cycle a node gets its set-point, then a READ. A node that
-    /// is not online gets its stop blind, apart from its READs; where a WRITE is answered, instead
-    /// of them.
+    /// Its request for this reason. In the cycle a node gets its set-point, then a READ. A node
+    /// that is not online gets its stop blind, apart from its READs; where a WRITE is answered,
+    /// instead of them.
     pub(super) fn request(&self, reason: Reason) -> Request<B> {
         let target = match reason {
             Reason::StopRead | Reason::Discovery => None,

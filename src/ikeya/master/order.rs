@@ -475,8 +475,8 @@ impl<B: Board> Stop<B> {
         self.written_at = Some(now);
     }
 
-    /// The application asks again: it is told again, `coast` later, that the node still moves. Asking
-    /// often must not postpone that.
+    /// The application asks again: it is told again, `coast` later, that the node still moves.
+    /// Asking often must not postpone that.
     fn join(&mut self, now: Instant) {
         self.is_released = false;
         if core::mem::take(&mut self.is_told) {

@@ -53,8 +53,8 @@ pub(super) struct Queue {
     discovery: Option<Discovery>,
     /// Time before which no abnormal node is searched for.
     search_at: Option<Instant>,
-    /// Index of the node searched for last, among those that were heard before and are owed a stop,
-    /// and among the others.
+    /// Index of the node searched for last, among those that were heard before and are owed a
+    /// stop, and among the others.
     searched_lost: usize,
     searched: usize,
     /// Whether the last one was of the former.
@@ -153,8 +153,8 @@ impl Queue {
         self.discovery_or_cycle(view).or(sought)
     }
 
-    /// The next request of the search, at the search rate, or with every round while a node that gets
-    /// no stop blind is owed one: its motor may be running.
+    /// The next request of the search, at the search rate, or with every round while a node that
+    /// gets no stop blind is owed one: its motor may be running.
     fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
         let is_time = self.search_at.is_none_or(|at| view.now >= at);
         let is_time = is_time || view.nodes.iter().any(|it| it.is_sought_first(view.config));
@@ -234,9 +234,9 @@ impl Queue {
         })
     }
 
-    /// Nodes that have had their turn, one bit each; a regular request is always for the next round.
-    /// A stop WRITE is followed by a READ before it is repeated, so it needs no turn of its own
-    /// unless it is answered; on a slow line a READ has to be waited for.
+    /// Nodes that have had their turn, one bit each; a regular request is always for the next
+    /// round. A stop WRITE is followed by a READ before it is repeated, so it needs no turn of
+    /// its own unless it is answered; on a slow line a READ has to be waited for.
     const fn served<B: Board>(&self, reason: Reason, round: Round) -> u8 {
         match (reason, round) {
             (Reason::Repeat, _) if !B::ANSWERS_WRITE => self.had_repeat,

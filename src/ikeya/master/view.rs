@@ -95,8 +95,8 @@ impl<B: Board> Master<B> {
         self.line.decoder().counters()
     }
 
-    /// The set-point that is repeated for a node, or that of its confirmed stop; `None` without one and
-    /// while a stop is not confirmed.
+    /// The set-point that is repeated for a node, or that of its confirmed stop; `None` without one
+    /// and while a stop is not confirmed.
     #[must_use]
     pub fn set_point(&self, node: NodeId) -> Option<Target<B>> {
         self.node(node).order().target()

@@ -43,9 +43,9 @@ pub struct HostConfig {
     /// Time after which a ping without a pong counts as lost; 500 ms. The next ping waits until
     /// then: a pong does not say which ping it answers.
     pub ping_timeout: Duration,
-    /// Time without a valid frame after which the link is down and the robot is told to stand still
-    /// (rulings U10 and U16); 500 ms. On a line on which the robot cannot answer, it is the time
-    /// for which it is driven at all.
+    /// Time without a valid frame after which the link is down and the robot is told to stand
+    /// still (rulings U10 and U16); 500 ms. On a line on which the robot cannot answer, it is
+    /// the time for which it is driven at all.
     pub link_timeout: Duration,
     /// Longest time for the acknowledgement of a calibration request, from the end of the request
     /// on the wire; 200 ms.

@@ -54,8 +54,8 @@ pub(crate) struct Wire {
     last_us: u64,
     /// When the first write of the open frame began.
     pub(crate) begun_us: u64,
-    /// The same as `last_us` if each byte had left when its write began. The truth, unknown to a driver, lies
-    /// between.
+    /// The same as `last_us` if each byte had left when its write began. The truth, unknown to a
+    /// driver, lies between.
     early_us: u64,
     /// The frame may have paused too long.
     is_doubtful: bool,

@@ -38,8 +38,8 @@ impl Nodes {
         }
     }
 
-    /// Whether the last command of a node is to stand still: a small speed, or a position of its own
-    /// in turn 3, where no set-point is.
+    /// Whether the last command of a node is to stand still: a small speed, or a position of its
+    /// own in turn 3, where no set-point is.
     pub(super) fn is_told_to_stop(&self, index: usize) -> bool {
         let told = self.told[index];
         match self.is_position[index] {
