@@ -128,7 +128,7 @@ impl<B: Board> Node<B> {
             last_failure: None,
             has_answered: false,
             has_failed: false,
-            order: Order::NONE,
+            order: Order::new(),
             guarded_until: None,
             read_due: None,
             status: None,

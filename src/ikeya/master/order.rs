@@ -64,12 +64,15 @@ enum Confirm {
 }
 
 impl<B: Board> Order<B> {
-    pub(super) const NONE: Self = Self {
-        state: State::None,
-        confirm: Confirm::Unasked,
-        is_written: false,
-        was_written: false,
-    };
+    // Not a constant: it would be copied from a table in flash.
+    pub(super) const fn new() -> Self {
+        Self {
+            state: State::None,
+            confirm: Confirm::Unasked,
+            is_written: false,
+            was_written: false,
+        }
+    }
 
     /// Takes a new set-point; the latest wins.
     pub(super) fn aim(&mut self, target: Target<B>) {
