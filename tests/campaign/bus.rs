@@ -1,5 +1,5 @@
-//! An episode on a bus, direct or behind a USB adapter: up to eight motors, a plug that may be
-//! loose, and a stop.
+//! An episode on a bus, direct or behind a USB adapter: one to eight motors, of which the master
+//! does not know how many there are, a plug that may be loose, and a stop.
 
 use axlewire::{
     ikeya::{
@@ -141,8 +141,8 @@ impl Episode {
         }
     }
 
-    /// Time in which the search finds each of these nodes again: two windows for each and as much
-    /// for the nodes that answer, and four windows for what is in progress.
+    /// Time in which the search finds each of these nodes again: two windows for each, as much for
+    /// the nodes that answer in between, and four windows for what is in progress.
     fn search_ms(&self, silent: usize) -> f64 {
         let window_ms = if self.is_adapter { 20.4 } else { 0.8 };
         4.0 * window_ms * (silent + 1) as f64 + 1.0
@@ -256,8 +256,8 @@ struct Watch {
     has_stood: bool,
     /// It was wrong about that.
     is_ok_wrong: bool,
-    /// What was damaged before the cable came back, and before the stop arrived; and when that
-    /// was, in ms, if the node was under a set-point until then.
+    /// What was damaged before the cable came back, and before the stop arrived; and when that was,
+    /// in ms, if the node was under a set-point until then.
     damage: Option<(u64, u64)>,
     back_ms: f64,
     is_back: bool,

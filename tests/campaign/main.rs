@@ -1,5 +1,6 @@
 //! A stop at a random moment on a line with every fault at once: how long and how far each motor
-//! still moves, compared with the bounds on the safety page.
+//! still moves, compared with the bounds on the safety page; when a stop reaches a node whose cable
+//! is back; and whether a motor that is seen to be still is told to be.
 //!
 //! Twenty episodes of each kind run with the other tests. To run all 50,000 of each kind and print
 //! the table:

@@ -9,9 +9,12 @@
 //! # Actions
 //!
 //! * Calls: set-point, stop, stop of all, release, confirm, read, discovery, sign of life.
-//! * Packets: arrive, are lost, are refused by the port, cut off, or not flushed.
+//! * Packets: arrive, are lost, also a WRITE whose READ is answered, any number of times, are
+//!   refused by the port, cut off, taken in parts with a late answer between them, or not flushed.
 //! * Answers: correct, missing, late, damaged, from another node, left over from an older request,
 //!   in another mode because the switch was moved.
+//! * Motors do what their node was last told: an answer shows a speed, or a place where the shaft
+//!   was never before, until that is a stop. `Ok` and `StandingStill` are true only then.
 //! * Nodes restart; time passes: briefly, up to a deadline, 1 us past it, 10 s.
 //!
 //! On UCP:

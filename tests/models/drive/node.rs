@@ -18,8 +18,8 @@ fn moves(frame: &[u8]) -> bool {
     frame[0] == 0xBB && !is_of(Mode::Velocity) && !is_of(Mode::Position)
 }
 
-/// Whether this is the payload of a stop: 0 rps, or the node's own rotation, 1, which read as a
-/// speed is as good as 0 rps.
+/// Whether this is the payload of a stop: 0 rps, or the node's own rotation, 1, which as a speed is
+/// as good as 0 rps.
 pub(crate) fn is_stop(mode: Mode, payload: &[u8]) -> bool {
     match mode {
         Mode::Velocity => payload == [0; 4] || payload[2..] == [1, 0],

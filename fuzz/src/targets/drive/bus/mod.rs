@@ -35,58 +35,23 @@ struct Setup {
 #[derive(Arbitrary, Clone, Copy, Debug)]
 enum Do {
     Service,
-    NextEvent {
-        ms: u8,
-    },
-    RunUntil {
-        ms: u8,
-    },
+    NextEvent { ms: u8 },
+    RunUntil { ms: u8 },
     Discover,
-    SetVelocity {
-        node: NodeId,
-        rps: i8,
-    },
-    SetPosition {
-        node: NodeId,
-        turns: i8,
-    },
-    DriveFor {
-        node: NodeId,
-        rps: i8,
-        ms: u8,
-    },
-    Read {
-        node: NodeId,
-    },
-    Stop {
-        node: NodeId,
-    },
+    SetVelocity { node: NodeId, rps: i8 },
+    SetPosition { node: NodeId, turns: i8 },
+    DriveFor { node: NodeId, rps: i8, ms: u8 },
+    Read { node: NodeId },
+    Stop { node: NodeId },
     StopAll,
-    /// From now on, WRITEs reach these nodes damaged, one bit each.
-    Deafen {
-        nodes: u8,
-    },
+    Deafen { nodes: u8 },
     Discard,
-    Fault {
-        call: Call,
-        fault: Fault,
-    },
+    Fault { call: Call, fault: Fault },
     Heal,
-    Pass {
-        units: u16,
-    },
-    Noise {
-        bytes: [u8; 3],
-    },
-    Switch {
-        node: NodeId,
-        is_there: bool,
-        is_position: bool,
-    },
-    Request {
-        node: NodeId,
-        rps: Option<i8>,
-    },
+    Pass { units: u16 },
+    Noise { bytes: [u8; 3] },
+    Switch { node: NodeId, is_there: bool, is_position: bool },
+    Request { node: NodeId, rps: Option<i8> },
 }
 
 pub(crate) fn bus(data: &[u8], tally: &mut Tally) {
