@@ -142,10 +142,11 @@ impl Episode {
     }
 
     /// Time in which the search finds each of these nodes again: two windows for each, as much for
-    /// the nodes that answer in between, and four windows for what is in progress.
+    /// the nodes that answer in between, four for what is in progress, and 4 ms for silent WRITEs
+    /// in between and for the look once a millisecond.
     fn search_ms(&self, silent: usize) -> f64 {
         let window_ms = if self.is_adapter { 20.4 } else { 0.8 };
-        4.0 * window_ms * (silent + 1) as f64 + 1.0
+        4.0 * window_ms * (silent + 1) as f64 + 4.0
     }
 
     /// Number of bytes that it and the master could not read.

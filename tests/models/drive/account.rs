@@ -37,7 +37,7 @@ pub(super) struct Before {
     /// The role refuses this call's set-point.
     pub(super) is_refused: bool,
     /// The node is owed nothing but to become still: a stop joins that.
-    is_coasting: bool,
+    pub(super) is_coasting: bool,
     /// Nothing prevents the call from succeeding.
     pub(super) is_clear: bool,
     /// The same, except for transient errors.

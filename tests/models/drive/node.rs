@@ -119,7 +119,7 @@ impl Peer for Ear {
         let mut after_us = 50;
         match answer {
             None => {}
-            Some(Answer::Other) => after_us = 600,
+            Some(Answer::Other) => after_us = 540,
             Some(Answer::Late) => after_us = 800,
             Some(Answer::Lost) => bytes.clear(),
             Some(Answer::Damaged) => bytes[4] ^= 0x10,

@@ -65,7 +65,8 @@ impl<P: Wired> MasterLife<P> {
             return Err(format!("Ok of {call:?}, but the node obeys {told:?}"));
         }
         if outcome == Err(Told::Moving) {
-            let is_early = took_us < u64::from(COAST.as_micros());
+            // A call may join a stop that is confirmed, and its time to become still.
+            let is_early = took_us < u64::from(COAST.as_micros()) && !before.is_coasting;
             if is_early || is_owed || !self.driver.role().coasting().contains(N1) {
                 return Err("StillMoving too early".into());
             }

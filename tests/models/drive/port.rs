@@ -274,8 +274,8 @@ impl embedded_io::Read for Shared {
 }
 
 pub(super) const SECOND_US: u64 = 1_000_000;
-/// Half a WRITE, and most of a pause.
-pub(super) const PART_US: u64 = 150;
+/// Most of the longest pause inside a frame.
+pub(super) const PART_US: u64 = 70;
 
 impl embedded_io::Write for Shared {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Broken> {
