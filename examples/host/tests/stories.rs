@@ -105,7 +105,7 @@ fn the_captures_are_what_the_program_writes_byte_for_byte() {
     for name in names {
         let written = fs::read(folder.join(&name)).unwrap();
         let kept = fs::read(Path::new(CAPTURES).join(&name)).unwrap();
-        assert!(kept.len() < 110_000, "{name:?} has {} bytes", kept.len());
+        assert!(kept.len() < 150_000, "{name:?} has {} bytes", kept.len());
         // Not assert_eq, which would print them all.
         assert!(
             written == kept,
@@ -133,19 +133,19 @@ fn a_folder_that_is_missing_or_not_given_is_one_line_and_leaves_no_file() {
 fn every_byte_of_the_motors_is_in_a_frame_or_in_a_gap_with_its_reason() {
     let motors = decode("motors");
     let expected = [
-        ("in", "position_response", 333),
-        ("in", "velocity_response", 319),
-        ("out", "read_request", 730),
-        ("out", "write", 682),
+        ("in", "position_response", 341),
+        ("in", "velocity_response", 519),
+        ("out", "read_request", 973),
+        ("out", "write", 943),
     ];
     assert_eq!(motors.kinds(), expected);
     let summary = &motors.summary;
-    assert_eq!((&summary["frames"], &summary["pending"]), (&2064.into(), &0.into()));
-    let skipped = serde_json::json!({"header": 236, "id": 8, "crc": 30});
-    assert_eq!((&summary["skipped"], &summary["skipped_by"]), (&274.into(), &skipped));
+    assert_eq!((&summary["frames"], &summary["pending"]), (&2776.into(), &0.into()));
+    let skipped = serde_json::json!({"header": 228, "id": 8, "crc": 23});
+    assert_eq!((&summary["skipped"], &summary["skipped_by"]), (&259.into(), &skipped));
     assert!(motors.lines.is_sorted_by(|one, other| one.at <= other.at));
     let end = motors.lines.last().unwrap().at;
-    assert!((10.4..10.5).contains(&end), "{end}");
+    assert!((10.2..10.3).contains(&end), "{end}");
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn noise_damages_answers_for_six_tenths_of_a_second_and_a_board_with_a_wrong_id_
     let (noise, others): (Vec<_>, Vec<_>) =
         gaps.iter().partition(|(at, ..)| (4.4..5.05).contains(at));
     let with = |wanted: &str| noise.iter().filter(|(_, _, reason)| *reason == wanted).count();
-    assert_eq!((noise.len(), with("crc"), with("header")), (16, 12, 4));
+    assert_eq!((noise.len(), with("crc"), with("header")), (18, 13, 5));
     let [(at, _, reason)] = others[..] else { panic!("{others:?}") };
     assert!((6.2..6.21).contains(&at) && reason == "id", "{others:?}");
 }
@@ -199,7 +199,7 @@ fn node_6_answers_late_once_and_all_other_answers_are_on_time() {
         }
     }
     let [(Some(6), at, response_us)] = late[..] else { panic!("{late:?}") };
-    assert!((5.6..5.61).contains(&at) && (500.0..1000.0).contains(&response_us), "{late:?}");
+    assert!((5.6..5.75).contains(&at) && (500.0..1000.0).contains(&response_us), "{late:?}");
 }
 
 #[test]
@@ -286,11 +286,11 @@ fn the_robot_stops_by_itself_and_the_host_resumes_when_the_link_has_lasted() {
     assert!(wheels(8.4, 8.65).iter().all(|rpm| *rpm > 80));
     // It hears nothing, while the host goes on until the link is down, half a second later.
     assert!(speeds(8.65, 9.16).iter().all(|speed| *speed == 70.0));
-    assert!(speeds(9.16, 10.31).iter().all(|speed| *speed == 0.0));
+    assert!(speeds(9.16, 10.3).iter().all(|speed| *speed == 0.0));
     let back = wheels(9.55, 10.3);
     assert!(back.len() > 30 && back.iter().all(|rpm| *rpm < 6), "{back:?}");
     assert_eq!(back.last(), Some(&0));
-    assert_eq!(speeds(10.31, 10.5), [70.0, 70.0]);
+    assert_eq!(speeds(10.3, 10.5), [70.0, 70.0]);
     assert!(wheels(11.0, 12.0).iter().all(|rpm| *rpm > 80));
 }
 
