@@ -277,57 +277,53 @@ impl<B: Board> Node<B> {
         config: &MasterConfig,
         now: Instant,
     ) -> Option<Instant> {
+        // An answered WRITE waits, like a READ, until no late answer can arrive.
+        let is_apart = matches!(
+            reason,
+            Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::Repeat | Reason::SetPoint
+        );
+        let guard = self.guarded_until.filter(|_| B::ANSWERS_WRITE || !is_apart);
+        let turn = match reason {
+            Reason::Repeat => self.order.stop_unseen().and_then(Stop::repeat_at),
+            Reason::Cycle if !self.is_wanted() => self.cycle_at(config),
+            _ => None,
+        };
+        let at = turn.max(guard).unwrap_or(now);
+        self.has(reason, config).then_some(at)
+    }
+
+    /// Whether there is a request for this reason, now or later.
+    fn has(&self, reason: Reason, config: &MasterConfig) -> bool {
         let (stop, write) = (self.order.stop_owed(), self.stop_write());
         let (is_online, is_in_doubt) = (self.is_online(), self.mode.is_in_doubt());
-        // An answered WRITE waits, like a READ, until no late answer can arrive.
-        let write_at = self.guarded_until.filter(|_| B::ANSWERS_WRITE);
-        let mut at = self.guarded_until;
-        let is_wanted = match reason {
-            Reason::Hold | Reason::SpeedStop | Reason::Stop => {
-                at = write_at;
-                is_online
-                    && match reason {
-                        Reason::Hold => write.is_some() && stop.is_some_and(Stop::is_measured),
-                        Reason::SpeedStop => matches!(write, Some(Target::Velocity(_))),
-                        _ => write.is_some(),
-                    }
+        match reason {
+            Reason::Hold => is_online && write.is_some() && stop.is_some_and(Stop::is_measured),
+            Reason::SpeedStop => is_online && matches!(write, Some(Target::Velocity(_))),
+            Reason::Stop => is_online && write.is_some(),
+            Reason::Repeat if is_in_doubt => false,
+            // The first WRITE to a node that is online has another reason.
+            Reason::Repeat if is_online => {
+                self.order.stop_unseen().is_some_and(|stop| stop.repeat_at().is_some())
             }
             Reason::Repeat => {
-                let repeat_at = self.order.stop_unseen().and_then(Stop::repeat_at);
-                at = repeat_at.max(write_at);
-                // The first WRITE to a node that is online has another reason.
-                let is_due = match is_online {
-                    true => repeat_at.is_some(),
-                    false => {
-                        let is_blind = matches!(self.stop_target(), Some(Target::Velocity(_)));
-                        !B::ANSWERS_WRITE && stop.is_some() && is_blind
-                    }
-                };
-                is_due && !is_in_doubt
+                let is_blind = matches!(self.stop_target(), Some(Target::Velocity(_)));
+                !B::ANSWERS_WRITE && stop.is_some() && is_blind
             }
             Reason::StopRead => is_online && (is_in_doubt || stop.is_some() && write.is_none()),
             Reason::LostStop => self.awaits_lost_stop(),
-            Reason::SetPoint => {
-                at = write_at;
-                self.order.is_new() && !is_in_doubt
-            }
+            Reason::SetPoint => self.order.is_new() && !is_in_doubt,
             Reason::Search => {
                 let is_sought = self.is_abnormal() && config.recovery_share_pct > 0;
                 !is_online && (stop.is_some() || is_sought)
             }
             Reason::Cycle => {
-                let is_wanted = self.is_wanted();
-                if !is_wanted {
-                    at = self.cycle_at(config).max(at);
-                }
-                let is_polled = is_wanted
+                let is_polled = self.is_wanted()
                     || config.polling != Polling::Manual
                     || self.order.coasting().is_some();
                 is_online && is_polled && stop.is_none() && !is_in_doubt
             }
             Reason::Discovery => true,
-        };
-        is_wanted.then(|| at.unwrap_or(now))
+        }
     }
 
     /// Its turn in the cycle; `None` for at once. Until it is still after a stop, it is read every
