@@ -66,13 +66,16 @@ pub(super) enum Reason {
     LostStop,
     SetPoint,
     Discovery,
+    /// The search for a node that was heard before and is owed a stop.
+    SearchLost,
+    /// The search for any other.
     Search,
     Cycle,
 }
 
 impl Reason {
     /// The urgent reasons by priority, then the rest.
-    pub(super) const ALL: [Self; 10] = [
+    pub(super) const ALL: [Self; 11] = [
         Self::Hold,
         Self::SpeedStop,
         Self::Stop,
@@ -81,6 +84,7 @@ impl Reason {
         Self::LostStop,
         Self::SetPoint,
         Self::Discovery,
+        Self::SearchLost,
         Self::Search,
         Self::Cycle,
     ];
@@ -96,6 +100,13 @@ impl Reason {
                 | Self::StopRead
                 | Self::LostStop
         )
+    }
+}
+
+impl Reason {
+    /// Whether it is for the search.
+    pub(super) const fn is_search(self) -> bool {
+        matches!(self, Self::SearchLost | Self::Search)
     }
 }
 
@@ -312,10 +323,12 @@ impl<B: Board> Node<B> {
             Reason::StopRead => is_online && (is_in_doubt || stop.is_some() && write.is_none()),
             Reason::LostStop => self.awaits_lost_stop(),
             Reason::SetPoint => self.order.is_new() && !is_in_doubt,
-            Reason::Search => {
-                let is_sought = self.is_abnormal() && config.recovery_share_pct > 0;
-                !is_online && (stop.is_some() || is_sought)
-            }
+            Reason::SearchLost => self.is_lost(),
+            Reason::Search if is_online => false,
+            Reason::Search => match self.health {
+                None => stop.is_some(),
+                Some(_) => stop.is_none() && config.recovery_share_pct > 0,
+            },
             Reason::Cycle => {
                 let is_polled = self.is_wanted()
                     || config.polling != Polling::Manual
@@ -370,7 +383,7 @@ impl<B: Board> Node<B> {
     pub(super) fn request(&self, reason: Reason) -> Request<B> {
         let target = match reason {
             Reason::StopRead | Reason::Discovery => None,
-            Reason::LostStop | Reason::Search if !B::ANSWERS_WRITE => None,
+            Reason::LostStop | Reason::SearchLost | Reason::Search if !B::ANSWERS_WRITE => None,
             Reason::Repeat => self.stop_target(),
             Reason::Cycle if self.order.is_written() => None,
             Reason::SetPoint | Reason::Cycle => self.order.target(),

@@ -164,15 +164,9 @@ impl Queue {
     /// The next request of the search. Nodes that were heard before and are owed a stop have every
     /// other turn.
     fn search<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
-        let is_lost = |index: usize| u8::from(view.nodes[index].is_lost()) << index;
-        let lost = (0..8).fold(0, |lost, index| lost | is_lost(index));
-        let mut turns = [(self.searched_lost, !lost), (self.searched, lost)];
-        if self.was_lost {
-            turns.reverse();
-        }
-        turns.into_iter().find_map(|(last, others)| {
-            self.next_of(Reason::Search, last + 1, view, Round::Next, others)
-        })
+        let lost = || self.next_for(Reason::SearchLost, self.searched_lost + 1, view, Round::Next);
+        let other = || self.next_for(Reason::Search, self.searched + 1, view, Round::Next);
+        if self.was_lost { other().or_else(lost) } else { lost().or_else(other) }
     }
 
     fn discovery_or_cycle<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
@@ -249,12 +243,10 @@ impl Queue {
         }
     }
 
-    /// Advances the turns past a request that has been handed out, to a node that `is_lost` or not.
-    /// `exchange` is the time of one with a node that does not answer.
+    /// Advances the turns past a request that has been handed out. `exchange` is the time of one with a node that does not answer.
     pub(super) fn book<B: Board>(
         &mut self,
         choice: &Choice<B>,
-        is_lost: bool,
         exchange: Duration,
         config: &MasterConfig,
         now: Instant,
@@ -269,7 +261,7 @@ impl Queue {
         // A silent WRITE of the cycle is followed by its READ; only the READ ends the round.
         if choice.round == Round::Next && is_exchange {
             (self.had_stop, self.had_set_point) = (0, 0);
-            self.was_search = choice.reason == Reason::Search;
+            self.was_search = choice.reason.is_search();
         }
         match choice.reason {
             Reason::SetPoint => {
@@ -279,13 +271,13 @@ impl Queue {
             // The node has yet to be read.
             _ if !is_exchange => {}
             Reason::Discovery => {}
-            Reason::Search => {
+            Reason::SearchLost | Reason::Search => {
                 let share = config.recovery_share_pct.clamp(LEAST_SHARE_PCT, 50);
                 let whole = exchange.saturating_mul(100).as_micros();
                 let pause = whole.checked_div(share.into()).unwrap_or(u32::MAX);
                 self.search_at = Some(now + Duration::from_micros(pause));
-                self.was_lost = is_lost;
-                match is_lost {
+                self.was_lost = choice.reason == Reason::SearchLost;
+                match self.was_lost {
                     true => self.searched_lost = index,
                     false => self.searched = index,
                 }
@@ -309,7 +301,7 @@ impl Queue {
     /// A request for this reason has not left: it is due again.
     pub(super) fn take_back(&mut self, reason: Reason) {
         self.take_back_writes();
-        if reason == Reason::Search {
+        if reason.is_search() {
             self.search_at = None;
         }
     }

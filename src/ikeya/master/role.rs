@@ -308,8 +308,8 @@ impl<B: Board> Master<B> {
         let choice = self.queue.choose(self.view()).filter(|it| self.line.takes(it, now))?;
         self.line.send(choice, &self.config, &mut self.statistics, now)?;
         let exchange = self.line.window_time(&self.config) + self.config.turnaround_gap;
+        self.queue.book(&choice, exchange, &self.config, now);
         let node = &mut self.nodes[index_of(choice.node)];
-        self.queue.book(&choice, node.is_lost(), exchange, &self.config, now);
         if matches!(choice.request, Request::Write(_)) {
             node.wrote(now);
         }
