@@ -4,7 +4,7 @@
 use heapless::Vec;
 
 use super::{
-    config::MasterConfig, event::Cause, node::Request, queue::Choice, statistics::MasterStatistics,
+    config::MasterConfig, event::Cause, node::Request, queue::Turn, statistics::MasterStatistics,
 };
 use crate::{
     encode::Encode,
@@ -70,7 +70,8 @@ enum Held {
 /// The request handed out last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sent<B: Board> {
-    pub(super) choice: Choice<B>,
+    pub(super) turn: Turn,
+    pub(super) request: Request<B>,
     /// Whether its window is open.
     pub(super) is_open: bool,
     /// Earliest time at which its first byte could leave.
@@ -172,34 +173,35 @@ impl<B: Board> Line<B> {
 
     /// Whether this one may. Right behind a WRITE: only what cannot pile up, a READ, or one stop
     /// for each node.
-    pub(super) fn takes(&self, choice: &Choice<B>, now: Instant) -> bool {
-        let is_set_point = !matches!(choice.request, Request::Read) && !choice.reason.is_stop();
+    pub(super) fn takes(&self, turn: Turn, request: &Request<B>, now: Instant) -> bool {
+        let is_set_point = !matches!(request, Request::Read) && !turn.reason.is_stop();
         self.is_free(now) || !is_set_point
     }
 
     /// Hands out a request; an exchange opens its window, and drops the bytes received before.
     pub(super) fn send(
         &mut self,
-        choice: Choice<B>,
+        turn: Turn,
+        request: Request<B>,
         config: &MasterConfig,
         statistics: &mut MasterStatistics,
         now: Instant,
     ) -> Option<()> {
-        let len = self.encode(&choice)?;
+        let len = self.encode(turn.node, &request)?;
         let start = self.free_at.map_or(now, |free| free.max(now));
-        let is_open = choice.request.is_exchange();
-        self.sent = Some(Sent { choice, is_open, start, len });
+        let is_open = request.is_exchange();
+        self.sent = Some(Sent { turn, request, is_open, start, len });
         let request_end = start + wire_time(len, config.baud);
         self.free_at = Some(request_end + config.turnaround_gap);
         self.is_behind_write = !is_open && config.turnaround_gap == Duration::ZERO;
-        count_apart(counter(&choice.request, statistics));
+        count_apart(counter(&request, statistics));
         if config.removes_echo {
             self.echo.expect(self.packet.get(..len)?);
         }
         if is_open {
             self.drop_stale_bytes(statistics);
             let deadline = request_end + self.answer_time(config);
-            let (node, heard) = (choice.node, Heard::Nothing);
+            let (node, heard) = (turn.node, Heard::Nothing);
             self.window = Some(Window { node, request_end, deadline, heard });
             if self.held != Held::Nothing {
                 self.held = Held::Several;
@@ -219,9 +221,9 @@ impl<B: Board> Line<B> {
     }
 
     /// Encodes the request into the buffer that is handed out; returns its length.
-    fn encode(&mut self, choice: &Choice<B>) -> Option<usize> {
-        let (id, buffer) = (choice.node, &mut self.packet);
-        let bytes = match choice.request {
+    fn encode(&mut self, id: NodeId, request: &Request<B>) -> Option<usize> {
+        let buffer = &mut self.packet;
+        let bytes = match *request {
             Request::Read => ReadRequest::new(id).encode(buffer),
             Request::Write(Target::Velocity(to)) => B::write_velocity(id, to).encode(buffer),
             Request::Write(Target::Position(to)) => B::write_position(id, to).encode(buffer),
@@ -261,7 +263,7 @@ impl<B: Board> Line<B> {
             self.free_at = Some(end + config.turnaround_gap + silence);
             self.echo.forget_all();
         }
-        uncount(counter(&sent.choice.request, statistics));
+        uncount(counter(&sent.request, statistics));
         sent.is_open = sent.is_open && self.window.take().is_some();
         Some(sent)
     }

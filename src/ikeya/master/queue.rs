@@ -20,7 +20,7 @@
 
 use super::{
     config::MasterConfig,
-    node::{Node, Reason, Request},
+    node::{Node, Reason},
 };
 use crate::{
     ikeya::{board::Board, units::NodeId},
@@ -61,11 +61,10 @@ pub(super) struct Queue {
     was_lost: bool,
 }
 
-/// One request.
+/// Whose turn it is, and why.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Choice<B: Board> {
+pub(super) struct Turn {
     pub(super) node: NodeId,
-    pub(super) request: Request<B>,
     pub(super) reason: Reason,
     round: Round,
 }
@@ -125,7 +124,7 @@ impl Queue {
     }
 
     /// Chooses the request to send now, if any, regardless of the line.
-    pub(super) fn choose<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+    pub(super) fn choose<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
         self.urgent(view, Round::Same)
             .or_else(|| self.regular(view))
             // With no regular request due, the next round begins at once.
@@ -137,7 +136,7 @@ impl Queue {
     }
 
     /// The next urgent request: for a stop, a mode in doubt or a new set-point.
-    fn urgent<B: Board>(&self, view: View<'_, B>, round: Round) -> Option<Choice<B>> {
+    fn urgent<B: Board>(&self, view: View<'_, B>, round: Round) -> Option<Turn> {
         Reason::ALL[..7].iter().find_map(|&reason| {
             let last = if reason.is_stop() { self.stop } else { self.set_point };
             self.next_for(reason, last + 1, view, round)
@@ -145,7 +144,7 @@ impl Queue {
     }
 
     /// The next regular request; it ends the round.
-    fn regular<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+    fn regular<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
         let sought = self.sought(view);
         if sought.is_some() && !self.was_search {
             return sought;
@@ -155,7 +154,7 @@ impl Queue {
 
     /// The next request of the search, at the search rate, or with every round while a node that
     /// gets no stop blind is owed one: its motor may be running.
-    fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+    fn sought<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
         let is_time = self.search_at.is_none_or(|at| view.now >= at);
         let is_time = is_time || view.nodes.iter().any(|it| it.is_sought_first(view.config));
         is_time.then(|| self.search(view)).flatten()
@@ -163,13 +162,13 @@ impl Queue {
 
     /// The next request of the search. Nodes that were heard before and are owed a stop have every
     /// other turn.
-    fn search<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+    fn search<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
         let lost = || self.next_for(Reason::SearchLost, self.searched_lost + 1, view, Round::Next);
         let other = || self.next_for(Reason::Search, self.searched + 1, view, Round::Next);
         if self.was_lost { other().or_else(lost) } else { lost().or_else(other) }
     }
 
-    fn discovery_or_cycle<B: Board>(&self, view: View<'_, B>) -> Option<Choice<B>> {
+    fn discovery_or_cycle<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
         if self.discovery.is_none() || self.cycle_first > 0 {
             let turn = self.next_for(Reason::Cycle, self.cycle, view, Round::Next);
             if turn.is_some() {
@@ -186,7 +185,7 @@ impl Queue {
         first: usize,
         view: View<'_, B>,
         round: Round,
-    ) -> Option<Choice<B>> {
+    ) -> Option<Turn> {
         self.next_of(reason, first, view, round, self.served::<B>(reason, round))
     }
 
@@ -198,7 +197,7 @@ impl Queue {
         view: View<'_, B>,
         round: Round,
         served: u8,
-    ) -> Option<Choice<B>> {
+    ) -> Option<Turn> {
         for step in 0..8 {
             let index = (first + step) & 7;
             if served >> index & 1 == 0 {
@@ -218,11 +217,10 @@ impl Queue {
         reason: Reason,
         view: View<'_, B>,
         round: Round,
-    ) -> Option<Choice<B>> {
+    ) -> Option<Turn> {
         let node = &view.nodes[index & 7];
-        reached(node.due_at(reason, view.config, view.now), view.now).then(|| Choice {
+        reached(node.due_at(reason, view.config, view.now), view.now).then_some(Turn {
             node: NodeId::ALL[index & 7],
-            request: node.request(reason),
             reason,
             round,
         })
@@ -244,26 +242,26 @@ impl Queue {
     }
 
     /// Advances the turns past a request that has been handed out. `exchange` is the time of one with a node that does not answer.
-    pub(super) fn book<B: Board>(
+    pub(super) fn book(
         &mut self,
-        choice: &Choice<B>,
+        turn: Turn,
+        is_exchange: bool,
         exchange: Duration,
         config: &MasterConfig,
         now: Instant,
     ) {
-        let index = index_of(choice.node);
-        let is_exchange = choice.request.is_exchange();
-        self.had_repeat = match choice.reason {
+        let index = index_of(turn.node);
+        self.had_repeat = match turn.reason {
             _ if is_exchange => 0,
             Reason::Repeat => self.had_repeat | 1 << index,
             _ => self.had_repeat,
         };
         // A silent WRITE of the cycle is followed by its READ; only the READ ends the round.
-        if choice.round == Round::Next && is_exchange {
+        if turn.round == Round::Next && is_exchange {
             (self.had_stop, self.had_set_point) = (0, 0);
-            self.was_search = choice.reason.is_search();
+            self.was_search = turn.reason.is_search();
         }
-        match choice.reason {
+        match turn.reason {
             Reason::SetPoint => {
                 self.set_point = index;
                 self.had_set_point |= 1 << index;
@@ -276,7 +274,7 @@ impl Queue {
                 let whole = exchange.saturating_mul(100).as_micros();
                 let pause = whole.checked_div(share.into()).unwrap_or(u32::MAX);
                 self.search_at = Some(now + Duration::from_micros(pause));
-                self.was_lost = choice.reason == Reason::SearchLost;
+                self.was_lost = turn.reason == Reason::SearchLost;
                 match self.was_lost {
                     true => self.searched_lost = index,
                     false => self.searched = index,

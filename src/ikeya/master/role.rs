@@ -305,15 +305,19 @@ impl<B: Board> Master<B> {
         for node in &mut self.nodes {
             node.forget_old_hold(now, self.config.turnaround_gap);
         }
-        let choice = self.queue.choose(self.view()).filter(|it| self.line.takes(it, now))?;
-        self.line.send(choice, &self.config, &mut self.statistics, now)?;
+        let turn = self.queue.choose(self.view())?;
+        let node = &mut self.nodes[index_of(turn.node)];
+        let request = node.request(turn.reason);
+        if !self.line.takes(turn, &request, now) {
+            return None;
+        }
+        self.line.send(turn, request, &self.config, &mut self.statistics, now)?;
         let exchange = self.line.window_time(&self.config) + self.config.turnaround_gap;
-        self.queue.book(&choice, exchange, &self.config, now);
-        let node = &mut self.nodes[index_of(choice.node)];
-        if matches!(choice.request, Request::Write(_)) {
+        self.queue.book(turn, request.is_exchange(), exchange, &self.config, now);
+        if matches!(request, Request::Write(_)) {
             node.wrote(now);
         }
-        if choice.request.is_exchange() {
+        if request.is_exchange() {
             node.asked(self.queue.is_discovering(), &self.config, now);
         }
         self.line.packet()
@@ -322,8 +326,8 @@ impl<B: Board> Master<B> {
     /// Whether the packet handed out last is a WRITE that the node would not get now: its set-point
     /// was dropped or replaced, or its mode is in doubt or another one (I11).
     fn has_sent_old_write(&self) -> bool {
-        self.line.sent().is_some_and(|sent| match sent.choice.request {
-            Request::Write(target) => !self.node(sent.choice.node).takes(target),
+        self.line.sent().is_some_and(|sent| match sent.request {
+            Request::Write(target) => !self.node(sent.turn.node).takes(target),
             Request::Read => false,
         })
     }
@@ -340,9 +344,9 @@ impl<B: Board> Master<B> {
         }
         let taken_back = self.line.take_back(unsent, &self.config, &mut self.statistics, now);
         let Some(sent) = taken_back else { return };
-        self.queue.take_back(sent.choice.reason);
-        let node = &mut self.nodes[index_of(sent.choice.node)];
-        if matches!(sent.choice.request, Request::Write(_)) {
+        self.queue.take_back(sent.turn.reason);
+        let node = &mut self.nodes[index_of(sent.turn.node)];
+        if matches!(sent.request, Request::Write(_)) {
             node.take_back_write();
         }
         if sent.is_open {
