@@ -314,7 +314,7 @@ impl<B: Board> Node<B> {
             Reason::Repeat if is_in_doubt => false,
             // The first WRITE to a node that is online has another reason.
             Reason::Repeat if is_online => {
-                self.order.stop_unseen().is_some_and(|stop| stop.repeat_at().is_some())
+                self.order.stop_unseen().is_some_and(Stop::is_repeated)
             }
             Reason::Repeat => {
                 let is_blind = matches!(self.stop_target(), Some(Target::Velocity(_)));
@@ -486,11 +486,7 @@ impl<B: Board> Node<B> {
             .with(Change::Health, was.is_some_and(|was| was != Health::Online));
         let changes = match decision {
             Decision::Agreed => changes,
-            Decision::Doubtful => {
-                let doubted = self.doubt_mode();
-                self.order.measure(status, now);
-                return changes.and(doubted);
-            }
+            Decision::Doubtful => changes.and(self.doubt_mode()),
             Decision::Settled => {
                 self.order.end_doubt();
                 changes
@@ -500,6 +496,10 @@ impl<B: Board> Node<B> {
                 changes.with(Change::Dropped, is_unconfirmed).with(Change::Mode, true)
             }
         };
+        self.order.measure(status, now);
+        if self.mode.is_in_doubt() {
+            return changes;
+        }
         self.statistics.reply(latency);
         self.has_answered = true;
         self.status = Some((*status, now));

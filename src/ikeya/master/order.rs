@@ -207,7 +207,7 @@ impl<B: Board> Order<B> {
     pub(super) fn is_new(&self) -> bool {
         match &self.state {
             State::SetPoint(set_point) => set_point.is_new,
-            State::Stop(stop) => stop.is_new && stop.repeated().is_some(),
+            State::Stop(stop) => stop.written_at.is_none() && stop.repeated().is_some(),
             State::None | State::Released => false,
         }
     }
@@ -333,8 +333,7 @@ impl<B: Board> Order<B> {
         }
     }
 
-    /// The node has answered in its mode: that may measure or confirm a stop, or show that the node
-    /// is still.
+    /// The node has answered in its mode: that may confirm a stop, or show that the node is still.
     pub(super) fn answered(
         &mut self,
         status: &Status<B>,
@@ -359,8 +358,6 @@ pub(super) struct Stop<B: Board> {
     stage: Stage,
     /// Whether a stop WRITE has been sent and waits for an answer.
     is_written: bool,
-    /// Whether the target of a confirmed stop has to be sent again: its WRITE was taken back.
-    is_new: bool,
     /// Whether it is no longer repeated once the node is still.
     is_released: bool,
     /// Whether the open window, if any, was opened after the stop was requested.
@@ -379,7 +376,7 @@ pub(super) struct Stop<B: Board> {
     measured_at: Option<Instant>,
     /// Time within which it must be written.
     patience: Duration,
-    /// Time of the latest stop WRITE.
+    /// Time of the latest stop WRITE, unless it was taken back.
     written_at: Option<Instant>,
     /// Time from which the node has to become still.
     confirmed_at: Instant,
@@ -405,7 +402,6 @@ impl<B: Board> Stop<B> {
         Self {
             stage: Stage::Owed,
             is_written: false,
-            is_new: false,
             is_released: false,
             is_asked: false,
             is_told: false,
@@ -458,7 +454,12 @@ impl<B: Board> Stop<B> {
         self.lost_attempts
     }
 
-    /// When it is to be written again, whatever else is due; `None` for at once.
+    /// Whether it is written again, whatever else is due: not before its first WRITE.
+    pub(super) fn is_repeated(&self) -> bool {
+        self.stage == Stage::Confirmed || self.written_at.is_some()
+    }
+
+    /// When it is; `None` for at once.
     pub(super) fn repeat_at(&self) -> Option<Instant> {
         self.written_at.map(|at| at + REPEAT_TIME)
     }
@@ -469,11 +470,11 @@ impl<B: Board> Stop<B> {
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
         (self.hold, self.measured_at) = (None, None);
         (self.is_written, self.writes, self.written_at) = (false, 0, None);
-        (self.is_new, self.is_told) = (false, false);
+        self.is_told = false;
     }
 
     fn wrote(&mut self, now: Instant) {
-        (self.is_written, self.is_new) = (true, false);
+        self.is_written = true;
         self.writes = self.writes.saturating_add(1);
         self.written_at = Some(now);
     }
@@ -488,7 +489,6 @@ impl<B: Board> Stop<B> {
     }
 
     fn take_back_write(&mut self) {
-        self.is_new = self.stage != Stage::Owed;
         let was_written = core::mem::take(&mut self.is_written);
         self.writes = self.writes.saturating_sub(was_written.into());
         self.written_at = None;
@@ -518,7 +518,6 @@ impl<B: Board> Stop<B> {
     /// Takes a good answer of the node in its mode.
     fn answered(&mut self, status: &Status<B>, coast: Duration, now: Instant) -> Changes {
         let mut settled = Changes::NONE;
-        self.measure(status, now);
         if core::mem::take(&mut self.is_written) {
             self.followed = self.followed.saturating_add(1);
         }
@@ -543,22 +542,22 @@ impl<B: Board> Stop<B> {
     /// Compares an answer with an earlier one; returns whether the two show a standstill. One alone
     /// may be of a motor that is just reversing.
     fn see(&mut self, status: &Status<B>, now: Instant) -> bool {
-        let is_moving = matches!(status, Status::Velocity(speed) if !B::is_still(*speed));
-        let Some((before, at)) = self.seen.filter(|_| !is_moving) else {
-            self.seen = Some((*status, now)).filter(|_| !is_moving);
-            return false;
-        };
-        if now - at < STILL_TIME {
-            return false;
-        }
-        match (before, status) {
-            (Status::Velocity(_), Status::Velocity(_)) => return true,
-            (Status::Position(there), Status::Position(here)) if B::is_same_place(*here, there) => {
-                return true;
+        let is_still = match (self.seen, status) {
+            (_, Status::Velocity(speed)) if !B::is_still(*speed) => {
+                self.seen = None;
+                return false;
             }
-            _ => self.seen = Some((*status, now)),
+            (Some((_, at)), _) if now - at < STILL_TIME => return false,
+            (Some((Status::Position(there), _)), Status::Position(here)) => {
+                B::is_same_place(*here, there)
+            }
+            (Some((Status::Velocity(_), _)), Status::Velocity(_)) => true,
+            _ => false,
+        };
+        if !is_still {
+            self.seen = Some((*status, now));
         }
-        false
+        is_still
     }
 }
 
