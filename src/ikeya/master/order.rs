@@ -118,8 +118,11 @@ impl<B: Board> Order<B> {
 
     /// The node is abnormal: it keeps its last command and is owed a stop, if that `is_stopped`.
     pub(super) fn lose(&mut self, is_stopped: bool) {
-        let is_owed = self.stop().is_some_and(|stop| stop.stage != Stage::Still);
-        let is_owed = is_owed || (is_stopped && self.is_commanded());
+        let is_owed = match &self.state {
+            State::Stop(stop) => stop.stage != Stage::Still || is_stopped && !stop.is_released,
+            State::SetPoint(_) | State::Released => is_stopped,
+            State::None => false,
+        };
         if is_owed {
             self.begin_stop(None, None);
         } else {
@@ -164,7 +167,7 @@ impl<B: Board> Order<B> {
     /// to 0": the node is owed a stop if it has ever had one (I11). Returns whether that ends a
     /// confirmation.
     pub(super) fn change_mode(&mut self) -> bool {
-        let is_commanded = self.was_written || self.is_commanded();
+        let is_commanded = self.was_written || self.is_set_point();
         match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => stop.restart(),
             _ if is_commanded => self.begin_stop(None, None),
@@ -220,11 +223,6 @@ impl<B: Board> Order<B> {
     /// Whether the latest command, sent or not, is a set-point: neither a stop nor none at all.
     pub(super) const fn is_set_point(&self) -> bool {
         matches!(self.state, State::SetPoint(_) | State::Released)
-    }
-
-    /// Whether there is a command, a stop included, that the node has been given or will be.
-    fn is_commanded(&self) -> bool {
-        self.is_set_point() || self.target().is_some()
     }
 
     /// The latest command, if it is a stop.
