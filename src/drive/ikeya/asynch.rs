@@ -110,7 +110,8 @@ where
     ///
     /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
     /// [`DriveError::StillMoving`] if the motor moves for longer than
-    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after that. **The motor
+    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
+    /// ends after the sum of both at the latest. **The motor
     /// may be running.** The stop is repeated as long as the driver is called.
     pub async fn stop_async(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
@@ -180,12 +181,12 @@ where
 
     /// Runs until these nodes are still, through errors of the port.
     async fn await_stops_async(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
-        let bounds = self.stop_bounds();
+        let mut wait = self.wait_for_stops(nodes);
         loop {
-            let until = if self.now() < bounds.0 { bounds.0 } else { bounds.1 };
+            let until = wait.until(self.now());
             let result =
-                self.until_async(until, |driver| driver.stopped::<P::Error>(nodes, bounds)).await;
-            if let Some(stopped) = self.stopped(nodes, bounds) {
+                self.until_async(until, |driver| driver.stopped::<P::Error>(&mut wait)).await;
+            if let Some(stopped) = self.stopped(&mut wait) {
                 return stopped;
             }
             if result.is_err() {

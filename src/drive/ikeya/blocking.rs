@@ -104,7 +104,8 @@ where
     ///
     /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
     /// [`DriveError::StillMoving`] if the motor moves for longer than
-    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after that. **The motor
+    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
+    /// ends after the sum of both at the latest. **The motor
     /// may be running.** The stop is repeated as long as the driver is called.
     pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
         self.begin_stop(node);
@@ -170,11 +171,11 @@ where
 
     /// Runs until these nodes are still, through errors of the port.
     fn await_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
-        let bounds = self.stop_bounds();
+        let mut wait = self.wait_for_stops(nodes);
         loop {
-            let until = if self.now() < bounds.0 { bounds.0 } else { bounds.1 };
-            let result = self.until(until, |driver| driver.stopped::<P::Error>(nodes, bounds));
-            if let Some(stopped) = self.stopped(nodes, bounds) {
+            let until = wait.until(self.now());
+            let result = self.until(until, |driver| driver.stopped::<P::Error>(&mut wait));
+            if let Some(stopped) = self.stopped(&mut wait) {
                 return stopped;
             }
             if result.is_err() {

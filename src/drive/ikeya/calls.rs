@@ -17,6 +17,22 @@ use crate::{
 /// The online nodes, in order of their ids, with their modes.
 pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
 
+/// A call that waits until nodes are still.
+pub(super) struct StopWait {
+    nodes: NodeSet,
+    /// Those of them whose stop has not been confirmed since the call.
+    unconfirmed: NodeSet,
+    confirmed_by: Instant,
+    still_by: Instant,
+}
+
+impl StopWait {
+    /// The next time limit.
+    pub(super) fn until(&self, now: Instant) -> Instant {
+        if now < self.confirmed_by { self.confirmed_by } else { self.still_by }
+    }
+}
+
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// Deadline of a call: a discovery may run before it, each takes no longer than a read may, and
     /// a driver on a host is late now and then.
@@ -24,10 +40,11 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.now() + self.role.read_bound().saturating_mul(4)
     }
 
-    /// Times by which stops must be confirmed, and their nodes be still.
-    pub(super) fn stop_bounds(&mut self) -> (Instant, Instant) {
+    /// Begins to wait until these nodes are still.
+    pub(super) fn wait_for_stops(&mut self, nodes: NodeSet) -> StopWait {
         let confirmed_by = self.now() + self.role.stop_bound();
-        (confirmed_by, confirmed_by + self.role.config().coast)
+        let still_by = confirmed_by + self.role.config().coast;
+        StopWait { nodes, unconfirmed: nodes, confirmed_by, still_by }
     }
 
     pub(super) fn is_online(&self, node: NodeId) -> bool {
@@ -136,25 +153,27 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.role.stop_all(now);
     }
 
-    /// How the stops of these nodes have ended, once they have: all nodes are still, or one is not
-    /// confirmed or still in time.
-    pub(super) fn stopped<E>(
-        &mut self,
-        nodes: NodeSet,
-        (confirmed_by, still_by): (Instant, Instant),
-    ) -> Option<Result<(), DriveError<E>>> {
+    /// How the stops have ended, once they have: all nodes are still, or one is not confirmed or
+    /// still in time.
+    pub(super) fn stopped<E>(&mut self, wait: &mut StopWait) -> Option<Result<(), DriveError<E>>> {
         self.drop_readings();
         let now = self.now();
-        let (owed, coasting) = (self.role.stops_owed().and(nodes), self.role.coasting().and(nodes));
-        if !owed.is_empty() {
-            return (now >= confirmed_by).then_some(Err(DriveError::StopsOwed(owed)));
-        }
-        if coasting.is_empty() {
+        let owed = self.role.stops_owed().and(wait.nodes);
+        let coasting = self.role.coasting().and(wait.nodes);
+        if owed.is_empty() && coasting.is_empty() {
             return Some(Ok(()));
         }
+        // A node that loses its confirmation, by damage or another mode, has time to be still too.
+        wait.unconfirmed = wait.unconfirmed.and(owed);
+        if now >= wait.still_by || now >= wait.confirmed_by && !wait.unconfirmed.is_empty() {
+            return Some(Err(match owed.is_empty() {
+                true => DriveError::StillMoving(coasting),
+                false => DriveError::StopsOwed(owed),
+            }));
+        }
         let is_moving = |node| self.role.stop_progress(node) == StopProgress::StillMoving;
-        let are_over = now >= still_by || coasting.iter().all(is_moving);
-        are_over.then_some(Err(DriveError::StillMoving(coasting)))
+        let are_moving = owed.is_empty() && coasting.iter().all(is_moving);
+        are_moving.then_some(Err(DriveError::StillMoving(coasting)))
     }
 
     /// Gives a sign of life; returns when to give the next, well before the dead-man fires.

@@ -524,39 +524,50 @@ impl<B: Board> Stop<B> {
             settled = settled.with(Change::Stopped, true);
         }
         // An answer to a READ in front of all stop WRITEs shows nothing.
-        let is_still = self.followed > 0 && self.see(status, now);
-        if self.stage == Stage::Confirmed {
-            if is_still {
+        let sight = if self.followed > 0 { self.see(status, now) } else { Sight::Unclear };
+        match sight {
+            _ if self.stage != Stage::Confirmed => {}
+            Sight::Still => {
                 self.stage = Stage::Still;
                 settled = settled.with(Change::Still, true);
-            } else if !self.is_told && now - self.confirmed_at >= coast {
+            }
+            Sight::MovingSince(since) if !self.is_told && since - self.confirmed_at >= coast => {
                 self.is_told = true;
                 settled = settled.with(Change::StillMoving, true);
             }
+            _ => {}
         }
         settled
     }
 
-    /// Compares an answer with an earlier one; returns whether the two show a standstill. One alone
-    /// may be of a motor that is just reversing.
-    fn see(&mut self, status: &Status<B>, now: Instant) -> bool {
-        let is_still = match (self.seen, status) {
+    /// Compares an answer with an earlier one. One alone may be of a motor that is just reversing.
+    fn see(&mut self, status: &Status<B>, now: Instant) -> Sight {
+        let sight = match (self.seen, status) {
             (_, Status::Velocity(speed)) if !B::is_still(*speed) => {
                 self.seen = None;
-                return false;
+                return Sight::MovingSince(now);
             }
-            (Some((_, at)), _) if now - at < STILL_TIME => return false,
-            (Some((Status::Position(there), _)), Status::Position(here)) => {
-                B::is_same_place(*here, there)
+            (Some((_, at)), _) if now - at < STILL_TIME => return Sight::Unclear,
+            (Some((Status::Velocity(_), _)), Status::Velocity(_)) => return Sight::Still,
+            (Some((Status::Position(there), at)), Status::Position(here)) => {
+                if B::is_same_place(*here, there) {
+                    return Sight::Still;
+                }
+                Sight::MovingSince(at)
             }
-            (Some((Status::Velocity(_), _)), Status::Velocity(_)) => true,
-            _ => false,
+            _ => Sight::Unclear,
         };
-        if !is_still {
-            self.seen = Some((*status, now));
-        }
-        is_still
+        self.seen = Some((*status, now));
+        sight
     }
+}
+
+/// What two answers show.
+enum Sight {
+    Still,
+    /// The motor has moved since then.
+    MovingSince(Instant),
+    Unclear,
 }
 
 /// Progress of a stop, see [`Master::stop_progress`](super::Master::stop_progress) (I12).
