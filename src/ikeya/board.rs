@@ -84,8 +84,8 @@ pub(crate) trait Packets: Units {
     /// Whether the speed is below 0.05 rps, which counts as standstill (I12). NaN is not.
     fn is_still(speed: Self::RawVelocity) -> bool;
 
-    /// Whether the two positions are within 8 counts of each other (I12).
-    fn is_same_place(here: Self::Position, there: Self::Position) -> bool;
+    /// Longest way of a motor between two positions, counts.
+    fn distance(here: Self::Position, there: Self::Position) -> u32;
 
     /// Whether a velocity node would read a WRITE of this position as standstill: 0 to
     /// 5e-10 rps (I11).
@@ -121,9 +121,6 @@ pub(super) const PACKET_LEN: usize = three::MAX_LEN;
 
 /// Speed below which a motor counts as standing still, rps (I12).
 const STILL_RPS: f32 = 0.05;
-
-/// Largest difference of two positions at which a motor counts as standing still, counts (I12).
-const STILL_COUNTS: u32 = 8;
 
 /// Whether these four bytes encode 0 to 5e-10 rps. Bit patterns of positive floats sort by value.
 const fn is_still_on_wire(payload: [u8; 4]) -> bool {
@@ -233,8 +230,8 @@ impl Packets for OneMotor {
         speed.abs() < STILL_RPS
     }
 
-    fn is_same_place(here: Position, there: Position) -> bool {
-        here.counts().abs_diff(there.counts()) <= STILL_COUNTS
+    fn distance(here: Position, there: Position) -> u32 {
+        here.counts().abs_diff(there.counts())
     }
 
     fn is_still_as_velocity(position: Position) -> bool {
@@ -307,8 +304,9 @@ impl Packets for ThreeMotors {
         speeds.into_iter().all(OneMotor::is_still)
     }
 
-    fn is_same_place(here: [Position; 3], there: [Position; 3]) -> bool {
-        here.into_iter().zip(there).all(|(here, there)| OneMotor::is_same_place(here, there))
+    fn distance(here: [Position; 3], there: [Position; 3]) -> u32 {
+        let ways = here.into_iter().zip(there).map(|(here, there)| OneMotor::distance(here, there));
+        ways.fold(0, u32::max)
     }
 
     fn is_still_as_velocity(positions: [Position; 3]) -> bool {

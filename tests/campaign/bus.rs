@@ -257,8 +257,8 @@ struct Watch {
     has_stood: bool,
     /// It was wrong about that.
     is_ok_wrong: bool,
-    /// What was damaged before the cable came back, and before the stop arrived; and when that was,
-    /// in ms, if the node was under a set-point until then.
+    /// What was damaged before the cable came back, and before the stop arrived; and when that
+    /// was, in ms, if the node was under a set-point until then.
     damage: Option<(u64, u64)>,
     back_ms: f64,
     is_back: bool,

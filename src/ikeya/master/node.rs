@@ -313,9 +313,7 @@ impl<B: Board> Node<B> {
             Reason::Stop => is_online && write.is_some(),
             Reason::Repeat if is_in_doubt => false,
             // The first WRITE to a node that is online has another reason.
-            Reason::Repeat if is_online => {
-                self.order.stop_unseen().is_some_and(Stop::is_repeated)
-            }
+            Reason::Repeat if is_online => self.order.stop_unseen().is_some_and(Stop::is_repeated),
             Reason::Repeat => {
                 let is_blind = matches!(self.stop_target(), Some(Target::Velocity(_)));
                 !B::ANSWERS_WRITE && stop.is_some() && is_blind

@@ -17,8 +17,11 @@ const CONFIRMATIONS: u8 = 2;
 /// each position that is given up, so that even a slow loop eventually writes one.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
-/// Minimum time between the two answers that show a standstill: 8 counts in this time are 0.05 rps.
+/// Minimum time between two answers that show a standstill.
 const STILL_TIME: Duration = Duration::from_millis(20);
+
+/// Longest way in this time that counts as a standstill, counts: 0.05 rps.
+const STILL_COUNTS: u32 = 8;
 
 /// Longest time between two stop WRITEs, where the line allows it (I12, I13).
 const REPEAT_TIME: Duration = Duration::from_millis(20);
@@ -378,8 +381,8 @@ pub(super) struct Stop<B: Board> {
     written_at: Option<Instant>,
     /// Time from which the node has to become still.
     confirmed_at: Instant,
-    /// An answer behind a stop WRITE that may be the first to show a standstill, and its time.
-    seen: Option<(Status<B>, Instant)>,
+    /// An answer behind a stop WRITE that may be the first of those that show a standstill.
+    seen: Option<Seen<B>>,
 }
 
 /// How far a stop has come.
@@ -541,25 +544,45 @@ impl<B: Board> Stop<B> {
     }
 
     /// Compares an answer with an earlier one. One alone may be of a motor that is just reversing.
+    ///
+    /// A position node overruns the position that it holds and comes back, so that two answers may
+    /// be of the same place: it takes three, and no answer in between that is far away.
     fn see(&mut self, status: &Status<B>, now: Instant) -> Sight {
-        let sight = match (self.seen, status) {
-            (_, Status::Velocity(speed)) if !B::is_still(*speed) => {
+        let is_enough = match status {
+            Status::Velocity(speed) if !B::is_still(*speed) => {
                 self.seen = None;
                 return Sight::MovingSince(now);
             }
-            (Some((_, at)), _) if now - at < STILL_TIME => return Sight::Unclear,
-            (Some((Status::Velocity(_), _)), Status::Velocity(_)) => return Sight::Still,
-            (Some((Status::Position(there), at)), Status::Position(here)) => {
-                if B::is_same_place(*here, there) {
-                    return Sight::Still;
-                }
-                Sight::MovingSince(at)
-            }
-            _ => Sight::Unclear,
+            Status::Velocity(_) => true,
+            Status::Position(_) => self.seen.is_some_and(|seen| seen.is_second),
         };
-        self.seen = Some((*status, now));
+        let way = match (&self.seen, status) {
+            (Some(Seen { status: Status::Position(there), .. }), Status::Position(here)) => {
+                B::distance(*here, *there)
+            }
+            _ => 0,
+        };
+        let (is_second, sight) = match self.seen {
+            None => (false, Sight::Unclear),
+            Some(seen) if way > 2 * STILL_COUNTS => (false, Sight::MovingSince(seen.at)),
+            Some(seen) if way > STILL_COUNTS || now - seen.at < STILL_TIME => {
+                return Sight::Unclear;
+            }
+            Some(_) if is_enough => return Sight::Still,
+            Some(_) => (true, Sight::Unclear),
+        };
+        self.seen = Some(Seen { status: *status, at: now, is_second });
         sight
     }
+}
+
+/// An answer that may show a standstill.
+#[derive(Clone, Copy, Debug)]
+struct Seen<B: Board> {
+    status: Status<B>,
+    at: Instant,
+    /// Whether an earlier one agrees.
+    is_second: bool,
 }
 
 /// What two answers show.

@@ -241,7 +241,8 @@ impl Queue {
         }
     }
 
-    /// Advances the turns past a request that has been handed out. `exchange` is the time of one with a node that does not answer.
+    /// Advances the turns past a request that has been handed out. `exchange` is the time of one
+    /// with a node that does not answer.
     pub(super) fn book(
         &mut self,
         turn: Turn,
