@@ -38,6 +38,33 @@ fn a_velocity_node_gets_0_rps_within_50_ms_after_its_cable_is_back() {
 }
 
 #[test]
+fn set_points_faster_than_the_line_do_not_hold_up_blind_stops() {
+    const ALL: [NodeId; 7] =
+        [NodeId::N2, NodeId::N3, NodeId::N4, NodeId::N5, NodeId::N6, NodeId::N7, NodeId::N8];
+    for (config, busy) in settings().flat_map(|it| [(it, 2), (it, 3), (it, 7)]) {
+        let config = with(config, |it| it.polling = Polling::Manual);
+        let online: Vec<_> = ALL[..busy].iter().map(|node| (*node, Mode::Velocity)).collect();
+        let mut desk = Desk::with_nodes(config, &[&[N1][..], &online].concat());
+        desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
+        desk.packets(1);
+        desk.lose_by_hand(NodeId::N1);
+        let (begin, mut written) = (desk.now, vec![]);
+        while desk.now - begin < MS(1000) {
+            for (node, _) in &online {
+                desk.master.set_velocity(*node, rps(1.0), desk.now).unwrap();
+            }
+            written.extend(
+                desk.follow(NodeId::N1, US(100), |_| Answer::Silence)
+                    .into_iter()
+                    .map(|(at, packet)| ((desk.now - begin).as_micros() + at, packet)),
+            );
+        }
+        let pause = longest(&written, WRITE) + 160;
+        assert!(pause <= 50_000, "{pause} us, {busy} nodes, {config:?}");
+    }
+}
+
+#[test]
 fn a_position_node_is_read_within_two_windows_for_each_commanded_node_that_is_silent() {
     let all = [N3, (NodeId::N4, Mode::Position), (NodeId::N6, Mode::Position)];
     for config in settings() {

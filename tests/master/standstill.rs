@@ -129,7 +129,7 @@ fn standstill_is_reported_once() {
 }
 
 #[test]
-fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
+fn three_positions_within_8_counts_and_20_ms_apart_are_a_standstill_and_two_are_not() {
     for (pause_us, way, is_still) in [
         (20_000, 8, true),
         (20_000, -8, true),
@@ -138,10 +138,53 @@ fn two_positions_within_8_counts_and_20_ms_apart_are_a_standstill() {
         (19_999, 0, false),
         (60_000, 0, true),
     ] {
-        let (mut desk, first) = asked_again(N3, &position(NodeId::N3, place(8190)));
-        desk.now = first + US(pause_us);
-        desk.hear(0, &position(NodeId::N3, place(8190 + way)));
-        assert_eq!(desk.news() == [STILL_3], is_still, "{way} counts in {pause_us} us");
+        let (mut desk, mut last) = asked_again(N3, &position(NodeId::N3, place(8190)));
+        for is_last in [false, true] {
+            if is_last {
+                while desk.turn()[0] != READ {}
+            }
+            while desk.now < last + US(pause_us) {
+                desk.now += US(1);
+                desk.master.handle_timeout(desk.now);
+            }
+            last = desk.now;
+            desk.hear(0, &position(NodeId::N3, place(8190 + way)));
+            let is_seen = desk.news() == [STILL_3];
+            assert_eq!(is_seen, is_last && is_still, "{way} counts in {pause_us} us");
+        }
+    }
+}
+
+/// What a motor shows that overruns the position that it holds, and comes back.
+fn overrun(lag_ms: f64, at_us: u32) -> Answer {
+    let lags = f64::from(at_us) / 1000.0 / lag_ms;
+    Answer::Position(place(8190 + (12_288.0 * lags * (-lags).exp()) as i32))
+}
+
+#[test]
+fn a_position_node_that_passes_a_place_twice_as_it_comes_back_is_not_still() {
+    for polling in [Polling::Fastest, Polling::Manual, Polling::Every(MS(20))] {
+        for lag_ms in [5.0, 8.0, 12.0, 18.0, 25.0] {
+            for phase_us in (0..20_000).step_by(500) {
+                let mut desk = Desk::stopping(with(direct(), |it| it.polling = polling), N3);
+                desk.now += US(phase_us);
+                let begin = desk.now;
+                while desk.master.stop_progress(NodeId::N3) != StopProgress::StandingStill {
+                    let offset = (desk.now - begin).as_micros() + phase_us;
+                    desk.follow(NodeId::N3, US(100), |at| overrun(lag_ms, offset + at));
+                }
+                let shown = |at: u32| match overrun(lag_ms, at) {
+                    Answer::Position(place) => place.counts(),
+                    _ => unreachable!(),
+                };
+                let at = (desk.now - begin).as_micros() + phase_us;
+                let way = shown(at).abs_diff(shown(at.saturating_sub(20_000)));
+                assert!(
+                    way <= 16,
+                    "{way} counts in 20 ms: {polling:?}, lag {lag_ms} ms, {phase_us}"
+                );
+            }
+        }
     }
 }
 

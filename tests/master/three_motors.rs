@@ -138,7 +138,8 @@ fn all_three_positions_have_to_stay_within_8_counts() {
         config.reply_timeout = MS(30);
         master = Master::new(config, T0);
         master.stop(NodeId::N1, T0);
-        for (expected, places) in [(READ, [0; 3]), (WRITE, [0; 3]), (WRITE, moved)] {
+        for (expected, places) in [(READ, [0; 3]), (WRITE, [0; 3]), (WRITE, moved), (WRITE, moved)]
+        {
             assert_eq!(answer(&mut master, places), Some(expected));
         }
         let events = core::iter::from_fn(|| master.poll_event());

@@ -365,6 +365,8 @@ pub(super) struct Stop<B: Board> {
     is_asked: bool,
     /// Whether the application was told that the node is still moving.
     is_told: bool,
+    /// Whether `seen` agrees with an earlier answer.
+    is_second: bool,
     /// Stop WRITEs sent.
     writes: u8,
     /// Stop WRITEs that were followed by a good answer.
@@ -382,7 +384,7 @@ pub(super) struct Stop<B: Board> {
     /// Time from which the node has to become still.
     confirmed_at: Instant,
     /// An answer behind a stop WRITE that may be the first of those that show a standstill.
-    seen: Option<Seen<B>>,
+    seen: Option<(Status<B>, Instant)>,
 }
 
 /// How far a stop has come.
@@ -406,6 +408,7 @@ impl<B: Board> Stop<B> {
             is_released: false,
             is_asked: false,
             is_told: false,
+            is_second: false,
             writes: 0,
             followed: 0,
             lost_attempts: 0,
@@ -554,35 +557,30 @@ impl<B: Board> Stop<B> {
                 return Sight::MovingSince(now);
             }
             Status::Velocity(_) => true,
-            Status::Position(_) => self.seen.is_some_and(|seen| seen.is_second),
+            Status::Position(_) => self.is_second,
         };
         let way = match (&self.seen, status) {
-            (Some(Seen { status: Status::Position(there), .. }), Status::Position(here)) => {
+            (Some((Status::Position(there), _)), Status::Position(here)) => {
                 B::distance(*here, *there)
             }
             _ => 0,
         };
-        let (is_second, sight) = match self.seen {
-            None => (false, Sight::Unclear),
-            Some(seen) if way > 2 * STILL_COUNTS => (false, Sight::MovingSince(seen.at)),
-            Some(seen) if way > STILL_COUNTS || now - seen.at < STILL_TIME => {
-                return Sight::Unclear;
+        let (is_far, is_very_far) = (way > STILL_COUNTS, way > 2 * STILL_COUNTS);
+        let sight = match self.seen.map(|(_, at)| (at, now - at)) {
+            Some((at, age)) if is_very_far || is_far && age >= STILL_TIME + STILL_TIME => {
+                self.is_second = false;
+                Sight::MovingSince(at)
             }
+            Some((_, age)) if is_far || age < STILL_TIME => return Sight::Unclear,
             Some(_) if is_enough => return Sight::Still,
-            Some(_) => (true, Sight::Unclear),
+            seen => {
+                self.is_second = seen.is_some();
+                Sight::Unclear
+            }
         };
-        self.seen = Some(Seen { status: *status, at: now, is_second });
+        self.seen = Some((*status, now));
         sight
     }
-}
-
-/// An answer that may show a standstill.
-#[derive(Clone, Copy, Debug)]
-struct Seen<B: Board> {
-    status: Status<B>,
-    at: Instant,
-    /// Whether an earlier one agrees.
-    is_second: bool,
 }
 
 /// What two answers show.

@@ -125,14 +125,19 @@ impl Queue {
 
     /// Chooses the request to send now, if any, regardless of the line.
     pub(super) fn choose<B: Board>(&self, view: View<'_, B>) -> Option<Turn> {
+        let repeat = || self.next_of(Reason::Repeat, self.stop + 1, view, Round::Same, 0);
         self.urgent(view, Round::Same)
             .or_else(|| self.regular(view))
-            // With no regular request due, the next round begins at once.
-            .or_else(|| self.urgent(view, Round::Next))
+            // With no regular request due, the next round begins at once. Set-points that come
+            // faster than the line takes them do not hold up the stops that are repeated.
+            .or_else(|| match self.urgent(view, Round::Next) {
+                Some(turn) if turn.reason == Reason::SetPoint => repeat().or(Some(turn)),
+                turn => turn,
+            })
             // An idle line belongs to the search.
             .or_else(|| self.search(view))
             // With nobody to be asked, a stop is repeated without an exchange in between.
-            .or_else(|| self.next_of(Reason::Repeat, self.stop + 1, view, Round::Same, 0))
+            .or_else(repeat)
     }
 
     /// The next urgent request: for a stop, a mode in doubt or a new set-point.
