@@ -73,6 +73,10 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
         let mut story = Story::new(only_two_and_five());
         let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
         assert_eq!(stopped, Ok(()), "no discovery is needed first");
+        let mut story = Story::new(MasterConfig::direct());
+        let both = only_two_and_five().nodes;
+        let stopped = call!(is_async, story.bus, stop, stop_async(both));
+        assert_eq!((stopped, story.told_two()), (Ok(()), STOPPED), "nobody waits for other ids");
     }
 }
 

@@ -1,8 +1,9 @@
 //! A motor bus on a port, with its master; shared by `scan`, `spin` and `stop`.
 
-use std::time;
+use std::time::Duration as Span;
 
 use axlewire::{
+    drive::DriveError,
     ikeya::{
         Master, Mode, NodeId, Status, Target,
         board::OneMotor,
@@ -15,16 +16,12 @@ use crate::{
     args::{self, Protocol},
     clock,
     failure::Failure,
-    line::Line,
+    line::{FAILURE_PAUSE, Line},
     session::Session,
     signals::{ABSENCE, DEAD_MAN, Signals},
 };
 
 pub(crate) use crate::boards::Boards;
-
-mod wait;
-pub(crate) use wait::Halt;
-use wait::{RUN_OUT, Wait};
 
 /// Period at which each node is read and its set-point repeated: short enough for every motor, and
 /// a USB adapter keeps up with three nodes.
@@ -33,12 +30,30 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// Longest interval between two rounds on the bus.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
-/// Minimum time allowed for nodes that answer to confirm a stop. A slow line gets more:
-/// [`Master::stop_bound`].
-const STOP_PATIENCE: Duration = Duration::from_millis(3000);
+/// Time for which stops that are not confirmed are waited for, at least. The library's own bound is
+/// a tenth of a second on a direct line, for a program that goes on; here nobody repeats the stop
+/// after it.
+const STOP_PATIENCE: Span = Span::from_millis(2000);
 
-/// Pause after a port failure during a stop, before the stop continues.
-const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
+/// Time for which an id that never answers is asked before a stop counts it as silent.
+const SILENCE: Span = Span::from_millis(1000);
+
+/// Outcome of a stop for one node.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) enum Halt {
+    /// The stop is confirmed, and the motor was measured at rest (ruling I12).
+    Still,
+    /// The stop is confirmed, but the motor was not measured at rest.
+    Moving,
+    /// The stop is not confirmed.
+    Owed,
+    /// The stop is not confirmed, because the mode of the node is in doubt (ruling I11).
+    Doubtful,
+    /// The id has only ever given damaged answers.
+    Damaged,
+    /// The id has never answered.
+    Silent,
+}
 
 /// The arguments of a master.
 #[derive(Debug, clap::Args)]
@@ -259,31 +274,44 @@ impl<B: Boards> Bus<B> {
         }
     }
 
-    /// Stops these nodes and waits until the outcome of each is known. Port failures do not end the
-    /// wait early; the last one is returned, unless the port has recovered since.
+    /// Stops these nodes as the library does, and waits until those that have answered are still.
+    /// The library cannot know which ids exist, waits for all of its time for those that never
+    /// answer, and takes a suspension of the tool for time in which a node was silent or moved.
     ///
-    /// The wait is bounded, and no signal ends it early.
+    /// If they are not all still, a failure of the port is returned. The wait is bounded, and no
+    /// signal ends it early.
     pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), Failure> {
-        let begin = self.now();
-        nodes.iter().for_each(|node| self.master_mut().stop(node, begin));
-        let mut wait = Wait::new(self.stop_bound(), begin);
-        loop {
-            let result = self.look();
-            let now = self.now();
-            let is_any = |halt| nodes.iter().any(|node| self.halt(node) == halt);
-            let is_unasked = nodes.iter().any(|node| self.is_unasked(node));
-            if !wait.goes_on(now, is_any, is_unasked) {
-                return result;
-            }
-            if result.is_err() {
+        let (now, begin) = (self.now(), self.session.awake());
+        nodes.iter().for_each(|node| self.master_mut().stop(node, now));
+        let patience = span(self.master().stop_bound()).max(STOP_PATIENCE);
+        let coast = span(self.master().config().coast);
+        let time = |bus: &Self| bus.session.awake() - begin;
+        while self.heard(nodes) != nodes
+            && time(self) < patience
+            && (time(self) < SILENCE || nodes.iter().any(|node| self.is_unasked(node)))
+        {
+            if self.look().is_err() {
                 clock::sleep(FAILURE_PAUSE);
+            }
+        }
+        loop {
+            let heard = self.heard(nodes);
+            let is_over = match self.session.stop(heard) {
+                // A node that was silent may have answered meanwhile.
+                Ok(()) => self.heard(nodes) == heard,
+                Err(DriveError::StillMoving(_)) => time(self) >= coast,
+                Err(_) => time(self) >= patience,
+            };
+            if is_over {
+                let are_still = nodes.iter().all(|node| self.halt(node) == Halt::Still);
+                return if are_still { Ok(()) } else { self.look() };
             }
         }
     }
 
-    /// Longest wait for the nodes to confirm a stop.
-    fn stop_bound(&self) -> Duration {
-        self.master().stop_bound().max(STOP_PATIENCE)
+    /// Those of these nodes that have ever answered.
+    fn heard(&self, nodes: NodeSet) -> NodeSet {
+        nodes.iter().filter(|&node| self.status(node).is_some()).collect()
     }
 
     /// Whether an id has never answered, but was not asked often enough to count as silent.
@@ -309,7 +337,7 @@ impl<B: Boards> Bus<B> {
         Some(match self.halt(node) {
             Halt::Still => return None,
             Halt::Moving => {
-                let seconds = RUN_OUT.as_micros() / 1_000_000;
+                let seconds = span(self.master().config().coast).as_secs_f64();
                 let now = self.status(node).map(B::describe).unwrap_or_default();
                 format!(
                     "node {node} confirmed the stop, but is still moving after {seconds} s: {now}"
@@ -330,6 +358,10 @@ impl<B: Boards> Bus<B> {
             Halt::Silent => format!("node {node} does not answer"),
         })
     }
+}
+
+fn span(duration: Duration) -> Span {
+    Span::from_micros(duration.as_micros().into())
 }
 
 /// What was heard of a node that has not confirmed its stop.

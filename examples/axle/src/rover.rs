@@ -1,6 +1,6 @@
 //! A rover on a port, with its host; shared by `drive` and `stop`.
 
-use std::time;
+use std::time::Duration as Span;
 
 use axlewire::{
     error::EncodeError,
@@ -15,9 +15,8 @@ use crate::{
     args::{self, Protocol},
     clock,
     failure::Failure,
-    line::Line,
+    line::{FAILURE_PAUSE, Line},
     session::Session,
-    signals::Awake,
 };
 
 mod pings;
@@ -27,13 +26,10 @@ use pings::{LONGEST_TRIP, Pings};
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
 
 /// Time allowed for the wheels to come to rest after the first stop.
-const STOP_PATIENCE: Duration = Duration::from_millis(3000);
+const STOP_PATIENCE: Span = Span::from_millis(3000);
 
 /// Longest interval between two calls of the host: well under its dead-man timeout of 500 ms.
 pub(crate) const CALL_PERIOD: Duration = Duration::from_millis(50);
-
-/// Pause after a port failure during a stop, before the stop continues.
-const FAILURE_PAUSE: time::Duration = time::Duration::from_millis(10);
 
 /// Consequence of a lost port for a moving robot.
 pub(crate) const OUT_OF_REACH: &str = "the robot can no longer be told to stop: it may be moving until 500 ms after the last byte \
@@ -175,7 +171,7 @@ impl Rover {
     /// Failures of the port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, before) = (self.now(), self.host().statistics().commands);
-        let mut awake = Awake::new(begin);
+        let end = self.session.awake() + STOP_PATIENCE;
         // When the stop was flushed, and the number of reports before the robot had heard of it.
         let (mut told, mut unheard) = (None, None);
         self.host_mut().stop(begin);
@@ -196,7 +192,7 @@ impl Rover {
             if result.is_ok() && is_news && progress == StopProgress::StandingStill {
                 return Ok(());
             }
-            if awake.time(self.now()) >= STOP_PATIENCE {
+            if self.session.awake() >= end {
                 break result.err();
             }
             if result.is_err() {

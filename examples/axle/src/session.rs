@@ -1,13 +1,16 @@
 //! A role on an open line, run by the library's driver.
 
 use std::{
+    cell::Cell,
     io,
+    rc::Rc,
     time::{Duration as Span, Instant as Clock},
 };
 
 use axlewire::{
     drive::{DriveError, Driver},
     endpoint::{Endpoint, Unsent},
+    ikeya::{Master, board::Board, master::NodeSet},
     time::{Duration, Instant},
 };
 use embedded_io::Write;
@@ -27,6 +30,7 @@ const STUCK: Span = Span::from_secs(1);
 /// A role on an open line.
 pub(crate) struct Session<R> {
     driver: Driver<R, Line, LineClock>,
+    awake: Rc<Cell<Span>>,
     /// Time since which the port has accepted no byte, if it is stuck.
     stuck_since: Option<Clock>,
 }
@@ -34,7 +38,13 @@ pub(crate) struct Session<R> {
 impl<R: Endpoint> Session<R> {
     pub(crate) fn new(line: Line, role: impl FnOnce(Instant) -> R) -> Self {
         let clock = line.clock();
-        Self { driver: Driver::with(role, line, clock), stuck_since: None }
+        let awake = clock.awake();
+        Self { driver: Driver::with(role, line, clock), awake, stuck_since: None }
+    }
+
+    /// The time for which the tool has been running since then, without suspensions.
+    pub(crate) fn awake(&self) -> Span {
+        self.awake.get()
     }
 
     /// The time since the line was opened.
@@ -116,6 +126,20 @@ impl<R: Endpoint> Session<R> {
             other => other.to_string(),
         };
         Some(Failure::lost(self.path(), &cause))
+    }
+}
+
+impl<B: Board> Session<Master<B>> {
+    /// Stops these nodes and waits until they are still, through failures of the port, as
+    /// [`Driver::stop`] does.
+    pub(crate) fn stop(&mut self, nodes: NodeSet) -> Result<(), DriveError<io::Error>> {
+        let begin = clock::now();
+        let stopped = self.driver.stop(nodes);
+        if stopped.is_err() {
+            // If it is stuck now, it may have been all the time.
+            self.stuck_since.get_or_insert(begin);
+        }
+        stopped
     }
 }
 

@@ -241,27 +241,6 @@ fn deaf(error: io::Error) -> Failure {
     Failure::Failed(format!("cannot listen for signals: {error}"))
 }
 
-/// Time for which the tool was running, for deadlines: a suspended stop still gets all of its time
-/// after a SIGCONT.
-#[derive(Debug)]
-pub(crate) struct Awake {
-    time: Duration,
-    seen_at: Instant,
-}
-
-impl Awake {
-    pub(crate) const fn new(now: Instant) -> Self {
-        Self { time: Duration::ZERO, seen_at: now }
-    }
-
-    /// The time so far. Call it in every round.
-    pub(crate) fn time(&mut self, now: Instant) -> Duration {
-        self.time = self.time + (now - self.seen_at).min(ABSENCE);
-        self.seen_at = now;
-        self.time
-    }
-}
-
 /// Longest pause between two rounds of a running tool. The dead-man timeouts of the master and the
 /// host are equal to it.
 pub(crate) const ABSENCE: Duration = Duration::from_millis(500);
@@ -320,9 +299,5 @@ mod tests {
         let failure = attendance.check(at(2498)).unwrap_err();
         assert_eq!(failure.to_string(), "the tool did not run for 0.5 s (suspended?)");
         attendance.check(at(2600)).unwrap();
-        let mut awake = Awake::new(at(0));
-        assert_eq!(awake.time(at(400)), Duration::from_millis(400));
-        assert_eq!(awake.time(at(60_000)), Duration::from_millis(900), "suspended");
-        assert_eq!(awake.time(at(60_100)), Duration::from_millis(1000));
     }
 }

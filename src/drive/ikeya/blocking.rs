@@ -93,9 +93,9 @@ where
         moved
     }
 
-    /// Stops a node as [`Master::stop`] does, and returns when it is **seen to be still**: its stop
-    /// is confirmed, and two answers at least 20 ms apart show a motor that does not move (ruling
-    /// I12). Continues through errors of the port.
+    /// Stops a node, or all of a [`NodeSet`], as [`Master::stop`] does, and returns when each is
+    /// **seen to be still**: its stop is confirmed, and two answers at least 20 ms apart show a
+    /// motor that does not move (ruling I12). Continues through errors of the port.
     ///
     /// To go on with other work meanwhile, call [`Master::stop`], keep calling the driver, and
     /// watch [`Master::stop_progress`].
@@ -107,9 +107,10 @@ where
     /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
     /// ends after the sum of both at the latest. **The motor
     /// may be running.** The stop is repeated as long as the driver is called.
-    pub fn stop(&mut self, node: NodeId) -> Result<(), DriveError<P::Error>> {
-        self.begin_stop(node);
-        self.await_stops(node.into())
+    pub fn stop(&mut self, nodes: impl Into<NodeSet>) -> Result<(), DriveError<P::Error>> {
+        let nodes = nodes.into();
+        self.begin_stop(nodes);
+        self.await_stops(nodes)
     }
 
     /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and

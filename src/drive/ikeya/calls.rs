@@ -111,7 +111,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     pub(super) fn withdraw(&mut self, node: NodeId) {
         let cut_off = self.sending.give_up();
         self.tell_unsent(cut_off);
-        self.begin_stop(node);
+        self.begin_stop(node.into());
     }
 
     /// Whether a node still has this set-point, and if not, why.
@@ -143,9 +143,9 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         Some(Err(DriveError::ReadFailed { node, cause }))
     }
 
-    pub(super) fn begin_stop(&mut self, node: NodeId) {
+    pub(super) fn begin_stop(&mut self, nodes: NodeSet) {
         let now = self.now();
-        self.role.stop(node, now);
+        nodes.iter().for_each(|node| self.role.stop(node, now));
     }
 
     pub(super) fn begin_stop_all(&mut self) {

@@ -170,17 +170,40 @@ fn an_id_counts_as_silent_only_after_as_many_requests_as_the_master_attempts() {
 }
 
 #[test]
-fn a_stop_on_a_slow_line_has_the_time_that_it_needs() {
-    let line = turning(|_, _| {}).line;
-    let bound = |baud| {
-        let config = complete(MasterConfig::usb_adapter(), &PortArgs::new(Some(baud)), &line);
-        let bus = Bus::<ThreeMotors>::new(line.clone(), config);
-        (bus.stop_bound(), bus.master().stop_bound())
-    };
-    let ((fast, needed), (slow, needed_slowly)) = (bound(500_000), bound(9600));
-    assert_eq!(fast, needed.max(Duration::from_millis(3000)));
-    assert_eq!(slow, needed_slowly.max(Duration::from_millis(3000)));
-    assert!(needed_slowly > Duration::from_millis(3000), "{needed_slowly:?}");
+fn a_stop_that_is_not_confirmed_is_waited_for_two_seconds_and_on_a_slow_line_longer() {
+    for (baud, is_slow) in [(500_000, false), (9600, true)] {
+        let line = turning(|said, bus| bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)));
+        let args = MasterArgs::new(PortArgs::new(Some(baud)), true, false);
+        let mut bus: Bus =
+            Bus::new(line.line.clone(), complete(args.config(), args.line(), &line.line));
+        let (begin, bound) = (clock::now(), span(bus.master().stop_bound()));
+        bus.stop(NodeId::N1.into()).unwrap();
+        assert_eq!((bus.halt(NodeId::N1), bound > STOP_PATIENCE), (Halt::Owed, is_slow));
+        let (took, least) = (clock::since(begin), bound.max(STOP_PATIENCE));
+        assert!(took >= least && took < least + bound + Span::from_millis(100), "{took:?}");
+    }
+}
+
+#[test]
+fn a_stop_during_which_the_tool_is_suspended_has_all_of_its_time_afterwards() {
+    // Until a second after it, the node does not answer, or the motor turns on.
+    for is_dumb in [true, false] {
+        let mut resumed = None;
+        let line = turning(move |said, bus| {
+            let writes = bus.said.iter().filter(|(said, _)| matches!(said, Said::Write(..)));
+            if resumed.is_none() && said == Said::Read(1) && writes.count() >= 3 {
+                clock::sleep(Span::from_secs(60));
+                resumed = Some(clock::now());
+            }
+            let is_over = resumed.is_some_and(|at| clock::since(at) > Span::from_secs(1));
+            bus.nodes[0].is_dumb = is_dumb && resumed.is_some() && !is_over;
+            bus.nodes[0].follows = is_over;
+        });
+        let mut bus = on(&line.line, NodeId::N1.into());
+        bus.discover(&Signals::none()).unwrap();
+        bus.stop(NodeId::N1.into()).unwrap();
+        assert_eq!(bus.halt(NodeId::N1), Halt::Still, "{is_dumb}");
+    }
 }
 
 #[test]

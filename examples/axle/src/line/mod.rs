@@ -5,7 +5,7 @@ mod tcp;
 mod wire;
 
 use std::{
-    cell::RefCell,
+    cell::{Cell, RefCell},
     io,
     rc::Rc,
     time::{Duration, Instant as Clock},
@@ -22,6 +22,7 @@ use crate::{
     clock,
     failure::Failure,
     pcapng::{Background, Direction, Recording},
+    signals::ABSENCE,
 };
 use tap::Tap;
 use tcp::TcpPort;
@@ -29,6 +30,9 @@ pub(crate) use wire::Wire;
 
 /// Longest wait for bytes, so that signals and keys are noticed in time.
 pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Pause after a failure of the port, before a stop continues.
+pub(crate) const FAILURE_PAUSE: Duration = Duration::from_millis(10);
 
 /// Silence that ends a partial frame (ruling B3): longer than the pauses of a USB adapter.
 pub(crate) const QUIET: time::Duration = time::Duration::from_millis(30);
@@ -122,7 +126,8 @@ impl Line {
 
     /// A clock that starts now and that idles until bytes have come.
     pub(crate) fn clock(&self) -> LineClock {
-        LineClock { wire: Rc::clone(&self.wire), start: clock::now() }
+        let (wire, start) = (Rc::clone(&self.wire), clock::now());
+        LineClock { wire, start, seen_at: Instant::from_micros(0), awake: Rc::default() }
     }
 
     /// The bytes that come within `patience`, as soon as there are some.
@@ -197,17 +202,34 @@ impl Write for Line {
 pub(crate) struct LineClock {
     wire: Rc<RefCell<dyn Wire>>,
     start: Clock,
+    seen_at: Instant,
+    awake: Rc<Cell<Duration>>,
+}
+
+impl LineClock {
+    /// The time for which the tool has been running, for deadlines: a stop during which it was
+    /// suspended still gets all of its time after a SIGCONT.
+    pub(crate) fn awake(&self) -> Rc<Cell<Duration>> {
+        Rc::clone(&self.awake)
+    }
 }
 
 impl drive::Clock for LineClock {
     fn now(&mut self) -> Instant {
-        Instant::from_micros(clock::since(self.start).as_micros() as u64)
+        let now = Instant::from_micros(clock::since(self.start).as_micros() as u64);
+        let step = (now - self.seen_at).min(ABSENCE).as_micros();
+        self.awake.set(self.awake.get() + Duration::from_micros(step.into()));
+        self.seen_at = now;
+        now
     }
 
     fn idle_until(&mut self, until: Instant) {
-        let patience = (until - self.now()).as_micros();
+        let patience = Duration::from_micros((until - self.now()).as_micros().into());
+        let waited = self.wire.borrow_mut().wait(patience);
         // A failure is found again, and handled, when the driver reads.
-        let _ = self.wire.borrow_mut().wait(Duration::from_micros(patience.into()));
+        if waited.is_err() {
+            clock::sleep(patience.min(FAILURE_PAUSE));
+        }
     }
 }
 
@@ -255,6 +277,16 @@ mod tests {
         let begin = clock::now();
         ours.idle_until(Instant::from_micros(1));
         assert_eq!(clock::since(begin), Duration::ZERO);
+    }
+
+    #[test]
+    fn a_suspension_is_no_time_for_which_the_tool_was_running() {
+        let mut ours = played::silence(true).clock();
+        for (millis, awake) in [(400, 400), (60_000, 900), (100, 1000)] {
+            clock::sleep(Duration::from_millis(millis));
+            ours.now();
+            assert_eq!(ours.awake().get(), Duration::from_millis(awake));
+        }
     }
 
     #[test]

@@ -193,7 +193,7 @@ fn the_dead_man_of_the_host_is_noticed() {
 
 #[test]
 fn a_late_pong_does_not_tell_that_a_later_ping_was_heard() {
-    let late = time::Duration::from_millis(700);
+    let late = Span::from_millis(700);
     let (mut played, mut waiting) = (played::PlayedRover::default(), VecDeque::new());
     let line = played::played(played::RoverState::default(), move |state, bytes| {
         let said = played.hear(state, bytes);

@@ -186,7 +186,7 @@ fn a_motor_that_turns_on_after_its_stop_is_not_called_stopped() {
     line.change(|node| node.rps = 2.0);
     let args = format!("spin --port {} --node 1 --rps 2 --for 0.2 --json", line.path);
     let ended = Process::start(&args).end();
-    let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+    let expected = "node 1 confirmed the stop, but is still moving after 2 s: 2.00 rps";
     assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
     assert!(!ended.stdout.iter().any(|line| line.contains("\"stopped\"")), "{ended:?}");
     let outcome = serde_json::json!(

@@ -136,7 +136,7 @@ fn stop_fails_when_a_motor_turns_on() {
     let line = played::bus(&[node], |_, _| {});
     let stop = format!("stop --port {} --protocol ikeya --node 1 --json", line.path);
     let ended = Process::start(&stop).end();
-    let expected = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+    let expected = "node 1 confirmed the stop, but is still moving after 2 s: 2.00 rps";
     assert_eq!((ended.code, &*ended.stderr), (Some(1), &[format!("axle: {expected}")][..]));
     let said: Vec<Value> =
         ended.stdout.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -152,7 +152,7 @@ fn a_motor_that_turns_on_is_the_outcome_and_a_recording_that_fails_is_told_befor
     let ended = Process::start(&stop).end();
     let [recording, motor] = &ended.stderr[..] else { panic!("{ended:?}") };
     assert!(recording.starts_with("axle: cannot create \"/dev/full\": "), "{recording}");
-    let turns_on = "node 1 confirmed the stop, but is still moving after 3 s: 2.00 rps";
+    let turns_on = "node 1 confirmed the stop, but is still moving after 2 s: 2.00 rps";
     assert_eq!((ended.code, &**motor), (Some(1), &*format!("axle: {turns_on}")));
     let outcome: Value = serde_json::from_str(ended.stdout.last().unwrap()).unwrap();
     assert_eq!((&outcome["at_rest"], &outcome["failure"]), (&false.into(), &turns_on.into()));
@@ -169,7 +169,7 @@ fn a_motor_that_confirms_late_has_its_time_to_coast_from_then_on() {
     wait_until("a stop", || !speeds(&line.said()).is_empty());
     thread::sleep(Duration::from_millis(1200));
     line.change(|node| node.is_dumb = false);
-    thread::sleep(Duration::from_millis(3600).saturating_sub(begin.elapsed()));
+    thread::sleep(Duration::from_millis(2800).saturating_sub(begin.elapsed()));
     line.change(|node| node.rps = 0.0);
     assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
 }
