@@ -324,7 +324,7 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn halt(&self, node: NodeId) -> Halt {
         match self.master().stop_progress(node) {
             StopProgress::StandingStill => Halt::Still,
-            StopProgress::Confirmed => Halt::Moving,
+            StopProgress::Confirmed | StopProgress::StillMoving => Halt::Moving,
             _ if self.is_damaged(node) => Halt::Damaged,
             _ if self.status(node).is_none() => Halt::Silent,
             _ if self.master().is_mode_in_doubt(node) => Halt::Doubtful,

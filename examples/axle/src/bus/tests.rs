@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, rc::Rc};
 
-use axlewire::ikeya::{Rps, board::ThreeMotors};
+use axlewire::ikeya::Rps;
 
 use super::*;
 use crate::{
@@ -182,6 +182,21 @@ fn a_stop_that_is_not_confirmed_is_waited_for_two_seconds_and_on_a_slow_line_lon
         let (took, least) = (clock::since(begin), bound.max(STOP_PATIENCE));
         assert!(took >= least && took < least + bound + Span::from_millis(100), "{took:?}");
     }
+}
+
+#[test]
+fn a_motor_that_turns_on_is_told_two_seconds_after_it_has_confirmed_its_stop() {
+    let line = turning(|_, bus| bus.nodes[0].follows = false);
+    let (mut bus, begin) = (on(&line.line, both()), clock::now());
+    bus.stop(both()).unwrap();
+    assert_eq!(
+        both().iter().map(|node| bus.halt(node)).collect::<Vec<_>>(),
+        [Halt::Moving, Halt::Still]
+    );
+    let says = "node 1 confirmed the stop, but is still moving after 2 s: 2.00 rps";
+    assert_eq!(bus.complaint(NodeId::N1).unwrap(), says);
+    let took = clock::since(begin).as_millis();
+    assert!((2000..2300).contains(&took), "{took} ms");
 }
 
 #[test]

@@ -159,22 +159,6 @@ fn a_motor_that_turns_on_is_the_outcome_and_a_recording_that_fails_is_told_befor
 }
 
 #[test]
-fn a_motor_that_confirms_late_has_its_time_to_coast_from_then_on() {
-    let node = Node { rps: 2.0, follows: false, ..Node::velocity(1) };
-    let line = played::bus(&[node], |said, bus| {
-        bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)) && speeds_said(bus) == 1;
-    });
-    let begin = Instant::now();
-    let stop = Process::start(&format!("stop -p {} -P ikeya", line.path));
-    wait_until("a stop", || !speeds(&line.said()).is_empty());
-    thread::sleep(Duration::from_millis(1200));
-    line.change(|node| node.is_dumb = false);
-    thread::sleep(Duration::from_millis(2800).saturating_sub(begin.elapsed()));
-    line.change(|node| node.rps = 0.0);
-    assert_eq!(stop.success()[0], "node 1: 0.00 rps, stopped and confirmed");
-}
-
-#[test]
 fn a_single_node_has_to_answer_and_no_other_is_stopped() {
     let line = played::bus(&[Node { rps: 2.0, ..Node::velocity(4) }], |_, _| {});
     for protocol in ["", " --protocol ikeya"] {
