@@ -17,9 +17,8 @@ use crate::{
     clock,
     line::{Line, Wire},
 };
-use devices::BusEar;
 pub(crate) use devices::{
-    BusState, Node, PlayedRover, RoverState, Said, confirmable_stops, speeds,
+    BusEar, BusState, Node, PlayedRover, RoverState, Said, confirmable_stops, speeds,
 };
 
 /// A line and what is at its other end.
@@ -30,6 +29,8 @@ pub(crate) struct Played<T> {
     pub(crate) is_gone: Rc<Cell<bool>>,
     /// When a port that has failed works again.
     pub(crate) back_at: Rc<Cell<Option<Instant>>>,
+    /// Number of bytes that the port takes at once, at most.
+    pub(crate) most: Rc<Cell<usize>>,
 }
 
 struct PlayedWire<P> {
@@ -38,6 +39,7 @@ struct PlayedWire<P> {
     unread: VecDeque<u8>,
     is_gone: Rc<Cell<bool>>,
     back_at: Rc<Cell<Option<Instant>>>,
+    most: Rc<Cell<usize>>,
 }
 
 /// A bus with these nodes; `on_request` is called before a node reacts.
@@ -63,8 +65,8 @@ pub(crate) fn rover(mut on_bytes: impl FnMut(&mut RoverState) + 'static) -> Play
 pub(crate) fn silence(is_instant: bool) -> Line {
     let play = |_: &[u8]| Vec::new();
     clock::play();
-    let (is_gone, back_at) = (Rc::default(), Rc::default());
-    let wire = PlayedWire { play, unread: VecDeque::new(), is_gone, back_at };
+    let (is_gone, back_at, most) = (Rc::default(), Rc::default(), Rc::new(Cell::new(usize::MAX)));
+    let wire = PlayedWire { play, unread: VecDeque::new(), is_gone, back_at, most };
     Line::new("played", wire, is_instant)
 }
 
@@ -75,15 +77,16 @@ pub(crate) fn played<T: 'static>(
 ) -> Played<T> {
     clock::play();
     let (state, is_gone) = (Rc::new(RefCell::new(state)), Rc::new(Cell::new(false)));
-    let back_at = Rc::new(Cell::new(None));
+    let (back_at, most) = (Rc::new(Cell::new(None)), Rc::new(Cell::new(usize::MAX)));
     let theirs = Rc::clone(&state);
     let wire = PlayedWire {
         play: move |bytes: &[u8]| play(&mut theirs.borrow_mut(), bytes),
         unread: VecDeque::new(),
         is_gone: Rc::clone(&is_gone),
         back_at: Rc::clone(&back_at),
+        most: Rc::clone(&most),
     };
-    Played { line: Line::new("played", wire, true), state, is_gone, back_at }
+    Played { line: Line::new("played", wire, true), state, is_gone, back_at, most }
 }
 
 impl Played<BusState> {
@@ -146,6 +149,7 @@ impl<P: FnMut(&[u8]) -> Vec<u8>> Read for PlayedWire<P> {
 impl<P: FnMut(&[u8]) -> Vec<u8>> Write for PlayedWire<P> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.check()?;
+        let bytes = &bytes[..bytes.len().min(self.most.get())];
         let said = (self.play)(bytes);
         self.unread.extend(said);
         Ok(bytes.len())

@@ -15,7 +15,7 @@ mod wheels;
 
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 
-use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals};
+use crate::{args::Protocol, failure::Failure, line::Line, signals::Signals, teller::Teller};
 pub(crate) use effect::{Limits, Side, of as effect_of};
 use nodes::Nodes;
 pub(crate) use plan::{Due, Plan};
@@ -26,17 +26,17 @@ use wheels::Wheels;
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
     hidden::refuse(&plan)?;
     let signals = Signals::listen_to_all()?;
-    let result =
-        Line::open(plan.bus.line(), plan.protocol).and_then(|line| play_on(plan, line, &signals));
+    let result = Line::open(plan.bus.line(), plan.protocol)
+        .and_then(|line| play_on(plan, line, Teller::new(), &signals));
     // The port is closed here.
     signals.suspend_if_wanted(result)
 }
 
-fn play_on(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
+fn play_on(plan: Plan<'_>, line: Line, teller: Teller, signals: &Signals) -> Result<(), Failure> {
     match plan.protocol {
-        Protocol::Ikeya => play::<Nodes<OneMotor>>(plan, line, signals),
-        Protocol::Ikeya3 => play::<Nodes<ThreeMotors>>(plan, line, signals),
-        Protocol::Ucp => play::<Wheels>(plan, line, signals),
+        Protocol::Ikeya => play::<Nodes<OneMotor>>(plan, line, teller, signals),
+        Protocol::Ikeya3 => play::<Nodes<ThreeMotors>>(plan, line, teller, signals),
+        Protocol::Ucp => play::<Wheels>(plan, line, teller, signals),
     }
 }
 

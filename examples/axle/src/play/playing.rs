@@ -56,14 +56,19 @@ const WAIT_PERIOD: Duration = Duration::from_millis(1);
 const TURNAROUND: Duration = Duration::from_micros(200);
 
 /// Sends the frames, then stops what they have moved, whatever happened.
-pub(super) fn play<V: Voice>(plan: Plan<'_>, line: Line, signals: &Signals) -> Result<(), Failure> {
+pub(super) fn play<V: Voice>(
+    plan: Plan<'_>,
+    line: Line,
+    teller: Teller,
+    signals: &Signals,
+) -> Result<(), Failure> {
     let (lister, line) = Lister::tap(&plan, line);
     let Some(voice) = V::prepare(&plan, line.clone(), signals)? else {
         return signals.interrupted();
     };
     lister.begin(voice.modes());
     let moves = plan.frames.iter().any(|due| due.effect.moves());
-    let mut playing = Playing { voice, lister, teller: Teller::new(), lost: 0, plan };
+    let mut playing = Playing { voice, lister, teller, lost: 0, plan };
     let played = guarded(|| playing.until_over(signals));
     let Playing { voice, lister, mut teller, lost, plan } = playing;
     if let Some(lines) = lister.end() {

@@ -1,6 +1,7 @@
 //! Frames for a bus and for a rover on a line within the process.
 
 mod bus;
+mod model;
 mod rover;
 
 use axlewire::{
@@ -44,6 +45,10 @@ impl Run {
         frames: &Frames<'_>,
         signals: &Signals,
     ) -> Result<(), String> {
+        self.on_line(&line.line, frames, signals)
+    }
+
+    fn on_line(&self, line: &Line, frames: &Frames<'_>, signals: &Signals) -> Result<(), String> {
         let bus = MasterArgs::new(PortArgs::new(self.baud), false, false);
         let due = |(after_ms, bytes): &(u64, &[u8])| {
             let (_, effect) = effect_of(self.protocol, bytes).unwrap();
@@ -59,7 +64,8 @@ impl Run {
             limits: Limits { max_rps: Rps::new(20.0).unwrap(), max_turns: 100.0 },
             is_json: true,
         };
-        play_on(plan, line.line.clone(), signals).map_err(|failure| failure.to_string())
+        play_on(plan, line.clone(), Teller::to_memory().0, signals)
+            .map_err(|failure| failure.to_string())
     }
 }
 
