@@ -120,58 +120,6 @@ fn a_question_about_a_node_that_does_not_answer_keeps_nobody_waiting() {
 }
 
 #[test]
-fn after_an_answer_in_the_other_mode_no_command_of_the_old_mode_leaves() {
-    for delay_ms in [0, 2, 5] {
-        let one = Node { delay: Duration::from_millis(delay_ms), ..Node::velocity(1) };
-        let line = played::bus(&[one], |said, bus| {
-            if is_speed(&said, 1, 1.0) {
-                let node = &mut bus.nodes[0];
-                (node.mode, node.counts, node.follows) = (Mode::Position, 40 * 8192, false);
-            }
-        });
-        let (write, read) = (speed(ONE, 1.0), read(ONE));
-        let mut frames: Vec<(u64, &[u8])> = vec![(0, &write), (10, &read)];
-        frames.extend((11..40).map(|at| (at, &write[..])));
-        let error = BUS.on(&line, &frames, &Signals::none()).unwrap_err();
-        let says = "node 1 has changed to position mode: it may have taken commands for velocity \
-                    mode";
-        assert_eq!(error, says);
-        let said = line.said();
-        let turned = said.iter().position(|said| is_speed(said, 1, 1.0)).unwrap();
-        let told = said[turned..].iter().position(|said| *said == Said::Read(1)).unwrap();
-        let later = &said[turned + told..];
-        assert!(!later.iter().any(|said| is_speed(said, 1, 1.0)), "{delay_ms}: {later:?}");
-        let is_hold = |said: &&Said| matches!(said, Said::Write(1, _, 327_680));
-        let writes: Vec<_> = later.iter().filter(|said| matches!(said, Said::Write(..))).collect();
-        assert!(writes.len() >= 2 && writes.iter().all(is_hold), "{delay_ms}: {later:?}");
-    }
-}
-
-#[test]
-fn a_node_that_falls_silent_gets_no_more_commands_while_another_one_answers() {
-    for is_asked in [true, false] {
-        let line = played::bus(&[Node::velocity(1), Node::velocity(3)], |said, bus| {
-            bus.nodes[1].is_dumb |= is_speed(&said, 3, 2.0);
-        });
-        let (one, three) = (speed(ONE, 1.0), speed(THREE, 2.0));
-        let (ask, other) = (read(ONE), read(THREE));
-        let mut frames: Vec<(u64, &[u8])> = Vec::new();
-        for at in 0..150 {
-            frames.extend([(at * 20, &one[..]), (at * 20, &three), (at * 20 + 5, &ask)]);
-            frames.extend(is_asked.then_some((at * 20 + 10, &other[..])));
-        }
-        let error = BUS.on(&line, &frames, &Signals::none()).unwrap_err();
-        let says = "node 3 was told to stop and has not confirmed it (nothing received): it may \
-                    be moving";
-        assert_eq!(error, says);
-        let said = line.said();
-        let commands = said.iter().filter(|said| is_speed(said, 3, 2.0)).count();
-        assert!(commands <= 20, "{commands} commands to a silent node");
-        assert!(line.state.borrow().nodes.iter().all(|node| node.rps == 0.0));
-    }
-}
-
-#[test]
 fn a_silent_node_does_not_delay_the_stop_of_the_others() {
     for silent in [0, 1] {
         let line = played::bus(&[Node::velocity(1), Node::velocity(3)], move |said, bus| {

@@ -23,7 +23,6 @@ use crate::{
 /// What happens from some byte on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
-    Nothing,
     /// The mode switch of a node is moved.
     Mode,
     /// The same, and all answers are late from then on.
@@ -49,7 +48,8 @@ struct Case {
 }
 
 impl Case {
-    /// Plays; returns the result and the number of bytes that have passed.
+    /// Plays; returns the result, whether it tells that everything is at rest, and the number of
+    /// bytes that have passed.
     fn play<T: 'static>(
         self,
         line: &Played<T>,
@@ -57,7 +57,7 @@ impl Case {
         frames: &Frames<'_>,
         fault: impl FnOnce() + 'static,
         mut on_read: impl FnMut(&[u8]) + 'static,
-    ) -> (Result<(), String>, usize) {
+    ) -> (Result<(), String>, bool, usize) {
         line.most.set(if self.in_bytes { 1 } else { usize::MAX });
         let (passed, signals) = (Rc::new(Cell::new(0)), Rc::new(Signals::none()));
         let (count, ctrl_c, mut fault) = (passed.clone(), signals.clone(), Some(fault));
@@ -76,31 +76,25 @@ impl Case {
             }
         });
         let played = run.on_line(&tapped, frames, &signals);
-        assert!(self.fault != Fault::Nothing || played.is_ok(), "{played:?}");
-        (played, passed.get())
+        assert!(self.at < usize::MAX || played.is_ok(), "{played:?}");
+        let is_at_rest = played.as_ref().err().is_none_or(|failure| failure.contains("at rest"));
+        (played, is_at_rest, passed.get())
     }
 }
 
 /// Plays each fault at every byte, or at one of each `step`.
 fn at_every_byte(faults: &[Fault], step: usize, play: impl Fn(Case) -> usize + Sync) {
-    let in_one_way = |in_bytes| {
-        let end = play(Case { fault: Fault::Nothing, at: usize::MAX, in_bytes });
+    let run = &|in_bytes| {
+        let end = play(Case { fault: faults[0], at: usize::MAX, in_bytes });
         for &fault in faults {
-            (0..end).step_by(step).for_each(|at| drop(play(Case { fault, at, in_bytes })));
+            for at in (0..end).step_by(step) {
+                play(Case { fault, at, in_bytes });
+            }
         }
     };
     std::thread::scope(|scope| {
-        [false, true].map(|way| {
-            drop(scope.spawn({
-                let run = &in_one_way;
-                move || run(way)
-            }))
-        })
+        [false, true].map(|in_bytes| scope.spawn(move || run(in_bytes))).len()
     });
-}
-
-fn says_at_rest(played: &Result<(), String>) -> bool {
-    played.as_ref().err().is_none_or(|failure| failure.contains("at rest"))
 }
 
 /// Longest silence of a node behind which a command to move still leaves: the period in which it is
@@ -205,24 +199,30 @@ fn play_to_nodes(case: Case, index: usize) -> usize {
     let bus = line.state.clone();
     let happen = move || ours.borrow_mut().begin(case.fault, &mut bus.borrow_mut().nodes[index]);
     let (slow, fast) = (&speed(NodeId::N1, 1.0)[..], &speed(NodeId::N1, 2.0)[..]);
-    let (way, ask) = (WriteRequest::position(NodeId::N3, there), read(NodeId::N3));
-    let (way, ask) = (&way.as_bytes()[..], &ask[..]);
-    let frames = [(0, slow), (5, way), (10, ask), (15, fast), (150, slow), (300, way), (300, fast)];
-    let (played, passed) =
+    let way = WriteRequest::position(NodeId::N3, there);
+    let (way, asks) = (&way.as_bytes()[..], [NodeId::N1, NodeId::N3].map(read));
+    // Commands leave before, while and after the answers to two questions come.
+    let mut frames = vec![(0, slow), (0, way), (10, &asks[0]), (10, &asks[1])];
+    frames.extend((12..15).flat_map(|at| [(at, fast), (at, way)]));
+    frames.extend([(150, slow), (300, way), (300, fast)]);
+    let (played, says_at_rest, passed) =
         case.play(&line, &BUS, &frames, happen, move |bytes| readers.borrow_mut().read(bytes));
     let (mut motors, mut bus) = (motors.borrow_mut(), line.state.borrow_mut());
     let is_at_rest = motors.advance(&mut bus);
+    let is_in = |id, mode| motors.heard[&id].0 == mode;
+    let mut written = motors.last_write.iter();
     // What cannot be heard and may be in another mode cannot be told (ruling I11).
     let is_told = case.fault == Fault::ModeAndMute
-        || motors
-            .last_write
-            .iter()
-            .all(|(id, rps)| *rps == 0.0 || motors.heard[id].0 == Mode::Position);
+        || written.clone().all(|(&id, rps)| *rps == 0.0 || is_in(id, Mode::Position));
+    let has_changed =
+        written.any(|(&id, _)| !is_in(id, [Mode::Velocity, Mode::Position][usize::from(id) / 2]));
     assert!(
-        motors.wrong.is_empty() && is_told && (is_at_rest || !says_at_rest(&played)),
-        "{case:?}, node {index}: {played:?} {:?} {:?}",
-        motors.wrong,
-        bus
+        motors.wrong.is_empty()
+            && is_told
+            && (is_at_rest || !says_at_rest)
+            && (played.is_err() || !has_changed),
+        "{case:?}, node {index}: {played:?} {:?} {bus:?}",
+        motors.wrong
     );
     passed
 }
@@ -247,23 +247,32 @@ fn a_silent_node_is_not_moved_and_not_called_at_rest_while_another_one_answers()
 /// Longest silence of a robot behind which a command to move still leaves (ruling U10).
 const ROBOT_SILENCE: Duration = Duration::from_millis(510);
 
+/// When a robot was driven and heard.
+#[derive(Clone, Copy)]
+struct Times {
+    fault_at: Option<Instant>,
+    moved_at: Instant,
+    heard_at: Instant,
+    /// Longest silence in front of a command to move.
+    silence: Duration,
+}
+
 /// Drives a robot.
 fn play_to_a_robot(case: Case) -> usize {
-    let begin = clock::now();
-    let (fault_at, moved_at, heard_at) =
-        (Rc::new(Cell::new(None)), Rc::new(Cell::new(begin)), Rc::new(Cell::new(begin)));
-    let (silence, ours, theirs) =
-        (Rc::new(Cell::new(Duration::ZERO)), fault_at.clone(), fault_at.clone());
-    let (moved, longest, heard, mut robot) =
-        (moved_at.clone(), silence.clone(), heard_at.clone(), PlayedRover::default());
+    clock::play();
+    let now = clock::now();
+    let (moved_at, heard_at, silence) = (now, now, Duration::ZERO);
+    let times = Rc::new(Cell::new(Times { fault_at: None, moved_at, heard_at, silence }));
+    let (ours, theirs, readers) = (times.clone(), times.clone(), times.clone());
+    let mut robot = PlayedRover::default();
     let line = played::played(RoverState::default(), move |state, bytes| {
         let (commands, pings) = (state.commands.len(), state.pings);
-        let said = robot.hear(state, bytes);
+        let (said, it, now) = (robot.hear(state, bytes), theirs.get(), clock::now());
         if state.commands[commands..].iter().any(|command| *command != (0, 0)) {
-            moved.set(clock::now());
-            longest.set(longest.get().max(clock::since(heard.get())));
+            let silence = it.silence.max(clock::since(it.heard_at));
+            theirs.set(Times { moved_at: now, silence, ..it });
         }
-        match (case.fault, theirs.get()) {
+        match (case.fault, it.fault_at) {
             (Fault::NoReports, Some(_)) if state.pings == pings => Vec::new(),
             (Fault::NoReports, Some(_)) => Pong::new(ErrorCode::Fine).frame(0).as_bytes().to_vec(),
             _ => said,
@@ -271,26 +280,26 @@ fn play_to_a_robot(case: Case) -> usize {
     });
     let rover = line.state.clone();
     let happen = move || {
-        ours.set(Some(clock::now()));
+        ours.set(Times { fault_at: Some(clock::now()), ..ours.get() });
         let mut rover = rover.borrow_mut();
         rover.is_dumb = case.fault == Fault::Mute;
         rover.wheels = (case.fault == Fault::Deaf).then_some([9; 4]);
     };
+    let heard = move |_: &[u8]| readers.set(Times { heard_at: clock::now(), ..readers.get() });
     let drive = [30, 60].map(|speed| MotorControl::new(speed, 0).unwrap().frame(0));
     let frames: Vec<_> = (0..7).map(|it| (it * 100, drive[it as usize % 2].as_bytes())).collect();
     let run = Run { protocol: Protocol::Ucp, ..BUS };
-    let (played, passed) =
-        case.play(&line, &run, &frames, happen, move |_| heard_at.set(clock::now()));
+    let (played, says_at_rest, passed) = case.play(&line, &run, &frames, happen, heard);
+    let (times, commands) = (times.get(), &line.state.borrow().commands);
     // Three reports behind the last command to move show that the wheels stand still.
-    let seen_at = moved_at.get() + Duration::from_millis(60);
-    let is_seen = fault_at.get().is_none_or(|at: Instant| at > seen_at);
-    let commands = &line.state.borrow().commands;
+    let seen_at = times.moved_at + Duration::from_millis(60);
+    let is_seen = times.fault_at.is_none_or(|at| at > seen_at);
     assert!(
-        silence.get() <= ROBOT_SILENCE
+        times.silence <= ROBOT_SILENCE
             && commands.last() == Some(&(0, 0))
-            && (is_seen || !says_at_rest(&played)),
+            && (is_seen || !says_at_rest),
         "{case:?}: {played:?} {:?} {commands:?}",
-        silence.get()
+        times.silence
     );
     passed
 }

@@ -59,21 +59,6 @@ fn a_rover_whose_plan_falls_silent_is_told_to_stop_as_by_any_host() {
 }
 
 #[test]
-fn a_rover_that_is_no_longer_heard_is_told_to_stop_and_gets_no_more_commands() {
-    let drive = drive();
-    let line = played::rover(|rover| rover.is_dumb |= rover.commands.len() >= 20);
-    let frames: Vec<_> = (0..300).map(|at| (at * 40, &drive[..])).collect();
-    let begin = clock::now();
-    let error = ROVER.on(&line, &frames, &Signals::none()).unwrap_err();
-    assert!(error.ends_with(" to stop and is no longer heard: it may be moving"), "{error}");
-    let commands = line.state.borrow().commands.clone();
-    let driven = commands.iter().filter(|command| **command == (30, 0)).count();
-    assert!(driven <= 20 + 7, "{driven} moving frames in all");
-    assert!(commands.ends_with(&[(0, 0)].repeat(20)), "{commands:?}");
-    assert!(clock::since(begin).as_secs() < 7, "{:?}", clock::since(begin));
-}
-
-#[test]
 fn what_was_due_during_an_absence_is_not_sent() {
     let drive = drive();
     let line = played::rover(|rover| {
