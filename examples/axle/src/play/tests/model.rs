@@ -205,8 +205,9 @@ fn play_to_nodes(case: Case, index: usize) -> usize {
     let mut frames = vec![(0, slow), (0, way), (10, &asks[0]), (10, &asks[1])];
     frames.extend((12..15).flat_map(|at| [(at, fast), (at, way)]));
     frames.extend([(150, slow), (300, way), (300, fast)]);
+    let run = Run { reads_back: !case.in_bytes, ..BUS };
     let (played, says_at_rest, passed) =
-        case.play(&line, &BUS, &frames, happen, move |bytes| readers.borrow_mut().read(bytes));
+        case.play(&line, &run, &frames, happen, move |bytes| readers.borrow_mut().read(bytes));
     let (mut motors, mut bus) = (motors.borrow_mut(), line.state.borrow_mut());
     let is_at_rest = motors.advance(&mut bus);
     let is_in = |id, mode| motors.heard[&id].0 == mode;
