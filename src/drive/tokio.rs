@@ -131,14 +131,21 @@ impl Write for TokioSerialPort {
     }
 
     async fn flush(&mut self) -> io::Result<()> {
-        use serialport::SerialPort as _;
-
-        while self.tty.bytes_to_write().map_err(lost)? > 0 {
-            tokio::time::sleep(NAP).await;
-        }
         // Not `poll_flush`, which hides errors.
-        io::Write::flush(&mut self.tty).map_err(lost)
+        drain(&mut self.tty, serialport::SerialPort::bytes_to_write, io::Write::flush).await
     }
+}
+
+/// Waits until the system holds no bytes, while other tasks run, and then for the UART.
+async fn drain<T>(
+    tty: &mut T,
+    held: impl Fn(&T) -> serialport::Result<u32>,
+    flush: impl FnOnce(&mut T) -> io::Result<()>,
+) -> io::Result<()> {
+    while held(tty).map_err(lost)? > 0 {
+        tokio::time::sleep(NAP).await;
+    }
+    flush(tty).map_err(lost)
 }
 
 /// The clock and the delay of a tokio runtime, starting at 0. The runtime must have timers
@@ -175,5 +182,40 @@ impl Clock for TokioClock {
 impl DelayNs for TokioClock {
     async fn delay_ns(&mut self, ns: u32) {
         tokio::time::sleep(Duration::from_nanos(ns.into())).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::task::{Context, Waker};
+    use std::{cell::Cell, io, pin::pin};
+
+    use super::*;
+
+    /// Bytes that the system still holds, fewer at each look, and whether the UART was waited for.
+    type Held = (Cell<u32>, bool);
+
+    #[test]
+    fn a_flush_lets_other_tasks_run_while_the_system_holds_bytes_and_then_waits_for_the_uart() {
+        let held = |tty: &Held| Ok(tty.0.replace(tty.0.get().saturating_sub(1)));
+        let flush = |tty: &mut Held| {
+            assert_eq!(tty.0.get(), 0, "it would block its thread");
+            tty.1 = true;
+            Ok(())
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        runtime.block_on(async {
+            let (mut tty, start) = ((Cell::new(3), false), std::time::Instant::now());
+            {
+                let mut drained = pin!(drain(&mut tty, held, flush));
+                let mut context = Context::from_waker(Waker::noop());
+                assert!(drained.as_mut().poll(&mut context).is_pending());
+                drained.await.unwrap();
+            }
+            assert!(tty.1, "the UART was not waited for");
+            assert!(start.elapsed() < Duration::from_secs(2), "the naps are long");
+            let gone = |_: &mut Held| Err(io::ErrorKind::BrokenPipe.into());
+            assert!(drain(&mut tty, held, gone).await.is_err());
+        });
     }
 }

@@ -93,11 +93,19 @@ fn bytes_taken_before_a_failed_write_leave_before_the_pin_goes_off_or_are_report
         assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Port(Unplugged)));
         assert_eq!(flush(&mut port, is_async), Ok(()));
     }
-    let (mut port, log) = delayed(Port::writing([Step::Few(1), Step::Error]), 0);
-    drain(&log);
-    assert_eq!(write(&mut port, false, b"12"), Ok(1));
-    assert!(write(&mut port, false, b"2").is_err());
-    assert_eq!(drain(&log), "on 5000 ns write write flush 7000 ns off");
+}
+
+#[test]
+fn a_second_write_that_fails_does_not_forget_that_bytes_were_lost() {
+    for is_async in BOTH {
+        let (mut port, ..) = undelayed(Port::writing([Step::Few(1), Step::Error, Step::Error]));
+        port.port_mut().flushes.push_back(Step::Error);
+        assert_eq!(write(&mut port, is_async, b"12"), Ok(1));
+        for _ in 0..2 {
+            assert_eq!(write(&mut port, is_async, b"2"), Err(Rs485Error::Port(Unplugged)));
+        }
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Lost));
+    }
 }
 
 #[test]

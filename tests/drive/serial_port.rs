@@ -1,6 +1,6 @@
 //! `drive::SerialPort` over a terminal whose calls are scripted. What takes real time is in `ptys`.
 
-use std::{collections::VecDeque, io::ErrorKind};
+use std::{collections::VecDeque, io::ErrorKind, time::Duration};
 
 use embedded_io::{Read as _, ReadReady, Write as _};
 
@@ -18,6 +18,18 @@ fn a_port_that_takes_no_byte_has_timed_out_and_may_take_the_next() {
     assert_eq!(windows.write(b"1").unwrap_err().kind(), ErrorKind::TimedOut);
     // A write of nothing reaches no port.
     assert_eq!(port.write(b"").unwrap(), 0);
+}
+
+#[test]
+fn a_write_waits_for_20_ms_at_most_so_that_no_outdated_command_leaves_late() {
+    let mut port = Script { writes: [Ok(1)].into(), ..Script::default() }.port();
+    port.wait(Duration::from_secs(60)).unwrap();
+    assert!(port.get_ref().timeout() > Duration::from_secs(50));
+    port.write(b"1").unwrap();
+    assert_eq!(port.get_ref().timeout(), Duration::from_millis(20));
+    // Nor does a look at what was received wait.
+    port.read_ready().unwrap();
+    assert_eq!(port.get_ref().timeout(), Duration::ZERO);
 }
 
 #[test]

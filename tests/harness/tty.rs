@@ -23,6 +23,8 @@ pub(crate) struct Script {
     pub(crate) flushes: Arc<Mutex<u32>>,
     /// Whether every other call is interrupted.
     pub(crate) signals_forever: bool,
+    /// Longest time for the next call.
+    pub(crate) timeout: Duration,
 }
 
 impl Script {
@@ -85,10 +87,11 @@ impl serialport::SerialPort for Scripted {
     }
 
     fn timeout(&self) -> Duration {
-        Duration::ZERO
+        self.0.lock().unwrap().timeout
     }
 
-    fn set_timeout(&mut self, _: Duration) -> Result<()> {
+    fn set_timeout(&mut self, timeout: Duration) -> Result<()> {
+        self.0.lock().unwrap().timeout = timeout;
         Ok(())
     }
 

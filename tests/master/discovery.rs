@@ -163,7 +163,17 @@ fn a_driver_that_sleeps_between_a_discovery_and_the_turns_that_go_first_is_never
 }
 
 #[test]
-fn a_discovery_counts_the_nodes_that_are_online_at_its_end() {
+fn a_discovery_counts_the_nodes_that_are_online_or_suspect_at_its_end() {
+    let mut desk = Desk::with_nodes(with(manual(), |config| config.attempts = 1), &[N1, N3]);
+    desk.master.read(NodeId::N1, desk.now).unwrap();
+    desk.miss();
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Suspect(1)));
+    desk.master.discover(desk.now);
+    while desk.master.is_discovering() {
+        desk.exchange().unwrap();
+    }
+    assert!(desk.told().contains(&MasterEvent::DiscoveryDone { online: 2 }));
+
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     desk.lose(NodeId::N3);
     desk.told();

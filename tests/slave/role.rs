@@ -94,14 +94,18 @@ fn a_request_overtaken_by_another_packet_is_not_answered() {
 
 #[test]
 fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
-    let mut slave = slave(Mode::Velocity);
-    let line = [&[0xBB][..], &read(NodeId::N2)].concat();
-    assert_eq!(answers(&mut slave, &line, T0), Vec::<Vec<u8>>::new());
-    let quiet = slave.poll_timeout().unwrap();
-    assert_eq!(quiet, T0 + US(100));
-    slave.handle_timeout(quiet);
-    assert_eq!(slave.poll_transmit(quiet), Some(&velocity(NodeId::N2, 0.0)[..]));
-    assert_eq!(slave.poll_timeout(), None);
+    // On two wires an answer can be cut off as well.
+    for (two_wire, header) in [(false, 0xBB), (true, 0xBB), (true, 0x55)] {
+        let config = with(SlaveConfig::direct(), |config| config.two_wire = two_wire);
+        let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
+        let line = [&[header][..], &read(NodeId::N2)].concat();
+        assert_eq!(answers(&mut slave, &line, T0), Vec::<Vec<u8>>::new());
+        let quiet = slave.poll_timeout().unwrap();
+        assert_eq!(quiet, T0 + US(100));
+        slave.handle_timeout(quiet);
+        assert_eq!(slave.poll_transmit(quiet), Some(&velocity(NodeId::N2, 0.0)[..]));
+        assert_eq!(slave.poll_timeout(), None);
+    }
 }
 
 #[test]
