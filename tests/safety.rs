@@ -90,6 +90,92 @@ fn every_hazard_has_tests_that_are_run() {
     }
 }
 
+/// A constant of the library that need not be public, as its source has it; times in milliseconds.
+fn constant(file: &str, name: &str) -> String {
+    let source = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
+    let line = source.lines().find(|line| line.contains(&format!("const {name}: ")));
+    let value = line.expect(name).rsplit(" = ").next().unwrap().trim_end_matches(';');
+    let time = value.strip_prefix("Duration::from_millis(");
+    time.map_or(value.to_owned(), |time| time.replace(')', " ms"))
+}
+
+#[cfg(all(feature = "ikeya", feature = "ucp"))]
+#[test]
+fn each_bound_on_the_page_is_the_one_in_the_code() {
+    use axlewire::{
+        endpoint::Endpoint,
+        ikeya::{Mode, NodeId, Slave, slave::SlaveConfig},
+        time::{Duration, Instant},
+        ucp::{Robot, host::HostConfig, robot::RobotConfig},
+    };
+    let ms = |it: Duration| format!("{} ms", it.as_micros() / 1000);
+    let (now, host, robot) = (Instant::default(), HostConfig::direct(), RobotConfig::direct());
+    let held_up = |within| {
+        let mut config = SlaveConfig::direct();
+        config.answer_within = Duration::from_millis(within);
+        ms(<Slave>::new(NodeId::N1, Mode::Velocity, config, now).held_up_after().unwrap())
+    };
+    let (robot_held_up, watchdog) =
+        (ms(Robot::new(robot, now).held_up_after().unwrap()), ms(robot.watchdog));
+    let (dead_man, period) = (ms(host.dead_man), ms(host.command_period));
+    assert_eq!(dead_man, ms(host.link_timeout), "the page has one figure for both");
+    let (order, board) = ("src/ikeya/master/order.rs", "src/ikeya/board.rs");
+
+    let is_read =
+        |part: &&str| ["Safety", "What", "Hazards"].iter().any(|title| part.starts_with(title));
+    let words = PAGE.split("\n# ").filter(is_read).flat_map(str::split_whitespace);
+    let mut page = words.collect::<Vec<_>>().join(" ");
+    let mut take = |bound: &str| {
+        assert!(page.contains(bound), "the page does not say: {bound}");
+        page = page.replace(bound, "");
+    };
+    for bound in [
+        format!(
+            "at least {} apart show less than {} rps, or positions within {} counts",
+            constant(order, "STILL_TIME"),
+            constant(board, "STILL_RPS"),
+            constant(board, "STILL_COUNTS")
+        ),
+        format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),
+        format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
+        format!("{dead_man} after the application's last call, or after the robot was last heard"),
+        format!("From {dead_man} after the last call on, or after the last frame of the robot"),
+        format!("A stop is repeated every {period}"),
+        format!("repeated every {period} until the first call"),
+        format!("The host repeats a stop every {period}"),
+        format!("A robot of this crate stops {watchdog} after the last *valid* command. A"),
+        format!("A robot of this crate stops {watchdog} after the last *valid* command (U10)"),
+        format!("at least {} and at most {}, go unnoticed", held_up(0), held_up(1000)),
+        format!("not seen the port empty for {robot_held_up}"),
+        format!("it drives for up to {robot_held_up} longer"),
+    ] {
+        take(&bound);
+    }
+    // Those that have a test of their own, and what vendors, motors and a search do.
+    for fact in [
+        "blind, at least every 50 ms",
+        "within 50 ms after its cable is back",
+        "5 % up to 0.9 s for each lost node",
+        "0.5 s behind an adapter",
+        "vendor robot waits for 500 ms",
+        "only 500 ms of silence",
+        "vendor robot stops 500 ms",
+        "0 rps",
+        "1 rps",
+        "1 to 5 %",
+        "8 % power",
+    ] {
+        take(fact);
+    }
+    let words: Vec<_> = page.split_whitespace().collect();
+    for pair in words.windows(2) {
+        let unit = pair[1].trim_end_matches([',', '.', ')', ';', ':']);
+        let is_bound = ["ms", "s", "rps", "rpm", "counts", "%"].contains(&unit)
+            && pair[0].trim_start_matches('(').parse::<f64>().is_ok();
+        assert!(!is_bound, "nothing is compared with this bound: {}", pair.join(" "));
+    }
+}
+
 #[test]
 fn every_promise_of_the_threat_model_is_shown_by_something_that_exists() {
     // The tool's tests are not in the package.
