@@ -1,7 +1,7 @@
 //! What the tests of the firmware use of the library.
 
 pub(crate) use axlewire::{
-    drive::Driver,
+    drive::{DriveError, Driver},
     encode::Encode,
     endpoint::Endpoint,
     ikeya::{

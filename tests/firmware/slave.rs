@@ -22,12 +22,17 @@ pub(crate) fn master_on(wire: Wire, mut config: MasterConfig) -> Bus {
 
 /// A board, and a master that has found it.
 fn discovered() -> Option<(Board, Bus)> {
+    discovered_with(MasterConfig::direct().coast)
+}
+
+/// The same, with this time for a motor to become still.
+fn discovered_with(coast: Duration) -> Option<(Board, Bus)> {
     let mut board = Board::start(Program::Slave)?;
     let mut config = MasterConfig::direct();
     // QEMU answers when this machine gets to it.
     (config.reply_timeout, config.attempts) = (Duration::from_millis(150), 2);
     config.polling = Polling::Every(Duration::from_millis(10));
-    config.nodes = NODE.into();
+    (config.nodes, config.coast) = (NODE.into(), coast);
     let mut bus = master_on(Wire::new(board.bus()), config);
     assert_eq!(bus.discover().unwrap(), [(NODE, Mode::Velocity)]);
     Some((board, bus))
@@ -89,6 +94,36 @@ fn a_paid_stop_is_two_commands_each_followed_by_an_answer_and_the_motor_is_at_re
     assert!(way.abs() <= 8, "{here:?} {there:?}");
     assert_eq!(there.get("target_mrps"), Some(0), "{there:?}");
     there.assert_nothing_lost();
+}
+
+#[test]
+fn a_stop_is_ok_once_a_write_behind_the_damaged_ones_was_taken_and_not_because_reads_are_answered()
+{
+    // Shorter than the board's own watchdog where no WRITE arrives.
+    for (damaged, coast_ms) in [(2, 2000), (u32::MAX, 100)] {
+        let coast = Duration::from_millis(coast_ms);
+        let Some((mut board, mut bus)) = discovered_with(coast) else { return };
+        bus.set_velocity(NODE, rps(3.0)).unwrap();
+        event_when(&mut bus, "at speed", |event| is_turning_at(event, 3.0));
+        let before = board.report_when("turning", |report| report.at("mrps") > 2900);
+        bus.port_mut().damaged = (packet(&WriteRequest::velocity(NODE, rps(0.0))), damaged);
+        let stopped = bus.stop(NODE);
+        // Nothing is sent behind the call.
+        let told = board.report_when("told", |_| true);
+        assert!(told.at("replies") >= before.at("replies") + 2, "{before:?} {told:?}");
+        assert!(told.at("skipped") >= before.at("skipped") + 2 * 8, "{before:?} {told:?}");
+        if damaged == 2 {
+            stopped.unwrap();
+            assert_eq!(bus.port().damaged.1, 0);
+            // A stop command, not the board's own watchdog.
+            assert_eq!((told.get("target_mrps"), told.at("stops")), (Some(0), 0), "{told:?}");
+            assert!(told.at("mrps").abs() < 50, "{told:?}");
+        } else {
+            let is_moving =
+                matches!(stopped, Err(DriveError::StillMoving(it)) if it == NODE.into());
+            assert!(is_moving, "{stopped:?}");
+        }
+    }
 }
 
 #[test]

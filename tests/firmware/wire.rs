@@ -71,6 +71,8 @@ pub(crate) struct Wire {
     inbox: Arc<Inbox>,
     noise: Option<Noise>,
     is_noisy: Arc<AtomicBool>,
+    /// A packet that gets a wrong bit on its way, so many times from now on.
+    pub(crate) damaged: (Vec<u8>, u32),
 }
 
 impl Wire {
@@ -89,7 +91,7 @@ impl Wire {
     /// A wire with noise, if any, from [`disturb`](Self::disturb) on.
     pub(crate) fn disturbed(stream: UnixStream, noise: Option<Noise>) -> Self {
         let (inbox, is_noisy) = (Arc::default(), Arc::default());
-        let mut wire = Self { stream: None, inbox, noise, is_noisy };
+        let mut wire = Self { stream: None, inbox, noise, is_noisy, damaged: (vec![], 0) };
         wire.plug(stream);
         wire
     }
@@ -137,6 +139,11 @@ impl Wire {
         match &mut self.noise {
             Some(noise) if self.is_noisy.load(Relaxed) => {
                 stream.write_all(&noise.disturb(bytes)).unwrap();
+            }
+            _ if self.damaged.1 > 0 && self.damaged.0 == bytes => {
+                self.damaged.1 -= 1;
+                let (first, rest) = bytes.split_first().unwrap();
+                stream.write_all(&[&[first ^ 1], rest].concat()).unwrap();
             }
             _ => stream.write_all(bytes).unwrap(),
         }
