@@ -39,10 +39,10 @@
 //!
 //! # Depths
 //!
-//! A normal run tries 2 or 3 consecutive actions from each of about ninety prepared states: an
+//! A normal run tries 2 or 3 consecutive actions from each of over a hundred prepared states: an
 //! abnormal node, a mode in doubt, a stop owed, a full event queue, other settings. The deep run
 //! searches every world to its full depth, and prints the depth, states and time of each, in about
-//! half an hour and 4 GB (a name behind it, such as `deep_host`, selects worlds; `MODELS_DEPTH=5`
+//! forty minutes and 4 GB (a name behind it, such as `deep_host`, selects worlds; `MODELS_DEPTH=5`
 //! gives all of them that depth):
 //!
 //! ```sh
@@ -51,39 +51,39 @@
 //!
 //! | World, for both kinds of boards | Consecutive actions | States in each |
 //! |---|---|---|
-//! | a fresh master of one node, in small steps | 7 | 62,000 to 73,000 |
-//! | a fresh master of two nodes, in small steps | 6 | 85,000 to 87,000 |
-//! | one known node, in small steps | 6 | 32,000 to 178,000 |
-//! | two known nodes, in small steps | 4 | 25,000 to 27,000 |
-//! | one node, an exchange at a time | 6 | 36,000 to 353,000 |
-//! | one node whose mode stays in doubt | 4 | 2,900 to 5,600 |
-//! | one node, with other settings | 6 | 43,000 to 323,000 |
-//! | two nodes, an exchange at a time | 4 | 10,000 to 50,000 |
-//! | two nodes that are commanded and stopped continuously | 9 | 143,000 to 214,000 |
-//! | a slave | 4 | 18,000 to 26,000 |
+//! | a fresh master of one node, in small steps | 7 | 41,000 to 45,000 |
+//! | a fresh master of two nodes, in small steps | 6 | 44,000 to 45,000 |
+//! | one known node, in small steps | 6 | 29,000 to 159,000 |
+//! | two known nodes, in small steps | 4 | 21,000 to 22,000 |
+//! | one node, an exchange at a time | 6 | 27,000 to 176,000 |
+//! | one node whose mode is, or stays, in doubt | 4 | 2,200 to 6,600 |
+//! | one node, with other settings | 6 | 28,000 to 170,000 |
+//! | two nodes, an exchange at a time | 4 | 4,100 to 22,000 |
+//! | two nodes that are commanded and stopped continuously | 9 | 96,000 to 108,000 |
+//! | a slave | 4 | 19,000 to 26,000 |
 //!
 //! A normal run tries 2 or 3 consecutive actions from each of about thirty states of a host and a
 //! robot, with 85 to 2,000 states each. The deep run:
 //!
 //! | UCP world | Consecutive actions | States in each |
 //! |---|---|---|
-//! | a host and its motor commands | 6 | 72,000 to 125,000 |
-//! | a host and firmware updates | 5 | 18,000 to 58,000 |
-//! | a host and calibrations | 4 | 15,000 to 41,000 |
-//! | a host with a full queue | 4, halves of frames 6 | 16,000 to 35,000 |
-//! | a robot and its motor commands | 5 | 160,000 to 181,000 |
-//! | a robot and all other requests | 4 | 20,000 to 74,000 |
+//! | a host and its motor commands | 6 | 40,000 to 92,000 |
+//! | a host and firmware updates | 5 | 21,000 to 59,000 |
+//! | a host and calibrations | 4 | 15,000 to 39,000 |
+//! | a host with a full queue | 4, halves of frames 6 | 16,000 to 36,000 |
+//! | a robot and its motor commands | 5 | 161,000 to 180,000 |
+//! | a robot and all other requests | 4 | 21,000 to 76,000 |
 //!
 //! Drivers, for one kind of board; a normal run tries 1 or 2 actions. The possible calls and the
 //! behaviour of port, pin and clock are in `models/drive/action.rs`:
 //!
 //! | Driver world | Consecutive actions | States in each |
 //! |---|---|---|
-//! | a blocking driver of a master, commanded | 4 | 142,000 |
-//! | the same in other states and settings | 3 | 4,700 to 10,500 |
-//! | an async driver of a master: commanded, cut off, in position mode | 3 | 34,000 to 87,000 |
-//! | the same in other states and settings | 2 | 970 to 2,900 |
-//! | a driver of a host | 3 | 6,900 to 8,500 |
+//! | a blocking driver of a master, commanded | 4 | 179,000 |
+//! | the same in other states and settings | 3 | 6,300 to 13,000 |
+//! | an async driver: commanded, cut off, in doubt, in position mode | 3 | 41,000 to 99,000 |
+//! | the same in other states and settings | 2 | 1,100 to 3,100 |
+//! | a driver of a host | 3 | 8,100 to 9,600 |
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "std"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
