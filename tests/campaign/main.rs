@@ -59,32 +59,30 @@ fn run(seeds: std::ops::Range<u64>, episode: fn(u64) -> Vec<Run>) -> Table {
     Table::new(runs.concat())
 }
 
-#[test]
-fn every_motor_of_a_bus_stops_within_its_bound() {
-    let table = run(QUICK, bus::episode);
+fn check(seeds: std::ops::Range<u64>, episode: fn(u64) -> Vec<Run>) {
+    let table = run(seeds, episode);
     println!("{table}");
     table.check();
 }
 
 #[test]
+fn every_motor_of_a_bus_stops_within_its_bound() {
+    check(QUICK, bus::episode);
+}
+
+#[test]
 fn every_rover_stops_within_its_bound() {
-    let table = run(QUICK, rover::episode);
-    println!("{table}");
-    table.check();
+    check(QUICK, rover::episode);
 }
 
 #[test]
 #[ignore = "takes minutes: see the top of this file"]
 fn every_motor_of_a_bus_stops_within_its_bound_50_000_times() {
-    let table = run(0..50_000, bus::episode);
-    println!("{table}");
-    table.check();
+    check(0..50_000, bus::episode);
 }
 
 #[test]
 #[ignore = "takes minutes: see the top of this file"]
 fn every_rover_stops_within_its_bound_50_000_times() {
-    let table = run(0..50_000, rover::episode);
-    println!("{table}");
-    table.check();
+    check(0..50_000, rover::episode);
 }

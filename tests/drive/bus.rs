@@ -100,23 +100,6 @@ fn stop_and_stop_all_have_been_confirmed_when_they_return() {
 }
 
 #[test]
-fn an_impossible_command_is_refused_with_the_node_and_the_reason() {
-    let mut story = Story::new(MasterConfig::direct()).discovered();
-    let error = story.bus.set_velocity(NodeId::N5, rps(1.0)).unwrap_err();
-    let wrong = CommandError::WrongMode { node: NodeId::N5, mode: Mode::Position };
-    assert_eq!(
-        (error, error.to_string().as_str()),
-        (DriveError::Bus(wrong), "node 5 is in position mode")
-    );
-    let error = story.bus.read(NodeId::N7).unwrap_err();
-    let absent = CommandError::NotOnline { node: NodeId::N7 };
-    assert_eq!(
-        (error, error.to_string().as_str()),
-        (DriveError::Bus(absent), "node 7 is not online")
-    );
-}
-
-#[test]
 fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
     for is_async in BOTH {
         let lost = || {
@@ -199,17 +182,14 @@ fn events_without_room_are_counted() {
 }
 
 #[test]
-fn a_vanished_port_is_an_error_of_every_call() {
+fn a_stop_is_not_given_up_with_its_port_and_goes_on_when_the_port_is_back() {
     for is_async in BOTH {
         let mut story = Story::new(only_two_and_five()).discovered();
         let unplugged = story.bus.port().unplugged.clone();
         unplugged.set(true);
         let bus = &mut story.bus;
-        assert_eq!(call!(is_async, *bus, discover, discover_async()), Err(GONE));
-        assert_eq!(call!(is_async, *bus, read, read_async(NodeId::N2)), Err(GONE));
         let set = call!(is_async, *bus, set_velocity, set_velocity_async(NodeId::N2, rps(1.0)));
         assert_eq!(set, Err(GONE));
-        // A stop is not given up because of it.
         let owed = DriveError::StopsOwed(only_two_and_five().nodes);
         assert_eq!(call!(is_async, *bus, stop_all, stop_all_async()), Err(owed));
         // The port comes back: the driver continues, and the last command is the one in force.

@@ -77,20 +77,6 @@ fn five_is_not_named() -> Story {
 }
 
 #[test]
-fn a_stop_of_all_stops_a_node_that_has_answered_although_the_settings_do_not_name_it() {
-    for is_async in BOTH {
-        let mut story = five_is_not_named();
-        story.bus.set_position(NodeId::N5, PLACE).unwrap();
-        call!(is_async, story.bus, stop_all, stop_all_async()).unwrap();
-        let role = story.bus.role();
-        for node in [NodeId::N2, NodeId::N5] {
-            assert_ne!(role.stop_progress(node), StopProgress::NotAsked, "{node}");
-        }
-        assert_ne!(role.set_point(NodeId::N5), Some(Target::Position(PLACE)));
-    }
-}
-
-#[test]
 fn a_stop_of_all_lists_a_silent_node_although_the_settings_do_not_name_it() {
     for is_async in BOTH {
         let mut story = five_is_not_named();

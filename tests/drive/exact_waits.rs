@@ -106,23 +106,22 @@ fn in_two(rest_after_us: u64, failing_flushes: usize) -> On<Pausing> {
 }
 
 #[test]
-fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long() {
+fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long_else_its_role_is_told_at_once() {
     // As above; behind a longer one only a flush within the time of the frame and a pause counts.
     for (rest_after_us, is_cut_off) in [(60 + 979, false), (60 + 980, false), (60 + 981, true)] {
         let mut driver = in_two(rest_after_us, 0);
         driver.service().unwrap();
         let expected = if is_cut_off { vec![Unsent::CutOff] } else { vec![] };
         assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
-    }
-}
-
-#[test]
-fn a_role_is_told_that_a_frame_was_given_up_before_it_is_told_that_all_has_left() {
-    for (rest_after_us, expected) in [(60 + 980, vec![]), (60 + 981, vec![Unsent::CutOff])] {
-        let mut driver = in_two(rest_after_us, 0);
-        driver.service().unwrap();
+        // Before it is told that all has left.
         assert_eq!(driver.role().unsent_when_flushed, Some(expected), "{rest_after_us} us");
     }
+    // Later parts without a pause do not make up for it.
+    let mut port = Port::writing([Step::Few(1), Step::Lags(1001, 8)]);
+    port.flushes.push_back(Step::Blocks(300));
+    let mut driver = on(Pausing::default(), port);
+    driver.service().unwrap();
+    assert_eq!(driver.role().unsent, [Unsent::CutOff]);
 }
 
 #[test]

@@ -5,8 +5,7 @@ use crate::{
     rig::*,
 };
 
-const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(MS_20)];
-const MS_20: Duration = Duration::from_millis(20);
+const POLLINGS: [Polling; 2] = [Polling::Fastest, Polling::Every(ms(20))];
 
 /// A motor that has turned at 5 rps for four seconds, and its master.
 fn turned(polling: Polling) -> (Wire, Bus) {
@@ -46,12 +45,19 @@ fn a_mode_that_changes_under_a_set_point_owes_a_stop() {
         let (wire, mut bus) = turned(polling);
         // 5 rps is a position far away.
         let way = way_after_switch(&wire, &mut bus);
-        assert!(
-            way < 1.0,
-            "{polling:?}: the motor makes {way} turns to a position that was never requested"
-        );
+        assert!(way < 1.0, "{polling:?}: it makes {way} turns to a position that nobody requested");
         assert_eq!(bus.role().stop_progress(NodeId::N1), StopProgress::StandingStill);
     }
+}
+
+/// The port takes bytes again, and a stop leaves the motor where it is.
+fn assert_is_stopped_where_it_is(wire: &Wire, bus: &mut Bus) {
+    let before = wire.turns();
+    wire.write_all();
+    bus.stop(NodeId::N1).unwrap();
+    run(bus, 10_000);
+    let way = wire.turns() - before;
+    assert!(way.abs() < 1.0, "the stop drives the motor {way} turns");
 }
 
 #[test]
@@ -71,13 +77,8 @@ fn a_held_position_that_could_not_be_written_at_once_is_measured_again() {
         wire.world.step(5);
     }
     run(&mut bus, 5000);
-    let before = wire.turns();
-    assert!(before > 100.0, "{before}: it is still moving");
-    wire.write_all();
-    bus.stop(NodeId::N1).unwrap();
-    run(&mut bus, 10_000);
-    let way = wire.turns() - before;
-    assert!(way.abs() < 1.0, "the stop drives the motor {way} turns");
+    assert!(wire.turns() > 100.0, "it is still moving");
+    assert_is_stopped_where_it_is(&wire, &mut bus);
 }
 
 #[test]
@@ -111,12 +112,7 @@ fn a_position_from_before_the_stop_is_held_only_if_it_can_be_written_soon() {
     wire.write_only(0);
     assert!(bus.stop(NodeId::N1).is_err());
     run(&mut bus, 2000);
-    let before = wire.turns();
-    wire.write_all();
-    bus.stop(NodeId::N1).unwrap();
-    run(&mut bus, 10_000);
-    let way = wire.turns() - before;
-    assert!(way.abs() < 1.0, "the stop drives the motor {way} turns");
+    assert_is_stopped_where_it_is(&wire, &mut bus);
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub(crate) use axlewire::{
             BiasRequest, Biases, CalibrationEnd, CalibrationEndAck, CalibrationKind,
             CalibrationStart, CalibrationStartAck, ErrorCode, FirmwareReport, ImuBias, ImuBiasAck,
             MagBias, MagBiasAck, NetworkState, OtaAck, OtaRequest, OtaStatus, Ping, Pong,
-            RawMotorControl, SetNetworkState,
+            SetNetworkState,
         },
         robot::{ReportLayout, RobotConfig, RobotEvent, UpdateSource},
     },
@@ -57,10 +57,6 @@ pub(crate) fn mag_bias() -> MagBias {
     MagBias::new([7, -8, 9])
 }
 
-pub(crate) fn kind(is_imu: bool) -> CalibrationKind {
-    if is_imu { IMU } else { MAG }
-}
-
 pub(crate) fn bytes<B: Body>(body: B) -> Vec<u8> {
     body.frame(0).as_bytes().to_vec()
 }
@@ -95,11 +91,6 @@ pub(crate) fn sent<R: Endpoint>(role: &mut R, now: Instant) -> Vec<Vec<u8>> {
 
 pub(crate) fn events<R: Endpoint>(role: &mut R) -> Vec<R::Event> {
     std::iter::from_fn(|| role.poll_event()).collect()
-}
-
-/// What an application would find now.
-pub(crate) fn waiting<R: Endpoint + Clone>(role: &R) -> Vec<R::Event> {
-    events(&mut role.clone())
 }
 
 /// Lets time pass up to `end`, deadline by deadline; returns the frames sent meanwhile, with times.

@@ -1,8 +1,6 @@
 //! Everything that a role acknowledges is available to its application, however full the queues are
 //! (U15).
 
-use proptest::{collection::vec, prelude::*};
-
 use crate::rig::*;
 
 /// The answers to a host's results in `frames`.
@@ -170,106 +168,5 @@ fn a_result_of_either_kind_without_room_withdraws_the_acknowledgement_of_the_one
         host.poll_event();
         host.handle_input(&this(2), ms(3));
         assert_eq!(sent(&mut host, ms(3)).len(), 1);
-    }
-}
-
-/// A single event for a host.
-#[derive(Clone, Copy, Debug)]
-enum ToHost {
-    Imu(i16),
-    Mag(i16),
-    Ask,
-    Report,
-    Pong,
-    Refused,
-    Calibrate(bool),
-    Ack(bool),
-    Take(usize),
-    Sleep(u32),
-}
-
-fn to_host() -> impl Strategy<Value = ToHost> {
-    prop_oneof![
-        3 => (0..20_i16).prop_map(ToHost::Imu),
-        3 => (0..20_i16).prop_map(ToHost::Mag),
-        1 => Just(ToHost::Ask),
-        3 => Just(ToHost::Report),
-        1 => Just(ToHost::Pong),
-        1 => Just(ToHost::Refused),
-        2 => any::<bool>().prop_map(ToHost::Calibrate),
-        2 => any::<bool>().prop_map(ToHost::Ack),
-        2 => (0..18_usize).prop_map(ToHost::Take),
-        2 => (0..600_000_u32).prop_map(ToHost::Sleep),
-    ]
-}
-
-fn is_end(event: &HostEvent) -> bool {
-    matches!(
-        event,
-        HostEvent::CalibrationStarted(_)
-            | HostEvent::CalibrationEnded(_)
-            | HostEvent::CalibrationFailed(_)
-    )
-}
-
-proptest! {
-    #[test]
-    fn a_host_without_a_store_loses_no_result_that_it_acknowledges(
-        calls in vec(to_host(), 1..120),
-    ) {
-        let mut now = ms(0);
-        let mut host = fresh_host();
-        sent(&mut host, now);
-        let (mut told, mut asked) = (Vec::new(), 0);
-        for call in calls {
-            match call {
-                ToHost::Imu(value) => {
-                    let bias = ImuBias::new([value; 3], [value; 3]);
-                    host.handle_input(&bytes(bias), now);
-                    let acks = sent(&mut host, now).iter().filter(|it| it[4] == 6).count();
-                    let event = HostEvent::ImuBias(bias);
-                    let found = told.contains(&event) || waiting(&host).contains(&event);
-                    prop_assert!(acks == 0 || found, "{bias:?}");
-                }
-                ToHost::Mag(value) => {
-                    let bias = MagBias::new([value; 3]);
-                    host.handle_input(&bytes(bias), now);
-                    let acks = sent(&mut host, now).iter().filter(|it| it[4] == 7).count();
-                    let event = HostEvent::MagBias(bias);
-                    let found = told.contains(&event) || waiting(&host).contains(&event);
-                    prop_assert!(acks == 0 || found, "{bias:?}");
-                }
-                ToHost::Ask => host.handle_input(&bytes(BiasRequest {}), now),
-                ToHost::Report => {
-                    let report = FirmwareReport::new(&Telemetry::default(), 38);
-                    host.handle_input(&bytes(report), now);
-                }
-                ToHost::Pong => host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), now),
-                ToHost::Refused => {
-                    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
-                }
-                ToHost::Calibrate(is_imu) => {
-                    asked += usize::from(host.start_calibration(kind(is_imu), now).is_ok());
-                }
-                ToHost::Ack(is_imu) => {
-                    let ack = CalibrationStartAck::new(kind(is_imu), ErrorCode::Fine);
-                    host.handle_input(&bytes(ack), now);
-                }
-                ToHost::Take(count) => {
-                    told.extend(std::iter::from_fn(|| host.poll_event()).take(count));
-                }
-                ToHost::Sleep(micros) => {
-                    let end = now + Duration::from_micros(micros);
-                    wait(&mut host, end);
-                    now = end;
-                }
-            }
-            host.handle_timeout(now);
-            sent(&mut host, now);
-        }
-        // Every calibration request ends, and its end is reported.
-        wait(&mut host, now + HostConfig::default().calibration_bound());
-        told.extend(events(&mut host));
-        prop_assert_eq!(told.iter().filter(|event| is_end(event)).count(), asked);
     }
 }

@@ -3,8 +3,6 @@
 
 mod acknowledgements;
 mod calibration;
-#[path = "../harness/rover_calls.rs"]
-mod calls;
 mod counts;
 mod firmware_hangs;
 mod firmware_update;
@@ -13,9 +11,7 @@ mod motor_commands;
 #[path = "../harness/rover_rig.rs"]
 #[allow(dead_code, unused_imports, reason = "robot uses more of it")]
 mod rig;
-mod robustness;
 mod settings;
-mod standstill;
 mod stop_progress;
 mod unsent_messages;
 mod unsent_motor_commands;

@@ -110,22 +110,6 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
 }
 
 #[test]
-fn a_repeated_request_that_did_not_leave_is_no_repetition() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut host = quiet_host();
-        host.start_calibration(IMU, ms(0)).unwrap();
-        sent(&mut host, ms(0));
-        host.handle_timeout(ms(300));
-        assert_eq!(host.poll_transmit(ms(300)).unwrap()[4], 3);
-        assert_eq!(host.statistics().calibration_retries, 1);
-        host.handle_unsent(unsent, ms(300));
-        assert_eq!(host.statistics().calibration_retries, 0);
-        sent(&mut host, ms(301));
-        assert_eq!(host.statistics().calibration_retries, 1);
-    }
-}
-
-#[test]
 fn the_acknowledgement_of_a_result_that_was_refused_before_is_due_again_if_it_did_not_leave() {
     for (kind, result) in [(IMU, bytes(imu_bias())), (MAG, bytes(mag_bias()))] {
         let mut host = Host::with_store(quiet_config(), Picky::new(|before| before == 0), ms(0));

@@ -1,14 +1,14 @@
 //! Properties of the motor bus roles under any faults of the line: no answer from another node or
-//! to another request, no set-point that was never sent or is stopped by now, no READ without an
-//! end, no forgotten stop.
+//! to another request, no READ without an end. What is written is judged by the models and by the
+//! fuzz target `session`.
 
 use std::collections::VecDeque;
 
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Master, Mode, NodeId, Position, Slave, Status, Target, WriteRequest,
-        master::{Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        Master, Mode, NodeId, Position, Slave, Status,
+        master::{Health, MasterConfig, MasterEvent},
         slave::{SlaveConfig, SlaveEvent},
     },
     sim::{Direction, Input, Line, Rng, Who},
@@ -81,14 +81,7 @@ struct Watched {
     asked: [Option<Instant>; 8],
     open: [Option<Instant>; 8],
     longest: Duration,
-    /// Set-points given to each node.
-    given: [Vec<Position>; 8],
-    /// The latest order of each node, unless it is a stop.
-    order: [Option<Position>; 8],
-    /// Nodes that are owed a stop.
-    owed: NodeSet,
     events: VecDeque<(MasterEvent, Option<Instant>)>,
-    packet: Vec<u8>,
 }
 
 fn index(node: NodeId) -> usize {
@@ -106,11 +99,7 @@ impl Watched {
             asked: [None; 8],
             open: [None; 8],
             longest: Duration::ZERO,
-            given: Default::default(),
-            order: [None; 8],
-            owed: NodeSet::NONE,
             events: VecDeque::new(),
-            packet: vec![],
         }
     }
 
@@ -131,45 +120,13 @@ impl Watched {
         if self.rng.chance(0.05) {
             let node = NodeId::ALL[self.rng.below(8) as usize];
             let target = Position::new(self.rng.below(8192) as i16, i16::from(node.get()) * 100);
-            if self.master.set_position(node, target, now).is_ok() {
-                self.given[index(node)].push(target);
-                self.order[index(node)] = Some(target);
-            }
+            // Refused while it is not online.
+            let _ = self.master.set_position(node, target, now);
         }
         if self.rng.chance(0.005) {
             let node = NodeId::ALL[self.rng.below(8) as usize];
             self.master.stop(node, now);
-            self.order[index(node)] = None;
         }
-        self.check_stops();
-    }
-
-    /// A stop is owed until it is paid.
-    fn check_stops(&mut self) {
-        let owed = self.master.stops_owed();
-        for node in NodeId::ALL {
-            if self.owed.contains(node) && !owed.contains(node) {
-                let progress = self.master.stop_progress(node);
-                let is_paid =
-                    matches!(progress, StopProgress::Confirmed | StopProgress::StandingStill);
-                assert!(is_paid || self.order[index(node)].is_some(), "{node}: {progress:?}");
-            }
-            if owed.contains(node) {
-                assert_eq!(self.master.set_point(node), None);
-                self.order[index(node)] = None;
-            }
-        }
-        self.owed = owed;
-    }
-
-    /// Every WRITE is the latest order, or a stop: hold at the measured position.
-    fn check_write(&self, packet: &[u8]) {
-        let Some(write) = packet.first_chunk().and_then(|it| WriteRequest::parse(it).ok()) else {
-            return;
-        };
-        let (node, to) = (write.id(), write.as_position());
-        let is_hold = to.rotation() == i16::from(node.get());
-        assert!(is_hold || self.order[index(node)] == Some(to), "{to:?} to node {node}");
     }
 }
 
@@ -190,10 +147,7 @@ impl Endpoint for Watched {
         let is_online = NodeId::ALL.map(|node| {
             matches!(self.master.health(node), Some(Health::Online | Health::Suspect(_)))
         });
-        let bytes = self.master.poll_transmit(now)?.to_vec();
-        self.check_write(&bytes);
-        self.packet = bytes;
-        let bytes = &self.packet;
+        let bytes = self.master.poll_transmit(now)?;
         let node = usize::from(bytes[1]) - 1;
         if bytes[0] == 0xAA {
             self.asked[node] = Some(now);
@@ -310,21 +264,6 @@ proptest! {
             let tail = weather.nodes.iter().position(|id| *id == node).expect("a node that exists");
             let answered = line.tail(tail).answered[at.count() as usize];
             prop_assert!(answered >= asked.expect("a request"), "an answer from before the request");
-        }
-    }
-
-    #[test]
-    fn no_spurious_set_point_is_applied(weather in weather()) {
-        let (mut line, _) = run(&weather);
-        for (_, tail, event) in line.take_tail_events() {
-            let SlaveEvent::Command(Target::Position(target)) = event else { panic!("{event:?}") };
-            let node = weather.nodes[tail];
-            // A stop holds at a position that the node itself has reported.
-            let is_hold = target.rotation() == i16::from(node.get())
-                && usize::from(target.count() as u16) < line.tail(tail).answered.len();
-            let given = &line.head().given[index(node)];
-            let is_given = is_hold || given.contains(&target);
-            prop_assert!(is_given, "{target:?} was not given to node {node}");
         }
     }
 

@@ -167,26 +167,6 @@ fn a_read_that_is_under_way_confirms_no_set_point_that_came_after_it() {
 }
 
 #[test]
-fn a_stop_of_all_reaches_a_lost_node_although_the_settings_do_not_name_it() {
-    let mut config = only(&[NodeId::N1]);
-    config.polling = Polling::Manual;
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.answer(NodeId::N3, Answer::Position(turns(3)));
-    desk.master.stop(NodeId::N3, desk.now);
-    desk.packets(9);
-    assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
-    desk.lose_by_hand(NodeId::N3);
-    // Since it was lost it is owed a stop; so it is after another one of all.
-    desk.answer(NodeId::N3, Answer::Position(turns(3)));
-    desk.run(MS(500));
-    desk.master.release(NodeId::N3);
-    desk.lose_by_hand(NodeId::N3);
-    assert_eq!(desk.master.stops_owed(), NodeSet::NONE, "it had no command to keep");
-    desk.master.stop_all(desk.now);
-    assert_eq!(desk.master.stops_owed(), [NodeId::N1, NodeId::N3].into_iter().collect());
-}
-
-#[test]
 fn a_measurement_has_the_time_at_which_its_answer_was_complete() {
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     for (node, answer) in

@@ -185,33 +185,24 @@ fn a_stop_waits_for_the_mode_and_is_then_written_in_it() {
 }
 
 #[test]
-fn what_was_written_in_doubt_does_not_confirm_the_stop() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.answer(NodeId::N1, Answer::Position(turns(7)));
-    desk.master.stop(NodeId::N1, desk.now);
-    let sent = desk.until(NodeId::N1, StopProgress::Confirmed);
-    let hold = hold(NodeId::N1, turns(7));
-    let read = read(NodeId::N1);
-    let in_doubt = [write(NodeId::N1, 0.0), read.clone(), hold.clone(), read.clone()];
-    let decided = [hold.clone(), read.clone(), hold, read];
-    assert_eq!(sent, [in_doubt, decided].concat());
-    let stopped = MasterEvent::Stopped { node: NodeId::N1 };
-    assert_eq!(desk.news().last(), Some(&stopped));
-}
-
-#[test]
-fn what_was_written_in_doubt_does_not_confirm_the_stop_of_a_node_that_is_in_its_old_mode() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.answer(NodeId::N1, Answer::Position(turns(7)));
-    desk.master.stop(NodeId::N1, desk.now);
-    let (zero, read) = (write(NodeId::N1, 0.0), read(NodeId::N1));
-    assert_eq!(desk.packets(3), [zero.clone(), read.clone(), hold(NodeId::N1, turns(7))]);
-    desk.answer(NodeId::N1, Answer::Velocity(0.0));
-    assert_eq!(desk.packets(1), std::slice::from_ref(&read));
-    assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
-    let sent = desk.until(NodeId::N1, StopProgress::Confirmed);
-    assert_eq!(sent, [zero.clone(), read.clone(), zero, read]);
-    assert_eq!(desk.news().first(), Some(&MasterEvent::Stopped { node: NodeId::N1 }));
+fn what_was_written_in_doubt_confirms_the_stop_in_neither_mode() {
+    for (answer, is_changed) in [(Answer::Position(turns(7)), true), (Answer::Velocity(0.0), false)]
+    {
+        let mut desk = Desk::with_nodes(manual(), &[N1]);
+        desk.answer(NodeId::N1, Answer::Position(turns(7)));
+        desk.master.stop(NodeId::N1, desk.now);
+        let (zero, read) = (write(NodeId::N1, 0.0), read(NodeId::N1));
+        let hold = hold(NodeId::N1, turns(7));
+        assert_eq!(desk.packets(3), [zero.clone(), read.clone(), hold.clone()]);
+        desk.answer(NodeId::N1, answer);
+        assert_eq!(desk.packets(1), std::slice::from_ref(&read));
+        assert!(!desk.master.is_mode_in_doubt(NodeId::N1));
+        let stop = if is_changed { hold } else { zero };
+        let sent = desk.until(NodeId::N1, StopProgress::Confirmed);
+        assert_eq!(sent, [stop.clone(), read.clone(), stop, read]);
+        let stopped = MasterEvent::Stopped { node: NodeId::N1 };
+        assert_eq!(desk.news()[usize::from(is_changed)..], [stopped]);
+    }
 }
 
 #[test]
@@ -333,6 +324,24 @@ fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
     assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
     let stopped = MasterEvent::Stopped { node: NodeId::N1 };
     assert_eq!(desk.news().iter().filter(|event| **event == stopped).count(), 2);
+}
+
+#[test]
+fn a_still_velocity_node_in_doubt_measures_no_position_to_hold() {
+    // The only exception in a doubt is for a stop that is owed (I11).
+    for at in [turns(7), turns(-7)] {
+        let mut desk = Desk::stopping(direct(), N1);
+        desk.until(NodeId::N1, StopProgress::StandingStill);
+        desk.answer(NodeId::N1, Answer::Position(at));
+        while !desk.master.is_mode_in_doubt(NodeId::N1) {
+            desk.exchange();
+        }
+        desk.answer(NodeId::N1, Answer::Velocity(0.0));
+        let written = writes(&desk.run(MS(50)));
+        assert!(written.iter().all(|it| *it == write(NodeId::N1, 0.0)), "{written:02x?}");
+        assert!(!desk.master.is_mode_in_doubt(NodeId::N1) && written.len() > 10);
+        assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(0.0))));
+    }
 }
 
 #[test]

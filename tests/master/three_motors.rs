@@ -1,51 +1,11 @@
 //! Boards with three motors: each WRITE is answered, and all three motors count (I10).
 
-use axlewire::ikeya::{
-    slave::SlaveConfig,
-    three::{PositionResponse, WriteRequest},
-};
+use axlewire::ikeya::three::{PositionResponse, WriteRequest};
 
 use crate::{
     boards::{Boards, T0},
     rig::*,
 };
-
-#[test]
-fn a_three_motor_board_answers_writes_and_its_master_waits_for_the_answer() {
-    let mut master: Master<ThreeMotors> = Master::new(direct(), T0);
-    let mut slave: Slave<ThreeMotors> =
-        Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), Instant::from_micros(0));
-    master.discover(T0);
-    let mut now = T0;
-    let (mut heard, mut written) = (0, 0);
-    for _ in 0..40 {
-        let request = master.poll_transmit(now).map(<[u8]>::to_vec);
-        if let Some(request) = request {
-            written += usize::from(request[0] == 0xBB);
-            assert!(request[0] == 0xAA || request.len() == 16);
-            slave.handle_input(&request, now);
-            if let Some(answer) = slave.poll_transmit(now).map(<[u8]>::to_vec) {
-                now += US(700);
-                master.handle_input(&answer, now);
-                continue;
-            }
-        }
-        now = master.poll_timeout().unwrap();
-        master.handle_timeout(now);
-        while let Some(event) = master.poll_event() {
-            if let MasterEvent::Status { status: Status::Velocity(_), .. } = event {
-                heard += 1;
-                let targets = [rps(1.0), rps(-2.0), rps(3.0)];
-                master.set_velocity(NodeId::N1, targets, now).unwrap();
-            }
-        }
-    }
-    assert!(heard > 5 && written > 5, "{heard} answers, {written} writes");
-    let targets = Target::Velocity([rps(1.0), rps(-2.0), rps(3.0)]);
-    assert_eq!(slave.command(now), Some(targets));
-    assert_eq!(master.node_statistics(NodeId::N1).timeouts, 0);
-    assert_eq!(slave.statistics().replies, slave.statistics().reads + slave.statistics().writes);
-}
 
 /// Boards 1 and 8 in velocity mode.
 fn two_boards(mut config: MasterConfig) -> Boards {

@@ -4,12 +4,9 @@
 mod acknowledgements;
 mod answers;
 mod calibration;
-#[path = "../harness/rover_calls.rs"]
-mod calls;
 mod commands;
 mod counts;
 #[path = "../harness/rover_rig.rs"]
 #[allow(dead_code, unused_imports, reason = "host uses more of it")]
 mod rig;
-mod robustness;
 mod unsent_messages;

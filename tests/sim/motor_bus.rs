@@ -186,6 +186,8 @@ fn the_three_motors_of_a_board_turn_go_and_stop_independently() {
         assert!((motor.velocity().get() - target.get()).abs() < 1e-3, "{motor:?}");
     }
     assert_eq!(line.tail(1).motor().each_ref().map(Motor::position), targets);
+    // The master waits for the answers to its WRITEs.
+    assert!(nodes.iter().all(|node| line.head().node_statistics(*node).timeouts == 0));
 
     let now = line.now();
     line.head_mut().stop_all(now);

@@ -41,15 +41,6 @@ fn the_same_seed_gives_the_same_faults_and_another_seed_others() {
 }
 
 #[test]
-fn a_stray_byte_comes_before_every_transmission() {
-    let mut wire = Wire::new(Faults::CLEAN, 1);
-    wire.faults_mut().stray = Some(0xFF);
-    wire.send(b"ab", at(0));
-    wire.send(b"cd", at(1));
-    assert_eq!(due(&mut wire, at(1)), [0xFF, b'a', b'b', 0xFF, b'c', b'd']);
-}
-
-#[test]
 fn bytes_are_due_after_the_delay_and_the_jitter_and_in_order() {
     let sent: Vec<u8> = (0..=255).collect();
     let mut wire = Wire::new(Faults::CLEAN, 3);
