@@ -115,6 +115,9 @@ fn a_frame_taken_in_parts_counts_as_sent_if_no_pause_was_too_long_else_its_role_
         assert_eq!(driver.role().unsent, expected, "{rest_after_us} us");
         // Before it is told that all has left.
         assert_eq!(driver.role().unsent_when_flushed, Some(expected), "{rest_after_us} us");
+        // Nor later.
+        driver.service().unwrap();
+        assert_eq!(driver.role().unsent.len(), usize::from(is_cut_off), "{rest_after_us} us");
     }
     // Later parts without a pause do not make up for it.
     let mut port = Port::writing([Step::Few(1), Step::Lags(1001, 8)]);
