@@ -187,8 +187,11 @@ impl DelayNs for TokioClock {
 
 #[cfg(test)]
 mod tests {
-    use core::task::{Context, Waker};
-    use std::{cell::Cell, io, pin::pin};
+    use core::{
+        cell::Cell,
+        pin::pin,
+        task::{Context, Waker},
+    };
 
     use super::*;
 
