@@ -91,6 +91,7 @@ fn every_hazard_has_tests_that_are_run() {
 }
 
 /// A constant of the library that need not be public, as its source has it; times in milliseconds.
+#[cfg(all(feature = "ikeya", feature = "ucp"))]
 fn constant(file: &str, name: &str) -> String {
     let source = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
     let line = source.lines().find(|line| line.contains(&format!("const {name}: ")));
