@@ -47,6 +47,11 @@ pub struct HostConfig {
     /// still (rulings U10 and U16); 500 ms. On a line on which the robot cannot answer, it is
     /// the time for which it is driven at all.
     pub link_timeout: Duration,
+    /// Time over which the robot averages the wheel speeds that it reports; 1100 ms, as the
+    /// vendor's firmware: ten values, one each 100 ms. After a stop the robot is not seen to
+    /// stand still before this time is over (ruling U16). Zero for a robot that reports what
+    /// it measures.
+    pub rpm_average: Duration,
     /// Longest time for the acknowledgement of a calibration request, from the end of the request
     /// on the wire; 200 ms.
     pub ack_timeout: Duration,
@@ -125,6 +130,7 @@ impl HostConfig {
             ping_period: Some(Duration::from_millis(200)),
             ping_timeout: Duration::from_millis(500),
             link_timeout: Duration::from_millis(500),
+            rpm_average: Duration::from_millis(1100),
             ack_timeout: Duration::from_millis(200),
             attempts: 3,
             idle_margin: Duration::from_millis(20),

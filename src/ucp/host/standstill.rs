@@ -4,9 +4,9 @@ use core::fmt;
 
 use crate::time::{Duration, Instant};
 
-/// Time in which a rover is seen to stand still after its stop, 2 s: for one that coasts.
-/// `Driver::drive_for` waits that long.
-pub const COAST: Duration = Duration::from_millis(2000);
+/// Time in which a rover is seen to stand still after its stop, 3 s: 2 s to coast, and one more
+/// until the average that it reports shows it. `Driver::drive_for` waits that long.
+pub const COAST: Duration = Duration::from_millis(3000);
 
 /// Number of reports in a row that must show all wheels still, 3: one alone may show wheels that
 /// are just reversing.
@@ -26,13 +26,15 @@ pub enum StopProgress {
     /// The stop has been flushed, and no report has arrived since, or none within the
     /// [link timeout](super::HostConfig::link_timeout). **The robot may be moving.**
     NoReports,
-    /// Reports have arrived since, but the latest three do not all show every wheel at standstill.
-    /// **The robot may be moving.**
+    /// Reports have arrived since, but the latest three do not all show every wheel at standstill,
+    /// or are averages that may not show yet how the wheels turn
+    /// ([`HostConfig::rpm_average`](super::HostConfig::rpm_average)). **The robot may be moving.**
     StillMoving {
         /// The wheel speeds of the latest report, rpm.
         rpm: [i16; 4],
     },
-    /// The latest three reports, all received since, show every wheel at 2 rpm or less.
+    /// The latest three reports, all received since, show every wheel at 2 rpm or less, and the
+    /// last of them is an average of the time since.
     StandingStill,
 }
 
@@ -42,6 +44,9 @@ impl fmt::Display for StopProgress {
             Self::NotAsked => f.write_str("it was not told to stop"),
             Self::Due => f.write_str("the stop has not been sent yet"),
             Self::NoReports => f.write_str("it was told to stop, but sends no reports"),
+            Self::StillMoving { rpm } if are_still(rpm) => {
+                f.write_str("it was told to stop, but its reports do not show a standstill yet")
+            }
             Self::StillMoving { rpm: [front_left, front_right, back_left, back_right] } => write!(
                 f,
                 "it was told to stop, but its wheels turn, at {front_left}, {front_right}, \
@@ -61,7 +66,25 @@ pub(super) enum Standstill {
     Told(Instant),
     /// The latest report that counts, how many in a row have shown a standstill, and until when
     /// this says something.
-    Reported { rpm: [i16; 4], still: u8, until: Instant },
+    Reported { told: Instant, rpm: [i16; 4], still: u8, until: Instant },
+}
+
+/// A report.
+pub(super) struct Wheels {
+    pub(super) rpm: [i16; 4],
+    /// When it arrived.
+    pub(super) at: Instant,
+    /// Time that it took on the line.
+    pub(super) on_line: Duration,
+    /// Time of which its speeds are the average.
+    pub(super) average: Duration,
+    /// When it no longer says anything.
+    pub(super) until: Instant,
+}
+
+/// Whether all wheels stand still: turning on the spot is also motion.
+fn are_still(rpm: &[i16; 4]) -> bool {
+    rpm.iter().all(|wheel| wheel.unsigned_abs() <= STILL_RPM)
 }
 
 impl Standstill {
@@ -74,18 +97,18 @@ impl Standstill {
         *self = Self::Told(now);
     }
 
-    /// Takes in the wheel speeds of a report that arrived at `at`, has taken `on_line`, and says
-    /// something `until` then.
-    pub(super) fn report(&mut self, rpm: [i16; 4], at: Instant, on_line: Duration, until: Instant) {
-        let before = match *self {
-            Self::Told(told) if at - told >= on_line => 0,
-            Self::Reported { still, .. } => still,
+    /// Takes in a report.
+    pub(super) fn report(&mut self, wheels: &Wheels) {
+        let (told, before) = match *self {
+            Self::Told(told) if wheels.at - told >= wheels.on_line => (told, 0),
+            Self::Reported { told, still, .. } => (told, still),
             _ => return,
         };
-        // Turning on the spot is also motion: every wheel counts.
-        let is_still = rpm.iter().all(|wheel| wheel.unsigned_abs() <= STILL_RPM);
-        let still = if is_still { before.saturating_add(1).min(STILL_REPORTS) } else { 0 };
-        *self = Self::Reported { rpm, still, until };
+        // An average from before the stop may not show yet that the wheels turn.
+        let is_settled = wheels.at - told >= wheels.average + wheels.on_line;
+        let most = if is_settled { STILL_REPORTS } else { STILL_REPORTS - 1 };
+        let still = if are_still(&wheels.rpm) { before.saturating_add(1).min(most) } else { 0 };
+        *self = Self::Reported { told, rpm: wheels.rpm, still, until: wheels.until };
     }
 
     /// Forgets the reports once there have been none for too long.

@@ -12,6 +12,7 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
+    standstill::Wheels,
     statistics::HostStatistics,
 };
 use crate::{
@@ -276,9 +277,13 @@ impl<S: BiasStore> State<S> {
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
         let at = self.old_since.map_or(at, |since| at.min(since));
-        let on_line = wire_time(frame.as_bytes().len(), self.config.baud);
-        let until = at + self.config.link_timeout;
-        self.motor.standstill().report(report.telemetry.rpm, at, on_line, until);
+        self.motor.standstill().report(&Wheels {
+            rpm: report.telemetry.rpm,
+            at,
+            on_line: wire_time(frame.as_bytes().len(), self.config.baud),
+            average: self.config.rpm_average,
+            until: at + self.config.link_timeout,
+        });
         (self.last_report, self.is_report_new) = (Some(report), true);
         self.events.push_frequent(HostEvent::Report(report));
     }
