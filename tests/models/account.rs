@@ -62,6 +62,8 @@ pub(crate) struct Account {
     pub(crate) paid: u8,
     /// Since when it has to become still: the stop is confirmed, or was asked for again.
     pub(crate) coasting_since: Option<Instant>,
+    /// Answers that it still moves which were heard when it had no more time for that; up to 2.
+    pub(crate) late_moves: u8,
     /// It was seen to be still.
     pub(crate) is_still: bool,
     /// When the last stop WRITE was sent, and whether anybody was asked since.
@@ -112,12 +114,19 @@ impl Account {
     /// that the node still moves, that begins anew.
     pub(crate) fn stop(&mut self, is_told: bool, now: Instant) {
         match self.coasting_since {
-            Some(since) => {
+            Some(_) => {
                 self.drop_target();
-                self.coasting_since = Some(if is_told { now } else { since });
+                if is_told {
+                    self.coast(now);
+                }
             }
             None => self.owe(),
         }
+    }
+
+    /// It has to become still from now on.
+    pub(crate) fn coast(&mut self, now: Instant) {
+        (self.coasting_since, self.late_moves) = (Some(now), 0);
     }
 
     /// The node is owed a stop, if it is not already.

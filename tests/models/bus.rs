@@ -307,7 +307,7 @@ impl<B: Kit> Bus<B> {
         let motor = &mut self.motors[usize::from(node.get()) - 1];
         let is_moving = !motor.is_told_to_stop;
         if is_moving && motor.mode == Mode::Position {
-            motor.count += 10;
+            motor.count += 20;
         }
         let far = if self.is_far { 13_000 } else { 0 };
         Reply { node, mode: motor.mode, place: (motor.count, rotation + far), is_moving }
@@ -329,7 +329,12 @@ impl<B: Kit> Bus<B> {
         if is_in_window {
             self.asked = None;
             self.line_free = at + self.master.config().turnaround_gap;
-            self.account(reply.node).hear_answer(reply.mode, reply.place, at);
+            let account = self.account(reply.node);
+            account.hear_answer(reply.mode, reply.place, at);
+            let is_late = account.coasting_since.is_some_and(|since| at >= since + COAST);
+            if is_late && reply.is_moving && !account.is_in_doubt {
+                account.late_moves = (account.late_moves + 1).min(2);
+            }
         } else {
             self.account(reply.node).hear_outside(reply.mode);
         }

@@ -4,7 +4,7 @@ use axlewire::ikeya::master::{MasterEvent, StopProgress};
 
 use super::{
     account::{Confirm, STRIKES},
-    bus::{Bus, COAST},
+    bus::Bus,
     kit::Sent,
     names::*,
 };
@@ -110,11 +110,12 @@ impl<B: Kit> Bus<B> {
                     return Err(format!("node {node}: the stop is forgotten"));
                 }
                 (account.is_owed, account.is_stop_due) = (false, false);
-                account.coasting_since = Some(self.now);
+                account.coast(self.now);
             }
-            if let Some(since) = account.coasting_since.filter(|_| !owed.contains(node)) {
-                let heard = self.master.status(node).filter(|_| !account.is_in_doubt);
-                let is_late = heard.is_some_and(|(_, at)| at >= since + COAST);
+            if account.coasting_since.is_some() && !owed.contains(node) {
+                // Of a position node, two answers show that it moves.
+                let is_velocity = self.motors[index].mode == Mode::Velocity;
+                let (least, most) = (1, if is_velocity { 1 } else { 2 });
                 match progress {
                     StopProgress::StandingStill if !self.motors[index].is_told_to_stop => {
                         return Err(format!("node {node} is still, but it was told to move"));
@@ -122,8 +123,8 @@ impl<B: Kit> Bus<B> {
                     StopProgress::StandingStill => {
                         (account.coasting_since, account.is_still) = (None, true);
                     }
-                    StopProgress::Confirmed if !is_late => {}
-                    StopProgress::StillMoving if is_late => {}
+                    StopProgress::Confirmed if account.late_moves < most => {}
+                    StopProgress::StillMoving if account.late_moves >= least => {}
                     _ => return Err(format!("node {node} coasts, and is {progress:?}")),
                 }
             } else if account.is_still && !owed.contains(node) {
