@@ -213,3 +213,27 @@ fn a_motor_that_moves_on_after_its_confirmed_stop_is_still_moving() {
         }
     }
 }
+
+#[test]
+fn a_node_that_loses_its_confirmation_has_time_to_be_still_all_the_same() {
+    for is_async in BOTH {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        story.two_obeys.set(false);
+        // It coasts for 1500 ms, and is not heard from 1000 to 1020 ms.
+        let (begin, clock) = (story.world.now(), story.world.clone());
+        let two = story.two.clone();
+        story.world.add(move || {
+            if let Ok(mut two) = two.try_borrow_mut() {
+                let at = clock.now() - begin;
+                two.port().unplugged.set((ms(1000)..ms(1020)).contains(&at));
+                two.role_mut().set_velocity(rps(if at < ms(1500) { 0.5 } else { 0.0 }));
+            }
+        });
+        assert_eq!(stop(&mut story, is_async), Ok(()));
+        let took = story.world.now() - begin;
+        assert!((ms(1520)..ms(1600)).contains(&took), "{took:?}");
+        let lost =
+            |it: &MasterEvent| matches!(it, MasterEvent::Health { health: Health::Abnormal, .. });
+        assert!(core::iter::from_fn(|| story.bus.role_mut().poll_event()).any(|it| lost(&it)));
+    }
+}

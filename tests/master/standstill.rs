@@ -268,6 +268,23 @@ fn a_stop_of_a_node_that_misses_its_reads_is_written_every_20_ms_behind_an_adapt
 }
 
 #[test]
+fn a_motor_is_told_to_move_on_only_when_an_answer_shows_that_it_does() {
+    for (node, moving, at_rest) in [
+        (N1, Answer::Velocity(3.0), Answer::Velocity(0.0)),
+        (N3, Answer::Position(turns(3)), Answer::Position(turns(4))),
+    ] {
+        let mut desk = Desk::stopping(direct(), node);
+        desk.answer(node.0, moving);
+        desk.until(node.0, StopProgress::Confirmed);
+        desk.news();
+        // The application comes back when there is no more time to coast.
+        desk.now += MS(5000);
+        desk.follow(node.0, MS(100), |_| at_rest);
+        assert_eq!(desk.news(), [MasterEvent::StandingStill { node: node.0 }]);
+    }
+}
+
+#[test]
 fn a_motor_that_coasts_on_is_told_once_and_again_when_it_is_stopped_again() {
     let status = Status::Velocity(3.0);
     let told = [MasterEvent::StillMoving { node: NodeId::N1, status }];
