@@ -41,10 +41,8 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
 
 #[test]
 fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
-    let mut config = SlaveConfig::direct();
-    config.watchdog = Some(Duration::from_millis(100));
     let wire = Wire::bus(None);
-    let mut slave = one_slave(&wire, config);
+    let mut slave = one_slave(&wire, with_watchdog());
     wire.receive(FIVE_RPS().as_bytes());
     slave.service().unwrap();
     assert!(command(&slave).is_some());

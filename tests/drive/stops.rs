@@ -237,3 +237,16 @@ fn a_node_that_loses_its_confirmation_has_time_to_be_still_all_the_same() {
         assert!(core::iter::from_fn(|| story.bus.role_mut().poll_event()).any(|it| lost(&it)));
     }
 }
+
+#[test]
+fn a_stop_whose_port_fails_for_good_once_it_is_confirmed_ends_at_its_bound() {
+    for is_async in BOTH {
+        let mut story = Story::new(MasterConfig::direct()).discovered();
+        story.two_obeys.set(false);
+        let now = story.bus.now();
+        story.bus.role_mut().stop(NodeId::N2, now);
+        story.run(10);
+        story.bus.port_mut().is_mute = true;
+        assert_eq!(stop(&mut story, is_async), Err(DriveError::StillMoving(only(NodeId::N2))));
+    }
+}

@@ -169,11 +169,8 @@ fn a_discovery_counts_the_nodes_that_are_online_or_suspect_at_its_end() {
     desk.miss();
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Suspect(1)));
     desk.master.discover(desk.now);
-    while desk.master.is_discovering() {
-        desk.exchange().unwrap();
-    }
+    desk.run(MS(50));
     assert!(desk.told().contains(&MasterEvent::DiscoveryDone { online: 2 }));
-
     let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
     desk.lose(NodeId::N3);
     desk.told();

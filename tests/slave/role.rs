@@ -131,15 +131,6 @@ fn the_watchdog_ends_a_command_and_reports_it_once() {
 }
 
 #[test]
-fn a_position_node_does_not_answer_before_it_knows_where_it_is() {
-    let mut slave = slave(Mode::Position);
-    assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), Vec::<Vec<u8>>::new());
-    slave.set_position(Position::new(4, -2));
-    let expected = [position(NodeId::N2, Position::new(4, -2))];
-    assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), expected);
-}
-
-#[test]
 fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
     let dip: DipSwitch = "0101".parse().unwrap();
     let slave: Slave = Slave::from_dip(

@@ -3,7 +3,7 @@
 use axlewire::{
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId, Position, PositionResponse, ReadRequest, Slave,
+        Mode, NodeId, Position, ReadRequest, Slave,
         board::Target,
         slave::{SlaveConfig, SlaveEvent},
     },
@@ -34,8 +34,7 @@ fn a_switch_that_is_moved_drops_the_command_with_its_event_and_its_watchdog() {
     // It answers in its new mode, and obeys in it.
     slave.set_position(turns(5));
     slave.handle_input(ReadRequest::new(NODE).as_bytes(), T0 + MS(200));
-    let answer = PositionResponse::new(NODE, turns(5));
-    assert_eq!(slave.poll_transmit(T0 + MS(200)), Some(&answer.as_bytes()[..]));
+    assert_eq!(slave.poll_transmit(T0 + MS(200)), Some(&position(NODE, turns(5))[..]));
     slave.handle_input(&hold(NODE, Position::new(3, 4)), T0 + MS(300));
     let target = Target::Position(Position::new(3, 4));
     assert_eq!(slave.poll_event(), Some(SlaveEvent::Command(target)));
