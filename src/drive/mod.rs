@@ -42,7 +42,7 @@
 //!     while let Some(event) = bus.next_event(end)? {
 //!         let _ = event; // a measurement, a change of a node's health, ...
 //!     }
-//!     bus.stop_all() // waits until every node has confirmed its stop, twice
+//!     bus.stop_all() // waits until every motor is seen to be still
 //! }
 //! # }
 //! ```

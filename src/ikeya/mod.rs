@@ -120,7 +120,8 @@
 //! * **I12** A stop is owed from the call until the node is *seen to be still*. It is *confirmed*
 //!   once two stop WRITEs have each been followed by an answer from the node in its mode; until
 //!   then set-points are refused. The node is *still* once two answers behind a stop WRITE, at
-//!   least 20 ms apart, both show less than 0.05 rps, or positions within 8 counts of each other.
+//!   least 20 ms apart, both show less than 0.05 rps, or positions within 8 counts of each other; a
+//!   position node that comes back to its hold passes a place twice, so the crate takes a third.
 //!   Until then, or until a new set-point, the stop is written with every reading, at least every
 //!   20 ms, whatever the polling: an answer shows that the READ was heard, not the WRITE. A stop
 //!   survives abnormal nodes, port errors and a full event queue, and a release does not cancel it.

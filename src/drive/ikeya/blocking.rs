@@ -15,9 +15,9 @@ use crate::{
 
 /// The blocking calls of a master.
 ///
-/// Each ends within four times [`Master::read_bound`], or at its deadline argument. Readings
-/// received meanwhile are not kept as events, because [`Master::status`] has the latest; all other
-/// events are kept.
+/// Each ends within four times [`Master::read_bound`], or at its deadline argument; those that stop
+/// within [`Master::stop_bound`] and the time to coast. Readings received meanwhile are not kept as
+/// events, because [`Master::status`] has the latest; all other events are kept.
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,

@@ -73,7 +73,7 @@ pub enum MasterEvent<B: Board = OneMotor> {
         node: NodeId,
     },
     /// The motor is seen to be still after a stop: two answers at least 20 ms apart show less than
-    /// 0.05 rps, or positions within 8 counts of each other (I12).
+    /// 0.05 rps, or three show positions within 8 counts of the one before (I12).
     StandingStill {
         /// The node.
         node: NodeId,

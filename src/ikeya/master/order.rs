@@ -606,7 +606,7 @@ pub enum StopProgress {
     /// Confirmed, but the motor still moves after
     /// [`MasterConfig::coast`](super::MasterConfig::coast). The stop is repeated.
     StillMoving,
-    /// Two answers at least 20 ms apart have shown a motor that is still: below 0.05 rps, or within
-    /// 8 counts.
+    /// Answers at least 20 ms apart have shown a motor that is still: two below 0.05 rps, or three
+    /// positions within 8 counts.
     StandingStill,
 }

@@ -35,10 +35,10 @@ const EVENTS: usize = 16;
 /// A stop is a debt (I12). As soon as [`stop`](Self::stop) is called, the set-point is gone and new
 /// ones are refused, until the stop is confirmed: two of its WRITEs have each been followed by an
 /// answer from the node ([`MasterEvent::Stopped`]). An answer shows that the READ was heard, not
-/// the WRITE, so the stop is repeated until two answers at least 20 ms apart show a motor that is
-/// still ([`MasterEvent::StandingStill`]), whatever happens on the line, in the port or in the
-/// event queue. A motor that still moves after [`MasterConfig::coast`] is reported
-/// ([`MasterEvent::StillMoving`]), and stopped further.
+/// the WRITE, so the stop is repeated until two answers of a velocity node, or three of a position
+/// node, at least 20 ms apart, show a motor that is still ([`MasterEvent::StandingStill`]),
+/// whatever happens on the line, in the port or in the event queue. A motor that still moves after
+/// [`MasterConfig::coast`] is reported ([`MasterEvent::StillMoving`]), and stopped further.
 ///
 /// * A velocity node is told 0 rps.
 /// * A position node is read, and told to hold the position of that answer (I6). It may move back
@@ -168,9 +168,9 @@ impl<B: Board> Master<B> {
     /// the motor is seen to be still ([`MasterEvent::StandingStill`], I12); see
     /// [`stop_progress`](Self::stop_progress).
     ///
-    /// A node that has never answered is read first. A repeated call joins the stop that is owed,
-    /// and [`MasterConfig::coast`] begins anew. A call after the node is still begins a new stop,
-    /// holding the same position.
+    /// A node that has never answered is read first. A repeated call joins the stop that is owed;
+    /// if the application was told that the motor still moves, [`MasterConfig::coast`] begins
+    /// anew. A call after the node is still begins a new stop, holding the same position.
     pub fn stop(&mut self, node: NodeId, now: Instant) {
         self.sign_of_life(now);
         self.owe_stop(node);
