@@ -132,10 +132,10 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     };
     for bound in [
         format!(
-            "at least {} apart show less than {} rps, or positions within {} counts",
+            "at least {} apart show less than {} rps, or three show positions within {} counts",
             constant(order, "STILL_TIME"),
             constant(board, "STILL_RPS"),
-            constant(board, "STILL_COUNTS")
+            constant(order, "STILL_COUNTS")
         ),
         format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
