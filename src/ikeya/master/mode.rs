@@ -50,6 +50,8 @@ impl KnownMode {
     }
 
     /// Takes the mode of an answer in its window.
+    // In line it would take 50 more bytes of flash.
+    #[inline(never)]
     pub(super) fn decide(&mut self, mode: Mode) -> Decision {
         let decision = match (self.differs_from(mode), self.doubt) {
             (true, None) => return Decision::Doubtful,

@@ -281,7 +281,6 @@ impl<B: Board> Node<B> {
     }
 
     /// Earliest time of a request for this reason; `None` if there is none to send.
-    #[inline(never)]
     pub(super) fn due_at(
         &self,
         reason: Reason,
@@ -299,7 +298,7 @@ impl<B: Board> Node<B> {
             Reason::Cycle if !self.is_wanted() => self.cycle_at(config),
             _ => None,
         };
-        let at = turn.max(guard).unwrap_or(now);
+        let at = turn.unwrap_or(now).max(guard.unwrap_or(now));
         self.has(reason, config).then_some(at)
     }
 
@@ -407,7 +406,6 @@ impl<B: Board> Node<B> {
     }
 
     /// A request that expects an answer has been handed out.
-    #[inline(never)]
     pub(super) fn asked(&mut self, is_scan: bool, config: &MasterConfig, now: Instant) {
         count_apart(&mut self.statistics.requests);
         if self.attempt > 0 {
@@ -468,6 +466,8 @@ impl<B: Board> Node<B> {
     }
 
     /// An answer in its window, this long after the end of the request.
+    // In line it would take 50 more bytes of flash.
+    #[inline(never)]
     pub(super) fn hear_answer(
         &mut self,
         status: &Status<B>,

@@ -134,7 +134,6 @@ impl<B: Board> Order<B> {
     }
 
     // In line it would take 300 more bytes of flash.
-    #[inline(never)]
     const fn begin_stop(&mut self, hold: Option<B::Position>, measured_at: Option<Instant>) {
         self.state = State::Stop(Stop::new(hold, measured_at));
     }

@@ -47,7 +47,6 @@ impl<B: Board> Master<B> {
     }
 
     /// Tells the application what has changed for a node.
-    #[inline(never)]
     pub(super) fn tell_changes(&mut self, node: NodeId, changes: Changes) {
         for change in Change::ALL {
             if changes.has(change) {

@@ -285,7 +285,6 @@ impl<B: Board> Master<B> {
         self.events.retain(stays);
     }
 
-    #[inline(never)]
     pub(super) fn tell(&mut self, event: MasterEvent<B>) {
         self.events.push(event);
     }
