@@ -51,6 +51,8 @@ pub(crate) enum Halt {
     Doubtful,
     /// The id has only ever given damaged answers.
     Damaged,
+    /// The id has only ever given answers that were too late or too early.
+    Untimely,
     /// The id has never answered.
     Silent,
 }
@@ -216,6 +218,12 @@ impl<B: Boards> Bus<B> {
         self.status(node).is_none() && self.master().node_statistics(node).crc_errors > 0
     }
 
+    /// Whether an id has given whole answers, but none in its window.
+    fn is_untimely(&self, node: NodeId) -> bool {
+        let counts = self.master().node_statistics(node);
+        self.status(node).is_none() && (counts.late > 0 || counts.early > 0)
+    }
+
     pub(crate) fn is_online(&self, node: NodeId) -> bool {
         matches!(self.master().health(node), Some(Health::Online | Health::Suspect(_)))
     }
@@ -326,6 +334,7 @@ impl<B: Boards> Bus<B> {
             StopProgress::StandingStill => Halt::Still,
             StopProgress::Confirmed | StopProgress::StillMoving => Halt::Moving,
             _ if self.is_damaged(node) => Halt::Damaged,
+            _ if self.is_untimely(node) => Halt::Untimely,
             _ if self.status(node).is_none() => Halt::Silent,
             _ if self.master().is_mode_in_doubt(node) => Halt::Doubtful,
             _ => Halt::Owed,
@@ -355,6 +364,10 @@ impl<B: Boards> Bus<B> {
             Halt::Damaged => {
                 format!("id {node} gives only damaged answers: its motor may be moving")
             }
+            Halt::Untimely => format!(
+                "id {node} gives only answers that are too late or too early: its motor may be \
+                 moving"
+            ),
             Halt::Silent => format!("node {node} does not answer"),
         })
     }

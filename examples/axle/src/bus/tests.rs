@@ -170,6 +170,24 @@ fn an_id_counts_as_silent_only_after_as_many_requests_as_the_master_attempts() {
 }
 
 #[test]
+fn an_id_whose_answers_all_come_too_late_is_not_silent() {
+    let answer = axlewire::ikeya::VelocityResponse::new(NodeId::N1, Rps::new(5.0).unwrap());
+    let line = played::played(Vec::new(), move |answers: &mut Vec<std::time::Instant>, said| {
+        if said.first() == Some(&0xAA) && said.get(1) == Some(&1) {
+            answers.push(clock::now() + Span::from_millis(30));
+        }
+        let (due, later) = answers.iter().partition(|at| **at <= clock::now());
+        *answers = later;
+        answer.as_bytes().repeat(Vec::len(&due))
+    });
+    let mut bus = on(&line.line, NodeId::N1.into());
+    bus.stop(NodeId::N1.into()).unwrap();
+    assert_eq!(bus.halt(NodeId::N1), Halt::Untimely);
+    let says = "id 1 gives only answers that are too late or too early: its motor may be moving";
+    assert_eq!(bus.complaint(NodeId::N1).unwrap(), says);
+}
+
+#[test]
 fn a_stop_that_is_not_confirmed_is_waited_for_two_seconds_and_on_a_slow_line_longer() {
     for (baud, is_slow) in [(500_000, false), (9600, true)] {
         let line = turning(|said, bus| bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)));

@@ -14,25 +14,25 @@ use crate::{failure::Failure, line::Line, rover::Rover, signals::Signals};
 /// robot, the host is silent.
 pub(super) struct Wheels {
     rover: Rover,
-    /// Whether the plan drives it.
-    drives: bool,
+    /// Whether the plan commands it, if only to stand still.
+    is_commanded: bool,
     is_json: bool,
 }
 
 impl Voice for Wheels {
-    /// Waits until the robot is heard, if the plan drives it.
+    /// Waits until the robot is heard, if the plan commands it.
     fn prepare(plan: &Plan<'_>, line: Line, signals: &Signals) -> Result<Option<Self>, Failure> {
-        let drives = plan.frames.iter().any(|due| due.effect.moves());
+        let is_commanded = plan.frames.iter().any(|due| matches!(due.effect, Effect::Wheels(_)));
         let mut config = HostConfig::default();
         // What else is said is a matter of the plan.
         config.sends_first_stop = plan.side == Side::Commander;
         config.low_ids_only = true;
-        config.ping_period = config.ping_period.filter(|_| drives);
+        config.ping_period = config.ping_period.filter(|_| is_commanded);
         let mut rover = Rover::with(config, line, plan.bus.line());
-        if drives && !rover.find(|| signals.is_raised())? {
+        if is_commanded && !rover.find(|| signals.is_raised())? {
             return Ok(None);
         }
-        Ok(Some(Self { rover, drives, is_json: plan.is_json }))
+        Ok(Some(Self { rover, is_commanded, is_json: plan.is_json }))
     }
 
     fn now(&mut self) -> Instant {
@@ -58,7 +58,7 @@ impl Voice for Wheels {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        if self.drives { self.rover.check_heard() } else { Ok(()) }
+        if self.is_commanded { self.rover.check_heard() } else { Ok(()) }
     }
 
     fn round(&mut self, until: Instant) -> Result<(), Failure> {
@@ -66,7 +66,7 @@ impl Voice for Wheels {
     }
 
     fn stop(mut self) -> Result<Vec<String>, Failure> {
-        if !self.drives {
+        if !self.is_commanded {
             return Ok(Vec::new());
         }
         self.rover.stop()?;

@@ -30,6 +30,14 @@ fn a_rover_that_was_driven_is_stopped_and_one_that_is_asked_is_stopped_first() {
 }
 
 #[test]
+fn a_rover_that_was_only_told_to_stand_still_is_seen_to_do_so() {
+    let stop = MotorControl::STOP.frame(0);
+    let frames: [(u64, &[u8]); 1] = [(0, stop.as_bytes())];
+    ROVER.on(&played::rover(|_| {}), &frames, &Signals::none()).unwrap();
+    assert!(ROVER.on_line(&played::silence(true), &frames, &Signals::none()).is_err());
+}
+
+#[test]
 fn a_rover_is_told_to_stop_every_100_ms_until_its_first_motor_command() {
     let ping = Ping {}.frame(7);
     let drive = MotorControl::new(10, 0).unwrap().with_front_led(true).frame(3);
