@@ -33,16 +33,20 @@
 //!     config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus
 //!     let mut bus: Driver<Master, _, _> =
 //!         Driver::with(|now| Master::new(config, now), port, clock);
-//!     for (node, mode) in bus.discover()? {
-//!         if mode == Mode::Velocity {
-//!             bus.set_velocity(node, target)?;
+//!     let moved = (|| {
+//!         for (node, mode) in bus.discover()? {
+//!             if mode == Mode::Velocity {
+//!                 bus.set_velocity(node, target)?;
+//!             }
 //!         }
-//!     }
-//!     let end = bus.now() + Duration::from_millis(1000);
-//!     while let Some(event) = bus.next_event(end)? {
-//!         let _ = event; // a measurement, a change of a node's health, ...
-//!     }
-//!     bus.stop_all() // waits until every motor is seen to be still
+//!         let end = bus.now() + Duration::from_millis(1000);
+//!         while let Some(event) = bus.next_event(end)? {
+//!             let _ = event; // a measurement, a change of a node's health, ...
+//!         }
+//!         Ok(())
+//!     })();
+//!     bus.stop_all()?; // whatever has failed; waits until every motor is seen to be still
+//!     moved
 //! }
 //! # }
 //! ```

@@ -285,6 +285,20 @@ fn a_motor_is_told_to_move_on_only_when_an_answer_shows_that_it_does() {
 }
 
 #[test]
+fn a_motor_is_told_to_move_on_once_although_its_node_is_lost_again_and_again() {
+    let mut desk = Desk::stopping(direct(), N1);
+    let (begin, mut told) = (desk.now, vec![]);
+    for _ in 0..20 {
+        desk.follow(NodeId::N1, MS(280), |_| Answer::Velocity(3.0));
+        desk.lose(NodeId::N1);
+        let news = desk.news().into_iter();
+        let still_moving = news.filter(|it| matches!(it, MasterEvent::StillMoving { .. }));
+        told.extend(still_moving.map(|_| (desk.now - begin).as_micros() / 1000));
+    }
+    assert!(told.len() == 1 && (2000..2400).contains(&told[0]), "{told:?}");
+}
+
+#[test]
 fn a_motor_that_coasts_on_is_told_once_and_again_when_it_is_stopped_again() {
     let status = Status::Velocity(3.0);
     let told = [MasterEvent::StillMoving { node: NodeId::N1, status }];

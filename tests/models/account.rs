@@ -60,8 +60,13 @@ pub(crate) struct Account {
     /// A stop WRITE has been sent and nothing was missed since.
     pub(crate) is_stop_written: bool,
     pub(crate) paid: u8,
-    /// Since when it has to become still: the stop is confirmed, or was asked for again.
+    /// Since when it has to become still, while the stop is confirmed.
     pub(crate) coasting_since: Option<Instant>,
+    /// The same, even if the confirmation is lost: when it was the first time, or the stop was
+    /// asked for again.
+    coasts_from: Option<Instant>,
+    /// The application was told that it still moves.
+    pub(crate) is_told: bool,
     /// Answers that it still moves which were heard when it had no more time for that; up to 2.
     pub(crate) late_moves: u8,
     /// It was seen to be still.
@@ -100,6 +105,7 @@ impl Account {
         (self.target, self.last_target, self.is_target_new) = (Some(number), number, true);
         (self.is_under_order, self.is_halted, self.hold) = (true, false, None);
         (self.coasting_since, self.is_still, self.waits) = (None, false, 0);
+        self.begin_coasting(None);
     }
 
     /// The set-point is dropped.
@@ -117,6 +123,7 @@ impl Account {
             Some(_) => {
                 self.drop_target();
                 if is_told {
+                    self.begin_coasting(Some(now));
                     self.coast(now);
                 }
             }
@@ -124,15 +131,21 @@ impl Account {
         }
     }
 
-    /// It has to become still from now on.
+    fn begin_coasting(&mut self, from: Option<Instant>) {
+        (self.coasts_from, self.is_told) = (from, false);
+    }
+
+    /// The stop is confirmed: it has to become still, unless that has begun before.
     pub(crate) fn coast(&mut self, now: Instant) {
-        (self.coasting_since, self.late_moves) = (Some(now), 0);
+        self.coasting_since = Some(*self.coasts_from.get_or_insert(now));
+        self.late_moves = 0;
     }
 
     /// The node is owed a stop, if it is not already.
     pub(crate) fn owe(&mut self) {
         self.drop_target();
         if !self.is_halted {
+            self.begin_coasting(None);
             (self.is_odd_stop, self.hold, self.may_hold_anew) = (!self.is_odd_stop, None, true);
             (self.places_heard, self.places_heard_at) = (0, [None; 4]);
         }
@@ -142,6 +155,9 @@ impl Account {
 
     /// The same stop is owed, or owed again.
     pub(crate) fn owe_again(&mut self) {
+        if self.is_still {
+            self.begin_coasting(None);
+        }
         (self.coasting_since, self.is_still) = (None, false);
         if !self.is_owed {
             (self.is_owed, self.paid, self.stopped_at, self.waits) = (true, 0, None, 0);

@@ -123,8 +123,11 @@ impl<B: Kit> Bus<B> {
                     StopProgress::StandingStill => {
                         (account.coasting_since, account.is_still) = (None, true);
                     }
-                    StopProgress::Confirmed if account.late_moves < most => {}
-                    StopProgress::StillMoving if account.late_moves >= least => {}
+                    StopProgress::Confirmed if !account.is_told && account.late_moves < most => {}
+                    StopProgress::StillMoving if account.late_moves >= least => {
+                        account.is_told = true
+                    }
+                    StopProgress::StillMoving if account.is_told => {}
                     _ => return Err(format!("node {node} coasts, and is {progress:?}")),
                 }
             } else if account.is_still && !owed.contains(node) {

@@ -120,9 +120,12 @@ impl<B: Board> Order<B> {
     }
 
     /// The node is abnormal: it keeps its last command and is owed a stop, if that `is_stopped`.
+    // In line it would take 30 more bytes of flash.
+    #[inline(never)]
     pub(super) fn lose(&mut self, is_stopped: bool) {
-        let is_owed = match &self.state {
-            State::Stop(stop) => stop.stage != Stage::Still || is_stopped && !stop.is_released,
+        let is_owed = match &mut self.state {
+            State::Stop(stop) if stop.stage != Stage::Still => return stop.lose(),
+            State::Stop(stop) => is_stopped && !stop.is_released,
             State::SetPoint(_) | State::Released => is_stopped,
             State::None => false,
         };
@@ -364,6 +367,8 @@ pub(super) struct Stop<B: Board> {
     is_asked: bool,
     /// Whether the application was told that the node is still moving.
     is_told: bool,
+    /// Whether it was confirmed, even if that was lost again.
+    was_confirmed: bool,
     /// Whether `seen` agrees with an earlier answer.
     is_second: bool,
     /// Stop WRITEs sent.
@@ -380,7 +385,8 @@ pub(super) struct Stop<B: Board> {
     patience: Duration,
     /// Time of the latest stop WRITE, unless it was taken back.
     written_at: Option<Instant>,
-    /// Time from which the node has to become still.
+    /// Time from which the node has to become still: that of the first confirmation, or of a stop
+    /// that was asked for again.
     confirmed_at: Instant,
     /// An answer behind a stop WRITE that may be the first of those that show a standstill.
     seen: Option<(Status<B>, Instant)>,
@@ -407,6 +413,7 @@ impl<B: Board> Stop<B> {
             is_released: false,
             is_asked: false,
             is_told: false,
+            was_confirmed: false,
             is_second: false,
             writes: 0,
             followed: 0,
@@ -473,7 +480,12 @@ impl<B: Board> Stop<B> {
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
         (self.hold, self.measured_at) = (None, None);
         (self.is_written, self.writes, self.written_at) = (false, 0, None);
-        self.is_told = false;
+    }
+
+    /// The node is abnormal. It has no more time to become still than before.
+    fn lose(&mut self) {
+        self.restart();
+        (self.is_asked, self.is_released, self.lost_attempts) = (false, false, 0);
     }
 
     fn wrote(&mut self, now: Instant) {
@@ -525,7 +537,10 @@ impl<B: Board> Stop<B> {
             self.followed = self.followed.saturating_add(1);
         }
         if self.stage == Stage::Owed && self.followed >= CONFIRMATIONS {
-            (self.stage, self.confirmed_at) = (Stage::Confirmed, now);
+            self.stage = Stage::Confirmed;
+            if !core::mem::replace(&mut self.was_confirmed, true) {
+                self.confirmed_at = now;
+            }
             settled = settled.with(Change::Stopped, true);
         }
         // An answer to a READ in front of all stop WRITEs shows nothing.
