@@ -288,7 +288,7 @@ fn driving_for_a_while_keeps_the_command_alive_and_ends_with_a_stop() {
         });
         let span = ms(1200);
         call!(is_async, rover, drive_for, drive_for_async(40, 0, span)).unwrap();
-        assert!((1200..1290).contains(&(world.now().as_micros() / 1000)));
+        assert!((2300..2390).contains(&(world.now().as_micros() / 1000)));
         world.pass(10_000);
         assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
         let is_driven =

@@ -136,12 +136,16 @@ pub(crate) fn quiet_config() -> HostConfig {
     config
 }
 
-/// A host without pings whose robot need not be heard.
-fn unheard_host(sends_first_stop: bool) -> Host {
+/// Settings of a host without pings whose robot need not be heard.
+pub(crate) fn unheard_config(sends_first_stop: bool) -> HostConfig {
     let mut config = quiet_config();
     config.sends_first_stop = sends_first_stop;
     config.link_timeout = Duration::from_millis(3_600_000);
-    Host::new(config, ms(0))
+    config
+}
+
+fn unheard_host(sends_first_stop: bool) -> Host {
+    Host::new(unheard_config(sends_first_stop), ms(0))
 }
 
 /// The same, which begins as hosts do.

@@ -1,7 +1,12 @@
 //! Whether a robot obeys a stop is in its reports (U16).
 
+use std::collections::VecDeque;
+
 use axlewire::ucp::{
-    host::StopProgress::{self, *},
+    host::{
+        COAST,
+        StopProgress::{self, *},
+    },
     message::DocumentReport,
 };
 
@@ -11,10 +16,19 @@ fn wheels(rpm: [i16; 4]) -> Vec<u8> {
     bytes(FirmwareReport::new(&Telemetry { rpm, ..Telemetry::default() }, 38))
 }
 
+/// A host that has sent its first frame, and whose robot reports what it measures.
+fn measured() -> Host {
+    let mut config = unheard_config(true);
+    config.rpm_average = Duration::ZERO;
+    let mut host = Host::new(config, ms(0));
+    wait(&mut host, ms(0));
+    host
+}
+
 /// A host that has driven, and whose stop is flushed at 100 ms, if `tells` by the word of the port;
 /// these reports arrive after it, one each 20 ms.
 fn stopped(tells: bool, reports: &[Vec<u8>]) -> Host {
-    let mut host = driven(begun(), 40, 20);
+    let mut host = driven(measured(), 40, 20);
     wait(&mut host, ms(20));
     host.stop(ms(90));
     assert!(host.poll_transmit(ms(90)).is_some());
@@ -96,7 +110,9 @@ fn a_command_to_move_is_no_stop_however_slow_and_one_to_stand_still_is() {
 
 #[test]
 fn reports_that_have_ceased_for_500_ms_show_nothing() {
-    let mut host = Host::new(quiet_config(), ms(0));
+    let mut config = quiet_config();
+    config.rpm_average = Duration::ZERO;
+    let mut host = Host::new(config, ms(0));
     host.stop(ms(0));
     assert_eq!((sent(&mut host, ms(0)).len(), sent(&mut host, ms(10)).len()), (1, 0));
     [20, 40, 60].into_iter().for_each(|at| host.handle_input(&wheels([0; 4]), ms(at)));
@@ -106,4 +122,113 @@ fn reports_that_have_ceased_for_500_ms_show_nothing() {
     assert_eq!((host.stop_progress(), host.link()), (StandingStill, Link::Up));
     host.handle_timeout(ms(560));
     assert_eq!((host.stop_progress(), host.link()), (NoReports, Link::Up));
+}
+
+#[test]
+fn an_average_from_before_a_stop_shows_no_standstill() {
+    for average in [0, 100, 1100] {
+        let mut config = quiet_config();
+        config.rpm_average = Duration::from_millis(average);
+        let mut host = Host::new(config, ms(0));
+        host.stop(ms(0));
+        assert_eq!((sent(&mut host, ms(0)).len(), sent(&mut host, ms(10)).len()), (1, 0));
+        // 44 bytes take 3.82 ms.
+        let settled = us(13_820 + 1000 * u64::from(average));
+        let mut reports = (1..60).map(|it| us(it * 20_000));
+        let told = std::iter::from_fn(|| {
+            reports.next().map(|at| {
+                host.handle_input(&wheels([0; 4]), at);
+                (at, host.stop_progress())
+            })
+        });
+        let is_still = |(at, progress): &(Instant, StopProgress)| {
+            assert!([StandingStill, StillMoving { rpm: [0; 4] }].contains(progress), "{at:?}");
+            *progress == StandingStill
+        };
+        let (at, _) = told.into_iter().find(is_still).unwrap();
+        let first = (1..60).map(|it| us(it * 20_000)).find(|at| *at >= settled).unwrap();
+        assert_eq!(at, first.max(ms(60)), "{average} ms");
+    }
+}
+
+/// A wheel as the vendor's firmware measures it: with a lag of 150 ms, in multiples of 6 rpm, and
+/// as the average of ten values, one each 100 ms.
+struct Wheel {
+    rpm: f64,
+    /// Turns since the last value.
+    turns: f64,
+    values: VecDeque<i16>,
+    until_next: u32,
+}
+
+impl Wheel {
+    const STEP_MS: u32 = 5;
+
+    /// At rest; its first value comes this much later, milliseconds.
+    fn new(until_next: u32) -> Self {
+        Self { rpm: 0.0, turns: 0.0, values: [0; 10].into(), until_next }
+    }
+
+    /// Goes on for 5 ms with this speed as its target; returns what it reports.
+    fn step(&mut self, target: f64) -> i16 {
+        let step_ms = f64::from(Self::STEP_MS);
+        self.rpm += (target - self.rpm) * (1.0 - (-step_ms / 150.0).exp());
+        self.turns += self.rpm * step_ms / 60_000.0;
+        self.until_next -= Self::STEP_MS;
+        if self.until_next == 0 {
+            // A turn in 100 ms is 600 rpm.
+            self.values.pop_front();
+            self.values.push_back((self.turns * 100.0) as i16 * 6);
+            (self.turns, self.until_next) = (0.0, 100);
+        }
+        self.values.iter().sum::<i16>() / 10
+    }
+}
+
+/// Drives, stops, and tells whether the robot is ever said to stand still while a wheel turns
+/// faster than 6 rpm. It takes its first value at this phase; the first stops are `lost`.
+fn is_wrong(average: Duration, (speed, span, phase, lost): (i16, u32, u32, usize)) -> bool {
+    let mut config = HostConfig::default();
+    config.rpm_average = average;
+    let robot = Robot::new(RobotConfig::default(), ms(0));
+    let mut rig = Rig::of(Host::new(config, ms(0)), robot, ms(0));
+    rig.run_for(500);
+    let (mut is_driven, mut lost) = (false, lost);
+    rig.fault = Box::new(move |_, frame| {
+        let speed = self::speed(frame);
+        is_driven |= speed.is_some_and(|it| it != 0);
+        let is_lost = is_driven && lost > 0 && speed == Some(0);
+        lost -= usize::from(is_lost);
+        if is_lost { Vec::new() } else { frame.to_vec() }
+    });
+    rig.host.drive(go(speed), rig.now).unwrap();
+    let stop_at = rig.now + Duration::from_millis(span);
+    let (mut wheel, mut is_still, mut is_wrong) = (Wheel::new(phase), false, false);
+    while rig.now < stop_at + COAST {
+        if rig.now == stop_at {
+            rig.host.stop(rig.now);
+        }
+        rig.run_for(Wheel::STEP_MS);
+        let full_rpm = f64::from(rig.robot.command(rig.now).speed()) * 1.2;
+        let rpm = [wheel.step(full_rpm); 4];
+        rig.robot.set_telemetry(&Telemetry { rpm, ..Telemetry::default() }, rig.now);
+        is_still = rig.host.stop_progress() == StandingStill;
+        is_wrong |= is_still && wheel.rpm > 6.0;
+    }
+    assert!(is_still, "{:?}", rig.host.stop_progress());
+    is_wrong
+}
+
+#[test]
+fn a_robot_that_reports_averages_never_stands_still_while_a_wheel_turns_faster_than_6_rpm() {
+    let phases = (5..=100).step_by(5).flat_map(|phase| [0, 1, 2].map(|lost| (phase, lost)));
+    let drives =
+        [10, 40, 100].into_iter().flat_map(|speed| [40, 100, 200, 400].map(|at| (speed, at)));
+    let mut all = drives.flat_map(|(speed, span)| {
+        phases.clone().map(move |(phase, lost)| (speed, span, phase, lost))
+    });
+    let average = HostConfig::default().rpm_average;
+    assert_eq!(all.clone().find(|&it| is_wrong(average, it)), None);
+    // The setting is what does it.
+    assert!(all.any(|it| is_wrong(Duration::ZERO, it)));
 }

@@ -25,8 +25,9 @@ use pings::{LONGEST_TRIP, Pings};
 /// Time allowed for a robot to be heard for the first time.
 const LINK_PATIENCE: Duration = Duration::from_millis(2000);
 
-/// Time allowed for the wheels to come to rest after the first stop.
-const STOP_PATIENCE: Span = Span::from_millis(3000);
+/// Time allowed for the wheels to come to rest after the first stop, and for the average that the
+/// robot reports to show it.
+const STOP_PATIENCE: Span = Span::from_millis(4000);
 
 /// Longest interval between two calls of the host: well under its dead-man timeout of 500 ms.
 pub(crate) const CALL_PERIOD: Duration = Duration::from_millis(50);
@@ -166,14 +167,16 @@ impl Rover {
         mark.open.is_some_and(|open| since > open)
     }
 
-    /// Repeats the stop until the robot is seen to stand still (ruling U16), by reports that came
+    /// Repeats the stop until the robot is seen to stand still (ruling U16), by reports of the time
     /// after it had heard of the stop: a network may hold back stop and reports for a while.
     /// Failures of the port and of the link do not end it early, and neither do signals.
     pub(crate) fn stop(&mut self) -> Result<(), Failure> {
         let (begin, before) = (self.now(), self.host().statistics().commands);
         let end = self.session.awake() + STOP_PATIENCE;
-        // When the stop was flushed, and the number of reports before the robot had heard of it.
+        // When the stop was flushed; the number of reports before the robot had heard of it, and
+        // when it had.
         let (mut told, mut unheard) = (None, None);
+        let average = self.host().config().rpm_average;
         self.host_mut().stop(begin);
         let failure = loop {
             let until = self.now() + CALL_PERIOD;
@@ -186,9 +189,11 @@ impl Rover {
                 |mark: &Mark| self.has_heard(mark) || now - mark.at >= LONGEST_TRIP;
             let reports = self.host().statistics().reports;
             if unheard.is_none() && told.as_ref().is_some_and(must_have_heard) {
-                unheard = Some(reports);
+                unheard = Some((reports, now));
             }
-            let is_news = unheard.is_some_and(|before| reports - before >= STILL_REPORTS.into());
+            let is_news = unheard.is_some_and(|(before, at)| {
+                reports - before >= STILL_REPORTS.into() && now - at >= average
+            });
             if result.is_ok() && is_news && progress == StopProgress::StandingStill {
                 return Ok(());
             }
