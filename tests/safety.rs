@@ -138,6 +138,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
             constant(order, "STILL_COUNTS")
         ),
         format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),
+        format!("the last of them {} after that", ms(host.rpm_average)),
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
         format!("{dead_man} after the application's last call, or after the robot was last heard"),
         format!("From {dead_man} after the last call on, or after the last frame of the robot"),
@@ -165,6 +166,8 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         "1 rps",
         "1 to 5 %",
         "8 % power",
+        "averages of 1 s",
+        "below 6 rpm",
     ] {
         take(fact);
     }

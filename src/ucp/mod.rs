@@ -130,16 +130,18 @@
 //!   or in an event queue that had room. Half of each queue is reserved for rare events.
 //! * **U16** Motor frames are never answered, so a stop is done when it has been flushed:
 //!   [`Host::is_stop_sent`]. A frame that did not reach the line makes the motor command due again,
-//!   twice if the frame was cut off or its flush failed. Whether the robot obeys is in its reports:
-//!   [`Host::stop_progress`], and `await_standstill` of a driver. A robot that has not been heard
-//!   for 500 ms is told to stand still, and commands to move are refused until it is heard again
-//!   ([`CommandError::LinkDown`]). The first frame of a host is a zero motor command, because a
-//!   vendor robot keeps driving while any byte arrives: a restarted host that only pings would keep
-//!   it moving. To disable this for hosts that only listen, clear [`HostConfig::sends_first_stop`].
+//!   twice if the frame was cut off or its flush failed. Whether the robot obeys is in its reports,
+//!   averages of the last 1.1 s ([`HostConfig::rpm_average`]): [`Host::stop_progress`], and
+//!   `await_standstill` of a driver. A robot that has not been heard for 500 ms is told to stand
+//!   still, and commands to move are refused until it is heard again ([`CommandError::LinkDown`]).
+//!   The first frame of a host is a zero motor command, because a vendor robot keeps driving while
+//!   any byte arrives: a restarted host that only pings would keep it moving. To disable this for
+//!   hosts that only listen, clear [`HostConfig::sends_first_stop`].
 //!
 //! [`BiasStore`]: host::BiasStore
 //! [`CommandError::LinkDown`]: host::CommandError::LinkDown
 //! [`HostConfig::low_ids_only`]: host::HostConfig::low_ids_only
+//! [`HostConfig::rpm_average`]: host::HostConfig::rpm_average
 //! [`HostConfig::sends_first_stop`]: host::HostConfig::sends_first_stop
 //! [`OtaRequest`]: message::OtaRequest
 //! [`OtaRequest::start_firmware_update`]: message::OtaRequest::start_firmware_update

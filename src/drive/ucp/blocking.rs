@@ -84,9 +84,11 @@ where
     }
 
     /// Waits until the robot, which was told to stop, is seen to stand still: three reports in a
-    /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less
-    /// ([`Host::stop_progress`]). Continues through errors of the port. For a rover that coasts,
-    /// set `deadline` at least [`COAST`](crate::ucp::host::COAST) from now.
+    /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less, and the
+    /// last is an average of the time since ([`Host::stop_progress`]). So this takes at least
+    /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average). Continues through
+    /// errors of the port. For a rover that coasts, set `deadline` at least
+    /// [`COAST`](crate::ucp::host::COAST) from now.
     ///
     /// # Errors
     ///

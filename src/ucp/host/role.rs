@@ -159,7 +159,9 @@ impl<S: BiasStore> Host<S> {
     /// 2 rpm or less. Both report layouts have wheel speeds, so both count. A report counts if it
     /// began to arrive after the stop had been flushed: that is when
     /// [`handle_flushed`](Endpoint::handle_flushed) was called, or, by a driver that never calls
-    /// it, when the next round began. A wheel that moves again, or 500 ms without a report
+    /// it, when the next round began. And the last must have begun to arrive 1.1 s after that
+    /// ([`HostConfig::rpm_average`]): a vendor robot reports averages, in which wheels that began
+    /// to turn a moment ago still stand still. A wheel that moves again, or 500 ms without a report
     /// ([`HostConfig::link_timeout`]), ends it.
     #[must_use]
     pub fn stop_progress(&self) -> StopProgress {

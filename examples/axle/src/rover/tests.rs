@@ -109,6 +109,31 @@ fn reports_from_before_a_stop_was_heard_do_not_count_towards_those_behind_it() {
 }
 
 #[test]
+fn an_average_from_before_the_robot_had_heard_of_a_stop_does_not_show_that_it_stands_still() {
+    // It hears of the stop late. Its average shows half a second after that how its wheels turn.
+    let (begin, mut heard_at) = (clock::now(), None);
+    let mut played = played::PlayedRover::default();
+    let line = played::played(played::RoverState::default(), move |state, bytes| {
+        let millis = clock::since(begin).as_millis();
+        if millis >= 1300 {
+            let heard_at = *heard_at.get_or_insert(clock::now());
+            state.wheels = (clock::since(heard_at).as_millis() >= 500).then_some([9; 4]);
+        }
+        let pings = state.pings;
+        let said = played.hear(state, bytes);
+        if (100..1300).contains(&millis) && state.pings > pings { Vec::new() } else { said }
+    });
+    let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
+    assert!(rover.find(|| false).unwrap());
+    while clock::since(begin).as_millis() < 150 {
+        let end = rover.now() + CALL_PERIOD;
+        rover.round(end).unwrap();
+    }
+    assert!(rover.stop().is_err());
+    assert_eq!(line.state.borrow().wheels, Some([9; 4]));
+}
+
+#[test]
 fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
     let line = played::rover(|_| {});
     let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
