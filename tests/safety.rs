@@ -142,6 +142,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
         format!("{dead_man} after the application's last call, or after the robot was last heard"),
         format!("From {dead_man} after the last call on, or after the last frame of the robot"),
+        format!("that has fallen silent for another {dead_man}"),
         format!("A stop is repeated every {period}"),
         format!("repeated every {period} until the first call"),
         format!("The host repeats a stop every {period}"),

@@ -120,6 +120,10 @@ fn reports_that_have_ceased_for_500_ms_show_nothing() {
     host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(400));
     wait(&mut host, us(559_999));
     assert_eq!((host.stop_progress(), host.link()), (StandingStill, Link::Up));
+    // A driver that is late hands in a report first.
+    let mut late = host.clone();
+    late.handle_input(&wheels([0; 4]), ms(560));
+    assert_eq!(late.stop_progress(), StillMoving { rpm: [0; 4] });
     host.handle_timeout(ms(560));
     assert_eq!((host.stop_progress(), host.link()), (NoReports, Link::Up));
 }

@@ -101,6 +101,7 @@ impl Standstill {
     pub(super) fn report(&mut self, wheels: &Wheels) {
         let (told, before) = match *self {
             Self::Told(told) if wheels.at - told >= wheels.on_line => (told, 0),
+            Self::Reported { until, .. } if until <= wheels.at => (wheels.at, 0),
             Self::Reported { told, still, .. } => (told, still),
             _ => return,
         };
