@@ -132,7 +132,8 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     };
     for bound in [
         format!(
-            "at least {} apart show less than {} rps, or three show positions within {} counts",
+            "at least {} apart show less than {} rps, or three show positions, each within {} counts \
+             of the one before",
             constant(order, "STILL_TIME"),
             constant(board, "STILL_RPS"),
             constant(order, "STILL_COUNTS")

@@ -100,8 +100,8 @@ where
     }
 
     /// Stops a node, or all of a [`NodeSet`], as [`Master::stop`] does, and returns when each is
-    /// **seen to be still**: its stop is confirmed, and two answers at least 20 ms apart show a
-    /// motor that does not move (ruling I12). Continues through errors of the port.
+    /// **seen to be still** ([`StopProgress::StandingStill`](crate::ikeya::master::StopProgress),
+    /// ruling I12). Continues through errors of the port.
     ///
     /// To go on with other work meanwhile, call [`Master::stop`], keep calling the driver, and
     /// watch [`Master::stop_progress`].
