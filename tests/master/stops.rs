@@ -122,6 +122,28 @@ fn a_hold_is_measured_again_after_the_node_was_abnormal() {
 }
 
 #[test]
+fn a_hold_that_was_perhaps_never_heard_is_measured_again_and_one_that_was_is_kept() {
+    for is_followed in [false, true] {
+        let mut desk = Desk::stopping_at(direct(), turns(40));
+        while writes(&desk.sent).is_empty() {
+            let packet = desk.exchange().unwrap();
+            desk.sent.push(packet);
+        }
+        if is_followed {
+            desk.exchange();
+        }
+        // Two windows, in which the shaft turns on.
+        desk.answer(NodeId::N3, Answer::Silence);
+        desk.run(MS(2));
+        assert_eq!(desk.master.health(NodeId::N3), Some(Health::Suspect(2)));
+        desk.answer(NodeId::N3, Answer::Position(turns(30)));
+        let held = if is_followed { turns(40) } else { turns(30) };
+        let written = writes(&desk.run(MS(10)));
+        assert_eq!(written.last(), Some(&hold(NodeId::N3, held)), "{is_followed}");
+    }
+}
+
+#[test]
 fn a_repeated_stop_joins_the_one_that_is_not_done() {
     // Two WRITEs confirm it; it is repeated until the node is still.
     for (node, way, count) in [(N1, 6, 3), (N3, 9, 4)] {

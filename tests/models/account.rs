@@ -288,6 +288,7 @@ impl Account {
     pub(crate) fn miss(&mut self, guard_until: Instant, stops_abnormal: bool) {
         self.guard_until = Some(guard_until);
         (self.is_stop_written, self.is_stop_due) = (false, self.is_owed);
+        self.may_hold_anew |= self.paid == 0;
         if self.is_in_doubt {
             self.undecided = (self.undecided + 1).min(UNDECIDED);
         }

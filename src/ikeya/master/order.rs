@@ -322,10 +322,14 @@ impl<B: Board> Order<B> {
         self.is_written = false;
     }
 
-    /// The node has not answered: the WRITE may have been lost too, and a stop is repeated.
+    /// The node has not answered: the WRITE may have been lost too, and a stop is repeated. A
+    /// position that the node has perhaps never heard is measured again.
     pub(super) fn missed(&mut self) {
         if let State::Stop(stop) = &mut self.state {
             stop.is_written = false;
+            if stop.followed == 0 && stop.hold.is_some() {
+                (stop.hold, stop.measured_at, stop.written_at) = (None, None, None);
+            }
         }
     }
 
