@@ -133,16 +133,16 @@ fn a_folder_that_is_missing_or_not_given_is_one_line_and_leaves_no_file() {
 fn every_byte_of_the_motors_is_in_a_frame_or_in_a_gap_with_its_reason() {
     let motors = decode("motors");
     let expected = [
-        ("in", "position_response", 355),
-        ("in", "velocity_response", 514),
-        ("out", "read_request", 989),
-        ("out", "write", 963),
+        ("in", "position_response", 362),
+        ("in", "velocity_response", 512),
+        ("out", "read_request", 994),
+        ("out", "write", 950),
     ];
     assert_eq!(motors.kinds(), expected);
     let summary = &motors.summary;
-    assert_eq!((&summary["frames"], &summary["pending"]), (&2821.into(), &0.into()));
-    let skipped = serde_json::json!({"header": 191, "id": 8, "crc": 20});
-    assert_eq!((&summary["skipped"], &summary["skipped_by"]), (&219.into(), &skipped));
+    assert_eq!((&summary["frames"], &summary["pending"]), (&2818.into(), &0.into()));
+    let skipped = serde_json::json!({"header": 255, "id": 8, "crc": 29});
+    assert_eq!((&summary["skipped"], &summary["skipped_by"]), (&292.into(), &skipped));
     assert!(motors.lines.is_sorted_by(|one, other| one.at <= other.at));
     let end = motors.lines.last().unwrap().at;
     assert!((10.2..10.3).contains(&end), "{end}");
@@ -175,7 +175,7 @@ fn noise_damages_answers_for_six_tenths_of_a_second_and_a_board_with_a_wrong_id_
     let (noise, others): (Vec<_>, Vec<_>) =
         gaps.iter().partition(|(at, ..)| (4.4..5.05).contains(at));
     let with = |wanted: &str| noise.iter().filter(|(_, _, reason)| *reason == wanted).count();
-    assert_eq!((noise.len(), with("crc"), with("header")), (21, 15, 6));
+    assert_eq!((noise.len(), with("crc"), with("header")), (25, 20, 5));
     let [(at, _, reason)] = others[..] else { panic!("{others:?}") };
     assert!((6.2..6.21).contains(&at) && reason == "id", "{others:?}");
 }
