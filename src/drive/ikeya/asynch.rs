@@ -111,8 +111,8 @@ where
     /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
     /// [`DriveError::StillMoving`] if the motor moves for longer than
     /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
-    /// ends after the sum of both at the latest. **The motor
-    /// may be running.** The stop is repeated as long as the driver is called.
+    /// ends after the sum of both at the latest. **The motor may be running.** The stop is repeated
+    /// as long as the driver is called.
     pub async fn stop_async(
         &mut self,
         nodes: impl Into<NodeSet>,
@@ -128,8 +128,8 @@ where
     /// # Errors
     ///
     /// Those of [`stop_async`](Self::stop_async), with all nodes that they concern. The stops owed
-    /// include ids that have never answered: only you know whether they
-    /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
+    /// include ids that have never answered: only you know whether they have a motor. On a bus of
+    /// fewer than eight nodes, set `MasterConfig::nodes`.
     pub async fn stop_all_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
         self.await_stops_async(NodeSet::ALL).await

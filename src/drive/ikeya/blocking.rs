@@ -105,8 +105,8 @@ where
     /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
     /// [`DriveError::StillMoving`] if the motor moves for longer than
     /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
-    /// ends after the sum of both at the latest. **The motor
-    /// may be running.** The stop is repeated as long as the driver is called.
+    /// ends after the sum of both at the latest. **The motor may be running.** The stop is repeated
+    /// as long as the driver is called.
     pub fn stop(&mut self, nodes: impl Into<NodeSet>) -> Result<(), DriveError<P::Error>> {
         let nodes = nodes.into();
         self.begin_stop(nodes);
@@ -119,8 +119,8 @@ where
     /// # Errors
     ///
     /// Those of [`stop`](Self::stop), with all nodes that they concern. The stops owed include
-    /// ids that have never answered: only you know whether they
-    /// have a motor. On a bus of fewer than eight nodes, set `MasterConfig::nodes`.
+    /// ids that have never answered: only you know whether they have a motor. On a bus of fewer
+    /// than eight nodes, set `MasterConfig::nodes`.
     pub fn stop_all(&mut self) -> Result<(), DriveError<P::Error>> {
         self.begin_stop_all();
         self.await_stops(NodeSet::ALL)

@@ -1,6 +1,10 @@
 //! High-level rover-link calls: the common part of the blocking and the async ones.
 
-use crate::drive::{clock::Clock, driver::Driver, error::DriveError, error::Operation};
+use crate::drive::{
+    clock::Clock,
+    driver::Driver,
+    error::{DriveError, Operation},
+};
 use crate::{
     time::{Duration, Instant},
     ucp::{

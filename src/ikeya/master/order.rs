@@ -136,7 +136,6 @@ impl<B: Board> Order<B> {
         }
     }
 
-    // In line it would take 300 more bytes of flash.
     const fn begin_stop(&mut self, hold: Option<B::Position>, measured_at: Option<Instant>) {
         self.state = State::Stop(Stop::new(hold, measured_at));
     }
@@ -601,7 +600,7 @@ impl<B: Board> Stop<B> {
     }
 }
 
-/// What two answers show.
+/// What an answer shows, with those before it.
 enum Sight {
     Still,
     /// The motor has moved since then.

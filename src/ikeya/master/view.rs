@@ -105,10 +105,8 @@ impl<B: Board> Master<B> {
     /// Whether the set-point of a node has been handed out for sending, and not been taken back.
     #[must_use]
     pub fn is_set_point_sent(&self, node: NodeId) -> bool {
-        {
-            let order = self.node(node).order();
-            order.target().is_some() && !order.is_new()
-        }
+        let order = self.node(node).order();
+        order.target().is_some() && !order.is_new()
     }
 
     /// Why the last READ of a node that was given up failed; `None` if none has.
