@@ -146,8 +146,6 @@ impl<B: Board> Line<B> {
     }
 
     /// Time of the next thing to do, if requests are due at `due`.
-    // In line it would take 90 more bytes of flash.
-    #[inline(never)]
     pub(super) fn next_at(&self, due: impl FnOnce() -> Option<Instant>) -> Option<Instant> {
         match &self.window {
             Some(window) => Some(window.deadline),

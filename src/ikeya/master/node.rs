@@ -19,13 +19,14 @@ use crate::{
 /// Number of consecutive windows without its answer after which a node is abnormal.
 const STRIKES: u8 = 3;
 
-// Flags first: short instructions can reach them there.
+// The order and the flags first: short instructions can reach them there.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(super) struct Node<B: Board> {
+    order: Order<B>,
+    mode: KnownMode,
     /// `None` until it has answered once.
     health: Option<Health>,
-    mode: KnownMode,
     /// Number of consecutive windows that closed without its answer.
     strikes: u8,
     /// Failed attempts of the READ in progress.
@@ -39,7 +40,6 @@ pub(super) struct Node<B: Board> {
     has_answered: bool,
     /// A READ has failed since then.
     has_failed: bool,
-    order: Order<B>,
     /// Time before which it is not polled: a late answer may be on its way.
     guarded_until: Option<Instant>,
     /// Time of the next READ; only set with [`Polling::Every`].
@@ -466,8 +466,6 @@ impl<B: Board> Node<B> {
     }
 
     /// An answer in its window, this long after the end of the request.
-    // In line it would take 50 more bytes of flash.
-    #[inline(never)]
     pub(super) fn hear_answer(
         &mut self,
         status: &Status<B>,

@@ -27,15 +27,17 @@ const STILL_COUNTS: u32 = 8;
 const REPEAT_TIME: Duration = Duration::from_millis(20);
 
 /// The latest order to a node.
+// Flags first: short instructions can reach them there.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub(super) struct Order<B: Board> {
-    state: State<B>,
     confirm: Confirm,
     /// Whether the node has had a WRITE since its last exchange ended: it is read before the order
     /// is repeated.
     is_written: bool,
     /// Whether the node has ever had a WRITE from this master.
     was_written: bool,
+    state: State<B>,
 }
 
 #[derive(Clone, Debug)]
@@ -105,23 +107,21 @@ impl<B: Board> Order<B> {
         measured: Option<Status<B>>,
         now: Instant,
     ) -> bool {
-        let (hold, measured_at) = match (&mut self.state, measured) {
+        let (hold, writes) = match (&mut self.state, measured) {
             (State::Stop(stop), _) if stop.stage != Stage::Still => {
                 stop.join(now);
                 return self.end_confirmation();
             }
-            _ if !is_certain => (None, None),
-            (State::Stop(stop), _) if !stop.is_released => (stop.hold, None),
-            (_, Some(Status::Position(position))) => (Some(position), Some(now)),
-            _ => (None, None),
+            _ if !is_certain => (None, 0),
+            (State::Stop(stop), _) if !stop.is_released => (stop.hold, 1),
+            (_, Some(Status::Position(position))) => (Some((position, now)), 0),
+            _ => (None, 0),
         };
-        self.begin_stop(hold, measured_at);
+        self.begin_stop(hold, writes);
         self.end_confirmation()
     }
 
     /// The node is abnormal: it keeps its last command and is owed a stop, if that `is_stopped`.
-    // In line it would take 30 more bytes of flash.
-    #[inline(never)]
     pub(super) fn lose(&mut self, is_stopped: bool) {
         let is_owed = match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => return stop.lose(),
@@ -130,14 +130,14 @@ impl<B: Board> Order<B> {
             State::None => false,
         };
         if is_owed {
-            self.begin_stop(None, None);
+            self.begin_stop(None, 0);
         } else {
             self.state = if self.is_set_point() { State::Released } else { State::None };
         }
     }
 
-    const fn begin_stop(&mut self, hold: Option<B::Position>, measured_at: Option<Instant>) {
-        self.state = State::Stop(Stop::new(hold, measured_at));
+    const fn begin_stop(&mut self, hold: Option<(B::Position, Instant)>, writes: u8) {
+        self.state = State::Stop(Stop::new(hold, writes));
     }
 
     /// The mode is in doubt: what was measured does not count, and a position that is held must be
@@ -174,7 +174,7 @@ impl<B: Board> Order<B> {
         let is_commanded = self.was_written || self.is_set_point();
         match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => stop.restart(),
-            _ if is_commanded => self.begin_stop(None, None),
+            _ if is_commanded => self.begin_stop(None, 0),
             state => *state = State::None,
         }
         self.end_confirmation()
@@ -202,6 +202,7 @@ impl<B: Board> Order<B> {
 /// What is to be sent.
 impl<B: Board> Order<B> {
     /// The target that is repeated: a set-point, or that of a stop that is confirmed.
+    #[inline(never)]
     pub(super) fn target(&self) -> Option<Target<B>> {
         match &self.state {
             State::SetPoint(set_point) => Some(set_point.target),
@@ -327,7 +328,7 @@ impl<B: Board> Order<B> {
         if let State::Stop(stop) = &mut self.state {
             stop.is_written = false;
             if stop.followed == 0 && stop.hold.is_some() {
-                (stop.hold, stop.measured_at, stop.written_at) = (None, None, None);
+                (stop.hold, stop.written_at) = (None, None);
             }
         }
     }
@@ -359,7 +360,9 @@ impl<B: Board> Order<B> {
 }
 
 /// A stop. It is owed to the node until the node is seen to be still (I12).
+// Flags first, as in `Order`.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(super) struct Stop<B: Board> {
     stage: Stage,
     /// Whether a stop WRITE has been sent and waits for an answer.
@@ -372,18 +375,18 @@ pub(super) struct Stop<B: Board> {
     is_told: bool,
     /// Whether it was confirmed, even if that was lost again.
     was_confirmed: bool,
-    /// Whether `seen` agrees with an earlier answer.
-    is_second: bool,
-    /// Stop WRITEs sent.
+    /// Stop WRITEs sent, of the present `hold` if there is one.
     writes: u8,
     /// Stop WRITEs that were followed by a good answer.
     followed: u8,
     /// Attempts made while the node was not online.
     lost_attempts: u8,
-    /// The position to hold for a position node; `None` until it has been measured.
-    hold: Option<B::Position>,
-    /// Time of that measurement.
-    measured_at: Option<Instant>,
+    /// Whether `seen` agrees with an earlier answer.
+    is_second: bool,
+    /// An answer behind a stop WRITE that may be the first of those that show a standstill.
+    seen: Option<(Status<B>, Instant)>,
+    /// The position to hold for a position node, and when it was measured; `None` until then.
+    hold: Option<(B::Position, Instant)>,
     /// Time within which it must be written.
     patience: Duration,
     /// Time of the latest stop WRITE, unless it was taken back.
@@ -391,8 +394,6 @@ pub(super) struct Stop<B: Board> {
     /// Time from which the node has to become still: that of the first confirmation, or of a stop
     /// that was asked for again.
     confirmed_at: Instant,
-    /// An answer behind a stop WRITE that may be the first of those that show a standstill.
-    seen: Option<(Status<B>, Instant)>,
 }
 
 /// How far a stop has come.
@@ -407,9 +408,9 @@ enum Stage {
 }
 
 impl<B: Board> Stop<B> {
-    /// A new debt. `hold` is a position that may be held without measuring again, treated as
-    /// measured at `measured_at`.
-    const fn new(hold: Option<B::Position>, measured_at: Option<Instant>) -> Self {
+    /// A new debt. `hold` is a position that may be held without measuring again, and has had that
+    /// many WRITEs of an earlier stop.
+    const fn new(hold: Option<(B::Position, Instant)>, writes: u8) -> Self {
         Self {
             stage: Stage::Owed,
             is_written: false,
@@ -418,11 +419,10 @@ impl<B: Board> Stop<B> {
             is_told: false,
             was_confirmed: false,
             is_second: false,
-            writes: 0,
+            writes,
             followed: 0,
             lost_attempts: 0,
             hold,
-            measured_at,
             patience: HOLD_PATIENCE,
             written_at: None,
             confirmed_at: Instant::from_micros(0),
@@ -434,11 +434,11 @@ impl<B: Board> Stop<B> {
     ///
     /// While the mode is in doubt: only a position that means standstill to a velocity node (I11).
     pub(super) fn target(&self, mode: Mode, is_in_doubt: bool) -> Option<Target<B>> {
-        let hold = self.hold.map(Target::Position);
+        let hold = self.hold.map(|it| it.0);
         match mode {
-            _ if is_in_doubt => hold.filter(|_| self.hold.is_some_and(B::is_still_as_velocity)),
+            _ if is_in_doubt => hold.filter(|it| B::is_still_as_velocity(*it)).map(Target::Position),
             Mode::Velocity => Some(Target::STANDSTILL),
-            Mode::Position => hold,
+            Mode::Position => hold.map(Target::Position),
         }
     }
 
@@ -450,7 +450,7 @@ impl<B: Board> Stop<B> {
             Stage::Confirmed => true,
             Stage::Still => !self.is_released,
         };
-        is_repeated.then(|| self.hold.map_or(Target::STANDSTILL, Target::Position))
+        is_repeated.then(|| self.hold.map_or(Target::STANDSTILL, |it| Target::Position(it.0)))
     }
 
     /// Whether its WRITE waits for an answer.
@@ -460,7 +460,7 @@ impl<B: Board> Stop<B> {
 
     /// Whether a position has been measured for it but not written yet.
     pub(super) const fn is_measured(&self) -> bool {
-        self.is_asked && self.measured_at.is_some() && self.writes == 0
+        self.is_asked && self.hold.is_some() && self.writes == 0
     }
 
     pub(super) const fn lost_attempts(&self) -> u8 {
@@ -481,7 +481,7 @@ impl<B: Board> Stop<B> {
     #[inline(never)]
     fn restart(&mut self) {
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
-        (self.hold, self.measured_at) = (None, None);
+        self.hold = None;
         (self.is_written, self.writes, self.written_at) = (false, 0, None);
     }
 
@@ -517,7 +517,7 @@ impl<B: Board> Stop<B> {
     fn measure(&mut self, status: &Status<B>, now: Instant) {
         let is_due = self.is_asked && self.stage == Stage::Owed;
         if let (Status::Position(position), None, true) = (status, self.hold, is_due) {
-            (self.hold, self.measured_at, self.writes) = (Some(*position), Some(now), 0);
+            (self.hold, self.writes) = (Some((*position, now)), 0);
         }
     }
 
@@ -527,8 +527,8 @@ impl<B: Board> Stop<B> {
         if self.writes > 0 {
             return;
         }
-        if self.measured_at.is_some_and(|at| now - at > self.patience + gap) {
-            (self.hold, self.measured_at) = (None, None);
+        if self.hold.is_some_and(|(_, at)| now - at > self.patience + gap) {
+            self.hold = None;
             self.patience = self.patience + self.patience;
         }
     }

@@ -31,7 +31,9 @@ use crate::{
 const LEAST_SHARE_PCT: u8 = 1;
 
 /// Whose turn it is.
+// In this order it takes 40 bytes of flash less than in that of the compiler.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
 pub(super) struct Queue {
     /// Index of the last node served with a stop.
     stop: usize,

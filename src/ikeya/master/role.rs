@@ -188,7 +188,6 @@ impl<B: Board> Master<B> {
     }
 
     /// Shows that the application is alive, for [`MasterConfig::dead_man`].
-    #[inline(never)]
     pub fn keep_alive(&mut self, now: Instant) {
         self.sign_of_life(now);
     }
@@ -251,7 +250,6 @@ impl<B: Board> Master<B> {
     }
 
     /// Time at which the dead-man stops the nodes.
-    #[inline(never)]
     fn dead_man_at(&self) -> Option<Instant> {
         let is_armed = self.nodes.iter().any(|node| node.order().is_set_point());
         self.config.dead_man.filter(|_| is_armed).map(|limit| self.alive_at + limit)
