@@ -13,6 +13,10 @@ use super::{
 /// Number of windows without the answer after which a node is abnormal.
 pub(crate) const STRIKES: u8 = 3;
 
+/// Time between two stop WRITEs until the node is still: the longest, and to a node that does not
+/// answer also the shortest (I12, I13).
+pub(crate) const REPEAT: Duration = Duration::from_millis(20);
+
 /// Number of exchanges with a node in doubt after which the application is notified.
 const UNDECIDED: u8 = 6;
 
@@ -192,6 +196,11 @@ impl Account {
             false => Order::SetPoint(aim),
         };
         judge(&write, is_three, self.record, self.is_in_doubt, order)?;
+        // Since the last one it has not answered: an answer would have brought it online.
+        let is_blind = zero && self.record == Some(Mode::Velocity) && !self.is_online();
+        if is_blind && !is_three && self.stopped_at.is_some_and(|last| at < last + REPEAT) {
+            return Err("two blind stops less than 20 ms apart".into());
+        }
         let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
         if is_hold {
             let place = Position::new(write.place.0, write.place.1);

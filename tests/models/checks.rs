@@ -3,7 +3,7 @@
 use axlewire::ikeya::master::{MasterEvent, StopProgress};
 
 use super::{
-    account::{Confirm, STRIKES},
+    account::{Confirm, REPEAT, STRIKES},
     bus::Bus,
     kit::Sent,
     names::*,
@@ -17,9 +17,6 @@ const CYCLE_WAITS: u8 = 10;
 
 /// Longest time until the search returns to a node that is owed a stop: one window at 1 %.
 const LONGEST_PAUSE: Duration = Duration::from_millis(150);
-
-/// Longest time between two stop WRITEs, until the node is still (I12, I13).
-const REPEAT: Duration = Duration::from_millis(20);
 
 impl<B: Kit> Bus<B> {
     /// No node waits longer than stated in `queue.rs`.
