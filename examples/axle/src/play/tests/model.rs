@@ -2,27 +2,23 @@
 //! that takes whole frames and one that takes single bytes, with answers in between.
 
 use std::{
-    cell::{Cell, RefCell},
-    collections::{BTreeMap, VecDeque},
+    cell::Cell,
+    collections::VecDeque,
     rc::Rc,
     time::{Duration, Instant},
 };
 
-use axlewire::{
-    ikeya::{Decoder, Position, Response, ToMaster},
-    stream::Event,
-    ucp::{Body, MotorControl, message::ErrorCode, message::Pong},
-};
+use axlewire::ikeya::Position;
 
 use super::*;
 use crate::{
     pcapng::Direction,
-    played::{BusEar, BusState, Node, PlayedRover, RoverState, Said},
+    played::{BusEar, BusState, Node, Said},
 };
 
 /// What happens from some byte on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
+pub(super) enum Fault {
     /// The mode switch of a node is moved.
     Mode,
     /// The same, and all answers are late from then on.
@@ -39,10 +35,13 @@ enum Fault {
     Signal,
 }
 
+/// Longest time in which a plan of less than a second and the stop behind it are over.
+const PATIENCE: Duration = Duration::from_secs(10);
+
 /// A run with a fault behind this byte of both directions, and whether the port takes single bytes.
 #[derive(Clone, Copy, Debug)]
-struct Case {
-    fault: Fault,
+pub(super) struct Case {
+    pub(super) fault: Fault,
     at: usize,
     in_bytes: bool,
 }
@@ -50,32 +49,35 @@ struct Case {
 impl Case {
     /// Plays; returns the result, whether it tells that everything is at rest, and the number of
     /// bytes that have passed.
-    fn play<T: 'static>(
+    pub(super) fn play<T: 'static>(
         self,
         line: &Played<T>,
         run: &Run,
         frames: &Frames<'_>,
-        fault: impl FnOnce() + 'static,
-        mut on_read: impl FnMut(&[u8]) + 'static,
+        begin: fn(&mut T, Fault),
+        read: fn(&mut T, &[u8]),
     ) -> (Result<(), String>, bool, usize) {
         line.most.set(if self.in_bytes { 1 } else { usize::MAX });
         let (passed, signals) = (Rc::new(Cell::new(0)), Rc::new(Signals::none()));
-        let (count, ctrl_c, mut fault) = (passed.clone(), signals.clone(), Some(fault));
+        let (count, ctrl_c, state) = (passed.clone(), signals.clone(), line.state.clone());
+        let since = clock::now();
         let tapped = line.line.clone().tapped(move |direction, bytes| {
             match direction {
                 // Otherwise no time would pass on a busy line.
                 Direction::Out => clock::sleep(Duration::from_micros(20 * bytes.len() as u64)),
-                Direction::In => on_read(bytes),
+                Direction::In => read(&mut state.borrow_mut(), bytes),
             }
-            count.set(count.get() + bytes.len());
-            if count.get() > self.at {
-                match self.fault {
-                    Fault::Signal => ctrl_c.raise(),
-                    _ => fault.take().into_iter().for_each(|happen| happen()),
-                }
+            let before = count.replace(count.get() + bytes.len());
+            let is_time = (before..count.get()).contains(&self.at);
+            match self.fault {
+                _ if clock::since(since) > PATIENCE => ctrl_c.raise(),
+                Fault::Signal if is_time => ctrl_c.raise(),
+                fault if is_time => begin(&mut state.borrow_mut(), fault),
+                _ => {}
             }
         });
         let played = run.on_line(&tapped, frames, &signals);
+        assert!(clock::since(since) < PATIENCE, "{self:?}: only Ctrl-C has ended it: {played:?}");
         assert!(self.at < usize::MAX || played.is_ok(), "{played:?}");
         let is_at_rest = played.as_ref().err().is_none_or(|failure| failure.contains("at rest"));
         (played, is_at_rest, passed.get())
@@ -83,7 +85,7 @@ impl Case {
 }
 
 /// Plays each fault at every byte, or at one of each `step`.
-fn at_every_byte(faults: &[Fault], step: usize, play: impl Fn(Case) -> usize + Sync) {
+pub(super) fn at_every_byte(faults: &[Fault], step: usize, play: impl Fn(Case) -> usize + Sync) {
     let run = &|in_bytes| {
         let end = play(Case { fault: faults[0], at: usize::MAX, in_bytes });
         for &fault in faults {
@@ -101,103 +103,111 @@ fn at_every_byte(faults: &[Fault], step: usize, play: impl Fn(Case) -> usize + S
 /// read, and three answers that do not come.
 const NODE_SILENCE: Duration = Duration::from_millis(250);
 
-/// The motors of a bus, and what the player has heard of them.
+/// Modes of nodes 1 and 3 before a fault.
+const MODES: [Mode; 2] = [Mode::Velocity, Mode::Position];
+
+/// Nodes 1 and 3.
 #[derive(Default)]
 struct Motors {
-    /// Where position nodes go, and since when.
-    goals: BTreeMap<u8, i32>,
+    bus: BusState,
+    ear: BusEar,
+    /// What the player has heard of them and last told them, and where that sends their motors.
+    heard: [Option<(Mode, Instant)>; 2],
+    told: [Option<f32>; 2],
+    goals: [Option<i32>; 2],
     moved_at: Option<Instant>,
-    /// Fault and id of a node.
-    fault: Option<(Fault, u8)>,
-    /// Number of answers since.
-    answers: u32,
-    heard: BTreeMap<u8, (Mode, Instant)>,
-    decoder: Decoder<ToMaster>,
-    last_write: BTreeMap<u8, f32>,
+    answers: VecDeque<(Instant, Vec<u8>)>,
+    /// Index of the node with the fault.
+    faulty: usize,
+    fault: Option<Fault>,
+    has_cut: bool,
     wrong: Vec<String>,
 }
 
 impl Motors {
     /// Goes on to now, at 10 turns per second; returns whether all motors are at rest.
-    fn advance(&mut self, bus: &mut BusState) -> bool {
+    fn advance(&mut self) -> bool {
         let way = clock::since(self.moved_at.replace(clock::now()).unwrap_or_else(clock::now));
         let way = (way.as_secs_f32() * 81_920.0) as i32;
-        bus.nodes.iter_mut().all(|node| {
-            let left = self.goals.get(&node.id).map_or(0, |goal| goal - node.counts);
+        self.goals.iter().zip(&mut self.bus.nodes).fold(true, |all, (goal, node)| {
+            let left = goal.map_or(0, |goal| goal - node.counts);
             node.counts += left.clamp(-way, way);
-            node.rps == 0.0 && left.abs() <= 8
+            all && node.rps == 0.0 && left.abs() <= 8
         })
     }
 
-    fn hear(&mut self, said: Said, bus: &mut BusState) {
-        self.advance(bus);
+    /// Gets these bytes, which take so long to be answered; returns the answer that is due.
+    fn hear(&mut self, bytes: &[u8], delay: u64) -> Vec<u8> {
+        self.advance();
+        let answer = self.ear.hear(&mut self.bus, bytes, |_, _| {});
+        for (said, _) in std::mem::take(&mut self.bus.said) {
+            self.obey(said);
+        }
+        let is_late = self.fault == Some(Fault::ModeAndLate);
+        if !answer.is_empty() {
+            let delay = Duration::from_millis(if is_late { 45 } else { delay });
+            self.answers.push_back((clock::now() + delay, answer));
+        }
+        // The first late one comes sooner if it can cut a WRITE in two.
+        let is_between = is_late && bytes.starts_with(&[0xBB]) && !self.answers.is_empty();
+        let is_first = is_between && !std::mem::replace(&mut self.has_cut, true);
+        let until = clock::now() + Duration::from_millis(if is_first { 45 } else { 0 });
+        let due = self.answers.pop_front_if(|(at, _)| *at <= until);
+        due.map(|(_, answer)| answer).unwrap_or_default()
+    }
+
+    fn obey(&mut self, said: Said) {
         let (Said::Read(id) | Said::Write(id, ..)) = said;
-        let Some(node) = bus.nodes.iter_mut().find(|node| node.id == id) else { return };
+        let index = usize::from(id) / 2;
+        let fault = self.fault.filter(|_| self.faulty == index);
+        let node = &mut self.bus.nodes[index];
         let Said::Write(_, rps, counts) = said else {
-            if self.fault == Some((Fault::ModeAndMute, id)) {
-                self.answers += 1;
-                node.is_dumb = self.answers > 1;
-            }
+            node.is_dumb |= fault == Some(Fault::ModeAndMute);
             return;
         };
-        let is_speed = [0.0, 1.0, 2.0].contains(&rps);
-        let meant = if is_speed { Mode::Velocity } else { Mode::Position };
-        let (mode, at) = self.heard[&id];
-        if node.mode == mode && mode != meant || rps != 0.0 && clock::since(at) > NODE_SILENCE {
-            self.wrong.push(format!("{said:?}, {mode} mode heard {:?} ago", clock::since(at)));
+        let meant = MODES[usize::from(![0.0, 1.0, 2.0].contains(&rps))];
+        let heard = self.heard[index].map(|(mode, at)| (mode, clock::since(at)));
+        let is_wrong =
+            |(mode, ago)| mode == node.mode && mode != meant || rps != 0.0 && ago > NODE_SILENCE;
+        if heard.is_none_or(is_wrong) {
+            self.wrong.push(format!("{said:?}, last heard: {heard:?} ago"));
         }
-        self.last_write.insert(id, rps);
+        self.told[index] = Some(rps);
         match node.mode {
-            _ if self.fault == Some((Fault::Deaf, id)) => {}
+            _ if fault == Some(Fault::Deaf) => {}
             Mode::Velocity => node.rps = rps,
-            Mode::Position => drop(self.goals.insert(id, counts)),
+            Mode::Position => self.goals[index] = Some(counts),
         }
     }
 
-    fn read(&mut self, mut bytes: &[u8]) {
-        while let Some(event) = self.decoder.decode(&mut bytes) {
-            let (id, mode) = match event {
-                Event::Frame(Response::Velocity(it)) => (it.id(), Mode::Velocity),
-                Event::Frame(Response::Position(it)) => (it.id(), Mode::Position),
-                Event::Skipped(_) => continue,
-            };
-            self.heard.insert(id.get(), (mode, clock::now()));
+    /// The player gets answers, whole ones.
+    fn read(&mut self, bytes: &[u8]) {
+        for answer in bytes.chunks(8) {
+            let mode = MODES[usize::from(answer[0] == 0x56)];
+            self.heard[usize::from(answer[1]) / 2] = Some((mode, clock::now()));
         }
     }
 
-    fn begin(&mut self, fault: Fault, node: &mut Node) {
-        self.fault = Some((fault, node.id));
+    fn begin(&mut self, fault: Fault) {
+        self.fault = Some(fault);
+        let node = &mut self.bus.nodes[self.faulty];
         node.is_dumb = matches!(fault, Fault::Mute | Fault::Deaf);
         if !node.is_dumb {
-            let is_speed = node.mode == Mode::Velocity;
-            node.mode = if is_speed { Mode::Position } else { Mode::Velocity };
-            node.rps = 0.0;
-            self.goals.remove(&node.id);
+            (node.mode, node.rps, self.goals[self.faulty]) = (MODES[1 - self.faulty], 0.0, None);
         }
     }
 }
 
 /// Moves a velocity node and a position node; the fault is one of the node at this index.
-fn play_to_nodes(case: Case, index: usize) -> usize {
+fn play_to_nodes(case: Case, faulty: usize) -> usize {
     // Taken as speeds, these positions are as fast as can be.
     let (counts, there) = (-200 * 8192, Position::from_counts(-190 * 8192).unwrap());
     let nodes = [Node { counts, ..Node::velocity(1) }, Node::position(3, counts)];
     let nodes = nodes.map(|node| Node { follows: false, ..node }).into();
-    let (motors, mut ear, mut answers) =
-        (Rc::new(RefCell::new(Motors::default())), BusEar::default(), VecDeque::new());
-    let (ours, theirs, readers) = (motors.clone(), motors.clone(), motors.clone());
-    let line = played::played(BusState { nodes, ..BusState::default() }, move |bus, bytes| {
-        let said = ear.hear(bus, bytes, |said, bus| theirs.borrow_mut().hear(said, bus));
-        let is_late = matches!(theirs.borrow().fault, Some((Fault::ModeAndLate, _)));
-        if !said.is_empty() {
-            let delay = if is_late { 45 } else { 3 * u64::from(case.in_bytes) };
-            answers.push_back((clock::now() + Duration::from_millis(delay), said));
-        }
-        let due = answers.pop_front_if(|(at, _)| *at <= clock::now());
-        due.map(|(_, said)| said).unwrap_or_default()
-    });
-    let bus = line.state.clone();
-    let happen = move || ours.borrow_mut().begin(case.fault, &mut bus.borrow_mut().nodes[index]);
+    let bus = BusState { nodes, ..BusState::default() };
+    let motors = Motors { bus, faulty, ..Motors::default() };
+    let delay = if case.in_bytes { 3 } else { 0 };
+    let line = played::played(motors, move |it, bytes| it.hear(bytes, delay));
     let (slow, fast) = (&speed(NodeId::N1, 1.0)[..], &speed(NodeId::N1, 2.0)[..]);
     let way = WriteRequest::position(NodeId::N3, there);
     let (way, asks) = (&way.as_bytes()[..], [NodeId::N1, NodeId::N3].map(read));
@@ -207,110 +217,34 @@ fn play_to_nodes(case: Case, index: usize) -> usize {
     frames.extend([(150, slow), (300, way), (300, fast)]);
     let run = Run { reads_back: !case.in_bytes, ..BUS };
     let (played, says_at_rest, passed) =
-        case.play(&line, &run, &frames, happen, move |bytes| readers.borrow_mut().read(bytes));
-    let (mut motors, mut bus) = (motors.borrow_mut(), line.state.borrow_mut());
-    let is_at_rest = motors.advance(&mut bus);
-    let is_in = |id, mode| motors.heard[&id].0 == mode;
-    // A mode that was not heard cannot be known.
-    let is_known =
-        bus.nodes.iter().all(|it| motors.heard.get(&it.id).is_none_or(|heard| heard.0 == it.mode));
-    let mut written = motors.last_write.iter();
-    // What cannot be heard and may be in another mode cannot be told (ruling I11).
-    let is_told = case.fault == Fault::ModeAndMute
-        || written.clone().all(|(&id, rps)| *rps == 0.0 || is_in(id, Mode::Position));
-    let has_changed =
-        written.any(|(&id, _)| !is_in(id, [Mode::Velocity, Mode::Position][usize::from(id) / 2]));
-    assert!(
-        motors.wrong.is_empty()
-            && is_told
-            && (is_at_rest || !says_at_rest || !is_known)
-            && (played.is_err() || !has_changed),
-        "{case:?}, node {index}: {played:?} {:?} {bus:?}",
-        motors.wrong
-    );
+        case.play(&line, &run, &frames, Motors::begin, Motors::read);
+    let mut motors = line.state.borrow_mut();
+    let (is_at_rest, mut is_known) = (motors.advance(), true);
+    let what = format!("{case:?}, node {faulty}: {played:?} {:?}", motors.bus.nodes);
+    assert!(motors.wrong.is_empty(), "it should not have written {:?}: {what}", motors.wrong);
+    for (index, node) in motors.bus.nodes.iter().enumerate() {
+        let (heard, told) = (motors.heard[index].map(|(mode, _)| mode), motors.told[index]);
+        // A mode that was not heard cannot be known.
+        is_known &= heard.is_none_or(|mode| mode == node.mode);
+        // What cannot be heard and may be in another mode cannot be told (ruling I11).
+        let is_beyond = case.fault == Fault::ModeAndMute || heard == Some(Mode::Position);
+        assert!(told.unwrap_or(0.0) == 0.0 || is_beyond, "it was not told to stop: {what}");
+        let has_changed = told.is_some() && heard != Some(MODES[index]);
+        assert!(played.is_err() || !has_changed, "the changed mode is not reported: {what}");
+    }
+    assert!(is_at_rest || !says_at_rest || !is_known, "it says that all are at rest: {what}");
     passed
 }
 
 #[test]
 fn no_write_is_taken_in_a_mode_that_was_heard_to_be_another() {
-    for index in [0, 1] {
-        let faults = [Fault::Mode, Fault::ModeAndLate, Fault::ModeAndMute];
-        at_every_byte(&faults, 1, |case| play_to_nodes(case, index));
-    }
+    let faults = [Fault::Mode, Fault::ModeAndLate, Fault::ModeAndMute];
+    at_every_byte(&faults, 1, |case| [0, 1].map(|node| play_to_nodes(case, node))[0]);
 }
 
 #[test]
 fn a_silent_node_is_not_moved_and_not_called_at_rest_while_another_one_answers() {
-    for index in [0, 1] {
-        // No packet is shorter than 4 bytes.
-        let faults = [Fault::Mute, Fault::Deaf, Fault::Signal];
-        at_every_byte(&faults, 3, |case| play_to_nodes(case, index));
-    }
-}
-
-/// Longest silence of a robot behind which a command to move still leaves (ruling U10).
-const ROBOT_SILENCE: Duration = Duration::from_millis(510);
-
-/// When a robot was driven and heard.
-#[derive(Clone, Copy)]
-struct Times {
-    fault_at: Option<Instant>,
-    moved_at: Instant,
-    heard_at: Instant,
-    /// Longest silence in front of a command to move.
-    silence: Duration,
-}
-
-/// Drives a robot.
-fn play_to_a_robot(case: Case) -> usize {
-    clock::play();
-    let now = clock::now();
-    let (moved_at, heard_at, silence) = (now, now, Duration::ZERO);
-    let times = Rc::new(Cell::new(Times { fault_at: None, moved_at, heard_at, silence }));
-    let (ours, theirs, readers) = (times.clone(), times.clone(), times.clone());
-    let mut robot = PlayedRover::default();
-    let line = played::played(RoverState::default(), move |state, bytes| {
-        let (commands, pings) = (state.commands.len(), state.pings);
-        let (said, it, now) = (robot.hear(state, bytes), theirs.get(), clock::now());
-        if state.commands[commands..].iter().any(|command| *command != (0, 0)) {
-            let silence = it.silence.max(clock::since(it.heard_at));
-            theirs.set(Times { moved_at: now, silence, ..it });
-        }
-        match (case.fault, it.fault_at) {
-            (Fault::NoReports, Some(_)) if state.pings == pings => Vec::new(),
-            (Fault::NoReports, Some(_)) => Pong::new(ErrorCode::Fine).frame(0).as_bytes().to_vec(),
-            _ => said,
-        }
-    });
-    let rover = line.state.clone();
-    let happen = move || {
-        ours.set(Times { fault_at: Some(clock::now()), ..ours.get() });
-        let mut rover = rover.borrow_mut();
-        rover.is_dumb = case.fault == Fault::Mute;
-        rover.wheels = (case.fault == Fault::Deaf).then_some([9; 4]);
-    };
-    let heard = move |_: &[u8]| readers.set(Times { heard_at: clock::now(), ..readers.get() });
-    let drive = [30, 60].map(|speed| MotorControl::new(speed, 0).unwrap().frame(0));
-    let frames: Vec<_> = (0..7).map(|it| (it * 100, drive[it as usize % 2].as_bytes())).collect();
-    let run = Run { protocol: Protocol::Ucp, ..BUS };
-    let (played, says_at_rest, passed) = case.play(&line, &run, &frames, happen, heard);
-    let (times, commands) = (times.get(), &line.state.borrow().commands);
-    // Three reports behind the last command to move show that the wheels stand still.
-    let seen_at = times.moved_at + Duration::from_millis(60);
-    let is_seen = times.fault_at.is_none_or(|at| at > seen_at);
-    assert!(
-        times.silence <= ROBOT_SILENCE
-            && commands.last() == Some(&(0, 0))
-            && (is_seen || !says_at_rest),
-        "{case:?}: {played:?} {:?} {commands:?}",
-        times.silence
-    );
-    passed
-}
-
-#[test]
-fn a_robot_that_is_not_heard_or_not_seen_to_stop_is_stopped_and_not_called_at_rest() {
-    // No command and no report is shorter than 22 bytes.
-    let faults = [Fault::Mute, Fault::NoReports, Fault::Deaf, Fault::Signal];
-    at_every_byte(&faults, 22, play_to_a_robot);
+    // No packet is shorter than 4 bytes.
+    let faults = [Fault::Mute, Fault::Deaf, Fault::Signal];
+    at_every_byte(&faults, 3, |case| [0, 1].map(|node| play_to_nodes(case, node))[0]);
 }

@@ -1,8 +1,17 @@
 //! Frames for a rover.
 
-use axlewire::ucp::{Body, MotorControl, message::Ping};
+use std::time::{Duration, Instant};
 
-use super::*;
+use axlewire::ucp::{
+    Body, MotorControl,
+    message::{ErrorCode, Ping, Pong},
+};
+
+use super::{
+    model::{Case, Fault, at_every_byte},
+    *,
+};
+use crate::played::{PlayedRover, RoverState};
 
 const ROVER: Run = Run { protocol: Protocol::Ucp, ..BUS };
 
@@ -72,7 +81,7 @@ fn what_was_due_during_an_absence_is_not_sent() {
     let line = played::rover(|rover| {
         if rover.commands.last() == Some(&(30, 0)) && rover.pings < 1000 {
             rover.pings = 1000;
-            clock::sleep(std::time::Duration::from_millis(600));
+            clock::sleep(Duration::from_millis(600));
         }
     });
     let fast = MotorControl::new(60, 0).unwrap().frame(0);
@@ -96,4 +105,66 @@ fn a_signal_ends_it_and_what_was_not_sent_is_counted() {
     let error = ROVER.on(&line, &frames, &signals).unwrap_err();
     assert_eq!(error, "2 frames not sent: interrupted; nothing moves");
     assert!(!line.state.borrow().commands.contains(&(30, 0)));
+}
+
+/// Longest silence of a robot behind which a command to move still leaves (ruling U10).
+const ROBOT_SILENCE: Duration = Duration::from_millis(510);
+
+/// A robot, and when it was driven and heard.
+struct Driven {
+    rover: RoverState,
+    fault: Option<(Fault, Instant)>,
+    moved_at: Instant,
+    heard_at: Instant,
+    /// Longest silence in front of a command to move.
+    silence: Duration,
+}
+
+impl Driven {
+    fn begin(&mut self, fault: Fault) {
+        self.fault = Some((fault, clock::now()));
+        self.rover.is_dumb = fault == Fault::Mute;
+        self.rover.wheels = (fault == Fault::Deaf).then_some([9; 4]);
+    }
+}
+
+/// Drives a robot.
+fn play_to_a_robot(case: Case) -> usize {
+    clock::play();
+    let (rover, now, silence) = (RoverState::default(), clock::now(), Duration::ZERO);
+    let driven = Driven { rover, fault: None, moved_at: now, heard_at: now, silence };
+    let mut robot = PlayedRover::default();
+    let line = played::played(driven, move |it, bytes| {
+        let (commands, pings) = (it.rover.commands.len(), it.rover.pings);
+        let said = robot.hear(&mut it.rover, bytes);
+        if it.rover.commands[commands..].iter().any(|command| *command != (0, 0)) {
+            it.silence = it.silence.max(clock::since(it.heard_at));
+            it.moved_at = clock::now();
+        }
+        match it.fault {
+            Some((Fault::NoReports, _)) if it.rover.pings == pings => Vec::new(),
+            Some((Fault::NoReports, _)) => Pong::new(ErrorCode::Fine).frame(0).as_bytes().to_vec(),
+            _ => said,
+        }
+    });
+    let drive = [30, 60].map(|speed| MotorControl::new(speed, 0).unwrap().frame(0));
+    let frames: Vec<_> = (0..7).map(|it| (it * 100, drive[it as usize % 2].as_bytes())).collect();
+    let (played, says_at_rest, passed) =
+        case.play(&line, &ROVER, &frames, Driven::begin, |it, _| it.heard_at = clock::now());
+    let Driven { rover, fault, moved_at, silence, .. } = &*line.state.borrow();
+    // Three reports behind the last command to move show that the wheels stand still.
+    let seen_at = *moved_at + Duration::from_millis(60);
+    let is_seen = fault.is_none_or(|(_, at)| at > seen_at);
+    let what = format!("{case:?}: {played:?} {silence:?} {:?}", rover.commands);
+    assert!(*silence <= ROBOT_SILENCE, "it has driven a silent robot: {what}");
+    assert_eq!(rover.commands.last(), Some(&(0, 0)), "it was not told to stop: {what}");
+    assert!(is_seen || !says_at_rest, "it says that the robot is at rest: {what}");
+    passed
+}
+
+#[test]
+fn a_robot_that_is_not_heard_or_not_seen_to_stop_is_stopped_and_not_called_at_rest() {
+    // No command and no report is shorter than 22 bytes.
+    let faults = [Fault::Mute, Fault::NoReports, Fault::Deaf, Fault::Signal];
+    at_every_byte(&faults, 22, play_to_a_robot);
 }
