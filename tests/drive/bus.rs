@@ -201,8 +201,7 @@ fn a_stop_is_not_given_up_with_its_port_and_goes_on_when_the_port_is_back() {
 
 #[test]
 fn a_repeated_discovery_has_the_same_result_after_a_drop_and_cuts_no_packet() {
-    let mut polls = 0;
-    loop {
+    dropped_at_any_await(100, |polls| {
         let mut story = Story::new(manual());
         (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
         let done = story.world.poll_times(polls, story.bus.discover_async());
@@ -214,18 +213,13 @@ fn a_repeated_discovery_has_the_same_result_after_a_drop_and_cuts_no_packet() {
         for node in [&story.two, &story.five] {
             assert_eq!(node.borrow().role().counters().skipped(), 0, "after {polls} polls");
         }
-        if done.is_some() {
-            break;
-        }
-        polls += 1;
-    }
-    assert!(polls > 100, "{polls}");
+        done.is_some()
+    });
 }
 
 #[test]
 fn a_repeated_read_or_command_has_the_same_result_after_a_drop() {
-    let mut polls = 0;
-    loop {
+    dropped_at_any_await(20, |polls| {
         let mut story = Story::new(manual()).discovered();
         (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
         let (world, bus) = (&story.world, &mut story.bus);
@@ -242,12 +236,8 @@ fn a_repeated_read_or_command_has_the_same_result_after_a_drop() {
         for node in [&story.two, &story.five] {
             assert_eq!(node.borrow().role().counters().skipped(), 0, "after {polls} polls");
         }
-        if done {
-            break;
-        }
-        polls += 1;
-    }
-    assert!(polls > 20, "{polls}");
+        done
+    });
 }
 
 #[test]

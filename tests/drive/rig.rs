@@ -49,6 +49,13 @@ macro_rules! call {
     }};
 }
 
+/// Drops a call before its first poll, then after one, and so on, until it is done within them.
+/// That takes more than `least` polls.
+pub(crate) fn dropped_at_any_await(least: usize, mut is_done_within: impl FnMut(usize) -> bool) {
+    let polls = (0..).find(|&polls| is_done_within(polls)).unwrap();
+    assert!(polls > least, "{polls}");
+}
+
 pub(crate) const BOTH: [bool; 2] = [false, true];
 pub(crate) const GONE: DriveError<Unplugged> = DriveError::Port(Unplugged);
 

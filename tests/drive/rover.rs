@@ -9,6 +9,14 @@ use axlewire::ucp::{
 
 use crate::rig::*;
 
+/// Calls the host this many times, this many microseconds apart.
+fn run(world: &World, rover: &mut Rover, times: u32, pause_us: u64) {
+    for _ in 0..times {
+        rover.service().unwrap();
+        world.step(pause_us);
+    }
+}
+
 /// The rover as it is.
 fn story() -> (World, Rover, Running<Robot>) {
     rover(|_| ())
@@ -37,10 +45,7 @@ fn a_ping_comes_back_with_its_round_trip() {
 fn an_earlier_pong_is_not_the_answer_to_a_ping() {
     for is_async in BOTH {
         let (world, mut rover, robot) = story();
-        for _ in 0..500 {
-            rover.service().unwrap();
-            world.step(20);
-        }
+        run(&world, &mut rover, 500, 20);
         assert_eq!(rover.role().statistics().round_trip.count(), 1);
         robot.borrow().port().unplugged.set(true);
         let deadline = after(&world, 700);
@@ -53,10 +58,7 @@ fn an_earlier_pong_is_not_the_answer_to_a_ping() {
 fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
     for is_async in BOTH {
         let (world, mut rover, _) = story();
-        for _ in 0..500 {
-            rover.service().unwrap();
-            world.step(20);
-        }
+        run(&world, &mut rover, 500, 20);
         rover.port_mut().reads.push_back(Step::Error);
         let deadline = after(&world, 700);
         let pong = call!(is_async, rover, ping, ping_async(deadline));
@@ -177,10 +179,7 @@ fn an_outcome_that_came_after_its_call_is_not_an_event_during_the_next() {
         };
         let timeout = Err(DriveError::Timeout(Operation::Calibration));
         assert_eq!(start(&mut rover, 1), timeout);
-        for _ in 0..100 {
-            rover.service().unwrap();
-            world.step(200);
-        }
+        run(&world, &mut rover, 100, 200);
         assert_eq!(rover.role().calibration_outcome(), Some(Ok(())));
         robot.borrow().port().unplugged.set(true);
         assert_eq!(start(&mut rover, 1), timeout);
@@ -240,8 +239,7 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
 
 #[test]
 fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
-    let mut polls = 0;
-    loop {
+    dropped_at_any_await(100, |polls| {
         let (world, mut rover, robot) = story();
         (rover.port_mut().most, rover.port_mut().stutters) = (1, true);
         rover.role_mut().drive(MotorControl::new(10, 0).unwrap(), world.now()).unwrap();
@@ -251,12 +249,8 @@ fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
         assert_eq!(robot.borrow().role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().statistics().reports_lost, 0);
-        if done {
-            break;
-        }
-        polls += 1;
-    }
-    assert!(polls > 100, "{polls}");
+        done
+    });
 }
 
 #[test]

@@ -146,8 +146,7 @@ fn drive_for_of_a_lost_node_ends_with_the_owed_stop() {
 
 #[test]
 fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
-    let mut polls = 0;
-    loop {
+    dropped_at_any_await(30, |polls| {
         let mut story = Story::new(manual()).discovered();
         (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
         let drive = story.bus.drive_for_async(NodeId::N2, rps(3.0), ms(1));
@@ -168,12 +167,8 @@ fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
         assert!(was_told || polls == 0);
         // A set-point WRITE that had begun is not completed.
         assert!(story.two.borrow().role().counters().skipped() < WriteRequest::LEN as u64);
-        if is_done {
-            break;
-        }
-        polls += 1;
-    }
-    assert!(polls > 30, "{polls}");
+        is_done
+    });
 }
 
 #[test]

@@ -43,9 +43,8 @@ fn of_several_errors_the_first_is_returned() {
     for round in ROUNDS {
         let port = Port {
             reads: [Step::Zero].into(),
-            writes: [Step::Error].into(),
             flushes: [Step::Error].into(),
-            ..Port::default()
+            ..Port::writing([Step::Error])
         };
         let mut driver = on(Recorder::sending(&[b"frame"]), port);
         assert_eq!(round(&mut driver), Some(Err(DriveError::Closed)));
@@ -135,11 +134,8 @@ fn a_role_is_told_again_of_a_failed_flush_if_its_port_has_been_asked_to_take_mor
         (Step::Zero, ASYNC),
         (Step::Stall, ASYNC),
     ] {
-        let port = Port {
-            writes: [Step::Few(2), step.clone()].into(),
-            flushes: [Step::Error, Step::Error].into(),
-            ..Port::default()
-        };
+        let flushes = [Step::Error, Step::Error].into();
+        let port = Port { flushes, ..Port::writing([Step::Few(2), step.clone()]) };
         let mut driver = on(Recorder::sending(&[b"12"]), port);
         assert_eq!(round(&mut driver), Some(Err(GONE)));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
@@ -159,11 +155,8 @@ fn a_role_is_told_again_of_a_failed_flush_if_its_port_has_been_asked_to_take_mor
 #[test]
 fn a_role_is_told_of_discarded_frames() {
     for round in ROUNDS {
-        let port = Port {
-            writes: [Step::Few(2), Step::Error].into(),
-            flushes: [Step::Error].into(),
-            ..Port::default()
-        };
+        let flushes = [Step::Error].into();
+        let port = Port { flushes, ..Port::writing([Step::Few(2), Step::Error]) };
         let mut driver = on(Recorder::sending(&[b"12345"]), port);
         assert_eq!(round(&mut driver), Some(Err(GONE)));
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed]);
@@ -171,8 +164,7 @@ fn a_role_is_told_of_discarded_frames() {
         assert_eq!(driver.role().unsent(), [Unsent::Unflushed, Unsent::CutOff]);
     }
     // A frame that an async call could not send, and a flush that it did not make.
-    let stalls = Port { writes: [Step::Stall].into(), ..Port::default() };
-    let mut driver = on(Recorder::sending(&[b"12345"]), stalls);
+    let mut driver = on(Recorder::sending(&[b"12345"]), Port::writing([Step::Stall]));
     assert_eq!(ASYNC(&mut driver), None);
     assert_eq!(driver.discard(), 5);
     assert_eq!(driver.role().unsent(), [Unsent::Untouched, Unsent::Unflushed]);

@@ -43,13 +43,22 @@ fn sum(one: &[u8], other: &[u8]) -> Vec<u8> {
     one.iter().zip(other).map(|(a, b)| a ^ b).collect()
 }
 
+/// All damage to the first byte of `len` bytes and to what is behind it, as judged.
+fn counted(len: usize, mut judge: impl FnMut(&mut Count, &[u8])) -> Counts {
+    let mut counts = [Count::default(); 2];
+    let mut error = vec![0; len];
+    with_errors_of_three_bits(&mut error, 0..8, |error| judge(&mut counts[0], error));
+    with_bursts(&mut error, 0..8, |error| judge(&mut counts[1], error));
+    counts
+}
+
 /// Damage to a packet of `long` bytes that makes it begin like a READ. It passes if the id,
 /// whatever becomes of it, is legal, and the payload begins with the CRC of that READ: in one
 /// packet of 65,536. Each such packet is built and judged.
 fn shrunk<F: Framing>(header: u8, long: usize) -> Counts {
-    let mut counts = [Count::default(); 2];
     let mut dice = Dice(u64::from(header));
-    let mut judge = |count: &mut Count, error: &[u8]| {
+    // Other bytes change no header.
+    counted(long, |count: &mut Count, error: &[u8]| {
         if header ^ error[0] != 0xAA {
             return;
         }
@@ -65,19 +74,13 @@ fn shrunk<F: Framing>(header: u8, long: usize) -> Counts {
             }
         }
         count.add(passes);
-    };
-    // Other bytes change no header.
-    let mut error = vec![0; long];
-    with_errors_of_three_bits(&mut error, 0..8, |error| judge(&mut counts[0], error));
-    with_bursts(&mut error, 0..8, |error| judge(&mut counts[1], error));
-    counts
+    })
 }
 
 /// Damage to a READ that makes it begin like a packet of `long` bytes, by the header `to`, times
 /// the eight READs, times what may follow: `behind` gives all that may. Every case is judged.
 fn grown<F: Framing>(to: u8, long: usize, behind: &[Vec<u8>]) -> Counts {
-    let mut counts = [Count::default(); 2];
-    let judge = |count: &mut Count, error: &[u8]| {
+    counted(4, |count: &mut Count, error: &[u8]| {
         if error[0] ^ 0xAA != to {
             return;
         }
@@ -89,11 +92,7 @@ fn grown<F: Framing>(to: u8, long: usize, behind: &[Vec<u8>]) -> Counts {
                 count.add(F::judge(&line) == Verdict::Frame { len: long });
             }
         }
-    };
-    let mut error = vec![0; 4];
-    with_errors_of_three_bits(&mut error, 0..8, |error| judge(&mut counts[0], error));
-    with_bursts(&mut error, 0..8, |error| judge(&mut counts[1], error));
-    counts
+    })
 }
 
 /// The next three READs, to any nodes.

@@ -5,11 +5,6 @@ use axlewire::crc16;
 
 use crate::{master::Nodes, names::*};
 
-fn packet(packet: &impl Encode) -> Vec<u8> {
-    let mut buffer = [0; 16];
-    packet.encode(&mut buffer).unwrap().to_vec()
-}
-
 #[test]
 fn a_slave_counts_what_it_heard_what_it_refused_and_what_it_answered() {
     let Some(mut board) = Board::start(Program::Slave) else { return };

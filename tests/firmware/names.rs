@@ -21,6 +21,6 @@ pub(crate) use axlewire::{
 
 pub(crate) use crate::{
     qemu::{Board, PATIENCE, Program, Report},
-    slave::{NODE, rps},
+    slave::{NODE, packet, rps},
     wire::{Wire, WireClock},
 };

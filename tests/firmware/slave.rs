@@ -216,7 +216,7 @@ impl Bare {
     }
 }
 
-fn packet(packet: &impl Encode) -> Vec<u8> {
+pub(crate) fn packet(packet: &impl Encode) -> Vec<u8> {
     let mut buffer = [0; 16];
     packet.encode(&mut buffer).unwrap().to_vec()
 }

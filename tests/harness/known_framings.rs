@@ -17,87 +17,54 @@ pub(crate) trait Known: Framing {
     fn bytes<'a: 'a>(frame: &Self::Frame<'a>) -> &'a [u8];
 }
 
-fn request_bytes<'a>(frame: &ikeya::Request<'a>) -> &'a [u8] {
-    match frame {
-        ikeya::Request::Read(packet) => packet.as_bytes(),
-        ikeya::Request::Write(packet) => packet.as_bytes(),
-    }
-}
-
-fn response_bytes<'a>(frame: &ikeya::Response<'a>) -> &'a [u8] {
-    match frame {
-        ikeya::Response::Velocity(packet) => packet.as_bytes(),
-        ikeya::Response::Position(packet) => packet.as_bytes(),
-    }
-}
-
-fn three_request_bytes<'a>(frame: &three::Request<'a>) -> &'a [u8] {
-    match frame {
-        three::Request::Read(packet) => packet.as_bytes(),
-        three::Request::Write(packet) => packet.as_bytes(),
-    }
-}
-
-fn three_response_bytes<'a>(frame: &three::Response<'a>) -> &'a [u8] {
-    match frame {
-        three::Response::Velocity(packet) => packet.as_bytes(),
-        three::Response::Position(packet) => packet.as_bytes(),
-    }
-}
-
-impl Known for ikeya::ToSlave {
-    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: false, long: 8 };
-
-    fn bytes<'a: 'a>(frame: &ikeya::Request<'a>) -> &'a [u8] {
-        request_bytes(frame)
-    }
-}
-
-impl Known for ikeya::ToMaster {
-    const RULES: Rules = Rules::Ikeya { to_slave: false, to_master: true, long: 8 };
-
-    fn bytes<'a: 'a>(frame: &ikeya::Response<'a>) -> &'a [u8] {
-        response_bytes(frame)
-    }
-}
-
-impl Known for ikeya::BothDirections {
-    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 8 };
-
-    fn bytes<'a: 'a>(frame: &ikeya::Packet<'a>) -> &'a [u8] {
-        match frame {
-            ikeya::Packet::Request(request) => request_bytes(request),
-            ikeya::Packet::Response(response) => response_bytes(response),
+/// The framings of a kind of boards, whose packets but the READ have `long` bytes.
+macro_rules! known_boards {
+    ($board:ident, $request:ident, $response:ident, $long:literal) => {
+        fn $request<'a>(frame: &$board::Request<'a>) -> &'a [u8] {
+            match frame {
+                $board::Request::Read(packet) => packet.as_bytes(),
+                $board::Request::Write(packet) => packet.as_bytes(),
+            }
         }
-    }
-}
 
-impl Known for three::ToSlave {
-    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: false, long: 16 };
-
-    fn bytes<'a: 'a>(frame: &three::Request<'a>) -> &'a [u8] {
-        three_request_bytes(frame)
-    }
-}
-
-impl Known for three::ToMaster {
-    const RULES: Rules = Rules::Ikeya { to_slave: false, to_master: true, long: 16 };
-
-    fn bytes<'a: 'a>(frame: &three::Response<'a>) -> &'a [u8] {
-        three_response_bytes(frame)
-    }
-}
-
-impl Known for three::BothDirections {
-    const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: 16 };
-
-    fn bytes<'a: 'a>(frame: &three::Packet<'a>) -> &'a [u8] {
-        match frame {
-            three::Packet::Request(request) => three_request_bytes(request),
-            three::Packet::Response(response) => three_response_bytes(response),
+        fn $response<'a>(frame: &$board::Response<'a>) -> &'a [u8] {
+            match frame {
+                $board::Response::Velocity(packet) => packet.as_bytes(),
+                $board::Response::Position(packet) => packet.as_bytes(),
+            }
         }
-    }
+
+        impl Known for $board::ToSlave {
+            const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: false, long: $long };
+
+            fn bytes<'a: 'a>(frame: &$board::Request<'a>) -> &'a [u8] {
+                $request(frame)
+            }
+        }
+
+        impl Known for $board::ToMaster {
+            const RULES: Rules = Rules::Ikeya { to_slave: false, to_master: true, long: $long };
+
+            fn bytes<'a: 'a>(frame: &$board::Response<'a>) -> &'a [u8] {
+                $response(frame)
+            }
+        }
+
+        impl Known for $board::BothDirections {
+            const RULES: Rules = Rules::Ikeya { to_slave: true, to_master: true, long: $long };
+
+            fn bytes<'a: 'a>(frame: &$board::Packet<'a>) -> &'a [u8] {
+                match frame {
+                    $board::Packet::Request(request) => $request(request),
+                    $board::Packet::Response(response) => $response(response),
+                }
+            }
+        }
+    };
 }
+
+known_boards!(ikeya, request_bytes, response_bytes, 8);
+known_boards!(three, three_request_bytes, three_response_bytes, 16);
 
 impl<const CAP: usize> Known for ucp::Ucp<CAP> {
     const RULES: Rules = Rules::Ucp { cap: CAP };

@@ -181,6 +181,12 @@ pub(crate) fn quiet_robot() -> Robot {
     quiet_robot_at(ms(0))
 }
 
+/// Both calibrations have a result.
+pub(crate) fn both_results(robot: &mut Robot, at: u64) {
+    robot.calibration_result_imu(imu_bias(), ms(at));
+    robot.calibration_result_mag(mag_bias(), ms(at));
+}
+
 pub(crate) fn quiet_robot_at(now: Instant) -> Robot {
     let mut config = RobotConfig::default();
     config.bias_request_period = None;

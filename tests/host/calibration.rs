@@ -62,9 +62,7 @@ fn a_calibration_request_that_arrives_damaged_is_resent_at_once_and_eventually_f
 
 #[test]
 fn the_cause_of_a_failure_is_that_of_the_last_attempt() {
-    let mut host = quiet_host();
-    host.start_calibration(IMU, ms(0)).unwrap();
-    sent(&mut host, ms(0));
+    let mut host = starting(IMU);
     let ack = CalibrationStartAck::new(IMU, ErrorCode::Damaged);
     host.handle_input(&bytes(ack), ms(1));
     assert_eq!(wait(&mut host, ms(1000)).len(), 2);
@@ -85,11 +83,17 @@ fn an_end_is_acknowledged_with_any_kind_as_long_as_the_robots_last_start_is_not_
     assert_eq!(events(&mut host).pop(), Some(HostEvent::CalibrationEnded(IMU)));
 }
 
-/// A host whose robot has begun a calibration.
-fn calibrating(kind: CalibrationKind) -> Host {
+/// A host that has asked its robot to begin a calibration.
+fn starting(kind: CalibrationKind) -> Host {
     let mut host = quiet_host();
     host.start_calibration(kind, ms(0)).unwrap();
     sent(&mut host, ms(0));
+    host
+}
+
+/// A host whose robot has begun a calibration.
+fn calibrating(kind: CalibrationKind) -> Host {
+    let mut host = starting(kind);
     let ack = CalibrationStartAck::new(kind, ErrorCode::Fine);
     host.handle_input(&bytes(ack), ms(1));
     events(&mut host);
@@ -190,12 +194,7 @@ fn neither_a_refused_start_nor_one_of_the_other_kind_makes_a_result_new() {
 #[test]
 fn a_result_is_reported_once_even_if_the_end_is_requested_before_it_is_repeated() {
     for (kind, result) in [(IMU, bytes(imu_bias())), (MAG, bytes(mag_bias()))] {
-        let mut host = quiet_host();
-        host.start_calibration(kind, ms(0)).unwrap();
-        sent(&mut host, ms(0));
-        let ack = CalibrationStartAck::new(kind, ErrorCode::Fine);
-        host.handle_input(&bytes(ack), ms(5));
-        events(&mut host);
+        let mut host = calibrating(kind);
         host.handle_input(&result, ms(100));
         sent(&mut host, ms(100)); // the acknowledgement is lost on the line
         assert_eq!(events(&mut host).len(), 1);
@@ -317,18 +316,14 @@ fn each_boot_of_a_robot_is_reported_once_however_often_its_biases_are_sent() {
 fn the_kind_in_a_bad_acknowledgement_of_a_start_is_ignored() {
     // The vendor firmware returns the kind of the previous start there.
     for kind in [IMU, MAG, CalibrationKind::Other(0)] {
-        let mut host = quiet_host();
-        host.start_calibration(IMU, ms(0)).unwrap();
-        sent(&mut host, ms(0));
+        let mut host = starting(IMU);
         let bad = CalibrationStartAck::new(kind, ErrorCode::Damaged);
         host.handle_input(&bytes(bad), ms(5));
         assert_eq!(sent(&mut host, ms(5)), [CalibrationStart::new(IMU).frame(1).as_bytes()]);
         assert_eq!(host.statistics().acks_unasked, 0);
     }
     // That of a good one is not.
-    let mut host = quiet_host();
-    host.start_calibration(IMU, ms(0)).unwrap();
-    sent(&mut host, ms(0));
+    let mut host = starting(IMU);
     host.handle_input(&bytes(CalibrationStartAck::new(MAG, ErrorCode::Fine)), ms(5));
     assert_eq!((host.statistics().acks_unasked, host.calibration_outcome()), (1, None));
 }

@@ -15,8 +15,7 @@ fn the_window_is_the_timeout_plus_the_wire_time_after_the_end_of_the_request() {
 
     desk.turn_with(741, &velocity(NodeId::N1, 1.0));
     desk.master.handle_timeout(desk.now);
-    let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
-    assert_eq!(desk.told(), [suspect], "after it does not");
+    assert_eq!(desk.told(), [turned(NodeId::N1, Health::Suspect(1))], "after it does not");
     assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
 }
 
@@ -50,8 +49,7 @@ fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_i
         desk.master.handle_taken(begin + US(taken_us));
         desk.now = begin + US(740.max(taken_us));
         desk.master.handle_timeout(desk.now);
-        let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
-        assert_eq!(desk.told(), [suspect]);
+        assert_eq!(desk.told(), [turned(NodeId::N1, Health::Suspect(1))]);
         assert_eq!(desk.master.poll_transmit(desk.now), None);
         desk.master.handle_flushed(begin + US(flushed_us));
         desk.now = begin + US(flushed_us);
@@ -64,8 +62,7 @@ fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_i
         assert_eq!(desk.turn(), read(NodeId::N3));
         assert_eq!(desk.now, end);
         desk.hear(290, &position(NodeId::N3, turns(2)));
-        let status = Status::Position(turns(2));
-        assert_eq!(desk.told(), [MasterEvent::Status { node: NodeId::N3, status }]);
+        assert_eq!(desk.told(), [reading(NodeId::N3, Status::Position(turns(2)))]);
         // The node may be late by its guard, as always.
         while desk.turn() != read(NodeId::N1) {
             desk.hear(290, &position(NodeId::N3, turns(2)));
@@ -82,8 +79,7 @@ fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answ
     // Nobody has let time pass meanwhile.
     desk.now = begin + US(741);
     desk.master.handle_flushed(desk.now);
-    let suspect = MasterEvent::Health { node: NodeId::N1, health: Health::Suspect(1) };
-    assert_eq!(desk.told(), [suspect]);
+    assert_eq!(desk.told(), [turned(NodeId::N1, Health::Suspect(1))]);
     desk.hear(1, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.told(), []);
     // The line is free then, but the node may be late by its guard.
@@ -126,21 +122,25 @@ fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_count
     assert_eq!(desk.turn(), read(NodeId::N1));
     assert!(desk.now >= flushed_at + US(660));
     desk.hear(290, &velocity(NodeId::N1, 3.0));
-    let status = Status::Velocity(3.0);
-    assert!(desk.told().contains(&MasterEvent::Status { node: NodeId::N1, status }));
+    assert!(desk.told().contains(&reading(NodeId::N1, Status::Velocity(3.0))));
+}
+
+/// A port that holds back a READ of node 3, and after a second takes a WRITE to node 1 as well.
+fn holding_back() -> Desk {
+    let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
+    desk.master.read(NodeId::N3, desk.now).unwrap();
+    desk.turn();
+    desk.master.handle_taken(desk.now);
+    desk.silence();
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+    desk
 }
 
 #[test]
 fn a_late_flush_keeps_the_line_free_for_the_answer_also_behind_a_write() {
     for next_is_stop in [false, true] {
-        let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
-        desk.master.read(NodeId::N3, desk.now).unwrap();
-        desk.turn();
-        desk.master.handle_taken(desk.now);
-        desk.silence();
-        // After a second the port takes a WRITE as well, and then all of it leaves.
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        let mut desk = holding_back();
         desk.master.handle_taken(desk.now);
         desk.master.handle_flushed(desk.now);
         let end = desk.now + US(660);
@@ -161,13 +161,7 @@ fn a_late_flush_keeps_the_line_free_for_the_answer_also_behind_a_write() {
 #[test]
 fn every_node_whose_request_left_late_is_guarded_and_no_node_that_was_only_told_something() {
     for is_asked in [false, true] {
-        let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
-        desk.master.read(NodeId::N3, desk.now).unwrap();
-        desk.turn();
-        desk.master.handle_taken(desk.now);
-        desk.silence();
-        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        let mut desk = holding_back();
         desk.master.read(NodeId::N1, desk.now).unwrap();
         if is_asked {
             assert_eq!(desk.turn(), read(NodeId::N1), "both have been asked");
@@ -249,10 +243,9 @@ fn a_stray_byte_before_every_answer_costs_nothing() {
             desk.turn();
             let answer = [&[stray][..], &velocity(NodeId::N1, turn as f32)].concat();
             desk.hear(310, &answer);
-            let status = Status::Velocity(turn as f32);
             assert_eq!(
                 desk.told(),
-                [MasterEvent::Status { node: NodeId::N1, status }],
+                [reading(NodeId::N1, Status::Velocity(turn as f32))],
                 "{stray:#x}"
             );
         }
@@ -267,12 +260,7 @@ fn an_answer_of_another_node_is_counted_and_never_accepted() {
     assert_eq!(desk.told(), []);
     assert_eq!(desk.master.node_statistics(NodeId::N3).late, 1);
     desk.hear(100, &velocity(NodeId::N1, 2.0));
-    let status = Status::Velocity(2.0);
-    assert_eq!(
-        desk.told(),
-        [MasterEvent::Status { node: NodeId::N1, status }],
-        "the window stayed open"
-    );
+    assert_eq!(desk.told(), [reading(NodeId::N1, Status::Velocity(2.0))], "the window stayed open");
 }
 
 #[test]
@@ -283,13 +271,9 @@ fn a_late_answer_is_not_taken_for_the_next_one() {
     desk.hear(400, &velocity(NodeId::N1, 9.0));
     assert_eq!(desk.master.poll_transmit(desk.now), None);
     desk.turn_with(290, &velocity(NodeId::N1, 1.0));
-    let statuses: Vec<_> = desk
-        .told()
-        .into_iter()
-        .filter(|event| matches!(event, MasterEvent::Status { .. }))
-        .collect();
-    let status = Status::Velocity(1.0);
-    assert_eq!(statuses, [MasterEvent::Status { node: NodeId::N1, status }]);
+    let mut told = desk.told();
+    told.retain(|event| matches!(event, MasterEvent::Status { .. }));
+    assert_eq!(told, [reading(NodeId::N1, Status::Velocity(1.0))]);
     assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
 }
 
@@ -324,8 +308,7 @@ fn a_second_answer_to_one_request_is_late() {
     let mut desk = Desk::asking(direct());
     let twice = [velocity(NodeId::N1, 1.0), velocity(NodeId::N1, 2.0)].concat();
     desk.hear(450, &twice);
-    let status = Status::Velocity(1.0);
-    assert_eq!(desk.told(), [MasterEvent::Status { node: NodeId::N1, status }]);
+    assert_eq!(desk.told(), [reading(NodeId::N1, Status::Velocity(1.0))]);
     assert_eq!(desk.master.node_statistics(NodeId::N1).late, 1);
 }
 

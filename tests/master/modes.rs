@@ -211,9 +211,8 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
         (true, MasterEvent::StopBlocked { node: NodeId::N1 }),
         (false, MasterEvent::ModeInDoubt { node: NodeId::N1 }),
     ] {
-        let config = with(direct(), |config| config.stops_abnormal = false);
         // The other node keeps the line busy.
-        let mut desk = Desk::with_nodes(config, &[N1, N3]);
+        let mut desk = Desk::tuned(|config| config.stops_abnormal = false, &[N1, N3]);
         desk.answer(NodeId::N1, Answer::Position(turns(-7)));
         while !desk.master.is_mode_in_doubt(NodeId::N1) {
             desk.exchange();
@@ -236,8 +235,7 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
 
 #[test]
 fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
-    let config = with(direct(), |config| config.stops_abnormal = false);
-    let mut desk = Desk::with_nodes(config, &[N1]);
+    let mut desk = Desk::tuned(|config| config.stops_abnormal = false, &[N1]);
     desk.answer(NodeId::N1, Answer::Position(turns(-7)));
     desk.packets(1);
     desk.answer(NodeId::N1, Answer::Silence);

@@ -48,6 +48,16 @@ pub(crate) fn writes(packets: &[Vec<u8>]) -> Vec<Vec<u8>> {
     packets.iter().filter(|packet| packet[0] == WRITE).cloned().collect()
 }
 
+/// The event of a reading.
+pub(crate) fn reading(node: NodeId, status: Status) -> MasterEvent {
+    MasterEvent::Status { node, status }
+}
+
+/// The event of a health.
+pub(crate) fn turned(node: NodeId, health: Health) -> MasterEvent {
+    MasterEvent::Health { node, health }
+}
+
 /// A node's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Answer {
@@ -114,6 +124,11 @@ impl Desk {
         }
         desk.told();
         desk
+    }
+
+    /// The same with a change to the settings of a direct line.
+    pub(crate) fn tuned(change: impl FnOnce(&mut MasterConfig), nodes: &[(NodeId, Mode)]) -> Self {
+        Self::with_nodes(with(direct(), change), nodes)
     }
 
     /// Node 1, commanded to turn.

@@ -67,8 +67,7 @@ fn the_bounds_of_a_master_follow_from_its_settings() {
 #[test]
 fn no_attempts_count_as_one() {
     for attempts in [0, 1] {
-        let config = with(direct(), |config| config.attempts = attempts);
-        let mut desk = Desk::with_nodes(config, &[N1]);
+        let mut desk = Desk::tuned(|config| config.attempts = attempts, &[N1]);
         assert!(desk.master.health(N1.0).is_some(), "found in the one pass");
         desk.told();
         desk.master.read(N1.0, desk.now).unwrap();

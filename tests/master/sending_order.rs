@@ -193,13 +193,18 @@ fn one_is_gone(change: impl Fn(&mut MasterConfig)) -> Desk {
     let mut config = direct();
     change(&mut config);
     let mut desk = Desk::with_nodes(config, &NodeId::ALL.map(|node| (node, Mode::Velocity)));
-    desk.answer(NodeId::N2, Answer::Silence);
-    let fell_silent = desk.now;
-    while desk.master.health(NodeId::N2) != Some(Health::Abnormal) {
-        assert!(desk.now < fell_silent + desk.master.read_bound(), "it is not read");
-        set_all(&mut desk);
-    }
+    lose_a_busy_one(&mut desk, NodeId::N2);
     desk
+}
+
+/// A node falls silent, and is found to be abnormal although the line is busy.
+fn lose_a_busy_one(desk: &mut Desk, node: NodeId) {
+    desk.answer(node, Answer::Silence);
+    let fell_silent = desk.now;
+    while desk.master.health(node) != Some(Health::Abnormal) {
+        assert!(desk.now < fell_silent + desk.master.read_bound(), "node {node} is not read");
+        set_all(desk);
+    }
 }
 
 /// A new set-point for every node that accepts one, and the next packet.
@@ -229,12 +234,7 @@ fn the_search_for_a_node_that_is_gone_keeps_no_other_from_being_read_whatever_it
         assert!(longest <= 7 * 8 + 8 * 9, "{share} %, {gap} us: {longest} packets without a READ");
         assert!(sought > 5, "{share} %, {gap} us: {sought} attempts");
 
-        desk.answer(NodeId::N3, Answer::Silence);
-        let fell_silent = desk.now;
-        while desk.master.health(NodeId::N3) != Some(Health::Abnormal) {
-            assert!(desk.now < fell_silent + desk.master.read_bound(), "{share} %, {gap} us");
-            set_all(&mut desk);
-        }
+        lose_a_busy_one(&mut desk, NodeId::N3);
         assert!(desk.master.stops_owed().contains(NodeId::N3), "it was under a set-point");
     }
 }

@@ -4,16 +4,11 @@ use crate::rig::*;
 
 #[test]
 fn periodic_polling_keeps_its_period_without_drift() {
-    let mut config = direct();
-    config.polling = Polling::Every(Duration::from_millis(10));
-    let mut desk = Desk::with_nodes(config, &[N1]);
-    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
-    desk.turn();
-    let begin = desk.now;
+    let (mut desk, begin) = read_every_10_ms();
     for turn in 1..100 {
-        desk.hear(290, &velocity(NodeId::N1, 0.0));
         desk.turn();
         assert_eq!(desk.now, begin + Duration::from_millis(10 * turn));
+        desk.hear(290, &velocity(NodeId::N1, 0.0));
     }
 }
 
@@ -32,8 +27,7 @@ fn a_requested_node_is_read_at_once_whatever_its_period() {
 
 /// A bus with one node that is read every 10 ms; the READ at the returned time has been answered.
 fn read_every_10_ms() -> (Desk, Instant) {
-    let config = with(direct(), |config| config.polling = Polling::Every(MS(10)));
-    let mut desk = Desk::with_nodes(config, &[N1]);
+    let mut desk = Desk::tuned(|config| config.polling = Polling::Every(MS(10)), &[N1]);
     // The first is late: it was due during the discovery.
     desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.turn();
@@ -103,8 +97,7 @@ fn an_unanswered_read_is_retried_right_after_the_guard_whatever_the_polling() {
 
 #[test]
 fn manual_polling_reads_when_asked_and_writes_when_told() {
-    let config = with(direct(), |config| config.polling = Polling::Manual);
-    let mut desk = Desk::with_nodes(config, &[N1]);
+    let mut desk = Desk::tuned(|config| config.polling = Polling::Manual, &[N1]);
     assert_eq!(desk.master.poll_timeout(), None);
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
@@ -118,8 +111,7 @@ fn manual_polling_reads_when_asked_and_writes_when_told() {
 
 #[test]
 fn a_turnaround_gap_is_kept_after_requests_and_answers() {
-    let config = with(direct(), |config| config.turnaround_gap = US(100));
-    let mut desk = Desk::with_nodes(config, &[N1]);
+    let mut desk = Desk::tuned(|config| config.turnaround_gap = US(100), &[N1]);
     desk.turn_with(290, &velocity(NodeId::N1, 0.0));
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     let heard = desk.now;
@@ -153,8 +145,7 @@ fn the_echo_of_an_echoing_line_is_removed() {
     let read = desk.turn();
     let line = [&desk.sent[0][..], &read, &velocity(NodeId::N1, 3.0)].concat();
     desk.hear(450, &line);
-    let status = Status::Velocity(3.0);
-    assert_eq!(desk.told(), [MasterEvent::Status { node: NodeId::N1, status }]);
+    assert_eq!(desk.told(), [reading(NodeId::N1, Status::Velocity(3.0))]);
     assert_eq!(desk.master.statistics().echo_bytes, 8 * 4 + 12);
     assert_eq!(desk.master.statistics().echo_errors, 0);
 }
@@ -206,8 +197,7 @@ fn a_wrong_echo_is_one_error_and_the_next_one_is_removed_again() {
 
 #[test]
 fn a_line_without_the_configured_echo_still_works() {
-    let config = with(direct(), |config| config.removes_echo = true);
-    let desk = Desk::with_nodes(config, &[N1]);
+    let desk = Desk::tuned(|config| config.removes_echo = true, &[N1]);
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
     assert!(desk.master.statistics().echo_errors > 0);
 }
@@ -221,8 +211,7 @@ fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     assert_eq!(desk.master.lost_events(), 12);
     let events = desk.told();
     assert_eq!(events.len(), 8, "readings leave half of the queue for rarer events");
-    let status = Status::Velocity(0.0);
-    assert_eq!(events[0], MasterEvent::Status { node: NodeId::N1, status });
+    assert_eq!(events[0], reading(NodeId::N1, Status::Velocity(0.0)));
     assert_eq!(
         desk.master.status(NodeId::N1).unwrap().0,
         Status::Velocity(19.0),
@@ -307,8 +296,7 @@ fn rare_events_have_room_however_many_readings_are_waiting() {
 #[test]
 fn an_answer_earlier_than_the_line_allows_is_accepted_if_configured() {
     for accepts_early in [false, true] {
-        let config = with(direct(), |config| config.accepts_early = accepts_early);
-        let mut desk = Desk::with_nodes(config, &[N1]);
+        let mut desk = Desk::tuned(|config| config.accepts_early = accepts_early, &[N1]);
         desk.turn_with(1, &velocity(NodeId::N1, 9.0));
         assert_eq!(!desk.told().is_empty(), accepts_early);
         let early = desk.master.node_statistics(NodeId::N1).early;

@@ -151,8 +151,7 @@ fn a_stopped_node_that_is_lost_is_no_longer_known_to_be_at_rest() {
 
 #[test]
 fn hold_age_does_not_hold_for_a_node_that_is_lost() {
-    let config = with(direct(), |config| config.hold_age = MS(60_000));
-    let mut desk = Desk::with_nodes(config, &[N3]);
+    let mut desk = Desk::tuned(|config| config.hold_age = MS(60_000), &[N3]);
     desk.lose(NodeId::N3);
     desk.master.stop(NodeId::N3, desk.now);
     assert_eq!(writes(&desk.packets(5)), [[0; 0]; 0]);

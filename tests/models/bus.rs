@@ -198,9 +198,7 @@ impl<B: Kit> Bus<B> {
             self.master.handle_input(&bytes, self.now);
         }
         let is_exchange = sent.is_exchange::<B>();
-        if is_exchange && self.asked.is_some() {
-            return Err("a second request in an open window".into());
-        }
+        broken_if!(is_exchange && self.asked.is_some(), "a second request in an open window");
         self.check_order(&sent)?;
         let start = self.line_free.max(self.now);
         let end = start + wire_time(sent.len, self.master.config().baud);

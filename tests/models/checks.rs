@@ -70,9 +70,7 @@ impl<B: Kit> Bus<B> {
             match event {
                 MasterEvent::Stopped { node } => {
                     let paid = self.account(node).paid;
-                    if paid < 2 {
-                        return Err(format!("Stopped, with {paid} payments"));
-                    }
+                    broken_if!(paid < 2, "Stopped, with {paid} payments");
                 }
                 MasterEvent::Confirmed { node } => {
                     let confirm = std::mem::take(&mut self.account(node).confirm);
@@ -103,9 +101,7 @@ impl<B: Kit> Bus<B> {
             let node = NodeId::ALL[index];
             let progress = self.master.stop_progress(node);
             if account.is_owed && !owed.contains(node) {
-                if account.paid < 2 {
-                    return Err(format!("node {node}: the stop is forgotten"));
-                }
+                broken_if!(account.paid < 2, "node {node}: the stop is forgotten");
                 (account.is_owed, account.is_stop_due) = (false, false);
                 account.coast(self.now);
             }
@@ -161,9 +157,7 @@ impl<B: Kit> Bus<B> {
     /// If the master has nothing to send, there is a future deadline at which it will.
     pub(super) fn check_rest(&self) -> Checked {
         let timeout = self.master.poll_timeout();
-        if timeout.is_some_and(|at| at <= self.now) {
-            return Err("a deadline in the past".into());
-        }
+        broken_if!(timeout.is_some_and(|at| at <= self.now), "a deadline in the past");
         // A packet handed out behind a WRITE that is still leaving would not leave any earlier.
         if timeout.is_none_or(|at| at > self.line_free) {
             check_sleep(&self.master, self.now)?;

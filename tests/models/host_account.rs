@@ -167,12 +167,8 @@ impl Account {
             return Err(format!("index {}, {} bytes", frame.index(), bytes.len()));
         }
         self.index = self.index.wrapping_add(1);
-        if self.update == Update::Silent {
-            return Err(format!("{message:?} during a firmware update"));
-        }
-        if self.low_ids_only && frame.id() > 4 {
-            return Err(format!("{message:?} to a robot that hangs on it"));
-        }
+        broken_if!(self.update == Update::Silent, "{message:?} during a firmware update");
+        broken_if!(self.low_ids_only && frame.id() > 4, "{message:?} to a robot that hangs on it");
         if let Message::MotorControl(command) = message {
             self.motion.frame(command, now)?;
             if let Update::Asked { needs_stop, .. } = &mut self.update {
@@ -181,9 +177,7 @@ impl Account {
             self.last = Some(Last::Motor);
             return Ok(());
         }
-        if self.motion.is_due(now) {
-            return Err(format!("{message:?} before a motor command that is due"));
-        }
+        broken_if!(self.motion.is_due(now), "{message:?} before a motor command that is due");
         self.motion.other_frame();
         let (is_right, last) = match message {
             Message::Ping(_) => {

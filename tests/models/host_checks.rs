@@ -109,9 +109,7 @@ impl Checks<HostSide> for Site {
             HostEvent::CalibrationEnded(kind) => (CalibrationStep::End, *kind, true),
             HostEvent::CalibrationFailed(failure) => {
                 let is_late = failure.cause == FailureCause::NoAnswer;
-                if failure.attempts != 3 && is_late {
-                    return Err(format!("{failure:?} before the last attempt"));
-                }
+                broken_if!(failure.attempts != 3 && is_late, "{failure:?} before the last attempt");
                 (failure.step, failure.kind, false)
             }
             HostEvent::ImuBias(_) => {
@@ -124,9 +122,7 @@ impl Checks<HostSide> for Site {
             }
             _ => return Ok(()),
         };
-        if self.account.untold.first() != Some(&end) {
-            return Err(format!("{event:?} has not happened"));
-        }
+        broken_if!(self.account.untold.first() != Some(&end), "{event:?} has not happened");
         self.account.untold.remove(0);
         Ok(())
     }
@@ -146,9 +142,7 @@ impl Checks<HostSide> for Site {
                 *ack = Ack::No;
             }
         }
-        if self.role.link() != self.account.link {
-            return Err(format!("the link is {:?}", self.role.link()));
-        }
+        broken_if!(self.role.link() != self.account.link, "the link is {:?}", self.role.link());
         Ok(())
     }
 

@@ -18,89 +18,46 @@ const DONE: Act = Act::DONE;
 /// Everything that moves the robot, and every fate of the frames.
 const MOTION: Menu = &[
     Act::FATES,
-    &[
-        Act::Call(Go(1)),
-        Act::Call(Go(2)),
-        Act::Call(Go(3)),
-        Act::Call(Stop),
-        Act::Fail(Unsent::CutOff),
-        Act::Wait(1_000),
-        Act::Wait(500_000),
-        Act::ToDeadline(0),
-        Act::ToDeadline(1),
-        Act::Wait(10_000_000),
-        Act::Run(450),
-        Act::Run(1_100),
-    ],
+    &Act::calls([Go(1), Go(2), Go(3), Stop]),
+    &[Act::Fail(Unsent::CutOff), Act::Wait(1_000), Act::Wait(500_000), Act::Wait(10_000_000)],
+    &[Act::ToDeadline(0), Act::ToDeadline(1), Act::Run(450), Act::Run(1_100)],
 ];
 
 /// A firmware update, among commands and answers.
 const UPDATE: Menu = &[
     Act::FATES,
-    &[
-        Act::Call(Go(1)),
-        Act::Call(Stop),
-        Act::Call(Update),
-        Act::Call(EndUpdate),
-        Act::Call(Calibrate(START, IMU)),
-        Act::Call(Show(3)),
-        Act::Hear(Hear::UpdateAnswer(OtaStatus::Accepted)),
-        Act::Hear(Hear::UpdateAnswer(OtaStatus::Forbidden)),
-        Act::Hear(Hear::BiasRequest),
-        Act::Hear(Hear::Report),
-        Act::Hear(Hear::Imu(1)),
-        Act::Fail(Unsent::CutOff),
-        Act::ToDeadline(0),
-        Act::Run(600),
-    ],
+    &Act::calls([Go(1), Stop, Update, EndUpdate, Calibrate(START, IMU), Show(3)]),
+    &Act::hears([
+        Hear::UpdateAnswer(OtaStatus::Accepted),
+        Hear::UpdateAnswer(OtaStatus::Forbidden),
+    ]),
+    &Act::hears([Hear::BiasRequest, Hear::Report, Hear::Imu(1)]),
+    &[Act::Fail(Unsent::CutOff), Act::ToDeadline(0), Act::Run(600)],
 ];
 
 /// Calibrations, results and biases, with all kinds of answers.
 const CALIBRATION: Menu = &[
     Act::FATES,
-    &[
-        Act::Call(Go(2)),
-        Act::Call(Calibrate(START, IMU)),
-        Act::Call(Calibrate(START, MAG)),
-        Act::Call(Calibrate(END, IMU)),
-        Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine)),
-        Act::Hear(Hear::StartAck(IMU, ErrorCode::Damaged)),
-        Act::Hear(Hear::StartAck(MAG, ErrorCode::Fine)),
-        Act::Hear(Hear::EndAck(IMU)),
-        Act::Hear(Hear::Imu(1)),
-        Act::Hear(Hear::Imu(2)),
-        Act::Hear(Hear::Mag(1)),
-        Act::Hear(Hear::BiasRequest),
-        Act::Hear(Hear::Pong),
-        Act::Hear(Hear::Unknown),
-        Act::Hear(Hear::Damaged),
-        Act::Hear(Hear::Echo),
-        Act::Call(Show(3)),
-        Act::Call(Show(1)),
-        Act::Call(SetStore(true)),
-        Act::Call(SetStore(false)),
-        Act::TakeEvent,
-        Act::Wait(500_000),
-        Act::ToDeadline(0),
-        Act::ToDeadline(1),
-        Act::Run(700),
-    ],
+    &Act::calls([Go(2), Calibrate(START, IMU), Calibrate(START, MAG), Calibrate(END, IMU)]),
+    &Act::hears([
+        Hear::StartAck(IMU, ErrorCode::Fine),
+        Hear::StartAck(IMU, ErrorCode::Damaged),
+        Hear::StartAck(MAG, ErrorCode::Fine),
+        Hear::EndAck(IMU),
+    ]),
+    &Act::hears([Hear::Imu(1), Hear::Imu(2), Hear::Mag(1), Hear::BiasRequest, Hear::Pong]),
+    &Act::hears([Hear::Unknown, Hear::Damaged, Hear::Echo]),
+    &Act::calls([Show(3), Show(1), SetStore(true), SetStore(false)]),
+    &[Act::TakeEvent, Act::Wait(500_000), Act::ToDeadline(0), Act::ToDeadline(1), Act::Run(700)],
 ];
 
 /// Frames in halves, among whole ones.
-const HALVES: Menu = &[&[
-    Act::Hear(Hear::Front),
-    Act::Hear(Hear::Rest),
-    Act::Hear(Hear::Imu(2)),
-    Act::Hear(Hear::Pong),
-    Act::Hear(Hear::StartAck(IMU, ErrorCode::Fine)),
-    Act::Hear(Hear::Damaged),
-    Act::Call(Go(1)),
-    Act::Call(Calibrate(START, IMU)),
-    DONE,
-    Act::ToDeadline(0),
-    Act::Wait(1_000),
-]];
+const HALVES: Menu = &[
+    &Act::hears([Hear::Front, Hear::Rest, Hear::Imu(2), Hear::Pong, Hear::Damaged]),
+    &Act::hears([Hear::StartAck(IMU, ErrorCode::Fine)]),
+    &Act::calls([Go(1), Calibrate(START, IMU)]),
+    &[DONE, Act::ToDeadline(0), Act::Wait(1_000)],
+];
 
 fn site(menu: Menu) -> Site {
     Site::new(HostConfig::default(), false, menu)

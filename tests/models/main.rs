@@ -87,6 +87,15 @@
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "std"))]
 #![cfg(all(feature = "embedded-io", feature = "embedded-io-async", feature = "embedded-hal"))]
 
+/// An invariant is broken if this is true: returns what to say of it.
+macro_rules! broken_if {
+    ($is_broken:expr, $($what:tt)+) => {
+        if $is_broken {
+            return Err(format!($($what)+));
+        }
+    };
+}
+
 mod account;
 mod action;
 mod bus;

@@ -111,9 +111,7 @@ impl Acts<RobotSide> for Rover {
             }
             Call::Abort => {
                 let was = self.account.calibrating.take().map(|(kind, _)| kind);
-                if self.role.abort_calibration() != was {
-                    return Err(format!("aborted: {was:?}"));
-                }
+                broken_if!(self.role.abort_calibration() != was, "aborted: {was:?}");
             }
             Call::AnswerUpdate(status) => {
                 let was_asked = std::mem::take(&mut self.account.is_update_asked);

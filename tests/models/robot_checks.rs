@@ -170,9 +170,7 @@ impl Checks<RobotSide> for Rover {
             return Err("frequent events take the room of rare ones".into());
         }
         let (command, expected) = (self.role.command(now), account.expected(now));
-        if command != expected {
-            return Err(format!("the command is {command:?} instead of {expected:?}"));
-        }
+        broken_if!(command != expected, "the command is {command:?} instead of {expected:?}");
         if self.role.calibrating() != account.calibrating.map(|(kind, _)| kind) {
             return Err(format!("calibrates {:?}", self.role.calibrating()));
         }

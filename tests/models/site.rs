@@ -34,6 +34,24 @@ impl<C: Copy + 'static, H: Copy + 'static> Act<C, H> {
     pub(crate) const DONE: Self = Self::Round(Fate::Flushed);
     pub(crate) const CUT: Self = Self::Round(Fate::First(Unsent::CutOff));
 
+    pub(crate) const fn calls<const N: usize>(calls: [C; N]) -> [Self; N] {
+        let (mut acts, mut at) = ([Self::TakeEvent; N], 0);
+        while at < N {
+            acts[at] = Self::Call(calls[at]);
+            at += 1;
+        }
+        acts
+    }
+
+    pub(crate) const fn hears<const N: usize>(heard: [H; N]) -> [Self; N] {
+        let (mut acts, mut at) = ([Self::TakeEvent; N], 0);
+        while at < N {
+            acts[at] = Self::Hear(heard[at]);
+            at += 1;
+        }
+        acts
+    }
+
     /// Every fate of the frames.
     pub(crate) const FATES: &'static [Self] = &[
         Self::DONE,
@@ -227,9 +245,7 @@ where
                 self.fail(unsent);
                 return Ok(());
             }
-            if frames > 16 {
-                return Err("it never stops sending".into());
-            }
+            broken_if!(frames > 16, "it never stops sending");
         }
         if fate == Fate::NotFlushed && self.is_unflushed {
             self.fail(Unsent::Unflushed);

@@ -178,9 +178,7 @@ impl<B: Kit> SlaveLine<B> {
             }
         } else if is_expired {
             self.command = None;
-            if !is_told {
-                return Err("the watchdog did not fire".into());
-            }
+            broken_if!(!is_told, "the watchdog did not fire");
         } else if is_told {
             return Err("the watchdog fired too early".into());
         }
@@ -188,20 +186,12 @@ impl<B: Kit> SlaveLine<B> {
         let is_last = self.tail.ends_with(&READ) || self.is_answered_write;
         let is_due = self.is_clean && !self.is_answered && self.now <= until;
         let Some(_) = self.slave.poll_transmit(self.now) else {
-            if is_due {
-                return Err("a READ was not answered".into());
-            }
+            broken_if!(is_due, "a READ was not answered");
             return check_sleep(&self.slave, self.now);
         };
-        if !is_last {
-            return Err("an answer, but the last packet received is not a request for it".into());
-        }
-        if self.is_inside {
-            return Err("an answer to what is inside another node's packet".into());
-        }
-        if self.is_answered || self.now > until {
-            return Err("a second answer, or a late one".into());
-        }
+        broken_if!(!is_last, "an answer, but the last packet received is not a request for it");
+        broken_if!(self.is_inside, "an answer to what is inside another node's packet");
+        broken_if!(self.is_answered || self.now > until, "a second answer, or a late one");
         if let Some(unsent) = unsent {
             self.slave.handle_unsent(unsent, self.now);
         }

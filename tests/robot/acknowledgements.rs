@@ -106,8 +106,7 @@ fn the_acknowledgement_of_an_older_result_ends_no_new_calibration() {
 #[test]
 fn an_acknowledgement_is_not_for_a_result_that_has_not_been_sent() {
     let mut robot = quiet_robot();
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(0));
+    both_results(&mut robot, 0);
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(1));
     robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(1));
     assert_eq!((events(&mut robot), robot.statistics().acks_refused), (vec![], 2));
@@ -139,8 +138,7 @@ fn a_calibration_ends_when_its_result_is_acknowledged_and_the_next_start_is_repo
     for kind in [IMU, MAG] {
         let mut robot = quiet_robot();
         robot.handle_input(&bytes(CalibrationStart::new(kind)), ms(1));
-        robot.calibration_result_imu(imu_bias(), ms(2));
-        robot.calibration_result_mag(mag_bias(), ms(2));
+        both_results(&mut robot, 2);
         sent(&mut robot, ms(2));
         // Of the other kind: it ends nothing.
         let acks =

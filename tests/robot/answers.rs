@@ -190,8 +190,7 @@ fn each_time_of_a_robot_has_a_setting_of_its_own() {
     (config.result_period, config.bias_request_period) = (after(300), Some(after(350)));
     let mut robot = Robot::new(config, ms(0));
     robot.set_telemetry(&Telemetry::default(), ms(0));
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(0));
+    both_results(&mut robot, 0);
     robot.handle_input(&bytes(go(5)), ms(0));
     let frames = wait(&mut robot, ms(1000));
     for (id, expected) in [

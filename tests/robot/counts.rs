@@ -45,8 +45,7 @@ fn every_event_of_a_robot_is_counted_once_and_in_one_place() {
             assert_eq!(robot.calibrating(), None);
         }
         "a result of each kind": results, results => |robot| {
-            robot.calibration_result_imu(imu_bias(), ms(1));
-            robot.calibration_result_mag(mag_bias(), ms(1));
+            both_results(robot, 1);
             sent(robot, ms(1));
         }
         "acknowledgements of nothing": acks_refused, acks_refused => |robot| {

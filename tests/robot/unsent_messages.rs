@@ -7,8 +7,7 @@ fn an_answer_of_a_robot_that_never_left_is_due_again() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut robot = Robot::new(RobotConfig::default(), ms(0));
         robot.set_telemetry(&Telemetry::default(), ms(0));
-        robot.calibration_result_imu(imu_bias(), ms(0));
-        robot.calibration_result_mag(mag_bias(), ms(0));
+        both_results(&mut robot, 0);
         robot.handle_input(&bytes(Ping {}), ms(0));
         robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(0));
         robot.handle_input(&bytes(CalibrationEnd::new(IMU)), ms(0));
@@ -94,8 +93,7 @@ fn skipped_reports_are_counted_once_even_if_the_next_did_not_leave() {
 #[test]
 fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     let mut robot = Robot::new(RobotConfig::default(), ms(0));
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(0));
+    both_results(&mut robot, 0);
     robot.handle_input(&bytes(Ping {}), ms(0));
     assert_eq!(sent(&mut robot, ms(0)).len(), 4);
     robot.handle_unsent(Unsent::Unflushed, ms(5));
@@ -106,8 +104,7 @@ fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
 fn a_robot_whose_flush_failed_answers_an_update_again_and_takes_the_acknowledgement_of_its_results()
 {
     let mut robot = quiet_robot();
-    robot.calibration_result_imu(imu_bias(), ms(0));
-    robot.calibration_result_mag(mag_bias(), ms(0));
+    both_results(&mut robot, 0);
     assert_eq!(sent(&mut robot, ms(0)).len(), 2);
     robot.handle_unsent(Unsent::Unflushed, ms(1));
     // They may have left all the same.

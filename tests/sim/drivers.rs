@@ -1,12 +1,6 @@
 //! How a station is driven: DMA, a USB adapter, a slow loop, and endpoints that break the contract.
 
-use axlewire::{
-    endpoint::Endpoint,
-    sim::{Input, Line, Stuck, Who},
-    time::{Duration, Instant},
-};
-
-use crate::talker::{Talker, at, one_way, us};
+use crate::talker::*;
 
 #[test]
 fn a_pause_or_a_full_buffer_ends_a_piece_of_dma() {

@@ -3,13 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use axlewire::{
-    endpoint::Endpoint,
-    sim::{Direction, Input, Line, Rng, Stuck, Who},
-    time::Instant,
-};
-
-use crate::talker::{Talker, at, one_way, us};
+use crate::talker::*;
 
 /// When each piece was there, and its length. The loop has seen it `late` microseconds later.
 fn pieces(line: &Line<Talker, Talker>, late: u32) -> Vec<(u64, usize)> {

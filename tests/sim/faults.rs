@@ -2,12 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use axlewire::{
-    sim::{Direction, Faults, PairStatistics, Who},
-    time::Duration,
-};
+use axlewire::sim::PairStatistics;
 
-use crate::talker::{Talker, at, one_way, random_bytes, us};
+use crate::talker::*;
 
 #[test]
 fn bits_are_flipped_at_the_requested_rate() {

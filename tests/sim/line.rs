@@ -1,11 +1,6 @@
 //! A line without faults: how long bytes take, which stations receive them, its trace and its seed.
 
-use axlewire::{
-    sim::{Direction, Faults, Line, Who},
-    time::{Duration, Instant},
-};
-
-use crate::talker::{Talker, at, one_way, random_bytes, us};
+use crate::talker::*;
 
 #[test]
 fn a_byte_takes_ten_bit_times_and_bytes_follow_one_another() {

@@ -1,12 +1,8 @@
 //! A simulated motor: how it reaches a speed and a position, and where it stays.
 
-use axlewire::{
-    ikeya::{Position, Rps},
-    sim::Motor,
-    time::Duration,
-};
+use axlewire::ikeya::{Position, Rps};
 
-use crate::talker::us;
+use crate::talker::*;
 
 #[test]
 fn a_motor_moves_the_same_in_one_step_and_in_many() {

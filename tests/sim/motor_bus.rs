@@ -2,18 +2,17 @@
 //! visited, and nodes that are unplugged or left without commands.
 
 use axlewire::{
-    endpoint::Endpoint,
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Slave,
         board::ThreeMotors,
         master::{Health, MasterConfig, MasterEvent, Schedule},
         slave::SlaveConfig,
     },
-    sim::{Direction, Line, Motor, MotorNode, Who},
-    time::{Duration, Instant, wire_time},
+    sim::MotorNode,
+    time::wire_time,
 };
 
-use crate::talker::{at, us};
+use crate::talker::*;
 
 const fn mode_of(node: NodeId) -> Mode {
     if node.get() % 2 == 1 { Mode::Velocity } else { Mode::Position }

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use axlewire::{
+pub(crate) use axlewire::{
     endpoint::Endpoint,
-    sim::{Line, Rng},
+    sim::{Direction, Faults, Input, Line, Motor, Rng, Stuck, Who},
     time::{Duration, Instant},
 };
 

@@ -1,11 +1,8 @@
 //! A wire for simulations in real time: the faults of a line, with the time given from outside.
 
-use axlewire::{
-    sim::{Faults, Wire},
-    time::{Duration, Instant},
-};
+use axlewire::sim::Wire;
 
-use crate::talker::{at, random_bytes, us};
+use crate::talker::*;
 
 /// Everything that is due by `now`.
 fn due(wire: &mut Wire, now: Instant) -> Vec<u8> {

@@ -4,6 +4,7 @@
 
 #[path = "../harness/packets.rs"]
 mod packets;
+mod rig;
 mod role;
 mod three_motors;
 mod times;

@@ -1,17 +1,9 @@
 //! The slave answers requests for its own id in time and in its mode, and its watchdog ends
 //! commands (I2, I3, I9, I14).
 
-use axlewire::{
-    endpoint::{Endpoint, Unsent},
-    ikeya::{
-        Mode, NodeId, Position, ReadRequest, Slave, Target, WriteRequest,
-        board::OneMotor,
-        slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
-    },
-    time::{Duration, Instant},
-};
+use axlewire::ikeya::WriteRequest;
 
-use crate::packets::*;
+use crate::rig::*;
 
 fn slave(mode: Mode) -> Slave {
     Slave::new(NodeId::N2, mode, SlaveConfig::direct(), Instant::from_micros(0))

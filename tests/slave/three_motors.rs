@@ -1,18 +1,9 @@
 //! The slave of a board with three motors (I10): everything that one motor's slave does, three
 //! times over.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position, ReadRequest, Rps, Slave,
-        board::{Target, ThreeMotors},
-        slave::{SlaveConfig, SlaveEvent},
-        three::{PositionResponse, VelocityResponse, WriteRequest},
-    },
-    time::Instant,
-};
+use axlewire::ikeya::three::{PositionResponse, VelocityResponse, WriteRequest};
 
-use crate::packets::*;
+use crate::rig::*;
 
 const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N3;

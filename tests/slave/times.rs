@@ -1,16 +1,6 @@
 //! A slave whose switch is moved, and how old its driver takes received bytes to be.
 
-use axlewire::{
-    endpoint::Endpoint,
-    ikeya::{
-        Mode, NodeId, Position, ReadRequest, Slave,
-        board::Target,
-        slave::{SlaveConfig, SlaveEvent},
-    },
-    time::Instant,
-};
-
-use crate::packets::*;
+use crate::rig::*;
 
 const T0: Instant = Instant::from_micros(1_000_000);
 const NODE: NodeId = NodeId::N1;

@@ -48,6 +48,11 @@ pub(crate) struct Checks {
 }
 
 impl Account {
+    /// Something was back again, so long after the last fault, microseconds.
+    pub(crate) fn recover(&mut self, at: u64, quiet_us: u64) {
+        self.recovery_us = self.recovery_us.max(at.saturating_sub(quiet_us));
+    }
+
     /// Prints everything; `what` is what was counted in `reads`.
     pub(crate) fn print(&self, plan: &Plan, what: &str, seconds: f64) {
         let Self { checks, .. } = self;

@@ -108,14 +108,11 @@ impl Bus {
             // Not at the time of a poll.
             let (step, ahead) = (self.plan.step_us, self.plan.step_us * 2 / 3);
             let step_end = ((self.line.elapsed() + ahead) / step + 1) * step - ahead;
-            loop {
-                let edge = self.schedule.next_edge();
-                self.line.run_to(edge.min(step_end));
-                if edge >= step_end {
-                    break;
-                }
+            while let Some(edge) = self.schedule.edge_before(step_end) {
+                self.line.run_to(edge);
                 self.change();
             }
+            self.line.run_to(step_end);
             // A motor is simulated up to the last call of its node.
             let now = self.line.now();
             for index in 0..NODES {

@@ -69,9 +69,7 @@ impl Bus {
                         self.ordered_us[index] = elapsed;
                     }
                     if health == Health::Online && self.schedule.is_quiet() {
-                        let at = self.line.since_start(at);
-                        let took = at.saturating_sub(self.quiet_us);
-                        self.account.recovery_us = self.account.recovery_us.max(took);
+                        self.account.recover(self.line.since_start(at), self.quiet_us);
                     }
                 }
                 _ => {}

@@ -84,14 +84,11 @@ impl Link {
         while self.line.elapsed() < self.plan.length_us {
             self.command();
             let step_end = (self.line.elapsed() / self.plan.step_us + 1) * self.plan.step_us;
-            loop {
-                let edge = self.schedule.next_edge();
-                self.line.run_to(edge.min(step_end));
-                if edge >= step_end {
-                    break;
-                }
+            while let Some(edge) = self.schedule.edge_before(step_end) {
+                self.line.run_to(edge);
                 self.change();
             }
+            self.line.run_to(step_end);
             // A rover is simulated up to the last call of its robot.
             let now = self.line.now();
             self.line.tail_mut(0).handle_input(&[], now);
@@ -182,9 +179,7 @@ impl Link {
                 HostEvent::Report(_) => self.account.answers += 1,
                 HostEvent::LinkDown => self.account.lost_nodes += 1,
                 HostEvent::LinkUp if self.schedule.is_quiet() => {
-                    let at = self.line.since_start(at);
-                    let took = at.saturating_sub(self.quiet_us);
-                    self.account.recovery_us = self.account.recovery_us.max(took);
+                    self.account.recover(self.line.since_start(at), self.quiet_us);
                 }
                 _ => {}
             }

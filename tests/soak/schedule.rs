@@ -84,9 +84,10 @@ impl Schedule {
         (from_us as f64 * (to_us.max(from_us) as f64 / from_us as f64).powf(part)) as u64
     }
 
-    /// When something changes next.
-    pub(crate) fn next_edge(&self) -> u64 {
-        self.active.iter().map(|(end, _)| *end).fold(self.next_us, u64::min)
+    /// When something changes next, if it does before `end_us`.
+    pub(crate) fn edge_before(&self, end_us: u64) -> Option<u64> {
+        let edge = self.active.iter().map(|(end, _)| *end).fold(self.next_us, u64::min);
+        (edge < end_us).then_some(edge)
     }
 
     /// The faults that end by `now`.

@@ -128,20 +128,10 @@ fn a_framing_that_breaks_its_contract_neither_loops_nor_panics_and_the_account_h
             feed_slice::<LIE>(bytes);
         }
     }
-    feed::<0>();
-    feed::<1>();
-    feed::<2>();
-    feed::<3>();
-    feed::<4>();
-    feed::<5>();
-    feed::<6>();
-    feed::<7>();
-    feed::<8>();
-    feed::<9>();
-    feed::<10>();
-    feed::<11>();
-    feed::<12>();
-    feed::<13>();
+    macro_rules! feed_each {
+        ($($lie:literal)+) => { $(feed::<$lie>();)+ };
+    }
+    feed_each!(0 1 2 3 4 5 6 7 8 9 10 11 12 13);
 }
 
 /// Frames of three bytes that begin with F, but are judged only when eight bytes are available.

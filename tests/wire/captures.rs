@@ -15,25 +15,14 @@ fn spans<F: Framing>(bytes: &[u8]) -> Vec<Span> {
     assert_eq!(counters.received, counters.framed + counters.skipped());
     let ends = events.iter().skip(1).map(|&(offset, _)| offset).chain([bytes.len()]);
     let lengths: Vec<usize> = events.iter().zip(ends).map(|((at, _), end)| end - at).collect();
-    let reasons = events.iter().zip(&lengths).map(|((_, event), &length)| match event {
-        Event::Frame(_) => None,
+    let span = |((at, event), length): (&(usize, _), usize)| match event {
+        Event::Frame(_) => (*at, length, None),
         Event::Skipped(Gap { len, reason }) => {
             assert_eq!(*len, length as u64);
-            Some(*reason)
+            (*at, length, Some(*reason))
         }
-    });
-    let reasons: Vec<_> = reasons.collect();
-    events
-        .iter()
-        .zip(lengths)
-        .zip(reasons)
-        .map(|(((at, _), length), reason)| (*at, length, reason))
-        .collect()
-}
-
-/// The gaps of a capture; everything else in it is frames.
-fn gaps(spans: &[Span]) -> Vec<(usize, usize, Reason)> {
-    spans.iter().filter_map(|&(at, length, reason)| Some((at, length, reason?))).collect()
+    };
+    events.iter().zip(lengths).map(span).collect()
 }
 
 /// Every delivered frame is one of the recorded ones.
@@ -47,34 +36,32 @@ fn all_recorded(file: &str, bytes: &[u8], spans: &[Span]) {
     }
 }
 
+/// A capture of this length has so many frames and gaps; these are the gaps.
+fn assert_capture<F: Framing>(
+    file: &str,
+    bytes: &[u8],
+    counts: (usize, usize),
+    expected: [(usize, usize, Reason); 5],
+) {
+    let spans = spans::<F>(bytes);
+    all_recorded(file, bytes, &spans);
+    assert_eq!((bytes.len(), spans.len()), counts);
+    let gaps = spans.iter().filter_map(|&(at, length, reason)| Some((at, length, reason?)));
+    assert_eq!(gaps.collect::<Vec<_>>(), expected);
+}
+
 #[test]
 fn the_motor_bus_capture_has_eleven_frames_and_five_gaps() {
+    use Reason::{Crc, Header, Id};
     let bytes = include_bytes!("../../examples/captures/ikeya.bin");
-    let spans = spans::<BothDirections>(bytes);
-    all_recorded("ikeya.jsonl", bytes, &spans);
-    assert_eq!((bytes.len(), spans.len()), (90, 16));
-    let expected = [
-        (12, 1, Reason::Header),
-        (29, 4, Reason::Id),
-        (41, 8, Reason::Crc),
-        (57, 5, Reason::Crc),
-        (74, 4, Reason::Crc),
-    ];
-    assert_eq!(gaps(&spans), expected);
+    let gaps = [(12, 1, Header), (29, 4, Id), (41, 8, Crc), (57, 5, Crc), (74, 4, Crc)];
+    assert_capture::<BothDirections>("ikeya.jsonl", bytes, (90, 16), gaps);
 }
 
 #[test]
 fn the_rover_capture_has_fifteen_frames_and_five_gaps() {
+    use Reason::{Crc, Header, Idle};
     let bytes = include_bytes!("../../examples/captures/ucp.bin");
-    let spans = spans::<Ucp>(bytes);
-    all_recorded("ucp.jsonl", bytes, &spans);
-    assert_eq!((bytes.len(), spans.len()), (405, 20));
-    let expected = [
-        (0, 3, Reason::Header),
-        (99, 4, Reason::Crc),
-        (147, 44, Reason::Crc),
-        (259, 17, Reason::Crc),
-        (396, 9, Reason::Idle),
-    ];
-    assert_eq!(gaps(&spans), expected);
+    let gaps = [(0, 3, Header), (99, 4, Crc), (147, 44, Crc), (259, 17, Crc), (396, 9, Idle)];
+    assert_capture::<Ucp>("ucp.jsonl", bytes, (405, 20), gaps);
 }

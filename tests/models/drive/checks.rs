@@ -15,9 +15,7 @@ impl DrivenLine {
         if self.pin_on_us.is_some() && !self.has_pin_failed() {
             return Err("the driver-enable pin was left on".into());
         }
-        if self.is_flush_due {
-            return Err("written bytes were not flushed".into());
-        }
+        broken_if!(self.is_flush_due, "written bytes were not flushed");
         if !unsent.is_empty() && !self.wire.goes_on_with(unsent) {
             return Err("a frame was kept of which no byte has left".into());
         }

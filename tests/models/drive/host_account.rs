@@ -97,9 +97,7 @@ impl<P: Wired> HostLife<P> {
         let took_us = line.now_us - before.begun_us;
         // A slow port blocks for longer than a pause, and up to eight frames may be sent at a time.
         let extra_us = 40_000 + 25_000 * before.faults as u64 + before.stalls * STALL_US;
-        if took_us > bound_us + extra_us {
-            return Err(format!("the call takes {took_us} us"));
-        }
+        broken_if!(took_us > bound_us + extra_us, "the call takes {took_us} us");
         let first = line.first_failure();
         let is_stop = matches!(call, Call::Stop | Call::DriveFor);
         let is_late_pong = call == Call::Ping && outcome == Err(Told::Other) && first.is_none();
@@ -110,9 +108,7 @@ impl<P: Wired> HostLife<P> {
             return Err("Ok, but the stop has not left".into());
         }
         if call == Call::Stop && outcome.is_err() {
-            if took_us < STOP_US {
-                return Err("a stop gave up too early".into());
-            }
+            broken_if!(took_us < STOP_US, "a stop gave up too early");
             if before.stalls == 0 && before.faults <= 4 {
                 return Err(format!("{outcome:?}, but only transient errors occurred"));
             }
@@ -128,9 +124,7 @@ impl<P: Wired> HostLife<P> {
         }
         if call == Call::Idle && is_clear {
             let commands = line.wire.taken.iter().filter(|taken| speed(&taken.frame).is_some());
-            if commands.count() == 0 {
-                return Err("the command was not repeated".into());
-            }
+            broken_if!(commands.count() == 0, "the command was not repeated");
         }
         Ok(())
     }
@@ -157,12 +151,8 @@ impl<P: Wired> HostLife<P> {
                 return Err("something is sent before the first stop".into());
             }
             let Some(speed) = speed.filter(|&speed| speed != 0) else { continue };
-            if speed != account.speed {
-                return Err(format!("{speed} is sent, but no longer in force"));
-            }
-            if offer.role_us - account.said_us > limit_us {
-                return Err("an expired command is sent".into());
-            }
+            broken_if!(speed != account.speed, "{speed} is sent, but no longer in force");
+            broken_if!(offer.role_us - account.said_us > limit_us, "an expired command is sent");
         }
         if line.wire.cuts > 0 {
             account.copies = 2;

@@ -131,16 +131,12 @@ impl<P: Wired> MasterLife<P> {
                 Entry::Answered(at_us) => at_us >= begun_us,
                 _ => false,
             });
-            if !is_heard {
-                return Err("a reading that no node gave".into());
-            }
+            broken_if!(!is_heard, "a reading that no node gave");
         }
         // After the dead-man has expired, a drive's set-point may be refused.
         let may_be_over = self.setup.dead_man_ms.is_some() && call == Call::DriveFor;
         let is_quiet = before.is_clear && outcome.is_err() && !may_be_over;
-        if is_quiet && !is_owed && !before.is_refused {
-            return Err(format!("{outcome:?} without a cause"));
-        }
+        broken_if!(is_quiet && !is_owed && !before.is_refused, "{outcome:?} without a cause");
         if call == Call::Idle && before.is_clear && was_owed && !self.account.is_stop_offered {
             return Err("an owed stop is not sent".into());
         }

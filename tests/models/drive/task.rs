@@ -60,9 +60,7 @@ pub(crate) fn run<T>(
             return Ok(End::Dropped);
         }
         if wakes.0.load(Ordering::Relaxed) > seen {
-            if in_a_row > POLLS {
-                return Err("the call spins".into());
-            }
+            broken_if!(in_a_row > POLLS, "the call spins");
             continue;
         }
         let next_us = line.sleepers.iter().map(|&(at_us, ..)| at_us).min();

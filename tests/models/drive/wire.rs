@@ -108,9 +108,7 @@ impl Wire {
             if !self.open.is_empty() {
                 // A command may have been replaced.
                 self.is_given_up |= self.is_moving || self.is_doubtful || self.may_be_late(at_us);
-                if !self.is_given_up {
-                    return Err("a frame is offered inside another".into());
-                }
+                broken_if!(!self.is_given_up, "a frame is offered inside another");
             }
             (self.is_moving, self.is_outdated) = ((self.speech.moves)(bytes), false);
             self.offers.push(Offer { role_us, taken: self.taken.len(), frame: bytes.to_vec() });
@@ -120,12 +118,8 @@ impl Wire {
         if self.open.is_empty() || (self.speech.shape)(&whole) != Shape::Whole {
             return Err(format!("{bytes:02X?} is offered after {:02X?}", self.open));
         }
-        if self.is_outdated {
-            return Err("the rest of a command is offered after a stop".into());
-        }
-        if self.is_late(at_us) {
-            return Err("the rest of a frame is offered after too long a pause".into());
-        }
+        broken_if!(self.is_outdated, "the rest of a command is offered after a stop");
+        broken_if!(self.is_late(at_us), "the rest of a frame is offered after too long a pause");
         Ok(())
     }
 

@@ -1,0 +1,12 @@
+//! What the scenarios use of the library.
+pub(crate) use axlewire::{
+    endpoint::{Endpoint, Unsent},
+    ikeya::{
+        Mode, NodeId, Position, ReadRequest, Rps, Slave,
+        board::{OneMotor, Target, ThreeMotors},
+        slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
+    },
+    time::{Duration, Instant},
+};
+
+pub(crate) use crate::packets::*;
