@@ -133,11 +133,13 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     for bound in [
         format!(
             "at least {} apart show less than {} rps, or three show positions, each within {} counts \
-             of the one before",
+             of the one before, and none more than {} counts, 1/32 of a turn, away",
             constant(order, "STILL_TIME"),
             constant(board, "STILL_RPS"),
-            constant(order, "STILL_COUNTS")
+            constant(order, "STILL_COUNTS"),
+            constant(order, "HOLD_COUNTS")
         ),
+        format!("again if it could not be written within {}", constant(order, "HOLD_PATIENCE")),
         format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),
         format!("the last of them {} after that", ms(host.rpm_average)),
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),

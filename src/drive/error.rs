@@ -41,9 +41,10 @@ pub enum DriveError<E> {
     /// owed.
     #[cfg(feature = "ikeya")]
     StopsOwed(ikeya::master::NodeSet),
-    /// These nodes have confirmed their stop and answer, but **their motors still move**, longer
-    /// than [`MasterConfig::coast`](ikeya::master::MasterConfig::coast) (ruling I12). The stops are
-    /// repeated as long as the driver is called.
+    /// These nodes have confirmed their stop, but were not seen to be still within
+    /// [`MasterConfig::coast`](ikeya::master::MasterConfig::coast) (ruling I12): **their motors
+    /// move**, or are not where they were told to hold, or the nodes were not heard since. The
+    /// stops are repeated as long as the driver is called.
     #[cfg(feature = "ikeya")]
     StillMoving(ikeya::master::NodeSet),
     /// A node could not be read in any of the attempts.
@@ -115,7 +116,9 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
                 write!(f, "stop of node {nodes} not confirmed: a motor may be running")
             }
             #[cfg(feature = "ikeya")]
-            Self::StillMoving(nodes) => write!(f, "node {nodes} is still moving after its stop"),
+            Self::StillMoving(nodes) => {
+                write!(f, "node {nodes} was not seen to be still after its stop")
+            }
             #[cfg(feature = "ikeya")]
             Self::ReadFailed { node, cause } => {
                 let heard = match cause {

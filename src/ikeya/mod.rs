@@ -93,8 +93,11 @@
 //!   truncates unless you choose otherwise; out of range is an error, never a wrap or a clamp.
 //! * **I6** Position mode has no stop: a stop reads the node and then writes back the position of
 //!   that answer, never "go to 0". An older position is used only if [`MasterConfig::hold_age`]
-//!   allows it. The position then becomes the set-point, and is measured again only after the node
-//!   was abnormal or its mode in doubt.
+//!   allows it. The position then becomes the set-point, and is measured again only for another
+//!   stop, after the node was abnormal or its mode in doubt, and until an answer follows it after a
+//!   lost READ (at most twice) or 20 ms in which it could not be written. Except after a doubt it
+//!   is kept unless the node is more than 256 counts (1/32 of a turn) away: a loaded motor stands
+//!   beside the position that it holds.
 //! * **I7** The reply timeout, 500 µs by default, runs from the end of the request on the wire, and
 //!   the answer's own wire time is added. Bytes received before the request are dropped. Answers
 //!   from another node, of another kind or after the deadline are counted, and never accepted.
@@ -121,13 +124,16 @@
 //!   once two stop WRITEs have each been followed by an answer from the node in its mode; until
 //!   then set-points are refused. The node is *still* once two answers behind a stop WRITE, at
 //!   least 20 ms apart, both show less than 0.05 rps, or positions within 8 counts of each other; a
-//!   position node that comes back to its hold passes a place twice, so the crate takes a third.
-//!   Until then, or until a new set-point, the stop is written with every reading, at least every
-//!   20 ms, whatever the polling: an answer shows that the READ was heard, not the WRITE. A stop
-//!   survives abnormal nodes, port errors and a full event queue, and a release does not cancel it.
-//!   A node that is confirmed and still moves after [`MasterConfig::coast`] is reported once. Ids
-//!   that have never answered are read first. A node that becomes abnormal while under a set-point
-//!   is owed a stop, because slaves keep their last command.
+//!   position node that comes back to its hold passes a place twice, so the crate takes a third,
+//!   and none of them may be more than 256 counts away from the hold. An answer may have been
+//!   measured 1 ms after its request, however late it comes. Until then, or until a new set-point,
+//!   the stop is written with every reading, at least every 20 ms, whatever the polling: an answer
+//!   shows that the READ was heard, not the WRITE. A node that is polled and moves again is no
+//!   longer still; one that is not polled gets no WRITE once it is. A stop survives abnormal nodes,
+//!   port errors and a full event queue, and a release does not cancel it. A node that is confirmed
+//!   and still moves after [`MasterConfig::coast`] is reported once. Ids that have never answered
+//!   are read first. A node that becomes abnormal while under a set-point is owed a stop, because
+//!   slaves keep their last command.
 //! * **I13** Stops of nodes that answer go first: velocity WRITEs, then position nodes in turn. An
 //!   abnormal node gets one attempt at once. From then on a velocity node gets a blind stop WRITE
 //!   after every exchange, at most every 20 ms, and a position node its stop after its next good

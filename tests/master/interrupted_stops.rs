@@ -172,9 +172,15 @@ fn a_stop_that_confirms_a_paid_one_holds_the_same_position_however_late_the_driv
     for late in [MS(0), MS(20), MS(21), MS(500)] {
         let mut desk = Desk::stopping_at(manual(), turns(30));
         desk.packets(9);
-        desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        let beside = Position::from_counts(turns(30).counts() + 200).unwrap();
+        desk.answer(NodeId::N3, Answer::Position(beside));
         desk.master.stop(NodeId::N3, desk.now);
         desk.now += late;
+        assert_eq!(desk.packets(1), [read(NodeId::N3)]);
+        desk.now += late;
+        if late > MS(20) {
+            assert_eq!(desk.packets(1), [read(NodeId::N3)]);
+        }
         assert_eq!(desk.packet(), hold(NodeId::N3, turns(30)));
     }
 }

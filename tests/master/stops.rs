@@ -98,14 +98,200 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
     }
     assert_eq!(desk.master.set_point(NodeId::N3), Some(Target::Position(turns(40))));
     assert!(written.len() > 15 && written.iter().all(|it| *it == hold(NodeId::N3, turns(40))));
-    // Nor after another stop call.
+    // Nor after another stop call, if it stands just beside that.
+    desk.answer(NodeId::N3, Answer::Position(beside(turns(40), 256)));
     desk.until(NodeId::N3, StopProgress::StandingStill);
     desk.news();
     desk.master.stop(NodeId::N3, desk.now);
     assert_eq!(desk.master.stop_progress(NodeId::N3), StopProgress::Owed);
     let (read, hold) = (read(NodeId::N3), hold(NodeId::N3, turns(40)));
-    assert_eq!(desk.packets(4), [hold.clone(), read.clone(), hold, read]);
+    assert_eq!(desk.packets(5), [read.clone(), hold.clone(), read.clone(), hold, read]);
     assert_eq!(desk.news(), [STOPPED_3]);
+}
+
+/// A position this far beside another one.
+fn beside(place: Position, counts: i32) -> Position {
+    Position::from_counts(place.counts() + counts).unwrap()
+}
+
+#[test]
+fn a_new_stop_of_a_node_that_was_turned_meanwhile_does_not_drive_it_back() {
+    for away in [257, -257, 50 * 8192] {
+        let mut desk = Desk::stopping_at(manual(), turns(40));
+        desk.until(NodeId::N3, StopProgress::StandingStill);
+        // It is switched off, turned by hand and switched on, while nobody reads it.
+        desk.now += MS(10_000);
+        let here = beside(turns(40), away);
+        desk.answer(NodeId::N3, Answer::Position(here));
+        desk.news();
+        desk.master.stop(NodeId::N3, desk.now);
+        let sent = desk.until(NodeId::N3, StopProgress::StandingStill);
+        assert!(writes(&sent).iter().all(|it| *it == hold(NodeId::N3, here)), "{sent:02x?}");
+    }
+}
+
+#[test]
+fn a_node_that_is_still_and_not_polled_is_read_without_a_write_in_front() {
+    for node in [N1, N3] {
+        let mut desk = Desk::stopping(manual(), node);
+        desk.until(node.0, StopProgress::StandingStill);
+        desk.now += MS(10_000);
+        desk.master.read(node.0, desk.now).unwrap();
+        assert_eq!(desk.packets(4), [read(node.0)]);
+    }
+}
+
+#[test]
+fn a_read_of_a_node_that_was_turned_by_hand_does_not_drive_it_back() {
+    for (node, moving) in [(N1, Answer::Velocity(0.5)), (N3, Answer::Position(turns(90)))] {
+        let mut desk = Desk::stopping(manual(), node);
+        desk.until(node.0, StopProgress::StandingStill);
+        desk.now += MS(10_000);
+        desk.answer(node.0, moving);
+        desk.master.read(node.0, desk.now).unwrap();
+        assert_eq!(desk.packets(4), [read(node.0)]);
+        // A failed flush of something else does not make it due either.
+        desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+        assert_eq!(desk.packets(4), Vec::<Vec<u8>>::new());
+        assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
+    }
+}
+
+#[test]
+fn a_confirmation_of_a_stop_that_is_still_ends_whatever_the_polling() {
+    for polling in [Polling::Fastest, Polling::Every(MS(20)), Polling::Manual] {
+        for node in [N1, N3] {
+            let mut desk = Desk::stopping(with(direct(), |it| it.polling = polling), node);
+            desk.until(node.0, StopProgress::StandingStill);
+            desk.news();
+            desk.master.confirm(node.0, desk.now).unwrap();
+            desk.run(MS(100));
+            assert_eq!(desk.news(), [MasterEvent::Confirmed { node: node.0 }]);
+        }
+    }
+}
+
+#[test]
+fn a_hold_that_is_kept_and_cannot_be_written_for_20_ms_is_looked_at_again() {
+    for (late_us, is_read) in [(20_000, false), (20_001, true), (3_000_000, true)] {
+        let mut desk = Desk::stopping_at(manual(), turns(40));
+        desk.until(NodeId::N3, StopProgress::StandingStill);
+        desk.master.stop(NodeId::N3, desk.now);
+        assert_eq!(desk.packets(1), [read(NodeId::N3)]);
+        // The port fails, and meanwhile the shaft is turned.
+        let begin = desk.now;
+        desk.answer(NodeId::N3, Answer::Position(turns(90)));
+        assert_eq!(desk.packet(), hold(NodeId::N3, turns(40)));
+        desk.master.handle_unsent(Unsent::Untouched, desk.now);
+        desk.now = begin + US(late_us);
+        let place = if is_read { turns(90) } else { turns(40) };
+        let written = writes(&desk.packets(3));
+        assert_eq!(written[0], hold(NodeId::N3, place), "{late_us} us");
+    }
+}
+
+#[test]
+fn a_loaded_node_that_is_lost_again_and_again_does_not_sink() {
+    for between in [MS(3), MS(200)] {
+        let mut desk = Desk::stopping_at(direct(), turns(40));
+        let mut told = turns(40);
+        for _ in 0..50 {
+            // It is held where it was, and its load turns it by 250 counts from there.
+            let sent = desk.run(between);
+            told = writes(&sent).last().map_or(told, |last| place_of(last));
+            desk.lose(NodeId::N3);
+            desk.answer(NodeId::N3, Answer::Position(beside(told, -250)));
+        }
+        assert_eq!(told, turns(40), "{between:?}");
+    }
+}
+
+fn place_of(write: &[u8]) -> Position {
+    let half = |at: usize| i16::from_le_bytes([write[at], write[at + 1]]);
+    Position::new(half(2), half(4))
+}
+
+#[test]
+fn a_loaded_node_that_misses_each_read_behind_a_write_does_not_creep_from_hold_to_hold() {
+    for sag in [40, 256] {
+        let mut desk = Desk::with_nodes(direct(), &[N3]);
+        desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        desk.master.stop(NodeId::N3, desk.now);
+        let mut told = turns(40);
+        for _ in 0..1000 {
+            let packet = desk.packet();
+            if packet[0] == WRITE {
+                told = place_of(&packet);
+                desk.packet();
+                desk.silence();
+            } else {
+                desk.hear(340, &position(NodeId::N3, beside(told, -sag)));
+            }
+        }
+        assert_eq!(told, beside(turns(40), -sag));
+    }
+}
+
+#[test]
+fn a_node_that_stands_away_from_what_it_was_told_to_hold_is_not_still() {
+    // All stop WRITEs are lost, and it has reached its old set-point.
+    for (away, is_still) in [(256, true), (-256, true), (257, false), (-257, false)] {
+        let mut desk = Desk::stopping_at(direct(), turns(40));
+        desk.packets(2);
+        desk.answer(NodeId::N3, Answer::Position(beside(turns(40), away)));
+        desk.run(MS(2500));
+        let progress = desk.master.stop_progress(NodeId::N3);
+        let expected =
+            if is_still { StopProgress::StandingStill } else { StopProgress::StillMoving };
+        assert_eq!(progress, expected, "{away}");
+    }
+}
+
+#[test]
+fn a_motor_that_moves_again_is_no_longer_still_and_is_stopped_again() {
+    for polling in [Polling::Fastest, Polling::Every(MS(20))] {
+        for (node, moving, at_rest) in [
+            (N1, Answer::Velocity(5.0), Answer::Velocity(0.0)),
+            (N3, Answer::Position(turns(9)), Answer::Position(turns(3))),
+        ] {
+            let mut desk = Desk::stopping(with(direct(), |it| it.polling = polling), node);
+            desk.answer(node.0, at_rest);
+            desk.until(node.0, StopProgress::StandingStill);
+            desk.run(MS(5000));
+            desk.news();
+            desk.answer(node.0, moving);
+            desk.run(MS(1900));
+            assert_eq!(desk.master.stop_progress(node.0), StopProgress::Confirmed);
+            assert_eq!(desk.news(), []);
+            desk.run(MS(200));
+            assert!(matches!(desk.news()[..], [MasterEvent::StillMoving { .. }]));
+            desk.answer(node.0, at_rest);
+            desk.run(MS(100));
+            assert_eq!(desk.news(), [MasterEvent::StandingStill { node: node.0 }]);
+            // Once the application has released it, it may move.
+            desk.master.release(node.0);
+            desk.answer(node.0, moving);
+            let sent = desk.run(MS(100));
+            assert_eq!(writes(&sent), Vec::<Vec<u8>>::new());
+            assert_eq!(desk.master.stop_progress(node.0), StopProgress::StandingStill);
+        }
+    }
+}
+
+#[test]
+fn a_node_whose_mode_was_in_doubt_has_all_of_its_time_to_become_still_again() {
+    let mut desk = Desk::stopping_at(direct(), turns(3));
+    desk.until(NodeId::N3, StopProgress::StandingStill);
+    desk.run(MS(5000));
+    desk.news();
+    desk.turn_with(340, &velocity(NodeId::N3, 1.0));
+    desk.answer(NodeId::N3, Answer::Position(turns(4)));
+    desk.packets(6);
+    desk.answer(NodeId::N3, Answer::Position(turns(6)));
+    desk.run(MS(1900));
+    assert_eq!(desk.news(), [STOPPED_3]);
+    desk.run(MS(200));
+    assert!(matches!(desk.news()[..], [MasterEvent::StillMoving { .. }]));
 }
 
 #[test]

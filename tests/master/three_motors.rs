@@ -87,9 +87,10 @@ fn all_three_positions_have_to_stay_within_8_counts() {
     ] {
         let mut master: Master<ThreeMotors> = Master::new(manual(), T0);
         let mut now = T0;
-        let mut answer = |master: &mut Master<ThreeMotors>, places: [i32; 3]| {
+        let mut answer = |master: &mut Master<ThreeMotors>, pause_ms, places: [i32; 3]| {
+            now += MS(pause_ms);
             let sent = master.poll_transmit(now).map(|it| it[0]);
-            now += MS(25);
+            now += MS(1);
             let answer = PositionResponse::new(NodeId::N1, places.map(place));
             master.handle_input(answer.as_bytes(), now);
             sent
@@ -98,9 +99,9 @@ fn all_three_positions_have_to_stay_within_8_counts() {
         config.reply_timeout = MS(30);
         master = Master::new(config, T0);
         master.stop(NodeId::N1, T0);
-        for (expected, places) in [(READ, [0; 3]), (WRITE, [0; 3]), (WRITE, moved), (WRITE, moved)]
-        {
-            assert_eq!(answer(&mut master, places), Some(expected));
+        let steps = [(READ, 0, [0; 3]), (WRITE, 0, [0; 3]), (WRITE, 25, moved), (WRITE, 25, moved)];
+        for (expected, pause_ms, places) in steps {
+            assert_eq!(answer(&mut master, pause_ms, places), Some(expected));
         }
         let events = core::iter::from_fn(|| master.poll_event());
         let told = events.filter(|it| matches!(it, MasterEvent::StandingStill { .. })).count();

@@ -17,6 +17,14 @@ pub(crate) const STRIKES: u8 = 3;
 /// answer also the shortest (I12, I13).
 pub(crate) const REPEAT: Duration = Duration::from_millis(20);
 
+/// Longest way from the position that a node holds at which that is still held.
+const HOLD_COUNTS: u16 = 256;
+
+/// A motor under way shows another place with each reading, 20 counts further.
+fn bit(count: i16) -> u64 {
+    1 << (count / 20 % 64)
+}
+
 /// Number of exchanges with a node in doubt after which the application is notified.
 const UNDECIDED: u8 = 6;
 
@@ -68,11 +76,13 @@ pub(crate) struct Account {
     pub(crate) coasting_since: Option<Instant>,
     /// The same, even if the confirmation is lost: when it was the first time, or the stop was
     /// asked for again.
-    coasts_from: Option<Instant>,
+    pub(crate) coasts_from: Option<Instant>,
     /// The application was told that it still moves.
     pub(crate) is_told: bool,
     /// Answers that it still moves which were heard when it had no more time for that; up to 2.
     pub(crate) late_moves: u8,
+    /// There was one before the stop was confirmed again.
+    pub(crate) has_moved_late: bool,
     /// It was seen to be still.
     pub(crate) is_still: bool,
     /// When the last stop WRITE was sent, and whether anybody was asked since.
@@ -81,10 +91,15 @@ pub(crate) struct Account {
     /// The position that the node was told to hold, and whether another one is allowed.
     hold: Option<Position>,
     pub(crate) may_hold_anew: bool,
+    pub(crate) is_released: bool,
+    /// Its last answer showed it away from that position.
+    pub(crate) is_away: bool,
     /// How often the node has measured a position for this stop, and when the last ones were
     /// heard.
     places_heard: u32,
     places_heard_at: [Option<(i16, Instant)>; 4],
+    /// All that it has measured, one bit each.
+    places_shown: u64,
     pub(crate) confirm: Confirm,
     /// The node must not be asked before this time.
     pub(crate) guard_until: Option<Instant>,
@@ -126,17 +141,26 @@ impl Account {
         match self.coasting_since {
             Some(_) => {
                 self.drop_target();
+                self.is_released = false;
                 if is_told {
                     self.begin_coasting(Some(now));
                     self.coast(now);
                 }
             }
-            None => self.owe(),
+            None => {
+                // What it held is kept if the node is there, unless it was released.
+                self.may_hold_anew |= self.is_still;
+                if self.is_owed && self.is_told {
+                    self.begin_coasting(Some(now));
+                }
+                self.hold = self.hold.filter(|_| !(self.is_still && self.is_released));
+                self.owe();
+            }
         }
     }
 
     fn begin_coasting(&mut self, from: Option<Instant>) {
-        (self.coasts_from, self.is_told) = (from, false);
+        (self.coasts_from, self.is_told, self.has_moved_late) = (from, false, false);
     }
 
     /// The stop is confirmed: it has to become still, unless that has begun before.
@@ -145,15 +169,21 @@ impl Account {
         self.late_moves = 0;
     }
 
+    /// It was still, and is not any longer.
+    pub(crate) fn moves_again(&mut self, now: Instant) {
+        self.begin_coasting(None);
+        self.coast(now);
+    }
+
     /// The node is owed a stop, if it is not already.
     pub(crate) fn owe(&mut self) {
         self.drop_target();
         if !self.is_halted {
             self.begin_coasting(None);
             (self.is_odd_stop, self.hold, self.may_hold_anew) = (!self.is_odd_stop, None, true);
-            (self.places_heard, self.places_heard_at) = (0, [None; 4]);
+            (self.places_heard, self.places_heard_at, self.places_shown) = (0, [None; 4], 0);
         }
-        (self.is_halted, self.is_under_order) = (true, false);
+        (self.is_halted, self.is_under_order, self.is_released) = (true, false, false);
         self.owe_again();
     }
 
@@ -172,7 +202,9 @@ impl Account {
     /// All payments and measurements are discarded, unless the node is still.
     fn restart_stop(&mut self) {
         if self.coasting_since.is_some() {
+            let is_released = self.is_released;
             self.owe();
+            self.is_released = is_released;
         }
         (self.paid, self.is_stop_written, self.is_stop_due) = (0, false, self.is_owed);
         (self.may_hold_anew, self.stopped_at) = (true, None);
@@ -204,15 +236,19 @@ impl Account {
         let is_hold = self.is_halted && !(self.record == Some(Mode::Velocity) && zero);
         if is_hold {
             let place = Position::new(write.place.0, write.place.1);
-            if self.hold.is_some_and(|hold| hold != place) && !self.may_hold_anew {
+            let way = |hold: Position| hold.counts().abs_diff(place.counts());
+            if self.hold.is_some_and(|hold| way(hold) > 0) && !self.may_hold_anew {
                 return Err("a different position to hold".into());
             }
             let doublings = self.places_heard.saturating_sub(1).min(9);
             let patience = HOLD_PATIENCE.saturating_mul(1 << doublings) + gap;
             let mut heard = self.places_heard_at.iter().flatten();
-            let is_young =
-                |&(count, heard_at): &_| count == write.place.0 && at <= heard_at + patience;
-            if !heard.any(is_young) && self.hold != Some(place) {
+            // It keeps an earlier one if the last one is near.
+            let is_young = |&(count, heard_at): &(i16, _)| {
+                count.abs_diff(write.place.0) <= HOLD_COUNTS && at <= heard_at + patience
+            };
+            let is_shown = self.places_shown & bit(write.place.0) != 0;
+            if !(is_shown && heard.any(is_young)) && self.hold != Some(place) {
                 return Err("a position to hold that is too old".into());
             }
             (self.hold, self.may_hold_anew) = (Some(place), false);
@@ -266,9 +302,13 @@ impl Account {
     /// The answer arrived in its window.
     pub(crate) fn hear_answer(&mut self, mode: Mode, place: (i16, i16), at: Instant) {
         (self.misses, self.guard_until) = (0, None);
+        let here = Position::new(place.0, place.1).counts();
+        let is_far = |hold: Position| here.abs_diff(hold.counts()) > HOLD_COUNTS.into();
+        self.is_away = mode == Mode::Position && self.hold.is_some_and(is_far);
         if mode == Mode::Position {
             self.places_heard_at[self.places_heard as usize % 4] = Some((place.0, at));
             self.places_heard += 1;
+            self.places_shown |= bit(place.0);
         }
         match self.record {
             Some(record) if record != mode && !self.is_in_doubt => return self.begin_doubt(),

@@ -15,6 +15,8 @@ pub(crate) enum Action {
     Switch(NodeId),
     /// The node restarts.
     Reset(NodeId),
+    /// The shaft is turned by hand or by a load, farther than a hold allows.
+    Turn(NodeId),
     Wait(Wait),
     /// A set-point, followed by an answered exchange.
     Command(NodeId),

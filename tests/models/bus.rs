@@ -139,6 +139,7 @@ impl<B: Kit> Bus<B> {
                 let account = self.account(node);
                 account.drop_target();
                 account.may_hold_anew |= !account.is_owed;
+                account.is_released = account.is_halted && !account.is_owed;
             }
             Call::Confirm(node) => {
                 if self.master.confirm(node, now).is_ok() {
@@ -329,9 +330,12 @@ impl<B: Kit> Bus<B> {
             self.line_free = at + self.master.config().turnaround_gap;
             let account = self.account(reply.node);
             account.hear_answer(reply.mode, reply.place, at);
-            let is_late = account.coasting_since.is_some_and(|since| at >= since + COAST);
-            if is_late && reply.is_moving && !account.is_in_doubt {
-                account.late_moves = (account.late_moves + 1).min(2);
+            let is_late = account.coasts_from.is_some_and(|since| at >= since + COAST);
+            if is_late && (reply.is_moving || account.is_away) && !account.is_in_doubt {
+                match account.coasting_since {
+                    Some(_) => account.late_moves = (account.late_moves + 1).min(2),
+                    None => account.has_moved_late = true,
+                }
             }
         } else {
             self.account(reply.node).hear_outside(reply.mode);
@@ -388,6 +392,7 @@ impl<B: Kit> World for Bus<B> {
                 };
                 motor.is_told_to_stop = true;
             }
+            Action::Turn(node) => self.motors[usize::from(node.get()) - 1].count += 400,
             Action::Reset(node) => {
                 self.motors[usize::from(node.get()) - 1].is_told_to_stop = true;
             }

@@ -9,8 +9,9 @@ use super::{
     names::*,
 };
 
-/// Most exchanges of each other node for which an urgent one waits.
-const URGENT_WAITS: u8 = 4;
+/// Most exchanges of each other node for which an urgent one waits. The fifth is that of a node
+/// whose mode changes, so that it is held twice.
+const URGENT_WAITS: u8 = 5;
 
 /// The same in the cycle.
 const CYCLE_WAITS: u8 = 10;
@@ -80,9 +81,13 @@ impl<B: Kit> Bus<B> {
                 }
                 MasterEvent::NotConfirmed { node, .. } => {
                     let attempts = self.master.config().attempts.clamp(1, STRIKES);
+                    let is_still = self.master.stop_progress(node) == StopProgress::StandingStill;
+                    let is_left = is_still && self.master.set_point(node).is_none();
                     let account = self.account(node);
                     let confirm = std::mem::take(&mut account.confirm);
-                    if confirm != Confirm::Fails && account.misses < attempts {
+                    // A stop that was released has no more WRITE once it is still.
+                    let is_dropped = confirm == Confirm::Fails || is_left;
+                    if !is_dropped && account.misses < attempts {
                         return Err(format!("NotConfirmed without a reason: {confirm:?}"));
                     }
                 }
@@ -113,11 +118,16 @@ impl<B: Kit> Bus<B> {
                     StopProgress::StandingStill if !self.motors[index].is_told_to_stop => {
                         return Err(format!("node {node} is still, but it was told to move"));
                     }
+                    StopProgress::StandingStill if account.is_away => {
+                        return Err(format!("node {node} is still, but not where it holds"));
+                    }
                     StopProgress::StandingStill => {
                         (account.coasting_since, account.is_still) = (None, true);
                     }
                     StopProgress::Confirmed if !account.is_told && account.late_moves < most => {}
-                    StopProgress::StillMoving if account.late_moves >= least => {
+                    StopProgress::StillMoving
+                        if account.late_moves >= least || account.has_moved_late =>
+                    {
                         account.is_told = true
                     }
                     StopProgress::StillMoving if account.is_told => {}
@@ -127,7 +137,10 @@ impl<B: Kit> Bus<B> {
                 // A stop that was released ends when the node is abnormal.
                 account.is_still = progress == StopProgress::StandingStill;
                 if !account.is_still && account.is_online() {
-                    return Err(format!("node {node} was still, and is {progress:?}"));
+                    if progress != StopProgress::Confirmed || !account.is_away {
+                        return Err(format!("node {node} was still, and is {progress:?}"));
+                    }
+                    account.moves_again(self.now);
                 }
             }
             if !account.is_owed && owed.contains(node) {

@@ -34,6 +34,7 @@ pub(crate) const COUNTERS_AND_STATUS: &[&str] = &[
     "has_failed",
     "places_heard",
     "places_heard_at",
+    "places_shown",
     "sent",
     "statistics",
     "status",

@@ -61,7 +61,7 @@ fn story<B: Kit>(seed: u64, is_told: bool) -> Checked {
     let mut bus = Bus::<B>::at(Instant::from_micros(start), &modes, config, Menu::FINE);
     bus.menu.polls_fastest = config.polling == Polling::Fastest;
     bus.is_far = rng.chance(0.3);
-    let is_lazy = rng.chance(0.3);
+    let (is_lazy, turns) = (rng.chance(0.3), rng.chance(0.3));
     if is_told {
         println!("{modes:?} {config:?}");
     }
@@ -85,6 +85,10 @@ fn story<B: Kit>(seed: u64, is_told: bool) -> Checked {
             }
         };
         step(&mut bus, action)?;
+        if turns && rng.chance(0.02) {
+            let node = NodeId::ALL[rng.below(modes.len() as u64) as usize];
+            step(&mut bus, Action::Turn(node))?;
+        }
     }
     let end = bus.now + RECOVERY;
     for count in 0.. {

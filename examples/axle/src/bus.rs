@@ -43,8 +43,10 @@ const SILENCE: Span = Span::from_millis(1000);
 pub(crate) enum Halt {
     /// The stop is confirmed, and the motor was measured at rest (ruling I12).
     Still,
-    /// The stop is confirmed, but the motor was not measured at rest.
+    /// The stop is confirmed, but the motor still moves, or is not where it is to hold.
     Moving,
+    /// The stop is confirmed, and nothing was heard since that shows whether the motor moves.
+    Unseen,
     /// The stop is not confirmed.
     Owed,
     /// The stop is not confirmed, because the mode of the node is in doubt (ruling I11).
@@ -332,7 +334,8 @@ impl<B: Boards> Bus<B> {
     pub(crate) fn halt(&self, node: NodeId) -> Halt {
         match self.master().stop_progress(node) {
             StopProgress::StandingStill => Halt::Still,
-            StopProgress::Confirmed | StopProgress::StillMoving => Halt::Moving,
+            StopProgress::StillMoving => Halt::Moving,
+            StopProgress::Confirmed => Halt::Unseen,
             _ if self.is_damaged(node) => Halt::Damaged,
             _ if self.is_untimely(node) => Halt::Untimely,
             _ if self.status(node).is_none() => Halt::Silent,
@@ -350,6 +353,11 @@ impl<B: Boards> Bus<B> {
                 let now = self.status(node).map(B::describe).unwrap_or_default();
                 format!(
                     "node {node} confirmed the stop, but is still moving after {seconds} s: {now}"
+                )
+            }
+            Halt::Unseen => {
+                format!(
+                    "node {node} confirmed the stop, but was not seen to be still: it may be moving"
                 )
             }
             Halt::Owed => {

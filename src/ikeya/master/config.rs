@@ -54,8 +54,8 @@ pub struct MasterConfig {
     /// your calls, for which an answer may wait in the port.
     pub hold_age: Duration,
     /// Time in which a motor may come to rest after its stop is confirmed; 2 s by default. Then
-    /// [`MasterEvent::StillMoving`](super::MasterEvent::StillMoving) reports that it still moves
-    /// (I12).
+    /// [`MasterEvent::StillMoving`](super::MasterEvent::StillMoving) reports that it still moves,
+    /// or is not where it was told to hold (I12).
     pub coast: Duration,
     /// Dead-man: after this much time without an accepted set-point, a stop or
     /// [`keep_alive`](super::Master::keep_alive), every node under a set-point is owed a stop

@@ -81,8 +81,8 @@ pub(super) struct Sent<B: Board> {
 
 /// What a response is.
 pub(super) enum Response {
-    /// The answer, this long after the end of the request.
-    Answer(Duration),
+    /// The answer to the request that ended at `asked_at`; it came this much later than possible.
+    Answer { asked_at: Instant, latency: Duration },
     /// From the node that was asked, but earlier than the line could have carried it.
     Early,
     /// Outside its window, or in another node's.
@@ -348,10 +348,11 @@ impl<B: Board> Line<B> {
                     window.heard = Heard::Others;
                     return Response::Early;
                 }
-                let latency = now - (window.request_end + self.answer_wire_time);
+                let asked_at = window.request_end;
+                let latency = now - (asked_at + self.answer_wire_time);
                 (self.window, self.held) = (None, Held::Nothing);
                 self.free_at = Some(now + config.turnaround_gap);
-                Response::Answer(latency)
+                Response::Answer { asked_at, latency }
             }
             window => {
                 if let Some(window) = window {

@@ -377,12 +377,14 @@ impl<B: Board> Node<B> {
     /// Its request for this reason. In the cycle a node gets its set-point, then a READ. A node
     /// that is not online gets its stop blind, apart from its READs; where a WRITE is answered,
     /// instead of them.
-    pub(super) fn request(&self, reason: Reason) -> Request<B> {
+    pub(super) fn request(&self, reason: Reason, polling: Polling) -> Request<B> {
         let target = match reason {
             Reason::StopRead | Reason::Discovery => None,
             Reason::LostStop | Reason::SearchLost | Reason::Search if !B::ANSWERS_WRITE => None,
             Reason::Repeat => self.stop_target(),
             Reason::Cycle if self.order.is_written() => None,
+            // With no cycle, a node that is still may have been moved by hand since it was read.
+            Reason::Cycle if polling == Polling::Manual && self.order.is_left_alone() => None,
             Reason::SetPoint | Reason::Cycle => self.order.target(),
             _ => self.stop_write(),
         };
@@ -465,12 +467,15 @@ impl<B: Board> Node<B> {
         Changes::NONE.with(Change::Dropped, is_unconfirmed)
     }
 
-    /// An answer in its window, this long after the end of the request.
+    /// An answer in its window, to a request that ended at `asked_at`; it came this late.
+    // In line it would take 20 more bytes of flash.
+    #[inline(never)]
     pub(super) fn hear_answer(
         &mut self,
         status: &Status<B>,
+        asked_at: Instant,
         latency: Duration,
-        coast: Duration,
+        config: &MasterConfig,
         now: Instant,
     ) -> Changes {
         self.order.end_exchange();
@@ -499,7 +504,7 @@ impl<B: Board> Node<B> {
         self.statistics.reply(latency);
         self.has_answered = true;
         self.status = Some((*status, now));
-        let settled = self.order.answered(status, coast, now);
+        let settled = self.order.answered(status, asked_at, config, now);
         changes.with(Change::Answered, true).and(settled)
     }
 

@@ -1,7 +1,10 @@
 //! Orders: what a node has been told, whether it is repeated, and the stop that it is owed (I6, I8,
 //! I12).
 
-use super::event::{Change, Changes};
+use super::{
+    config::{MasterConfig, Polling},
+    event::{Change, Changes},
+};
 use crate::{
     ikeya::{
         board::{Board, Status, Target},
@@ -20,8 +23,15 @@ const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 /// Minimum time between two answers that show a standstill.
 const STILL_TIME: Duration = Duration::from_millis(20);
 
-/// Longest way in this time that counts as a standstill, counts: 0.05 rps.
+/// Longest time from a request to its answer in which nothing can have moved far.
+const PROMPT: Duration = Duration::from_millis(1);
+
+/// Longest way in [`STILL_TIME`] that counts as a standstill, counts: 0.05 rps.
 const STILL_COUNTS: u32 = 8;
+
+/// Longest way from the position that a node holds at which it obeys, counts: 1/32 of a turn. A
+/// loaded motor may stand beside the position that it was told.
+const HOLD_COUNTS: u32 = 256;
 
 /// Longest time between two stop WRITEs, where the line allows it (I12, I13).
 const REPEAT_TIME: Duration = Duration::from_millis(20);
@@ -99,25 +109,28 @@ impl<B: Board> Order<B> {
     /// whether the application is waiting for the confirmation of the set-point that ends with
     /// this.
     ///
-    /// If the node `is_certain`, that is, online and in its mode, the stop holds what an earlier
-    /// stop has held, or the position `measured`, treated as measured `now`.
+    /// It holds what an earlier stop has held, if the node is still there when it is read. A node
+    /// that `is_certain`, that is, online and in its mode, may hold the position `measured`,
+    /// treated as measured `now`.
     pub(super) fn owe_stop(
         &mut self,
         is_certain: bool,
         measured: Option<Status<B>>,
         now: Instant,
     ) -> bool {
-        let (hold, writes) = match (&mut self.state, measured) {
-            (State::Stop(stop), _) if stop.stage != Stage::Still => {
+        let held = match &mut self.state {
+            State::Stop(stop) if stop.stage != Stage::Still => {
                 stop.join(now);
                 return self.end_confirmation();
             }
-            _ if !is_certain => (None, 0),
-            (State::Stop(stop), _) if !stop.is_released => (stop.hold, 1),
-            (_, Some(Status::Position(position))) => (Some((position, now)), 0),
-            _ => (None, 0),
+            State::Stop(stop) if !stop.is_released => stop.hold,
+            _ => None,
         };
-        self.begin_stop(hold, writes);
+        let mut stop = Stop::new(held);
+        if let (true, Some(Status::Position(position))) = (is_certain, measured) {
+            stop.hold_at(position, now);
+        }
+        self.state = State::Stop(stop);
         self.end_confirmation()
     }
 
@@ -125,26 +138,25 @@ impl<B: Board> Order<B> {
     pub(super) fn lose(&mut self, is_stopped: bool) {
         let is_owed = match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => return stop.lose(),
-            State::Stop(stop) => is_stopped && !stop.is_released,
+            State::Stop(stop) if is_stopped && !stop.is_released => {
+                *stop = Stop::new(stop.hold);
+                return;
+            }
             State::SetPoint(_) | State::Released => is_stopped,
-            State::None => false,
+            State::None | State::Stop(_) => false,
         };
         if is_owed {
-            self.begin_stop(None, 0);
+            self.state = State::Stop(Stop::new(None));
         } else {
             self.state = if self.is_set_point() { State::Released } else { State::None };
         }
-    }
-
-    const fn begin_stop(&mut self, hold: Option<(B::Position, Instant)>, writes: u8) {
-        self.state = State::Stop(Stop::new(hold, writes));
     }
 
     /// The mode is in doubt: what was measured does not count, and a position that is held must be
     /// measured again. Returns whether that ends a confirmation.
     pub(super) fn doubt(&mut self) -> bool {
         if let State::Stop(stop) = &mut self.state {
-            let is_held = stop.hold.is_some() && !stop.is_released;
+            let is_held = stop.held().is_some() && !stop.is_released;
             if stop.stage != Stage::Still || is_held {
                 stop.restart();
                 return self.end_confirmation();
@@ -174,7 +186,7 @@ impl<B: Board> Order<B> {
         let is_commanded = self.was_written || self.is_set_point();
         match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => stop.restart(),
-            _ if is_commanded => self.begin_stop(None, 0),
+            state if is_commanded => *state = State::Stop(Stop::new(None)),
             state => *state = State::None,
         }
         self.end_confirmation()
@@ -215,7 +227,7 @@ impl<B: Board> Order<B> {
     pub(super) fn is_new(&self) -> bool {
         match &self.state {
             State::SetPoint(set_point) => set_point.is_new,
-            State::Stop(stop) => stop.written_at.is_none() && stop.repeated().is_some(),
+            State::Stop(stop) => stop.stage == Stage::Confirmed && stop.written_at.is_none(),
             State::None | State::Released => false,
         }
     }
@@ -252,6 +264,11 @@ impl<B: Board> Order<B> {
     /// The stop, if it is confirmed and the node not still.
     pub(super) fn coasting(&self) -> Option<&Stop<B>> {
         self.stop().filter(|stop| stop.stage == Stage::Confirmed)
+    }
+
+    /// Whether the node is seen to be still after a stop, and no WRITE is asked for.
+    pub(super) fn is_left_alone(&self) -> bool {
+        !self.awaits_confirmation() && self.stop().is_some_and(|stop| stop.stage == Stage::Still)
     }
 
     pub(super) fn progress(&self) -> StopProgress {
@@ -322,14 +339,10 @@ impl<B: Board> Order<B> {
         self.is_written = false;
     }
 
-    /// The node has not answered: the WRITE may have been lost too, and a stop is repeated. A
-    /// position that the node has perhaps never heard is measured again.
+    /// The node has not answered: the WRITE may have been lost too, and a stop is repeated.
     pub(super) fn missed(&mut self) {
         if let State::Stop(stop) = &mut self.state {
-            stop.is_written = false;
-            if stop.followed == 0 && stop.hold.is_some() {
-                (stop.hold, stop.written_at) = (None, None);
-            }
+            stop.missed();
         }
     }
 
@@ -340,22 +353,25 @@ impl<B: Board> Order<B> {
         }
     }
 
-    /// The node has answered in its mode: that may confirm a stop, or show that the node is still.
+    /// The node has answered in its mode, a request that ended at `asked_at`: that may confirm a
+    /// stop, or show that the node is still.
+    // In line it would take 90 more bytes of flash.
+    #[inline(never)]
     pub(super) fn answered(
         &mut self,
         status: &Status<B>,
-        coast: Duration,
+        asked_at: Instant,
+        config: &MasterConfig,
         now: Instant,
     ) -> Changes {
         let settled = match &mut self.state {
-            State::Stop(stop) => stop.answered(status, coast, now),
+            State::Stop(stop) => stop.answered(status, asked_at, config, now),
             _ => Changes::NONE,
         };
-        let is_confirmed = self.confirm == Confirm::AfterAnswer;
-        if is_confirmed {
-            self.confirm = Confirm::Unasked;
-        }
-        settled.with(Change::Confirmed, is_confirmed)
+        let is_confirmed = self.confirm == Confirm::AfterAnswer && self.end_confirmation();
+        // A stop that was released has no WRITE to be confirmed once it is still.
+        let is_dropped = self.target().is_none() && self.end_confirmation();
+        settled.with(Change::Confirmed, is_confirmed).with(Change::Dropped, is_dropped)
     }
 }
 
@@ -375,18 +391,22 @@ pub(super) struct Stop<B: Board> {
     is_told: bool,
     /// Whether it was confirmed, even if that was lost again.
     was_confirmed: bool,
-    /// Stop WRITEs sent, of the present `hold` if there is one.
-    writes: u8,
+    /// Whether a WRITE was sent since the node was read at `hold`.
+    is_held: bool,
     /// Stop WRITEs that were followed by a good answer.
     followed: u8,
     /// Attempts made while the node was not online.
     lost_attempts: u8,
+    /// Whether the node was read since it may have moved, or been moved, away from `hold`.
+    is_there: bool,
     /// Whether `seen` agrees with an earlier answer.
     is_second: bool,
     /// An answer behind a stop WRITE that may be the first of those that show a standstill.
     seen: Option<(Status<B>, Instant)>,
-    /// The position to hold for a position node, and when it was measured; `None` until then.
-    hold: Option<(B::Position, Instant)>,
+    /// The position that a position node is to hold; `None` until it has been measured.
+    hold: Option<B::Position>,
+    /// When it was read there.
+    measured_at: Instant,
     /// Time within which it must be written.
     patience: Duration,
     /// Time of the latest stop WRITE, unless it was taken back.
@@ -408,9 +428,8 @@ enum Stage {
 }
 
 impl<B: Board> Stop<B> {
-    /// A new debt. `hold` is a position that may be held without measuring again, and has had that
-    /// many WRITEs of an earlier stop.
-    const fn new(hold: Option<(B::Position, Instant)>, writes: u8) -> Self {
+    /// A new debt. An earlier stop has `held` this position.
+    fn new(held: Option<B::Position>) -> Self {
         Self {
             stage: Stage::Owed,
             is_written: false,
@@ -419,10 +438,12 @@ impl<B: Board> Stop<B> {
             is_told: false,
             was_confirmed: false,
             is_second: false,
-            writes,
+            is_held: false,
             followed: 0,
             lost_attempts: 0,
-            hold,
+            is_there: false,
+            hold: held,
+            measured_at: Instant::from_micros(0),
             patience: HOLD_PATIENCE,
             written_at: None,
             confirmed_at: Instant::from_micros(0),
@@ -434,12 +455,24 @@ impl<B: Board> Stop<B> {
     ///
     /// While the mode is in doubt: only a position that means standstill to a velocity node (I11).
     pub(super) fn target(&self, mode: Mode, is_in_doubt: bool) -> Option<Target<B>> {
-        let hold = self.hold.map(|it| it.0);
+        let hold = self.held();
         match mode {
-            _ if is_in_doubt => hold.filter(|it| B::is_still_as_velocity(*it)).map(Target::Position),
+            _ if is_in_doubt => {
+                hold.filter(|it| B::is_still_as_velocity(*it)).map(Target::Position)
+            }
             Mode::Velocity => Some(Target::STANDSTILL),
             Mode::Position => hold.map(Target::Position),
         }
+    }
+
+    /// Whether a WRITE of the position to hold has left, or an answer has followed one.
+    const fn is_heard(&self) -> bool {
+        self.is_held || self.followed > 0
+    }
+
+    /// The position to hold, unless the node is to be read first.
+    fn held(&self) -> Option<B::Position> {
+        self.hold.filter(|_| self.is_there)
     }
 
     /// Its target, if it is confirmed and repeated. A position stop is not confirmed until there is
@@ -450,7 +483,7 @@ impl<B: Board> Stop<B> {
             Stage::Confirmed => true,
             Stage::Still => !self.is_released,
         };
-        is_repeated.then(|| self.hold.map_or(Target::STANDSTILL, |it| Target::Position(it.0)))
+        is_repeated.then(|| self.held().map_or(Target::STANDSTILL, Target::Position))
     }
 
     /// Whether its WRITE waits for an answer.
@@ -459,8 +492,8 @@ impl<B: Board> Stop<B> {
     }
 
     /// Whether a position has been measured for it but not written yet.
-    pub(super) const fn is_measured(&self) -> bool {
-        self.is_asked && self.hold.is_some() && self.writes == 0
+    pub(super) fn is_measured(&self) -> bool {
+        self.is_asked && !self.is_heard() && self.held().is_some()
     }
 
     pub(super) const fn lost_attempts(&self) -> u8 {
@@ -480,20 +513,24 @@ impl<B: Board> Stop<B> {
     /// Discards everything measured or confirmed so far: the mode is, or was, in doubt.
     #[inline(never)]
     fn restart(&mut self) {
+        if self.stage == Stage::Still {
+            (self.was_confirmed, self.is_told) = (false, false);
+        }
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
-        self.hold = None;
-        (self.is_written, self.writes, self.written_at) = (false, 0, None);
+        (self.is_written, self.written_at) = (false, None);
+        (self.hold, self.is_there, self.is_held) = (None, false, false);
     }
 
     /// The node is abnormal. It has no more time to become still than before.
     fn lose(&mut self) {
+        let hold = self.hold;
         self.restart();
+        self.hold = hold;
         (self.is_asked, self.is_released, self.lost_attempts) = (false, false, 0);
     }
 
     fn wrote(&mut self, now: Instant) {
-        self.is_written = true;
-        self.writes = self.writes.saturating_add(1);
+        (self.is_written, self.is_held) = (true, true);
         self.written_at = Some(now);
     }
 
@@ -507,34 +544,60 @@ impl<B: Board> Stop<B> {
     }
 
     fn take_back_write(&mut self) {
-        let was_written = core::mem::take(&mut self.is_written);
-        self.writes = self.writes.saturating_sub(was_written.into());
+        (self.is_written, self.is_held) = (false, false);
         self.written_at = None;
     }
 
     /// Keeps the position of an answer to hold, if it was requested after the stop and the stop is
     /// owed: a velocity node that is still has none, and may just be in doubt.
     fn measure(&mut self, status: &Status<B>, now: Instant) {
-        let is_due = self.is_asked && self.stage == Stage::Owed;
-        if let (Status::Position(position), None, true) = (status, self.hold, is_due) {
-            (self.hold, self.writes) = (Some((*position, now)), 0);
+        let is_due = self.is_asked && self.stage == Stage::Owed && !self.is_there;
+        if let (Status::Position(position), true) = (status, is_due) {
+            self.hold_at(*position, now);
+        }
+    }
+
+    /// Holds a position that was measured now, or what it has held before, if that is near: a
+    /// loaded motor stands beside what it holds, and would creep away if that were held next.
+    fn hold_at(&mut self, position: B::Position, now: Instant) {
+        let is_near = self.hold.is_some_and(|held| B::distance(held, position) <= HOLD_COUNTS);
+        if !is_near {
+            self.hold = Some(position);
+        }
+        (self.measured_at, self.is_there, self.is_held) = (now, true, false);
+    }
+
+    /// If the node has perhaps never heard the position to hold, it is read first. Not each time: a
+    /// loaded node that never answers behind a WRITE would creep away.
+    fn missed(&mut self) {
+        self.is_written = false;
+        if self.is_there && self.followed == 0 && self.patience <= HOLD_PATIENCE + HOLD_PATIENCE {
+            self.read_again();
         }
     }
 
     /// Gives up a position that could not be written at once, allowing for the `gap` after each
     /// packet.
     fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        if self.writes > 0 {
-            return;
-        }
-        if self.hold.is_some_and(|(_, at)| now - at > self.patience + gap) {
-            self.hold = None;
-            self.patience = self.patience + self.patience;
+        let is_due = self.stage == Stage::Owed && self.is_there && !self.is_heard();
+        if is_due && now - self.measured_at > self.patience + gap {
+            self.read_again();
         }
     }
 
-    /// Takes a good answer of the node in its mode.
-    fn answered(&mut self, status: &Status<B>, coast: Duration, now: Instant) -> Changes {
+    fn read_again(&mut self) {
+        (self.is_there, self.written_at) = (false, None);
+        self.patience = self.patience + self.patience;
+    }
+
+    /// Takes a good answer of the node in its mode, to a request that ended at `asked_at`.
+    fn answered(
+        &mut self,
+        status: &Status<B>,
+        asked_at: Instant,
+        config: &MasterConfig,
+        now: Instant,
+    ) -> Changes {
         let mut settled = Changes::NONE;
         if core::mem::take(&mut self.is_written) {
             self.followed = self.followed.saturating_add(1);
@@ -547,16 +610,26 @@ impl<B: Board> Stop<B> {
             settled = settled.with(Change::Stopped, true);
         }
         // An answer to a READ in front of all stop WRITEs shows nothing.
-        let sight = if self.followed > 0 { self.see(status, now) } else { Sight::Unclear };
-        match sight {
-            _ if self.stage != Stage::Confirmed => {}
-            Sight::Still => {
+        let sight =
+            if self.followed > 0 { self.see(status, asked_at, now) } else { Sight::Unclear };
+        match (self.stage, sight) {
+            (Stage::Confirmed, Sight::Still) => {
                 self.stage = Stage::Still;
                 settled = settled.with(Change::Still, true);
             }
-            Sight::MovingSince(since) if !self.is_told && since - self.confirmed_at >= coast => {
+            (Stage::Confirmed, Sight::MovingSince(since))
+                if !self.is_told && since - self.confirmed_at >= config.coast =>
+            {
                 self.is_told = true;
                 settled = settled.with(Change::StillMoving, true);
+            }
+            // It looked still, but had not obeyed, or obeys no longer. If it is not told any more
+            // to hold its position, it must not be driven back there.
+            (Stage::Still, Sight::MovingSince(_))
+                if !self.is_released && config.polling != Polling::Manual =>
+            {
+                self.stage = Stage::Confirmed;
+                (self.confirmed_at, self.is_told) = (now, false);
             }
             _ => {}
         }
@@ -566,16 +639,24 @@ impl<B: Board> Stop<B> {
     /// Compares an answer with an earlier one. One alone may be of a motor that is just reversing.
     ///
     /// A position node overruns the position that it holds and comes back, so that two answers may
-    /// be of the same place: it takes three, and no answer in between that is far away.
-    fn see(&mut self, status: &Status<B>, now: Instant) -> Sight {
-        let is_enough = match status {
-            Status::Velocity(speed) if !B::is_still(*speed) => {
-                self.seen = None;
-                return Sight::MovingSince(now);
-            }
-            Status::Velocity(_) => true,
-            Status::Position(_) => self.is_second,
+    /// be of the same place: it takes three, and no answer in between that is far away. A node that
+    /// stands elsewhere has not obeyed.
+    fn see(&mut self, status: &Status<B>, asked_at: Instant, now: Instant) -> Sight {
+        let is_still = self.stage == Stage::Still;
+        let limit = if is_still { 2 * HOLD_COUNTS } else { HOLD_COUNTS };
+        let is_away = match (status, &self.hold) {
+            (Status::Velocity(speed), _) => !B::is_still(*speed),
+            (Status::Position(here), Some(hold)) => B::distance(*here, *hold) > limit,
+            (Status::Position(_), None) => false,
         };
+        if is_away {
+            self.seen = None;
+            return Sight::MovingSince(now);
+        }
+        if is_still {
+            return Sight::Still;
+        }
+        let is_enough = matches!(status, Status::Velocity(_)) || self.is_second;
         let way = match (&self.seen, status) {
             (Some((Status::Position(there), _)), Status::Position(here)) => {
                 B::distance(*here, *there)
@@ -583,7 +664,9 @@ impl<B: Board> Stop<B> {
             _ => 0,
         };
         let (is_far, is_very_far) = (way > STILL_COUNTS, way > 2 * STILL_COUNTS);
-        let sight = match self.seen.map(|(_, at)| (at, now - at)) {
+        // A late answer may have been measured as soon as it was asked for.
+        let measured_at = now.min(asked_at + PROMPT);
+        let sight = match self.seen.map(|(_, at)| (at, measured_at - at)) {
             Some((at, age)) if is_very_far || is_far && age >= STILL_TIME + STILL_TIME => {
                 self.is_second = false;
                 Sight::MovingSince(at)
@@ -621,9 +704,13 @@ pub enum StopProgress {
     /// stop is repeated.
     Confirmed,
     /// Confirmed, but the motor still moves after
-    /// [`MasterConfig::coast`](super::MasterConfig::coast). The stop is repeated.
+    /// [`MasterConfig::coast`](super::MasterConfig::coast), or is more than 1/32 of a turn away
+    /// from the position that it was told to hold. The stop is repeated.
     StillMoving,
     /// Answers at least 20 ms apart have shown a motor that is still: two below 0.05 rps, or three
-    /// positions within 8 counts.
+    /// positions within 8 counts, no more than 1/32 of a turn away from the position to hold. An
+    /// answer above 0.05 rps, or more than 1/16 of a turn away, ends this, unless the node was
+    /// [released](super::Master::release) or is polled by hand
+    /// ([`Polling::Manual`](super::Polling::Manual)).
     StandingStill,
 }

@@ -3,6 +3,7 @@
 use super::{
     event::{Cause, Change, Changes, MasterEvent},
     line::{Response, Window},
+    queue::index_of,
     role::Master,
 };
 use crate::{
@@ -17,15 +18,16 @@ impl<B: Board> Master<B> {
     /// Handles a response.
     pub(super) fn hear(&mut self, id: NodeId, status: Status<B>, now: Instant) {
         let response = self.line.judge(id, &self.config, now);
-        let coast = self.config.coast;
-        let node = self.node_mut(id);
+        let node = &mut self.nodes[index_of(id)];
         let changes = match response {
-            Response::Answer(latency) => node.hear_answer(&status, latency, coast, now),
+            Response::Answer { asked_at, latency } => {
+                node.hear_answer(&status, asked_at, latency, &self.config, now)
+            }
             Response::Early => node.hear_outside_window(status.mode(), true),
             Response::Late => node.hear_outside_window(status.mode(), false),
         };
         self.tell_changes(id, changes);
-        if matches!(response, Response::Answer(_)) {
+        if matches!(response, Response::Answer { .. }) {
             self.settle_discovery();
         }
     }

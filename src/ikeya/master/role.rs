@@ -38,13 +38,16 @@ const EVENTS: usize = 16;
 /// the WRITE, so the stop is repeated until two answers of a velocity node, or three of a position
 /// node, at least 20 ms apart, show a motor that is still ([`MasterEvent::StandingStill`]),
 /// whatever happens on the line, in the port or in the event queue. A motor that still moves after
-/// [`MasterConfig::coast`] is reported ([`MasterEvent::StillMoving`]), and stopped further.
+/// [`MasterConfig::coast`] is reported ([`MasterEvent::StillMoving`]), and stopped further; so is
+/// one that is polled and moves again.
 ///
 /// * A velocity node is told 0 rps.
 /// * A position node is read, and told to hold the position of that answer (I6). It may move back
 ///   by the distance it has run since the measurement: the speed times the time from the answer to
 ///   the WRITE. The WRITE is sent next, so that time is about 0.2 ms on a dedicated line. A USB
-///   adapter that delays answers adds its delay.
+///   adapter that delays answers adds its delay. It is still when it is at most 1/32 of a turn away
+///   from that position. If a position is to be measured again, or held by another stop, the former
+///   one is kept unless the node is farther away: a loaded motor stands beside what it holds.
 /// * A velocity node that is abnormal is told 0 rps blind, every 20 ms; a position node is read in
 ///   every other turn of the search, and stopped when it answers (I13).
 /// * A node that becomes abnormal while under a set-point is owed a stop; so is every node under a
@@ -170,7 +173,8 @@ impl<B: Board> Master<B> {
     ///
     /// A node that has never answered is read first. A repeated call joins the stop that is owed;
     /// if the application was told that the motor still moves, [`MasterConfig::coast`] begins
-    /// anew. A call after the node is still begins a new stop, holding the same position.
+    /// anew. A call after the node is still begins a new stop: a position node is read, and holds
+    /// the same position if it is there.
     pub fn stop(&mut self, node: NodeId, now: Instant) {
         self.sign_of_life(now);
         self.owe_stop(node);
@@ -304,7 +308,7 @@ impl<B: Board> Master<B> {
         }
         let turn = self.queue.choose(self.view())?;
         let node = &mut self.nodes[index_of(turn.node)];
-        let request = node.request(turn.reason);
+        let request = node.request(turn.reason, self.config.polling);
         if !self.line.takes(turn, &request, now) {
             return None;
         }

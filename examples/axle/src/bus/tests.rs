@@ -218,6 +218,31 @@ fn a_motor_that_turns_on_is_told_two_seconds_after_it_has_confirmed_its_stop() {
 }
 
 #[test]
+fn a_motor_at_rest_whose_node_was_lost_and_came_back_late_is_not_said_to_move() {
+    let bus = on(&turning(|_, _| {}).line, NodeId::N1.into());
+    let longest = bus.master().stop_bound() + bus.master().config().coast;
+    let complaints = (0..200).step_by(4).map(|before_ms| {
+        let out = span(longest) - Span::from_millis(before_ms);
+        let mut lost = None;
+        let line = turning(move |_, bus| {
+            let stops = bus.said.iter().filter(|(said, _)| matches!(said, Said::Write(1, ..)));
+            if lost.is_none() && stops.count() == 3 {
+                lost = Some(clock::now());
+            }
+            bus.nodes[0].is_dumb = lost.is_some_and(|at| clock::since(at) < out);
+        });
+        let mut bus = on(&line.line, NodeId::N1.into());
+        bus.discover(&Signals::none()).unwrap();
+        bus.stop(NodeId::N1.into()).unwrap();
+        bus.complaint(NodeId::N1)
+    });
+    let complaints: Vec<_> = complaints.flatten().collect();
+    let unseen = "node 1 confirmed the stop, but was not seen to be still: it may be moving";
+    assert!(complaints.iter().any(|it| it == unseen), "{complaints:?}");
+    assert!(!complaints.iter().any(|it| it.contains("still moving")), "{complaints:?}");
+}
+
+#[test]
 fn a_stop_during_which_the_tool_is_suspended_has_all_of_its_time_afterwards() {
     // Until a second after it, the node does not answer, or the motor turns on.
     for is_dumb in [true, false] {
