@@ -113,9 +113,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         &mut self.port
     }
 
-    /// Role, port and clock. Unsent bytes are discarded.
+    /// Role, port and clock. Unsent and unflushed bytes are discarded, see
+    /// [`discard`](Self::discard).
     #[must_use]
-    pub fn into_parts(self) -> (R, P, C) {
+    pub fn into_parts(mut self) -> (R, P, C) {
+        self.discard();
         (self.role, self.port, self.clock)
     }
 

@@ -68,6 +68,26 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
 }
 
 #[test]
+fn a_stop_of_which_a_part_has_left_is_sent_twice_through_a_reopened_port() {
+    for is_async in [false, true] {
+        let (wire, mut host) = host();
+        let now = host.now();
+        host.role_mut().stop(now);
+        wire.write_only(10);
+        assert!(host.service().is_err());
+        let cut = wire.sent().len();
+        wire.write_all();
+        let (role, port, clock) = host.into_parts();
+        let mut host = Driver::new(role, port, clock);
+        call!(is_async, host, stop, stop_async()).unwrap();
+        let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
+        let stop = FrameOf::<MotorControl>::LEN;
+        assert_eq!(sent.len(), 2 * stop);
+        assert!(sent.chunks(stop).all(|frame| frame[6..10] == [0; 4]));
+    }
+}
+
+#[test]
 fn a_stop_that_a_port_cut_in_two_is_sent_again() {
     let fails_10_ms = [Step::Few(10)].into_iter().chain(vec![Step::Error; 10]);
     let pauses = [

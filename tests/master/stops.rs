@@ -158,16 +158,48 @@ fn a_read_of_a_node_that_was_turned_by_hand_does_not_drive_it_back() {
 }
 
 #[test]
-fn a_confirmation_of_a_stop_that_is_still_ends_whatever_the_polling() {
+fn a_confirmation_of_a_stop_that_is_still_ends_and_is_refused_if_nobody_polls() {
     for polling in [Polling::Fastest, Polling::Every(MS(20)), Polling::Manual] {
         for node in [N1, N3] {
             let mut desk = Desk::stopping(with(direct(), |it| it.polling = polling), node);
             desk.until(node.0, StopProgress::StandingStill);
             desk.news();
-            desk.master.confirm(node.0, desk.now).unwrap();
-            desk.run(MS(100));
-            assert_eq!(desk.news(), [MasterEvent::Confirmed { node: node.0 }]);
+            let asked = desk.master.confirm(node.0, desk.now);
+            let sent = desk.run(MS(100));
+            if polling == Polling::Manual {
+                assert_eq!(asked, Err(CommandError::NoSetPoint { node: node.0 }));
+                assert_eq!((sent, desk.news()), (vec![], vec![]));
+            } else {
+                assert_eq!(desk.news(), [MasterEvent::Confirmed { node: node.0 }]);
+            }
         }
+    }
+}
+
+#[test]
+fn a_stop_that_was_released_is_not_repeated_once_it_is_still_whenever_that_was() {
+    for (released_at, is_lost) in [
+        (StopProgress::Owed, false),
+        (StopProgress::Owed, true),
+        (StopProgress::Confirmed, false),
+        (StopProgress::Confirmed, true),
+        (StopProgress::StandingStill, true),
+    ] {
+        let mut desk = Desk::stopping_at(direct(), turns(40));
+        desk.until(NodeId::N3, released_at);
+        desk.master.release(NodeId::N3);
+        if is_lost {
+            desk.lose(NodeId::N3);
+            desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        }
+        desk.run(MS(300));
+        let progress = desk.master.stop_progress(NodeId::N3);
+        let is_over = released_at == StopProgress::StandingStill;
+        let expected = if is_over { StopProgress::NotAsked } else { StopProgress::StandingStill };
+        assert_eq!(progress, expected, "{released_at:?}, {is_lost}");
+        // Somebody works on it.
+        desk.answer(NodeId::N3, Answer::Position(turns(43)));
+        assert_eq!(writes(&desk.run(MS(2000))), Vec::<Vec<u8>>::new());
     }
 }
 

@@ -112,7 +112,7 @@ impl<B: Kit> Bus<B> {
             }
             if account.coasting_since.is_some() && !owed.contains(node) {
                 // Of a position node, two answers show that it moves.
-                let is_velocity = self.motors[index].mode == Mode::Velocity;
+                let is_velocity = account.record == Some(Mode::Velocity);
                 let (least, most) = (1, if is_velocity { 1 } else { 2 });
                 match progress {
                     StopProgress::StandingStill if !self.motors[index].is_told_to_stop => {

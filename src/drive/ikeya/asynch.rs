@@ -16,8 +16,8 @@ use crate::{
 /// The async calls of a master: the same as the blocking ones, and cancel safe as the
 /// [module](crate::drive) describes.
 ///
-/// A set-point is sent even if its call is cancelled, and a cancelled stop is still owed. After a
-/// cancelled discovery or read, call it again.
+/// Once a call has been polled, its set-point is sent even if the call is cancelled, and a
+/// cancelled stop is still owed. After a cancelled discovery or read, call it again.
 impl<B: Board, P, C> Driver<Master<B>, P, C>
 where
     P: embedded_io_async::Read + embedded_io_async::Write,

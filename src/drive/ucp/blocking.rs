@@ -39,7 +39,9 @@ where
     ///
     /// # Errors
     ///
-    /// [`DriveError::Rover`], and port errors.
+    /// [`DriveError::Rover`], and port errors. **After a port error the command stays in force**
+    /// until 500 ms after this call, and is sent when the port works again: call
+    /// [`stop`](Self::stop).
     pub fn drive(&mut self, speed: i16, angular: i16) -> Result<(), DriveError<P::Error>> {
         self.command(speed, angular)?;
         self.service()

@@ -186,11 +186,11 @@ impl<B: Board> Node<B> {
         changes.with(Change::Undecided, is_new && self.mode.is_undecided())
     }
 
-    pub(super) fn confirm(&mut self, node: NodeId) -> Result<(), CommandError> {
+    pub(super) fn confirm(&mut self, node: NodeId, polling: Polling) -> Result<(), CommandError> {
         if !self.is_online() {
             return Err(CommandError::NotOnline { node });
         }
-        if !self.order.confirm() {
+        if !self.order.confirm(polling) {
             return Err(CommandError::NoSetPoint { node });
         }
         Ok(())

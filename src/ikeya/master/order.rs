@@ -99,7 +99,7 @@ impl<B: Board> Order<B> {
     pub(super) fn release(&mut self) -> bool {
         match &mut self.state {
             State::SetPoint(_) => self.state = State::Released,
-            State::Stop(stop) => stop.is_released = stop.stage != Stage::Owed,
+            State::Stop(stop) => stop.is_released = true,
             State::None | State::Released => {}
         }
         self.end_confirmation()
@@ -192,9 +192,11 @@ impl<B: Board> Order<B> {
         self.end_confirmation()
     }
 
-    /// Asks for a confirmation; returns whether there is a set-point to confirm.
-    pub(super) fn confirm(&mut self) -> bool {
-        let is_confirmable = self.target().is_some();
+    /// Asks for a confirmation; returns whether there is a set-point to confirm. A node that is
+    /// still and not polled gets no WRITE.
+    pub(super) fn confirm(&mut self, polling: Polling) -> bool {
+        let is_repeated = polling != Polling::Manual || !self.is_still();
+        let is_confirmable = is_repeated && self.target().is_some();
         if is_confirmable {
             self.confirm = Confirm::AfterWrite;
         }
@@ -268,7 +270,11 @@ impl<B: Board> Order<B> {
 
     /// Whether the node is seen to be still after a stop, and no WRITE is asked for.
     pub(super) fn is_left_alone(&self) -> bool {
-        !self.awaits_confirmation() && self.stop().is_some_and(|stop| stop.stage == Stage::Still)
+        !self.awaits_confirmation() && self.is_still()
+    }
+
+    fn is_still(&self) -> bool {
+        self.stop().is_some_and(|stop| stop.stage == Stage::Still)
     }
 
     pub(super) fn progress(&self) -> StopProgress {
@@ -526,7 +532,7 @@ impl<B: Board> Stop<B> {
         let hold = self.hold;
         self.restart();
         self.hold = hold;
-        (self.is_asked, self.is_released, self.lost_attempts) = (false, false, 0);
+        (self.is_asked, self.lost_attempts) = (false, 0);
     }
 
     fn wrote(&mut self, now: Instant) {

@@ -209,10 +209,13 @@ impl<B: Board> Master<B> {
     ///
     /// # Errors
     ///
-    /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] if there is none to confirm.
+    /// [`CommandError::NotOnline`], and [`CommandError::NoSetPoint`] if there is none to confirm:
+    /// none is repeated for a node that is still after a stop with
+    /// [`Polling::Manual`](super::Polling::Manual).
     pub fn confirm(&mut self, node: NodeId, now: Instant) -> Result<(), CommandError> {
         self.now = now;
-        self.node_mut(node).confirm(node)
+        let polling = self.config.polling;
+        self.node_mut(node).confirm(node, polling)
     }
 
     /// Reads a node once, in addition to polling. Use it with

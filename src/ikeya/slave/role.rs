@@ -130,7 +130,7 @@ impl<B: Board> Slave<B> {
     }
 
     /// Changes the mode, as when the switch is moved. The command is dropped: it was meant for the
-    /// other mode.
+    /// other mode, and its watchdog ends with it: **stop the motor yourself**.
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
@@ -250,6 +250,14 @@ impl<B: Board> Slave<B> {
     fn watchdog_at(&self) -> Option<Instant> {
         Some(self.commanded_at? + self.config.watchdog?)
     }
+
+    fn expire_command(&mut self, now: Instant) {
+        if reached(self.watchdog_at(), now) {
+            (self.command, self.commanded_at) = (None, None);
+            count(&mut self.statistics.watchdog);
+            self.tell(SlaveEvent::Watchdog);
+        }
+    }
 }
 
 impl<B: Board> Endpoint for Slave<B> {
@@ -263,11 +271,7 @@ impl<B: Board> Endpoint for Slave<B> {
         if self.requests.settle(now) {
             self.receive(&[], self.requests.last());
         }
-        if reached(self.watchdog_at(), now) {
-            (self.command, self.commanded_at) = (None, None);
-            count(&mut self.statistics.watchdog);
-            self.tell(SlaveEvent::Watchdog);
-        }
+        self.expire_command(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
@@ -313,6 +317,8 @@ impl<B: Board> Endpoint for Slave<B> {
             self.overtake();
             self.requests.receive(since, now);
             self.receive(bytes, since);
+            // A command may be too old already.
+            self.expire_command(now);
         }
     }
 
