@@ -188,7 +188,7 @@ fn overrun(lag_ms: f64, at_us: u32) -> Answer {
 fn a_position_node_that_passes_a_place_twice_as_it_comes_back_is_not_still() {
     for polling in [Polling::Fastest, Polling::Manual, Polling::Every(MS(20))] {
         for lag_ms in [5.0, 8.0, 12.0, 18.0, 25.0] {
-            for phase_us in (0..20_000).step_by(500) {
+            for phase_us in (0..20_000).step_by(1000) {
                 let mut desk = Desk::stopping(with(direct(), |it| it.polling = polling), N3);
                 desk.now += US(phase_us);
                 let begin = desk.now;
