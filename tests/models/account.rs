@@ -299,6 +299,12 @@ impl Account {
         }
     }
 
+    /// The count that it has shown last, for this stop.
+    pub(crate) fn last_count(&self) -> Option<i16> {
+        let last = self.places_heard.checked_sub(1)?;
+        self.places_heard_at[last as usize % 4].map(|(count, _)| count)
+    }
+
     /// The answer arrived in its window.
     pub(crate) fn hear_answer(&mut self, mode: Mode, place: (i16, i16), at: Instant) {
         (self.misses, self.guard_until) = (0, None);

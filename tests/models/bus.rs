@@ -329,9 +329,12 @@ impl<B: Kit> Bus<B> {
             self.asked = None;
             self.line_free = at + self.master.config().turnaround_gap;
             let account = self.account(reply.node);
+            // A motor that comes back to what it holds moves too.
+            let comes_back = account.last_count().is_some_and(|it| it.abs_diff(reply.place.0) > 16);
+            let is_moving = reply.is_moving || reply.mode == Mode::Position && comes_back;
             account.hear_answer(reply.mode, reply.place, at);
             let is_late = account.coasts_from.is_some_and(|since| at >= since + COAST);
-            if is_late && (reply.is_moving || account.is_away) && !account.is_in_doubt {
+            if is_late && (is_moving || account.is_away) && !account.is_in_doubt {
                 match account.coasting_since {
                     Some(_) => account.late_moves = (account.late_moves + 1).min(2),
                     None => account.has_moved_late = true,
