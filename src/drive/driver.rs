@@ -115,6 +115,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Role, port and clock. Unsent and unflushed bytes are discarded, see
     /// [`discard`](Self::discard).
+    ///
+    /// Another driver does not know what this one knew of the port: which bytes in it are old, what
+    /// it still holds, and whether the clock has stepped back. **To reopen a port, replace it by
+    /// [`port_mut`](Self::port_mut)** and call `discard`. Give a role to another driver only a
+    /// second later, and with a port whose input is empty.
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();

@@ -204,6 +204,39 @@ fn a_stop_that_was_released_is_not_repeated_once_it_is_still_whenever_that_was()
 }
 
 #[test]
+fn a_confirmation_that_is_asked_for_just_before_standstill_writes_nothing_to_a_node_not_polled() {
+    for exchanges in 1..12 {
+        let mut desk = Desk::stopping_at(manual(), turns(40));
+        desk.packets(exchanges);
+        let is_asked = desk.master.confirm(NodeId::N3, desk.now).is_ok();
+        desk.until(NodeId::N3, StopProgress::StandingStill);
+        assert_eq!(desk.packets(4), Vec::<Vec<u8>>::new(), "{exchanges}");
+        let news = desk.news().into_iter();
+        let ends = news.filter(|it| {
+            matches!(it, MasterEvent::Confirmed { .. } | MasterEvent::NotConfirmed { .. })
+        });
+        assert_eq!(ends.count(), usize::from(is_asked), "{exchanges}");
+    }
+}
+
+#[test]
+fn a_hold_behind_which_no_answer_has_come_is_looked_at_again_after_a_pause() {
+    for misses in 0..6 {
+        let mut desk = Desk::stopping_at(direct(), turns(40));
+        desk.turn_with(340, &position(NodeId::N3, turns(40)));
+        for _ in 0..misses {
+            // The WRITE and the READ behind it are lost.
+            desk.miss();
+        }
+        desk.now += MS(3000);
+        desk.answer(NodeId::N3, Answer::Position(turns(70)));
+        let sent = desk.run(MS(50));
+        let last = writes(&sent).into_iter().find(|it| it[0] == WRITE).unwrap();
+        assert_eq!(last, hold(NodeId::N3, turns(70)), "{misses}");
+    }
+}
+
+#[test]
 fn a_hold_that_is_kept_and_cannot_be_written_for_20_ms_is_looked_at_again() {
     for (late_us, is_read) in [(20_000, false), (20_001, true), (3_000_000, true)] {
         let mut desk = Desk::stopping_at(manual(), turns(40));

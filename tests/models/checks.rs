@@ -82,10 +82,13 @@ impl<B: Kit> Bus<B> {
                 MasterEvent::NotConfirmed { node, .. } => {
                     let attempts = self.master.config().attempts.clamp(1, STRIKES);
                     let is_still = self.master.stop_progress(node) == StopProgress::StandingStill;
-                    let is_left = is_still && self.master.set_point(node).is_none();
+                    let is_manual = self.master.config().polling == Polling::Manual;
+                    let has_target = self.master.set_point(node).is_some();
+                    let is_left = is_still && (is_manual || !has_target);
                     let account = self.account(node);
                     let confirm = std::mem::take(&mut account.confirm);
-                    // A stop that was released has no more WRITE once it is still.
+                    // A stop that was released, or is not polled, has no more WRITE once it is
+                    // still.
                     let is_dropped = confirm == Confirm::Fails || is_left;
                     if !is_dropped && account.misses < attempts {
                         return Err(format!("NotConfirmed without a reason: {confirm:?}"));

@@ -51,15 +51,15 @@
 //!
 //! | World, for both kinds of boards | Consecutive actions | States in each |
 //! |---|---|---|
-//! | a fresh master of one node, in small steps | 7 | 41,000 to 45,000 |
-//! | a fresh master of two nodes, in small steps | 6 | 44,000 to 45,000 |
-//! | one known node, in small steps | 6 | 29,000 to 159,000 |
-//! | two known nodes, in small steps | 4 | 21,000 to 22,000 |
-//! | one node, an exchange at a time | 6 | 27,000 to 176,000 |
-//! | one node whose mode is, or stays, in doubt | 4 | 2,200 to 6,600 |
-//! | one node, with other settings | 6 | 28,000 to 170,000 |
-//! | two nodes, an exchange at a time | 4 | 4,100 to 22,000 |
-//! | two nodes that are commanded and stopped continuously | 9 | 96,000 to 108,000 |
+//! | a fresh master of one node, in small steps | 7 | 48,000 to 52,000 |
+//! | a fresh master of two nodes, in small steps | 6 | 55,000 to 57,000 |
+//! | one known node, in small steps | 6 | 37,000 to 166,000 |
+//! | two known nodes, in small steps | 4 | 22,000 to 24,000 |
+//! | one node, an exchange at a time | 6 | 41,000 to 174,000 |
+//! | one node whose mode is, or stays, in doubt | 4 | 2,800 to 6,700 |
+//! | one node, with other settings | 6 | 29,000 to 163,000 |
+//! | two nodes, an exchange at a time | 4 | 5,700 to 22,000 |
+//! | two nodes that are commanded and stopped continuously | 9 | 99,000 to 120,000 |
 //! | a slave | 4 | 19,000 to 26,000 |
 //!
 //! A normal run tries 2 or 3 consecutive actions from each of about thirty states of a host and a

@@ -384,7 +384,7 @@ impl<B: Board> Node<B> {
             Reason::Repeat => self.stop_target(),
             Reason::Cycle if self.order.is_written() => None,
             // With no cycle, a node that is still may have been moved by hand since it was read.
-            Reason::Cycle if polling == Polling::Manual && self.order.is_left_alone() => None,
+            Reason::Cycle if polling == Polling::Manual && self.order.is_still() => None,
             Reason::SetPoint | Reason::Cycle => self.order.target(),
             _ => self.stop_write(),
         };

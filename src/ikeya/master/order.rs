@@ -268,12 +268,8 @@ impl<B: Board> Order<B> {
         self.stop().filter(|stop| stop.stage == Stage::Confirmed)
     }
 
-    /// Whether the node is seen to be still after a stop, and no WRITE is asked for.
-    pub(super) fn is_left_alone(&self) -> bool {
-        !self.awaits_confirmation() && self.is_still()
-    }
-
-    fn is_still(&self) -> bool {
+    /// Whether the node is seen to be still after a stop.
+    pub(super) fn is_still(&self) -> bool {
         self.stop().is_some_and(|stop| stop.stage == Stage::Still)
     }
 
@@ -375,8 +371,10 @@ impl<B: Board> Order<B> {
             _ => Changes::NONE,
         };
         let is_confirmed = self.confirm == Confirm::AfterAnswer && self.end_confirmation();
-        // A stop that was released has no WRITE to be confirmed once it is still.
-        let is_dropped = self.target().is_none() && self.end_confirmation();
+        // A node that is still gets no WRITE to be confirmed if it was released or is not polled.
+        let is_over =
+            self.target().is_none() || config.polling == Polling::Manual && self.is_still();
+        let is_dropped = is_over && self.end_confirmation();
         settled.with(Change::Confirmed, is_confirmed).with(Change::Dropped, is_dropped)
     }
 }
@@ -582,10 +580,10 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Gives up a position that could not be written at once, allowing for the `gap` after each
-    /// packet.
+    /// Gives up a position behind which no answer has come at once, allowing for the `gap` after
+    /// each packet.
     fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        let is_due = self.stage == Stage::Owed && self.is_there && !self.is_heard();
+        let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
         if is_due && now - self.measured_at > self.patience + gap {
             self.read_again();
         }
