@@ -172,8 +172,7 @@ fn a_stop_that_confirms_a_paid_one_holds_the_same_position_however_late_the_driv
     for late in [MS(0), MS(20), MS(21), MS(500)] {
         let mut desk = Desk::stopping_at(manual(), turns(30));
         desk.packets(9);
-        let beside = Position::from_counts(turns(30).counts() + 200).unwrap();
-        desk.answer(NodeId::N3, Answer::Position(beside));
+        desk.answer(NodeId::N3, Answer::Position(beside(turns(30), 200)));
         desk.master.stop(NodeId::N3, desk.now);
         desk.now += late;
         assert_eq!(desk.packets(1), [read(NodeId::N3)]);

@@ -48,6 +48,11 @@ pub(crate) fn writes(packets: &[Vec<u8>]) -> Vec<Vec<u8>> {
     packets.iter().filter(|packet| packet[0] == WRITE).cloned().collect()
 }
 
+/// A position this far beside another one.
+pub(crate) fn beside(place: Position, counts: i32) -> Position {
+    Position::from_counts(place.counts() + counts).unwrap()
+}
+
 /// The event of a reading.
 pub(crate) fn reading(node: NodeId, status: Status) -> MasterEvent {
     MasterEvent::Status { node, status }

@@ -109,11 +109,6 @@ fn a_hold_is_the_set_point_and_is_repeated_with_the_same_value() {
     assert_eq!(desk.news(), [STOPPED_3]);
 }
 
-/// A position this far beside another one.
-fn beside(place: Position, counts: i32) -> Position {
-    Position::from_counts(place.counts() + counts).unwrap()
-}
-
 #[test]
 fn a_new_stop_of_a_node_that_was_turned_meanwhile_does_not_drive_it_back() {
     for away in [257, -257, 50 * 8192] {

@@ -284,6 +284,19 @@ fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
 }
 
 #[test]
+fn an_old_command_for_which_the_watchdog_is_over_is_no_command_but_a_watchdog() {
+    let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
+    for (age_ms, event) in
+        [(99, SlaveEvent::Command(Target::Velocity(rps(5.0)))), (100, SlaveEvent::Watchdog)]
+    {
+        let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
+        slave.handle_old_input(&write(NodeId::N2, 5.0), T0, T0 + MS(age_ms));
+        assert_eq!(slave.poll_event(), Some(event), "{age_ms} ms");
+        assert_eq!(slave.poll_event(), None);
+    }
+}
+
+#[test]
 fn an_old_request_that_a_false_header_held_back_is_not_answered() {
     let now = T0 + MS(70);
     let held = [&[0xBB, 0x02], &read(NodeId::N2)[..]].concat();

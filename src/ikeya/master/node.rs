@@ -383,9 +383,7 @@ impl<B: Board> Node<B> {
             Reason::LostStop | Reason::SearchLost | Reason::Search if !B::ANSWERS_WRITE => None,
             Reason::Repeat => self.stop_target(),
             Reason::Cycle if self.order.is_written() => None,
-            // With no cycle, a node that is still may have been moved by hand since it was read.
-            Reason::Cycle if polling == Polling::Manual && self.order.is_still() => None,
-            Reason::SetPoint | Reason::Cycle => self.order.target(),
+            Reason::SetPoint | Reason::Cycle => self.order.cycle_target(polling),
             _ => self.stop_write(),
         };
         target.map_or(Request::Read, Request::Write)

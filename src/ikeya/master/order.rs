@@ -16,8 +16,8 @@ use crate::{
 /// Stop WRITEs that must be followed by a good answer before a stop is confirmed.
 const CONFIRMATIONS: u8 = 2;
 
-/// Time within which a measured position must be written, or it is measured again. It doubles with
-/// each position that is given up, so that even a slow loop eventually writes one.
+/// Time within which a WRITE of a measured position must be followed by an answer, or the node is
+/// read again. It doubles each time, so that even a slow loop eventually writes one.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
 
 /// Minimum time between two answers that show a standstill.
@@ -192,11 +192,9 @@ impl<B: Board> Order<B> {
         self.end_confirmation()
     }
 
-    /// Asks for a confirmation; returns whether there is a set-point to confirm. A node that is
-    /// still and not polled gets no WRITE.
+    /// Asks for a confirmation; returns whether there is a set-point to confirm.
     pub(super) fn confirm(&mut self, polling: Polling) -> bool {
-        let is_repeated = polling != Polling::Manual || !self.is_still();
-        let is_confirmable = is_repeated && self.target().is_some();
+        let is_confirmable = self.cycle_target(polling).is_some();
         if is_confirmable {
             self.confirm = Confirm::AfterWrite;
         }
@@ -223,6 +221,12 @@ impl<B: Board> Order<B> {
             State::Stop(stop) => stop.repeated(),
             State::None | State::Released => None,
         }
+    }
+
+    /// The target that goes in front of a READ in the cycle. With no cycle, a node that is still
+    /// gets none: it may have been moved by hand since it was read.
+    pub(super) fn cycle_target(&self, polling: Polling) -> Option<Target<B>> {
+        self.target().filter(|_| polling != Polling::Manual || !self.is_still())
     }
 
     /// Whether the target has not been sent yet.
@@ -269,7 +273,7 @@ impl<B: Board> Order<B> {
     }
 
     /// Whether the node is seen to be still after a stop.
-    pub(super) fn is_still(&self) -> bool {
+    fn is_still(&self) -> bool {
         self.stop().is_some_and(|stop| stop.stage == Stage::Still)
     }
 
@@ -285,7 +289,7 @@ impl<B: Board> Order<B> {
         }
     }
 
-    /// Gives up a measured position that could not be written at once.
+    /// Reads the node again if no answer has come in time behind a measured position.
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
         if let State::Stop(stop) = &mut self.state {
             stop.forget_old_hold(now, gap);
@@ -372,9 +376,7 @@ impl<B: Board> Order<B> {
         };
         let is_confirmed = self.confirm == Confirm::AfterAnswer && self.end_confirmation();
         // A node that is still gets no WRITE to be confirmed if it was released or is not polled.
-        let is_over =
-            self.target().is_none() || config.polling == Polling::Manual && self.is_still();
-        let is_dropped = is_over && self.end_confirmation();
+        let is_dropped = self.cycle_target(config.polling).is_none() && self.end_confirmation();
         settled.with(Change::Confirmed, is_confirmed).with(Change::Dropped, is_dropped)
     }
 }
@@ -395,8 +397,6 @@ pub(super) struct Stop<B: Board> {
     is_told: bool,
     /// Whether it was confirmed, even if that was lost again.
     was_confirmed: bool,
-    /// Whether a WRITE was sent since the node was read at `hold`.
-    is_held: bool,
     /// Stop WRITEs that were followed by a good answer.
     followed: u8,
     /// Attempts made while the node was not online.
@@ -411,7 +411,7 @@ pub(super) struct Stop<B: Board> {
     hold: Option<B::Position>,
     /// When it was read there.
     measured_at: Instant,
-    /// Time within which it must be written.
+    /// Time within which an answer must follow its WRITE.
     patience: Duration,
     /// Time of the latest stop WRITE, unless it was taken back.
     written_at: Option<Instant>,
@@ -442,7 +442,6 @@ impl<B: Board> Stop<B> {
             is_told: false,
             was_confirmed: false,
             is_second: false,
-            is_held: false,
             followed: 0,
             lost_attempts: 0,
             is_there: false,
@@ -469,11 +468,6 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Whether a WRITE of the position to hold has left, or an answer has followed one.
-    const fn is_heard(&self) -> bool {
-        self.is_held || self.followed > 0
-    }
-
     /// The position to hold, unless the node is to be read first.
     fn held(&self) -> Option<B::Position> {
         self.hold.filter(|_| self.is_there)
@@ -497,7 +491,8 @@ impl<B: Board> Stop<B> {
 
     /// Whether a position has been measured for it but not written yet.
     pub(super) fn is_measured(&self) -> bool {
-        self.is_asked && !self.is_heard() && self.held().is_some()
+        let is_unheard = self.followed == 0 && self.written_at.is_none();
+        self.is_asked && is_unheard && self.held().is_some()
     }
 
     pub(super) const fn lost_attempts(&self) -> u8 {
@@ -522,7 +517,7 @@ impl<B: Board> Stop<B> {
         }
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
         (self.is_written, self.written_at) = (false, None);
-        (self.hold, self.is_there, self.is_held) = (None, false, false);
+        (self.hold, self.is_there) = (None, false);
     }
 
     /// The node is abnormal. It has no more time to become still than before.
@@ -534,8 +529,7 @@ impl<B: Board> Stop<B> {
     }
 
     fn wrote(&mut self, now: Instant) {
-        (self.is_written, self.is_held) = (true, true);
-        self.written_at = Some(now);
+        (self.is_written, self.written_at) = (true, Some(now));
     }
 
     /// The application asks again: it is told again, `coast` later, that the node still moves.
@@ -548,8 +542,7 @@ impl<B: Board> Stop<B> {
     }
 
     fn take_back_write(&mut self) {
-        (self.is_written, self.is_held) = (false, false);
-        self.written_at = None;
+        (self.is_written, self.written_at) = (false, None);
     }
 
     /// Keeps the position of an answer to hold, if it was requested after the stop and the stop is
@@ -568,7 +561,7 @@ impl<B: Board> Stop<B> {
         if !is_near {
             self.hold = Some(position);
         }
-        (self.measured_at, self.is_there, self.is_held) = (now, true, false);
+        (self.measured_at, self.is_there) = (now, true);
     }
 
     /// If the node has perhaps never heard the position to hold, it is read first. Not each time: a
@@ -580,8 +573,8 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Gives up a position behind which no answer has come at once, allowing for the `gap` after
-    /// each packet.
+    /// Reads the node again if no answer has come in time behind the measured position, allowing
+    /// for the `gap` after each packet.
     fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
         let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
         if is_due && now - self.measured_at > self.patience + gap {
@@ -699,7 +692,9 @@ enum Sight {
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StopProgress {
-    /// The node's latest command, if any, is not a stop.
+    /// No stop is watched: the node's latest command, if any, is not a stop; or the node was lost
+    /// after it was still, and it was released or
+    /// [`stops_abnormal`](super::MasterConfig::stops_abnormal) is off.
     NotAsked,
     /// The stop is not confirmed: set-points are refused.
     Owed,

@@ -45,9 +45,9 @@ const EVENTS: usize = 16;
 /// * A position node is read, and told to hold the position of that answer (I6). It may move back
 ///   by the distance it has run since the measurement: the speed times the time from the answer to
 ///   the WRITE. The WRITE is sent next, so that time is about 0.2 ms on a dedicated line. A USB
-///   adapter that delays answers adds its delay. It is still when it is at most 1/32 of a turn away
-///   from that position. If a position is to be measured again, or held by another stop, the former
-///   one is kept unless the node is farther away: a loaded motor stands beside what it holds.
+///   adapter that delays answers adds its delay. It counts as still only within 1/32 of a turn of
+///   that position. When the node is read again, or stopped again, it keeps the position unless it
+///   is farther away: a loaded motor stands beside what it holds.
 /// * A velocity node that is abnormal is told 0 rps blind, every 20 ms; a position node is read in
 ///   every other turn of the search, and stopped when it answers (I13).
 /// * A node that becomes abnormal while under a set-point is owed a stop; so is every node under a
