@@ -12,6 +12,9 @@ pub(super) const CHUNK_LEN: usize = 64;
 /// Reads in a row, at most: 4096 bytes. A line is slower than that; a runaway port is not.
 pub(super) const READS: usize = 64;
 
+/// Age that a request of an earlier driver does not reach: an hour, in microseconds.
+const LONG_US: u64 = 3_600_000_000;
+
 /// Frames sent in one round, at most: a role flooded with requests could go on forever.
 pub(super) const FRAMES: usize = 8;
 
@@ -42,8 +45,8 @@ pub struct Driver<R, P, C> {
     pub(super) empty_at: Instant,
     /// Whether the last look ended there. It may have ended in an error, or at its limit.
     is_empty: bool,
-    /// A frame was handed out although bytes may have waited: up to the next empty port, what is
-    /// received may be from before that frame.
+    /// A frame was handed out although bytes may have waited, by this driver or by one before it:
+    /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
     pub(super) sending: Sending,
 }
@@ -55,8 +58,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Combines a role, a port and a clock. The role must have been made with a time of the same
     /// clock; [`with`](Self::with) ensures that.
+    ///
+    /// A master takes nothing that is in the port already for an answer.
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
+        // A master may have asked through this port before.
+        let empty_at = match role.held_up_after() {
+            Some(_) => latest,
+            None => Instant::from_micros(latest.as_micros().wrapping_sub(LONG_US)),
+        };
         Self {
             role,
             port,
@@ -64,9 +74,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             latest,
             ahead_us: 0,
             looked_at: latest,
-            empty_at: latest,
+            empty_at,
             is_empty: false,
-            has_overtaken: false,
+            has_overtaken: true,
             sending: Sending::new(),
         }
     }
@@ -116,10 +126,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Role, port and clock. Unsent and unflushed bytes are discarded, see
     /// [`discard`](Self::discard).
     ///
-    /// Another driver does not know what this one knew of the port: which bytes in it are old, what
-    /// it still holds, and whether the clock has stepped back. **To reopen a port, replace it by
-    /// [`port_mut`](Self::port_mut)** and call `discard`. Give a role to another driver only a
-    /// second later, and with a port whose input is empty.
+    /// To reopen a port, replace it by [`port_mut`](Self::port_mut) and call `discard`: another
+    /// driver does not know whether the clock has stepped back. If it has, a role that is given to
+    /// another driver waits for as long as the step was.
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();

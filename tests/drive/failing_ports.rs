@@ -137,6 +137,33 @@ fn an_answer_behind_more_bytes_than_a_round_reads_is_not_taken_for_a_later_one()
 }
 
 #[test]
+fn an_answer_that_another_driver_finds_in_its_port_is_not_taken_for_a_later_one() {
+    let mut story = Story::new(MasterConfig::usb_adapter(), Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.set_position(NodeId::N1, Position::new(0, 50)).unwrap();
+    story.bus.port_mut().is_deaf = true;
+    // The answer to the first READ is not read, and the second READ is sent past it.
+    for pause_us in [2_000_000, 500] {
+        let reads = story.bus.role().statistics().reads;
+        while story.bus.role().statistics().reads == reads {
+            let _ = story.bus.service();
+            story.world.step(10);
+        }
+        story.world.step(pause_us);
+    }
+    story.bus.port_mut().is_deaf = false;
+    let (role, port, clock) = story.bus.into_parts();
+    story.bus = Driver::new(role, port, clock);
+    let now = story.bus.now();
+    story.bus.service().unwrap();
+    let (_, heard_at) = story.bus.role().status(NodeId::N1).unwrap();
+    assert!(heard_at < now, "the old answer counts as the new one");
+    story.run(30);
+    let (_, heard_at) = story.bus.role().status(NodeId::N1).unwrap();
+    assert!(heard_at > now, "the next answer does not count");
+}
+
+#[test]
 fn a_stop_of_an_abnormal_node_is_no_success() {
     for is_async in BOTH {
         let mut story = Story::at_10_rps(MasterConfig::direct());
