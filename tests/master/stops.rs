@@ -390,6 +390,22 @@ fn a_hold_that_was_perhaps_never_heard_is_measured_again_and_one_that_was_is_kep
 }
 
 #[test]
+fn an_answer_that_measures_a_hold_again_does_not_follow_the_write_of_the_old_one() {
+    let mut desk = Desk::stopping_at(direct(), turns(40));
+    while writes(&desk.sent).is_empty() {
+        let packet = desk.exchange().unwrap();
+        desk.sent.push(packet);
+    }
+    // The WRITE is lost, and the application is away twice.
+    for place in [turns(60), turns(90)] {
+        desk.now += MS(3000);
+        desk.answer(NodeId::N3, Answer::Position(place));
+        assert_eq!(desk.exchange(), Some(read(NodeId::N3)), "a hold that is 3 s old");
+    }
+    assert_eq!(desk.packet(), hold(NodeId::N3, turns(90)));
+}
+
+#[test]
 fn a_repeated_stop_joins_the_one_that_is_not_done() {
     // Two WRITEs confirm it; it is repeated until the node is still.
     for (node, way, count) in [(N1, 6, 3), (N3, 9, 4)] {

@@ -72,6 +72,8 @@ pub(crate) struct Account {
     /// A stop WRITE has been sent and nothing was missed since.
     pub(crate) is_stop_written: bool,
     pub(crate) paid: u8,
+    /// Payments for a position to hold that was not too old by then.
+    paid_in_time: u8,
     /// Since when it has to become still, while the stop is confirmed.
     pub(crate) coasting_since: Option<Instant>,
     /// The same, even if the confirmation is lost: when it was the first time, or the stop was
@@ -91,6 +93,8 @@ pub(crate) struct Account {
     /// The position that the node was told to hold, and whether another one is allowed.
     hold: Option<Position>,
     pub(crate) may_hold_anew: bool,
+    /// When the last answer in front of its WRITE was heard.
+    hold_heard_at: Option<Instant>,
     pub(crate) is_released: bool,
     /// Its last answer showed it away from that position.
     pub(crate) is_away: bool,
@@ -159,7 +163,8 @@ impl Account {
         }
     }
 
-    fn begin_coasting(&mut self, from: Option<Instant>) {
+    /// It has all of its time again to become still.
+    pub(crate) fn begin_coasting(&mut self, from: Option<Instant>) {
         (self.coasts_from, self.is_told, self.has_moved_late) = (from, false, false);
     }
 
@@ -195,6 +200,7 @@ impl Account {
         (self.coasting_since, self.is_still) = (None, false);
         if !self.is_owed {
             (self.is_owed, self.paid, self.stopped_at, self.waits) = (true, 0, None, 0);
+            self.paid_in_time = 0;
             (self.is_stop_due, self.is_stop_written) = (true, false);
         }
     }
@@ -206,7 +212,8 @@ impl Account {
             self.owe();
             self.is_released = is_released;
         }
-        (self.paid, self.is_stop_written, self.is_stop_due) = (0, false, self.is_owed);
+        (self.paid, self.paid_in_time) = (0, 0);
+        (self.is_stop_written, self.is_stop_due) = (false, self.is_owed);
         (self.may_hold_anew, self.stopped_at) = (true, None);
     }
 
@@ -252,6 +259,7 @@ impl Account {
                 return Err("a position to hold that is too old".into());
             }
             (self.hold, self.may_hold_anew) = (Some(place), false);
+            self.hold_heard_at = self.last_heard().map(|(_, heard_at)| heard_at);
         }
         (self.is_target_new, self.was_written) = (false, true);
         (self.stopped_at, self.was_asked_since) = (self.is_halted.then_some(at), false);
@@ -299,10 +307,14 @@ impl Account {
         }
     }
 
-    /// The count that it has shown last, for this stop.
-    pub(crate) fn last_count(&self) -> Option<i16> {
+    /// The count that it has shown last, for this stop, and when that was heard.
+    fn last_heard(&self) -> Option<(i16, Instant)> {
         let last = self.places_heard.checked_sub(1)?;
-        self.places_heard_at[last as usize % 4].map(|(count, _)| count)
+        self.places_heard_at[last as usize % 4]
+    }
+
+    pub(crate) fn last_count(&self) -> Option<i16> {
+        self.last_heard().map(|(count, _)| count)
     }
 
     /// The answer arrived in its window.
@@ -334,7 +346,11 @@ impl Account {
             self.confirm = Confirm::Succeeds;
         }
         if self.is_owed {
+            // The node has perhaps never heard what it holds, and was read again.
+            let is_overdue = self.hold_heard_at.is_some_and(|heard| at > heard + HOLD_PATIENCE);
+            self.may_hold_anew |= is_overdue && self.paid_in_time == 0;
             self.paid += u8::from(self.is_stop_written);
+            self.paid_in_time += u8::from(self.is_stop_written && !is_overdue);
             (self.is_stop_written, self.is_stop_due) = (false, true);
         }
     }
@@ -343,7 +359,7 @@ impl Account {
     pub(crate) fn miss(&mut self, guard_until: Instant, stops_abnormal: bool) {
         self.guard_until = Some(guard_until);
         (self.is_stop_written, self.is_stop_due) = (false, self.is_owed);
-        self.may_hold_anew |= self.paid == 0;
+        self.may_hold_anew |= self.paid_in_time == 0;
         if self.is_in_doubt {
             self.undecided = (self.undecided + 1).min(UNDECIDED);
         }

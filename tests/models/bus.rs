@@ -251,6 +251,10 @@ impl<B: Kit> Bus<B> {
             Fate::UnflushedArrives | Fate::UnflushedLost => Unsent::Unflushed,
         };
         self.master.handle_unsent(unsent, self.now);
+        if sent.is_exchange::<B>() {
+            // It is repeated, and was no turn.
+            self.accounts.iter_mut().for_each(|it| it.waits = it.waits.saturating_sub(1));
+        }
         if unsent == Unsent::Unflushed {
             self.accounts.iter_mut().for_each(Account::take_back_write);
         } else {

@@ -139,6 +139,9 @@ impl<B: Kit> Bus<B> {
             } else if account.is_still && !owed.contains(node) {
                 // A stop that was released ends when the node is abnormal.
                 account.is_still = progress == StopProgress::StandingStill;
+                if progress == StopProgress::NotAsked {
+                    account.begin_coasting(None);
+                }
                 if !account.is_still && account.is_online() {
                     if progress != StopProgress::Confirmed || !account.is_away {
                         return Err(format!("node {node} was still, and is {progress:?}"));

@@ -123,3 +123,10 @@ fn a_random_master_of_boards_with_one_motor_obeys_the_model() {
 fn a_random_master_of_boards_with_three_motors_obeys_the_model() {
     play::<ThreeMotors>(0..400);
 }
+
+#[test]
+#[ignore = "a minute"]
+fn deep_random_masters_obey_the_model() {
+    play::<OneMotor>(400..20_000);
+    play::<ThreeMotors>(400..20_000);
+}

@@ -583,7 +583,7 @@ impl<B: Board> Stop<B> {
     }
 
     fn read_again(&mut self) {
-        (self.is_there, self.written_at) = (false, None);
+        (self.is_there, self.is_written, self.written_at) = (false, false, None);
         self.patience = self.patience + self.patience;
     }
 
