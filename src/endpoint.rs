@@ -54,7 +54,8 @@ pub trait Endpoint {
     /// `None`: they never do.
     ///
     /// A role that acts on commands has such a limit. Check its port at least twice within it, and
-    /// hand bytes that may have waited longer to [`handle_old_input`](Self::handle_old_input).
+    /// hand bytes that may have waited longer to [`handle_old_input`](Self::handle_old_input). Zero
+    /// does not ask for more checks: all bytes then count from when the port was last seen empty.
     fn held_up_after(&self) -> Option<Duration> {
         None
     }

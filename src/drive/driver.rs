@@ -149,6 +149,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let look_at = self
             .role
             .held_up_after()
+            .filter(|&limit| limit != Duration::ZERO)
             .map(|limit| self.looked_at + Duration::from_micros(limit.as_micros() / 2));
         earliest(&[self.role.poll_timeout(), look_at])
     }

@@ -64,7 +64,8 @@
 //! command as new, so its driver checks the port repeatedly while it waits, twice per
 //! [`Endpoint::held_up_after`]. If it has not seen the port empty for longer than that, because of
 //! its caller, another task, or a slow `write` or `flush`, the bytes that it finds count as
-//! received when the port was last seen empty ([`Endpoint::handle_old_input`]).
+//! received when the port was last seen empty ([`Endpoint::handle_old_input`]). A host's reports
+//! always do, where it matters whether they are from before a stop.
 //!
 //! So call the driver of a slave or a robot no later than [`poll_timeout`](Driver::poll_timeout): a
 //! slave that is called too rarely does not answer, and a command counts for less time. The driver

@@ -182,6 +182,7 @@ impl<B: MotorBoard> MotorNode<B> {
     /// Moves the mode switch. The command is forgotten.
     pub fn set_mode(&mut self, mode: Mode) {
         self.slave.set_mode(mode);
+        self.show();
         self.obey(self.now.unwrap_or_default());
     }
 

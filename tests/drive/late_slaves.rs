@@ -57,6 +57,23 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
     assert_eq!(events, [SlaveEvent::Watchdog]);
 }
 
+#[test]
+fn a_command_does_not_outlive_its_watchdog_while_an_answer_is_flushed() {
+    for (is_async, fails) in [(false, false), (false, true), (true, false), (true, true)] {
+        let wire = Wire::bus(None);
+        let mut slave = idle_slave(&wire, with_watchdog());
+        wire.receive(FIVE_RPS().as_bytes());
+        wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+        wire.world.step(200);
+        let us = 700_000;
+        let slow = if fails { Step::BlocksAndFails(us) } else { Step::Blocks(us) };
+        slave.port_mut().flushes = [slow].into();
+        let heard = call!(is_async, slave, next_command, next_command_async(at_ms(0)));
+        assert_eq!(heard, Ok(None), "a command whose watchdog has fired");
+        assert_eq!(events(&mut slave), [SlaveEvent::Watchdog]);
+    }
+}
+
 /// A slave that has received nothing yet, and its watchdog.
 fn idle_slave(wire: &Wire, config: SlaveConfig) -> On<Slave> {
     let mut slave = one_slave(wire, config);

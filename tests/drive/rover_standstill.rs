@@ -1,6 +1,9 @@
 //! A rover is seen to stand still after its stop, or the call says why not (U16).
 
-use axlewire::ucp::host::{COAST, CommandError, StopProgress};
+use axlewire::ucp::{
+    host::{COAST, CommandError, StopProgress},
+    message::FirmwareReport,
+};
 
 use crate::rig::*;
 
@@ -66,6 +69,25 @@ fn a_rover_without_reports_is_no_success_at_the_deadline_and_one_that_is_not_hea
         assert_eq!(rover.now() < at_ms(510) + COAST, !is_heard);
         let unheard = Err(DriveError::Rover(CommandError::LinkDown));
         assert_eq!(rover.drive(40, 0), if is_heard { Ok(()) } else { unheard });
+    }
+}
+
+#[test]
+fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_they_are_read() {
+    for (is_async, average) in BOTH.into_iter().flat_map(|it| [(it, ms(0)), (it, ms(100))]) {
+        let (world, mut rover, robot) = rover(|config| config.rpm_average = average);
+        rover.run_until(at_ms(200), |_, _, _| ()).unwrap();
+        robot.borrow().port().unplugged.set(true);
+        rover.drive(40, 0).unwrap();
+        rover.run_until(at_ms(240), |_, _, _| ()).unwrap();
+        let report = FirmwareReport::new(&Telemetry::default(), 38);
+        (0..5).for_each(|index| rover.port().receive(report.frame(index).as_bytes()));
+        rover.port_mut().flushes = [Step::Blocks(100_000)].into();
+        call!(is_async, rover, stop, stop_async()).unwrap();
+        world.step(10_000 + u64::from(average.as_micros()));
+        let deadline = rover.now() + ms(300);
+        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        assert_eq!(waited, not_still(StopProgress::NoReports), "async {is_async}, {average:?}");
     }
 }
 

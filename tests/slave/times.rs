@@ -47,6 +47,19 @@ fn a_switch_that_is_moved_the_other_way_does_the_same() {
 }
 
 #[test]
+fn a_position_from_before_the_switch_was_moved_is_not_reported() {
+    let mut slave: Slave = Slave::new(NODE, Mode::Position, SlaveConfig::direct(), T0);
+    slave.set_position(turns(5));
+    slave.set_mode(Mode::Velocity);
+    slave.set_mode(Mode::Position);
+    slave.handle_input(&read(NODE), T0);
+    assert_eq!(slave.poll_transmit(T0), None, "it has turned since");
+    slave.set_position(turns(7));
+    slave.handle_input(&read(NODE), T0 + MS(1));
+    assert_eq!(slave.poll_transmit(T0 + MS(1)), Some(&position(NODE, turns(7))[..]));
+}
+
+#[test]
 fn anything_behind_a_read_in_the_same_chunk_means_that_the_master_has_moved_on() {
     let packets = [read(NODE), read(NodeId::N2), write(NodeId::N2, 1.0), write(NODE, 1.0)];
     for packet in packets {

@@ -26,9 +26,10 @@ use crate::{
 ///
 /// Motor bus: reads all ids, stops those that answer (a velocity node gets 0 rps, a position node
 /// holds the position read at that moment), and repeats the stop until each has confirmed it twice
-/// and was measured at rest. Silent ids are listed and are not a failure, as long as one node
-/// answers. Rover: sends zero motor commands every 100 ms until the reports show that all wheels
-/// have stopped; a robot without reports may be moving, and is a failure.
+/// and was measured at rest. Ids that do not answer within a second are listed and are not a
+/// failure, as long as one node answers: stop a motor whose plug is loose with --node. Rover: sends
+/// zero motor commands every 100 ms until the reports show that all wheels have stopped; a robot
+/// without reports may be moving, and is a failure.
 ///
 /// The exit code is 0 only if something has answered and all of it is at rest. The tool finishes
 /// within about 10 seconds; Ctrl-C, Ctrl-Z and Ctrl-\ do not cut it short.
@@ -83,7 +84,7 @@ impl fmt::Display for Event {
             Self::Stopped { node: None, text, .. } => write!(f, "robot: {text}, stopped"),
             Self::Silent { nodes } => {
                 let nodes: Vec<_> = nodes.iter().map(ToString::to_string).collect();
-                write!(f, "silent: {}", nodes.join(", "))
+                write!(f, "silent, not stopped: {}", nodes.join(", "))
             }
         }
     }

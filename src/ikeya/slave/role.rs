@@ -123,17 +123,20 @@ impl<B: Board> Slave<B> {
         self.velocity = current;
     }
 
-    /// Sets the position that a position node reports from now on. Before the first call the node
-    /// does not answer at all: a master would hold a made-up position.
+    /// Sets the position that a position node reports from now on. Before the first call, and
+    /// before the next one after a change of mode, the node does not answer at all: a master
+    /// would hold a made-up or an old position.
     pub fn set_position(&mut self, current: B::Position) {
         self.position = Some(current);
     }
 
     /// Changes the mode, as when the switch is moved. The command is dropped: it was meant for the
-    /// other mode, and its watchdog ends with it: **stop the motor yourself**.
+    /// other mode, and its watchdog ends with it: **stop the motor yourself**. The position that
+    /// was set is forgotten: it may be from long ago.
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
+            self.position = None;
             if let Some(SlaveEvent::Command(_)) = self.event.peek() {
                 self.event.take();
             }
@@ -322,6 +325,15 @@ impl<B: Board> Endpoint for Slave<B> {
         }
     }
 
+    /// A command does not outlive its watchdog because the port is slow.
+    fn handle_taken(&mut self, now: Instant) {
+        self.expire_command(now);
+    }
+
+    fn handle_flushed(&mut self, now: Instant) {
+        self.expire_command(now);
+    }
+
     /// Whether more has been heard since the answer was handed out (I14).
     fn is_outdated(&self) -> bool {
         self.sent.is_none()
@@ -329,7 +341,8 @@ impl<B: Board> Endpoint for Slave<B> {
 
     /// An answer of which no byte has left remains due, within its time. One that was cut off is
     /// not repeated: the master asks again.
-    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
+    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+        self.expire_command(now);
         if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
             uncount(&mut self.statistics.replies);
             self.answer = Some(answer);

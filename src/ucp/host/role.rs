@@ -354,6 +354,11 @@ impl<S: BiasStore> Endpoint for Host<S> {
         self.state.old_since = None;
     }
 
+    /// Zero: a report may have waited while a stop was flushed, or while the application was away.
+    fn held_up_after(&self) -> Option<Duration> {
+        Some(Duration::ZERO)
+    }
+
     fn handle_timeout(&mut self, now: Instant) {
         while self.inbox.settle(now) {
             self.receive(&[]);

@@ -46,6 +46,6 @@ fn a_node_and_a_robot_that_were_stopped_are_told_in_both_forms() {
     assert_eq!(Form::Text.plain(&event), "robot: rpm 0, stopped");
     assert_eq!(Form::Json.plain(&event), r#"{"event":"stopped"}"#);
     let event = Event::Silent { nodes: vec![NodeId::N1, NodeId::N8] };
-    assert_eq!(Form::Text.plain(&event), "silent: 1, 8");
+    assert_eq!(Form::Text.plain(&event), "silent, not stopped: 1, 8");
     assert_eq!(Form::Json.plain(&event), r#"{"event":"silent","nodes":[1,8]}"#);
 }

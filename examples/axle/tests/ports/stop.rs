@@ -36,7 +36,7 @@ fn stop_finds_what_a_killed_program_has_left_turning_and_stops_it() {
     let lines = Process::start(&format!("stop --port {port}")).success();
     assert!(lines[0].starts_with("node 1: 0.0") && lines[0].ends_with("stopped and confirmed"));
     assert!(lines[1].starts_with("node 3: ") && lines[1].ends_with("turns, stopped and confirmed"));
-    assert_eq!(lines[2..], ["silent: 2, 4, 5, 6, 7, 8"]);
+    assert_eq!(lines[2..], ["silent, not stopped: 2, 4, 5, 6, 7, 8"]);
     sim.line("node 1: at rest");
     sim.line("node 3: at rest");
 }
@@ -70,7 +70,7 @@ fn a_recording_that_cannot_be_made_does_not_keep_a_motor_turning() {
 fn on_a_line_with_echo_silent_ids_are_silent() {
     let (_sim, port) = sim("ikeya --node 1:velocity --echo");
     let lines = Process::start(&format!("stop -p {port} -P ikeya --echo")).success();
-    assert_eq!(lines[1..], ["silent: 2, 3, 4, 5, 6, 7, 8"]);
+    assert_eq!(lines[1..], ["silent, not stopped: 2, 3, 4, 5, 6, 7, 8"]);
 }
 
 #[test]

@@ -55,7 +55,12 @@ fn slave<B: Kit>(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
                 let read = ReadRequest::new(id);
                 input = [read.as_bytes(), &[0xAA][..]].concat();
             }
-            6 => slave.set_mode(if u.arbitrary()? { Mode::Velocity } else { Mode::Position }),
+            6 => {
+                let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
+                // What it has measured in the other mode is old.
+                place = place.filter(|_| mode == slave.mode());
+                slave.set_mode(mode);
+            }
             7 => {
                 place = Some(B::place(u.arbitrary()?));
                 slave.set_position(B::place(position(u)?));
