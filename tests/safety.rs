@@ -162,6 +162,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         "blind, at least every 50 ms",
         "within 50 ms after its cable is back",
         "5 % up to 0.9 s for each lost node",
+        "0.4 s for each such id of `nodes`, and 2 s at 0 %",
         "0.5 s behind an adapter",
         "vendor robot waits for 500 ms",
         "only 500 ms of silence",
