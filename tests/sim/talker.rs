@@ -2,9 +2,11 @@
 
 use std::collections::VecDeque;
 
+#[cfg(feature = "ikeya")]
+pub(crate) use axlewire::sim::Motor;
 pub(crate) use axlewire::{
     endpoint::Endpoint,
-    sim::{Direction, Faults, Input, Line, Motor, Rng, Stuck, Who},
+    sim::{Direction, Faults, Input, Line, Rng, Stuck, Who},
     time::{Duration, Instant},
 };
 

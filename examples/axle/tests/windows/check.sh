@@ -118,7 +118,7 @@ ports() {
     { wait $spin || true; } 2>/dev/null
     axle stop --port COM7 --instant >out
     expect '^node 1: .* rps, stopped and confirmed$' out
-    expect '^silent: 2, 4, 5, 6, 7, 8$' out
+    expect '^silent, not stopped: 2, 4, 5, 6, 7, 8$' out
     grep 'node 1: command' sim | tail -n 1 >last
     expect 'command 0.00 rps' last
 
