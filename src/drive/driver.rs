@@ -59,13 +59,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Combines a role, a port and a clock. The role must have been made with a time of the same
     /// clock; [`with`](Self::with) ensures that.
     ///
-    /// A master takes nothing that is in the port already for an answer.
+    /// A master takes nothing that is in the port already for an answer, and a host no report for
+    /// one from after a stop.
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
-        // A master may have asked through this port before.
+        // A master or a host may have talked through this port before.
         let empty_at = match role.held_up_after() {
-            Some(_) => latest,
-            None => Instant::from_micros(latest.as_micros().wrapping_sub(LONG_US)),
+            Some(limit) if limit != Duration::ZERO => latest,
+            _ => Instant::from_micros(latest.as_micros().wrapping_sub(LONG_US)),
         };
         Self {
             role,
@@ -137,7 +138,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// The next event in the queue, without using the port.
     pub fn poll_event(&mut self) -> Option<R::Event> {
+        self.tell_time();
         self.role.poll_event()
+    }
+
+    /// A slave's command must not be told after its watchdog, however long the port took.
+    pub(super) fn tell_time(&mut self) {
+        let now = self.now();
+        self.role.handle_input(&[], now);
     }
 
     /// When the next round must run at the latest, if no bytes arrive.

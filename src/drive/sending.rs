@@ -79,7 +79,8 @@ impl Sending {
             outbox: Outbox::new(),
             asked_at,
             begun: None,
-            flush: Flush::Done,
+            // A driver before this one may have left something in the port.
+            flush: Flush::Failed,
             #[cfg(feature = "embedded-io-async")]
             write_wait: Wait(None),
             #[cfg(feature = "embedded-io-async")]

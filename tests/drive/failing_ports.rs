@@ -164,6 +164,25 @@ fn an_answer_that_another_driver_finds_in_its_port_is_not_taken_for_a_later_one(
 }
 
 #[test]
+fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
+    let mut story = Story::at_10_rps(MasterConfig::direct());
+    story.bus.port_mut().flushes = vec![Step::Stall].into();
+    while story.bus.port().flushes.len() > 0 {
+        let _ = story.world.run(Some(2), story.bus.service_async());
+        story.world.step(20);
+    }
+    story.world.step(500);
+    story.bus.port().inbox.borrow_mut().clear();
+    let (role, port, clock) = story.bus.into_parts();
+    story.bus = Driver::new(role, port, clock);
+    let now = story.bus.now();
+    story.bus.role_mut().stop(NodeId::N1, now);
+    story.run(5);
+    let command = story.node.borrow().role().slave().command(now);
+    assert_eq!(command, Some(Target::Velocity(Rps::ZERO)), "the stop is late");
+}
+
+#[test]
 fn a_stop_of_an_abnormal_node_is_no_success() {
     for is_async in BOTH {
         let mut story = Story::at_10_rps(MasterConfig::direct());

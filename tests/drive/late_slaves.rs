@@ -59,19 +59,44 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_motor() {
 
 #[test]
 fn a_command_does_not_outlive_its_watchdog_while_an_answer_is_flushed() {
-    for (is_async, fails) in [(false, false), (false, true), (true, false), (true, true)] {
-        let wire = Wire::bus(None);
-        let mut slave = idle_slave(&wire, with_watchdog());
-        wire.receive(FIVE_RPS().as_bytes());
-        wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
-        wire.world.step(200);
-        let us = 700_000;
-        let slow = if fails { Step::BlocksAndFails(us) } else { Step::Blocks(us) };
-        slave.port_mut().flushes = [slow].into();
-        let heard = call!(is_async, slave, next_command, next_command_async(at_ms(0)));
-        assert_eq!(heard, Ok(None), "a command whose watchdog has fired");
-        assert_eq!(events(&mut slave), [SlaveEvent::Watchdog]);
+    let (slow, fails) = (Step::Blocks(700_000), Step::BlocksAndFails(700_000));
+    for (first, flush) in [(None, slow), (None, fails.clone()), (Some(Step::Error), fails)] {
+        for (is_async, is_polled) in BOTH.into_iter().flat_map(|it| BOTH.map(|by| (it, by))) {
+            let wire = Wire::bus(None);
+            let mut slave = idle_slave(&wire, with_watchdog());
+            slave.port_mut().flushes.extend(first.clone());
+            wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+            assert_eq!(slave.service().is_ok(), first.is_none());
+            wire.world.step(2000);
+            wire.receive(FIVE_RPS().as_bytes());
+            wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+            wire.world.step(200);
+            slave.port_mut().flushes = [flush.clone()].into();
+            if is_polled {
+                let _ = call!(is_async, slave, service, service_async());
+            } else {
+                let heard = call!(is_async, slave, next_command, next_command_async(at_ms(0)));
+                assert_eq!(heard, Ok(None), "a command whose watchdog has fired");
+            }
+            assert_eq!(events(&mut slave), [SlaveEvent::Watchdog]);
+        }
     }
+}
+
+#[test]
+fn a_command_does_not_outlive_its_watchdog_while_another_task_runs() {
+    let wire = Wire::bus(None);
+    let mut slave = idle_slave(&wire, with_watchdog());
+    wire.receive(FIVE_RPS().as_bytes());
+    wire.world.step(200);
+    slave.port_mut().reads = [Step::Few(usize::MAX), Step::Error].into();
+    let heard = {
+        let mut call = std::pin::pin!(slave.next_command_async(at_ms(60_000)));
+        assert!(poll(call.as_mut()).is_pending(), "it yields behind an error");
+        wire.world.step(5_000_000);
+        wire.world.block_on(call)
+    };
+    assert_eq!(heard, Ok(None), "a command that is 5 s old");
 }
 
 /// A slave that has received nothing yet, and its watchdog.

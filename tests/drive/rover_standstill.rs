@@ -74,7 +74,9 @@ fn a_rover_without_reports_is_no_success_at_the_deadline_and_one_that_is_not_hea
 
 #[test]
 fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_they_are_read() {
-    for (is_async, average) in BOTH.into_iter().flat_map(|it| [(it, ms(0)), (it, ms(100))]) {
+    let averages = [(ms(0), false), (ms(100), false), (ms(100), true)];
+    for (is_async, (average, is_moved)) in BOTH.into_iter().flat_map(|it| averages.map(|a| (it, a)))
+    {
         let (world, mut rover, robot) = rover(|config| config.rpm_average = average);
         rover.run_until(at_ms(200), |_, _, _| ()).unwrap();
         robot.borrow().port().unplugged.set(true);
@@ -85,6 +87,10 @@ fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_t
         rover.port_mut().flushes = [Step::Blocks(100_000)].into();
         call!(is_async, rover, stop, stop_async()).unwrap();
         world.step(10_000 + u64::from(average.as_micros()));
+        if is_moved {
+            let (role, port, clock) = rover.into_parts();
+            rover = Driver::new(role, port, clock);
+        }
         let deadline = rover.now() + ms(300);
         let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
         assert_eq!(waited, not_still(StopProgress::NoReports), "async {is_async}, {average:?}");

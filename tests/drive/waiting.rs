@@ -28,8 +28,9 @@ fn a_waiting_driver_wakes_for_its_role() {
     let mut driver = on(Recorder::default(), near);
     driver.role_mut().timeout = Some(at_ms(5));
     assert_eq!(world.block_on(driver.next_event_async(at_ms(10))), Ok(None));
-    let calls = &driver.role().calls;
-    assert_eq!(calls.iter().filter(|call| **call == Call::Timeout).count(), 1);
+    let is_none = |call: &Call| matches!(call, Call::Input(bytes) if bytes.is_empty());
+    let calls: Vec<_> = driver.role().calls.iter().filter(|call| !is_none(call)).collect();
+    assert_eq!(calls.iter().filter(|call| ***call == Call::Timeout).count(), 1);
     // Wakes only for the role: a round at the start, at 5 ms and at the end.
     assert_eq!(calls.len(), 4, "{calls:?}");
 }

@@ -320,17 +320,8 @@ impl<B: Board> Endpoint for Slave<B> {
             self.overtake();
             self.requests.receive(since, now);
             self.receive(bytes, since);
-            // A command may be too old already.
-            self.expire_command(now);
         }
-    }
-
-    /// A command does not outlive its watchdog because the port is slow.
-    fn handle_taken(&mut self, now: Instant) {
-        self.expire_command(now);
-    }
-
-    fn handle_flushed(&mut self, now: Instant) {
+        // A command may be too old already.
         self.expire_command(now);
     }
 
@@ -341,8 +332,7 @@ impl<B: Board> Endpoint for Slave<B> {
 
     /// An answer of which no byte has left remains due, within its time. One that was cut off is
     /// not repeated: the master asks again.
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.expire_command(now);
+    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
         if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
             uncount(&mut self.statistics.replies);
             self.answer = Some(answer);
