@@ -167,7 +167,7 @@ fn an_answer_that_another_driver_finds_in_its_port_is_not_taken_for_a_later_one(
 fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
     let mut story = Story::at_10_rps(MasterConfig::direct());
     story.bus.port_mut().flushes = vec![Step::Stall].into();
-    while story.bus.port().flushes.len() > 0 {
+    while !story.bus.port().flushes.is_empty() {
         let _ = story.world.run(Some(2), story.bus.service_async());
         story.world.step(20);
     }

@@ -101,10 +101,10 @@ pub struct Master<B: Board = OneMotor> {
     pub(super) now: Instant,
     /// Time of the application's last sign of life.
     alive_at: Instant,
+    pub(super) events: Events<MasterEvent<B>, EVENTS>,
     pub(super) statistics: MasterStatistics,
     pub(super) line: Line<B>,
     pub(super) nodes: [Node<B>; 8],
-    pub(super) events: Events<MasterEvent<B>, EVENTS>,
 }
 
 /// Commands.
