@@ -12,9 +12,6 @@ pub(super) const CHUNK_LEN: usize = 64;
 /// Reads in a row, at most: 4096 bytes. A line is slower than that; a runaway port is not.
 pub(super) const READS: usize = 64;
 
-/// Age that a request of an earlier driver does not reach: an hour, in microseconds.
-const LONG_US: u64 = 3_600_000_000;
-
 /// Frames sent in one round, at most: a role flooded with requests could go on forever.
 pub(super) const FRAMES: usize = 8;
 
@@ -51,6 +48,12 @@ pub struct Driver<R, P, C> {
     pub(super) sending: Sending,
 }
 
+/// When the bytes in a port may have arrived that was not looked at before.
+fn long_before(now: Instant) -> Instant {
+    const HOUR_US: u64 = 3_600_000_000;
+    Instant::from_micros(now.as_micros().wrapping_sub(HOUR_US))
+}
+
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Pause after an error of the port, in a call that continues.
     #[cfg(any(feature = "ikeya", feature = "ucp"))]
@@ -66,7 +69,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         // A master or a host may have talked through this port before.
         let empty_at = match role.held_up_after() {
             Some(limit) if limit != Duration::ZERO => latest,
-            _ => Instant::from_micros(latest.as_micros().wrapping_sub(LONG_US)),
+            _ => long_before(latest),
         };
         Self {
             role,
@@ -133,6 +136,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();
+        if self.sending.needs_flush() {
+            // Nobody flushes it any more: the role must not wait for that.
+            let now = self.now();
+            self.role.handle_flushed(now);
+        }
         (self.role, self.port, self.clock)
     }
 
@@ -168,14 +176,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.sending.rest()
     }
 
-    /// Discards unsent or unflushed bytes, for a port that comes back after a while; returns the
-    /// number of unsent bytes. The role counts them as not sent. The other end may have received
-    /// the beginning of the frame.
+    /// Discards unsent or unflushed bytes, for a port that comes back after a while, or another
+    /// one; returns the number of unsent bytes. The role counts them as not sent. The other end may
+    /// have received the beginning of the frame. Received bytes that are in the port count as old.
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
-        let given_up = self.sending.give_up();
-        self.tell_unsent(given_up);
         self.unflushed();
+        self.empty_at = long_before(self.latest);
+        (self.is_empty, self.has_overtaken) = (false, true);
         discarded
     }
 
@@ -310,12 +318,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// Notes that bytes sent since the last flush may not have left.
+    /// Notes that bytes sent since the last flush may not have left; their frame has no rest then.
     pub(super) fn unflushed(&mut self) {
-        if self.sending.is_in_doubt() {
-            let given_up = self.sending.give_up();
-            self.tell_unsent(given_up);
-        }
+        let given_up = self.sending.give_up();
+        self.tell_unsent(given_up);
         let unsent = self.sending.flush_failed();
         self.tell_unsent(unsent);
     }

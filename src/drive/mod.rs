@@ -90,7 +90,8 @@
 //!   for that long, or the whole frame was flushed in hardly more than its time on the line
 //!   ([`Endpoint::wire_time`]). Otherwise it is given up as well. So `flush` must wait until the
 //!   bytes are out, and after a partial `write` the driver must be called again in time.
-//! * *After a failed `flush`* the role counts its latest commands as not sent.
+//! * *After a failed `flush`* the role counts its latest commands as not sent, and a frame that was
+//!   cut off has no rest.
 //! * *A request that the port still holds*, because its `flush` has failed or its call was dropped,
 //!   will be answered late. A master keeps the line free for that answer, for a second at most. As
 //!   long as no `flush` succeeds it sends on after that, stops included, but takes no answer: it

@@ -40,6 +40,8 @@ struct Begun {
     unbroken_at: Instant,
     /// Whether a pause may have been too long.
     is_doubtful: bool,
+    /// Whether its first part was flushed alone: the rest may have waited for the next flush.
+    is_split: bool,
 }
 
 /// Since when a port has been asked for something, including calls that were dropped.
@@ -79,8 +81,7 @@ impl Sending {
             outbox: Outbox::new(),
             asked_at,
             begun: None,
-            // A driver before this one may have left something in the port.
-            flush: Flush::Failed,
+            flush: Flush::Done,
             #[cfg(feature = "embedded-io-async")]
             write_wait: Wait(None),
             #[cfg(feature = "embedded-io-async")]
@@ -123,12 +124,14 @@ impl Sending {
             left_at: asked_at,
             unbroken_at: asked_at,
             is_doubtful: false,
+            is_split: false,
         });
         let is_first = self.begun.is_none();
         let frame = Begun {
             left_at: before.left_at.max(asked_at) + wire_time,
             unbroken_at: before.unbroken_at + wire_time,
             is_doubtful: before.is_doubtful || !is_first && now > before.left_at + silence,
+            is_split: before.is_split,
         };
         self.begun = Some(frame);
         // Its flush can no longer be in time.
@@ -138,7 +141,7 @@ impl Sending {
 
     /// Whether all of a frame was taken, but only a flush in time can show that it did not pause.
     pub(super) fn is_in_doubt(&self) -> bool {
-        self.outbox.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
+        self.outbox.is_empty() && self.begun.is_some_and(|it| it.is_doubtful || it.is_split)
     }
 
     /// Gives up a frame that is no longer worth sending: one of which nothing has left, or that was
@@ -168,8 +171,12 @@ impl Sending {
     /// too long.
     pub(super) fn flushed(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         self.flush = Flush::Done;
+        if let (Some(frame), false) = (&mut self.begun, self.outbox.is_empty()) {
+            frame.is_split = true;
+        }
         let frame = self.begun.filter(|_| self.is_in_doubt())?;
-        if now > frame.unbroken_at + silence {
+        let due = if frame.is_doubtful { frame.unbroken_at } else { frame.left_at };
+        if now > due + silence {
             return self.give_up();
         }
         self.begun = None;

@@ -18,7 +18,7 @@ fn a_write_that_fails_inside_a_frame_leaves_the_rest_for_the_next_call() {
                 assert_eq!(round(&mut driver), Some(Ok(())));
                 assert_eq!(
                     (&driver.port().written[..], driver.port().flushed),
-                    (&b"1234567"[..], 3)
+                    (&b"1234567"[..], 4)
                 );
             }
         }

@@ -164,6 +164,29 @@ fn an_answer_that_another_driver_finds_in_its_port_is_not_taken_for_a_later_one(
 }
 
 #[test]
+fn an_answer_that_a_driver_finds_in_another_port_is_not_taken_for_a_later_one() {
+    let mut story = Story::new(MasterConfig::usb_adapter(), Mode::Position);
+    story.bus.discover().unwrap();
+    story.bus.role_mut().read(NodeId::N1, story.world.now()).unwrap();
+    let reads = story.bus.role().statistics().reads;
+    while story.bus.role().statistics().reads == reads {
+        story.bus.service().unwrap();
+        story.world.step(10);
+    }
+    story.world.step(500);
+    let now = story.bus.now();
+    // The other one has been listening to the line for long.
+    story.bus.port().inbox.borrow_mut().clear();
+    let old = PositionResponse::new(NodeId::N1, Position::new(0, 3));
+    story.bus.port().receive(old.as_bytes());
+    story.world.step(200);
+    story.bus.discard();
+    story.bus.service().unwrap();
+    let (_, heard_at) = story.bus.role().status(NodeId::N1).unwrap();
+    assert!(heard_at < now, "the old answer counts as the new one");
+}
+
+#[test]
 fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
     let mut story = Story::at_10_rps(MasterConfig::direct());
     story.bus.port_mut().flushes = vec![Step::Stall].into();
@@ -173,10 +196,19 @@ fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
     }
     story.world.step(500);
     story.bus.port().inbox.borrow_mut().clear();
-    let (role, port, clock) = story.bus.into_parts();
+    let (mut role, port, clock) = story.bus.into_parts();
+    // Nor does a role that is driven by hand from then on.
+    let (now, mut alone) = (story.world.now(), role.clone());
+    alone.stop(NodeId::N1, now);
+    let stop = WriteRequest::velocity(NodeId::N1, Rps::ZERO);
+    let is_sent = (0..5000).step_by(20).any(|us| {
+        let now = now + Duration::from_micros(us);
+        alone.handle_timeout(now);
+        alone.poll_transmit(now) == Some(stop.as_bytes())
+    });
+    assert!(is_sent, "the stop is late");
+    role.stop(NodeId::N1, now);
     story.bus = Driver::new(role, port, clock);
-    let now = story.bus.now();
-    story.bus.role_mut().stop(NodeId::N1, now);
     story.run(5);
     let command = story.node.borrow().role().slave().command(now);
     assert_eq!(command, Some(Target::Velocity(Rps::ZERO)), "the stop is late");

@@ -88,6 +88,46 @@ fn a_stop_of_which_a_part_has_left_is_sent_twice_through_a_reopened_port() {
 }
 
 #[test]
+fn a_stop_whose_first_part_was_flushed_alone_is_sent_twice_more_unless_its_rest_leaves_in_time() {
+    for (flush_us, is_late) in [(1000, false), (100_000, true)] {
+        for is_async in [false, true] {
+            let (wire, mut host) = host();
+            let now = host.now();
+            host.role_mut().stop(now);
+            let before = wire.sent().len();
+            wire.write_as([Step::Few(10), Step::Error]);
+            assert!(host.service().is_err());
+            wire.world.step(3000);
+            host.port_mut().flushes = [Step::Blocks(flush_us)].into();
+            call!(is_async, host, stop, stop_async()).unwrap();
+            let copies = if is_late { 3 } else { 1 };
+            assert_eq!(
+                wire.sent().len() - before,
+                copies * FrameOf::<MotorControl>::LEN,
+                "{flush_us} us"
+            );
+        }
+    }
+}
+
+#[test]
+fn behind_a_failed_flush_no_rest_of_a_stop_is_sent() {
+    for is_async in [false, true] {
+        let (wire, mut host) = host();
+        let now = host.now();
+        host.role_mut().stop(now);
+        let cut = wire.sent().len() + 10;
+        wire.write_as([Step::Few(10), Step::Error]);
+        host.port_mut().flushes = [Step::Error].into();
+        assert!(host.service().is_err());
+        call!(is_async, host, stop, stop_async()).unwrap();
+        let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
+        let copies = sent.chunks(FrameOf::<MotorControl>::LEN);
+        assert_eq!(copies.map(|it| it.starts_with(&[0xFD, 0xFF])).collect::<Vec<_>>(), [true; 2]);
+    }
+}
+
+#[test]
 fn a_stop_that_a_port_cut_in_two_is_sent_again() {
     let fails_10_ms = [Step::Few(10)].into_iter().chain(vec![Step::Error; 10]);
     let pauses = [

@@ -162,7 +162,7 @@ impl<S: BiasStore> Host<S> {
     /// it, when the next round began. And the last must have begun to arrive 1.1 s after that
     /// ([`HostConfig::rpm_average`]): a vendor robot reports averages, in which wheels that began
     /// to turn a moment ago still stand still. A wheel that moves again, or 500 ms without a report
-    /// ([`HostConfig::link_timeout`]), ends it.
+    /// ([`HostConfig::link_timeout`]) or a look at the port, ends it.
     #[must_use]
     pub fn stop_progress(&self) -> StopProgress {
         self.state.motor.stop_progress()
