@@ -181,7 +181,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// have received the beginning of the frame. Received bytes that are in the port count as old.
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
-        self.unflushed();
+        let given_up = self.sending.give_up();
+        self.tell_unsent(given_up);
+        // What has left before may have left through another port: a stop is due again (U16).
+        self.sending.flush_failed();
+        self.tell_unsent(Some(Unsent::Unflushed));
         self.empty_at = long_before(self.latest);
         (self.is_empty, self.has_overtaken) = (false, true);
         discarded

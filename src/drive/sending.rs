@@ -167,19 +167,23 @@ impl Sending {
         self.flush != Flush::Done
     }
 
-    /// Notes that everything has left. Gives up a frame in doubt, unless it cannot have paused for
-    /// too long.
+    /// Notes that everything taken has left. Gives up a frame in doubt, unless it cannot have
+    /// paused for too long.
     pub(super) fn flushed(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         self.flush = Flush::Done;
-        if let (Some(frame), false) = (&mut self.begun, self.outbox.is_empty()) {
-            frame.is_split = true;
-        }
-        let frame = self.begun.filter(|_| self.is_in_doubt())?;
-        let due = if frame.is_doubtful { frame.unbroken_at } else { frame.left_at };
-        if now > due + silence {
+        let is_whole = self.outbox.is_empty();
+        let frame = self.begun.as_mut()?;
+        let is_in_doubt = frame.is_doubtful || frame.is_split;
+        if is_in_doubt && now > frame.unbroken_at + silence {
             return self.give_up();
         }
-        self.begun = None;
+        if !is_whole {
+            // What has left did not pause; the rest may wait for the next flush.
+            (frame.is_split, frame.is_doubtful) = (true, false);
+            frame.unbroken_at = frame.left_at;
+        } else if is_in_doubt {
+            self.begun = None;
+        }
         None
     }
 

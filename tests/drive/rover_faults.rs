@@ -89,7 +89,7 @@ fn a_stop_of_which_a_part_has_left_is_sent_twice_through_a_reopened_port() {
 
 #[test]
 fn a_stop_whose_first_part_was_flushed_alone_is_sent_twice_more_unless_its_rest_leaves_in_time() {
-    for (flush_us, is_late) in [(1000, false), (100_000, true)] {
+    for (flush_us, is_late) in [(1000, false), (4500, true), (100_000, true)] {
         for is_async in [false, true] {
             let (wire, mut host) = host();
             let now = host.now();
@@ -107,6 +107,23 @@ fn a_stop_whose_first_part_was_flushed_alone_is_sent_twice_more_unless_its_rest_
                 "{flush_us} us"
             );
         }
+    }
+}
+
+#[test]
+fn a_stop_is_sent_again_once_its_port_was_replaced() {
+    for (is_async, is_moved) in BOTH.into_iter().flat_map(|it| BOTH.map(|moved| (it, moved))) {
+        let (wire, mut host) = host();
+        call!(is_async, host, stop, stop_async()).unwrap();
+        let before = wire.sent().len();
+        if is_moved {
+            let (role, port, clock) = host.into_parts();
+            host = Driver::new(role, port, clock);
+        } else {
+            host.discard();
+        }
+        call!(is_async, host, stop, stop_async()).unwrap();
+        assert_eq!(wire.sent().len() - before, 2 * FrameOf::<MotorControl>::LEN);
     }
 }
 

@@ -135,7 +135,7 @@ impl<S: BiasStore> State<S> {
     /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        // It stays on record after a failed flush: its rest may still be sent.
+        // It stays on record after a failed flush: it may have arrived.
         let last = self.last;
         let was_motor = matches!(last, Some(Outgoing::Motor(_)));
         if unsent == Unsent::Unflushed {
