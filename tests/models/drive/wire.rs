@@ -193,7 +193,9 @@ impl Wire {
         self.taken.iter_mut().for_each(|taken| taken.is_flushed |= !taken.is_doubtful);
     }
 
+    /// A frame that was cut off has no rest then (U16).
     pub(crate) fn flush_failed(&mut self) {
+        self.is_given_up |= !self.open.is_empty();
         self.taken.iter_mut().for_each(|taken| taken.is_doubtful |= !taken.is_flushed);
     }
 
