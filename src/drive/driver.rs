@@ -181,8 +181,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// have received the beginning of the frame. Received bytes that are in the port count as old.
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
-        let given_up = self.sending.give_up();
-        self.tell_unsent(given_up);
+        self.give_up();
         // What has left before may have left through another port: a stop is due again (U16).
         self.sending.flush_failed();
         self.tell_unsent(Some(Unsent::Unflushed));
@@ -275,9 +274,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// something, or time has passed, since its last bytes left.
     pub(super) fn give_up_outdated(&mut self) {
         if !self.sending.rest().is_empty() && self.role.is_outdated() {
-            let given_up = self.sending.give_up();
-            self.tell_unsent(given_up);
+            self.give_up();
         }
+    }
+
+    fn give_up(&mut self) {
+        let given_up = self.sending.give_up();
+        self.tell_unsent(given_up);
     }
 
     /// Notes that the port is about to be asked to take the unsent bytes.
@@ -324,8 +327,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Notes that bytes sent since the last flush may not have left; their frame has no rest then.
     pub(super) fn unflushed(&mut self) {
-        let given_up = self.sending.give_up();
-        self.tell_unsent(given_up);
+        self.give_up();
         let unsent = self.sending.flush_failed();
         self.tell_unsent(unsent);
     }

@@ -36,12 +36,10 @@ pub(super) struct Sending {
 struct Begun {
     /// Earliest time at which all bytes taken by the port can have left.
     left_at: Instant,
-    /// The same time, without any pause or wait.
+    /// The same time, without any pause or wait since the last flush.
     unbroken_at: Instant,
     /// Whether a pause may have been too long.
     is_doubtful: bool,
-    /// Whether its first part was flushed alone: the rest may have waited for the next flush.
-    is_split: bool,
 }
 
 /// Since when a port has been asked for something, including calls that were dropped.
@@ -124,14 +122,12 @@ impl Sending {
             left_at: asked_at,
             unbroken_at: asked_at,
             is_doubtful: false,
-            is_split: false,
         });
         let is_first = self.begun.is_none();
         let frame = Begun {
             left_at: before.left_at.max(asked_at) + wire_time,
             unbroken_at: before.unbroken_at + wire_time,
             is_doubtful: before.is_doubtful || !is_first && now > before.left_at + silence,
-            is_split: before.is_split,
         };
         self.begun = Some(frame);
         // Its flush can no longer be in time.
@@ -141,7 +137,7 @@ impl Sending {
 
     /// Whether all of a frame was taken, but only a flush in time can show that it did not pause.
     pub(super) fn is_in_doubt(&self) -> bool {
-        self.outbox.is_empty() && self.begun.is_some_and(|it| it.is_doubtful || it.is_split)
+        self.outbox.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
     }
 
     /// Gives up a frame that is no longer worth sending: one of which nothing has left, or that was
@@ -173,15 +169,13 @@ impl Sending {
         self.flush = Flush::Done;
         let is_whole = self.outbox.is_empty();
         let frame = self.begun.as_mut()?;
-        let is_in_doubt = frame.is_doubtful || frame.is_split;
-        if is_in_doubt && now > frame.unbroken_at + silence {
+        if frame.is_doubtful && now > frame.unbroken_at + silence {
             return self.give_up();
         }
         if !is_whole {
             // What has left did not pause; the rest may wait for the next flush.
-            (frame.is_split, frame.is_doubtful) = (true, false);
-            frame.unbroken_at = frame.left_at;
-        } else if is_in_doubt {
+            (frame.unbroken_at, frame.is_doubtful) = (frame.left_at, true);
+        } else if frame.is_doubtful {
             self.begun = None;
         }
         None

@@ -152,8 +152,7 @@ fn an_answer_that_another_driver_finds_in_its_port_is_not_taken_for_a_later_one(
         story.world.step(pause_us);
     }
     story.bus.port_mut().is_deaf = false;
-    let (role, port, clock) = story.bus.into_parts();
-    story.bus = Driver::new(role, port, clock);
+    story.bus = in_another_driver(story.bus);
     let now = story.bus.now();
     story.bus.service().unwrap();
     let (_, heard_at) = story.bus.role().status(NodeId::N1).unwrap();

@@ -85,6 +85,12 @@ pub(crate) fn on<R: Endpoint>(role: R, port: Port) -> On<R> {
     Driver::new(role, port, world)
 }
 
+/// The same role and port in another driver.
+pub(crate) fn in_another_driver<R: Endpoint>(driver: On<R>) -> On<R> {
+    let (role, port, clock) = driver.into_parts();
+    Driver::new(role, port, clock)
+}
+
 /// A role that runs whenever virtual time passes, unless it is unplugged: then it hears nothing.
 pub(crate) fn run<R: Endpoint + 'static>(role: R, port: Port) -> Running<R> {
     let world = port.world.clone();

@@ -77,8 +77,7 @@ fn a_stop_of_which_a_part_has_left_is_sent_twice_through_a_reopened_port() {
         assert!(host.service().is_err());
         let cut = wire.sent().len();
         wire.write_all();
-        let (role, port, clock) = host.into_parts();
-        let mut host = Driver::new(role, port, clock);
+        let mut host = in_another_driver(host);
         call!(is_async, host, stop, stop_async()).unwrap();
         let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
@@ -117,8 +116,7 @@ fn a_stop_is_sent_again_once_its_port_was_replaced() {
         call!(is_async, host, stop, stop_async()).unwrap();
         let before = wire.sent().len();
         if is_moved {
-            let (role, port, clock) = host.into_parts();
-            host = Driver::new(role, port, clock);
+            host = in_another_driver(host);
         } else {
             host.discard();
         }

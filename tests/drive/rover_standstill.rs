@@ -88,8 +88,7 @@ fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_t
         call!(is_async, rover, stop, stop_async()).unwrap();
         world.step(10_000 + u64::from(average.as_micros()));
         if is_moved {
-            let (role, port, clock) = rover.into_parts();
-            rover = Driver::new(role, port, clock);
+            rover = in_another_driver(rover);
         }
         let deadline = rover.now() + ms(300);
         let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
