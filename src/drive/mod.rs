@@ -157,8 +157,7 @@
 //! # Half duplex
 //!
 //! `Rs485` (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On a
-//! two-wire line whose receiver stays on while sending, also set
-//! [`removes_echo`](crate::ikeya::master::MasterConfig::removes_echo) of the master.
+//! two-wire line whose receiver stays on while sending, put a [`WithoutEcho`] around the port.
 //!
 //! [`Endpoint`]: crate::endpoint::Endpoint
 //! [`Endpoint::frame_pause`]: crate::endpoint::Endpoint::frame_pause
@@ -188,6 +187,7 @@ mod tokio;
 mod tty;
 #[cfg(feature = "ucp")]
 mod ucp;
+mod without_echo;
 
 pub use clock::Clock;
 #[cfg(feature = "std")]
@@ -204,3 +204,4 @@ pub use rs485::{NoDelay, Rs485, Rs485Error};
 pub use serial_port::SerialPort;
 #[cfg(feature = "tokio")]
 pub use tokio::{TokioClock, TokioSerialPort};
+pub use without_echo::WithoutEcho;

@@ -26,6 +26,7 @@ mod buffered;
 #[cfg(feature = "alloc")]
 mod capture;
 mod decoder;
+mod echo;
 mod event;
 mod fill;
 mod frames;
@@ -42,6 +43,7 @@ pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
 #[cfg(feature = "ucp")]
 pub(crate) use decoder::Held;
+pub use echo::Echo;
 pub use event::Event;
 pub use frames::Frames;
 pub use framing::{Batch, Framing, OneByOne, Verdict};

@@ -64,6 +64,7 @@ mod serial_port;
 mod slow_port;
 mod stalled_ports;
 mod stops;
+mod two_wires;
 mod unsent_frames;
 mod waiting;
 mod waking;

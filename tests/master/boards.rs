@@ -60,7 +60,7 @@ impl Boards {
                 let node = NodeId::new(packet[1]).unwrap();
                 match self.dead == Some(node) {
                     true => self.expire()?,
-                    false => self.answer(node, &packet),
+                    false => self.answer(node),
                 }
                 return Some(packet);
             }
@@ -76,7 +76,7 @@ impl Boards {
         Some(())
     }
 
-    fn answer(&mut self, node: NodeId, packet: &[u8]) {
+    fn answer(&mut self, node: NodeId) {
         let answer = match self.mode(node) {
             Mode::Velocity => VelocityResponse::new(node, self.speeds.map(rps)).as_bytes().to_vec(),
             Mode::Position => {
@@ -85,9 +85,8 @@ impl Boards {
                 PositionResponse::new(node, [place; 3]).as_bytes().to_vec()
             }
         };
-        let echo = if self.master.config().removes_echo { packet } else { &[] };
         self.now += US(self.answer_us);
-        self.master.handle_input(&[echo, &answer].concat(), self.now);
+        self.master.handle_input(&answer, self.now);
         self.events.extend(core::iter::from_fn(|| self.master.poll_event()));
     }
 }

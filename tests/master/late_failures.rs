@@ -115,16 +115,6 @@ fn a_position_of_the_permitted_age_is_held_for_20_ms_from_the_call() {
 }
 
 #[test]
-fn a_line_without_an_echo_has_no_echo_to_remove_and_none_that_is_wrong() {
-    let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-    assert!(writes(&desk.run(MS(10))).len() > 2);
-    let statistics = desk.master.statistics();
-    assert_eq!((statistics.echo_bytes, statistics.echo_errors), (0, 0));
-    assert_eq!(statistics.stale_bytes, 0);
-}
-
-#[test]
 fn nothing_follows_a_cut_off_write_before_the_silence_is_over() {
     for (is_stop, noticed_us) in [(false, 0), (false, 700), (true, 0), (true, 700)] {
         let mut desk = Desk::with_nodes(manual(), &[N1, N3]);

@@ -9,7 +9,6 @@ mod blind_stops;
 mod boards;
 mod dead_man;
 mod discovery;
-mod echo;
 mod health;
 mod interrupted_stops;
 mod late_failures;

@@ -1,4 +1,4 @@
-//! Settings of a master: polling, gaps, echo removal, queues, defaults and memory.
+//! Settings of a master: polling, gaps, queues, defaults and memory.
 
 use crate::rig::*;
 
@@ -122,86 +122,6 @@ fn a_turnaround_gap_is_kept_after_requests_and_answers() {
     assert_eq!(desk.now, sent + US(160 + 100));
 }
 
-/// A master on a line that echoes, at the beginning of a discovery.
-fn discovering_on_an_echoing_line() -> Desk {
-    let config = with(direct(), |config| config.removes_echo = true);
-    let mut desk = Desk::new(config);
-    desk.master.discover(desk.now);
-    desk
-}
-
-#[test]
-fn the_echo_of_an_echoing_line_is_removed() {
-    let mut desk = discovering_on_an_echoing_line();
-    for node in NodeId::ALL {
-        let request = desk.turn();
-        desk.hear(80, &request[..2]);
-        desk.hear(40, &request[2..]);
-        desk.hear(160, &velocity(node, 0.0));
-    }
-    assert!(!desk.master.is_discovering());
-    desk.told();
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-    let read = desk.turn();
-    let line = [&desk.sent[0][..], &read, &velocity(NodeId::N1, 3.0)].concat();
-    desk.hear(450, &line);
-    assert_eq!(desk.told(), [reading(NodeId::N1, Status::Velocity(3.0))]);
-    assert_eq!(desk.master.statistics().echo_bytes, 8 * 4 + 12);
-    assert_eq!(desk.master.statistics().echo_errors, 0);
-}
-
-#[test]
-fn the_longest_echo_is_a_set_point_and_a_stop_for_each_node_and_a_read() {
-    let mut desk = discovering_on_an_echoing_line();
-    for node in NodeId::ALL {
-        let request = desk.turn();
-        desk.hear(280, &[request, velocity(node, 0.0)].concat());
-    }
-    let before = desk.master.statistics().echo_bytes;
-    for node in NodeId::ALL {
-        desk.master.set_velocity(node, rps(1.0), desk.now).unwrap();
-    }
-    let mut echo = vec![];
-    for _ in 0..8 {
-        echo.extend(desk.packet());
-    }
-    desk.master.stop_all(desk.now);
-    for _ in 0..9 {
-        echo.extend(desk.packet());
-    }
-    assert_eq!((echo.len(), echo[128]), (8 * 8 + 8 * 8 + 4, READ));
-    let line = [&echo[..], &velocity(NodeId::new(echo[129]).unwrap(), 1.0)].concat();
-    desk.told();
-    let deadline = desk.master.poll_timeout().unwrap();
-    desk.hear((deadline - desk.now).as_micros() - 100, &line);
-    let statistics = desk.master.statistics();
-    assert_eq!((statistics.echo_bytes - before, statistics.echo_errors), (132, 0));
-    assert!(matches!(desk.told()[..], [MasterEvent::Status { .. }]));
-}
-
-#[test]
-fn a_wrong_echo_is_one_error_and_the_next_one_is_removed_again() {
-    let mut desk = discovering_on_an_echoing_line();
-    let request = desk.turn();
-    desk.hear(280, &[&request[..2], &[0x00, 0x00], &velocity(NodeId::N1, 0.0)].concat());
-    let statistics = *desk.master.statistics();
-    assert_eq!((statistics.echo_bytes, statistics.echo_errors), (2, 1));
-    for node in &NodeId::ALL[1..] {
-        let request = desk.turn();
-        desk.hear(280, &[request, velocity(*node, 0.0)].concat());
-    }
-    let statistics = *desk.master.statistics();
-    assert_eq!((statistics.echo_bytes, statistics.echo_errors), (2 + 7 * 4, 1));
-    assert!(NodeId::ALL.iter().all(|node| desk.master.health(*node) == Some(Health::Online)));
-}
-
-#[test]
-fn a_line_without_the_configured_echo_still_works() {
-    let desk = Desk::tuned(|config| config.removes_echo = true, &[N1]);
-    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
-    assert!(desk.master.statistics().echo_errors > 0);
-}
-
 #[test]
 fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
@@ -268,7 +188,7 @@ fn the_defaults_of_a_master_are_those_of_the_rulings() {
     assert_eq!((config.reply_timeout, config.late_guard), (US(500), US(500)));
     assert_eq!((config.turnaround_gap, config.attempts), (US(0), 3));
     assert_eq!((config.polling, config.recovery_share_pct), (Polling::Fastest, 5));
-    assert!(!config.removes_echo && !config.accepts_early);
+    assert!(!config.accepts_early);
     assert_eq!((config.hold_age, config.dead_man), (US(0), None));
     assert!(config.stops_abnormal);
     let adapter = MasterConfig::usb_adapter();

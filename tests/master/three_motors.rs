@@ -143,20 +143,6 @@ fn in_doubt_positions_may_be_written_if_all_read_as_standstill() {
 }
 
 #[test]
-fn the_longest_echo_is_removed() {
-    let config = with(direct(), |config| config.removes_echo = true);
-    let mut boards = two_boards(config);
-    for _ in 0..50 {
-        boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();
-        boards.exchange();
-    }
-    let statistics = boards.master.statistics();
-    assert_eq!(statistics.echo_errors, 0);
-    assert_eq!(statistics.echo_bytes, 4 * statistics.reads + 16 * statistics.writes);
-    assert!(statistics.writes > 20);
-}
-
-#[test]
 fn a_stop_has_one_attempt_per_round_if_its_write_is_answered() {
     let mut boards = two_boards(direct());
     boards.master.set_velocity(NodeId::N1, [rps(1.0); 3], boards.now).unwrap();

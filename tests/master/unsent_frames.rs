@@ -210,21 +210,6 @@ fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
 }
 
 #[test]
-fn an_echo_is_not_expected_of_a_frame_that_did_not_leave() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let config = with(manual(), |config| config.removes_echo = true);
-        let mut desk = Desk::new(config);
-        desk.master.stop(NodeId::N1, desk.now);
-        assert_eq!(desk.packet(), read(NodeId::N1));
-        fail(&mut desk, unsent);
-        assert_eq!(desk.packet(), read(NodeId::N1));
-        desk.hear(450, &[read(NodeId::N1), velocity(NodeId::N1, 0.0)].concat());
-        assert_eq!(desk.master.statistics().echo_errors, 0);
-        assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
-    }
-}
-
-#[test]
 fn a_frame_that_left_is_not_taken_back_twice() {
     let mut desk = Desk::turning(manual(), 1.0);
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));

@@ -195,9 +195,6 @@ impl<B: Kit> Bus<B> {
             return Ok(None);
         };
         let sent = Sent::read::<B>(&bytes);
-        if self.master.config().removes_echo && !matches!(fate, Fate::Untouched | Fate::CutOff) {
-            self.master.handle_input(&bytes, self.now);
-        }
         let is_exchange = sent.is_exchange::<B>();
         broken_if!(is_exchange && self.asked.is_some(), "a second request in an open window");
         self.check_order(&sent)?;

@@ -36,7 +36,6 @@ fn settings(rng: &mut Rng) -> MasterConfig {
     if rng.chance(0.3) {
         config.attempts = rng.below(4) as u8;
     }
-    config.removes_echo = rng.chance(0.3);
     config
 }
 

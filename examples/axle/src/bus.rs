@@ -86,8 +86,8 @@ pub(crate) struct Bus<B: Boards = OneMotor> {
 
 impl MasterArgs {
     #[cfg(test)]
-    pub(crate) const fn new(line: args::PortArgs, direct: bool, echo: bool) -> Self {
-        Self { line, direct, echo }
+    pub(crate) const fn new(line: args::PortArgs, direct: bool) -> Self {
+        Self { line, direct, echo: false }
     }
 
     pub(crate) const fn line(&self) -> &args::PortArgs {
@@ -96,10 +96,13 @@ impl MasterArgs {
 
     /// Settings of a master for this adapter.
     pub(crate) const fn config(&self) -> MasterConfig {
-        let mut config =
-            if self.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() };
-        config.removes_echo = self.echo;
-        config
+        if self.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() }
+    }
+
+    /// Opens the port, for a bus of this protocol.
+    pub(crate) fn open(&self, protocol: Protocol) -> Result<Line, Failure> {
+        let line = Line::open(&self.line, protocol)?;
+        Ok(if self.echo { line.without_echo() } else { line })
     }
 }
 
@@ -115,7 +118,7 @@ pub(crate) fn complete(config: MasterConfig, args: &args::PortArgs, line: &Line)
 
 impl<B: Boards> Bus<B> {
     pub(crate) fn open(args: &MasterArgs) -> Result<Self, Failure> {
-        let line = Line::open(&args.line, B::PROTOCOL)?;
+        let line = args.open(B::PROTOCOL)?;
         let config = complete(args.config(), &args.line, &line);
         Ok(Self::new(line, config))
     }

@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn prepare_and_drive(args: &Args, command: MotorControl, signals: &Signals) -> Result<(), Failure> {
     let baud = args.line.baud_for(Protocol::Ucp);
-    let about = About { command: "drive", protocol: Protocol::Ucp, baud, has_echo: false };
+    let about = About { command: "drive", protocol: Protocol::Ucp, baud };
     let wire = Line::open(&args.line, Protocol::Ucp)?;
     let (page, wire) = args.page.open(wire, &about, signals)?;
     let mut rover = Rover::on(wire, &args.line);

@@ -41,8 +41,6 @@ pub struct MasterConfig {
     /// requests due, percent. An idle line is searched all the time. 0 searches only for nodes
     /// that are owed a stop, at 1 %; more than 50 counts as 50 (I13).
     pub recovery_share_pct: u8,
-    /// Whether this is a 2-wire line whose adapter hears its own bytes: the echo is then removed.
-    pub removes_echo: bool,
     /// Whether an answer may arrive before the line could have carried it, as behind a pipe, a
     /// socket or an emulator. Otherwise such bytes must be older than the request: they are
     /// counted as [`early`](super::NodeStatistics::early) and ignored. Also set it if the
@@ -92,7 +90,6 @@ impl MasterConfig {
             attempts: 3,
             polling: Polling::Fastest,
             recovery_share_pct: 5,
-            removes_echo: false,
             accepts_early: false,
             hold_age: Duration::ZERO,
             coast: Duration::from_millis(2000),

@@ -1,8 +1,6 @@
 //! The line: what is on the wire, who may answer until when, and which received bytes are answers
 //! (I7).
 
-use heapless::Vec;
-
 use super::{
     config::MasterConfig, event::Cause, node::Request, queue::Turn, statistics::MasterStatistics,
 };
@@ -37,7 +35,6 @@ pub(super) struct Line<B: Board> {
     /// The request in `packet`.
     sent: Option<Sent<B>>,
     decoder: Decoder<B::ToMaster, PACKET_LEN>,
-    echo: Echo,
 }
 
 /// A node has been asked and may answer.
@@ -127,7 +124,6 @@ impl<B: Board> Line<B> {
             packet: [0; PACKET_LEN],
             sent: None,
             decoder: Decoder::new(),
-            echo: Echo::new(),
         }
     }
 
@@ -195,9 +191,6 @@ impl<B: Board> Line<B> {
         self.free_at = Some(request_end + config.turnaround_gap);
         self.is_behind_write = !is_open && config.turnaround_gap == Duration::ZERO;
         count_apart(counter(&request, statistics));
-        if config.removes_echo {
-            self.echo.expect(self.packet.get(..len)?);
-        }
         if is_open {
             self.drop_stale_bytes(statistics);
             let deadline = request_end + self.answer_time(config);
@@ -253,7 +246,6 @@ impl<B: Board> Line<B> {
         self.is_behind_write = false;
         if unsent == Unsent::Untouched {
             self.free_at = Some(sent.start);
-            self.echo.forget_last();
         } else {
             // Bytes that the port has taken may still be on their way. Leave twice the pause that
             // ends a packet after them: a slave must not take the next packet for the rest of this
@@ -261,7 +253,6 @@ impl<B: Board> Line<B> {
             let end = sent.start.max(now) + wire_time(sent.len, config.baud);
             let silence = frame_pause(config).saturating_mul(2);
             self.free_at = Some(end + config.turnaround_gap + silence);
-            self.echo.forget_all();
         }
         uncount(counter(&sent.request, statistics));
         sent.is_open = sent.is_open && self.window.take().is_some();
@@ -314,11 +305,8 @@ fn counter<'a, B: Board>(
 
 /// Replies.
 impl<B: Board> Line<B> {
-    /// Removes the echo from the front of the input.
-    pub(super) fn remove_echo(&mut self, bytes: &mut &[u8], statistics: &mut MasterStatistics) {
-        let removed = self.echo.remove(bytes);
-        add(&mut statistics.echo_bytes, removed.bytes);
-        add(&mut statistics.echo_errors, removed.is_wrong.into());
+    /// Notes received bytes, for the cause if the window passes without an answer.
+    pub(super) fn note(&mut self, bytes: &[u8]) {
         if let Some(window) = self.window.as_mut().filter(|_| !bytes.is_empty()) {
             if window.heard == Heard::Nothing {
                 window.heard = Heard::Bytes;
@@ -381,69 +369,5 @@ impl<B: Board> Line<B> {
     /// Closes a window that has passed without its answer.
     pub(super) fn expire_window(&mut self, now: Instant) -> Option<Window> {
         self.window.take_if(|window| now >= window.deadline)
-    }
-}
-
-/// Longest echo in flight, in bytes: a set-point and a stop for each of eight nodes, none of them
-/// answered, and the READ after them.
-const ECHO_LEN: usize = 8 * (8 + 8) + 4;
-
-/// The bytes that an echoing line will return, in order.
-#[derive(Clone, Debug)]
-struct Echo {
-    /// Cleared once all of it has been heard.
-    sent: Vec<u8, ECHO_LEN>,
-    /// Number of these bytes heard.
-    heard: usize,
-    /// Length of the packet added last.
-    last: usize,
-}
-
-/// Echo found in the input.
-struct Removed {
-    /// Number of own bytes removed.
-    bytes: u32,
-    /// Whether the echo differed from what had been sent.
-    is_wrong: bool,
-}
-
-impl Echo {
-    const fn new() -> Self {
-        Self { sent: Vec::new(), heard: 0, last: 0 }
-    }
-
-    /// Adds a packet that has been handed out.
-    fn expect(&mut self, packet: &[u8]) {
-        if self.sent.extend_from_slice(packet).is_err() {
-            // On a line without echo the buffer must not fill up forever.
-            self.forget_all();
-            let _ = self.sent.extend_from_slice(packet);
-        }
-        self.last = packet.len();
-    }
-
-    /// Forgets the packet handed out last: it has not left.
-    fn forget_last(&mut self) {
-        let before = self.sent.len().saturating_sub(core::mem::take(&mut self.last));
-        self.sent.truncate(before.max(self.heard));
-    }
-
-    /// Forgets everything: an unknown part of the packet handed out last has left.
-    fn forget_all(&mut self) {
-        self.sent.clear();
-        (self.heard, self.last) = (0, 0);
-    }
-
-    /// Removes the echo from the front of the input.
-    fn remove(&mut self, input: &mut &[u8]) -> Removed {
-        let expected = self.sent.get(self.heard..).unwrap_or_default();
-        let same = expected.iter().zip(*input).take_while(|(sent, heard)| sent == heard).count();
-        let is_wrong = same < expected.len().min(input.len());
-        self.heard += same;
-        if is_wrong || same == expected.len() {
-            self.forget_all();
-        }
-        *input = input.get(same..).unwrap_or_default();
-        Removed { bytes: same as u32, is_wrong }
     }
 }

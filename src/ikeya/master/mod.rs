@@ -5,7 +5,7 @@
 //! | file | what it owns |
 //! |---|---|
 //! | `role` | commands, and the calls of [`Endpoint`](crate::endpoint::Endpoint); the dead-man (I13) |
-//! | `line` | what is on the wire: the reply window, the echo, what the port holds (I7) |
+//! | `line` | what is on the wire: the reply window, what the port holds (I7) |
 //! | `queue` | which packet goes next: rounds, the search, discovery (I13) |
 //! | `node` | whether a node answers, when it is asked, and which request is due (I7, I8) |
 //! | `order` | what a node has been told, and the stop that it is owed (I6, I8, I12) |

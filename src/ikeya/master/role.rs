@@ -365,7 +365,7 @@ impl<B: Board> Endpoint for Master<B> {
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
         let mut bytes = bytes;
-        self.line.remove_echo(&mut bytes, &mut self.statistics);
+        self.line.note(bytes);
         while let Some((node, status)) = self.line.next_response(&mut bytes) {
             self.hear(node, status, now);
         }

@@ -17,10 +17,6 @@ pub struct MasterStatistics {
     pub reads: u32,
     /// Bytes dropped because they were received before a request.
     pub stale_bytes: u32,
-    /// Own bytes heard and removed.
-    pub echo_bytes: u32,
-    /// Number of times the echo differed from what had been sent.
-    pub echo_errors: u32,
     /// Number of times the dead-man has stopped the nodes.
     pub dead_man: u32,
 }

@@ -31,10 +31,9 @@ fn turning(on_request: impl FnMut(Said, &mut BusState) + 'static) -> Played<BusS
 
 #[test]
 fn the_options_of_a_master_are_its_settings() {
-    let config = |direct, echo| MasterArgs::new(PortArgs::new(None), direct, echo).config();
-    assert_eq!(config(false, false), MasterConfig::usb_adapter());
-    assert_eq!(config(true, false), MasterConfig::direct());
-    assert!(config(false, true).removes_echo && config(true, true).removes_echo);
+    let config = |direct| MasterArgs::new(PortArgs::new(None), direct).config();
+    assert_eq!(config(false), MasterConfig::usb_adapter());
+    assert_eq!(config(true), MasterConfig::direct());
 }
 
 #[test]
@@ -191,7 +190,7 @@ fn an_id_whose_answers_all_come_too_late_is_not_silent() {
 fn a_stop_that_is_not_confirmed_is_waited_for_two_seconds_and_on_a_slow_line_longer() {
     for (baud, is_slow) in [(500_000, false), (9600, true)] {
         let line = turning(|said, bus| bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)));
-        let args = MasterArgs::new(PortArgs::new(Some(baud)), true, false);
+        let args = MasterArgs::new(PortArgs::new(Some(baud)), true);
         let mut bus: Bus =
             Bus::new(line.line.clone(), complete(args.config(), args.line(), &line.line));
         let (begin, bound) = (clock::now(), span(bus.master().stop_bound()));

@@ -12,7 +12,7 @@ use std::{
 };
 
 use axlewire::{
-    drive::{self, SerialPort},
+    drive::{self, SerialPort, WithoutEcho},
     time::{self, Instant},
 };
 use embedded_io::{ErrorType, Read, ReadReady, Write};
@@ -84,6 +84,12 @@ impl Line {
     /// The same line, whose bytes are also told.
     pub(crate) fn tapped(self, tell: impl FnMut(Direction, &[u8]) + 'static) -> Self {
         Self { wire: Rc::new(RefCell::new(Tap { wire: self.wire, tell })), ..self }
+    }
+
+    /// The same line without the echo of what is sent.
+    pub(crate) fn without_echo(self) -> Self {
+        let hearing_itself = Self { recording: None, ..self.clone() };
+        Self { wire: Rc::new(RefCell::new(WithoutEcho::new(hearing_itself))), ..self }
     }
 
     /// The same line, whose bytes go through `tap`.

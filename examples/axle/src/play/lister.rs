@@ -2,7 +2,6 @@
 
 use std::{
     cell::RefCell,
-    collections::VecDeque,
     rc::Rc,
     time::{SystemTime, UNIX_EPOCH},
 };
@@ -25,8 +24,6 @@ struct Lists {
     sheet: Sheet,
     sent: Box<dyn Stream>,
     received: Box<dyn Stream>,
-    /// Sent bytes that the line will echo, if it does.
-    echo: Option<VecDeque<u8>>,
     start: std::time::Instant,
     /// The system's time at the start, microseconds since 1970.
     epoch_us: u64,
@@ -39,8 +36,7 @@ impl Lister {
             true => Style::Json,
             false => Style::text(plan.protocol.number(), TimeColumn::Relative),
         };
-        let has_echo = plan.bus.config().removes_echo;
-        let lists = Rc::new(RefCell::new(Lists::new(plan.protocol, style, has_echo)));
+        let lists = Rc::new(RefCell::new(Lists::new(plan.protocol, style)));
         let tapped = Rc::clone(&lists);
         let line = line.tapped(move |direction, bytes| tapped.borrow_mut().take(direction, bytes));
         (Self(lists), line)
@@ -68,7 +64,7 @@ impl Lister {
 }
 
 impl Lists {
-    fn new(protocol: Protocol, style: Style, has_echo: bool) -> Self {
+    fn new(protocol: Protocol, style: Style) -> Self {
         let mut sheet = Sheet::new(Some(style));
         style.titles(&mut sheet.out);
         Self {
@@ -76,7 +72,6 @@ impl Lists {
             sheet,
             sent: decode::stream_of(protocol, Direction::Out),
             received: decode::stream_of(protocol, Direction::In),
-            echo: has_echo.then(VecDeque::new),
             start: clock::now(),
             epoch_us: SystemTime::now()
                 .duration_since(UNIX_EPOCH)
@@ -85,23 +80,10 @@ impl Lists {
     }
 
     fn take(&mut self, direction: Direction, bytes: &[u8]) {
-        let (mut bytes, stream) = match direction {
-            Direction::Out => (bytes, &mut self.sent),
-            Direction::In => (bytes, &mut self.received),
+        let stream = match direction {
+            Direction::Out => &mut self.sent,
+            Direction::In => &mut self.received,
         };
-        match &mut self.echo {
-            Some(echo) if direction == Direction::Out => echo.extend(bytes),
-            Some(echo) => {
-                let same = echo.iter().zip(bytes).take_while(|(sent, heard)| sent == heard).count();
-                echo.drain(..same);
-                bytes = bytes.get(same..).unwrap_or_default();
-                if !bytes.is_empty() {
-                    // Damaged, or other bytes came first: the rest is shown unchanged.
-                    echo.clear();
-                }
-            }
-            None => {}
-        }
         if self.is_on && !bytes.is_empty() {
             let micros = self.epoch_us + clock::since(self.start).as_micros() as u64;
             stream.feed(bytes, Some(micros), &mut self.sheet);
@@ -120,8 +102,8 @@ mod tests {
 
     use super::*;
 
-    fn lists(column: TimeColumn, has_echo: bool) -> Lists {
-        let mut lists = Lists::new(Protocol::Ikeya, Style::text("node", column), has_echo);
+    fn lists(column: TimeColumn) -> Lists {
+        let mut lists = Lists::new(Protocol::Ikeya, Style::text("node", column));
         lists.is_on = true;
         lists
     }
@@ -139,39 +121,9 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_taken_out_once_and_an_answer_behind_it_is_shown() {
-        for (has_echo, reads) in [(true, 1), (false, 2)] {
-            let mut lists = lists(TimeColumn::None, has_echo);
-            lists.take(Direction::Out, &read(NodeId::N1));
-            // It may come in pieces.
-            lists.take(Direction::In, &read(NodeId::N1)[..2]);
-            lists.take(Direction::In, &read(NodeId::N1)[2..]);
-            lists.take(Direction::In, &answer());
-            let text = all(lists);
-            let count = |name: &str| text.matches(name).count();
-            assert_eq!((count("read_request"), count("position_response")), (reads, 1), "{text}");
-        }
-    }
-
-    #[test]
-    fn the_echo_behind_a_damaged_or_a_lost_one_is_taken_out_again() {
-        let [first, second] = [NodeId::N1, NodeId::N2].map(read);
-        let damaged = [first[0], !first[1], first[2], first[3]];
-        for comes_back in [&damaged[..], &[0x11]] {
-            let mut lists = lists(TimeColumn::None, true);
-            lists.take(Direction::Out, &first);
-            lists.take(Direction::In, comes_back);
-            lists.take(Direction::Out, &second);
-            lists.take(Direction::In, &second);
-            let text = all(lists);
-            assert_eq!(text.matches("read_request").count(), 2, "those sent: {text}");
-        }
-    }
-
-    #[test]
     fn each_line_has_its_time_and_the_last_one_comes_at_the_end() {
         let _ = crate::played::silence(true);
-        let mut lists = lists(TimeColumn::Relative, false);
+        let mut lists = lists(TimeColumn::Relative);
         let mut later = |millis, bytes: &[u8]| {
             clock::sleep(std::time::Duration::from_millis(millis));
             lists.take(Direction::In, bytes);
@@ -186,7 +138,7 @@ mod tests {
 
     #[test]
     fn what_is_said_before_the_first_frame_and_while_all_is_stopped_is_not_listed() {
-        let mut lists = lists(TimeColumn::None, false);
+        let mut lists = lists(TimeColumn::None);
         lists.is_on = false;
         lists.take(Direction::Out, &read(NodeId::N1));
         let lister = Lister(Rc::new(RefCell::new(lists)));

@@ -26,8 +26,8 @@ use wheels::Wheels;
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
     hidden::refuse(&plan)?;
     let signals = Signals::listen_to_all()?;
-    let result = Line::open(plan.bus.line(), plan.protocol)
-        .and_then(|line| play_on(plan, line, Teller::new(), &signals));
+    let result =
+        plan.bus.open(plan.protocol).and_then(|line| play_on(plan, line, Teller::new(), &signals));
     // The port is closed here.
     signals.suspend_if_wanted(result)
 }

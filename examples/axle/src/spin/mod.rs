@@ -14,7 +14,6 @@ use crate::{
     bus::{self, Bus},
     failure::Failure,
     help::MOTION_HELP,
-    line::Line,
     report::Form,
     signals::Signals,
     teller::{self, Teller},
@@ -113,13 +112,9 @@ fn prepare<B: Boards>(
     signals: &Signals,
 ) -> Result<Ready<B>, Failure> {
     let port = args.bus.line();
-    let wire = Line::open(port, B::PROTOCOL)?;
-    let about = About {
-        command: "spin",
-        protocol: B::PROTOCOL,
-        baud: port.baud_for(B::PROTOCOL),
-        has_echo: args.bus.config().removes_echo,
-    };
+    let wire = args.bus.open(B::PROTOCOL)?;
+    let (protocol, baud) = (B::PROTOCOL, port.baud_for(B::PROTOCOL));
+    let about = About { command: "spin", protocol, baud };
     let (page, wire) = args.page.open(wire, &about, signals)?;
     let config = bus::complete(args.bus.config(), port, &wire);
     let mut bus = Bus::new(wire, config);

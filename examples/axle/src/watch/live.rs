@@ -108,9 +108,9 @@ impl Live {
         }
     }
 
-    /// The same line; the page is told of its bytes. With `has_echo`, the line hears what it sends.
-    pub(crate) fn tap(&self, line: Line, has_echo: bool) -> Line {
-        self.tell.clone().tap(line, has_echo)
+    /// The same line; the page is told of its bytes.
+    pub(crate) fn tap(&self, line: Line) -> Line {
+        self.tell.clone().tap(line)
     }
 
     /// Adds a line to the log of the page.
@@ -189,11 +189,10 @@ impl Tell {
         }
     }
 
-    /// The same line, whose bytes are told once, whether or not it hears what it sends.
-    fn tap(self, line: Line, has_echo: bool) -> Line {
+    /// The same line, whose bytes are told.
+    fn tap(self, line: Line) -> Line {
         line.tapped(move |direction, bytes| match direction {
             Direction::In => self.tell(What::Bytes(Source::Received, bytes.into())),
-            Direction::Out if has_echo => {}
             Direction::Out => self.tell(What::Bytes(Source::Sent, bytes.into())),
         })
     }

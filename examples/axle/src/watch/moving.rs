@@ -38,8 +38,6 @@ pub(crate) struct About {
     pub(crate) command: &'static str,
     pub(crate) protocol: Protocol,
     pub(crate) baud: u32,
-    /// The line hears what it sends.
-    pub(crate) has_echo: bool,
 }
 
 impl PageArgs {
@@ -54,14 +52,14 @@ impl PageArgs {
         if !self.page {
             return Ok((Page::default(), line));
         }
-        let About { command, protocol, baud, has_echo } = *about;
+        let About { command, protocol, baud } = *about;
         let open = match protocol {
             Protocol::Ucp => Live::open::<ucp::Ucp>,
             Protocol::Ikeya => Live::open::<ikeya::BothDirections>,
             Protocol::Ikeya3 => Live::open::<three::BothDirections>,
         };
         let live = open(command, line.path(), protocol, baud, signals)?;
-        let line = live.tap(line, has_echo);
+        let line = live.tap(line);
         Ok((Page { live: Some(live) }, line))
     }
 

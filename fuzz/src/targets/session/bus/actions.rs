@@ -4,6 +4,7 @@ use arbitrary::Arbitrary;
 use axlewire::{
     endpoint::Unsent,
     ikeya::{Master, Mode, NodeId, Position, master::NodeSet},
+    stream::Echo,
 };
 
 use super::{
@@ -228,6 +229,7 @@ impl<B: Kit> Session<B> {
         self.dead_man.alive_at = self.now;
         self.to_master.clear();
         self.to_slaves.clear();
+        self.echo = self.echo.take().map(|_| Echo::new());
         self.unheard.clear();
         self.answers.clear();
         self.given = 0;

@@ -6,6 +6,7 @@ use axlewire::{
         Mode, NodeId,
         master::{Health, MasterEvent, StopProgress},
     },
+    stream::Echo,
 };
 
 use super::{super::ears::Found, Session, index};
@@ -53,6 +54,10 @@ impl<B: Kit> Session<B> {
     /// Hands bytes to the master; it takes only answers that were sent.
     fn hear(&mut self, bytes: &[u8]) {
         self.given += bytes.len() as u64;
+        let bytes = match &mut self.echo {
+            Some(echo) => echo.strip(bytes),
+            None => bytes,
+        };
         let is_still = |it: &Self, id| it.master.stop_progress(id) == StopProgress::StandingStill;
         let were_still = NodeId::ALL.map(|id| is_still(self, id));
         let before = self.master.counters().frames;
@@ -133,6 +138,7 @@ impl<B: Kit> Session<B> {
                 let cut = 1 + cut % (packet.len() - 1);
                 self.to_slaves.send(&packet[..cut], number, self.now);
                 self.echo(&packet[..cut]);
+                self.echo.iter_mut().for_each(Echo::forget);
                 self.master.handle_unsent(Unsent::CutOff, self.now);
                 return false;
             }
@@ -151,15 +157,16 @@ impl<B: Kit> Session<B> {
         true
     }
 
-    /// The adapter hears its own bytes.
+    /// An adapter may hear its own bytes.
     fn echo(&mut self, bytes: &[u8]) {
-        if self.config.removes_echo {
+        if let Some(echo) = &mut self.echo {
+            echo.sent(bytes);
             self.to_master.noise(bytes, self.now);
         }
     }
 
     fn check_account(&self) {
-        let (counters, echo) = (self.master.counters(), self.master.statistics().echo_bytes);
+        let (counters, echo) = (self.master.counters(), self.echo.as_ref().map_or(0, Echo::bytes));
         assert_eq!(counters.received + u64::from(echo), self.given);
         let open = counters.received - counters.framed - counters.skipped();
         assert!(open < 16, "{open} bytes are nowhere");

@@ -8,6 +8,7 @@ use axlewire::{
         master::{MasterConfig, Polling},
         slave::SlaveConfig,
     },
+    stream::Echo,
     time::{Duration, Instant},
 };
 
@@ -31,7 +32,7 @@ struct Setup {
     gap_us: u8,
     share: u8,
     dead_man_ms: Option<u8>,
-    removes_echo: bool,
+    has_echo: bool,
     knows_nodes: bool,
     has_watchdog: bool,
     is_far: bool,
@@ -48,6 +49,8 @@ pub(super) struct Session<B: Kit> {
     pub(super) stations: Vec<Station<B>>,
     to_master: Way,
     to_slaves: Way,
+    /// What the master's adapter hears of itself, if it does.
+    echo: Option<Echo>,
     ears: Ears,
     /// Answers that the master has received but not yet taken, and those under way.
     unheard: Vec<(Reply, u64)>,
@@ -105,7 +108,6 @@ impl<B: Kit> Session<B> {
         config.turnaround_gap = US(u32::from(setup.gap_us % 200));
         config.recovery_share_pct = [5, 0, 1, 50, 100][usize::from(setup.share % 5)];
         config.dead_man = setup.dead_man_ms.map(|ms| Duration::from_millis(ms.into()));
-        config.removes_echo = setup.removes_echo;
         if setup.knows_nodes {
             config.nodes = ids.iter().copied().collect();
         }
@@ -125,6 +127,7 @@ impl<B: Kit> Session<B> {
             // An answer is never later than the guard behind its window.
             to_master: Way::new(20, 700),
             to_slaves: Way::new(20, 90),
+            echo: setup.has_echo.then(Echo::new),
             ears: Ears::new(Rules::Ikeya { to_slave: false, to_master: true, long }),
             unheard: Vec::new(),
             answers: Vec::new(),
