@@ -136,8 +136,11 @@ impl Sub for Instant {
     type Output = Duration;
 
     fn sub(self, other: Self) -> Duration {
-        let micros = self.distance(other).max(0);
-        Duration { micros: u32::try_from(micros).unwrap_or(u32::MAX) }
+        match self.distance(other) {
+            ..0 => Duration::ZERO,
+            micros if micros >> 32 != 0 => Duration { micros: u32::MAX },
+            micros => Duration { micros: micros as u32 },
+        }
     }
 }
 

@@ -23,25 +23,25 @@ const HELD: Duration = Duration::from_millis(1000);
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(super) struct Line<B: Board> {
+    /// Time at which the bytes handed out have left and the gap after them is over.
+    free_at: Instant,
+    packet: [u8; PACKET_LEN],
     /// Whether the last packet was an unanswered WRITE: a READ may follow without a pause.
     is_behind_write: bool,
-    held: Held,
-    /// Time at which the bytes handed out have left and the gap after them is over.
-    free_at: Option<Instant>,
     /// The open reply window.
     window: Option<Window>,
-    answer_wire_time: Duration,
-    packet: [u8; PACKET_LEN],
+    decoder: Decoder<B::ToMaster, PACKET_LEN>,
+    held: Held,
     /// The request in `packet`.
     sent: Option<Sent<B>>,
-    decoder: Decoder<B::ToMaster, PACKET_LEN>,
+    answer_wire_time: Duration,
 }
 
 /// A node has been asked and may answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
-    pub(super) node: NodeId,
     request_end: Instant,
+    pub(super) node: NodeId,
     pub(super) deadline: Instant,
     heard: Heard,
 }
@@ -67,13 +67,13 @@ enum Held {
 /// The request handed out last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sent<B: Board> {
-    pub(super) turn: Turn,
-    pub(super) request: Request<B>,
-    /// Whether its window is open.
-    pub(super) is_open: bool,
     /// Earliest time at which its first byte could leave.
     start: Instant,
+    /// Whether its window is open.
+    pub(super) is_open: bool,
     len: usize,
+    pub(super) turn: Turn,
+    pub(super) request: Request<B>,
 }
 
 /// What a response is.
@@ -114,11 +114,11 @@ impl Overdue {
 }
 
 impl<B: Board> Line<B> {
-    pub(super) fn new(config: &MasterConfig) -> Self {
+    pub(super) fn new(config: &MasterConfig, now: Instant) -> Self {
         Self {
             is_behind_write: false,
             held: Held::Nothing,
-            free_at: None,
+            free_at: now,
             window: None,
             answer_wire_time: wire_time(<B::ToMaster as Framing>::MAX_LEN, config.baud),
             packet: [0; PACKET_LEN],
@@ -146,7 +146,7 @@ impl<B: Board> Line<B> {
         match &self.window {
             Some(window) => Some(window.deadline),
             // Not before the line is free.
-            None => due().map(|due| self.free_at.unwrap_or(due).max(due)),
+            None => due().map(|due| due.max(self.free_at)),
         }
     }
 }
@@ -159,7 +159,7 @@ impl<B: Board> Line<B> {
     }
 
     fn is_free(&self, now: Instant) -> bool {
-        self.free_at.is_none_or(|free| now >= free)
+        now >= self.free_at
     }
 
     /// Whether any request may be sent now.
@@ -184,11 +184,11 @@ impl<B: Board> Line<B> {
         now: Instant,
     ) -> Option<()> {
         let len = self.encode(turn.node, &request)?;
-        let start = self.free_at.map_or(now, |free| free.max(now));
+        let start = self.free_at.max(now);
         let is_open = request.is_exchange();
         self.sent = Some(Sent { turn, request, is_open, start, len });
         let request_end = start + wire_time(len, config.baud);
-        self.free_at = Some(request_end + config.turnaround_gap);
+        self.free_at = request_end + config.turnaround_gap;
         self.is_behind_write = !is_open && config.turnaround_gap == Duration::ZERO;
         count_apart(counter(&request, statistics));
         if is_open {
@@ -245,14 +245,14 @@ impl<B: Board> Line<B> {
         let mut sent = self.sent.take()?;
         self.is_behind_write = false;
         if unsent == Unsent::Untouched {
-            self.free_at = Some(sent.start);
+            self.free_at = sent.start;
         } else {
             // Bytes that the port has taken may still be on their way. Leave twice the pause that
             // ends a packet after them: a slave must not take the next packet for the rest of this
             // one.
             let end = sent.start.max(now) + wire_time(sent.len, config.baud);
             let silence = frame_pause(config).saturating_mul(2);
-            self.free_at = Some(end + config.turnaround_gap + silence);
+            self.free_at = end + config.turnaround_gap + silence;
         }
         uncount(counter(&sent.request, statistics));
         sent.is_open = sent.is_open && self.window.take().is_some();
@@ -263,7 +263,7 @@ impl<B: Board> Line<B> {
     pub(super) fn hold(&mut self, now: Instant) {
         if let (Some(window), Held::Nothing) = (&self.window, self.held) {
             self.held = Held::Last(window.node);
-            self.free_at = Some(now + HELD);
+            self.free_at = now + HELD;
         }
     }
 
@@ -276,12 +276,12 @@ impl<B: Board> Line<B> {
             (_, Held::Nothing) => None,
             (Some(window), Held::Last(_)) if is_open => {
                 window.deadline = window.deadline.max(answer_by);
-                self.free_at = Some(window.request_end.max(left_by) + config.turnaround_gap);
+                self.free_at = window.request_end.max(left_by) + config.turnaround_gap;
                 None
             }
             _ => {
                 // The answer comes too late, or may be that of an earlier request.
-                (self.free_at, self.is_behind_write) = (Some(answer_by), false);
+                (self.free_at, self.is_behind_write) = (answer_by, false);
                 Some(Overdue { held, closed: self.window.take(), answer_by })
             }
         }
@@ -339,7 +339,7 @@ impl<B: Board> Line<B> {
                 let asked_at = window.request_end;
                 let latency = now - (asked_at + self.answer_wire_time);
                 (self.window, self.held) = (None, Held::Nothing);
-                self.free_at = Some(now + config.turnaround_gap);
+                self.free_at = now + config.turnaround_gap;
                 Response::Answer { asked_at, latency }
             }
             window => {

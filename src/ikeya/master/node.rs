@@ -31,20 +31,20 @@ pub(super) struct Node<B: Board> {
     strikes: u8,
     /// Failed attempts of the READ in progress.
     attempt: u8,
+    last_failure: Option<Cause>,
+    status: Option<(Status<B>, Instant)>,
     /// Whether the application, or a mode in doubt, asks for a READ.
     is_asked: bool,
-    /// Number of requests in the discovery in progress.
-    scans: u8,
-    last_failure: Option<Cause>,
     /// The node has answered since the application requested a READ.
     has_answered: bool,
     /// A READ has failed since then.
     has_failed: bool,
+    /// Number of requests in the discovery in progress.
+    scans: u8,
     /// Time before which it is not polled: a late answer may be on its way.
-    guarded_until: Option<Instant>,
+    guarded_until: Instant,
     /// Time of the next READ; only set with [`Polling::Every`].
     read_due: Option<Instant>,
-    status: Option<(Status<B>, Instant)>,
     statistics: NodeStatistics,
 }
 
@@ -128,7 +128,7 @@ impl<B: Board> Request<B> {
 impl<B: Board> Node<B> {
     // In line it would take 90 more bytes of flash.
     #[inline(never)]
-    pub(super) const fn new() -> Self {
+    pub(super) const fn new(now: Instant) -> Self {
         Self {
             health: None,
             mode: KnownMode::UNKNOWN,
@@ -140,7 +140,7 @@ impl<B: Board> Node<B> {
             has_answered: false,
             has_failed: false,
             order: Order::new(),
-            guarded_until: None,
+            guarded_until: now,
             read_due: None,
             status: None,
             statistics: NodeStatistics::NEW,
@@ -292,13 +292,13 @@ impl<B: Board> Node<B> {
             reason,
             Reason::Hold | Reason::SpeedStop | Reason::Stop | Reason::Repeat | Reason::SetPoint
         );
-        let guard = self.guarded_until.filter(|_| B::ANSWERS_WRITE || !is_apart);
+        let guard = if B::ANSWERS_WRITE || !is_apart { self.guarded_until } else { now };
         let turn = match reason {
             Reason::Repeat => self.order.stop_unseen().and_then(Stop::repeat_at),
             Reason::Cycle if !self.is_wanted() => self.cycle_at(config),
             _ => None,
         };
-        let at = turn.unwrap_or(now).max(guard.unwrap_or(now));
+        let at = turn.unwrap_or(now).max(guard);
         self.has(reason, config).then_some(at)
     }
 
@@ -359,7 +359,7 @@ impl<B: Board> Node<B> {
     /// left.
     pub(super) fn is_sought_first(&self, config: &MasterConfig) -> bool {
         if self.health.is_none() {
-            return self.has_attempts(config.attempts.max(1));
+            return self.has_attempts(config.attempts);
         }
         self.is_lost() && (B::ANSWERS_WRITE || self.mode.on_record() == Some(Mode::Position))
     }
@@ -442,7 +442,7 @@ impl<B: Board> Node<B> {
 
     /// Its answer may come until then.
     pub(super) const fn guard_until(&mut self, at: Instant) {
-        self.guarded_until = Some(at);
+        self.guarded_until = at;
     }
 
     /// An answer outside its window, or too early: it can put the mode in doubt, but decides
@@ -478,7 +478,7 @@ impl<B: Board> Node<B> {
     ) -> Changes {
         self.order.end_exchange();
         let was = self.health.replace(Health::Online);
-        (self.strikes, self.attempt, self.guarded_until) = (0, 0, None);
+        (self.strikes, self.attempt, self.guarded_until) = (0, 0, now);
         let decision = self.mode.decide(status.mode());
         let changes = Changes::NONE
             .with(Change::Discovered, was.is_none())
@@ -508,7 +508,7 @@ impl<B: Board> Node<B> {
 
     /// Its window has closed without its answer. A late one may come until the guard is over.
     pub(super) fn miss(&mut self, cause: Cause, config: &MasterConfig, guard: Instant) -> Changes {
-        self.guarded_until = Some(guard);
+        self.guarded_until = guard;
         count_apart(&mut self.statistics.timeouts);
         if cause == Cause::Damaged {
             count_apart(&mut self.statistics.crc_errors);
@@ -524,7 +524,7 @@ impl<B: Board> Node<B> {
         let is_abnormal = self.strikes >= STRIKES;
         let health = if is_abnormal { Health::Abnormal } else { Health::Suspect(self.strikes) };
         self.health = Some(health);
-        let is_failed = is_abnormal || self.attempt >= config.attempts.max(1);
+        let is_failed = is_abnormal || self.attempt >= config.attempts;
         let is_unconfirmed = is_failed && self.order.end_confirmation();
         if is_failed {
             (self.attempt, self.last_failure, self.has_failed) = (0, Some(cause), true);

@@ -44,9 +44,9 @@ pub(super) struct Order<B: Board> {
     /// Whether the node has had a WRITE since its last exchange ended: it is read before the order
     /// is repeated.
     is_written: bool,
-    confirm: Confirm,
     /// Whether the node has ever had a WRITE from this master.
     was_written: bool,
+    confirm: Confirm,
     state: State<B>,
 }
 
@@ -62,9 +62,9 @@ enum State<B: Board> {
 /// A target that is repeated in every cycle.
 #[derive(Clone, Copy, Debug)]
 struct SetPoint<B: Board> {
-    target: Target<B>,
     /// Whether it has not been sent yet.
     is_new: bool,
+    target: Target<B>,
 }
 
 /// Progress of confirming a WRITE.
@@ -136,20 +136,14 @@ impl<B: Board> Order<B> {
 
     /// The node is abnormal: it keeps its last command and is owed a stop, if that `is_stopped`.
     pub(super) fn lose(&mut self, is_stopped: bool) {
-        let is_owed = match &mut self.state {
+        let held = match &mut self.state {
             State::Stop(stop) if stop.stage != Stage::Still => return stop.lose(),
-            State::Stop(stop) if is_stopped && !stop.is_released => {
-                *stop = Stop::new(stop.hold);
-                return;
-            }
-            State::SetPoint(_) | State::Released => is_stopped,
-            State::None | State::Stop(_) => false,
+            State::Stop(stop) if is_stopped && !stop.is_released => stop.hold,
+            State::SetPoint(_) | State::Released if is_stopped => None,
+            State::SetPoint(_) | State::Released => return self.state = State::Released,
+            State::None | State::Stop(_) => return self.state = State::None,
         };
-        if is_owed {
-            self.state = State::Stop(Stop::new(None));
-        } else {
-            self.state = if self.is_set_point() { State::Released } else { State::None };
-        }
+        self.state = State::Stop(Stop::new(held));
     }
 
     /// The mode is in doubt: what was measured does not count, and a position that is held must be
@@ -510,7 +504,6 @@ impl<B: Board> Stop<B> {
     }
 
     /// Discards everything measured or confirmed so far: the mode is, or was, in doubt.
-    #[inline(never)]
     fn restart(&mut self) {
         if self.stage == Stage::Still {
             (self.was_confirmed, self.is_told) = (false, false);

@@ -41,6 +41,8 @@ pub(super) struct Queue {
     set_point: usize,
     /// Index of the node whose turn in the cycle it is.
     cycle: usize,
+    /// Nodes that have had a stop repeated since the last exchange, one bit each.
+    had_repeat: u8,
     /// Turns of the cycle that go before a discovery.
     cycle_first: u8,
     is_second_discovery: bool,
@@ -50,8 +52,6 @@ pub(super) struct Queue {
     had_stop: u8,
     /// Nodes that have had their new set-point in this round, one bit each.
     had_set_point: u8,
-    /// Nodes that have had a stop repeated since the last exchange, one bit each.
-    had_repeat: u8,
     discovery: Option<Discovery>,
     /// Time before which no abnormal node is searched for.
     search_at: Option<Instant>,
@@ -67,8 +67,8 @@ pub(super) struct Queue {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Turn {
     pub(super) node: NodeId,
-    pub(super) reason: Reason,
     round: Round,
+    pub(super) reason: Reason,
 }
 
 /// Round of a request: the one in progress, or the next, in which each node has its turns again.
@@ -336,7 +336,7 @@ impl Queue {
         config: &MasterConfig,
     ) -> bool {
         let Some(mut discovery) = self.discovery else { return false };
-        while discovery.pass() < config.attempts.max(1).into() {
+        while discovery.pass() < config.attempts.into() {
             let is_here = config.nodes.contains(NodeId::ALL[discovery.index()]);
             if is_here && nodes[discovery.index()].is_scanned(discovery.pass()) {
                 self.discovery = Some(discovery);

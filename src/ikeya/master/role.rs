@@ -99,11 +99,11 @@ pub struct Master<B: Board = OneMotor> {
     pub(super) queue: Queue,
     /// Time of the last call.
     pub(super) now: Instant,
-    /// Time of the application's last sign of life.
-    alive_at: Instant,
     pub(super) events: Events<MasterEvent<B>, EVENTS>,
     pub(super) statistics: MasterStatistics,
     pub(super) line: Line<B>,
+    /// Time of the application's last sign of life.
+    alive_at: Instant,
     pub(super) nodes: [Node<B>; 8],
 }
 
@@ -112,14 +112,16 @@ impl<B: Board> Master<B> {
     /// Creates a master that knows no nodes yet; call [`discover`](Self::discover) to find them.
     #[must_use]
     pub fn new(config: MasterConfig, now: Instant) -> Self {
+        let mut config = config;
+        config.attempts = config.attempts.max(1);
         Self {
             config,
             queue: Queue::default(),
             now,
             alive_at: now,
             statistics: MasterStatistics::default(),
-            line: Line::new(&config),
-            nodes: core::array::from_fn(|_| Node::new()),
+            line: Line::new(&config, now),
+            nodes: core::array::from_fn(|_| Node::new(now)),
             events: Events::new(),
         }
     }

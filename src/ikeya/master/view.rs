@@ -174,6 +174,6 @@ impl<B: Board> Master<B> {
 
     fn attempts_bound(&self, between: Duration) -> Duration {
         let attempt = self.config.late_guard + between;
-        attempt.saturating_mul(self.config.attempts.max(1).into())
+        attempt.saturating_mul(self.config.attempts.into())
     }
 }
