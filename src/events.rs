@@ -58,6 +58,12 @@ impl<E, const N: usize> Events<E, N> {
         }
     }
 
+    /// Changes queued events that are no longer true.
+    #[cfg(feature = "ucp")]
+    pub(crate) fn amend(&mut self, change: impl FnMut(&mut E)) {
+        self.queue.iter_mut().for_each(change);
+    }
+
     /// The newest queued event of a kind.
     #[cfg(feature = "ucp")]
     pub(crate) fn newest(&self, is_of_its_sort: impl Fn(&E) -> bool) -> Option<&E> {

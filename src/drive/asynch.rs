@@ -11,7 +11,7 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, patience},
     error::DriveError,
     sending::FRAME_LEN,
 };
@@ -40,16 +40,21 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
     /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        let result = self.round_async().await;
+        self.service_by_async(None).await
+    }
+
+    async fn service_by_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
+        let result = self.round_async(by).await;
         if result.is_err() {
             yield_once().await;
         }
         result
     }
 
-    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    /// A round; that of a slave or a robot does not wait for a slow port beyond `by`.
+    async fn round_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
-        let mut result = Ok(());
+        let (mut result, begin) = (Ok(()), self.now());
         for _ in 0..FRAMES {
             result = result.and(self.receive_async().await);
             self.expire();
@@ -61,15 +66,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     break;
                 }
             }
-            let (received, sent) = self.send_async().await;
+            let (received, sent) = self.send_async(by).await;
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
-            if has_failed {
+            if !has_failed && self.sending.is_under_way() {
+                // The next round continues to wait for the port.
+                return result;
+            }
+            if has_failed || self.is_held_up(begin) {
                 break;
             }
         }
         if self.sending.needs_flush() {
-            let flushed = self.flush_async().await;
+            let flushed = self.flush_async(by).await;
             result = result.and(flushed);
         }
         result
@@ -126,7 +135,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            let result = self.service_async().await;
+            let result = self.service_by_async(Some(deadline)).await;
             if result.is_ok() || needs != Needs::WholePort {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));
@@ -160,15 +169,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
     /// that may forbid the rest. A failing receiver does not stop the sending.
-    async fn send_async(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
+    async fn send_async(&mut self, by: Option<Instant>) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
             let patience_us = self.patience_us(waited);
+            let wait_us = self.wait_us(patience_us, by);
             let writing = self.port.write(self.sending.rest());
-            let written = first(writing, self.clock.delay_us(patience_us)).await;
+            let written = first(writing, self.clock.delay_us(wait_us)).await;
+            if written.is_none() && wait_us < patience_us {
+                return (received, Ok(()));
+            }
             self.sending.write_wait.end();
             let Some(written) = written else {
                 self.reclaim();
@@ -183,16 +196,20 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
         }
         if self.sending.is_in_doubt() {
-            return (received, self.flush_async().await);
+            return (received, self.flush_async(by).await);
         }
         (received, Ok(()))
     }
 
-    async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    async fn flush_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
         let patience_us = self.patience_us(waited);
-        let flushed = first(self.port.flush(), self.clock.delay_us(patience_us)).await;
+        let wait_us = self.wait_us(patience_us, by);
+        let flushed = first(self.port.flush(), self.clock.delay_us(wait_us)).await;
+        if flushed.is_none() && wait_us < patience_us {
+            return Ok(());
+        }
         self.sending.flush_wait.end();
         match flushed {
             Some(flushed) => self.after_flush(flushed),
@@ -204,8 +221,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// perhaps in a call that was dropped. At least the time that a frame takes, for a healthy port
     /// that was not asked for a while.
     fn patience_us(&self, waited: Duration) -> u32 {
-        let frame_us = 2 * self.role.wire_time(FRAME_LEN).as_micros() + 1000;
-        STALL.as_micros().saturating_sub(waited.as_micros()).max(frame_us)
+        let frame = self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1);
+        STALL.as_micros().saturating_sub(waited.as_micros()).max(frame.as_micros())
+    }
+
+    /// How long to wait for the port this time, microseconds. A slave and a robot are looked at
+    /// when their watchdog is due, and `by` the end of the call.
+    fn wait_us(&self, patience_us: u32, by: Option<Instant>) -> u32 {
+        let until = |at: Instant| (at - self.latest).as_micros();
+        let looks = [self.role.poll_timeout(), by].into_iter().flatten().map(until);
+        match patience(&self.role) {
+            Some(_) => looks.filter(|&us| us > 0).fold(patience_us, u32::min),
+            None => patience_us,
+        }
     }
 
     /// Handles a stalled port. A write of no bytes, which takes no time, lets an

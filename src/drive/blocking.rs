@@ -24,6 +24,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     pub fn service(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let mut result = self.receive();
+        let begin = self.latest;
         for _ in 0..FRAMES {
             self.expire();
             match self.load() {
@@ -37,7 +38,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             let (received, sent) = self.send();
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
-            if has_failed {
+            if has_failed || self.is_held_up(begin) {
                 break;
             }
         }

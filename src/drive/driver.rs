@@ -48,6 +48,12 @@ pub struct Driver<R, P, C> {
     pub(super) sending: Sending,
 }
 
+/// How long the port of a role that acts on commands may go unread, see
+/// [`Endpoint::held_up_after`].
+pub(super) fn patience<R: Endpoint>(role: &R) -> Option<Duration> {
+    role.held_up_after().filter(|&limit| limit != Duration::ZERO)
+}
+
 /// When the bytes in a port may have arrived that was not looked at before.
 fn long_before(now: Instant) -> Instant {
     const HOUR_US: u64 = 3_600_000_000;
@@ -67,9 +73,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
         // A master or a host may have talked through this port before.
-        let empty_at = match role.held_up_after() {
-            Some(limit) if limit != Duration::ZERO => latest,
-            _ => long_before(latest),
+        let empty_at = match patience(&role) {
+            Some(_) => latest,
+            None => long_before(latest),
         };
         Self {
             role,
@@ -162,10 +168,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// be old, and do not count as new ([`Endpoint::held_up_after`]).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let look_at = self
-            .role
-            .held_up_after()
-            .filter(|&limit| limit != Duration::ZERO)
+        let look_at = patience(&self.role)
             .map(|limit| self.looked_at + Duration::from_micros(limit.as_micros() / 2));
         earliest(&[self.role.poll_timeout(), look_at])
     }
@@ -247,6 +250,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub(super) fn saw_empty(&mut self) {
         self.empty_at = self.latest;
         (self.is_empty, self.has_overtaken) = (true, false);
+    }
+
+    /// Whether a round that began then sends no more frames: through a slow port the application of
+    /// a slave or a robot would hear of its watchdog too late.
+    pub(super) fn is_held_up(&mut self, begin: Instant) -> bool {
+        let now = self.now();
+        patience(&self.role).is_some_and(|limit| now - begin >= limit)
     }
 
     /// Lets time pass.

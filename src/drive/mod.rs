@@ -56,7 +56,9 @@
 //! [`service`](Driver::service) does not wait. All other calls end at a deadline, which is an
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
-//! either after one second ([`DriveError::Stalled`]).
+//! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for the
+//! port no longer than until their deadline or that of their role, and the next call goes on: the
+//! application hears of a watchdog in time.
 //!
 //! # When a driver is held up
 //!
@@ -86,10 +88,10 @@
 //!   replaced or stopped, an answer that others have overtaken). In these cases the driver gives it
 //!   up and tells the role, which sends a stop twice (ruling U16).
 //! * *A frame that the port took in parts* counts as sent only if it cannot have paused for that
-//!   long in between: each `write` returned before the bytes ahead of its own could have been out
-//!   for that long, or the whole frame was flushed in hardly more than its time on the line
-//!   ([`Endpoint::wire_time`]). Otherwise it is given up as well. So `flush` must wait until the
-//!   bytes are out, and after a partial `write` the driver must be called again in time.
+//!   long in between: it is flushed at once, and must be out in hardly more than its time on the
+//!   line ([`Endpoint::wire_time`]). Otherwise it is given up as well. So `flush` must wait until
+//!   the bytes are out, and a port should take whole frames: of one that it took in a single
+//!   `write`, it must not send a part and hold the rest.
 //! * *After a failed `flush`* the role counts its latest commands as not sent, and a frame that was
 //!   cut off has no rest.
 //! * *A request that the port still holds*, because its `flush` has failed or its call was dropped,

@@ -16,8 +16,11 @@ pub(super) struct Sending {
     outbox: Outbox<FRAME_LEN>,
     /// Start of the latest write.
     asked_at: Instant,
-    /// The frame, if any byte of it has left.
-    begun: Option<Begun>,
+    /// Earliest time at which all bytes taken by the port can have left.
+    left_at: Instant,
+    /// The same time, without a pause inside the frame since the last flush.
+    unbroken_at: Instant,
+    taken: Taken,
     flush: Flush,
     /// Since when the port has been asked, without success, to take bytes, and to flush them.
     #[cfg(feature = "embedded-io-async")]
@@ -26,20 +29,20 @@ pub(super) struct Sending {
     pub(super) flush_wait: Wait,
 }
 
-/// Timing of a frame that a port takes in parts.
+/// How the port has taken the frame.
 ///
-/// When its bytes are on the line is not known: a write may return before they are out, or long
-/// after. But no byte leaves before its write begins, and when the write returns, its bytes are on
-/// their way. So the longest possible pause in front of them is known. And no pause is longer than
-/// the time from the first write of the frame to its flush, less its time on the line.
-#[derive(Clone, Copy, Debug)]
-struct Begun {
-    /// Earliest time at which all bytes taken by the port can have left.
-    left_at: Instant,
-    /// The same time, without any pause or wait since the last flush.
-    unbroken_at: Instant,
-    /// Whether a pause may have been too long.
-    is_doubtful: bool,
+/// When the bytes of a part are on the line is not known: a port may send them at once, or hold
+/// them until its flush. But no byte leaves before its write begins, and all have left after a
+/// flush. So no pause inside the frame is longer than the time from its first write to its flush,
+/// less its time on the line.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Taken {
+    /// Nothing of it.
+    Nothing,
+    /// A part, or all of it in parts: only a flush in time shows that it did not pause too long.
+    Parts,
+    /// All of it at once, or all of it has left.
+    Whole,
 }
 
 /// Since when a port has been asked for something, including calls that were dropped.
@@ -78,7 +81,9 @@ impl Sending {
         Self {
             outbox: Outbox::new(),
             asked_at,
-            begun: None,
+            left_at: asked_at,
+            unbroken_at: asked_at,
+            taken: Taken::Nothing,
             flush: Flush::Done,
             #[cfg(feature = "embedded-io-async")]
             write_wait: Wait(None),
@@ -96,7 +101,7 @@ impl Sending {
     pub(super) fn load<E>(&mut self, frame: &[u8]) -> Result<(), DriveError<E>> {
         let (length, limit) = (frame.len(), FRAME_LEN);
         self.outbox.extend(frame).ok_or(DriveError::FrameTooLong { length, limit })?;
-        self.begun = None;
+        self.taken = Taken::Nothing;
         Ok(())
     }
 
@@ -117,36 +122,40 @@ impl Sending {
         silence: Duration,
     ) -> Option<Unsent> {
         self.outbox.taken(count);
-        let asked_at = self.asked_at;
-        let before = self.begun.unwrap_or(Begun {
-            left_at: asked_at,
-            unbroken_at: asked_at,
-            is_doubtful: false,
-        });
-        let is_first = self.begun.is_none();
-        let frame = Begun {
-            left_at: before.left_at.max(asked_at) + wire_time,
-            unbroken_at: before.unbroken_at + wire_time,
-            is_doubtful: before.is_doubtful || !is_first && now > before.left_at + silence,
-        };
-        self.begun = Some(frame);
-        // Its flush can no longer be in time.
-        let is_cut_off = frame.is_doubtful && now > frame.unbroken_at + silence;
-        if is_cut_off { self.give_up() } else { None }
+        self.left_at = self.left_at.max(self.asked_at);
+        if self.taken == Taken::Nothing {
+            self.unbroken_at = self.left_at;
+            self.taken = if self.outbox.is_empty() { Taken::Whole } else { Taken::Parts };
+        }
+        self.left_at += wire_time;
+        self.unbroken_at += wire_time;
+        self.give_up_late(now, silence)
     }
 
     /// Whether all of a frame was taken, but only a flush in time can show that it did not pause.
     pub(super) fn is_in_doubt(&self) -> bool {
-        self.outbox.is_empty() && self.begun.is_some_and(|frame| frame.is_doubtful)
+        self.outbox.is_empty() && self.taken == Taken::Parts
+    }
+
+    /// Whether the port is still to take a part of the frame, or to be flushed behind its parts.
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) fn is_under_way(&self) -> bool {
+        !self.outbox.is_empty() || self.is_in_doubt()
     }
 
     /// Gives up a frame that is no longer worth sending: one of which nothing has left, or that was
     /// cut off too long ago. The role then decides again.
     pub(super) fn reclaim(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
-        match self.begun {
-            Some(frame) if !self.outbox.is_empty() && now <= frame.left_at + silence => None,
+        match self.taken {
+            Taken::Parts if !self.outbox.is_empty() => self.give_up_late(now, silence),
             _ => self.give_up(),
         }
+    }
+
+    /// Gives up a frame in parts that has paused for too long, or may have.
+    fn give_up_late(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
+        let is_late = self.taken == Taken::Parts && now > self.unbroken_at + silence;
+        if is_late { self.give_up() } else { None }
     }
 
     /// Gives up the frame.
@@ -155,7 +164,10 @@ impl Sending {
             return None;
         }
         self.outbox.discard();
-        Some(self.begun.take().map_or(Unsent::Untouched, |_| Unsent::CutOff))
+        match core::mem::replace(&mut self.taken, Taken::Whole) {
+            Taken::Nothing => Some(Unsent::Untouched),
+            Taken::Parts | Taken::Whole => Some(Unsent::CutOff),
+        }
     }
 
     /// Whether a flush is due; after a failed one, it is due again.
@@ -163,22 +175,16 @@ impl Sending {
         self.flush != Flush::Done
     }
 
-    /// Notes that everything taken has left. Gives up a frame in doubt, unless it cannot have
+    /// Notes that everything taken has left. Gives up a frame in parts, unless it cannot have
     /// paused for too long.
     pub(super) fn flushed(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         self.flush = Flush::Done;
-        let is_whole = self.outbox.is_empty();
-        let frame = self.begun.as_mut()?;
-        if frame.is_doubtful && now > frame.unbroken_at + silence {
-            return self.give_up();
+        let given_up = self.give_up_late(now, silence);
+        if self.is_in_doubt() {
+            self.taken = Taken::Whole;
         }
-        if !is_whole {
-            // What has left did not pause; the rest may wait for the next flush.
-            (frame.unbroken_at, frame.is_doubtful) = (frame.left_at, true);
-        } else if frame.is_doubtful {
-            self.begun = None;
-        }
-        None
+        self.unbroken_at = self.left_at;
+        given_up
     }
 
     /// Notes that a flush failed, or will not be made; returns whether the role does not know that

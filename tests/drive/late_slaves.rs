@@ -190,3 +190,21 @@ fn a_command_that_a_held_up_slave_finds_half_arrived_is_not_lost() {
     slave.service().unwrap();
     assert!(command(&slave).is_some(), "the delay cut a WRITE in two");
 }
+
+#[test]
+fn a_slave_whose_port_takes_no_answer_hears_of_its_watchdog_in_time() {
+    let config = with_watchdog();
+    let watchdog = config.watchdog.unwrap();
+    let wire = Wire::bus(None);
+    let mut slave = one_slave(&wire, config);
+    wire.receive(FIVE_RPS().as_bytes());
+    wire.world.block_on(slave.next_command_async(wire.world.now() + ms(1))).unwrap().unwrap();
+    let commanded = wire.world.now();
+    wire.write_with(|_| Step::Stall);
+    wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
+    while command(&slave).is_some() {
+        let deadline = wire.world.now() + ms(1000);
+        wire.world.block_on(slave.next_command_async(deadline)).unwrap();
+    }
+    assert!(wire.world.now() - commanded <= watchdog + ms(1), "{:?}", wire.world.now());
+}

@@ -29,15 +29,15 @@ fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {
 #[test]
 fn a_role_is_told_when_its_frame_was_taken_and_when_it_was_flushed() {
     for is_async in BOTH {
-        // Only the write of the last part takes the frame.
+        // Only the write of the last part takes the frame, which is flushed at once.
         let mut port = Port { most: 2, ..Port::writing([Step::Late(3000)]) };
         port.flushes.push_back(Step::Late(4000));
         let role = Recorder::sending(&[b"123", b"45"]);
         let mut driver = on(role, port);
         let sent = call!(is_async, driver, service, service_async());
         assert_eq!(sent, Ok(()));
-        assert_eq!(driver.role().taken_at, [3, 3].map(at_ms), "async {is_async}");
-        assert_eq!(driver.role().flushed_at, [7].map(at_ms), "async {is_async}");
+        assert_eq!(driver.role().taken_at, [3, 7].map(at_ms), "async {is_async}");
+        assert_eq!(driver.role().flushed_at, [7, 7].map(at_ms), "async {is_async}");
     }
 }
 

@@ -4,7 +4,7 @@ use axlewire::drive::Driver;
 use embedded_io::Write;
 
 use crate::{
-    port::{Port, World},
+    port::{Port, Step, World},
     rover_rig::*,
 };
 
@@ -52,5 +52,64 @@ fn a_stop_is_handed_out_however_many_commands_came_before_it() {
         }
         assert_eq!(robot.role().command(world.now()).speed(), 0);
         assert_eq!(speed, 0, "the application keeps driving after a stop");
+    }
+}
+
+/// When an application that waits for commands is told, in microseconds, that its robot stands
+/// still, if the last command came at 0 and each write of its reports takes this long.
+fn told_to_stand_still(is_async: bool, write_us: u64) -> u64 {
+    let world = World::default();
+    let (near, mut far) = Port::pair(&world, 87);
+    *near.writer.borrow_mut() = Some(Box::new(move |_| Step::Late(write_us)));
+    let mut robot = Robot::new(RobotConfig::default(), world.now());
+    robot.set_telemetry(&Telemetry::default(), world.now());
+    let mut robot = Driver::new(robot, near, world.clone());
+    far.write(&bytes(go(50))).unwrap();
+    let mut speed = 0;
+    while speed != 0 || world.now_us() < 10_000 {
+        let deadline = world.now() + Duration::from_millis(20);
+        let command = match is_async {
+            true => world.block_on(robot.next_command_async(deadline)),
+            false => robot.next_command(deadline),
+        };
+        speed = command.unwrap_or_default().map_or(speed, |command| command.speed());
+        assert!(world.now_us() < 5_000_000 && (speed == 0 || speed == 50));
+    }
+    world.now_us()
+}
+
+#[test]
+fn through_a_slow_port_an_application_hears_of_the_watchdog_in_time() {
+    // The command has come after its 24 bytes.
+    const DUE_US: u64 = 500_000 + 24 * 87;
+    for write_us in [20_000, 100_000, 900_000] {
+        let told_us = told_to_stand_still(true, write_us);
+        assert!(told_us < DUE_US + 1000, "async, {write_us} us: at {told_us} us");
+    }
+    for write_us in [5000, 20_000, 100_000] {
+        // Nothing can be done while a write blocks.
+        let told_us = told_to_stand_still(false, write_us);
+        assert!(told_us < DUE_US + 20_000 + 2 * write_us, "{write_us} us: at {told_us} us");
+    }
+}
+
+#[test]
+fn an_event_that_moves_the_robot_is_not_told_behind_its_watchdog() {
+    for is_async in [false, true] {
+        let world = World::default();
+        let (mut near, mut far) = Port::pair(&world, 87);
+        near.flushes.push_back(Step::Blocks(700_000));
+        let mut robot = Driver::new(Robot::new(RobotConfig::default(), world.now()), near, world);
+        let world = robot.port().world.clone();
+        far.write(&bytes(go(50))).unwrap();
+        far.write(&bytes(Ping {})).unwrap();
+        world.step(10_000);
+        let deadline = world.now();
+        let told = match is_async {
+            true => world.block_on(robot.next_event_async(deadline)),
+            false => robot.next_event(deadline),
+        };
+        assert_eq!(told.unwrap(), Some(RobotEvent::Motor(go(0))), "async {is_async}");
+        assert_eq!(robot.poll_event(), Some(RobotEvent::Watchdog));
     }
 }

@@ -113,3 +113,16 @@ fn a_port_that_has_stalled_is_given_a_second_again() {
         assert!(script(&mut bus, flushes_hang).is_empty(), "no frame was due");
     }
 }
+
+#[test]
+fn settings_without_a_line_speed_are_slow_but_no_panic() {
+    let mut config = MasterConfig::direct();
+    config.baud = 0;
+    let world = World::default();
+    let mut bus: Bus = on(Master::new(config, world.now()), Port::new(&world, 20));
+    let world = bus.port().world.clone();
+    let now = bus.now();
+    bus.role_mut().discover(now);
+    assert_eq!(world.block_on(bus.service_async()), Ok(()));
+    assert_eq!(bus.service(), Ok(()));
+}

@@ -142,6 +142,25 @@ fn the_first_frame_is_zero_even_when_its_flush_and_that_of_a_command_fail() {
 }
 
 #[test]
+fn the_first_frame_is_due_again_if_its_flush_was_dropped_and_its_port_replaced() {
+    for is_flushed in [false, true] {
+        let mut host = fresh_host();
+        assert_eq!(host.poll_transmit(ms(0)).and_then(speed), Some(0));
+        host.handle_taken(ms(0));
+        assert_eq!(host.poll_transmit(ms(0)), None);
+        if is_flushed {
+            host.handle_flushed(ms(1));
+        }
+        host.drive(go(60), ms(30)).unwrap();
+        assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(60));
+        host.handle_taken(ms(30));
+        host.handle_unsent(Unsent::Unflushed, ms(31));
+        let first = host.poll_transmit(ms(31)).and_then(speed);
+        assert_eq!(first, Some(if is_flushed { 60 } else { 0 }));
+    }
+}
+
+#[test]
 fn a_spurious_handle_unsent_only_repeats_the_motor_command() {
     let mut host = begun();
     host.handle_unsent(Unsent::Untouched, ms(1));

@@ -36,8 +36,19 @@ fn a_robot_whose_driver_is_late_still_stands_still() {
     assert_eq!(robot.command(ms(500)).speed(), 0, "without handle_timeout");
     // The next command arrives before the timeout has been handled.
     robot.handle_input(&bytes(go(60)), ms(700));
-    let go = RobotEvent::Motor(go(60));
-    assert_eq!(events(&mut robot), [go, RobotEvent::Watchdog, go]);
+    // The first command is over before the application was told of it.
+    let told = [RobotEvent::Motor(go(0)), RobotEvent::Watchdog, RobotEvent::Motor(go(60))];
+    assert_eq!(events(&mut robot), told);
+}
+
+#[test]
+fn empty_input_lets_the_watchdog_fire() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(go(60)), ms(0));
+    robot.handle_input(&[], ms(499));
+    assert_eq!(robot.statistics().watchdog, 0);
+    robot.handle_input(&[], ms(500));
+    assert_eq!(events(&mut robot), [RobotEvent::Motor(go(0)), RobotEvent::Watchdog]);
 }
 
 #[test]

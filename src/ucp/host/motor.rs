@@ -21,6 +21,8 @@ pub(super) struct Motor {
     /// Time at which the application has been silent for too long; set while the robot moves.
     dead_man: Option<Instant>,
     first: First,
+    /// Whether the port has taken all of the first frame, and will tell when it has been flushed.
+    is_first_taken: bool,
     copies: Copies,
     stop: Stop,
     standstill: Standstill,
@@ -111,6 +113,7 @@ impl Motor {
             due,
             dead_man: None,
             first,
+            is_first_taken: false,
             copies: Copies::None,
             stop: Stop::Done,
             standstill: Standstill::Untold,
@@ -217,7 +220,10 @@ impl Motor {
         self.due = Some(if goes_on { now } else { now + config.command_period });
         if !self.copies.are_due() {
             self.first = match self.first {
-                First::Due => First::Out,
+                First::Due => {
+                    self.is_first_taken = false;
+                    First::Out
+                }
                 First::Out | First::Followed => First::Followed,
                 // A request for the next round shows that this one has been flushed.
                 First::Flushing | First::Done => First::Done,
@@ -238,7 +244,7 @@ impl Motor {
 
     /// Ends a round: everything that was due has been handed out.
     pub(super) fn end_round(&mut self) {
-        if matches!(self.first, First::Out | First::Followed) {
+        if matches!(self.first, First::Out | First::Followed) && !self.is_first_taken {
             self.first = First::Flushing;
         }
         if self.copies == Copies::Out {
@@ -251,6 +257,7 @@ impl Motor {
 
     /// The port has taken all of the last frame, a motor command.
     pub(super) fn taken(&mut self) {
+        self.is_first_taken |= self.first == First::Out;
         if self.stop == Stop::Out {
             self.stop = Stop::Taken;
         }
@@ -258,6 +265,9 @@ impl Motor {
 
     /// All that the port has taken has left.
     pub(super) fn flushed(&mut self, now: Instant) {
+        if self.is_first_taken && self.first != First::Due {
+            self.first = First::Done;
+        }
         if self.stop == Stop::Taken {
             self.left(now);
         }

@@ -212,7 +212,7 @@ impl Endpoint for Robot {
     /// Treats commands as old as they can be (U10).
     fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
         if bytes.is_empty() {
-            return;
+            return self.state.watch(now);
         }
         self.inbox.receive(bytes, since, now);
         self.receive(bytes, now);

@@ -167,12 +167,18 @@ impl State {
         }
     }
 
-    /// Stops the robot when the command is too old.
+    /// Stops the robot when the command is too old. One that the application has not been told yet
+    /// is no longer told as one that moves: it must not begin to move.
     pub(super) fn watch(&mut self, now: Instant) {
         if reached(self.command_until, now) {
             self.command_until = None;
             (self.command, self.is_command_new) = (self.command.halted(), true);
             count(&mut self.stats.watchdog);
+            self.events.amend(|event| {
+                if let RobotEvent::Motor(command) = event {
+                    *command = command.halted();
+                }
+            });
             self.events.push_latest(RobotEvent::Watchdog, is_motion);
         }
     }

@@ -203,6 +203,17 @@ impl Write for Line {
     }
 }
 
+impl Wire for WithoutEcho<Line> {
+    /// Ends early if only an echo has come.
+    fn wait(&mut self, patience: Duration) -> io::Result<bool> {
+        if self.read_ready()? {
+            return Ok(true);
+        }
+        self.port_mut().wire.borrow_mut().wait(patience)?;
+        self.read_ready()
+    }
+}
+
 /// The clock of a driver on this line. Waits for bytes instead of sleeping, so that answers are
 /// taken in at once and an idle tool needs hardly any processor time.
 pub(crate) struct LineClock {
