@@ -15,6 +15,7 @@ pub(crate) const fn count_apart(counter: &mut u32) {
 }
 
 /// Adds `number`.
+#[cfg(feature = "ikeya")]
 #[inline]
 pub(crate) const fn add(counter: &mut u32, number: u32) {
     *counter = counter.saturating_add(number);
