@@ -145,7 +145,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if self.now() >= deadline {
                 return Ok(None);
             }
-            self.wait_async(deadline).await?;
+            // A port that is slow is waited for first: its driver may be on.
+            if self.is_sent() {
+                self.wait_async(deadline).await?;
+            }
         }
     }
 
@@ -175,11 +178,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             self.before_write();
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
-            let patience_us = self.patience_us(waited);
-            let wait_us = self.wait_us(patience_us, by);
+            let wait_us = self.wait_us(waited, by);
             let writing = self.port.write(self.sending.rest());
             let written = first(writing, self.clock.delay_us(wait_us)).await;
-            if written.is_none() && wait_us < patience_us {
+            if written.is_none() && wait_us < self.patience_us(waited) {
                 return (received, Ok(()));
             }
             self.sending.write_wait.end();
@@ -204,10 +206,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn flush_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
-        let patience_us = self.patience_us(waited);
-        let wait_us = self.wait_us(patience_us, by);
+        let wait_us = self.wait_us(waited, by);
         let flushed = first(self.port.flush(), self.clock.delay_us(wait_us)).await;
-        if flushed.is_none() && wait_us < patience_us {
+        if flushed.is_none() && wait_us < self.patience_us(waited) {
             return Ok(());
         }
         self.sending.flush_wait.end();
@@ -217,23 +218,30 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    /// Time to wait for the port, microseconds: what is left of a second since it was first asked,
-    /// perhaps in a call that was dropped. At least the time that a frame takes, for a healthy port
-    /// that was not asked for a while.
+    /// Time to wait for the port, microseconds, after `waited` since it was first asked, perhaps in
+    /// a call that was dropped: what is left of a second. At least the time that a frame takes, for
+    /// a healthy port that was not asked for a while.
     fn patience_us(&self, waited: Duration) -> u32 {
-        let frame = self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1);
-        STALL.as_micros().saturating_sub(waited.as_micros()).max(frame.as_micros())
+        STALL.as_micros().saturating_sub(waited.as_micros()).max(self.frame_us())
     }
 
-    /// How long to wait for the port this time, microseconds. A slave and a robot are looked at
-    /// when their watchdog is due, and `by` the end of the call.
-    fn wait_us(&self, patience_us: u32, by: Option<Instant>) -> u32 {
+    /// The same for this call. A slave and a robot are looked at when their watchdog is due, and
+    /// `by` the end of the call, unless the port is about to be done, with its driver still on.
+    fn wait_us(&self, waited: Duration, by: Option<Instant>) -> u32 {
+        let patience_us = self.patience_us(waited);
+        if patience(&self.role).is_none() {
+            return patience_us;
+        }
+        let least_us = self.frame_us().saturating_sub(waited.as_micros());
         let until = |at: Instant| (at - self.latest).as_micros();
         let looks = [self.role.poll_timeout(), by].into_iter().flatten().map(until);
-        match patience(&self.role) {
-            Some(_) => looks.filter(|&us| us > 0).fold(patience_us, u32::min),
-            None => patience_us,
-        }
+        looks.filter(|&us| us > 0).fold(patience_us, |us, look| us.min(look.max(least_us)))
+    }
+
+    /// Time within which a healthy port takes or flushes a frame, microseconds.
+    fn frame_us(&self) -> u32 {
+        let frame = self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1);
+        frame.as_micros()
     }
 
     /// Handles a stalled port. A write of no bytes, which takes no time, lets an

@@ -343,7 +343,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// Whether everything that the role handed out has left the port.
-    #[cfg(any(feature = "ikeya", feature = "ucp"))]
+    #[cfg(any(feature = "ikeya", feature = "ucp", feature = "embedded-io-async"))]
     pub(super) fn is_sent(&self) -> bool {
         self.sending.rest().is_empty() && !self.sending.needs_flush()
     }

@@ -143,3 +143,19 @@ fn a_port_that_stalls_for_a_second_does_not_leave_the_driver_enable_pin_on() {
         assert!(stalls > 0 && !driver.port_mut().is_on(), "{story}");
     }
 }
+
+#[test]
+fn a_slave_whose_call_ends_while_its_answer_leaves_returns_with_its_pin_off() {
+    let world = World::default();
+    let (near, mut far) = Port::pair(&world, 20);
+    let (port, _log, _pin) = undelayed(Port { drains: true, ..near });
+    let role: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
+    let mut slave = Driver::new(role, port, world.clone());
+    embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
+    // The request takes 80 us, the answer 160 us.
+    let deadline = world.now() + Duration::from_micros(180);
+    assert_eq!(world.block_on(slave.next_command_async(deadline)).unwrap(), None);
+    assert!(!slave.port_mut().is_on());
+    assert_eq!(slave.port_mut().port_mut().written.len(), 8);
+    assert!(world.now() >= at_ms(0) + Duration::from_micros(240));
+}

@@ -195,7 +195,10 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         let limit = u64::from(longest.as_micros()) + before.backlog_us + stalled + slack;
         assert!(elapsed <= limit, "it took {elapsed} us instead of {limit}");
         if let Some(Ok(_)) = result {
-            assert!(!P::HAS_PIN || !is_on, "the driver-enable pin stays on");
+            // A slave and a robot leave a port that is slow to the next call.
+            let leaves = self.driver.role().held_up_after().is_some_and(|it| it > Duration::ZERO);
+            let is_slow = leaves && faults > 0;
+            assert!(!P::HAS_PIN || !is_on || is_slow, "the driver-enable pin stays on");
         }
         self.check_offers(before);
     }
