@@ -40,19 +40,14 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
     /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        self.service_by_async(None).await
-    }
-
-    async fn service_by_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
-        let result = self.round_async(by).await;
+        let result = self.round_async().await;
         if result.is_err() {
             yield_once().await;
         }
         result
     }
 
-    /// A round; that of a slave or a robot does not wait for a slow port beyond `by`.
-    async fn round_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
+    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
         for _ in 0..FRAMES {
@@ -66,7 +61,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     break;
                 }
             }
-            let (received, sent) = self.send_async(by).await;
+            let (received, sent) = self.send_async().await;
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
             if !has_failed && self.sending.is_under_way() {
@@ -78,7 +73,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
         }
         if self.sending.needs_flush() {
-            let flushed = self.flush_async(by).await;
+            let flushed = self.flush_async().await;
             result = result.and(flushed);
         }
         result
@@ -135,7 +130,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
-            let result = self.service_by_async(Some(deadline)).await;
+            let result = self.service_async().await;
             if result.is_ok() || needs != Needs::WholePort {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));
@@ -172,13 +167,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
     /// that may forbid the rest. A failing receiver does not stop the sending.
-    async fn send_async(&mut self, by: Option<Instant>) -> (Received<P::Error>, Sent<P::Error>) {
+    async fn send_async(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
-            let wait_us = self.wait_us(waited, by);
+            let wait_us = self.wait_us(waited);
             let writing = self.port.write(self.sending.rest());
             let written = first(writing, self.clock.delay_us(wait_us)).await;
             if written.is_none() && wait_us < self.patience_us(waited) {
@@ -198,15 +193,15 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
         }
         if self.sending.is_in_doubt() {
-            return (received, self.flush_async(by).await);
+            return (received, self.flush_async().await);
         }
         (received, Ok(()))
     }
 
-    async fn flush_async(&mut self, by: Option<Instant>) -> Result<(), DriveError<P::Error>> {
+    async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
-        let wait_us = self.wait_us(waited, by);
+        let wait_us = self.wait_us(waited);
         let flushed = first(self.port.flush(), self.clock.delay_us(wait_us)).await;
         if flushed.is_none() && wait_us < self.patience_us(waited) {
             return Ok(());
@@ -225,17 +220,14 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         STALL.as_micros().saturating_sub(waited.as_micros()).max(self.frame_us())
     }
 
-    /// The same for this call. A slave and a robot are looked at when their watchdog is due, and
-    /// `by` the end of the call, unless the port is about to be done, with its driver still on.
-    fn wait_us(&self, waited: Duration, by: Option<Instant>) -> u32 {
+    /// The same for this call: the application of a slave or a robot is given the chance to hear of
+    /// a watchdog in between, unless the port is about to be done, with its driver still on.
+    fn wait_us(&self, waited: Duration) -> u32 {
         let patience_us = self.patience_us(waited);
-        if patience(&self.role).is_none() {
-            return patience_us;
+        match patience(&self.role) {
+            Some(limit) => patience_us.min(limit.as_micros().max(self.frame_us())),
+            None => patience_us,
         }
-        let least_us = self.frame_us().saturating_sub(waited.as_micros());
-        let until = |at: Instant| (at - self.latest).as_micros();
-        let looks = [self.role.poll_timeout(), by].into_iter().flatten().map(until);
-        looks.filter(|&us| us > 0).fold(patience_us, |us, look| us.min(look.max(least_us)))
     }
 
     /// Time within which a healthy port takes or flushes a frame, microseconds.

@@ -87,7 +87,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             empty_at,
             is_empty: false,
             has_overtaken: true,
-            sending: Sending::new(),
+            sending: Sending::new(latest),
         }
     }
 
@@ -272,6 +272,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
         let now = self.now();
         self.give_up_outdated();
+        if self.sending.is_in_doubt() {
+            // Its flush was dropped, and goes first.
+            return Ok(true);
+        }
         if self.sending.rest().is_empty() {
             let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
             self.sending.load(frame)?;

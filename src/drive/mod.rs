@@ -56,10 +56,9 @@
 //! [`service`](Driver::service) does not wait. All other calls end at a deadline, which is an
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
-//! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot do not wait
-//! for a port that takes longer than two frames and a millisecond beyond their deadline or that of
-//! their role, and the next call goes on: the application hears of a watchdog in time. Until then a
-//! driver-enable pin may stay on.
+//! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for it
+//! for 20 ms at a time, within which a healthy port is done: the application hears of a watchdog
+//! that late at most, and a call may end with a frame, and a driver-enable pin, left to the next.
 //!
 //! # When a driver is held up
 //!

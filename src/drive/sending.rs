@@ -76,13 +76,12 @@ enum Flush {
 }
 
 impl Sending {
-    pub(super) const fn new() -> Self {
-        let asked_at = Instant::from_micros(0);
+    pub(super) const fn new(now: Instant) -> Self {
         Self {
             outbox: Outbox::new(),
-            asked_at,
-            left_at: asked_at,
-            unbroken_at: asked_at,
+            asked_at: now,
+            left_at: now,
+            unbroken_at: now,
             taken: Taken::Nothing,
             flush: Flush::Done,
             #[cfg(feature = "embedded-io-async")]
@@ -147,7 +146,7 @@ impl Sending {
     /// cut off too long ago. The role then decides again.
     pub(super) fn reclaim(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
         match self.taken {
-            Taken::Parts if !self.outbox.is_empty() => self.give_up_late(now, silence),
+            Taken::Parts => self.give_up_late(now, silence),
             _ => self.give_up(),
         }
     }
@@ -164,6 +163,7 @@ impl Sending {
             return None;
         }
         self.outbox.discard();
+        self.left_at = self.left_at.min(self.asked_at);
         match core::mem::replace(&mut self.taken, Taken::Whole) {
             Taken::Nothing => Some(Unsent::Untouched),
             Taken::Parts | Taken::Whole => Some(Unsent::CutOff),
@@ -183,6 +183,9 @@ impl Sending {
         if self.is_in_doubt() {
             self.taken = Taken::Whole;
         }
+        if self.outbox.is_empty() {
+            self.left_at = self.left_at.min(now);
+        }
         self.unbroken_at = self.left_at;
         given_up
     }
@@ -190,6 +193,8 @@ impl Sending {
     /// Notes that a flush failed, or will not be made; returns whether the role does not know that
     /// yet.
     pub(super) fn flush_failed(&mut self) -> Option<Unsent> {
+        // The port may hold nothing any more.
+        self.left_at = self.left_at.min(self.asked_at);
         let is_news = self.flush == Flush::Due;
         if is_news {
             self.flush = Flush::Failed;

@@ -135,6 +135,24 @@ fn a_failed_flush_behind_a_frame_in_parts_counts_for_it_and_for_the_frames_befor
     }
 }
 
+#[test]
+fn no_pause_is_hidden_by_frames_whose_flush_failed_or_by_a_clock_that_is_about_to_wrap() {
+    // Behind 50 lost frames, 10 ms on a line, and for a driver that begins before the wrap.
+    for (begin_us, lost) in [(0, 0), (0, 50), (u64::MAX - 100_000, 0), (u64::MAX - 100_000, 50)] {
+        let world = World::starting_at(begin_us);
+        let mut port = Port::new(&world, 0);
+        port.flushes.extend(vec![Step::Error; lost]);
+        let mut driver = on(Pausing { repeats: true, ..Pausing::default() }, port);
+        for _ in 0..lost {
+            assert!(driver.service().is_err());
+        }
+        driver.port_mut().writes.extend([Step::Few(3), Step::Late(5000)]);
+        let before = driver.role().unsent.len();
+        driver.service().unwrap();
+        assert!(driver.role().unsent[before..].contains(&Unsent::CutOff), "{begin_us} {lost}");
+    }
+}
+
 /// A delay that is late by 1 %, and notes how long it was asked to wait.
 struct Late(World, Rc<RefCell<Vec<u32>>>);
 

@@ -66,7 +66,7 @@ impl<P: Wired> MasterLife<P> {
         let faults = line.faults();
         let stalls = line.stalls();
         let now = line.role_now();
-        let is_due = is_whole && line.inbox.is_empty() && {
+        let is_due = is_whole && !line.wire.is_in_parts && line.inbox.is_empty() && {
             let mut twin = role.clone();
             match call {
                 Call::Stop => twin.stop(N1, now),

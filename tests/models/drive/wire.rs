@@ -59,6 +59,9 @@ pub(crate) struct Wire {
     early_us: u64,
     /// The frame may have paused too long.
     is_doubtful: bool,
+    /// The last frame was taken in parts: unless a driver knows of its flush, that goes before the
+    /// next one.
+    pub(crate) is_in_parts: bool,
     /// The rest of a frame came late: a silence must follow.
     is_noisy: bool,
     /// The application has discarded a frame: a new one may follow.
@@ -82,6 +85,7 @@ impl Wire {
             begun_us: 0,
             early_us: 0,
             is_doubtful: false,
+            is_in_parts: false,
             is_noisy: false,
             is_given_up: false,
             unheard: VecDeque::new(),
@@ -171,7 +175,9 @@ impl Wire {
         self.last_us = end_us;
         if self.open.is_empty() {
             (self.begun_us, self.early_us, self.is_doubtful) = (begun_us, begun_us, false);
+            self.is_in_parts = false;
         }
+        self.is_in_parts |= !self.open.is_empty();
         self.is_doubtful |= !self.open.is_empty() && self.may_be_late(at_us);
         self.early_us = self.early_us.max(begun_us) + self.speech.byte_us * bytes.len() as u64;
         for &byte in bytes {
@@ -213,7 +219,7 @@ impl Wire {
     pub(crate) fn digest(&self, now_us: u64) -> impl Hash {
         let since =
             |at_us: u64| (now_us as i64 - at_us as i64).min(self.speech.pause_us as i64 + 1);
-        let flags = (self.is_noisy, self.is_given_up, self.is_doubtful);
+        let flags = (self.is_noisy, self.is_given_up, self.is_doubtful, self.is_in_parts);
         let command = (self.is_moving, self.is_outdated);
         (self.open.clone(), since(self.last_us), since(self.early_us), flags, command)
     }
