@@ -154,6 +154,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         format!("at least {} and at most {}, go unnoticed", held_up(0), held_up(1000)),
         format!("not seen the port empty for {robot_held_up}"),
         format!("it drives for up to {robot_held_up} longer"),
+        format!("tells of the watchdog at most {robot_held_up} after it fires"),
     ] {
         take(&bound);
     }
