@@ -11,7 +11,7 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, patience},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, unread_limit},
     error::DriveError,
     sending::FRAME_LEN,
 };
@@ -224,7 +224,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// a watchdog in between, unless the port is about to be done, with its driver still on.
     fn wait_us(&self, waited: Duration) -> u32 {
         let patience_us = self.patience_us(waited);
-        match patience(&self.role) {
+        match unread_limit(&self.role) {
             Some(limit) => patience_us.min(limit.as_micros().max(self.frame_us())),
             None => patience_us,
         }

@@ -50,7 +50,7 @@ pub struct Driver<R, P, C> {
 
 /// How long the port of a role that acts on commands may go unread, see
 /// [`Endpoint::held_up_after`].
-pub(super) fn patience<R: Endpoint>(role: &R) -> Option<Duration> {
+pub(super) fn unread_limit<R: Endpoint>(role: &R) -> Option<Duration> {
     role.held_up_after().filter(|&limit| limit != Duration::ZERO)
 }
 
@@ -73,7 +73,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
         // A master or a host may have talked through this port before.
-        let empty_at = match patience(&role) {
+        let empty_at = match unread_limit(&role) {
             Some(_) => latest,
             None => long_before(latest),
         };
@@ -168,7 +168,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// be old, and do not count as new ([`Endpoint::held_up_after`]).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let look_at = patience(&self.role)
+        let look_at = unread_limit(&self.role)
             .map(|limit| self.looked_at + Duration::from_micros(limit.as_micros() / 2));
         earliest(&[self.role.poll_timeout(), look_at])
     }
@@ -256,7 +256,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// a slave or a robot would hear of its watchdog too late.
     pub(super) fn is_held_up(&mut self, begin: Instant) -> bool {
         let now = self.now();
-        patience(&self.role).is_some_and(|limit| now - begin >= limit)
+        unread_limit(&self.role).is_some_and(|limit| now - begin >= limit)
     }
 
     /// Lets time pass.

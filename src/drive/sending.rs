@@ -137,7 +137,6 @@ impl Sending {
     }
 
     /// Whether the port is still to take a part of the frame, or to be flushed behind its parts.
-    #[cfg(feature = "embedded-io-async")]
     pub(super) fn is_under_way(&self) -> bool {
         !self.outbox.is_empty() || self.is_in_doubt()
     }
@@ -159,7 +158,7 @@ impl Sending {
 
     /// Gives up the frame.
     pub(super) fn give_up(&mut self) -> Option<Unsent> {
-        if self.outbox.is_empty() && !self.is_in_doubt() {
+        if !self.is_under_way() {
             return None;
         }
         self.outbox.discard();

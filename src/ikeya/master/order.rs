@@ -376,7 +376,7 @@ impl<B: Board> Order<B> {
 }
 
 /// A stop. It is owed to the node until the node is seen to be still (I12).
-// In this order it takes 60 bytes of flash less.
+// This order was found by trying: it takes less flash than others.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(super) struct Stop<B: Board> {

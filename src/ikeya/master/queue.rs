@@ -31,7 +31,7 @@ use crate::{
 const LEAST_SHARE_PCT: u8 = 1;
 
 /// Whose turn it is.
-// In this order it takes 40 bytes of flash less than in that of the compiler.
+// This order was found by trying: it takes less flash than others.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub(super) struct Queue {
