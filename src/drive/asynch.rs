@@ -11,9 +11,8 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, unread_limit},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
     error::DriveError,
-    sending::FRAME_LEN,
 };
 use crate::{
     endpoint::Endpoint,
@@ -50,6 +49,11 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
+        if begin - self.looked_at >= STALL {
+            // It may have recovered meanwhile.
+            self.sending.write_wait.end();
+            self.sending.flush_wait.end();
+        }
         for _ in 0..FRAMES {
             result = result.and(self.receive_async().await);
             self.expire();
@@ -61,7 +65,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     break;
                 }
             }
-            let (received, sent) = self.send_async().await;
+            let (received, sent) = self.send_async(begin).await;
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
             if !has_failed && self.sending.is_under_way() {
@@ -167,16 +171,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
     /// that may forbid the rest. A failing receiver does not stop the sending.
-    async fn send_async(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
+    async fn send_async(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
-            let wait_us = self.wait_us(waited);
+            let (wait_us, is_last) = self.patience(waited);
             let writing = self.port.write(self.sending.rest());
             let written = first(writing, self.clock.delay_us(wait_us)).await;
-            if written.is_none() && wait_us < self.patience_us(waited) {
+            if written.is_none() && !is_last {
                 return (received, Ok(()));
             }
             self.sending.write_wait.end();
@@ -190,6 +194,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if !self.sending.rest().is_empty() {
                 received = received.and(self.receive_async().await);
                 self.give_up_outdated();
+                if self.is_held_up(begin) {
+                    return (received, Ok(()));
+                }
             }
         }
         if self.sending.is_in_doubt() {
@@ -201,9 +208,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
-        let wait_us = self.wait_us(waited);
+        let (wait_us, is_last) = self.patience(waited);
         let flushed = first(self.port.flush(), self.clock.delay_us(wait_us)).await;
-        if flushed.is_none() && wait_us < self.patience_us(waited) {
+        if flushed.is_none() && !is_last {
             return Ok(());
         }
         self.sending.flush_wait.end();
@@ -213,27 +220,17 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    /// Time to wait for the port, microseconds, after `waited` since it was first asked, perhaps in
-    /// a call that was dropped: what is left of a second. At least the time that a frame takes, for
-    /// a healthy port that was not asked for a while.
-    fn patience_us(&self, waited: Duration) -> u32 {
-        STALL.as_micros().saturating_sub(waited.as_micros()).max(self.frame_us())
-    }
-
-    /// The same for this call: the application of a slave or a robot is given the chance to hear of
-    /// a watchdog in between, unless the port is about to be done, with its driver still on.
-    fn wait_us(&self, waited: Duration) -> u32 {
-        let patience_us = self.patience_us(waited);
-        match unread_limit(&self.role) {
-            Some(limit) => patience_us.min(limit.as_micros().max(self.frame_us())),
-            None => patience_us,
-        }
-    }
-
-    /// Time within which a healthy port takes or flushes a frame, microseconds.
-    fn frame_us(&self) -> u32 {
-        let frame = self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1);
-        frame.as_micros()
+    /// Time to wait for the port in this call, microseconds, after `waited` since it was first
+    /// asked; and whether it has stalled if it is not done then.
+    ///
+    /// It has after a second, but not within the time that a frame takes: a healthy port may not
+    /// have been asked for a while. Before, the application of a slave or a robot is given the
+    /// chance to hear of a watchdog, unless the port is about to be done, with its driver still on.
+    fn patience(&self, waited: Duration) -> (u32, bool) {
+        let left_us = STALL.as_micros().saturating_sub(waited.as_micros());
+        let left = Duration::from_micros(left_us).max(self.frame_time());
+        let wait = self.round_time().map_or(left, |limit| limit.min(left));
+        (wait.as_micros(), wait == left)
     }
 
     /// Handles a stalled port. A write of no bytes, which takes no time, lets an

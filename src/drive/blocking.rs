@@ -35,7 +35,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                     break;
                 }
             }
-            let (received, sent) = self.send();
+            let (received, sent) = self.send(begin);
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
             if has_failed || self.is_held_up(begin) {
@@ -133,7 +133,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// Sends the unsent bytes, and takes in bytes received meanwhile: they belong before the next
     /// frame, and a receiver without a buffer would lose them. A failing receiver does not stop the
     /// sending.
-    fn send(&mut self) -> (Received<P::Error>, Sent<P::Error>) {
+    fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
@@ -143,6 +143,9 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             }
             received = received.and(self.receive());
             self.give_up_outdated();
+            if self.is_held_up(begin) {
+                break;
+            }
         }
         if self.sending.is_in_doubt() {
             let flushed = self.port.flush();

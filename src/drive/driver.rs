@@ -1,6 +1,10 @@
 //! The driver itself: a role, a port and a clock, and the steps of one round.
 
-use super::{clock::Clock, error::DriveError, sending::Sending};
+use super::{
+    clock::Clock,
+    error::DriveError,
+    sending::{FRAME_LEN, Sending},
+};
 use crate::{
     endpoint::{Endpoint, Unsent},
     time::{Duration, Instant, earliest, reached},
@@ -48,10 +52,11 @@ pub struct Driver<R, P, C> {
     pub(super) sending: Sending,
 }
 
-/// How long the port of a role that acts on commands may go unread, see
+/// How often the port of a role that acts on commands must be read, see
 /// [`Endpoint::held_up_after`].
-pub(super) fn unread_limit<R: Endpoint>(role: &R) -> Option<Duration> {
-    role.held_up_after().filter(|&limit| limit != Duration::ZERO)
+pub(super) fn look_period<R: Endpoint>(role: &R) -> Option<Duration> {
+    let limit = role.held_up_after().filter(|&limit| limit != Duration::ZERO)?;
+    Some(Duration::from_micros(limit.as_micros() / 2))
 }
 
 /// When the bytes in a port may have arrived that was not looked at before.
@@ -73,7 +78,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
         // A master or a host may have talked through this port before.
-        let empty_at = match unread_limit(&role) {
+        let empty_at = match look_period(&role) {
             Some(_) => latest,
             None => long_before(latest),
         };
@@ -168,8 +173,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// be old, and do not count as new ([`Endpoint::held_up_after`]).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let look_at = unread_limit(&self.role)
-            .map(|limit| self.looked_at + Duration::from_micros(limit.as_micros() / 2));
+        let look_at = look_period(&self.role).map(|period| self.looked_at + period);
         earliest(&[self.role.poll_timeout(), look_at])
     }
 
@@ -252,11 +256,21 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         (self.is_empty, self.has_overtaken) = (true, false);
     }
 
-    /// Whether a round that began then sends no more frames: through a slow port the application of
-    /// a slave or a robot would hear of its watchdog too late.
+    /// Time after which a round sends nothing more: through a slow port the application of a slave
+    /// or a robot would hear of its watchdog too late.
+    pub(super) fn round_time(&self) -> Option<Duration> {
+        look_period(&self.role).map(|period| period.max(self.frame_time()))
+    }
+
+    /// Whether that has passed since a round began.
     pub(super) fn is_held_up(&mut self, begin: Instant) -> bool {
         let now = self.now();
-        unread_limit(&self.role).is_some_and(|limit| now - begin >= limit)
+        self.round_time().is_some_and(|limit| now - begin >= limit)
+    }
+
+    /// Time within which a healthy port takes or flushes a frame.
+    pub(super) fn frame_time(&self) -> Duration {
+        self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
     }
 
     /// Lets time pass.

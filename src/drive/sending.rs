@@ -57,7 +57,7 @@ impl Wait {
         now - *self.0.get_or_insert(now)
     }
 
-    /// Notes that the port has done it, or has failed.
+    /// Notes that the port has done it, has failed, or was not asked for long.
     pub(super) fn end(&mut self) {
         self.0 = None;
     }

@@ -56,12 +56,14 @@ fn a_stop_is_handed_out_however_many_commands_came_before_it() {
 }
 
 /// When an application that waits for commands, for so long at a time, is told, in microseconds,
-/// that its robot stands still, if the last command came at 0 and each write of its reports takes
-/// this long.
-fn told_to_stand_still(is_async: bool, write_us: u64, call_ms: u32) -> u64 {
+/// that its robot stands still, if the last command came at 0, and each write and flush of its
+/// reports takes this long, for so many bytes at most.
+fn told_to_stand_still(is_async: bool, write_us: u64, most: usize, call_ms: u32) -> u64 {
     let world = World::default();
-    let (near, mut far) = Port::pair(&world, 87);
+    let (mut near, mut far) = Port::pair(&world, 87);
     *near.writer.borrow_mut() = Some(Box::new(move |_| Step::Late(write_us)));
+    near.flushes.extend(vec![Step::Late(write_us); 1000]);
+    near.most = most;
     let mut robot = Robot::new(RobotConfig::default(), world.now());
     robot.set_telemetry(&Telemetry::default(), world.now());
     let mut robot = Driver::new(robot, near, world.clone());
@@ -77,6 +79,7 @@ fn told_to_stand_still(is_async: bool, write_us: u64, call_ms: u32) -> u64 {
         };
         speed = command.unwrap_or_default().map_or(speed, |command| command.speed());
         assert!(world.now_us() < 5_000_000 && (speed == 0 || speed == 50));
+        world.step(100);
     }
     world.now_us()
 }
@@ -85,16 +88,18 @@ fn told_to_stand_still(is_async: bool, write_us: u64, call_ms: u32) -> u64 {
 fn through_a_slow_port_an_application_hears_of_the_watchdog_in_time() {
     // The command has come after its 24 bytes.
     const DUE_US: u64 = 500_000 + 24 * 87;
-    for (write_us, call_ms) in
-        [20_000, 100_000, 900_000].into_iter().flat_map(|it| [0, 20, 10_000].map(|ms| (it, ms)))
+    for (write_us, most, call_ms) in
+        [1000, 5000, 6000, 9900, 12_000, 19_000, 100_000, 900_000].into_iter().flat_map(|it| {
+            [(1, 20), (20, 20), (64, 0), (64, 20), (64, 10_000)].map(|(most, ms)| (it, most, ms))
+        })
     {
-        let told_us = told_to_stand_still(true, write_us, call_ms);
-        assert!(told_us <= DUE_US + 20_100, "async, {write_us} us, {call_ms} ms: at {told_us} us");
-    }
-    for write_us in [5000, 20_000, 100_000] {
-        // Nothing can be done while a write blocks.
-        let told_us = told_to_stand_still(false, write_us, 20);
-        assert!(told_us < DUE_US + 20_000 + 2 * write_us, "{write_us} us: at {told_us} us");
+        let told_us = told_to_stand_still(true, write_us, most, call_ms);
+        let late_us = told_us.saturating_sub(DUE_US);
+        assert!(late_us < 40_000, "async, {write_us} us, {most} bytes, {call_ms} ms: {late_us} us");
+        // Nothing can be done while a write or a flush blocks.
+        let told_us = told_to_stand_still(false, write_us, most, call_ms);
+        let late_us = told_us.saturating_sub(DUE_US);
+        assert!(late_us < 13_000 + 3 * write_us, "{write_us} us, {most} bytes: {late_us} us");
     }
 }
 

@@ -72,7 +72,7 @@ fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
         let mut driver = slow(role, write_us, 0);
         let world = driver.port().world.clone();
         assert_eq!(world.poll_times(1, driver.service_async()), None);
-        world.step(5_000_000);
+        world.step(999_000 - write_us);
         assert_eq!(world.block_on(driver.service_async()), expected, "{write_us} us");
     }
 }

@@ -115,6 +115,24 @@ fn a_port_that_has_stalled_is_given_a_second_again() {
 }
 
 #[test]
+fn a_call_that_was_dropped_long_ago_does_not_make_a_slow_port_a_stalled_one() {
+    for flushes_hang in [false, true] {
+        let (wire, mut bus) = turning();
+        script(&mut bus, flushes_hang).push_back(Step::Stall);
+        let mut context = Context::from_waker(Waker::noop());
+        while pin!(bus.service_async()).poll(&mut context).is_ready() {
+            wire.world.step(100);
+        }
+        wire.world.step(5_000_000);
+        script(&mut bus, flushes_hang).push_back(Step::Late(50_000));
+        while !script(&mut bus, flushes_hang).is_empty() {
+            assert_eq!(wire.world.block_on(bus.service_async()), Ok(()), "{flushes_hang}");
+            wire.world.step(100);
+        }
+    }
+}
+
+#[test]
 fn settings_without_a_line_speed_are_slow_but_no_panic() {
     let mut config = MasterConfig::direct();
     config.baud = 0;

@@ -19,7 +19,8 @@ use crate::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct MasterConfig {
-    /// Speed of the line, bit/s.
+    /// Speed of the line, bit/s. Not less than it really is: a pause inside a packet would count
+    /// as its time on the line.
     pub baud: u32,
     /// Ids on this bus; all eight by default. A discovery polls these, and
     /// [`stop_all`](super::Master::stop_all) is done only when each of them has stopped (I12).

@@ -19,7 +19,8 @@ use crate::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct HostConfig {
-    /// Speed of the line, bit/s; 115,200.
+    /// Speed of the line, bit/s; 115,200. Not less than it really is: a pause inside a frame would
+    /// count as its time on the line.
     pub baud: u32,
     /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
     pub command_period: Duration,

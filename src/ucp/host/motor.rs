@@ -21,8 +21,6 @@ pub(super) struct Motor {
     /// Time at which the application has been silent for too long; set while the robot moves.
     dead_man: Option<Instant>,
     first: First,
-    /// Whether the port has taken all of the first frame, and will tell when it has been flushed.
-    is_first_taken: bool,
     copies: Copies,
     stop: Stop,
     standstill: Standstill,
@@ -90,10 +88,13 @@ impl Copies {
 enum First {
     /// To be sent before anything else.
     Due,
-    /// Handed out, with no motor command since.
-    Out,
-    /// Handed out, and followed by other motor commands before the port could be flushed.
-    Followed,
+    /// Handed out.
+    Out {
+        /// Other motor commands have been handed out behind it.
+        is_followed: bool,
+        /// The port has taken all of it, and will tell when it has been flushed.
+        is_taken: bool,
+    },
     /// Handed out, and so have all other frames: the port is being flushed.
     Flushing,
     /// Done, or not wanted.
@@ -113,7 +114,6 @@ impl Motor {
             due,
             dead_man: None,
             first,
-            is_first_taken: false,
             copies: Copies::None,
             stop: Stop::Done,
             standstill: Standstill::Untold,
@@ -220,11 +220,8 @@ impl Motor {
         self.due = Some(if goes_on { now } else { now + config.command_period });
         if !self.copies.are_due() {
             self.first = match self.first {
-                First::Due => {
-                    self.is_first_taken = false;
-                    First::Out
-                }
-                First::Out | First::Followed => First::Followed,
+                First::Due => First::Out { is_followed: false, is_taken: false },
+                First::Out { is_taken, .. } => First::Out { is_followed: true, is_taken },
                 // A request for the next round shows that this one has been flushed.
                 First::Flushing | First::Done => First::Done,
             };
@@ -244,7 +241,7 @@ impl Motor {
 
     /// Ends a round: everything that was due has been handed out.
     pub(super) fn end_round(&mut self) {
-        if matches!(self.first, First::Out | First::Followed) && !self.is_first_taken {
+        if matches!(self.first, First::Out { is_taken: false, .. }) {
             self.first = First::Flushing;
         }
         if self.copies == Copies::Out {
@@ -257,7 +254,9 @@ impl Motor {
 
     /// The port has taken all of the last frame, a motor command.
     pub(super) fn taken(&mut self) {
-        self.is_first_taken |= self.first == First::Out;
+        if let First::Out { is_followed: false, is_taken } = &mut self.first {
+            *is_taken = true;
+        }
         if self.stop == Stop::Out {
             self.stop = Stop::Taken;
         }
@@ -265,7 +264,7 @@ impl Motor {
 
     /// All that the port has taken has left.
     pub(super) fn flushed(&mut self, now: Instant) {
-        if self.is_first_taken && self.first != First::Due {
+        if matches!(self.first, First::Out { is_taken: true, .. }) {
             self.first = First::Done;
         }
         if self.stop == Stop::Taken {
@@ -287,8 +286,10 @@ impl Motor {
         self.sent = None;
         self.expect_stop();
         let is_lost = match self.first {
-            First::Out | First::Flushing => was_last || unsent == Unsent::Unflushed,
-            First::Followed => unsent == Unsent::Unflushed,
+            First::Flushing | First::Out { is_followed: false, .. } => {
+                was_last || unsent == Unsent::Unflushed
+            }
+            First::Out { is_followed: true, .. } => unsent == Unsent::Unflushed,
             First::Due | First::Done => false,
         };
         if is_lost {
