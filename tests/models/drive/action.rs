@@ -21,6 +21,8 @@ pub(crate) enum Fault {
     CutOff,
     /// One byte is taken, and the next one after too long a pause.
     Late,
+    /// The first half is sent when it is taken, and the rest when it is flushed: too late.
+    Held,
     Read(Reading),
     Flush(Flushing),
     Pin(Pinning),
@@ -69,6 +71,10 @@ impl Fault {
             (Self::Write(writing), _) => line.writes.push_back(writing),
             (Self::CutOff, _) => line.writes.extend([Writing::One, Writing::Error]),
             (Self::Late, _) => line.writes.extend([Writing::One, Writing::Slow]),
+            (Self::Held, _) => {
+                line.writes.extend([Writing::Half, Writing::Held]);
+                line.flushes.push_back(Flushing::Late);
+            }
             (Self::Read(reading), _) => line.reads.push_back(reading),
             (Self::Flush(flushing), _) => line.flushes.push_back(flushing),
             (Self::Pin(pinning), _) => line.pins.push_back(pinning),
@@ -82,7 +88,7 @@ impl Fault {
     /// Faults of the port and, if there is one, of its pin.
     pub(crate) fn of_port(has_pin: bool, is_async: bool) -> Vec<Self> {
         use {Flushing as F, Reading as R, Writing as W};
-        let mut faults = vec![Self::CutOff, Self::Late];
+        let mut faults = vec![Self::CutOff, Self::Late, Self::Held];
         faults.extend([W::One, W::Half, W::Part, W::Error].map(Self::Write));
         faults.extend([W::Zero, W::Slow, W::Stall].map(Self::Write));
         faults.extend([R::One, R::Error, R::Zero].map(Self::Read));

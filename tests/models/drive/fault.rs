@@ -11,6 +11,8 @@ pub(crate) enum Writing {
     Zero,
     /// Returns, with one byte taken, after longer than any pause inside a frame.
     Slow,
+    /// Takes all, and holds it until a flush.
+    Held,
     /// Async: is never ready. Blocking: fails after a second.
     Stall,
 }
@@ -38,6 +40,8 @@ pub(crate) enum Flushing {
     ErrorLost,
     /// Fails, but everything has left.
     ErrorLeft,
+    /// Succeeds, after longer than any pause inside a frame.
+    Late,
     /// Async: is never ready. Blocking: fails after a second.
     Stall,
 }

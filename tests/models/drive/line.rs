@@ -41,6 +41,9 @@ pub(crate) struct DrivenLine {
     pub(crate) inbox: VecDeque<(u64, u8)>,
     /// When the last byte written will have left.
     pub(crate) free_us: u64,
+    /// Bytes taken that wait for a flush, and when their write began.
+    pub(crate) held: Vec<u8>,
+    pub(crate) held_since_us: u64,
     pub(crate) reads: VecDeque<Reading>,
     pub(crate) writes: VecDeque<Writing>,
     pub(crate) flushes: VecDeque<Flushing>,
@@ -108,6 +111,8 @@ impl DrivenLine {
             writes_in_call: 0,
             first_write_us: None,
             is_touched: false,
+            held: vec![],
+            held_since_us: 0,
             is_flush_due: false,
             has_pin,
             pin_on_us: None,
@@ -220,6 +225,15 @@ impl DrivenLine {
         }
     }
 
+    /// Sends what was held.
+    pub(crate) fn release(&mut self) {
+        let held = std::mem::take(&mut self.held);
+        if !held.is_empty() {
+            self.wire.is_in_parts = true;
+            self.carry(&held, self.held_since_us);
+        }
+    }
+
     pub(crate) fn has_arrived(&self) -> bool {
         self.inbox.front().is_some_and(|&(at_us, _)| at_us <= self.now_us)
     }
@@ -250,7 +264,7 @@ impl DrivenLine {
 /// The state that affects the future.
 impl Hash for DrivenLine {
     fn hash<H: Hasher>(&self, hasher: &mut H) {
-        (&self.reads, &self.writes, &self.flushes, &self.pins).hash(hasher);
+        (&self.reads, &self.writes, &self.flushes, &self.pins, &self.held).hash(hasher);
         self.wire.digest(self.now_us).hash(hasher);
         (self.pin_on_us.is_some(), self.free_us.saturating_sub(self.now_us)).hash(hasher);
         // Time that will pass unseen because the clock has gone back.

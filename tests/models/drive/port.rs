@@ -178,6 +178,10 @@ impl Shared {
         line.has_write_failed_first |= is_failure && line.failures.is_empty();
         let count = match writing {
             None => bytes.len(),
+            Some(Writing::Held) => {
+                (line.held, line.held_since_us) = (bytes.to_vec(), begun_us);
+                return Ok(bytes.len());
+            }
             Some(Writing::One | Writing::Slow) => 1,
             Some(Writing::Half | Writing::Part) => bytes.len().div_ceil(2),
             Some(Writing::Error | Writing::Stall) => return Err(Broken(line.fail(Failure::Port))),
@@ -186,6 +190,7 @@ impl Shared {
                 return Ok(0);
             }
         };
+        line.release();
         line.carry(&bytes[..count], begun_us);
         Ok(count)
     }
@@ -197,9 +202,23 @@ impl Shared {
         line.flushes.pop_front()
     }
 
+    /// When a flush begins to send what is held.
+    pub(super) fn held_until_us(&self, flushing: Option<Flushing>) -> u64 {
+        let line = self.line();
+        let late_us = line.wire.too_late_us(line.now_us);
+        if flushing == Some(Flushing::Late) { late_us } else { line.now_us }
+    }
+
+    pub(super) fn release(&self, flushing: Option<Flushing>) {
+        if matches!(flushing, None | Some(Flushing::Late | Flushing::ErrorLeft)) {
+            self.line().release();
+        }
+    }
+
     pub(super) fn end_flush(&self, flushing: Option<Flushing>) -> Result<(), Broken> {
         let mut line = self.line();
-        if flushing.is_some() {
+        if flushing.is_some_and(|flushing| flushing != Flushing::Late) {
+            line.held.clear();
             line.is_given_up = true;
             line.wire.flush_failed();
             return Err(Broken(line.fail(Failure::Port)));
@@ -293,8 +312,11 @@ impl embedded_io::Write for Shared {
 
     fn flush(&mut self) -> Result<(), Broken> {
         let flushing = self.begin_flush();
+        let held_until_us = self.held_until_us(flushing);
+        self.line().pass_until(held_until_us);
+        self.release(flushing);
         let end_us = match flushing {
-            None => self.line().free_us,
+            None | Some(Flushing::Late) => self.line().free_us,
             Some(Flushing::Stall) => self.line().now_us + SECOND_US,
             Some(_) => 0,
         };

@@ -41,6 +41,7 @@ impl Drop for Sending<'_> {
         // The pin already had its time.
         if line.now_us + 100 >= self.begun_us + SECOND_US {
             line.is_given_up = true;
+            line.held.clear();
             line.failed(Failure::Stalled);
         } else if !self.is_over {
             let waits_since_us = *line.waits_since_us.get_or_insert(self.begun_us);
@@ -128,8 +129,11 @@ impl embedded_io_async::Write for Shared {
     async fn flush(&mut self) -> Result<(), Broken> {
         let flushing = self.begin_flush();
         let sending = Sending::begin(self);
+        let held_until_us = self.held_until_us(flushing);
+        self.sleep_until(held_until_us).await;
+        self.release(flushing);
         match flushing {
-            None => {
+            None | Some(Flushing::Late) => {
                 let free_us = self.line().free_us;
                 self.sleep_until(free_us).await;
             }
