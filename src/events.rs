@@ -9,21 +9,25 @@ use crate::stats::count_apart;
 /// A queue of at most `N` events, in order.
 ///
 /// Half of it is reserved for events that happen once (ruling U15): frequent events, and those that
-/// repeat by themselves, never take that room. Events that find no room are counted as lost, unless
-/// the caller keeps them.
+/// repeat by themselves, never take that room. `LATEST` places are for as many kinds of which the
+/// latest must not be lost, and for nothing else. Events that find no room are counted as lost,
+/// unless the caller keeps them.
 #[derive(Clone, Debug)]
-pub(crate) struct Events<E, const N: usize> {
+pub(crate) struct Events<E, const N: usize, const LATEST: usize = 0> {
     queue: Deque<E, N>,
     lost: u32,
 }
 
-impl<E, const N: usize> Events<E, N> {
+impl<E, const N: usize, const LATEST: usize> Events<E, N, LATEST> {
     pub(crate) const fn new() -> Self {
         Self { queue: Deque::new(), lost: 0 }
     }
 
     /// Queues a rare event, or returns it if there is no room.
     pub(crate) fn keep(&mut self, event: E) -> Result<(), E> {
+        if self.queue.len() + LATEST >= N {
+            return Err(event);
+        }
         self.queue.push_back(event)
     }
 
@@ -44,7 +48,8 @@ impl<E, const N: usize> Events<E, N> {
     }
 
     /// Queues an event of which only the latest of its kind matters. When room is short it replaces
-    /// the newest event of that kind, so that the last one in the queue is always the latest.
+    /// the newest event of that kind, so that the last one in the queue is always the latest. There
+    /// is always room for one of each of `LATEST` kinds.
     #[cfg(feature = "ucp")]
     pub(crate) fn push_latest(&mut self, event: E, is_of_its_sort: impl Fn(&E) -> bool) {
         let is_reserved = self.is_reserved();
@@ -54,7 +59,11 @@ impl<E, const N: usize> Events<E, N> {
                 *newest = event;
                 count_apart(&mut self.lost);
             }
-            _ => self.push(event),
+            _ => {
+                if self.queue.push_back(event).is_err() {
+                    count_apart(&mut self.lost);
+                }
+            }
         }
     }
 
@@ -95,7 +104,7 @@ impl<E, const N: usize> Events<E, N> {
 
     /// Whether the remaining room is for rare events only.
     fn is_reserved(&self) -> bool {
-        self.queue.len() >= N / 2
+        self.queue.len() >= (N - LATEST) / 2
     }
 }
 
@@ -149,6 +158,22 @@ mod tests {
         assert_eq!(events.lost(), 2, "the caller got the last one back");
         let all: heapless::Vec<u8, 8> = core::iter::from_fn(|| events.pop()).collect();
         assert_eq!(all, [0, 1, 10, 11]);
+    }
+
+    #[cfg(feature = "ucp")]
+    #[test]
+    fn there_is_always_room_for_the_latest_of_each_kind() {
+        let mut events: Events<u8, 8, 2> = Events::new();
+        for event in 0..6 {
+            assert_eq!(events.keep(event), Ok(()));
+        }
+        assert_eq!(events.keep(6), Err(6));
+        for event in [100, 110, 101, 111] {
+            events.push_latest(event, |other| other / 10 == event / 10);
+        }
+        assert_eq!(events.lost(), 2, "the first of each kind");
+        let all: heapless::Vec<u8, 8> = core::iter::from_fn(|| events.pop()).collect();
+        assert_eq!(all, [0, 1, 2, 3, 4, 5, 101, 111]);
     }
 
     #[test]

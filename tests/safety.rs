@@ -160,7 +160,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     // Those that have a test of their own, and what vendors, motors and a search do.
     for fact in [
         "blind, at least every 50 ms",
-        "tells of the watchdog at most 40 ms after it fires",
+        "tells of the watchdog at most 50 ms after it fires",
         "within 50 ms after its cable is back",
         "5 % up to 0.9 s for each lost node",
         "0.4 s for each such id of `nodes`, and 2 s at 0 %",

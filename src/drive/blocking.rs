@@ -23,9 +23,10 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// the port could.
     pub fn service(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
-        let mut result = self.receive();
-        let begin = self.latest;
+        let (mut result, begin) = (Ok(()), self.now());
         for _ in 0..FRAMES {
+            // Before time passes: the rest of a frame may wait in the port.
+            result = result.and(self.receive());
             self.expire();
             match self.load() {
                 Ok(false) => break,
@@ -130,9 +131,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         Ok(())
     }
 
-    /// Sends the unsent bytes, and takes in bytes received meanwhile: they belong before the next
-    /// frame, and a receiver without a buffer would lose them. A failing receiver does not stop the
-    /// sending.
+    /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
+    /// that may forbid the rest. A failing receiver does not stop the sending.
     fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
@@ -141,10 +141,12 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));
             }
-            received = received.and(self.receive());
-            self.give_up_outdated();
-            if self.is_held_up(begin) {
-                break;
+            if !self.sending.rest().is_empty() {
+                received = received.and(self.receive());
+                self.give_up_outdated();
+                if self.is_held_up(begin) {
+                    break;
+                }
             }
         }
         if self.sending.is_in_doubt() {

@@ -5,7 +5,7 @@ use crate::time::Instant;
 /// A microsecond clock that does not go backwards.
 ///
 /// With it a driver sees pauses inside of what it sends, and answers that come too early: it must
-/// count in steps of at most 50 µs on a motor bus, of a millisecond with a rover.
+/// count in steps of at most 20 µs on a motor bus, of a millisecond with a rover.
 ///
 /// A closure is a clock: `|| Instant::from_micros(counter())`. For a 32-bit counter, use
 /// [`Wrapping32`](crate::time::Wrapping32).

@@ -29,6 +29,9 @@ pub(super) enum Needs {
     HalfPort,
 }
 
+/// Pause before a port is asked again, after an error or in the middle of a frame.
+pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
+
 /// A role with its port and its clock; see the [module](super).
 #[derive(Clone, Debug)]
 pub struct Driver<R, P, C> {
@@ -66,10 +69,6 @@ fn long_before(now: Instant) -> Instant {
 }
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
-    /// Pause after an error of the port, in a call that continues.
-    #[cfg(any(feature = "ikeya", feature = "ucp"))]
-    pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
-
     /// Combines a role, a port and a clock. The role must have been made with a time of the same
     /// clock; [`with`](Self::with) ensures that.
     ///
@@ -77,6 +76,16 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// one from after a stop.
     pub fn new(role: R, port: P, mut clock: C) -> Self {
         let latest = clock.now();
+        Self::starting_at(latest, role, port, clock)
+    }
+
+    /// The same, with a role made here, at the time of this clock.
+    pub fn with(role: impl FnOnce(Instant) -> R, port: P, mut clock: C) -> Self {
+        let latest = clock.now();
+        Self::starting_at(latest, role(latest), port, clock)
+    }
+
+    fn starting_at(latest: Instant, role: R, port: P, clock: C) -> Self {
         // A master or a host may have talked through this port before.
         let empty_at = match look_period(&role) {
             Some(_) => latest,
@@ -94,12 +103,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             has_overtaken: true,
             sending: Sending::new(latest),
         }
-    }
-
-    /// The same, with a role made here, at the time of this clock.
-    pub fn with(role: impl FnOnce(Instant) -> R, port: P, mut clock: C) -> Self {
-        let latest = clock.now();
-        Self::new(role(latest), port, clock)
     }
 
     /// The time given to the role. If the clock goes backwards, the role's time continues from
@@ -167,14 +170,16 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.role.handle_input(&[], now);
     }
 
-    /// When the next round must run at the latest, if no bytes arrive.
+    /// When the next round must run at the latest, if no bytes arrive: at once, or a millisecond
+    /// later, if the port has not taken or flushed a frame yet.
     ///
     /// Never `None` for a slave or a robot, even an idle one: bytes found after a longer time may
     /// be old, and do not count as new ([`Endpoint::held_up_after`]).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let look_at = look_period(&self.role).map(|period| self.looked_at + period);
-        earliest(&[self.role.poll_timeout(), look_at])
+        let retry_at = self.is_pending().then(|| self.latest + ERROR_NAP);
+        earliest(&[self.role.poll_timeout(), look_at, retry_at])
     }
 
     /// The bytes of a frame that the port has not taken yet.
@@ -188,6 +193,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// have received the beginning of the frame. Received bytes that are in the port count as old.
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
+        self.sending.end_waits();
         self.give_up();
         // What has left before may have left through another port: a stop is due again (U16).
         self.sending.flush_failed();
@@ -287,11 +293,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let now = self.now();
         self.give_up_outdated();
         if self.sending.is_in_doubt() {
-            // Its flush was dropped, and goes first.
+            // Its flush goes first: it was dropped, or the rest of the frame was given up.
             return Ok(true);
         }
         if self.sending.rest().is_empty() {
-            let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
+            let Some(frame) = self.role.poll_transmit(now) else {
+                self.sending.end_write_wait();
+                return Ok(false);
+            };
             self.sending.load(frame)?;
             self.has_overtaken |= !self.is_empty;
         }
@@ -364,6 +373,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     #[cfg(any(feature = "ikeya", feature = "ucp", feature = "embedded-io-async"))]
     pub(super) fn is_sent(&self) -> bool {
         self.sending.rest().is_empty() && !self.sending.needs_flush()
+    }
+
+    /// Whether the port is to be asked again for what it has not done yet.
+    pub(super) fn is_pending(&self) -> bool {
+        !self.sending.rest().is_empty() || self.sending.is_flush_due()
     }
 
     /// The same moment on the user's clock.

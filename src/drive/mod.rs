@@ -58,7 +58,7 @@
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
 //! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for it
 //! for 10 ms at a time, or for the time of two of the longest frames and a millisecond if that is
-//! longer: a healthy port is done by then. The application hears of a watchdog at most three such
+//! longer: a healthy port is done by then. The application hears of a watchdog at most four such
 //! times late, and a call may leave a frame, and a driver-enable pin, to the next.
 //!
 //! # When a driver is held up

@@ -41,6 +41,8 @@ enum Taken {
     Nothing,
     /// A part, or all of it in parts: only a flush in time shows that it did not pause too long.
     Parts,
+    /// A part, and the rest was given up: a flush shows when that part has left.
+    CutOff,
     /// All of it at once, or all of it has left.
     Whole,
 }
@@ -131,13 +133,18 @@ impl Sending {
         self.give_up_late(now, silence)
     }
 
-    /// Whether all of a frame was taken, but only a flush in time can show that it did not pause.
+    /// Whether the port is to be flushed before it is asked to take more.
     pub(super) fn is_in_doubt(&self) -> bool {
-        self.outbox.is_empty() && self.taken == Taken::Parts
+        self.outbox.is_empty() && matches!(self.taken, Taken::Parts | Taken::CutOff)
+    }
+
+    /// Whether the frame is not yet known to have left, or to be given up.
+    fn is_under_way(&self) -> bool {
+        !self.outbox.is_empty() || self.taken == Taken::Parts
     }
 
     /// Whether the port is still to take a part of the frame, or to be flushed behind its parts.
-    pub(super) fn is_under_way(&self) -> bool {
+    pub(super) fn is_pending(&self) -> bool {
         !self.outbox.is_empty() || self.is_in_doubt()
     }
 
@@ -163,15 +170,35 @@ impl Sending {
         }
         self.outbox.discard();
         self.left_at = self.left_at.min(self.asked_at);
-        match core::mem::replace(&mut self.taken, Taken::Whole) {
-            Taken::Nothing => Some(Unsent::Untouched),
-            Taken::Parts | Taken::Whole => Some(Unsent::CutOff),
-        }
+        let (taken, unsent) = match self.taken {
+            Taken::Nothing => (Taken::Whole, Unsent::Untouched),
+            _ => (Taken::CutOff, Unsent::CutOff),
+        };
+        self.taken = taken;
+        Some(unsent)
+    }
+
+    /// Forgets for how long the port has been asked in vain to take bytes.
+    pub(super) fn end_write_wait(&mut self) {
+        #[cfg(feature = "embedded-io-async")]
+        self.write_wait.end();
+    }
+
+    /// The same, and for how long to flush them.
+    pub(super) fn end_waits(&mut self) {
+        self.end_write_wait();
+        #[cfg(feature = "embedded-io-async")]
+        self.flush_wait.end();
     }
 
     /// Whether a flush is due; after a failed one, it is due again.
     pub(super) fn needs_flush(&self) -> bool {
         self.flush != Flush::Done
+    }
+
+    /// The same, unless the last one failed.
+    pub(super) fn is_flush_due(&self) -> bool {
+        self.flush == Flush::Due
     }
 
     /// Notes that everything taken has left. Gives up a frame in parts, unless it cannot have
@@ -194,6 +221,9 @@ impl Sending {
     pub(super) fn flush_failed(&mut self) -> Option<Unsent> {
         // The port may hold nothing any more.
         self.left_at = self.left_at.min(self.asked_at);
+        if self.is_in_doubt() {
+            self.taken = Taken::Whole;
+        }
         let is_news = self.flush == Flush::Due;
         if is_news {
             self.flush = Flush::Failed;

@@ -194,6 +194,8 @@ fn a_stop_is_not_given_up_with_its_port_and_goes_on_when_the_port_is_back() {
         assert_eq!(call!(is_async, *bus, stop_all, stop_all_async()), Err(owed));
         // The port comes back: the driver continues, and the last command is the one in force.
         unplugged.set(false);
+        // A silence follows what may have been cut off.
+        bus.port().world.step(1000);
         assert_eq!(bus.discover(), Ok(FOUND.into_iter().collect()));
         assert_eq!(story.told_two(), STOPPED);
     }

@@ -230,3 +230,20 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
         assert_eq!((bus.stop(NodeId::N1), wire.rps()), (Ok(()), 0.0));
     }
 }
+
+#[test]
+fn a_port_is_flushed_behind_the_part_of_a_frame_before_it_is_asked_to_take_the_next() {
+    for is_async in BOTH {
+        let role = Recorder::sending(&[b"123", b"456"]);
+        let mut driver = on(role, Port::writing([Step::Few(2), Step::Error]));
+        let log = crate::port::Log::default();
+        driver.port_mut().log = Some(log.clone());
+        // The first flush fails to be asked: the call is dropped, or it is too late for the rest.
+        assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+        driver.port().world.step(50_000);
+        log.borrow_mut().clear();
+        assert_eq!(call!(is_async, driver, service, service_async()), Ok(()));
+        assert_eq!(log.borrow().join(" "), "flush write flush");
+        assert_eq!(driver.port().written, b"12456");
+    }
+}

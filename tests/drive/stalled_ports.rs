@@ -36,6 +36,8 @@ fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
         assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
         let took_us = wire.world.now_us() - begin_us;
         assert!(took_us < 1_500_000, "it gives up after {took_us} us");
+        // A silence follows what may have been cut off.
+        wire.world.step(1000);
         let stalled = wire.world.block_on(bus.service_async());
         assert_eq!(stalled, Err(DriveError::Stalled), "flushes hang: {flushes_hang}");
         // The port works again: the stop is sent again.
@@ -143,4 +145,19 @@ fn settings_without_a_line_speed_are_slow_but_no_panic() {
     bus.role_mut().discover(now);
     assert_eq!(world.block_on(bus.service_async()), Ok(()));
     assert_eq!(bus.service(), Ok(()));
+}
+
+#[test]
+fn a_write_that_was_given_up_long_ago_does_not_make_a_slow_port_a_stalled_one() {
+    let mut driver = on(Recorder::sending(&[b"123"]), Port::writing([Step::Stall]));
+    let world = driver.port().world.clone();
+    assert!(poll(pin!(driver.service_async())).is_pending());
+    for _ in 0..30 {
+        world.step(100_000);
+        assert_eq!(world.block_on(driver.service_async()), Ok(()));
+    }
+    driver.port_mut().writes.push_back(Step::Late(9000));
+    driver.role_mut().frames.push_back(b"456".into());
+    assert_eq!(world.block_on(driver.service_async()), Ok(()));
+    assert_eq!(driver.port().written, b"456");
 }

@@ -124,3 +124,26 @@ fn by_default_frames_may_pause_for_20_ms_and_take_no_time() {
     assert_eq!(role.frame_pause(), Duration::from_millis(20));
     assert_eq!(role.wire_time(64), Duration::ZERO);
 }
+
+#[test]
+fn while_a_frame_or_its_flush_is_pending_the_next_round_is_due_within_a_millisecond() {
+    let mut driver = on(Recorder::sending(&[b"123"]), Port::writing([Step::Few(1), Step::Error]));
+    assert_eq!(driver.poll_timeout(), None);
+    assert_eq!(driver.service(), Err(GONE));
+    assert_eq!(driver.unsent(), b"23");
+    let now = driver.now();
+    assert_eq!(driver.poll_timeout(), Some(now + ms(1)));
+    assert_eq!(driver.service(), Ok(()));
+    assert_eq!(driver.poll_timeout(), None);
+    // A call that is dropped before the frame has left, or before it was flushed.
+    for polls in [1, 2] {
+        let mut driver = on(Recorder::sending(&[b"123"]), Port::new(&World::default(), 20));
+        driver.port_mut().stutters = true;
+        let world = driver.port().world.clone();
+        assert_eq!(world.poll_times(polls, driver.service_async()), None);
+        let now = driver.now();
+        assert!(driver.poll_timeout() <= Some(now + ms(1)) && driver.poll_timeout().is_some());
+        assert_eq!(world.block_on(driver.service_async()), Ok(()));
+        assert_eq!(driver.poll_timeout(), None, "{polls}");
+    }
+}

@@ -363,3 +363,23 @@ fn the_write_of_a_dropped_or_replaced_set_point_is_outdated() {
         assert!(!desk.master.is_outdated(), "neither a stop nor a READ ever is");
     }
 }
+
+#[test]
+fn behind_a_packet_that_was_cut_off_the_silence_begins_with_its_flush() {
+    for unsent in [Unsent::CutOff, Unsent::Unflushed] {
+        let mut desk = Desk::turning(manual(), 1.0);
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+        // The port has sent a part of it, or may have, as late as 5 ms after that.
+        desk.now += MS(5);
+        fail(&mut desk, unsent);
+        if unsent == Unsent::CutOff {
+            desk.now += MS(5);
+            desk.master.handle_flushed(desk.now);
+        }
+        // Ten bytes of silence, twice what ends a packet.
+        desk.now += Duration::from_micros(199);
+        assert_eq!(desk.master.poll_transmit(desk.now), None, "{unsent:?}");
+        desk.now += Duration::from_micros(1);
+        assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+    }
+}

@@ -153,3 +153,22 @@ fn a_calibration_ends_when_its_result_is_acknowledged_and_the_next_start_is_repo
         assert_eq!(events(&mut robot), [begins(kind)]);
     }
 }
+
+#[test]
+fn a_stop_and_the_watchdog_are_reported_behind_a_queue_full_of_requests() {
+    for is_told in [true, false] {
+        let mut robot = Robot::new(RobotConfig::default(), ms(0));
+        robot.handle_input(&bytes(go(60)), ms(0));
+        assert_eq!(events(&mut robot), [RobotEvent::Motor(go(60))]);
+        fill(&mut robot, ms(1));
+        let state = SetNetworkState::new(NetworkState::from(1)).unwrap();
+        robot.handle_input(&bytes(state), ms(2));
+        if is_told {
+            robot.handle_input(&bytes(go(0)), ms(3));
+        }
+        robot.handle_timeout(ms(505));
+        let seen = events(&mut robot);
+        assert_eq!(seen.len(), 18, "16 requests, the network, and the latest about motion");
+        assert_eq!(seen.last(), Some(&RobotEvent::Watchdog));
+    }
+}

@@ -3,7 +3,11 @@
 use super::calls::OnlineNodes;
 use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{clock::Clock, driver::Needs, error::Operation},
+    drive::{
+        clock::Clock,
+        driver::{ERROR_NAP, Needs},
+        error::Operation,
+    },
     ikeya::{
         NodeId,
         board::{Board, Status, Target},
@@ -195,7 +199,7 @@ where
             }
             if result.is_err() {
                 // If the port fails at once, pause before the next attempt.
-                self.clock.delay_us(Self::ERROR_NAP.as_micros()).await;
+                self.clock.delay_us(ERROR_NAP.as_micros()).await;
             }
         }
     }

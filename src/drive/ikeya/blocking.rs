@@ -3,7 +3,11 @@
 use super::calls::OnlineNodes;
 use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{clock::Clock, driver::Needs, error::Operation},
+    drive::{
+        clock::Clock,
+        driver::{ERROR_NAP, Needs},
+        error::Operation,
+    },
     ikeya::{
         NodeId,
         board::{Board, Status, Target},
@@ -181,7 +185,7 @@ where
             }
             if result.is_err() {
                 // If the port fails at once, pause before the next attempt.
-                let until = (self.now() + Self::ERROR_NAP).min(until);
+                let until = (self.now() + ERROR_NAP).min(until);
                 let until = self.on_clock(until);
                 self.clock.idle_until(until);
             }

@@ -2,7 +2,11 @@
 
 use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{clock::Clock, driver::Needs, error::Operation},
+    drive::{
+        clock::Clock,
+        driver::{ERROR_NAP, Needs},
+        error::Operation,
+    },
     time::{Duration, Instant},
     ucp::{
         MotorControl,
@@ -205,7 +209,7 @@ where
             match self.until_with_async(deadline, Needs::HalfPort, &mut done).await {
                 Err(error) if self.now() >= deadline => return Err(error),
                 // If the port fails at once, pause before the next attempt.
-                Err(_) => self.clock.delay_us(Self::ERROR_NAP.as_micros()).await,
+                Err(_) => self.clock.delay_us(ERROR_NAP.as_micros()).await,
                 found => return found,
             }
         }

@@ -2,7 +2,11 @@
 
 use crate::drive::{driver::Driver, error::DriveError};
 use crate::{
-    drive::{clock::Clock, driver::Needs, error::Operation},
+    drive::{
+        clock::Clock,
+        driver::{ERROR_NAP, Needs},
+        error::Operation,
+    },
     time::{Duration, Instant},
     ucp::{
         MotorControl,
@@ -190,7 +194,7 @@ where
                 Err(error) if self.now() >= deadline => return Err(error),
                 // If the port fails at once, pause before the next attempt.
                 Err(_) => {
-                    let until = (self.now() + Self::ERROR_NAP).min(deadline);
+                    let until = (self.now() + ERROR_NAP).min(deadline);
                     let until = self.on_clock(until);
                     self.clock.idle_until(until);
                 }

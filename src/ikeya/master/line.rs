@@ -251,12 +251,17 @@ impl<B: Board> Line<B> {
             // ends a packet after them: a slave must not take the next packet for the rest of this
             // one.
             let end = sent.start.max(now) + wire_time(sent.len, config.baud);
-            let silence = frame_pause(config).saturating_mul(2);
-            self.free_at = end + config.turnaround_gap + silence;
+            self.free_at = end + config.turnaround_gap + silence(config);
         }
         uncount(counter(&sent.request, statistics));
         sent.is_open = sent.is_open && self.window.take().is_some();
         Some(sent)
+    }
+
+    /// A part of a packet may have left as late as now: a silence must follow.
+    pub(super) fn cut_off(&mut self, config: &MasterConfig, now: Instant) {
+        self.free_at = self.free_at.max(now + silence(config));
+        self.is_behind_write = false;
     }
 
     /// The port has taken a request, and may hold it: the next one waits for its flush.
@@ -269,6 +274,9 @@ impl<B: Board> Line<B> {
 
     /// What the port has held has left, at the latest by now. Returns what is overdue.
     pub(super) fn flushed(&mut self, left_by: Instant, config: &MasterConfig) -> Option<Overdue> {
+        if self.sent.is_none() {
+            self.cut_off(config, left_by);
+        }
         let held = core::mem::replace(&mut self.held, Held::Nothing);
         let answer_by = left_by + self.answer_time(config);
         let is_open = self.window.as_ref().is_some_and(|window| left_by <= window.deadline);
@@ -291,6 +299,11 @@ impl<B: Board> Line<B> {
 /// Longest pause inside a packet: as long as a slave on a UART waits for its rest.
 pub(super) fn frame_pause(config: &MasterConfig) -> Duration {
     wire_time(5, config.baud)
+}
+
+/// Silence behind a part of a packet.
+fn silence(config: &MasterConfig) -> Duration {
+    frame_pause(config).saturating_mul(2)
 }
 
 fn counter<'a, B: Board>(

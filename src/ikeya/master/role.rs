@@ -346,6 +346,7 @@ impl<B: Board> Master<B> {
             // not count an answer that comes now for any of them.
             self.nodes.iter_mut().for_each(Node::take_back_write);
             self.queue.take_back_writes();
+            self.line.cut_off(&self.config, now);
             return;
         }
         let taken_back = self.line.take_back(unsent, &self.config, &mut self.statistics, now);

@@ -37,8 +37,8 @@ use crate::{
 /// * **Events (U15).** The queue holds 16 events, and only an event that has found room settles a
 ///   request from either side: without room a request is not acknowledged, and biases and
 ///   acknowledgements are not accepted, so that the other side repeats them. Changes of the command
-///   and of the network state take at most half of the queue; if that is full, the latest replaces
-///   the newest of its kind, and both have getters.
+///   and of the network state take at most half of the queue, or one more place each; without room,
+///   the latest replaces the newest of its kind, and both have getters.
 /// * **Firmware update (U7).** Never starts by itself: it is an event, and the application decides.
 /// * **Frames that only a robot sends (U13)** are counted and ignored. Shipped robots hang on id 5.
 ///

@@ -26,7 +26,7 @@ use crate::{
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) config: RobotConfig,
-    pub(super) events: Events<RobotEvent, 16>,
+    pub(super) events: Events<RobotEvent, 18, 2>,
     pub(super) stats: RobotStatistics,
     pub(super) command: MotorControl,
     /// Whether the command has changed since it was taken.
