@@ -25,7 +25,7 @@ impl<E, const N: usize, const LATEST: usize> Events<E, N, LATEST> {
 
     /// Queues a rare event, or returns it if there is no room.
     pub(crate) fn keep(&mut self, event: E) -> Result<(), E> {
-        if self.queue.len() + LATEST >= N {
+        if LATEST > 0 && self.queue.len() + LATEST >= N {
             return Err(event);
         }
         self.queue.push_back(event)
@@ -59,10 +59,10 @@ impl<E, const N: usize, const LATEST: usize> Events<E, N, LATEST> {
                 *newest = event;
                 count_apart(&mut self.lost);
             }
+            _ if LATEST == 0 => self.push(event),
             _ => {
-                if self.queue.push_back(event).is_err() {
-                    count_apart(&mut self.lost);
-                }
+                // It has a place of its own.
+                let _ = self.queue.push_back(event);
             }
         }
     }
