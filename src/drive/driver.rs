@@ -377,7 +377,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Whether the port is to be asked again for what it has not done yet.
     pub(super) fn is_pending(&self) -> bool {
-        !self.sending.rest().is_empty() || self.sending.is_flush_due()
+        self.sending.is_pending() || self.sending.is_flush_due()
     }
 
     /// The same moment on the user's clock.
