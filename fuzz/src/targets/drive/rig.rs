@@ -76,6 +76,8 @@ impl Wired for Pinned {
 
 /// The state of the port when a call begins.
 pub(super) struct Before {
+    /// The driver-enable pin.
+    was_on: bool,
     pub(super) now_us: u64,
     pub(super) taken: usize,
     pub(super) offers: usize,
@@ -146,9 +148,11 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
     }
 
     pub(super) fn begin(&mut self) -> Before {
-        let (world, faults) = (self.world.clone(), self.faults());
+        let (world, faults, was_on) =
+            (self.world.clone(), self.faults(), self.pin.state.borrow().0);
         let port = self.port();
         Before {
+            was_on,
             now_us: world.now_us(),
             taken: port.written.len(),
             offers: port.offers.len(),
@@ -195,9 +199,10 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         let limit = u64::from(longest.as_micros()) + before.backlog_us + stalled + slack;
         assert!(elapsed <= limit, "it took {elapsed} us instead of {limit}");
         if let Some(Ok(_)) = result {
-            // A slave and a robot leave a port that is slow to the next call.
+            // A slave and a robot leave a port that is slow to the next call, and tell a command
+            // before they wait for one that a dropped call has left.
             let leaves = self.driver.role().held_up_after().is_some_and(|it| it > Duration::ZERO);
-            let is_slow = leaves && faults > 0;
+            let is_slow = leaves && (faults > 0 || before.was_on);
             assert!(!P::HAS_PIN || !is_on || is_slow, "the driver-enable pin stays on");
         }
         self.check_offers(before);
