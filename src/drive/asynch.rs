@@ -134,13 +134,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     ) -> Result<Option<T>, DriveError<P::Error>> {
         loop {
             let mut result = Ok(());
-            if self.round_time().is_some() && self.is_pending() {
-                // Through a slow port, each call may be dropped before its round ends: what came in
-                // is told before that.
+            // Through a slow port, each call may be dropped before its round ends: what came in is
+            // told before that, but not twice in a row, so that the port is asked again.
+            self.has_told = !self.has_told && self.round_time().is_some() && self.is_pending();
+            if self.has_told {
                 result = self.receive_async().await;
                 self.expire();
-                if let (Ok(()), Some(found)) = (&result, done(self)) {
-                    return Ok(Some(found));
+                if result.is_ok() || needs != Needs::WholePort {
+                    if let Some(found) = done(self) {
+                        return Ok(Some(found));
+                    }
                 }
             }
             result = result.and(self.service_async().await);

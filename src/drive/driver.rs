@@ -52,6 +52,9 @@ pub struct Driver<R, P, C> {
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
+    /// The latest call told something before it waited for a slow port.
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) has_told: bool,
     pub(super) sending: Sending,
 }
 
@@ -101,6 +104,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             empty_at,
             is_empty: false,
             has_overtaken: true,
+            #[cfg(feature = "embedded-io-async")]
+            has_told: false,
             sending: Sending::new(latest),
         }
     }

@@ -174,3 +174,26 @@ fn an_application_whose_calls_are_all_dropped_hears_of_the_watchdog() {
     }
     assert!(matches!(told[..], [(10_000, 50), (500_000..520_000, 0)]), "{told:?}");
 }
+
+#[test]
+fn a_command_that_arrives_before_a_read_fails_is_told_through_a_slow_port_too() {
+    for is_event in [false, true] {
+        let world = World::default();
+        let mut port = Port::new(&world, 87);
+        port.writes.extend(vec![Step::Stall; 4]);
+        let mut robot = Robot::new(RobotConfig::default(), world.now());
+        robot.set_telemetry(&Telemetry::default(), world.now());
+        let mut robot = Driver::new(robot, port, world.clone());
+        assert!(poll(pin!(robot.next_command_async(world.now()))).is_pending());
+        robot.port_mut().reads.extend([Step::Bytes(bytes(go(50))), Step::Error]);
+        let deadline = world.now();
+        if is_event {
+            assert!(world.block_on(robot.next_event_async(deadline)).is_err());
+            let event = world.block_on(robot.next_event_async(deadline));
+            assert_eq!(event, Ok(Some(RobotEvent::Motor(go(50)))));
+        } else {
+            let command = world.block_on(robot.next_command_async(deadline));
+            assert_eq!(command, Ok(Some(go(50))));
+        }
+    }
+}

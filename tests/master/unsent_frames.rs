@@ -372,14 +372,35 @@ fn behind_a_packet_that_was_cut_off_the_silence_begins_with_its_flush() {
         // The port has sent a part of it, or may have, as late as 5 ms after that.
         desk.now += MS(5);
         fail(&mut desk, unsent);
-        if unsent == Unsent::CutOff {
-            desk.now += MS(5);
-            desk.master.handle_flushed(desk.now);
-        }
+        desk.now += MS(5);
+        desk.master.handle_flushed(desk.now);
         // Ten bytes of silence, twice what ends a packet.
         desk.now += Duration::from_micros(199);
         assert_eq!(desk.master.poll_transmit(desk.now), None, "{unsent:?}");
         desk.now += Duration::from_micros(1);
         assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
     }
+}
+
+#[test]
+fn through_a_port_that_spoils_every_write_each_node_has_its_turn_of_the_stops() {
+    let nodes = [(NodeId::N1, Mode::Velocity), (NodeId::N4, Mode::Velocity)];
+    let mut desk = Desk::with_nodes(manual(), &nodes);
+    for (id, _) in nodes {
+        desk.master.set_velocity(id, rps(5.0), desk.now).unwrap();
+    }
+    desk.run(MS(20));
+    desk.master.stop_all(desk.now);
+    let mut stops = vec![];
+    for _ in 0..20 {
+        let packet = desk.packet();
+        if packet[0] == WRITE {
+            stops.push(packet[1]);
+        }
+        fail(&mut desk, Unsent::CutOff);
+        desk.now += MS(1);
+        desk.master.handle_flushed(desk.now);
+    }
+    assert_eq!(stops[..4], [4, 1, 4, 1]);
+    assert!(stops.len() >= 10, "{stops:?}");
 }

@@ -258,9 +258,11 @@ impl<B: Board> Line<B> {
         Some(sent)
     }
 
-    /// A part of a packet may have left as late as now: a silence must follow.
-    pub(super) fn cut_off(&mut self, config: &MasterConfig, now: Instant) {
-        self.free_at = self.free_at.max(now + silence(config));
+    /// A part of a packet may leave until `end`: a silence must follow, and another one behind the
+    /// next flush.
+    pub(super) fn cut_off(&mut self, config: &MasterConfig, end: Instant) {
+        self.sent = None;
+        self.free_at = self.free_at.max(end + silence(config));
         self.is_behind_write = false;
     }
 

@@ -304,11 +304,15 @@ impl Queue {
         self.had_repeat = 0;
     }
 
-    /// A request for this reason has not left: it is due again.
-    pub(super) fn take_back(&mut self, reason: Reason) {
+    /// A request has not left: it is due again. The stops of other nodes go first: it may never
+    /// leave whole.
+    pub(super) fn take_back(&mut self, turn: Turn) {
         self.take_back_writes();
-        if reason.is_search() {
+        if turn.reason.is_search() {
             self.search_at = None;
+        }
+        if turn.reason.is_stop() {
+            self.stop = index_of(turn.node);
         }
     }
 }

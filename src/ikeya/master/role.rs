@@ -12,7 +12,7 @@ use crate::{
     endpoint::{Endpoint, Unsent},
     events::Events,
     ikeya::{
-        board::{Board, OneMotor, Target},
+        board::{Board, OneMotor, PACKET_LEN, Target},
         units::NodeId,
     },
     stats::count_apart,
@@ -346,12 +346,14 @@ impl<B: Board> Master<B> {
             // not count an answer that comes now for any of them.
             self.nodes.iter_mut().for_each(Node::take_back_write);
             self.queue.take_back_writes();
-            self.line.cut_off(&self.config, now);
+            // A part of a packet may still leave, although its flush has failed.
+            let end = now + wire_time(PACKET_LEN, self.config.baud);
+            self.line.cut_off(&self.config, end);
             return;
         }
         let taken_back = self.line.take_back(unsent, &self.config, &mut self.statistics, now);
         let Some(sent) = taken_back else { return };
-        self.queue.take_back(sent.turn.reason);
+        self.queue.take_back(sent.turn);
         let node = &mut self.nodes[index_of(sent.turn.node)];
         if matches!(sent.request, Request::Write(_)) {
             node.take_back_write();
