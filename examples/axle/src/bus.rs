@@ -101,8 +101,12 @@ impl MasterArgs {
 
     /// Opens the port, for a bus of this protocol.
     pub(crate) fn open(&self, protocol: Protocol) -> Result<Line, Failure> {
-        let line = Line::open(&self.line, protocol)?;
-        Ok(if self.echo { line.without_echo() } else { line })
+        Line::open(&self.line, protocol).map(|line| self.without_echo(line))
+    }
+
+    /// This line, without its echo if it has one.
+    pub(crate) fn without_echo(&self, line: Line) -> Line {
+        if self.echo { line.without_echo() } else { line }
     }
 }
 

@@ -201,7 +201,7 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let mut config = args.bus.config();
     config.nodes = args.node.map_or(NodeSet::ALL, NodeSet::from);
     let nodes = config.nodes;
-    let line = lines.open(B::PROTOCOL)?;
+    let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
     let failure = bus.stop(nodes).err();
