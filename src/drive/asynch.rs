@@ -235,9 +235,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Time to wait for the port in this call, microseconds, after `waited` since it was first
     /// asked; and whether it has stalled if it is not done then.
     ///
-    /// It has after a second, but not within the time that a frame takes: a healthy port may not
-    /// have been asked for a while. Before, the application of a slave or a robot is given the
-    /// chance to hear of a watchdog, unless the port is about to be done, with its driver still on.
+    /// It has stalled after a second, but never before the time that a frame takes: a healthy port
+    /// may not have been asked for a while. A slave or a robot waits for less, so that its
+    /// application can hear of a watchdog, but as long as a healthy port needs to finish.
     fn patience(&self, waited: Duration) -> (u32, bool) {
         let left_us = STALL.as_micros().saturating_sub(waited.as_micros());
         let left = Duration::from_micros(left_us).max(self.frame_time());

@@ -52,7 +52,7 @@ pub struct Driver<R, P, C> {
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
-    /// The latest call told something before it waited for a slow port.
+    /// The latest wait for a slow port began with a look at what has been received.
     #[cfg(feature = "embedded-io-async")]
     pub(super) has_told: bool,
     pub(super) sending: Sending,

@@ -277,6 +277,7 @@ impl<B: Board> Line<B> {
     /// What the port has held has left, at the latest by now. Returns what is overdue.
     pub(super) fn flushed(&mut self, left_by: Instant, config: &MasterConfig) -> Option<Overdue> {
         if self.sent.is_none() {
+            // A part of the packet that was taken back may be among it.
             self.cut_off(config, left_by);
         }
         let held = core::mem::replace(&mut self.held, Held::Nothing);

@@ -51,8 +51,8 @@ pub struct HostConfig {
     /// Time over which the robot averages the wheel speeds that it reports; 1100 ms, as the
     /// vendor's firmware: ten values, one each 100 ms. After a stop the robot is not seen to
     /// stand still before this time is over (ruling U16). Zero for a robot that reports what
-    /// it measures: a time shorter than `command_period` shows a standstill before a command
-    /// that was damaged is repeated.
+    /// it measures; then a standstill may be seen before a damaged command has been repeated,
+    /// as with any time below `command_period`.
     pub rpm_average: Duration,
     /// Longest time for the acknowledgement of a calibration request, from the end of the request
     /// on the wire; 200 ms.
