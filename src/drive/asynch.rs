@@ -67,6 +67,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             let (received, sent) = self.send_async(begin).await;
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
+            if !has_failed && self.sending.is_in_doubt() {
+                let flushed = self.flush_async().await;
+                if flushed.is_err() {
+                    // The next round tries it again.
+                    return result.and(flushed);
+                }
+            }
             if !has_failed && self.sending.is_pending() {
                 // The next round continues to wait for the port.
                 return result;
@@ -210,9 +217,6 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     return (received, Ok(()));
                 }
             }
-        }
-        if self.sending.is_in_doubt() {
-            return (received, self.flush_async().await);
         }
         (received, Ok(()))
     }

@@ -39,13 +39,19 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             let (received, sent) = self.send(begin);
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
+            if !has_failed && self.sending.is_in_doubt() {
+                let flushed = self.flush();
+                if flushed.is_err() {
+                    // The next round tries it again.
+                    return result.and(flushed);
+                }
+            }
             if has_failed || self.is_held_up(begin) {
                 break;
             }
         }
         if self.sending.needs_flush() {
-            let flushed = self.port.flush();
-            result = result.and(self.after_flush(flushed));
+            result = result.and(self.flush());
         }
         result
     }
@@ -149,11 +155,12 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                 }
             }
         }
-        if self.sending.is_in_doubt() {
-            let flushed = self.port.flush();
-            return (received, self.after_flush(flushed));
-        }
         (received, Ok(()))
+    }
+
+    fn flush(&mut self) -> Result<(), DriveError<P::Error>> {
+        let flushed = self.port.flush();
+        self.after_flush(flushed)
     }
 }
 

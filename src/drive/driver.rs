@@ -32,6 +32,9 @@ pub(super) enum Needs {
 /// Pause before a port is asked again, after an error or in the middle of a frame.
 pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
 
+/// Time after which a receiver that keeps failing counts as one that has received nothing.
+const RECOVERY: Duration = Duration::from_millis(20);
+
 /// A role with its port and its clock; see the [module](super).
 #[derive(Clone, Debug)]
 pub struct Driver<R, P, C> {
@@ -47,8 +50,8 @@ pub struct Driver<R, P, C> {
     pub(super) looked_at: Instant,
     /// When it was last seen empty: all received bytes have arrived since.
     pub(super) empty_at: Instant,
-    /// Whether the last look ended there. It may have ended in an error, or at its limit.
-    is_empty: bool,
+    /// The first look since that did not end there, but in an error or at its limit.
+    unsure_since: Option<Instant>,
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
@@ -102,7 +105,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             ahead_us: 0,
             looked_at: latest,
             empty_at,
-            is_empty: false,
+            unsure_since: Some(latest),
             has_overtaken: true,
             #[cfg(feature = "embedded-io-async")]
             has_told: false,
@@ -204,7 +207,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.sending.flush_failed();
         self.tell_unsent(Some(Unsent::Unflushed));
         self.empty_at = long_before(self.latest);
-        (self.is_empty, self.has_overtaken) = (false, true);
+        (self.unsure_since, self.has_overtaken) = (Some(self.latest), true);
         discarded
     }
 
@@ -257,14 +260,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Notes that the port is checked for received bytes now, or a little later.
     pub(super) fn look(&mut self) {
         self.looked_at = self.latest;
-        self.is_empty = false;
+        self.unsure_since.get_or_insert(self.latest);
     }
 
     /// Notes that the port was empty at `latest` or a little later. A short read does not show
     /// that: a ring buffer returns only the bytes up to its end.
     pub(super) fn saw_empty(&mut self) {
         self.empty_at = self.latest;
-        (self.is_empty, self.has_overtaken) = (true, false);
+        (self.unsure_since, self.has_overtaken) = (None, false);
     }
 
     /// Time after which a round sends nothing more: through a slow port the application of a slave
@@ -284,10 +287,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
     }
 
-    /// Lets time pass.
+    /// Lets time pass. If the rest of a frame may be in the port, because the receiver has failed,
+    /// a slave or a robot is only told the time: its line is not idle.
     pub(super) fn expire(&mut self) {
         let now = self.now();
-        if reached(self.role.poll_timeout(), now) {
+        let may_hold = |since| look_period(&self.role).is_some() && now - since < RECOVERY;
+        if self.unsure_since.is_some_and(may_hold) {
+            self.role.handle_input(&[], now);
+        } else if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);
         }
     }
@@ -307,7 +314,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
                 return Ok(false);
             };
             self.sending.load(frame)?;
-            self.has_overtaken |= !self.is_empty;
+            self.has_overtaken |= self.unsure_since.is_some();
         }
         Ok(true)
     }

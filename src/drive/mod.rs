@@ -80,7 +80,8 @@
 //! A failure is returned and breaks nothing: call again.
 //!
 //! * *A receiver that fails* does not keep the driver from sending: it first sends and flushes what
-//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off.
+//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off. The
+//!   beginning of a command waits for 20 ms for a rest that may still be in the port.
 //! * *A frame of which no byte has left* goes back to its role, which decides again what to send:
 //!   an old command is never sent late.
 //! * *A frame that was cut off* continues with the next call, unless its last byte left too long
@@ -94,7 +95,7 @@
 //!   the bytes are out, and a port should take whole frames: of one that it took in a single
 //!   `write`, it must not send a part and hold the rest.
 //! * *After a failed `flush`* the role counts its latest commands as not sent, and a frame that was
-//!   cut off has no rest.
+//!   cut off has no rest. The port is flushed once more before it takes the next frame.
 //! * *A request that the port still holds*, because its `flush` has failed or its call was dropped,
 //!   will be answered late. A master keeps the line free for that answer, for a second at most. As
 //!   long as no `flush` succeeds it sends on after that, stops included, but takes no answer: it

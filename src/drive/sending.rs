@@ -218,13 +218,17 @@ impl Sending {
 
     /// Notes that a flush failed, or will not be made; returns whether the role does not know that
     /// yet.
+    ///
+    /// The port may hold a part of a frame for the next flush, so that is tried before the port is
+    /// asked to take more. A port that cannot be flushed at all must still be sent stops, so it is
+    /// tried only once.
     pub(super) fn flush_failed(&mut self) -> Option<Unsent> {
         // The port may hold nothing any more.
         self.left_at = self.left_at.min(self.asked_at);
-        if self.is_in_doubt() {
+        let is_news = self.flush == Flush::Due;
+        if self.is_in_doubt() && !is_news {
             self.taken = Taken::Whole;
         }
-        let is_news = self.flush == Flush::Due;
         if is_news {
             self.flush = Flush::Failed;
         }

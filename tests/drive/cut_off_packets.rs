@@ -247,3 +247,26 @@ fn a_port_is_flushed_behind_the_part_of_a_frame_before_it_is_asked_to_take_the_n
         assert_eq!(driver.port().written, b"12456");
     }
 }
+
+#[test]
+fn a_port_whose_flush_failed_behind_a_part_is_flushed_once_more_before_it_takes_the_next_frame() {
+    // It may have kept the part.
+    for (is_async, (failures, calls)) in
+        BOTH.into_iter().flat_map(|it| [(it, (1, "flush write flush")), (it, (2, "flush"))])
+    {
+        let role = Recorder::sending(&[b"123", b"456"]);
+        let mut driver = on(role, Port::writing([Step::Few(2), Step::Error]));
+        driver.port_mut().flushes = vec![Step::Error; failures].into();
+        let log = crate::port::Log::default();
+        driver.port_mut().log = Some(log.clone());
+        assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+        assert_eq!(log.borrow().join(" "), "write write flush");
+        driver.port().world.step(50_000);
+        log.borrow_mut().clear();
+        let second = call!(is_async, driver, service, service_async());
+        assert_eq!((second.is_ok(), log.borrow().join(" ").as_str()), (failures == 1, calls));
+        // A port that cannot be flushed at all still gets the frame.
+        let _ = call!(is_async, driver, service, service_async());
+        assert_eq!(driver.port().written, b"12456");
+    }
+}

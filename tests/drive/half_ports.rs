@@ -36,6 +36,32 @@ fn a_command_counts_although_the_answers_cannot_be_sent() {
 
 #[cfg(feature = "ucp")]
 #[test]
+fn a_receiver_that_fails_does_not_end_the_frame_whose_rest_it_holds() {
+    use axlewire::ucp::{Body, MotorControl};
+    let stop = MotorControl::new(0, 0).unwrap().frame(0);
+    for is_async in BOTH {
+        for (failing_us, is_received) in [(1000, true), (19_000, true), (25_000, false)] {
+            let (mut driver, mut far) = robot();
+            far.write_all(&stop.as_bytes()[..7]).unwrap();
+            far.world.step(2000);
+            call!(is_async, driver, service, service_async()).unwrap();
+            // The rest is received while the receiver fails.
+            far.write_all(&stop.as_bytes()[7..]).unwrap();
+            far.world.step(18_000);
+            for _ in 0..failing_us / 1000 {
+                driver.port_mut().reads.push_back(Step::Error);
+                far.world.step(1000);
+                assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+            }
+            call!(is_async, driver, service, service_async()).unwrap();
+            assert_eq!(driver.role().command(far.world.now()).speed(), 0);
+            assert_eq!(driver.role().statistics().commands == 1, is_received, "{failing_us} us");
+        }
+    }
+}
+
+#[cfg(feature = "ucp")]
+#[test]
 fn a_command_of_a_rover_counts_although_its_reports_cannot_be_sent() {
     use axlewire::ucp::{Body, MotorControl, Telemetry};
     for is_async in BOTH {
