@@ -22,6 +22,9 @@ use crate::{
 /// Longest time for which a port may take no byte, or stay unflushed.
 const STALL: Duration = Duration::from_millis(1000);
 
+/// Shortest wait for a port in one call, unless it has stalled.
+const ASKS: Duration = Duration::from_millis(10);
+
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
 
@@ -40,7 +43,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round_async().await;
-        if result.is_err() {
+        // A runaway port, which always has more, must not starve them either.
+        if result.is_err() || self.may_have_more() {
             yield_once().await;
         }
         result
@@ -240,12 +244,15 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// asked; and whether it has stalled if it is not done then.
     ///
     /// It has stalled after a second, but never before the time that a frame takes: a healthy port
-    /// may not have been asked for a while. A slave or a robot waits for less, so that its
-    /// application can hear of a watchdog, but as long as a healthy port needs to finish.
-    fn patience(&self, waited: Duration) -> (u32, bool) {
+    /// may not have been asked for a while. At its next deadline the role decides again what to
+    /// send. A slave or a robot waits for less, so that its application can hear of a watchdog, but
+    /// as long as a healthy port needs to finish.
+    fn patience(&mut self, waited: Duration) -> (u32, bool) {
         let left_us = STALL.as_micros().saturating_sub(waited.as_micros());
         let left = Duration::from_micros(left_us).max(self.frame_time());
-        let wait = self.round_time().map_or(left, |limit| limit.min(left));
+        let decides_in = self.role.poll_timeout().map_or(left, |at| at - self.now());
+        let asked_for = decides_in.max(ASKS).max(self.frame_time());
+        let wait = self.round_time().unwrap_or(asked_for).min(left);
         (wait.as_micros(), wait == left)
     }
 

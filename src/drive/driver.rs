@@ -132,7 +132,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         &self.role
     }
 
-    /// The role, to give it commands.
+    /// The role, to give it commands. To put another one in its place, call
+    /// [`discard`](Self::discard) first: the rest of a frame would still be sent.
     pub const fn role_mut(&mut self) -> &mut R {
         &mut self.role
     }
@@ -154,7 +155,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     ///
     /// To reopen a port, replace it by [`port_mut`](Self::port_mut) and call `discard`: another
     /// driver does not know whether the clock has stepped back. If it has, a role that is given to
-    /// another driver waits for as long as the step was.
+    /// another driver waits for as long as the step was. A firmware update that was requested is
+    /// requested again: a stop or [`end_firmware_update`] prevents that.
+    ///
+    /// [`end_firmware_update`]: crate::ucp::Host::end_firmware_update
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();
@@ -206,6 +210,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         // What has left before may have left through another port: a stop is due again (U16).
         self.sending.flush_failed();
         self.tell_unsent(Some(Unsent::Unflushed));
+        self.sending.ask_flush();
         self.empty_at = long_before(self.latest);
         (self.unsure_since, self.has_overtaken) = (Some(self.latest), true);
         discarded
@@ -270,6 +275,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         (self.unsure_since, self.has_overtaken) = (None, false);
     }
 
+    /// Whether the latest look ended in an error, or at its limit.
+    #[cfg(feature = "embedded-io-async")]
+    pub(super) const fn may_have_more(&self) -> bool {
+        self.unsure_since.is_some()
+    }
+
     /// Time after which a round sends nothing more: through a slow port the application of a slave
     /// or a robot would hear of its watchdog too late.
     pub(super) fn round_time(&self) -> Option<Duration> {
@@ -287,12 +298,19 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
     }
 
-    /// Lets time pass. If the rest of a frame may be in the port, because the receiver has failed,
-    /// a slave or a robot is only told the time: its line is not idle.
+    /// Whether the port of a slave or a robot may hold more, because its receiver has failed, or
+    /// because there is too much for one look: its line is not idle then, and an answer may be
+    /// overtaken.
+    fn may_hold_more(&mut self) -> bool {
+        let now = self.now();
+        let is_recent = |since| now - since < RECOVERY;
+        look_period(&self.role).is_some() && self.unsure_since.is_some_and(is_recent)
+    }
+
+    /// Lets time pass.
     pub(super) fn expire(&mut self) {
         let now = self.now();
-        let may_hold = |since| look_period(&self.role).is_some() && now - since < RECOVERY;
-        if self.unsure_since.is_some_and(may_hold) {
+        if self.may_hold_more() {
             self.role.handle_input(&[], now);
         } else if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);
@@ -302,6 +320,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
     /// is outdated.
     pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
+        // The receiver may have taken long since the round began.
+        self.reclaim();
         let now = self.now();
         self.give_up_outdated();
         if self.sending.is_in_doubt() {
@@ -309,6 +329,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             return Ok(true);
         }
         if self.sending.rest().is_empty() {
+            if self.may_hold_more() {
+                return Ok(false);
+            }
             let Some(frame) = self.role.poll_transmit(now) else {
                 self.sending.end_write_wait();
                 return Ok(false);

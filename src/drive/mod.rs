@@ -59,7 +59,9 @@
 //! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for it
 //! for 10 ms at a time, or for the time of two of the longest frames and a millisecond if that is
 //! longer: a healthy port is done by then. The application hears of a watchdog at most four such
-//! times late, and a call may leave a frame, and a driver-enable pin, to the next.
+//! times late, and a call may leave a frame, and a driver-enable pin, to the next. Those of a
+//! master and of a host wait at least as long, and then until the role's next deadline: a command
+//! that has ended meanwhile does not leave.
 //!
 //! # When a driver is held up
 //!
@@ -80,8 +82,9 @@
 //! A failure is returned and breaks nothing: call again.
 //!
 //! * *A receiver that fails* does not keep the driver from sending: it first sends and flushes what
-//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off. The
-//!   beginning of a command waits for 20 ms for a rest that may still be in the port.
+//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off. In a
+//!   slave or a robot, the beginning of a command waits for 20 ms for a rest that may still be in
+//!   the port, and so do answers and reports: the requests behind may have overtaken them.
 //! * *A frame of which no byte has left* goes back to its role, which decides again what to send:
 //!   an old command is never sent late.
 //! * *A frame that was cut off* continues with the next call, unless its last byte left too long

@@ -85,7 +85,8 @@ impl Sending {
             left_at: now,
             unbroken_at: now,
             taken: Taken::Nothing,
-            flush: Flush::Done,
+            // A driver before this one may have left bytes in the port, and its pin on.
+            flush: Flush::Failed,
             #[cfg(feature = "embedded-io-async")]
             write_wait: Wait(None),
             #[cfg(feature = "embedded-io-async")]
@@ -214,6 +215,11 @@ impl Sending {
         }
         self.unbroken_at = self.left_at;
         given_up
+    }
+
+    /// Notes that the port, perhaps another one, is to be flushed.
+    pub(super) const fn ask_flush(&mut self) {
+        self.flush = Flush::Due;
     }
 
     /// Notes that a flush failed, or will not be made; returns whether the role does not know that

@@ -77,3 +77,22 @@ fn a_command_of_a_rover_counts_although_its_reports_cannot_be_sent() {
         assert_eq!(next(), Err(GONE));
     }
 }
+
+#[test]
+fn a_slave_does_not_answer_while_its_receiver_fails_because_it_may_have_been_overtaken() {
+    for is_async in BOTH {
+        let (mut driver, mut far) = slave(SlaveConfig::direct());
+        far.write_all(ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
+        far.world.step(100);
+        call!(is_async, driver, service, service_async()).unwrap();
+        let answers = driver.role().statistics().replies;
+        // The request for another node is in the port when the receiver fails.
+        let read = ReadRequest::new(NodeId::N2);
+        driver.role_mut().handle_input(read.as_bytes(), far.world.now());
+        far.write_all(ReadRequest::new(NodeId::N3).as_bytes()).unwrap();
+        far.world.step(100);
+        driver.port_mut().reads.push_back(Step::Error);
+        assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+        assert_eq!(driver.role().statistics().replies, answers);
+    }
+}

@@ -159,3 +159,23 @@ fn a_slave_whose_call_ends_while_its_answer_leaves_returns_with_its_pin_off() {
     assert_eq!(slave.port_mut().port_mut().written.len(), 8);
     assert!(world.now() >= at_ms(0) + Duration::from_micros(240));
 }
+
+#[test]
+fn a_pin_that_was_left_on_goes_off_in_the_first_round_of_another_driver() {
+    let world = World::default();
+    let (near, mut far) = Port::pair(&world, 20);
+    let (mut near, log, _) = undelayed(near);
+    near.port_mut().flushes.push_back(Step::Stall);
+    let role = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
+    let mut slave: Driver<Slave, _, _> = Driver::new(role, near, world.clone());
+    embedded_io::Write::write_all(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
+    world.step(100);
+    // A call that is dropped while the answer leaves.
+    assert_eq!(world.poll_times(1, slave.service_async()), None);
+    assert!(is_on(&log));
+    let (role, port, clock) = slave.into_parts();
+    let mut slave = Driver::new(role, port, clock);
+    world.step(10_000);
+    world.block_on(slave.service_async()).unwrap();
+    assert!(!is_on(&log), "the pair is jammed for all nodes");
+}

@@ -76,3 +76,44 @@ fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
         assert_eq!(world.block_on(driver.service_async()), expected, "{write_us} us");
     }
 }
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
+    use axlewire::ucp::{Message, MotorControl};
+    let mut rover = host();
+    let world = rover.port().world.clone();
+    world.block_on(rover.stop_async()).unwrap();
+    rover.port_mut().written.clear();
+    // It would take each frame after 400 ms, if it were not asked to take another one meanwhile.
+    let begin_us = world.now_us();
+    let taken = world.clone();
+    let slow = move |_: &[u8]| {
+        let is_over = taken.now_us() > begin_us + 700_000;
+        if is_over { Step::Few(64) } else { Step::Late(400_000) }
+    };
+    *rover.port_mut().writer.borrow_mut() = Some(Box::new(slow));
+    let now = rover.now();
+    rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
+    let end = now + ms(1500);
+    world.block_on(rover.run_until_async(end, |_, _, _| ())).unwrap();
+    assert!(rover.now() < end + ms(20), "the call ends in time");
+    let written = rover.port().written.clone();
+    let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
+    let speeds: Vec<i16> = frames
+        .filter_map(|frame| match frame.message() {
+            Message::MotorControl(command) => Some(command.speed()),
+            _ => None,
+        })
+        .collect();
+    assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{speeds:?}");
+}
+
+#[test]
+fn a_port_that_always_has_more_does_not_starve_other_tasks() {
+    let endless = (0..1000).map(|_| Step::Bytes(vec![0; 64]));
+    let mut driver = on(Recorder::default(), Port::reading(endless));
+    let mut call = std::pin::pin!(driver.service_async());
+    assert!(poll(call.as_mut()).is_pending(), "it yields after 4096 bytes");
+    assert_eq!(poll(call.as_mut()), std::task::Poll::Ready(Ok(())));
+}

@@ -1,6 +1,8 @@
 //! A master whose packets fail late, whose attempts outlast its patience, or whose set-points keep
 //! changing.
 
+use axlewire::ikeya::slave::SlaveConfig;
+
 use crate::rig::*;
 
 #[test]
@@ -31,8 +33,9 @@ fn the_silence_after_a_cut_off_packet_begins_when_the_failure_was_noticed() {
         desk.master.handle_unsent(Unsent::CutOff, desk.now);
         let noticed = desk.now;
         assert_eq!(desk.packet(), read(NodeId::N1));
-        // The packet may still be leaving: 80 us, and twice the five byte times of a pause.
-        assert_eq!(desk.now, noticed + US(80 + 2 * 100), "{noticed_us} us");
+        // The packet may still be leaving: 80 us, twice the five byte times of a pause, and the
+        // time within which a node may answer.
+        assert_eq!(desk.now, noticed + US(80 + 2 * 100 + 500), "{noticed_us} us");
     }
 }
 
@@ -130,7 +133,7 @@ fn nothing_follows_a_cut_off_write_before_the_silence_is_over() {
         let noticed = desk.now;
         // The same again, or the READ of the other node.
         assert!([(WRITE, 1), (READ, 3)].contains(&kind(&desk.packet())));
-        assert_eq!(desk.now, noticed + US(160 + 2 * 100), "stop {is_stop}, {noticed_us} us");
+        assert_eq!(desk.now, noticed + US(160 + 2 * 100 + 500), "stop {is_stop}, {noticed_us} us");
     }
 }
 
@@ -174,5 +177,22 @@ fn a_measurement_has_the_time_at_which_its_answer_was_complete() {
             _ => Status::Position(turns(8)),
         };
         assert_eq!(status, expected);
+    }
+}
+
+#[test]
+fn behind_a_part_of_a_packet_the_line_is_silent_for_as_long_as_a_node_waits_for_its_rest() {
+    for (config, idle) in [
+        (MasterConfig::direct(), SlaveConfig::direct().idle),
+        (MasterConfig::usb_adapter(), SlaveConfig::usb_adapter().idle),
+    ] {
+        let config = with(config, |config| config.polling = Polling::Manual);
+        let mut desk = Desk::with_nodes(config, &[N1]);
+        desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+        assert_eq!(kind(&desk.packet()), (WRITE, 1));
+        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        let noticed = desk.now;
+        assert_eq!(kind(&desk.packet()), (WRITE, 1));
+        assert!(desk.now - noticed > idle, "{:?}", desk.now - noticed);
     }
 }

@@ -204,9 +204,9 @@ fn a_failing_port_does_not_use_up_the_immediate_attempt_for_an_abnormal_node() {
     assert_eq!(desk.packet(), read(NodeId::N1));
     fail(&mut desk, Unsent::Untouched);
     assert_eq!(kind(&desk.packet()), (READ, 1));
-    // The bytes already taken by the port are out after 160 us, followed by 200 us of silence and
+    // The bytes already taken by the port are out after 160 us, followed by 700 us of silence and
     // the time of the WRITE.
-    assert_eq!(desk.now, begin + US(160 + 200 + 160), "when the WRITE has left");
+    assert_eq!(desk.now, begin + US(160 + 700 + 160), "when the WRITE has left");
 }
 
 #[test]
@@ -239,9 +239,8 @@ fn a_frame_that_did_not_leave_waits_for_bytes_that_are_still_leaving() {
     fail(&mut desk, Unsent::CutOff);
     let cut = desk.now;
     desk.turn();
-    // Ten byte times after the bytes in flight, so that no slave takes the next packet for the
-    // rest.
-    assert_eq!((cut, desk.now), (heard, cut + US(80 + 100 + 200)), "the gap is kept");
+    // 700 us after the bytes in flight, so that no slave takes the next packet for the rest.
+    assert_eq!((cut, desk.now), (heard, cut + US(80 + 100 + 700)), "the gap is kept");
 }
 
 #[test]
@@ -270,7 +269,7 @@ fn a_read_of_the_search_that_was_cut_off_is_repeated_as_soon_as_the_silence_is_o
             fail(&mut desk, Unsent::CutOff);
             let noticed = desk.now;
             assert_eq!(desk.turn(), read(node.0));
-            assert_eq!(desk.now, noticed + US(80 + 2 * 100), "{node:?}, stop {is_stop}");
+            assert_eq!(desk.now, noticed + US(80 + 2 * 100 + 500), "{node:?}, stop {is_stop}");
         }
     }
 }
@@ -298,7 +297,7 @@ fn the_silence_after_a_cut_off_read_begins_when_the_write_before_it_has_left() {
     assert_eq!(desk.now, begin, "a port may take both at once");
     fail(&mut desk, Unsent::CutOff);
     desk.packet();
-    assert_eq!(desk.now, begin + US(160 + 80 + 200));
+    assert_eq!(desk.now, begin + US(160 + 80 + 700));
 }
 
 #[test]

@@ -40,10 +40,22 @@ fn a_switch_that_is_moved_the_other_way_does_the_same() {
     assert_eq!((slave.mode(), slave.command(T0)), (Mode::Velocity, None));
     assert_eq!((slave.poll_event(), slave.poll_timeout()), (None, None));
     slave.handle_input(&read(NODE), T0 + MS(1));
-    assert_eq!(slave.poll_transmit(T0 + MS(1)), Some(&velocity(NODE, 0.0)[..]));
+    assert_eq!(slave.poll_transmit(T0 + MS(1)), None, "its speed is not known");
     slave.handle_input(&write(NODE, 1.5), T0 + MS(2));
     let target = Target::Velocity(rps(1.5));
     assert_eq!(slave.poll_event(), Some(SlaveEvent::Command(target)));
+}
+
+#[test]
+fn a_speed_from_before_the_switch_was_moved_is_not_reported() {
+    let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+    slave.set_mode(Mode::Position);
+    slave.set_mode(Mode::Velocity);
+    slave.handle_input(&read(NODE), T0);
+    assert_eq!(slave.poll_transmit(T0), None, "a motor in motion would look still");
+    slave.set_velocity(rps(2.0));
+    slave.handle_input(&read(NODE), T0 + MS(1));
+    assert_eq!(slave.poll_transmit(T0 + MS(1)), Some(&velocity(NODE, 2.0)[..]));
 }
 
 #[test]

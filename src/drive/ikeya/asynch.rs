@@ -41,7 +41,8 @@ where
     }
 
     /// Turns a velocity node, and returns when the command is on the line. The command is repeated
-    /// as long as the driver is called.
+    /// as long as the driver is called, except with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual).
     ///
     /// # Errors
     ///
@@ -61,7 +62,8 @@ where
     }
 
     /// Moves a position node, and returns when the command is on the line. The command is repeated
-    /// as long as the driver is called.
+    /// as long as the driver is called, except with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual).
     ///
     /// # Errors
     ///
@@ -75,7 +77,9 @@ where
     }
 
     /// Turns a velocity node for `span`, then stops it and returns when it is seen to be
-    /// still. Meanwhile the set-point is repeated, and counts as a sign of life.
+    /// still. Meanwhile the set-point is repeated, and counts as a sign of life; with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual) it is sent once, and the motor
+    /// does not turn if it is lost.
     ///
     /// If the future is dropped, the stop is owed, and the next call sends it. **If there is no
     /// next call, the motor runs on.**

@@ -304,9 +304,11 @@ pub(super) fn frame_pause(config: &MasterConfig) -> Duration {
     wire_time(5, config.baud)
 }
 
-/// Silence behind a part of a packet.
+/// Silence behind a part of a packet. Nodes that may answer late, such as those of a PC, also wait
+/// longer for the rest of a packet: at most 20 ms, as with `SlaveConfig::usb_adapter`.
 fn silence(config: &MasterConfig) -> Duration {
-    frame_pause(config).saturating_mul(2)
+    let late = config.reply_timeout.min(Duration::from_millis(20));
+    frame_pause(config).saturating_mul(2) + late
 }
 
 fn counter<'a, B: Board>(

@@ -53,7 +53,7 @@ pub struct Slave<B: Board = OneMotor> {
     node: NodeId,
     mode: Mode,
     config: SlaveConfig,
-    velocity: B::Velocity,
+    velocity: Option<B::Velocity>,
     position: Option<B::Position>,
     command: Option<Target<B>>,
     commanded_at: Option<Instant>,
@@ -90,7 +90,7 @@ impl<B: Board> Slave<B> {
             node,
             mode,
             config,
-            velocity: B::ZERO,
+            velocity: Some(B::ZERO),
             position: None,
             command: None,
             commanded_at: None,
@@ -118,9 +118,11 @@ impl<B: Board> Slave<B> {
         Ok(Self::new(dip.node_id(reading)?, dip.mode(), config, now))
     }
 
-    /// Sets the speed that a velocity node reports from now on.
+    /// Sets the speed that a velocity node reports from now on; at first it reports 0. After a
+    /// change of mode it does not answer before the next call: a master would take an old speed
+    /// for a motor that is still.
     pub fn set_velocity(&mut self, current: B::Velocity) {
-        self.velocity = current;
+        self.velocity = Some(current);
     }
 
     /// Sets the position that a position node reports from now on. Before the first call, and
@@ -131,12 +133,12 @@ impl<B: Board> Slave<B> {
     }
 
     /// Changes the mode, as when the switch is moved. The command is dropped: it was meant for the
-    /// other mode, and its watchdog ends with it: **stop the motor yourself**. The position that
-    /// was set is forgotten: it may be from long ago.
+    /// other mode, and its watchdog ends with it: **stop the motor yourself**. The speed and the
+    /// position that were set are forgotten: they may be from long ago.
     pub fn set_mode(&mut self, mode: Mode) {
         if mode != self.mode {
             (self.mode, self.command, self.commanded_at) = (mode, None, None);
-            self.position = None;
+            (self.velocity, self.position) = (None, None);
             if let Some(SlaveEvent::Command(_)) = self.event.peek() {
                 self.event.take();
             }
@@ -285,12 +287,9 @@ impl<B: Board> Endpoint for Slave<B> {
             return None;
         }
         let mut buffer = [0; PACKET_LEN];
-        let packet = match (self.mode, self.position) {
-            (Mode::Velocity, _) => {
-                B::velocity_response(self.node, self.velocity).encode(&mut buffer)
-            }
-            (Mode::Position, Some(at)) => B::position_response(self.node, at).encode(&mut buffer),
-            (Mode::Position, None) => return None,
+        let packet = match self.mode {
+            Mode::Velocity => B::velocity_response(self.node, self.velocity?).encode(&mut buffer),
+            Mode::Position => B::position_response(self.node, self.position?).encode(&mut buffer),
         };
         self.packet.clear();
         self.packet.extend_from_slice(packet.ok()?).ok()?;

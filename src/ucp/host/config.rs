@@ -52,7 +52,8 @@ pub struct HostConfig {
     /// vendor's firmware: ten values, one each 100 ms. After a stop the robot is not seen to
     /// stand still before this time is over (ruling U16). Zero for a robot that reports what
     /// it measures; then a standstill may be seen before a damaged command has been repeated,
-    /// as with any time below `command_period`.
+    /// as with any time below `command_period`, and a report of which a part arrived before the
+    /// stop may count.
     pub rpm_average: Duration,
     /// Longest time for the acknowledgement of a calibration request, from the end of the request
     /// on the wire; 200 ms.

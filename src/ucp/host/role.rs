@@ -157,12 +157,12 @@ impl<S: BiasStore> Host<S> {
     ///
     /// [`StopProgress::StandingStill`] takes three reports in a row that show all four wheels at
     /// 2 rpm or less. Both report layouts have wheel speeds, so both count. A report counts if it
-    /// began to arrive after the stop had been flushed: that is when
+    /// was complete at least its time on the line after the stop had been flushed: that is when
     /// [`handle_flushed`](Endpoint::handle_flushed) was called, or, by a driver that never calls
     /// it, when the next round began. And the last must have begun to arrive 1.1 s after that
     /// ([`HostConfig::rpm_average`]): a vendor robot reports averages, in which wheels that began
     /// to turn a moment ago still stand still. A wheel that moves again, or 500 ms without a report
-    /// ([`HostConfig::link_timeout`]) or a look at the port, ends it.
+    /// ([`HostConfig::link_timeout`]), ends it, with the next call of the driver.
     #[must_use]
     pub fn stop_progress(&self) -> StopProgress {
         self.state.motor.stop_progress()

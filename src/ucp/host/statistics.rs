@@ -21,7 +21,7 @@ pub struct HostStatistics {
     pub pings_lost: u32,
     /// Pongs that report a damaged ping, or any code other than 0.
     pub pings_damaged: u32,
-    /// Pongs that were not expected, including late ones.
+    /// Pongs while no ping was waiting for one. A late pong counts as that of the next ping.
     pub pongs_unasked: u32,
     /// Round trips of the answered pings.
     pub round_trip: Latency,
