@@ -11,16 +11,13 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL},
     error::DriveError,
 };
 use crate::{
     endpoint::Endpoint,
     time::{Duration, Instant},
 };
-
-/// Longest time for which a port may take no byte, or stay unflushed.
-const STALL: Duration = Duration::from_millis(1000);
 
 /// Shortest wait for a port in one call, unless it has stalled.
 const ASKS: Duration = Duration::from_millis(10);
@@ -39,18 +36,25 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// The first of any [`DriveError::Port`], [`Closed`](DriveError::Closed),
     /// [`WriteZero`](DriveError::WriteZero) or [`Stalled`](DriveError::Stalled); but if an
     /// [`Rs485`](super::Rs485) port cannot be flushed after a failed `write`, the error is
-    /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
-    /// call has yielded once, so a loop that ignores errors does not starve other tasks.
+    /// `Stalled`, and there is none if it can in the end. What is due has still been sent and
+    /// flushed, as far as the port could. A failed call has yielded once, so a loop that
+    /// ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        let result = self.round_async().await;
-        // A runaway port, which always has more, must not starve them either.
+        let (mut result, mut waits) = self.round_async().await;
+        // A master and a host wait for a slow port, but decide again what to send.
+        while waits && self.round_time().is_none() {
+            let (round, still_waits) = self.round_async().await;
+            (result, waits) = (result.and(round), still_waits);
+        }
+        // A runaway port, which always has more, must not starve other tasks either.
         if result.is_err() || self.may_have_more() {
             yield_once().await;
         }
         result
     }
 
-    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    /// Runs a round; returns whether the port has not done yet what it was asked for.
+    async fn round_async(&mut self) -> (Result<(), DriveError<P::Error>>, bool) {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
         if begin - self.looked_at >= STALL {
@@ -75,12 +79,12 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 let flushed = self.flush_async().await;
                 if flushed.is_err() {
                     // The next round tries it again.
-                    return result.and(flushed);
+                    return (result.and(flushed), false);
                 }
             }
             if !has_failed && self.sending.is_pending() {
                 // The next round continues to wait for the port.
-                return result;
+                return (result, true);
             }
             if has_failed || self.is_held_up(begin) {
                 break;
@@ -88,9 +92,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
         if self.sending.needs_flush() {
             let flushed = self.flush_async().await;
-            result = result.and(flushed);
+            let waits = flushed.is_ok() && self.sending.needs_flush();
+            return (result.and(flushed), waits);
         }
-        result
+        (result, false)
     }
 
     /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least

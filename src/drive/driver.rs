@@ -32,6 +32,9 @@ pub(super) enum Needs {
 /// Pause before a port is asked again, after an error or in the middle of a frame.
 pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
 
+/// Longest time for which an async port may take no byte, or stay unflushed.
+pub(super) const STALL: Duration = Duration::from_millis(1000);
+
 /// Time after which a receiver that keeps failing counts as one that has received nothing.
 const RECOVERY: Duration = Duration::from_millis(20);
 
@@ -287,10 +290,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         look_period(&self.role).map(|period| period.max(self.frame_time()))
     }
 
-    /// Whether that has passed since a round began.
+    /// Whether that has passed since a round began; a second for a master or a host.
     pub(super) fn is_held_up(&mut self, begin: Instant) -> bool {
-        let now = self.now();
-        self.round_time().is_some_and(|limit| now - begin >= limit)
+        self.now() - begin >= self.round_time().unwrap_or(STALL)
     }
 
     /// Time within which a healthy port takes or flushes a frame.

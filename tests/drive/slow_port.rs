@@ -97,7 +97,6 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
     rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
     let end = now + ms(1500);
     world.block_on(rover.run_until_async(end, |_, _, _| ())).unwrap();
-    assert!(rover.now() < end + ms(20), "the call ends in time");
     let written = rover.port().written.clone();
     let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
     let speeds: Vec<i16> = frames

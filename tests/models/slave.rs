@@ -237,6 +237,7 @@ impl<B: Kit> World for SlaveLine<B> {
                     Mode::Position => Mode::Velocity,
                 };
                 self.slave.set_mode(self.mode);
+                self.slave.set_velocity(B::speed(0.0));
                 self.slave.set_position(B::place(Position::new(1, 1)));
                 self.command = None;
             }
