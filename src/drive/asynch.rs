@@ -11,16 +11,16 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL, read_time},
     error::DriveError,
 };
 use crate::{
     endpoint::Endpoint,
-    time::{Duration, Instant},
+    time::{Duration, Instant, earliest, reached},
 };
 
-/// Shortest wait for a port in one call, unless it has stalled.
-const ASKS: Duration = Duration::from_millis(10);
+/// Shortest pause before a frame that waits for its port is looked at again, microseconds.
+const LOOK_US: u32 = 1000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
@@ -36,16 +36,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// The first of any [`DriveError::Port`], [`Closed`](DriveError::Closed),
     /// [`WriteZero`](DriveError::WriteZero) or [`Stalled`](DriveError::Stalled); but if an
     /// [`Rs485`](super::Rs485) port cannot be flushed after a failed `write`, the error is
-    /// `Stalled`, and there is none if it can in the end. What is due has still been sent and
-    /// flushed, as far as the port could. A failed call has yielded once, so a loop that
-    /// ignores errors does not starve other tasks.
+    /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
+    /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        let (mut result, mut waits) = self.round_async().await;
-        // A master and a host wait for a slow port, but decide again what to send.
-        while waits && self.round_time().is_none() {
-            let (round, still_waits) = self.round_async().await;
-            (result, waits) = (result.and(round), still_waits);
-        }
+        let result = self.round_async().await;
         // A runaway port, which always has more, must not starve other tasks either.
         if result.is_err() || self.may_have_more() {
             yield_once().await;
@@ -53,8 +47,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         result
     }
 
-    /// Runs a round; returns whether the port has not done yet what it was asked for.
-    async fn round_async(&mut self) -> (Result<(), DriveError<P::Error>>, bool) {
+    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
         if begin - self.looked_at >= STALL {
@@ -79,23 +72,22 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 let flushed = self.flush_async().await;
                 if flushed.is_err() {
                     // The next round tries it again.
-                    return (result.and(flushed), false);
+                    return result.and(flushed);
                 }
             }
             if !has_failed && self.sending.is_pending() {
                 // The next round continues to wait for the port.
-                return (result, true);
+                return result;
             }
-            if has_failed || self.is_held_up(begin) {
+            if has_failed || self.is_held_up(begin) || self.is_over() {
                 break;
             }
         }
         if self.sending.needs_flush() {
             let flushed = self.flush_async().await;
-            let waits = flushed.is_ok() && self.sending.needs_flush();
-            return (result.and(flushed), waits);
+            result = result.and(flushed);
         }
-        (result, false)
+        result
     }
 
     /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least
@@ -148,6 +140,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         needs: Needs,
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
+        self.ends_at = needs.ends_at(deadline);
         loop {
             let mut result = Ok(());
             // Through a slow port, each call may be dropped before its round ends: what came in is
@@ -156,14 +149,14 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if self.has_told {
                 result = self.receive_async().await;
                 self.expire();
-                if result.is_ok() || needs != Needs::WholePort {
+                if result.is_ok() || needs.is_half() {
                     if let Some(found) = done(self) {
                         return Ok(Some(found));
                     }
                 }
             }
             result = result.and(self.service_async().await);
-            if result.is_ok() || needs != Needs::WholePort {
+            if result.is_ok() || needs.is_half() {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));
                 }
@@ -175,6 +168,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // A port that is slow is waited for first: its driver may be on.
             if self.is_sent() {
                 self.wait_async(deadline).await?;
+            }
+            if self.is_over() {
+                return Ok(None);
             }
         }
     }
@@ -206,8 +202,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
             let (wait_us, is_last) = self.patience(waited);
-            let writing = self.port.write(self.sending.rest());
-            let written = first(writing, self.clock.delay_us(wait_us)).await;
+            let written = self.write_async(wait_us).await;
+            if written.is_none() && self.role.is_outdated() {
+                // The role decides again, within the time that this frame had.
+                self.give_up_outdated();
+                continue;
+            }
+            if written.is_none() && self.is_over() {
+                self.reclaim();
+                return (received, Ok(()));
+            }
             if written.is_none() && !is_last {
                 return (received, Ok(()));
             }
@@ -230,6 +234,33 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         (received, Ok(()))
     }
 
+    /// Asks the port to take the unsent bytes; `None` if it does not within this time, or if they
+    /// have become wrong meanwhile: then none of them has left.
+    async fn write_async(&mut self, wait_us: u32) -> Option<Result<usize, P::Error>> {
+        let Self { role, port, clock, latest, ahead_us, sending, ends_at, .. } = self;
+        let mut writing = pin!(port.write(sending.rest()));
+        let (begin, mut now, mut written) = (*latest, *latest, None);
+        loop {
+            let left_us = wait_us.saturating_sub((now - begin).as_micros());
+            if left_us == 0 {
+                return first(writing, ready(())).await;
+            }
+            let decides_at = earliest(&[role.poll_timeout(), *ends_at]);
+            let nap_us = decides_at.map_or(left_us, |at| (at - now).as_micros());
+            let nap_us = nap_us.max(LOOK_US).min(left_us);
+            // The delay first: if this task was held up, the port does not take what has ended.
+            let taking = until(writing.as_mut(), &mut written);
+            if first(clock.delay_us(nap_us), taking).await.is_none() {
+                return written;
+            }
+            now = read_time(clock, latest, ahead_us);
+            role.handle_input(&[], now);
+            if role.is_outdated() || reached(*ends_at, now) {
+                return None;
+            }
+        }
+    }
+
     async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
@@ -249,15 +280,12 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// asked; and whether it has stalled if it is not done then.
     ///
     /// It has stalled after a second, but never before the time that a frame takes: a healthy port
-    /// may not have been asked for a while. At its next deadline the role decides again what to
-    /// send. A slave or a robot waits for less, so that its application can hear of a watchdog, but
-    /// as long as a healthy port needs to finish.
-    fn patience(&mut self, waited: Duration) -> (u32, bool) {
+    /// may not have been asked for a while. A slave or a robot waits for less, so that its
+    /// application can hear of a watchdog, but as long as a healthy port needs to finish.
+    fn patience(&self, waited: Duration) -> (u32, bool) {
         let left_us = STALL.as_micros().saturating_sub(waited.as_micros());
         let left = Duration::from_micros(left_us).max(self.frame_time());
-        let decides_in = self.role.poll_timeout().map_or(left, |at| at - self.now());
-        let asked_for = decides_in.max(ASKS).max(self.frame_time());
-        let wait = self.round_time().unwrap_or(asked_for).min(left);
+        let wait = self.round_time().map_or(left, |limit| limit.min(left));
         (wait.as_micros(), wait == left)
     }
 
@@ -299,6 +327,11 @@ async fn first<T>(read: impl Future<Output = T>, wait: impl Future<Output = ()>)
         Poll::Pending => wait.as_mut().poll(context).map(|()| None),
     })
     .await
+}
+
+/// Ends with `future`, and keeps its output.
+async fn until<T>(future: impl Future<Output = T>, output: &mut Option<T>) {
+    *output = Some(future.await);
 }
 
 /// Lets other tasks run.

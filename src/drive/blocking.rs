@@ -46,7 +46,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                     return result.and(flushed);
                 }
             }
-            if has_failed || self.is_held_up(begin) {
+            if has_failed || self.is_held_up(begin) || self.is_over() {
                 break;
             }
         }
@@ -106,9 +106,10 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         needs: Needs,
         mut done: impl FnMut(&mut Self) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
+        self.ends_at = needs.ends_at(deadline);
         loop {
             let result = self.service();
-            if result.is_ok() || needs != Needs::WholePort {
+            if result.is_ok() || needs.is_half() {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));
                 }
@@ -119,6 +120,9 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             }
             let until = self.on_clock(self.wake_at(deadline));
             self.clock.idle_until(until);
+            if self.is_over() {
+                return Ok(None);
+            }
         }
     }
 

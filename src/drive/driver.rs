@@ -24,9 +24,30 @@ pub(super) const FRAMES: usize = 8;
 pub(super) enum Needs {
     /// A round without a failure.
     WholePort,
+    /// The same, and no round once the deadline has passed: a command that ends then would be
+    /// repeated.
+    #[cfg(any(feature = "ikeya", feature = "ucp"))]
+    WholePortInTime,
     /// The half that works may be enough: a command was received, or a stop has left.
     #[cfg(any(feature = "ikeya", feature = "ucp"))]
     HalfPort,
+}
+
+impl Needs {
+    pub(super) fn is_half(self) -> bool {
+        #[cfg(any(feature = "ikeya", feature = "ucp"))]
+        return self == Self::HalfPort;
+        #[cfg(not(any(feature = "ikeya", feature = "ucp")))]
+        false
+    }
+
+    /// When a call ends without another round.
+    pub(super) fn ends_at(self, deadline: Instant) -> Option<Instant> {
+        #[cfg(any(feature = "ikeya", feature = "ucp"))]
+        return (self == Self::WholePortInTime).then_some(deadline);
+        #[cfg(not(any(feature = "ikeya", feature = "ucp")))]
+        None
+    }
 }
 
 /// Pause before a port is asked again, after an error or in the middle of a frame.
@@ -61,7 +82,25 @@ pub struct Driver<R, P, C> {
     /// The latest wait for a slow port began with a look at what has been received.
     #[cfg(feature = "embedded-io-async")]
     pub(super) has_told: bool,
+    /// When the call that is running ends, if its command must not be sent after that.
+    pub(super) ends_at: Option<Instant>,
     pub(super) sending: Sending,
+}
+
+/// The time to give to a role; see [`Driver::now`].
+pub(super) fn read_time(
+    clock: &mut impl Clock,
+    latest: &mut Instant,
+    ahead_us: &mut u64,
+) -> Instant {
+    let reading = clock.now().as_micros();
+    let now = Instant::from_micros(reading.wrapping_add(*ahead_us));
+    if now < *latest {
+        *ahead_us = latest.as_micros().wrapping_sub(reading);
+    } else {
+        *latest = now;
+    }
+    *latest
 }
 
 /// How often the port of a role that acts on commands must be read, see
@@ -112,6 +151,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             has_overtaken: true,
             #[cfg(feature = "embedded-io-async")]
             has_told: false,
+            ends_at: None,
             sending: Sending::new(latest),
         }
     }
@@ -119,14 +159,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// The time given to the role. If the clock goes backwards, the role's time continues from
     /// where it was: one wrong reading must not stop it.
     pub fn now(&mut self) -> Instant {
-        let reading = self.clock.now().as_micros();
-        let now = Instant::from_micros(reading.wrapping_add(self.ahead_us));
-        if now < self.latest {
-            self.ahead_us = self.latest.as_micros().wrapping_sub(reading);
-        } else {
-            self.latest = now;
-        }
-        self.latest
+        read_time(&mut self.clock, &mut self.latest, &mut self.ahead_us)
     }
 
     /// The role.
@@ -293,6 +326,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Whether that has passed since a round began; a second for a master or a host.
     pub(super) fn is_held_up(&mut self, begin: Instant) -> bool {
         self.now() - begin >= self.round_time().unwrap_or(STALL)
+    }
+
+    /// Whether the call that is running has ended.
+    pub(super) fn is_over(&mut self) -> bool {
+        let now = self.now();
+        reached(self.ends_at, now)
     }
 
     /// Time within which a healthy port takes or flushes a frame.

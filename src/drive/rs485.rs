@@ -144,12 +144,7 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
 
     /// Switches the pin off after a write that took nothing. Bytes taken before are out, or may be
     /// lost.
-    fn end<E>(
-        &mut self,
-        written: Result<usize, E>,
-        is_flushed: bool,
-    ) -> Result<usize, Rs485Error<E, O::Error>> {
-        self.is_lost |= !is_flushed;
+    fn end<E>(&mut self, written: Result<usize, E>) -> Result<usize, Rs485Error<E, O::Error>> {
         match written {
             Err(error) => self.fail(error),
             Ok(_) => self.give_up(),
@@ -259,9 +254,9 @@ where
         if let Ok(1..) = written {
             return written.map_err(Rs485Error::Port);
         }
-        let is_flushed = self.port.flush().is_ok();
+        self.is_lost |= self.port.flush().is_err();
         self.delay.delay_us(self.after.as_micros());
-        self.end(written, is_flushed)
+        self.end(written)
     }
 
     fn flush(&mut self) -> Result<(), Self::Error> {
@@ -308,9 +303,9 @@ where
         if let Ok(1..) = written {
             return written.map_err(Rs485Error::Port);
         }
-        let is_flushed = self.port.flush().await.is_ok();
+        self.is_lost |= self.port.flush().await.is_err();
         self.delay.delay_us(self.after.as_micros()).await;
-        self.end(written, is_flushed)
+        self.end(written)
     }
 
     async fn flush(&mut self) -> Result<(), Self::Error> {

@@ -115,17 +115,6 @@ pub(crate) fn events<R: Endpoint>(driver: &mut On<R>) -> Vec<R::Event> {
 
 // The bus
 
-/// Calls the driver until its port counts as stalled, for a second and a half at most.
-pub(crate) fn stall(bus: &mut Bus) -> Result<(), DriveError<Unplugged>> {
-    let world = bus.port().world.clone();
-    let end = world.now_us() + 1_500_000;
-    while world.now_us() < end {
-        world.block_on(bus.service_async())?;
-        world.step(10);
-    }
-    Ok(())
-}
-
 pub(crate) type Bus = On<Master>;
 
 /// A master, and two slaves that run whenever virtual time passes: node 2 in velocity mode, node 5

@@ -85,14 +85,8 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
     let world = rover.port().world.clone();
     world.block_on(rover.stop_async()).unwrap();
     rover.port_mut().written.clear();
-    // It would take each frame after 400 ms, if it were not asked to take another one meanwhile.
-    let begin_us = world.now_us();
-    let taken = world.clone();
-    let slow = move |_: &[u8]| {
-        let is_over = taken.now_us() > begin_us + 700_000;
-        if is_over { Step::Few(64) } else { Step::Late(400_000) }
-    };
-    *rover.port_mut().writer.borrow_mut() = Some(Box::new(slow));
+    // It would take the command after 900 ms, if it were still asked to.
+    rover.port_mut().writes = vec![Step::Late(900_000)].into();
     let now = rover.now();
     rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
     let end = now + ms(1500);
@@ -106,6 +100,68 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
         })
         .collect();
     assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{speeds:?}");
+}
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_command_that_waits_for_a_slow_port_is_not_sent_after_its_call_or_after_a_hold_up() {
+    for hold_ms in [0, 2000] {
+        let mut rover = host();
+        let world = rover.port().world.clone();
+        world.block_on(rover.stop_async()).unwrap();
+        rover.port_mut().written.clear();
+        rover.port_mut().writes = vec![Step::Late(300_000)].into();
+        {
+            let mut drive = std::pin::pin!(rover.drive_for_async(50, 0, ms(100)));
+            assert!(poll(drive.as_mut()).is_pending());
+            world.step(hold_ms * 1000);
+            // No robot answers, so nobody sees it stand still.
+            assert!(world.block_on(drive).is_err());
+        }
+        let written = rover.port().written.clone();
+        assert!(!written.is_empty());
+        let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
+        for frame in frames {
+            if let axlewire::ucp::Message::MotorControl(command) = frame.message() {
+                assert_eq!(command.speed(), 0, "held for {hold_ms} ms");
+            }
+        }
+    }
+}
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_thread_that_wakes_late_does_not_repeat_a_command_behind_the_end_of_its_call() {
+    /// Its first idling takes half a second longer.
+    struct WakesLate(World, std::rc::Rc<std::cell::Cell<u64>>);
+    impl Clock for WakesLate {
+        fn now(&mut self) -> Instant {
+            World::now(&self.0)
+        }
+        fn idle_until(&mut self, until: Instant) {
+            self.0.step(self.1.take());
+            self.0.idle_until(until);
+        }
+    }
+    let world = World::default();
+    let role = Host::new(HostConfig::default(), at_ms(0));
+    let late_us = std::rc::Rc::default();
+    let clock = WakesLate(world.clone(), std::rc::Rc::clone(&late_us));
+    let mut rover = Driver::new(role, Port::new(&world, 87), clock);
+    rover.stop().unwrap();
+    rover.port_mut().written.clear();
+    world.step(30_000);
+    late_us.set(500_000);
+    assert!(rover.drive_for(50, 0, ms(190)).is_err(), "no robot answers");
+    let written = rover.port().written.clone();
+    let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
+    let speeds: Vec<i16> = frames
+        .filter_map(|frame| match frame.message() {
+            axlewire::ucp::Message::MotorControl(command) => Some(command.speed()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(speeds.iter().filter(|&&speed| speed != 0).count(), 1, "{speeds:?}");
 }
 
 #[test]

@@ -138,3 +138,22 @@ fn whatever_was_asked_for_during_an_update_is_due_when_it_ends() {
         assert!(sent(&mut host, ms(9)).iter().any(|frame| frame[4] == id));
     }
 }
+
+#[test]
+fn the_rest_of_an_update_request_that_was_ended_is_outdated() {
+    for end in [Host::stop as fn(&mut Host, Instant), Host::end_firmware_update] {
+        let mut host = Host::new(HostConfig::default(), ms(0));
+        while host.poll_transmit(ms(0)).is_some() {}
+        host.stop(ms(30));
+        while host.poll_transmit(ms(30)).is_some() {}
+        host.start_firmware_update(50, ms(40)).unwrap();
+        while let Some(frame) = host.poll_transmit(ms(40)) {
+            if frame[4] == 9 {
+                break;
+            }
+        }
+        assert!(!host.is_outdated());
+        end(&mut host, ms(41));
+        assert!(host.is_outdated(), "a robot in an update hears no stop");
+    }
+}

@@ -184,7 +184,8 @@ where
         };
         while self.now() < end {
             let next = self.keep_alive().min(end);
-            if let Some(error) = self.until_async(next, lost).await? {
+            let kept = self.until_with_async(next, Needs::WholePortInTime, lost).await?;
+            if let Some(error) = kept {
                 return Err(error.into());
             }
         }

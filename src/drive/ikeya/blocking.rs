@@ -171,7 +171,8 @@ where
         };
         while self.now() < end {
             let next = self.keep_alive().min(end);
-            if let Some(error) = self.until(next, lost)? {
+            let kept = self.until_with(next, Needs::WholePortInTime, lost)?;
+            if let Some(error) = kept {
                 return Err(error.into());
             }
         }

@@ -145,6 +145,7 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
 
     pub(super) fn begin_stop(&mut self, nodes: NodeSet) {
         let now = self.now();
+        self.ends_at = None;
         nodes.iter().for_each(|node| self.role.stop(node, now));
     }
 

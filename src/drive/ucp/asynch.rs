@@ -69,7 +69,8 @@ where
     ///
     /// The errors of [`stop_async`](Self::stop_async), then those of
     /// [`await_standstill_async`](Self::await_standstill_async), whatever else failed before;
-    /// otherwise [`DriveError::Rover`] and port errors.
+    /// otherwise [`DriveError::Rover`] and port errors. A refused call changes nothing, and stops
+    /// nothing.
     pub async fn drive_for_async(
         &mut self,
         speed: i16,
@@ -184,7 +185,8 @@ where
         };
         while self.now() < end {
             let next = self.renew_at().min(end);
-            if let Some(error) = self.until_async(next, refused).await? {
+            let kept = self.until_with_async(next, Needs::WholePortInTime, refused).await?;
+            if let Some(error) = kept {
                 return Err(error.into());
             }
         }

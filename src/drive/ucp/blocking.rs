@@ -58,7 +58,7 @@ where
     ///
     /// The errors of [`stop`](Self::stop), then those of
     /// [`await_standstill`](Self::await_standstill), whatever else failed before; otherwise
-    /// [`DriveError::Rover`] and port errors.
+    /// [`DriveError::Rover`] and port errors. A refused call changes nothing, and stops nothing.
     pub fn drive_for(
         &mut self,
         speed: i16,
@@ -168,7 +168,8 @@ where
         };
         while self.now() < end {
             let next = self.renew_at().min(end);
-            if let Some(error) = self.until(next, refused)? {
+            let kept = self.until_with(next, Needs::WholePortInTime, refused)?;
+            if let Some(error) = kept {
                 return Err(error.into());
             }
         }

@@ -37,6 +37,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
 
     pub(super) fn begin_stop(&mut self) {
         let now = self.now();
+        self.ends_at = None;
         self.role.stop(now);
     }
 

@@ -369,6 +369,7 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
+        self.expire_commands(now);
         let mut bytes = bytes;
         self.line.note(bytes);
         while let Some((node, status)) = self.line.next_response(&mut bytes) {

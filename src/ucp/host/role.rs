@@ -340,7 +340,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         if bytes.is_empty() {
-            return;
+            return self.state.expire_dead_man(now);
         }
         self.inbox.receive(bytes, now, now);
         self.receive(bytes);

@@ -119,12 +119,13 @@ impl<S: BiasStore> State<S> {
     }
 
     /// Whether the frame handed out last is a motor command that moves the robot, and is no longer
-    /// the latest.
+    /// the latest, or asks for an update that was ended.
     pub(super) fn has_sent_old_command(&self) -> bool {
         match self.last {
             Some(Outgoing::Motor(command)) => {
                 !command.stands_still() && self.motor.latest() != Some(command)
             }
+            Some(Outgoing::Update(_)) => self.update != Update::Silent,
             _ => false,
         }
     }

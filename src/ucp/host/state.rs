@@ -414,12 +414,17 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Ends a command whose application has gone silent, or whose robot is no longer heard (U10).
-    pub(super) fn expire_command(&mut self, now: Instant) {
+    /// Ends a command whose application has gone silent (U10).
+    pub(super) fn expire_dead_man(&mut self, now: Instant) {
         if self.motor.expire(now) {
             count(&mut self.stats.dead_man);
             self.events.push(HostEvent::DeadMan);
         }
+    }
+
+    /// Ends a command whose application has gone silent, or whose robot is no longer heard (U10).
+    pub(super) fn expire_command(&mut self, now: Instant) {
+        self.expire_dead_man(now);
         if reached(self.link_until, now) {
             self.link_until = None;
             self.link = Link::Down;

@@ -34,12 +34,6 @@ impl DrivenLine {
         (writes.count() + flushes.count()) as u64
     }
 
-    /// Whether a failed write may have been returned to nobody: behind it the pin waited for a
-    /// flush, which worked the next time.
-    pub(super) fn may_have_swallowed(&self) -> bool {
-        self.has_pin && self.has_write_failed_first && self.has_flush_stalled
-    }
-
     /// The failure that has to be returned to the caller.
     pub(super) fn first_failure(&self) -> Option<Failure> {
         let mut failures = self.failures.iter().map(|&(_, failure)| failure);

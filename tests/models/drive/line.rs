@@ -70,8 +70,6 @@ pub(crate) struct DrivenLine {
     pub(crate) failures: Vec<(u64, Failure)>,
     /// The first of them was a write failure.
     pub(crate) has_write_failed_first: bool,
-    /// A flush that never ends was begun in the current call.
-    pub(crate) has_flush_stalled: bool,
     /// A flush has failed, or the port has stalled: the bytes it has taken may be lost.
     pub(crate) is_given_up: bool,
     pub(crate) sleepers: Vec<(u64, u32, Waker)>,
@@ -123,7 +121,6 @@ impl DrivenLine {
             may_have_stalled: false,
             failures: vec![],
             has_write_failed_first: false,
-            has_flush_stalled: false,
             is_given_up: false,
             sleepers: vec![],
             sleepers_so_far: 0,
@@ -138,7 +135,7 @@ impl DrivenLine {
         (self.writes_in_call, self.first_write_us, self.is_touched) = (0, None, false);
         self.operations = 0;
         self.failures.clear();
-        (self.has_write_failed_first, self.has_flush_stalled) = (false, false);
+        self.has_write_failed_first = false;
         (self.is_given_up, self.may_have_stalled) = (false, false);
         self.wire.begin();
     }

@@ -98,8 +98,7 @@ impl<P: Wired> MasterLife<P> {
                     .first()
                     .is_some_and(|&(at_us, _)| at_us < before.begun_us + span_us);
                 // A set-point that is refused after all fails before anything else.
-                let is_told = matches!(outcome, Err(Told::Owed | Told::Moving | Told::Other))
-                    || line.may_have_swallowed() && outcome.is_ok();
+                let is_told = matches!(outcome, Err(Told::Owed | Told::Moving | Told::Other));
                 if is_early && !is_told && first.map(Told::Failure) != outcome.err() {
                     return Err(format!("{outcome:?} of a drive that failed with {first:?}"));
                 }
@@ -110,8 +109,7 @@ impl<P: Wired> MasterLife<P> {
                     _ => None,
                 };
                 let has_stalled = line.may_have_stalled && told == Some(Failure::Stalled);
-                let is_swallowed = line.may_have_swallowed() && told.is_none();
-                if told != first && !has_stalled && !is_swallowed {
+                if told != first && !has_stalled {
                     return Err(format!("{outcome:?}, but the port failed with {first:?}"));
                 }
             }

@@ -137,10 +137,7 @@ impl embedded_io_async::Write for Shared {
                 let free_us = self.line().free_us;
                 self.sleep_until(free_us).await;
             }
-            Some(Flushing::Stall) => {
-                self.line().has_flush_stalled = true;
-                self.sleep_until(u64::MAX).await;
-            }
+            Some(Flushing::Stall) => self.sleep_until(u64::MAX).await,
             Some(_) => {}
         }
         sending.end();
