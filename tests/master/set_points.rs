@@ -150,22 +150,3 @@ fn after_a_failed_flush_an_answer_does_not_confirm_the_write_in_front_of_its_rea
     desk.hear(450, &velocity(NodeId::N1, 0.0));
     assert_eq!(desk.news(), [MasterEvent::Confirmed { node: NodeId::N1 }]);
 }
-
-#[test]
-fn an_answer_behind_the_write_of_a_replaced_set_point_does_not_confirm_the_new_one() {
-    let mut desk = Desk::with_nodes(manual(), &[N1]);
-    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
-    desk.master.confirm(NodeId::N1, desk.now).unwrap();
-    assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
-    assert_eq!(desk.packet(), read(NodeId::N1));
-    desk.master.set_velocity(NodeId::N1, rps(5.0), desk.now).unwrap();
-    desk.now += US(500);
-    desk.master.handle_input(&velocity(NodeId::N1, 1.0), desk.now);
-    let confirmed = MasterEvent::Confirmed { node: NodeId::N1 };
-    assert!(!desk.news().contains(&confirmed), "5 rps has not left yet");
-    assert_eq!(desk.packet(), write(NodeId::N1, 5.0));
-    assert_eq!(desk.packet(), read(NodeId::N1));
-    desk.now += US(500);
-    desk.master.handle_input(&velocity(NodeId::N1, 5.0), desk.now);
-    assert!(desk.news().contains(&confirmed));
-}

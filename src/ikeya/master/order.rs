@@ -92,10 +92,6 @@ impl<B: Board> Order<B> {
     /// Takes a new set-point; the latest wins.
     pub(super) fn aim(&mut self, target: Target<B>) {
         self.state = State::SetPoint(SetPoint { target, is_new: true });
-        if self.confirm == Confirm::AfterAnswer {
-            // The answer that is waited for follows the WRITE of another set-point.
-            self.confirm = Confirm::AfterWrite;
-        }
     }
 
     /// No longer repeats the set-point, or the target of a stop once the node is still. Returns

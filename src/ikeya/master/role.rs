@@ -207,7 +207,8 @@ impl<B: Board> Master<B> {
 
     /// Requests a confirmation: [`MasterEvent::Confirmed`] comes once the node has answered a READ
     /// that followed the next WRITE of its set-point (I8), or [`MasterEvent::NotConfirmed`] if that
-    /// READ fails or the set-point is dropped first.
+    /// READ fails or the set-point is dropped first. It is about that WRITE: a set-point that
+    /// replaces it before the answer comes needs a confirmation of its own.
     ///
     /// # Errors
     ///
@@ -369,7 +370,9 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
-        self.expire_commands(now);
+        if bytes.is_empty() {
+            return self.expire_commands(now);
+        }
         let mut bytes = bytes;
         self.line.note(bytes);
         while let Some((node, status)) = self.line.next_response(&mut bytes) {
