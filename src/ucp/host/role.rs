@@ -238,8 +238,9 @@ impl<S: BiasStore> Host<S> {
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
-    /// During an update the robot hears no stop either. So one more stop precedes the request, and
-    /// the request waits for a stop that did not leave. If both may have been lost
+    /// During an update the robot hears no stop either: **call `stop` of the driver before, and go
+    /// on only if it is `Ok`**, so that a stop has left for certain. One more stop precedes the
+    /// request, and the request waits for a stop that did not leave. If both may have been lost
     /// ([`handle_unsent`](Endpoint::handle_unsent)), both are sent again.
     ///
     /// # Errors
