@@ -330,8 +330,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Whether the call that is running has ended.
     pub(super) fn is_over(&mut self) -> bool {
-        let now = self.now();
-        reached(self.ends_at, now)
+        // Reading the time is what costs most in a round.
+        self.ends_at.is_some_and(|at| self.now() >= at)
     }
 
     /// Time within which a healthy port takes or flushes a frame.
@@ -343,9 +343,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// because there is too much for one look: its line is not idle then, and an answer may be
     /// overtaken.
     fn may_hold_more(&mut self) -> bool {
-        let now = self.now();
-        let is_recent = |since| now - since < RECOVERY;
-        look_period(&self.role).is_some() && self.unsure_since.is_some_and(is_recent)
+        let Some(since) = self.unsure_since else { return false };
+        look_period(&self.role).is_some() && self.now() - since < RECOVERY
     }
 
     /// Lets time pass.
@@ -361,8 +360,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
     /// is outdated.
     pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
-        // The receiver may have taken long since the round began.
-        self.reclaim();
+        if !self.sending.rest().is_empty() {
+            // The receiver may have taken long since the round began.
+            self.reclaim();
+        }
         let now = self.now();
         self.give_up_outdated();
         if self.sending.is_in_doubt() {
