@@ -60,8 +60,8 @@
 //! for 10 ms at a time, or for the time of two of the longest frames and a millisecond if that is
 //! longer: a healthy port is done by then. The application hears of a watchdog at most four such
 //! times late, and a call may leave a frame, and a driver-enable pin, to the next. A
-//! command that ends while a write of its first bytes waits, by a dead-man or because its call is
-//! over, does not leave.
+//! command that ends while a write of its first bytes waits, by the dead-man of a host or because
+//! its call is over, does not leave.
 //!
 //! # When a driver is held up
 //!

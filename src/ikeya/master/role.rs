@@ -370,9 +370,6 @@ impl<B: Board> Endpoint for Master<B> {
 
     fn handle_input(&mut self, bytes: &[u8], now: Instant) {
         self.now = now;
-        if bytes.is_empty() {
-            return self.expire_commands(now);
-        }
         let mut bytes = bytes;
         self.line.note(bytes);
         while let Some((node, status)) = self.line.next_response(&mut bytes) {
