@@ -41,7 +41,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round_async().await;
         // A runaway port, which always has more, must not starve other tasks either.
-        if result.is_err() || self.may_have_more() {
+        if result.is_err() || self.unsure_since.is_some() {
             yield_once().await;
         }
         result

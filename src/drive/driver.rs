@@ -21,32 +21,28 @@ pub(super) const FRAMES: usize = 8;
 
 /// What a call needs from its port before it looks at the role.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(
+    not(any(feature = "ikeya", feature = "ucp")),
+    allow(dead_code, reason = "only the calls of a role need more than a whole port")
+)]
 pub(super) enum Needs {
     /// A round without a failure.
     WholePort,
     /// The same, and no round once the deadline has passed: a command that ends then would be
     /// repeated.
-    #[cfg(any(feature = "ikeya", feature = "ucp"))]
     WholePortInTime,
     /// The half that works may be enough: a command was received, or a stop has left.
-    #[cfg(any(feature = "ikeya", feature = "ucp"))]
     HalfPort,
 }
 
 impl Needs {
     pub(super) fn is_half(self) -> bool {
-        #[cfg(any(feature = "ikeya", feature = "ucp"))]
-        return self == Self::HalfPort;
-        #[cfg(not(any(feature = "ikeya", feature = "ucp")))]
-        false
+        self == Self::HalfPort
     }
 
     /// When a call ends without another round.
     pub(super) fn ends_at(self, deadline: Instant) -> Option<Instant> {
-        #[cfg(any(feature = "ikeya", feature = "ucp"))]
-        return (self == Self::WholePortInTime).then_some(deadline);
-        #[cfg(not(any(feature = "ikeya", feature = "ucp")))]
-        return Some(deadline).filter(|_| false);
+        (self == Self::WholePortInTime).then_some(deadline)
     }
 }
 
@@ -75,7 +71,7 @@ pub struct Driver<R, P, C> {
     /// When it was last seen empty: all received bytes have arrived since.
     pub(super) empty_at: Instant,
     /// The first look since that did not end there, but in an error or at its limit.
-    unsure_since: Option<Instant>,
+    pub(super) unsure_since: Option<Instant>,
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
@@ -198,11 +194,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();
-        if self.sending.needs_flush() {
-            // Nobody flushes it any more: the role must not wait for that.
-            let now = self.now();
-            self.role.handle_flushed(now);
-        }
+        // Nobody flushes it any more: the role must not wait for that.
+        let now = self.now();
+        self.role.handle_flushed(now);
         (self.role, self.port, self.clock)
     }
 
@@ -309,12 +303,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub(super) fn saw_empty(&mut self) {
         self.empty_at = self.latest;
         (self.unsure_since, self.has_overtaken) = (None, false);
-    }
-
-    /// Whether the latest look ended in an error, or at its limit.
-    #[cfg(feature = "embedded-io-async")]
-    pub(super) const fn may_have_more(&self) -> bool {
-        self.unsure_since.is_some()
     }
 
     /// Time after which a round sends nothing more: through a slow port the application of a slave

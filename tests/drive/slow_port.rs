@@ -77,10 +77,24 @@ fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
     }
 }
 
+/// The speeds of all motor commands that have left.
+#[cfg(feature = "ucp")]
+fn speeds(port: &Port) -> Vec<i16> {
+    use axlewire::{
+        stream::Frames,
+        ucp::{Message, Ucp},
+    };
+    let speed = |message| match message {
+        Message::MotorControl(command) => Some(command.speed()),
+        _ => None,
+    };
+    Frames::<Ucp>::new(&port.written).filter_map(|frame| speed(frame.message())).collect()
+}
+
 #[cfg(feature = "ucp")]
 #[test]
 fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
-    use axlewire::ucp::{Message, MotorControl};
+    use axlewire::ucp::MotorControl;
     let mut rover = host();
     let world = rover.port().world.clone();
     world.block_on(rover.stop_async()).unwrap();
@@ -91,14 +105,7 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
     rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
     let end = now + ms(1500);
     world.block_on(rover.run_until_async(end, |_, _, _| ())).unwrap();
-    let written = rover.port().written.clone();
-    let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
-    let speeds: Vec<i16> = frames
-        .filter_map(|frame| match frame.message() {
-            Message::MotorControl(command) => Some(command.speed()),
-            _ => None,
-        })
-        .collect();
+    let speeds = speeds(rover.port());
     assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{speeds:?}");
 }
 
@@ -118,14 +125,8 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_its_call_or_after_a_ho
             // No robot answers, so nobody sees it stand still.
             assert!(world.block_on(drive).is_err());
         }
-        let written = rover.port().written.clone();
-        assert!(!written.is_empty());
-        let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
-        for frame in frames {
-            if let axlewire::ucp::Message::MotorControl(command) = frame.message() {
-                assert_eq!(command.speed(), 0, "held for {hold_ms} ms");
-            }
-        }
+        let speeds = speeds(rover.port());
+        assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{hold_ms} ms");
     }
 }
 
@@ -153,14 +154,7 @@ fn a_thread_that_wakes_late_does_not_repeat_a_command_behind_the_end_of_its_call
     world.step(30_000);
     late_us.set(500_000);
     assert!(rover.drive_for(50, 0, ms(190)).is_err(), "no robot answers");
-    let written = rover.port().written.clone();
-    let frames = axlewire::stream::Frames::<axlewire::ucp::Ucp>::new(&written);
-    let speeds: Vec<i16> = frames
-        .filter_map(|frame| match frame.message() {
-            axlewire::ucp::Message::MotorControl(command) => Some(command.speed()),
-            _ => None,
-        })
-        .collect();
+    let speeds = speeds(rover.port());
     assert_eq!(speeds.iter().filter(|&&speed| speed != 0).count(), 1, "{speeds:?}");
 }
 

@@ -157,9 +157,8 @@ impl<B: Board> Master<B> {
     ///
     /// It is four times [`MasterConfig::attempts`] times the longest time between two reads of a
     /// node while stops are owed: the guard, an exchange with every other node and with one that is
-    /// searched for, and a WRITE to each. It holds for a
-    /// [`turnaround_gap`](MasterConfig::turnaround_gap) of at most 1 ms and at least
-    /// 38,400 bit/s: beyond that, several position nodes may need longer.
+    /// searched for, and a WRITE to each. With a [`turnaround_gap`](MasterConfig::turnaround_gap)
+    /// of milliseconds, or at a low speed, several position nodes may need longer.
     #[must_use]
     pub fn stop_bound(&self) -> Duration {
         let (write, exchange) = self.request_times();
