@@ -15,6 +15,7 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     assert_eq!(sent(&mut host, ms(100)), [] as [Vec<u8>; 0], "a refused call sends nothing");
     host.stop(ms(110));
     assert_eq!(speeds(&wait(&mut host, ms(110))), [(110_000, 0)]);
+    flushed(&mut host, ms(110));
     host.start_firmware_update(40, ms(110)).unwrap();
     assert_eq!(host.drive(go(10), ms(110)), Err(CommandError::Updating));
     assert_eq!(host.start_calibration(IMU, ms(110)), Err(CommandError::Updating));
@@ -43,10 +44,16 @@ fn a_refused_update_and_a_stop_end_the_silence() {
     assert_eq!(sent(&mut host, ms(20)).len(), 1);
     host.stop(ms(30));
     sent(&mut host, ms(30));
+    flushed(&mut host, ms(30));
     host.start_firmware_update(40, ms(30)).unwrap();
     sent(&mut host, ms(30));
     host.stop(ms(60));
     assert_eq!(speeds(&wait(&mut host, ms(60))), [(60_000, 0)]);
+}
+
+/// The port has been flushed: the host is asked for the next frame.
+fn flushed(host: &mut Host, now: Instant) {
+    assert_eq!(sent(host, now), [] as [Vec<u8>; 0]);
 }
 
 /// A host whose robot has been told to drive.
@@ -59,7 +66,7 @@ fn driving() -> Host {
 }
 
 #[test]
-fn an_update_is_refused_until_the_stop_has_been_sent() {
+fn an_update_is_refused_until_the_stop_has_left() {
     let mut host = fresh_host();
     let refused = Err(CommandError::Moving);
     assert_eq!(host.start_firmware_update(40, ms(0)), refused, "the first frame is due");
@@ -72,6 +79,8 @@ fn an_update_is_refused_until_the_stop_has_been_sent() {
         host.handle_unsent(unsent, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "{unsent:?}");
         sent(&mut host, ms(41));
+        assert_eq!(host.start_firmware_update(40, ms(41)), refused, "handed out");
+        flushed(&mut host, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), Ok(()));
     }
 }
@@ -85,6 +94,7 @@ fn one_more_stop_precedes_an_update_request() {
     let mut stop = sent(&mut host, ms(40)).concat();
     stop[7] ^= 4; // damaged on the line
     robot.handle_input(&stop, ms(41));
+    flushed(&mut host, ms(41));
     host.start_firmware_update(40, ms(42)).unwrap();
     for frame in sent(&mut host, ms(42)) {
         robot.handle_input(&frame, ms(43));
@@ -103,6 +113,7 @@ fn an_update_request_waits_for_a_stop_that_did_not_leave() {
             let mut host = driving();
             host.stop(ms(40));
             sent(&mut host, ms(40));
+            flushed(&mut host, ms(41));
             host.start_firmware_update(40, ms(42)).unwrap();
             (0..frames).for_each(|_| assert!(host.poll_transmit(ms(42)).is_some()));
             host.handle_unsent(unsent, ms(43));

@@ -89,6 +89,7 @@ fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
 fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut host = begun();
+        assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
         host.start_firmware_update(50, ms(10)).unwrap();
         assert_eq!(sent(&mut host, ms(10)).len(), 2);
         host.handle_unsent(unsent, ms(11));
@@ -100,6 +101,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
 
         // Unless the application has changed its mind.
         let mut host = begun();
+        assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
         host.start_firmware_update(50, ms(10)).unwrap();
         sent(&mut host, ms(10));
         host.stop(ms(11));

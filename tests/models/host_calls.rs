@@ -51,9 +51,7 @@ impl Site {
                     () if self.account.low_ids_only => Some(CommandError::LowIdsOnly { id: 9 }),
                     () if is_updating => Some(CommandError::Updating),
                     () if is_calibrating => Some(CommandError::Calibrating),
-                    () if motion.wanted.is_some() && !motion.is_stop_sent() => {
-                        Some(CommandError::Moving)
-                    }
+                    () if !motion.allows_update() => Some(CommandError::Moving),
                     () => None,
                 };
                 if result.is_ok() {

@@ -17,6 +17,16 @@ enum Greeting {
     Done,
 }
 
+/// How far the latest stop has got.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+enum Stop {
+    No,
+    Handed,
+    /// Flushed, which the host learns when it is next asked for a frame.
+    Flushed,
+    Left,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
     /// The motion wanted of the robot: the latest call, halted 500 ms after it.
@@ -36,6 +46,7 @@ pub(crate) struct Motion {
     greeting: Greeting,
     /// The last frame handed out is the very first one.
     is_greeting_last: bool,
+    stop: Stop,
 }
 
 impl Motion {
@@ -51,10 +62,14 @@ impl Motion {
             is_motor_last: false,
             greeting: if sends_first_stop { Greeting::Due } else { Greeting::Done },
             is_greeting_last: false,
+            stop: Stop::No,
         }
     }
 
     pub(crate) fn call(&mut self, command: MotorControl, now: Instant) {
+        if !command.stands_still() {
+            self.stop = Stop::No;
+        }
         (self.wanted, self.is_called) = (Some(command), true);
         self.dead_man = (!command.stands_still()).then(|| now + ms(500));
     }
@@ -100,6 +115,18 @@ impl Motion {
         stands_still(self.wanted) && stands_still(self.told) && !self.owes_copies()
     }
 
+    /// Whether an update may be asked for: the robot was never told anything, or its stop has left.
+    pub(crate) fn allows_update(&self) -> bool {
+        self.wanted.is_none_or(|wanted| wanted.stands_still() && self.stop == Stop::Left)
+    }
+
+    /// The host is asked for a frame, and so learns that the port has been flushed.
+    pub(crate) fn asked(&mut self) {
+        if self.stop == Stop::Flushed {
+            self.stop = Stop::Left;
+        }
+    }
+
     fn owes_copies(&self) -> bool {
         self.behind_cut.is_some_and(|out| out < 2)
     }
@@ -128,6 +155,9 @@ impl Motion {
         self.behind_cut = self.behind_cut.map(|out| (out + 1).min(2));
         (self.gap_until, self.repeat_at) = (now + ms(20), now + ms(100));
         self.is_greeting_last = false;
+        if self.is_stop_sent() && self.stop != Stop::Left {
+            self.stop = Stop::Handed;
+        }
         if !self.owes_copies() {
             if self.greeting == Greeting::Due {
                 (self.greeting, self.is_greeting_last) = (Greeting::Handed, true);
@@ -146,6 +176,9 @@ impl Motion {
     }
 
     pub(crate) fn flushed(&mut self) {
+        if self.stop == Stop::Handed {
+            self.stop = Stop::Flushed;
+        }
         if matches!(self.greeting, Greeting::Handed | Greeting::May) {
             self.greeting = Greeting::Flushed;
         }
@@ -155,7 +188,7 @@ impl Motion {
     /// Whatever the robot was told before is sent again, twice after half a frame or a failed flush
     /// (U16).
     pub(crate) fn unsent(&mut self, unsent: Unsent) {
-        self.told = None;
+        (self.told, self.stop) = (None, Stop::No);
         self.greeting = match (self.greeting, unsent) {
             (Greeting::Handed, Unsent::Unflushed) => Greeting::Due,
             (Greeting::Handed, _) if self.is_greeting_last => Greeting::Due,

@@ -191,7 +191,7 @@ pub enum CommandError {
         id: u8,
     },
     /// A firmware update requires that the robot has been told to stand still, and that the stop
-    /// has been [sent](super::Host::is_stop_sent).
+    /// has been flushed ([`Host::stop_progress`](super::Host::stop_progress)).
     Moving,
     /// A firmware update is in progress: the frame would end up in it.
     Updating,

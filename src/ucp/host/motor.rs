@@ -146,9 +146,18 @@ impl Motor {
         &mut self.standstill
     }
 
-    /// Whether an update may begin: the robot has been told to stand still, or this host has sent
-    /// it no command at all.
+    /// Whether an update may be asked for: the latest command is a stop that has left, or there has
+    /// been none at all. One that was only handed out may be lost together with the request's stop.
     pub(super) fn allows_update(&self) -> bool {
+        match self.stop_progress() {
+            StopProgress::NotAsked => self.latest.is_none(),
+            StopProgress::Due => false,
+            _ => true,
+        }
+    }
+
+    /// Whether the request of an update may be sent: one more stop has been sent before it.
+    pub(super) fn is_ready_for_update(&self) -> bool {
         self.latest.is_none() || self.is_stop_sent()
     }
 

@@ -238,14 +238,16 @@ impl<S: BiasStore> Host<S> {
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
-    /// During an update the robot hears no stop either: **call `stop` of the driver before, and go
-    /// on only if it is `Ok`**, so that a stop has left for certain. One more stop precedes the
-    /// request, and the request waits for a stop that did not leave. If both may have been lost
-    /// ([`handle_unsent`](Endpoint::handle_unsent)), both are sent again.
+    /// During an update the robot hears no stop either, so the call is refused until a stop has
+    /// been flushed: **call `stop` of the driver before, and go on only if it is `Ok`**. One
+    /// more stop precedes the request, and the request waits for one that did not leave. If
+    /// both may have been lost ([`handle_unsent`](Endpoint::handle_unsent)), both are sent
+    /// again.
     ///
     /// # Errors
     ///
-    /// [`CommandError::Moving`] unless [`is_stop_sent`](Self::is_stop_sent); without
+    /// [`CommandError::Moving`] unless the latest command is a stop that has been flushed
+    /// ([`stop_progress`](Self::stop_progress) is past [`StopProgress::Due`]); without
     /// [`HostConfig::sends_first_stop`] the call is also accepted before the first motor command.
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with

@@ -81,7 +81,7 @@ impl<S: BiasStore> State<S> {
             return Some(Outgoing::Network(body));
         }
         match self.update {
-            Update::Asked { version, .. } if self.motor.allows_update() => {
+            Update::Asked { version, .. } if self.motor.is_ready_for_update() => {
                 self.update = Update::Silent;
                 self.motor.pause();
                 return Some(Outgoing::Update(version));
@@ -146,7 +146,7 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if let (Some(Outgoing::Update(version)), false) = (last, self.motor.allows_update()) {
+        if let (Some(Outgoing::Update(version)), false) = (last, self.motor.is_ready_for_update()) {
             self.ask_update_again(version, now);
         }
     }
@@ -192,7 +192,7 @@ impl<S: BiasStore> State<S> {
             return self.link_until;
         }
         let asked = match self.update {
-            Update::Asked { at, .. } if self.motor.allows_update() => Some(at),
+            Update::Asked { at, .. } if self.motor.is_ready_for_update() => Some(at),
             _ => None,
         };
         earliest(&[
