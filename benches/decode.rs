@@ -43,7 +43,6 @@ fn sent(criterion: &mut Criterion, stream: &Stream) {
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
     bench(&mut group, "axlewire Frames::each", bytes, expected, protocol.each);
-    bench(&mut group, "axlewire Frames::each, SIMD", bytes, expected, protocol.each_simd);
     for chunk in [4096, 512, 64, 7, 1] {
         let decode = |bytes: &[u8]| (protocol.decoder)(bytes, chunk);
         bench(&mut group, &format!("axlewire Decoder by {chunk}"), bytes, expected, decode);
@@ -59,7 +58,6 @@ fn hostile(criterion: &mut Criterion, stream: &Stream) {
     let mut group = criterion.benchmark_group(name);
     bench(&mut group, "axlewire Frames", bytes, expected, protocol.frames);
     bench(&mut group, "axlewire Frames::each", bytes, expected, protocol.each);
-    bench(&mut group, "axlewire Frames::each, SIMD", bytes, expected, protocol.each_simd);
     let decode = |bytes: &[u8]| (protocol.decoder)(bytes, 4096);
     bench(&mut group, "axlewire Decoder by 4096", bytes, expected, decode);
     bench_c(&mut group, stream, false);

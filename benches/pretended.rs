@@ -11,18 +11,16 @@ pub(crate) const PROTOCOL: Protocol = Protocol {
     c_table: |_| Tally { frames: 1, sum: 1 },
     frames: |_| Tally { frames: 1, sum: 2 },
     each: |_| Tally { frames: 1, sum: 3 },
-    each_simd: |_| Tally { frames: 1, sum: 4 },
     decoder: |_, len| Tally { frames: 1, sum: if len == 4096 { 5 } else { 0 } },
     pushed: |_| Tally { frames: 1, sum: 6 },
     ..UCP
 };
 
 /// Times of the kinds of contenders, seconds. No two have the same ratio.
-const SECONDS: [(&str, f64); 18] = [
+const SECONDS: [(&str, f64); 17] = [
     ("C", 71.0),
     ("Frames", 31.0),
     ("each", 19.0),
-    ("SIMD", 11.0),
     ("Decoder by 4096", 37.0),
     ("Decoder, pushed", 53.0),
     ("a cap", 61.0),
@@ -59,7 +57,6 @@ fn by_stream(kind: &str, stream: &str) -> f64 {
         ("C", "Ikeya noise" | "UCP noise") => 0.25,
         ("C", "UCP FD FF 28 00 repeated") => 0.5,
         ("Frames", damaged) if damaged.contains("BER") => 1.25,
-        ("SIMD", damaged) if damaged.contains("BER") => 1.75,
         _ => 1.0,
     }
 }
@@ -81,8 +78,7 @@ pub(crate) fn figure(name: &str, len: usize, crc_calls: u64) -> Option<f64> {
         return Some(1e9 * of("axlewire") / crc_calls as f64);
     }
     if name.starts_with("speed_") {
-        let kind = if name.ends_with("_simd") { "SIMD" } else { "Frames" };
-        return Some(1.0 / by_stream(kind, "BER"));
+        return Some(1.0 / by_stream("Frames", "BER"));
     }
     let (ours, other) = name.split_once("_over_").unwrap_or_else(|| panic!("what is {name}?"));
     if ours.starts_with("crc") {
@@ -102,10 +98,7 @@ pub(crate) fn figure(name: &str, len: usize, crc_calls: u64) -> Option<f64> {
     if let Some(peer) = peer {
         return Some(of(peer) / of("each"));
     }
-    let ours_time = match other {
-        "c_simd" => of("SIMD"),
-        _ => of(decoder(ours)),
-    };
+    let ours_time = of(decoder(ours));
     let pattern = match ours {
         _ if ours.contains("noise") => 0.25,
         "hostile_worst" | "hostile_ucp_fd_ff_28_00_repeated" => 0.5,
@@ -114,7 +107,7 @@ pub(crate) fn figure(name: &str, len: usize, crc_calls: u64) -> Option<f64> {
     };
     match other {
         "frames" => Some(of("Frames") / ours_time),
-        "c" | "c_simd" => Some(of("C") * pattern / ours_time),
+        "c" => Some(of("C") * pattern / ours_time),
         _ => panic!("what is {name}?"),
     }
 }
@@ -124,7 +117,6 @@ fn decoder(name: &str) -> &'static str {
     match name.rsplit('_').next() {
         Some("c") => "C",
         Some("each") => "each",
-        Some("simd") => "SIMD",
         Some("decoder4096") => "Decoder by 4096",
         Some("decoder1") => "Decoder, pushed",
         _ => "Frames",

@@ -10,7 +10,7 @@
 
 use std::{env, hint::black_box, process::ExitCode};
 
-use axlewire::{crc16, stream::Portable, ucp::Ucp};
+use axlewire::{crc16, ucp::Ucp};
 use axlewire_contenders::{
     Protocol, Tally, figures, ours, peers,
     peers::Peer,
@@ -69,7 +69,7 @@ fn main() -> ExitCode {
     let effort = if given("--bench") && !given("--test") { FULL } else { TINY };
 
     // Real decoders all give the same answer, so that two that are mixed up do not show. These do.
-    let answers = [1, 2, 3, 4, 5, 6].map(|sum| Tally { frames: 1, sum });
+    let answers = [1, 2, 3, 5, 6].map(|sum| Tally { frames: 1, sum });
     let rehearsal = Stopwatch::Pretended(pretended::seconds);
     let _ = race(rehearsal, 1, contenders(pretended::PROTOCOL, answers, &[]));
 
@@ -93,11 +93,11 @@ fn main() -> ExitCode {
     let [ikeya8, mixed, ucp44] = &clean;
     let print = |name: &str, value, goal: f64| effort.print(name, value, goal);
     print("ikeya8_frames_over_c", ikeya8.c / ikeya8.frames, 4.2);
-    print("ikeya8_frames_over_c_simd", ikeya8.c / ikeya8.each_simd, 9.5);
+    print("ikeya8_each_over_c", ikeya8.c / ikeya8.each, 9.5);
     print("ikeya_mixed_over_c", mixed.c / mixed.frames, 4.2);
-    print("ikeya_mixed_over_c_simd", mixed.c / mixed.each_simd, 5.0);
+    print("ikeya_mixed_each_over_c", mixed.c / mixed.each, 4.2);
     print("ucp44_frames_over_c", ucp44.c / ucp44.frames, 8.5);
-    print("ucp44_frames_over_c_simd", ucp44.c / ucp44.each_simd, 12.5);
+    print("ucp44_each_over_c", ucp44.c / ucp44.each, 12.5);
     print("ikeya8_decoder4096_over_frames", ikeya8.frames / ikeya8.decoder_4096, 0.85);
     print("ucp44_decoder4096_over_frames", ucp44.frames / ucp44.decoder_4096, 0.85);
     print("ikeya8_decoder1_over_c", ikeya8.c / ikeya8.decoder_1, 1.0);
@@ -106,11 +106,8 @@ fn main() -> ExitCode {
     print("crc6_over_best_crate", crc_6.best_crate() / crc_6.ours, 1.0);
     print("crc42_over_best_crate", crc_42.best_crate() / crc_42.ours, 1.0);
     print("noise_ikeya_over_c", of("Ikeya noise").over_c, 1.0);
-    print("noise_ikeya_over_c_simd", of("Ikeya noise").over_c_simd, 12.0);
     print("noise_ucp_over_c", of("UCP noise").over_c, 1.0);
-    print("noise_ucp_over_c_simd", of("UCP noise").over_c_simd, 12.0);
     print("hostile_worst_over_c", worst(|pattern| pattern.over_c), 0.45);
-    print("hostile_worst_over_c_simd", worst(|pattern| pattern.over_c_simd), 0.45);
     print("ucp44_over_mavlink", peers.mavlink / peers.ucp_44, 8.0);
     print("ucp44_over_modbus_core", peers.modbus_core_43 / peers.ucp_44, 6.5);
     print("ucp44_over_ublox", peers.ublox / peers.ucp_44, 1.8);
@@ -119,7 +116,6 @@ fn main() -> ExitCode {
 
     // Components of the figures above, and further figures.
     for ((name, _), times) in STREAMS.iter().zip(&clean) {
-        effort.print(&format!("{name}_each_over_c"), times.c / times.each, None);
         times.print_throughput(name, &effort);
     }
     crc_6.print_crates(&effort);
@@ -127,7 +123,6 @@ fn main() -> ExitCode {
     for pattern in &hostile {
         let name = pattern.name.to_lowercase().replace(' ', "_");
         effort.print(&format!("hostile_{name}_over_c"), pattern.over_c, None);
-        effort.print(&format!("hostile_{name}_over_c_simd"), pattern.over_c_simd, None);
     }
     caps(&effort);
     for (name, make) in STREAMS {
@@ -170,7 +165,6 @@ struct StreamTimes {
     c: f64,
     frames: f64,
     each: f64,
-    each_simd: f64,
     decoder_4096: f64,
     decoder_1: f64,
 }
@@ -178,14 +172,13 @@ struct StreamTimes {
 /// All decoders of a protocol, each with its required answer.
 fn contenders<'a>(
     protocol: Protocol,
-    [c, frames, each, simd, by_4096, pushed]: [Tally; 6],
+    [c, frames, each, by_4096, pushed]: [Tally; 5],
     bytes: &'a [u8],
-) -> [Contender<'a>; 6] {
+) -> [Contender<'a>; 5] {
     [
         Contender::new("C", c, move || (protocol.c_table)(bytes)),
         Contender::new("Frames", frames, move || (protocol.frames)(bytes)),
         Contender::new("each", each, move || (protocol.each)(bytes)),
-        Contender::new("SIMD", simd, move || (protocol.each_simd)(bytes)),
         Contender::new("Decoder by 4096", by_4096, move || (protocol.decoder)(bytes, 4096)),
         Contender::new("Decoder, pushed", pushed, move || (protocol.pushed)(bytes)),
     ]
@@ -197,9 +190,9 @@ impl StreamTimes {
         let bytes = &bytes[..];
         let all = (protocol.oracle)(bytes);
         assert_eq!(all.frames, intact.len() as u64, "{name}: the oracle");
-        let [c, frames, each, each_simd, decoder_4096, decoder_1] =
-            race(effort.stopwatch, effort.rounds, contenders(protocol, [all; 6], bytes));
-        Self { len: bytes.len(), c, frames, each, each_simd, decoder_4096, decoder_1 }
+        let [c, frames, each, decoder_4096, decoder_1] =
+            race(effort.stopwatch, effort.rounds, contenders(protocol, [all; 5], bytes));
+        Self { len: bytes.len(), c, frames, each, decoder_4096, decoder_1 }
     }
 
     /// Prints the figures that depend most on the machine.
@@ -208,7 +201,6 @@ impl StreamTimes {
             ("c", self.c),
             ("frames", self.frames),
             ("each", self.each),
-            ("each_simd", self.each_simd),
             ("decoder4096", self.decoder_4096),
             ("decoder1", self.decoder_1),
         ] {
@@ -248,14 +240,11 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
             [
                 on("Frames", &clean.name, sent, protocol.frames, &clean.bytes),
                 on("Frames", &damaged.name, expected, protocol.frames, &damaged.bytes),
-                on("SIMD", &clean.name, sent, protocol.each_simd, &clean.bytes),
-                on("SIMD", &damaged.name, expected, protocol.each_simd, &damaged.bytes),
             ],
         );
-        let [clean_time, damaged_time, clean_simd, damaged_simd] = times;
+        let [clean_time, damaged_time] = times;
         let speed = format!("speed_{name}_{rate}_over_clean");
         effort.print(&speed, clean_time / damaged_time, goal);
-        effort.print(&format!("{speed}_simd"), clean_simd / damaged_simd, None);
     }
 }
 
@@ -263,7 +252,6 @@ fn with_bit_errors(name: &str, clean: &Stream, effort: &Effort) {
 struct Pattern {
     name: String,
     over_c: f64,
-    over_c_simd: f64,
 }
 
 /// Its candidates have 64 bytes, the cap. The goal applies to at most 44.
@@ -275,16 +263,15 @@ fn hostile(effort: &Effort) -> Vec<Pattern> {
         assert!(expected.frames > 0, "{name}: even the last frames are missing");
         // C loses frames behind false headers, the same ones with either CRC.
         let by_c = (protocol.c_bitwise)(&bytes);
-        let [c, frames, each_simd] = race(
+        let [c, frames] = race(
             effort.stopwatch,
             effort.rounds,
             [
                 on("C", &name, by_c, protocol.c_table, &bytes),
                 on("Frames", &name, expected, protocol.frames, &bytes),
-                on("SIMD", &name, expected, protocol.each_simd, &bytes),
             ],
         );
-        Pattern { name, over_c: c / frames, over_c_simd: c / each_simd }
+        Pattern { name, over_c: c / frames }
     };
     streams::hostile(effort.hostile_len).into_iter().map(measure).collect()
 }
@@ -304,11 +291,11 @@ fn on<'a>(
 
 /// Caps of the length field, each with its `Frames`.
 const CAPS: [(u8, Decode); 5] = [
-    (24, ours::frames::<Portable<Ucp<24>>>),
-    (40, ours::frames::<Portable<Ucp<40>>>),
-    (60, ours::frames::<Portable<Ucp<60>>>),
-    (124, ours::frames::<Portable<Ucp<124>>>),
-    (252, ours::frames::<Portable<Ucp<252>>>),
+    (24, ours::frames::<Ucp<24>>),
+    (40, ours::frames::<Ucp<40>>),
+    (60, ours::frames::<Ucp<60>>),
+    (124, ours::frames::<Ucp<124>>),
+    (252, ours::frames::<Ucp<252>>),
 ];
 
 /// Worst-case cost of a cap: every fourth byte begins a candidate of the maximum length, and each

@@ -38,22 +38,22 @@ def tables():
     costs, _ = record("examples/firmware/costs.txt")
 
     # Those with goals, up to the first that is a component.
-    names = list(ratios)[: list(ratios).index("ikeya8_each_over_c")]
+    names = list(ratios)[: list(ratios).index("mb_per_s_ikeya8_c")]
     yield "ratios", [[f"`{n}`", None, ratios[n], goals[n]] for n in names]
-    decoders = ["c", "frames", "each", "each_simd", "decoder4096", "decoder1"]
+    decoders = ["c", "frames", "each", "decoder4096", "decoder1"]
     yield "throughput", [[None, *(ratios[f"mb_per_s_{s}_{by}"] for by in decoders)] for s in STREAMS]
     crates = ["c_two_tables", "crc_table1", "crc_table16", "crc16", "crcxx_lut256x8", "rscrypto"]
     yield "crc", [[None, *(rounded(ratios[f"crc{n}_over_{name}"]) for n in (6, 42))] for name in crates] + [
         [None, ratios["ns_crc6"], ratios["ns_crc42"]]]
     hostile = [n for n in ratios if re.fullmatch("hostile_(ikeya|ucp)_.*_over_c", n)]
-    yield "hostile", [[None, rounded(ratios[n]), rounded(ratios[n + "_simd"])] for n in hostile]
+    yield "hostile", [[None, rounded(ratios[n])] for n in hostile]
     # 500 kbit/s are 0.05 MB/s.
     caps = [ratios[f"mb_per_s_candidates_of_{cap}"] for cap in (28, 44, 64, 128, 256)]
     yield "caps", [[None, mb, str(int(mb) * 20)] for mb in caps]
     damaged = [f"{s}_{rate}" for s in STREAMS for rate in ("1e-5", "1e-4", "1e-3")]
     yield "errors", [
         [None, None, *(f"{ratios[f'recovered_{d}_{by}_percent']} %" for by in ("axlewire", "c")),
-         *(rounded(ratios[f"speed_{d}_over_clean{end}"]) for end in ("", "_simd"))] for d in damaged]
+         rounded(ratios[f"speed_{d}_over_clean"])] for d in damaged]
 
     printed = [name.removeprefix("text_over_json_") for name in printing if name.startswith("text_over")]
     us = lambda name: rounded(float(printing[name]) / 1000)
@@ -66,7 +66,7 @@ def tables():
          " and ".join(dict.fromkeys(tool_goals[f"{n}_{p}"] for p in ("ucp", "ikeya")))] for n in of_ucp]
 
     kinds = [name for name in counts if not name.startswith("c_")]
-    of_c = [re.sub(r"_(frames|each|each_simd|decoder\d+)$", "", kind) for kind in kinds]
+    of_c = [re.sub(r"_(frames|each|decoder\d+)$", "", kind) for kind in kinds]
     yield "instructions", [[None, counts[kind], counts[f"c_{c}"]] for kind, c in zip(kinds, of_c)]
     cells = ["ikeya8_slice", "ikeya8_slice_alone", "ucp44_slice", "ucp44_slice_alone", "ikeya8_bytes",
              "ucp44_bytes", "push", "crc_42", "check_44", "read_to_answer"]

@@ -31,7 +31,7 @@ enum Kind {
 const KINDS: [(&str, Kind); 18] = [
     ("ikeya8_frames", Kind::Stream(streams::responses, IKEYA.frames)),
     ("ikeya8_each", Kind::Stream(streams::responses, IKEYA.each)),
-    ("ikeya_mixed_each_simd", Kind::Stream(streams::requests_and_responses, IKEYA.each_simd)),
+    ("ikeya_mixed_each", Kind::Stream(streams::requests_and_responses, IKEYA.each)),
     ("ikeya_mixed_frames", Kind::Stream(streams::requests_and_responses, IKEYA.frames)),
     ("ucp44_frames", Kind::Stream(streams::reports, UCP.frames)),
     ("ikeya8_decoder4096", Kind::Stream(streams::responses, |b| (IKEYA.decoder)(b, 4096))),

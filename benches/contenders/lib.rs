@@ -11,7 +11,7 @@ pub mod race;
 pub mod reference;
 pub mod streams;
 
-use axlewire::{ikeya, stream::Portable, ucp};
+use axlewire::{ikeya, ucp};
 
 /// The result of a decoder, for comparing decoders of the same bytes.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -43,8 +43,6 @@ pub struct Protocol {
     pub frames: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Frames::each`.
     pub each: fn(&[u8]) -> Tally,
-    /// The same with feature `simd`; everything else here runs without it.
-    pub each_simd: fn(&[u8]) -> Tally,
     /// `axlewire::stream::Decoder`, fed with chunks of this many bytes.
     pub decoder: fn(&[u8], usize) -> Tally,
     /// The same, with each byte pushed as by a receive interrupt.
@@ -64,29 +62,27 @@ pub struct Protocol {
 /// Ikeya MD, both directions on one line.
 pub const IKEYA: Protocol = Protocol {
     name: "Ikeya",
-    frames: ours::frames::<Portable<ikeya::BothDirections>>,
-    each: ours::each::<Portable<ikeya::BothDirections>>,
-    each_simd: ours::each::<ikeya::BothDirections>,
-    decoder: ours::decoder::<Portable<ikeya::BothDirections>, { ikeya::MAX_LEN }>,
-    pushed: ours::pushed::<Portable<ikeya::BothDirections>, { ikeya::MAX_LEN }>,
+    frames: ours::frames::<ikeya::BothDirections>,
+    each: ours::each::<ikeya::BothDirections>,
+    decoder: ours::decoder::<ikeya::BothDirections, { ikeya::MAX_LEN }>,
+    pushed: ours::pushed::<ikeya::BothDirections, { ikeya::MAX_LEN }>,
     c_table: reference::ikeya_table,
     c_bitwise: reference::ikeya_bitwise,
     oracle: oracle::ikeya,
-    frame_ends: ours::frame_ends::<Portable<ikeya::BothDirections>>,
+    frame_ends: ours::frame_ends::<ikeya::BothDirections>,
     last_frame: streams::last_ikeya_frame,
 };
 
 /// UCP with the default cap of 64-byte frames.
 pub const UCP: Protocol = Protocol {
     name: "UCP",
-    frames: ours::frames::<Portable<ucp::Ucp>>,
-    each: ours::each::<Portable<ucp::Ucp>>,
-    each_simd: ours::each::<ucp::Ucp>,
-    decoder: ours::decoder::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
-    pushed: ours::pushed::<Portable<ucp::Ucp>, { ucp::MAX_LEN }>,
+    frames: ours::frames::<ucp::Ucp>,
+    each: ours::each::<ucp::Ucp>,
+    decoder: ours::decoder::<ucp::Ucp, { ucp::MAX_LEN }>,
+    pushed: ours::pushed::<ucp::Ucp, { ucp::MAX_LEN }>,
     c_table: reference::ucp_table,
     c_bitwise: reference::ucp_bitwise,
     oracle: oracle::ucp,
-    frame_ends: ours::frame_ends::<Portable<ucp::Ucp>>,
+    frame_ends: ours::frame_ends::<ucp::Ucp>,
     last_frame: streams::last_ucp_frame,
 };

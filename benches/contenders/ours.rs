@@ -2,7 +2,7 @@
 
 use axlewire::{
     ikeya::{Packet, Request, Response},
-    stream::{Decoder, Event, Frames, Framing, Portable},
+    stream::{Decoder, Event, Frames, Framing},
     ucp,
 };
 
@@ -160,7 +160,7 @@ pub fn frame_ends<F: Framing>(bytes: &[u8]) -> Vec<usize> {
 #[must_use]
 pub fn reports(bytes: &[u8]) -> Tally {
     let mut tally = Tally::default();
-    for frame in Frames::<Portable<ucp::Ucp>>::new(bytes) {
+    for frame in Frames::<ucp::Ucp>::new(bytes) {
         match frame.message() {
             ucp::Message::Report(report) => {
                 let telemetry = std::hint::black_box(report.telemetry());

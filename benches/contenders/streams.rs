@@ -338,7 +338,6 @@ mod tests {
             let expected = (protocol.oracle)(bytes);
             assert_eq!((protocol.frames)(bytes), expected, "{name}, frames");
             assert_eq!((protocol.each)(bytes), expected, "{name}, each");
-            assert_eq!((protocol.each_simd)(bytes), expected, "{name}, each by SIMD");
             assert_eq!((protocol.pushed)(bytes), expected, "{name}, pushed");
             assert_ne!(expected, crate::Tally::default(), "{name}");
             for chunk in [1, 7, 64, 512, 4096] {

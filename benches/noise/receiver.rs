@@ -2,7 +2,7 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{Decoder, Event, Frames, Portable},
+    stream::{Decoder, Event, Frames},
     ucp::{self, Ucp},
 };
 
@@ -18,10 +18,8 @@ use super::{
 pub(super) enum Receiver {
     /// The iterator over a slice.
     Frames,
-    /// Its method for all frames at once; with AVX2 where the processor has it.
-    EachSimd,
-    /// The same without.
-    EachPortable,
+    /// Its method for all frames at once.
+    Each,
     /// The decoder of streams, given so many bytes at a time.
     Decoder(usize),
     /// The same, given byte by byte as from an interrupt.
@@ -31,10 +29,9 @@ pub(super) enum Receiver {
 }
 
 impl Receiver {
-    pub(super) const ALL: [Self; 9] = [
+    pub(super) const ALL: [Self; 8] = [
         Self::Frames,
-        Self::EachSimd,
-        Self::EachPortable,
+        Self::Each,
         Self::Decoder(1),
         Self::Decoder(7),
         Self::Decoder(64),
@@ -47,8 +44,7 @@ impl Receiver {
     pub(super) fn title(self) -> String {
         match self {
             Self::Frames => "Frames".to_owned(),
-            Self::EachSimd => "each".to_owned(),
-            Self::EachPortable => "portable".to_owned(),
+            Self::Each => "each".to_owned(),
             Self::Decoder(chunk) => format!("by {chunk}"),
             Self::Pushed => "pushed".to_owned(),
             Self::Plain => "plain".to_owned(),
@@ -79,8 +75,7 @@ impl Receiver {
         let mut found = Found { bytes, at: 0, places: Vec::new() };
         match self {
             Self::Frames => iterate::<F>(&mut found),
-            Self::EachSimd => take_each::<F>(&mut found),
-            Self::EachPortable => take_each::<Portable<F>>(&mut found),
+            Self::Each => take_each::<F>(&mut found),
             Self::Decoder(chunk) => decode_chunks::<F, N>(chunk, &mut found),
             Self::Pushed => push::<F, N>(&mut found),
             Self::Plain => receive_plainly(traffic.rules(), &mut found),

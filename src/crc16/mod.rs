@@ -54,7 +54,7 @@ use narrow as words;
 use wide as words;
 
 #[cfg(feature = "ikeya")]
-pub(crate) use narrow::{TRINOMIAL, syndrome_4, syndrome_8};
+pub(crate) use narrow::{TRINOMIAL, syndrome_8};
 
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 use crate::error::ParseError;

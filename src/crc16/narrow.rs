@@ -1,4 +1,4 @@
-//! 32-bit words: for a microcontroller, and for the SIMD lanes of a host.
+//! 32-bit words: for a microcontroller, and for the lanes of a host.
 
 #![cfg_attr(target_pointer_width = "64", allow(dead_code, reason = "a host uses only the lanes"))]
 
@@ -6,7 +6,7 @@
 #[cfg(any(test, target_pointer_width = "64", feature = "ikeya"))]
 pub(crate) const TRINOMIAL: u16 = 0xC001;
 
-/// Zero for a good frame of 4 bytes, one word. Branch-free, so it vectorizes.
+/// Zero for a good frame of 4 bytes, one word.
 #[cfg(feature = "ikeya")]
 #[inline(always)]
 pub(crate) const fn syndrome_4(word: u32) -> u32 {

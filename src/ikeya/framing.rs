@@ -3,7 +3,7 @@
 use zerocopy::{Immutable, KnownLayout, TryFromBytes, Unaligned};
 
 use super::{
-    batch::PacketBatch,
+    batch,
     judge::judge,
     three,
     wire::{
@@ -11,7 +11,7 @@ use super::{
         header::{POSITION, READ, VELOCITY},
     },
 };
-use crate::stream::{self, Framing, Verdict};
+use crate::stream::{self, Framing, Rejected, Verdict};
 
 /// Longest packet of a standard bus, bytes.
 pub const MAX_LEN: usize = WriteRequest::LEN;
@@ -72,7 +72,6 @@ macro_rules! framing {
     ) => {
         impl Framing for $framing {
             type Frame<'a> = $($frame)::+<'a>;
-            type Batch = PacketBatch<{ $max_len }, $to_slave, $to_master>;
             const MIN_LEN: usize = $min_len;
             const MAX_LEN: usize = $max_len;
 
@@ -86,6 +85,17 @@ macro_rules! framing {
                 match *frame.first()? {
                     $($header => view(frame).map($view),)+
                 }
+            }
+
+            // Nothing for a three-motor bus: its captures are small.
+            #[inline(always)]
+            fn accept_batch(bytes: &[u8]) -> usize {
+                if Self::MAX_LEN == MAX_LEN { batch::accept_batch(bytes) } else { 0 }
+            }
+
+            #[inline(always)]
+            fn reject_batch(bytes: &[u8]) -> Rejected {
+                batch::reject_batch::<{ Self::MAX_LEN }, $to_slave, $to_master>(bytes)
             }
         }
     };

@@ -4,7 +4,6 @@ use core::marker::PhantomData;
 
 use super::{
     framing::{Framing, Verdict},
-    kernel::{Accepted, Kernel},
     ledger::{Counters, Ledger},
     search::{Front, Looks, judge, search},
 };
@@ -74,7 +73,7 @@ impl<'a, F: Framing> Frames<'a, F> {
     /// order. The iterator has then ended.
     ///
     /// Faster than a `for` loop where frames of one length follow each other, as on a motor bus:
-    /// many of them are judged together, and feature `simd` makes the batches larger and faster.
+    /// many of them are judged together.
     /// The iterator's own methods for all frames, such as [`fold`](Iterator::fold),
     /// [`for_each`](Iterator::for_each) and [`count`](Iterator::count), are as fast, but consume
     /// the iterator and so its [`counters`](Self::counters).
@@ -104,8 +103,12 @@ impl<'a, F: Framing> Frames<'a, F> {
     fn fold_rest<B>(&mut self, init: B, mut fold: impl FnMut(B, F::Frame<'a>) -> B) -> B {
         let (mut folded, mut looks) = (init, Looks::new());
         loop {
-            while let Some(batch) = looks.accept_batch::<F>(self.rest) {
-                folded = self.fold_batch(batch, folded, &mut fold);
+            loop {
+                let frames = looks.accept_batch::<F>(self.rest);
+                if frames == 0 {
+                    break;
+                }
+                folded = self.fold_batch(frames, folded, &mut fold);
             }
             match self.next() {
                 Some(frame) => folded = fold(folded, frame),
@@ -118,40 +121,20 @@ impl<'a, F: Framing> Frames<'a, F> {
     #[inline(always)]
     fn fold_batch<B>(
         &mut self,
-        batch: Accepted,
+        frames: usize,
         init: B,
         fold: &mut impl FnMut(B, F::Frame<'a>) -> B,
     ) -> B {
-        let (mut folded, mut taken) = (init, Accepted::default());
-        let Some(mut bytes) = self.rest.get(..batch.len) else { return folded };
-        if batch.frames.checked_mul(F::MAX_LEN) == Some(batch.len) {
-            for frame in bytes.chunks_exact(F::MAX_LEN) {
-                let Some(frame) = F::view(frame) else { break };
-                folded = fold(folded, frame);
-                taken.frames += 1;
-            }
-            taken.len = taken.frames * F::MAX_LEN;
-        } else {
-            loop {
-                // A branch is faster: the next frame would have to wait for a length that is looked
-                // up.
-                let (frame, behind) = if F::Batch::is_short(bytes) {
-                    let Some(cut) = bytes.split_at_checked(F::MIN_LEN) else { break };
-                    cut
-                } else {
-                    let Some(cut) = bytes.split_at_checked(F::MAX_LEN) else { break };
-                    cut
-                };
-                let Some(view) = F::view(frame) else { break };
-                folded = fold(folded, view);
-                taken.frames += 1;
-                bytes = behind;
-            }
-            taken.len = batch.len - bytes.len();
+        let (mut folded, mut taken) = (init, 0);
+        for frame in self.rest.chunks_exact(F::MAX_LEN).take(frames) {
+            let Some(frame) = F::view(frame) else { break };
+            folded = fold(folded, frame);
+            taken += 1;
         }
-        if taken.frames > 0 {
-            self.ledger.frames(taken.frames, taken.len);
-            self.rest = self.rest.get(taken.len..).unwrap_or_default();
+        if taken > 0 {
+            let len = taken * F::MAX_LEN;
+            self.ledger.frames(taken, len);
+            self.rest = self.rest.get(len..).unwrap_or_default();
         }
         folded
     }

@@ -1,6 +1,6 @@
 //! What a protocol defines so that its frames can be found.
 
-use super::{kernel::Kernel, ledger::Reason};
+use super::{batch::Rejected, ledger::Reason};
 
 /// Verdict on the front of a slice.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -34,14 +34,13 @@ pub enum Verdict {
 /// bytes before it:
 ///
 /// ```
-/// use axlewire::stream::{Decoder, Event, Frames, Framing, OneByOne, Reason, Verdict};
+/// use axlewire::stream::{Decoder, Event, Frames, Framing, Reason, Verdict};
 ///
 /// /// `7E | len | payload | sum`
 /// enum Sensor {}
 ///
 /// impl Framing for Sensor {
 ///     type Frame<'a> = &'a [u8]; // the payload
-///     type Batch = OneByOne;
 ///     const MIN_LEN: usize = 4;
 ///     const MAX_LEN: usize = 19;
 ///
@@ -90,9 +89,6 @@ pub trait Framing {
     /// The typed view of a frame, borrowed from the bytes it arrived in.
     type Frame<'a>;
 
-    /// How batches are judged on a host: [`OneByOne`] for every framing outside this crate.
-    type Batch: Batch;
-
     /// Length of the shortest frame, bytes; at least 1. A decoder that holds nothing waits for this
     /// many.
     const MIN_LEN: usize;
@@ -111,24 +107,29 @@ pub trait Framing {
     ///
     /// `None` for any other bytes, but never after a [`Verdict::Frame`].
     fn view(frame: &[u8]) -> Option<Self::Frame<'_>>;
+
+    /// Number of adjacent frames of the longest length at the front that are cheaper to judge
+    /// together than one by one. More may follow.
+    ///
+    /// Each is either a frame according to `judge` or refused by `view`:
+    /// [`Frames::each`](super::Frames::each) passes them on without judging them again, up to the
+    /// first without a view. Used on a host only; the framings of this crate have batches.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn accept_batch(bytes: &[u8]) -> usize {
+        let _ = bytes;
+        0
+    }
+
+    /// Rejects bytes at the front that are cheaper to reject together than one by one: `judge`
+    /// would reject each of them, for the same reasons.
+    ///
+    /// Called after a rejected byte, where rejected bytes are dense. Anything may follow the batch,
+    /// including more bytes to reject. Used on a host only.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn reject_batch(bytes: &[u8]) -> Rejected {
+        let _ = bytes;
+        Rejected::default()
+    }
 }
-
-/// How a [`Framing`] judges many bytes at once, where that is faster on a host.
-///
-/// It has no methods to implement: the framings of this crate have their own batches, and all
-/// others use [`OneByOne`].
-///
-/// ```compile_fail,E0624
-/// fn reject<B: axlewire::stream::Batch>(bytes: &[u8]) {
-///     B::reject_batch(bytes);
-/// }
-/// ```
-#[expect(private_bounds, reason = "only this crate implements it, and calls its methods")]
-pub trait Batch: Kernel {}
-
-/// No batches: byte after byte and frame after frame. The frames and gaps are the same.
-#[derive(Clone, Copy, Debug)]
-pub enum OneByOne {}
-
-impl Kernel for OneByOne {}
-impl Batch for OneByOne {}

@@ -22,6 +22,7 @@
 //!   `MAX_LEN` times; batches on a host add a bounded factor. Nothing allocates, nothing panics.
 
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
+mod batch;
 mod buffered;
 #[cfg(feature = "alloc")]
 mod capture;
@@ -31,13 +32,14 @@ mod event;
 mod fill;
 mod frames;
 mod framing;
-mod kernel;
 mod ledger;
-#[cfg(feature = "simd")]
-mod portable;
 mod search;
 mod split;
 
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
+pub(crate) use batch::Rejected;
+#[cfg(all(test, feature = "std", any(feature = "ikeya", feature = "ucp")))]
+pub(crate) use batch::tests::check_batches;
 #[cfg(feature = "alloc")]
 pub use capture::{Located, decode_capture};
 pub use decoder::Decoder;
@@ -46,14 +48,6 @@ pub(crate) use decoder::Held;
 pub use echo::Echo;
 pub use event::Event;
 pub use frames::Frames;
-pub use framing::{Batch, Framing, OneByOne, Verdict};
-#[cfg(feature = "ikeya")]
-pub(crate) use kernel::Accepted;
-#[cfg(all(test, feature = "std", any(feature = "ikeya", feature = "ucp")))]
-pub(crate) use kernel::tests::check_batches;
-#[cfg(any(feature = "ikeya", feature = "ucp"))]
-pub(crate) use kernel::{Kernel, Rejected};
+pub use framing::{Framing, Verdict};
 pub use ledger::{Counters, Gap, Reason};
-#[cfg(feature = "simd")]
-pub use portable::Portable;
 pub use split::{Parts, parts, split_point};

@@ -1,11 +1,11 @@
 //! The search for the next frame, and when to judge batches.
 
 use super::{
+    batch::Rejected,
     framing::{Framing, Verdict},
-    kernel::{Accepted, Kernel, Rejected},
     ledger::{Ledger, Reason},
 };
-use crate::machine::{self, IS_HOST};
+use crate::machine::IS_HOST;
 
 /// What stops the search: a verdict other than a rejection.
 #[derive(Clone, Copy, Debug)]
@@ -143,7 +143,7 @@ impl BackOff {
 #[cold]
 #[inline(never)]
 fn reject_batch<'b, F: Framing>(bytes: &'b [u8], ledger: &mut Ledger) -> &'b [u8] {
-    let Rejected { len, length, crc } = rejected::<F::Batch>(bytes);
+    let Rejected { len, length, crc } = F::reject_batch(bytes);
     let Some(behind) = bytes.get(len..) else { return bytes };
     ledger.refuse(Reason::Length, length);
     ledger.refuse(Reason::Crc, crc);
@@ -176,44 +176,20 @@ impl Looks {
         Self { due: usize::MAX, wait: 0 }
     }
 
-    /// The batch at the front of `rest`, if a look is due and finds one.
+    /// Number of frames of the longest length in the batch at the front of `rest`; 0 if no look is
+    /// due, or it finds none.
     #[inline(always)]
-    pub(super) fn accept_batch<F: Framing>(&mut self, rest: &[u8]) -> Option<Accepted> {
+    pub(super) fn accept_batch<F: Framing>(&mut self, rest: &[u8]) -> usize {
         if !IS_HOST || rest.len() > self.due {
-            return None;
+            return 0;
         }
-        let batch = accepted::<F::Batch>(rest);
-        let is_there = batch.frames > 0 && (1..=rest.len()).contains(&batch.len);
-        let behind = if is_there { rest.len() - batch.len } else { rest.len() };
-        self.wait = if is_there && batch.frames >= MANY {
+        let frames = F::accept_batch(rest).min(rest.len() / F::MAX_LEN);
+        self.wait = if frames >= MANY {
             self.wait / 4
         } else {
             (4 * self.wait).clamp(FIRST_WAIT, LONGEST_WAIT)
         };
-        self.due = behind.saturating_sub(self.wait);
-        is_there.then_some(batch)
+        self.due = (rest.len() - frames * F::MAX_LEN).saturating_sub(self.wait);
+        frames
     }
-}
-
-/// What a batch rejects, with feature `simd` compiled for AVX2 where the processor has it.
-// The closure calls the batch itself: through another closure it would not be compiled for AVX2.
-#[inline(always)]
-fn rejected<K: Kernel>(bytes: &[u8]) -> Rejected {
-    if K::USES_AVX2 {
-        if let Some(rejected) = machine::in_avx2(|| K::reject_batch(bytes)) {
-            return rejected;
-        }
-    }
-    K::reject_batch(bytes)
-}
-
-/// What a batch accepts, likewise.
-#[inline(always)]
-fn accepted<K: Kernel>(bytes: &[u8]) -> Accepted {
-    if K::USES_AVX2 {
-        if let Some(accepted) = machine::in_avx2(|| K::accept_batch(bytes, true)) {
-            return accepted;
-        }
-    }
-    K::accept_batch(bytes, false)
 }

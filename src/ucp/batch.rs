@@ -6,20 +6,7 @@
 use zerocopy::transmute;
 
 use super::header::{LEN_WITHOUT_BODY, SYNC};
-use crate::stream::{Batch, Kernel, Rejected};
-
-/// The batches of UCP: bytes without a sync and a length of 4..=`CAP`.
-#[derive(Clone, Copy, Debug)]
-pub enum SyncBatch<const CAP: usize> {}
-
-impl<const CAP: usize> Batch for SyncBatch<CAP> {}
-
-impl<const CAP: usize> Kernel for SyncBatch<CAP> {
-    #[inline(always)]
-    fn reject_batch(bytes: &[u8]) -> Rejected {
-        reject_batch::<CAP>(bytes)
-    }
-}
+use crate::stream::Rejected;
 
 /// Number of places judged together.
 const PLACES: usize = 32;
@@ -30,7 +17,7 @@ const BLOCK: usize = PLACES + 3;
 /// Counts the bytes at the front that start no frame. Ends before a length that a frame may have,
 /// or where less than a block is left.
 #[inline(always)]
-fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
+pub(super) fn reject_batch<const CAP: usize>(bytes: &[u8]) -> Rejected {
     let mut rejected = Rejected::default();
     while let Some(block) = bytes.get(rejected.len..).and_then(|rest| rest.first_chunk::<BLOCK>()) {
         let (mut syncs, mut starts) = ([0; PLACES], [0; PLACES]);
@@ -79,9 +66,9 @@ mod tests {
 
     use proptest::{collection::vec, prelude::*, sample::select};
 
-    use super::{SyncBatch, reject_batch};
+    use super::reject_batch;
     use crate::{
-        stream::{Kernel, check_batches},
+        stream::{Framing, check_batches},
         ucp::Ucp,
     };
 
@@ -113,7 +100,7 @@ mod tests {
     #[test]
     fn dense_syncs_are_rejected_up_to_their_last_places() {
         let dense = [0xFD, 0xFF].repeat(100);
-        let rejected = SyncBatch::<60>::reject_batch(&dense);
+        let rejected = Ucp::<60>::reject_batch(&dense);
         assert!((150..200).contains(&rejected.len), "{rejected:?}");
         assert_eq!(rejected, reject_batch::<60>(&dense));
         check_batches::<Ucp>(&dense);

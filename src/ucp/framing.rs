@@ -1,14 +1,14 @@
 //! Finds UCP frames in a byte stream.
 
 use super::{
-    batch::SyncBatch,
+    batch,
     frame::Frame,
     header::{LEN_WITHOUT_BODY, MAX_LEN, OUTSIDE_LEN, SYNC},
 };
 use crate::{
     crc16,
     machine::IS_HOST,
-    stream::{self, Framing, Reason, Verdict},
+    stream::{self, Framing, Reason, Rejected, Verdict},
 };
 
 /// Decoder with the default cap and the smallest buffer for it.
@@ -24,7 +24,6 @@ pub enum Ucp<const CAP: usize = 60> {}
 
 impl<const CAP: usize> Framing for Ucp<CAP> {
     type Frame<'a> = &'a Frame;
-    type Batch = SyncBatch<CAP>;
 
     const MIN_LEN: usize = LEN_WITHOUT_BODY + OUTSIDE_LEN;
     const MAX_LEN: usize = {
@@ -52,6 +51,11 @@ impl<const CAP: usize> Framing for Ucp<CAP> {
     #[inline]
     fn view(frame: &[u8]) -> Option<&Frame> {
         Frame::view(frame)
+    }
+
+    #[inline(always)]
+    fn reject_batch(bytes: &[u8]) -> Rejected {
+        batch::reject_batch::<CAP>(bytes)
     }
 }
 

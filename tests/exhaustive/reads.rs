@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use axlewire::{
     ikeya,
-    stream::{Decoder, Event, Portable},
+    stream::{Decoder, Event},
 };
 
 use super::*;
@@ -81,7 +81,7 @@ fn committed(strings: Range<u64>) -> Vec<[u8; 4]> {
     })
 }
 
-const WAYS: [(&str, Way); 12] = [
+const WAYS: [(&str, Way); 11] = [
     ("ReadRequest::parse", |strings| accepted(strings, |bytes| ReadRequest::parse(bytes).is_ok())),
     ("judge, ToSlave", judged::<ikeya::ToSlave>),
     ("judge, BothDirections", judged::<ikeya::BothDirections>),
@@ -89,7 +89,6 @@ const WAYS: [(&str, Way); 12] = [
     ("judge, three::BothDirections", judged::<three::BothDirections>),
     ("Frames", iterated::<ikeya::ToSlave>),
     ("Frames::each", each::<ikeya::ToSlave>),
-    ("Frames::each without SIMD", each::<Portable<ikeya::ToSlave>>),
     ("Decoder::decode, whole", decoded::<4>),
     ("Decoder::decode, byte by byte", decoded::<1>),
     ("Decoder::push", pushed),
@@ -166,7 +165,6 @@ where
 fn a_batch_accepts_a_read_only_if_it_is_legal() {
     let legal = [legal_reads()[3]];
     assert_eq!(accepted_in_a_run::<ikeya::ToSlave>(0xAA04_0000..0xAA04_8000), legal);
-    assert_eq!(accepted_in_a_run::<Portable<ikeya::ToSlave>>(0xAA04_0000..0xAA04_8000), legal);
 }
 
 /// Strings with another header are left out: `judge` has refused them above, and a batch judges no
@@ -174,14 +172,11 @@ fn a_batch_accepts_a_read_only_if_it_is_legal() {
 #[test]
 #[ignore = "takes a minute: see the top of main.rs"]
 fn of_all_strings_that_begin_like_a_read_a_batch_accepts_the_eight_legal_ones() {
-    for (name, way) in [
-        ("Frames::each in a run", accepted_in_a_run::<ikeya::ToSlave> as Way),
-        ("the same without SIMD", accepted_in_a_run::<Portable<ikeya::ToSlave>>),
-    ] {
-        let shifted = |part: Range<u64>| way(0xAA00_0000 + part.start..0xAA00_0000 + part.end);
-        let mut found = on_all_cores(1 << 24, shifted).concat();
-        found.sort_unstable();
-        assert_eq!(found, legal_reads(), "{name}");
-        println!("{name}: {} of 2^24", found.len());
-    }
+    let shifted = |part: Range<u64>| {
+        accepted_in_a_run::<ikeya::ToSlave>(0xAA00_0000 + part.start..0xAA00_0000 + part.end)
+    };
+    let mut found = on_all_cores(1 << 24, shifted).concat();
+    found.sort_unstable();
+    assert_eq!(found, legal_reads());
+    println!("Frames::each in a run: {} of 2^24", found.len());
 }

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use axlewire::stream::{Framing, OneByOne, Reason, Verdict};
+use axlewire::stream::{Framing, Reason, Verdict};
 
 use super::{
     checked_line::{CheckedLine, Op},
@@ -20,7 +20,6 @@ pub(crate) struct Counted<F>(F);
 
 impl<F: Known> Framing for Counted<F> {
     type Frame<'a> = F::Frame<'a>;
-    type Batch = OneByOne;
     const MIN_LEN: usize = F::MIN_LEN;
     const MAX_LEN: usize = F::MAX_LEN;
 

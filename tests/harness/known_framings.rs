@@ -2,7 +2,7 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{Framing, Portable},
+    stream::Framing,
     ucp,
 };
 
@@ -71,13 +71,5 @@ impl<const CAP: usize> Known for ucp::Ucp<CAP> {
 
     fn bytes<'a: 'a>(frame: &&'a ucp::Frame) -> &'a [u8] {
         frame.as_bytes()
-    }
-}
-
-impl<F: Known> Known for Portable<F> {
-    const RULES: Rules = F::RULES;
-
-    fn bytes<'a: 'a>(frame: &F::Frame<'a>) -> &'a [u8] {
-        F::bytes(frame)
     }
 }

@@ -1,7 +1,7 @@
 //! Foreign framings: one that breaks its contract hangs nothing, one that asks for more than it
 //! needs loses nothing.
 
-use axlewire::stream::{OneByOne, decode_capture};
+use axlewire::stream::decode_capture;
 
 use crate::rig::*;
 
@@ -10,7 +10,6 @@ struct Liar<const LIE: u8>;
 
 impl<const LIE: u8> Framing for Liar<LIE> {
     type Frame<'a> = &'a [u8];
-    type Batch = OneByOne;
     const MIN_LEN: usize = 1;
     const MAX_LEN: usize = 4;
 
@@ -139,7 +138,6 @@ struct Patient;
 
 impl Framing for Patient {
     type Frame<'a> = &'a [u8];
-    type Batch = OneByOne;
     const MIN_LEN: usize = 3;
     const MAX_LEN: usize = 8;
 

@@ -1,6 +1,7 @@
 //! The stream layer: against the slow oracle on hostile streams, and as single scenarios.
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "simd"))]
+#![cfg(all(feature = "ikeya", feature = "ucp"))]
 
+mod batches;
 mod buffer;
 #[path = "../harness/checked_line.rs"]
 mod checked_line;
@@ -25,7 +26,6 @@ mod properties;
 mod quiet_line;
 /// Packets for the scenarios, and a decoder's output for them.
 mod rig;
-mod simd;
 mod split;
 #[path = "../harness/traffic.rs"]
 #[allow(dead_code, reason = "each kind has a test here")]

@@ -146,7 +146,6 @@ fn a_framing_that_breaks_its_contract_only_moves_the_place() {
     enum Liar {}
     impl Framing for Liar {
         type Frame<'a> = &'a [u8];
-        type Batch = stream::OneByOne;
         const MIN_LEN: usize = 1;
         const MAX_LEN: usize = 4;
 

@@ -1,11 +1,11 @@
-//! Whole captures: long ones, with runs of good frames as SIMD likes them, decoded as a slice,
+//! Whole captures: long ones, with runs of good frames as batches like them, decoded as a slice,
 //! frame by frame, by `each`, in parts, and as a list of events; always against the oracle.
 //!
 //! The data is a plan of up to 64 pieces, four bytes each: what, how often, and two for a value.
 
 use axlewire::{
     ikeya::{self, three},
-    stream::{self, Frames, Portable},
+    stream::{self, Frames},
     ucp,
 };
 
@@ -44,9 +44,7 @@ fn check<F: Known>(kind: u8, plan: &[u8], repair: Repair, tally: &mut Tally) {
     }
     repair.repair::<F>(&mut stream);
     check_slice::<F>(&stream);
-    check_slice::<Portable<F>>(&stream);
     check_finished_slice::<F>(&stream);
-    check_finished_slice::<Portable<F>>(&stream);
     check_idle_between::<F>(&stream);
     let told = oracle::answer(F::RULES, &stream, &[]);
     check_parts::<F>(&stream, &told);

@@ -1,6 +1,6 @@
 //! Both forms of the CRC against one that is computed bit by bit: 64-bit words, which a host uses,
-//! and 32-bit words, for microcontrollers and for SIMD lanes. The latter is compiled in from the
-//! library's own file, because no build for a host calls it.
+//! and 32-bit words, for microcontrollers and for the lanes of a host. The latter is compiled in
+//! from the library's own file, because no build for a host calls it.
 
 #[path = "../../../src/crc16/narrow.rs"]
 #[allow(dead_code, clippy::all, reason = "a part of the library, checked there")]

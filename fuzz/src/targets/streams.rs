@@ -9,7 +9,6 @@
 
 use axlewire::{
     ikeya::{self, three},
-    stream::Portable,
     ucp,
 };
 
@@ -86,8 +85,7 @@ impl<'a> Script<'a> {
         CheckedLine::<F, N>::new().play(&stream, &self.ops);
         check_work::<F, N>(&stream, &self.ops);
         checked_line::check_slice::<F>(&stream);
-        checked_line::check_slice::<Portable<F>>(&stream);
-        // Feature `simd` works on blocks of 128 bytes: more than most inputs have.
+        // Batches are blocks of up to 128 bytes: more than most inputs have.
         checked_line::check_slice::<F>(&stream.repeat(1 + 256 / (stream.len() + 1)));
         let frames = oracle::answer(F::RULES, &stream, &[]).frames().len();
         tally.did_many(self.choice % kinds, frames);

@@ -3,42 +3,8 @@
 mod accept;
 mod reject;
 
-use super::wire::{VelocityResponse, header::READ};
-use crate::stream::{Accepted, Batch, Kernel, Rejected};
-
-/// The batches of one framing: `LONG` is the length of everything but a READ, the others are the
-/// directions that it finds.
-#[derive(Clone, Copy, Debug)]
-pub enum PacketBatch<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool> {}
-
-impl<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool> Batch
-    for PacketBatch<LONG, TO_SLAVE, TO_MASTER>
-{
-}
-
-impl<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool> Kernel
-    for PacketBatch<LONG, TO_SLAVE, TO_MASTER>
-{
-    #[inline(always)]
-    fn reject_batch(bytes: &[u8]) -> Rejected {
-        reject::reject_batch::<LONG, TO_SLAVE, TO_MASTER>(bytes)
-    }
-
-    /// Nothing for a three-motor bus: its captures are small.
-    #[inline(always)]
-    fn accept_batch(bytes: &[u8], is_wide: bool) -> Accepted {
-        if LONG == VelocityResponse::LEN {
-            accept::accept_batch::<TO_SLAVE, TO_MASTER>(bytes, is_wide)
-        } else {
-            Accepted::default()
-        }
-    }
-
-    #[inline(always)]
-    fn is_short(bytes: &[u8]) -> bool {
-        bytes.first() == Some(&READ)
-    }
-}
+pub(super) use accept::accept_batch;
+pub(super) use reject::reject_batch;
 
 #[cfg(all(test, feature = "std"))]
 mod tests {
@@ -49,7 +15,7 @@ mod tests {
     use crate::{
         crc16::{self, TRINOMIAL},
         ikeya::{BothDirections, ToMaster, ToSlave, three},
-        stream::{Framing, Kernel, check_batches},
+        stream::{Framing, check_batches},
     };
 
     const HEADERS: [u8; 4] = [0xAA, 0xBB, 0x55, 0x56];
@@ -102,7 +68,7 @@ mod tests {
     #[test]
     fn dense_headers_are_rejected_up_to_their_last_places() {
         fn check_end<F: Framing>(bytes: &[u8]) {
-            let rejected = F::Batch::reject_batch(bytes).len;
+            let rejected = F::reject_batch(bytes).len;
             assert!((150..200).contains(&rejected), "{rejected}");
             check_batches::<F>(bytes);
         }
@@ -124,21 +90,8 @@ mod tests {
     #[test]
     fn a_run_of_good_packets_is_accepted() {
         let answer = [0x55, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x54, 0x0E].repeat(20);
-        let batch = <ToMaster as Framing>::Batch::accept_batch(&answer, false);
-        assert!(batch.frames >= 14, "{batch:?}");
-        assert_eq!(batch.len, 8 * batch.frames);
-        let exchange = [0xAA, 0x01, 0xBE, 0xD0, 0xBB, 0x02, 0x00, 0x00, 0x80, 0x3F, 0x43, 0x40];
-        let batch = <ToSlave as Framing>::Batch::accept_batch(&exchange.repeat(20), true);
-        assert!(batch.frames >= 14, "{batch:?}");
-        // A READ of 4 bytes, and a WRITE of 8.
-        assert_eq!(batch.len, batch.frames / 2 * 12 + batch.frames % 2 * 4);
-        let answer = |header| {
-            let body = [header, 0x02, 0, 0, 0, 0];
-            [&body[..], &crc16::compute(&body).to_le_bytes()].concat()
-        };
-        let poll = [&exchange[..4], &answer(0x55), &exchange[..4], &answer(0x56)].concat();
-        let batch = <BothDirections as Framing>::Batch::accept_batch(&poll.repeat(20), true);
-        assert!(batch.frames >= 14, "{batch:?}");
-        assert_eq!(batch.len, batch.frames / 2 * 12 + batch.frames % 2 * 4);
+        assert!(ToMaster::accept_batch(&answer) >= 14);
+        assert!(BothDirections::accept_batch(&answer) >= 14);
+        assert_eq!(three::ToMaster::accept_batch(&answer), 0);
     }
 }

@@ -165,7 +165,7 @@ impl<F: Known, const N: usize> Life<F, N> {
                     false => Some(self.writer.flush()),
                 };
                 if done == Some(Ok(())) {
-                    assert_eq!(self.writer.unsent(), []);
+                    assert!(self.writer.unsent().is_empty());
                     let port = self.writer.port_mut();
                     assert_eq!(port.flushed_bytes, port.written.len());
                 }
