@@ -6,6 +6,7 @@
 //! differences, so even the 64-bit wrap is harmless.
 
 use core::{
+    cell::Cell,
     cmp::Ordering,
     ops::{Add, AddAssign, Sub},
 };
@@ -34,6 +35,12 @@ impl Duration {
         Self { micros: millis.saturating_mul(1000) }
     }
 
+    /// A span in seconds. More than 4294 s saturate to 71 minutes.
+    #[must_use]
+    pub const fn from_secs(secs: u32) -> Self {
+        Self { micros: secs.saturating_mul(1_000_000) }
+    }
+
     /// The span in microseconds.
     #[must_use]
     pub const fn as_micros(self) -> u32 {
@@ -58,6 +65,21 @@ impl Add for Duration {
 
     fn add(self, other: Self) -> Self {
         self.saturating_add(other)
+    }
+}
+
+impl From<Duration> for core::time::Duration {
+    fn from(span: Duration) -> Self {
+        Self::from_micros(span.micros.into())
+    }
+}
+
+/// Fractions of a microsecond are cut off; more than 71 minutes are an error.
+impl TryFrom<core::time::Duration> for Duration {
+    type Error = core::num::TryFromIntError;
+
+    fn try_from(span: core::time::Duration) -> Result<Self, Self::Error> {
+        span.as_micros().try_into().map(Self::from_micros)
     }
 }
 
@@ -149,30 +171,30 @@ impl Sub for Instant {
 /// ```
 /// use axlewire::time::Wrapping32;
 ///
-/// let mut clock = Wrapping32::new();
+/// let clock = Wrapping32::new();
 /// let before = clock.at(0xFFFF_FFF0);
 /// let after = clock.at(0x0000_0010); // the counter has wrapped
 /// assert_eq!((after - before).as_micros(), 0x20);
 /// ```
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[derive(Clone, Debug, Default)]
 pub struct Wrapping32 {
-    last: u64,
+    last: Cell<u64>,
 }
 
 impl Wrapping32 {
     /// Starts in the first cycle of the counter.
     #[must_use]
     pub const fn new() -> Self {
-        Self { last: 0 }
+        Self { last: Cell::new(0) }
     }
 
     /// The time at this reading of the counter. Pass readings in order, at least one every 71
     /// minutes.
-    pub fn at(&mut self, counter: u32) -> Instant {
-        let elapsed = counter.wrapping_sub(self.last as u32);
-        self.last = self.last.wrapping_add(elapsed.into());
-        Instant::from_micros(self.last)
+    pub fn at(&self, counter: u32) -> Instant {
+        let last = self.last.get();
+        let elapsed = counter.wrapping_sub(last as u32);
+        self.last.set(last.wrapping_add(elapsed.into()));
+        Instant::from_micros(self.last.get())
     }
 }
 

@@ -11,7 +11,7 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL, read_time},
+    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL},
     error::DriveError,
 };
 use crate::{
@@ -237,9 +237,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Asks the port to take the unsent bytes; `None` if it does not within this time, or if they
     /// have become wrong meanwhile: then none of them has left.
     async fn write_async(&mut self, wait_us: u32) -> Option<Result<usize, P::Error>> {
-        let Self { role, port, clock, latest, ahead_us, sending, ends_at, .. } = self;
+        let Self { role, port, clock, time, sending, ends_at, .. } = self;
         let mut writing = pin!(port.write(sending.rest()));
-        let (begin, mut now, mut written) = (*latest, *latest, None);
+        let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
         loop {
             let left_us = wait_us.saturating_sub((now - begin).as_micros());
             if left_us == 0 {
@@ -253,7 +253,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if first(clock.delay_us(nap_us), taking).await.is_none() {
                 return written;
             }
-            now = read_time(clock, latest, ahead_us);
+            now = time.read(clock);
             role.handle_input(&[], now);
             if role.is_outdated() || reached(*ends_at, now) {
                 return None;

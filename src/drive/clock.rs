@@ -1,5 +1,7 @@
 //! The time source of a driver.
 
+use core::cell::Cell;
+
 use crate::time::Instant;
 
 /// A microsecond clock that does not go backwards.
@@ -11,7 +13,7 @@ use crate::time::Instant;
 /// [`Wrapping32`](crate::time::Wrapping32).
 pub trait Clock {
     /// The current time.
-    fn now(&mut self) -> Instant;
+    fn now(&self) -> Instant;
 
     /// Idles until `until`, or for a part of that time: the caller checks for received bytes when
     /// this returns. Return in time: if the driver of a slave or a robot is late, the bytes that it
@@ -25,9 +27,48 @@ pub trait Clock {
     }
 }
 
-impl<F: FnMut() -> Instant> Clock for F {
-    fn now(&mut self) -> Instant {
+impl<F: Fn() -> Instant> Clock for F {
+    fn now(&self) -> Instant {
         self()
+    }
+}
+
+/// The time given to a role: that of a clock, but if the clock goes backwards, this continues from
+/// where it was. One wrong reading must not stop a role.
+#[derive(Clone, Debug)]
+pub(super) struct SteadyTime {
+    latest: Cell<Instant>,
+    /// Lead over the clock, microseconds: the sum of all its backward steps.
+    ahead_us: Cell<u64>,
+}
+
+impl SteadyTime {
+    pub(super) const fn new(latest: Instant) -> Self {
+        Self { latest: Cell::new(latest), ahead_us: Cell::new(0) }
+    }
+
+    /// The time now.
+    pub(super) fn read(&self, clock: &impl Clock) -> Instant {
+        let reading = clock.now().as_micros();
+        let (now, latest) =
+            (Instant::from_micros(reading.wrapping_add(self.ahead_us.get())), self.latest());
+        if now < latest {
+            self.ahead_us.set(latest.as_micros().wrapping_sub(reading));
+            return latest;
+        }
+        self.latest.set(now);
+        now
+    }
+
+    /// The latest time that was read.
+    pub(super) const fn latest(&self) -> Instant {
+        self.latest.get()
+    }
+
+    /// The same moment on the clock.
+    #[cfg(feature = "embedded-io")]
+    pub(super) fn on_clock(&self, at: Instant) -> Instant {
+        Instant::from_micros(at.as_micros().wrapping_sub(self.ahead_us.get()))
     }
 }
 
@@ -63,7 +104,7 @@ impl Default for StdClock {
 
 #[cfg(feature = "std")]
 impl Clock for StdClock {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         Instant::from_micros(self.zero.elapsed().as_micros() as u64)
     }
 
@@ -90,7 +131,7 @@ pub struct WithDelay<C, D> {
 
 #[cfg(feature = "embedded-io-async")]
 impl<C: Clock, D> Clock for WithDelay<C, D> {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         self.clock.now()
     }
 

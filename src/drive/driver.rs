@@ -1,7 +1,7 @@
 //! The driver itself: a role, a port and a clock, and the steps of one round.
 
 use super::{
-    clock::Clock,
+    clock::{Clock, SteadyTime},
     error::DriveError,
     sending::{FRAME_LEN, Sending},
 };
@@ -61,11 +61,7 @@ pub struct Driver<R, P, C> {
     pub(super) role: R,
     pub(super) port: P,
     pub(super) clock: C,
-    /// The latest time given to the role.
-    pub(super) latest: Instant,
-    /// Lead of the role's time over the clock, microseconds: the sum of all backward steps of the
-    /// clock.
-    pub(super) ahead_us: u64,
+    pub(super) time: SteadyTime,
     /// When the port was last checked for received bytes.
     pub(super) looked_at: Instant,
     /// When it was last seen empty: all received bytes have arrived since.
@@ -81,22 +77,6 @@ pub struct Driver<R, P, C> {
     /// When the call that is running ends, if its command must not be sent after that.
     pub(super) ends_at: Option<Instant>,
     pub(super) sending: Sending,
-}
-
-/// The time to give to a role; see [`Driver::now`].
-pub(super) fn read_time(
-    clock: &mut impl Clock,
-    latest: &mut Instant,
-    ahead_us: &mut u64,
-) -> Instant {
-    let reading = clock.now().as_micros();
-    let now = Instant::from_micros(reading.wrapping_add(*ahead_us));
-    if now < *latest {
-        *ahead_us = latest.as_micros().wrapping_sub(reading);
-    } else {
-        *latest = now;
-    }
-    *latest
 }
 
 /// How often the port of a role that acts on commands must be read, see
@@ -118,13 +98,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     ///
     /// A master takes nothing that is in the port already for an answer, and a host no report for
     /// one from after a stop.
-    pub fn new(role: R, port: P, mut clock: C) -> Self {
+    pub fn new(role: R, port: P, clock: C) -> Self {
         let latest = clock.now();
         Self::starting_at(latest, role, port, clock)
     }
 
     /// The same, with a role made here, at the time of this clock.
-    pub fn with(role: impl FnOnce(Instant) -> R, port: P, mut clock: C) -> Self {
+    pub fn with(role: impl FnOnce(Instant) -> R, port: P, clock: C) -> Self {
         let latest = clock.now();
         Self::starting_at(latest, role(latest), port, clock)
     }
@@ -139,8 +119,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             role,
             port,
             clock,
-            latest,
-            ahead_us: 0,
+            time: SteadyTime::new(latest),
             looked_at: latest,
             empty_at,
             unsure_since: Some(latest),
@@ -154,8 +133,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// The time given to the role. If the clock goes backwards, the role's time continues from
     /// where it was: one wrong reading must not stop it.
-    pub fn now(&mut self) -> Instant {
-        read_time(&mut self.clock, &mut self.latest, &mut self.ahead_us)
+    pub fn now(&self) -> Instant {
+        self.time.read(&self.clock)
+    }
+
+    /// The latest time given to the role.
+    pub(super) const fn latest(&self) -> Instant {
+        self.time.latest()
     }
 
     /// The role.
@@ -220,7 +204,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let look_at = look_period(&self.role).map(|period| self.looked_at + period);
-        let retry_at = self.is_pending().then(|| self.latest + ERROR_NAP);
+        let retry_at = self.is_pending().then(|| self.latest() + ERROR_NAP);
         earliest(&[self.role.poll_timeout(), look_at, retry_at])
     }
 
@@ -241,8 +225,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.sending.flush_failed();
         self.tell_unsent(Some(Unsent::Unflushed));
         self.sending.ask_flush();
-        self.empty_at = long_before(self.latest);
-        (self.unsure_since, self.has_overtaken) = (Some(self.latest), true);
+        self.empty_at = long_before(self.latest());
+        (self.unsure_since, self.has_overtaken) = (Some(self.latest()), true);
         discarded
     }
 
@@ -294,14 +278,14 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Notes that the port is checked for received bytes now, or a little later.
     pub(super) fn look(&mut self) {
-        self.looked_at = self.latest;
-        self.unsure_since.get_or_insert(self.latest);
+        self.looked_at = self.latest();
+        self.unsure_since.get_or_insert(self.latest());
     }
 
     /// Notes that the port was empty at `latest` or a little later. A short read does not show
     /// that: a ring buffer returns only the bytes up to its end.
     pub(super) fn saw_empty(&mut self) {
-        self.empty_at = self.latest;
+        self.empty_at = self.latest();
         (self.unsure_since, self.has_overtaken) = (None, false);
     }
 
@@ -448,7 +432,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// The same moment on the user's clock.
     #[cfg(feature = "embedded-io")]
     pub(super) fn on_clock(&self, at: Instant) -> Instant {
-        Instant::from_micros(at.as_micros().wrapping_sub(self.ahead_us))
+        self.time.on_clock(at)
     }
 
     /// When to look at the role again, `deadline` at the latest.

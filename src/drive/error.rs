@@ -2,6 +2,8 @@
 
 use core::{error::Error, fmt};
 
+use crate::error::EncodeError;
+
 #[cfg(feature = "ikeya")]
 use crate::ikeya;
 #[cfg(feature = "ucp")]
@@ -33,6 +35,9 @@ pub enum DriveError<E> {
     },
     /// The operation timed out.
     Timeout(Operation),
+    /// A value that no frame can have, such as a speed out of range: nothing was sent. Returned by
+    /// no call; it converts, so that `?` works where the values are made.
+    Value(EncodeError),
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
     Bus(ikeya::master::CommandError),
@@ -109,6 +114,7 @@ impl<E: fmt::Display> fmt::Display for DriveError<E> {
                 write!(f, "frame of {length} bytes is longer than {limit}")
             }
             Self::Timeout(operation) => operation.fmt(f),
+            Self::Value(error) => error.fmt(f),
             #[cfg(feature = "ikeya")]
             Self::Bus(error) => error.fmt(f),
             #[cfg(feature = "ikeya")]
@@ -182,12 +188,19 @@ impl<E: Error + 'static> Error for DriveError<E> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             Self::Port(error) => Some(error),
+            Self::Value(error) => Some(error),
             #[cfg(feature = "ikeya")]
             Self::Bus(error) => Some(error),
             #[cfg(feature = "ucp")]
             Self::Rover(error) => Some(error),
             _ => None,
         }
+    }
+}
+
+impl<E> From<EncodeError> for DriveError<E> {
+    fn from(error: EncodeError) -> Self {
+        Self::Value(error)
     }
 }
 

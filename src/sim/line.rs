@@ -99,7 +99,7 @@ impl Error for Stuck {}
 /// use axlewire::time::{Duration, Instant};
 ///
 /// let start = Instant::from_micros(0);
-/// let mut master: Master = Master::new(MasterConfig::direct(), start);
+/// let mut master = Master::new(MasterConfig::direct(), start);
 /// master.discover(start);
 /// let mut line = Line::new(500_000, 1, master);
 /// line.add(MotorNode::new(NodeId::N3, Mode::Velocity));

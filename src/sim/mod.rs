@@ -17,7 +17,7 @@
 //! use axlewire::time::{Duration, Instant};
 //!
 //! let start = Instant::from_micros(0); // a line begins at 0
-//! let mut master: Master = Master::new(MasterConfig::direct(), start);
+//! let mut master = Master::new(MasterConfig::direct(), start);
 //! master.discover(start);
 //! let mut line = Line::new(500_000, 42, master);
 //! for node in [NodeId::N1, NodeId::N2] {

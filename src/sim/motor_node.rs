@@ -148,7 +148,7 @@ impl MotorNode<ThreeMotors> {
     /// The same with three motors on the board.
     #[must_use]
     pub fn three_motors(node: NodeId, mode: Mode) -> Self {
-        let slave = Slave::new(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
+        let slave = Slave::for_board(node, mode, SlaveConfig::direct(), Instant::from_micros(0));
         Self::from_parts(slave, [Motor::new(), Motor::new(), Motor::new()])
     }
 }

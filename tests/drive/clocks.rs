@@ -8,8 +8,7 @@ use crate::rig::*;
 
 #[test]
 fn role_time_continues_after_a_clock_goes_backwards() {
-    let mut readings = [100, 50, 70, 120].into_iter().cycle();
-    let clock = move || Instant::from_micros(readings.next().unwrap());
+    let clock = clock_that_says([100, 50, 70, 120].into_iter().cycle());
     let flood = (0..100).map(|_| bytes(1));
     // The recorder itself asserts that time never goes backwards.
     let mut driver = Driver::new(Recorder::default(), Port::reading(flood), clock);
@@ -18,9 +17,8 @@ fn role_time_continues_after_a_clock_goes_backwards() {
 
     // One reading is an hour ahead: the steps before and after it still count.
     let hour = 3_600_000_000;
-    let mut readings = [1000, hour + 1000, 1500, 2500, 2400, 2700].into_iter();
-    let clock = move || Instant::from_micros(readings.next().unwrap());
-    let mut driver = Driver::new(Recorder::default(), Port::default(), clock);
+    let clock = clock_that_says([1000, hour + 1000, 1500, 2500, 2400, 2700]);
+    let driver = Driver::new(Recorder::default(), Port::default(), clock);
     let times: Vec<u64> = (0..5).map(|_| driver.now().as_micros() - hour).collect();
     assert_eq!(times, [1000, 1000, 2000, 2000, 2300]);
 }
@@ -30,7 +28,7 @@ fn a_clock_and_a_delay_can_be_combined() {
     let said = RefCell::new(vec![]);
     struct Says<'a>(&'a RefCell<Vec<String>>);
     impl Clock for Says<'_> {
-        fn now(&mut self) -> Instant {
+        fn now(&self) -> Instant {
             at_ms(7)
         }
         fn idle_until(&mut self, until: Instant) {

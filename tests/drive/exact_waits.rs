@@ -183,7 +183,7 @@ fn an_async_call_delays_for_a_second_at_most_and_asks_its_clock_in_between() {
 struct SetBack(Rc<RefCell<(Vec<u64>, Vec<u64>)>>);
 
 impl Clock for SetBack {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         let mut parts = self.0.borrow_mut();
         let reading = if parts.0.len() > 1 { parts.0.remove(0) } else { parts.0[0] };
         Instant::from_micros(reading)
@@ -212,7 +212,7 @@ fn a_driver_whose_clock_was_set_back_idles_until_the_deadline_on_that_clock() {
 fn a_stop_behind_a_failing_port_naps_for_a_millisecond_on_a_clock_that_was_set_back() {
     let clock = SetBack::default();
     clock.0.borrow_mut().0 = vec![1000, 500];
-    let master = <Master>::new(MasterConfig::direct(), Instant::from_micros(0));
+    let master = Master::new(MasterConfig::direct(), Instant::from_micros(0));
     let mut bus = Driver::new(master, Port::writing([Step::Error]), clock.clone());
     let _ = bus.stop(NodeId::N1);
     // The clock stays at 500; the time of the role goes on from 1000.

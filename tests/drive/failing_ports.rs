@@ -276,7 +276,7 @@ fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
         let (world, pin) = (World::default(), Pin::default());
         let (mut port, mut far) = Port::pair(&world, 20);
         port.is_deafened = true;
-        let slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
+        let slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
         let port = Rs485::new(port, pin.clone()).unwrap();
         let mut node = Driver::new(slave, port, world.clone());
         let read = ReadRequest::new(NodeId::N2);

@@ -8,7 +8,7 @@ fn a_driver_gives_back_its_role_its_port_and_its_clock() {
     let clock = || Instant::from_micros(7);
     let mut driver = Driver::new(Recorder::default(), Port::reading([bytes(3)]), clock);
     driver.service().unwrap();
-    let (role, mut port, mut clock) = driver.into_parts();
+    let (role, mut port, clock) = driver.into_parts();
     assert_eq!(role.received.len(), 3);
     assert!(!embedded_io::ReadReady::read_ready(&mut port).unwrap(), "it has been read");
     assert_eq!(clock.now(), Instant::from_micros(7));
@@ -28,11 +28,7 @@ fn a_port_with_a_driver_enable_pin_gives_back_its_parts_with_the_pin_as_it_is() 
 
 #[test]
 fn a_closure_as_a_clock_does_not_idle() {
-    let mut calls = 0;
-    let mut clock = || {
-        calls += 1;
-        Instant::from_micros(calls)
-    };
+    let mut clock = clock_that_says(1..);
     clock.idle_until(Instant::from_micros(u64::MAX));
     assert_eq!(clock.now(), Instant::from_micros(1));
 }

@@ -149,7 +149,7 @@ fn a_slave_whose_call_ends_while_its_answer_leaves_returns_with_its_pin_off() {
     let world = World::default();
     let (near, mut far) = Port::pair(&world, 20);
     let (port, _log, _pin) = undelayed(Port { drains: true, ..near });
-    let role: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
+    let role = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
     let mut slave = Driver::new(role, port, world.clone());
     embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
     // The request takes 80 us, the answer 160 us.

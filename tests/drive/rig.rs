@@ -12,6 +12,12 @@ pub(crate) use axlewire::ucp::{
     message::CalibrationKind,
     robot::{RobotConfig, RobotEvent},
 };
+/// A clock with these readings, microseconds.
+pub(crate) fn clock_that_says(readings: impl IntoIterator<Item = u64>) -> impl Fn() -> Instant {
+    let readings = RefCell::new(readings.into_iter());
+    move || Instant::from_micros(readings.borrow_mut().next().unwrap())
+}
+
 /// What the scenarios use of the library, and their port.
 pub(crate) use axlewire::{
     drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay},

@@ -136,7 +136,7 @@ fn a_thread_that_wakes_late_does_not_repeat_a_command_behind_the_end_of_its_call
     /// Its first idling takes half a second longer.
     struct WakesLate(World, std::rc::Rc<std::cell::Cell<u64>>);
     impl Clock for WakesLate {
-        fn now(&mut self) -> Instant {
+        fn now(&self) -> Instant {
             World::now(&self.0)
         }
         fn idle_until(&mut self, until: Instant) {

@@ -13,7 +13,7 @@ fn two_wires(change: impl FnOnce(&mut Port)) -> (World, Driver<Master, WithoutEc
     let mut far = Port::new(&world, 20);
     far.join(&mut near);
     change(&mut near);
-    let slave = <Slave>::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
+    let slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
     let slave = run(slave, far);
     let clock = world.clone();
     world.add(move || {

@@ -44,14 +44,13 @@ fn one_wrong_reading_of_the_clock_does_not_make_a_call_idle_longer() {
 
 #[test]
 fn a_driver_and_its_role_begin_at_the_same_reading_of_the_clock() {
-    let mut readings = [5_000_000, 3].into_iter();
-    let clock = move || Instant::from_micros(readings.next().unwrap());
+    let clock = clock_that_says([5_000_000, 3]);
     let mut begun = None;
     let make = |now| {
         begun = Some(now);
         Recorder::default()
     };
     // The clock has gone back when it is read next.
-    let mut driver = Driver::with(make, Port::default(), clock);
+    let driver = Driver::with(make, Port::default(), clock);
     assert_eq!((begun, driver.now()), (Some(at_ms(5000)), at_ms(5000)));
 }

@@ -192,7 +192,7 @@ pub(crate) struct WireClock {
 }
 
 impl drive::Clock for WireClock {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         Instant::from_micros(self.zero.elapsed().as_micros() as u64)
     }
 

@@ -202,7 +202,7 @@ impl World {
 }
 
 impl Clock for World {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         self.count_call();
         let now_us = self.now_us() + self.0.reading_us.get();
         self.0.now_us.set(now_us);

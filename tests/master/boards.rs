@@ -25,7 +25,7 @@ impl Boards {
     /// The master has discovered them.
     pub(crate) fn new(config: MasterConfig, modes: [Mode; 8], answer_us: u32) -> Self {
         let mut boards = Self {
-            master: Master::new(config, T0),
+            master: Master::for_board(config, T0),
             now: T0,
             modes,
             speeds: [0.0; 3],

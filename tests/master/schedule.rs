@@ -42,8 +42,8 @@ fn the_bounds_of_a_master_follow_from_its_settings() {
         let mut config = direct();
         (config.turnaround_gap, config.late_guard) = (US(gap_us), US(guard_us));
         config.attempts = attempts;
-        let (now, three) = (Desk::new(config).now, Master::<ThreeMotors>::new);
-        let (one, three) = (<Master>::new(config, now), three(config, now));
+        let (now, three) = (Desk::new(config).now, Master::<ThreeMotors>::for_board);
+        let (one, three) = (Master::new(config, now), three(config, now));
         [one.read_bound(), one.stop_bound(), three.read_bound(), three.stop_bound()]
     };
     // The time of a WRITE, the longest of both kinds, and of an exchange: of a WRITE, a READ, 500

@@ -85,7 +85,7 @@ fn all_three_positions_have_to_stay_within_8_counts() {
         ([0, 0, 9], false),
         ([9, -9, 0], false),
     ] {
-        let mut master: Master<ThreeMotors> = Master::new(manual(), T0);
+        let mut master = Master::<ThreeMotors>::for_board(manual(), T0);
         let mut now = T0;
         let mut answer = |master: &mut Master<ThreeMotors>, pause_ms, places: [i32; 3]| {
             now += MS(pause_ms);
@@ -97,7 +97,7 @@ fn all_three_positions_have_to_stay_within_8_counts() {
         };
         let mut config = *master.config();
         config.reply_timeout = MS(30);
-        master = Master::new(config, T0);
+        master = Master::for_board(config, T0);
         master.stop(NodeId::N1, T0);
         let steps = [(READ, 0, [0; 3]), (WRITE, 0, [0; 3]), (WRITE, 25, moved), (WRITE, 25, moved)];
         for (expected, pause_ms, places) in steps {

@@ -74,7 +74,7 @@ impl<B: Kit> Bus<B> {
         config.coast = COAST;
         let motor = |&mode| Motor { mode, is_told_to_stop: true, count: 100 };
         Self {
-            master: Master::new(config, now),
+            master: Master::for_board(config, now),
             now,
             motors: modes.iter().map(motor).collect(),
             accounts: vec![Account::default(); modes.len()],

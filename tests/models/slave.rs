@@ -74,7 +74,7 @@ impl<B: Kit> SlaveLine<B> {
         let mut config = SlaveConfig::direct();
         (config.two_wire, config.watchdog) = (two_wire, Some(WATCHDOG));
         let now = Instant::from_micros(1_000_000);
-        let mut slave = Slave::new(NodeId::N1, mode, config, Instant::from_micros(0));
+        let mut slave = Slave::for_board(NodeId::N1, mode, config, Instant::from_micros(0));
         slave.set_position(B::place(Position::new(1, 1)));
         Self {
             slave,

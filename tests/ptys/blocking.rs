@@ -28,7 +28,7 @@ fn a_master_turns_a_motor_and_stops_it() {
     let port = SerialPort::open(&motor.path, BAUD).unwrap();
     assert!(port.is_pseudo_terminal());
     let turned = in_time(move || {
-        let mut bus = Driver::with(|now| <Master>::new(patient(), now), port, StdClock::new());
+        let mut bus = Driver::with(|now| Master::new(patient(), now), port, StdClock::new());
         assert_eq!(bus.discover()?[..], [(NodeId::N1, Mode::Velocity)]);
         let speed = Rps::new(2.0).unwrap();
         bus.drive_for(NodeId::N1, speed, time::Duration::from_millis(100))?;
@@ -119,7 +119,7 @@ fn a_driver_whose_port_is_unplugged_says_so_and_does_not_wait() {
     let (port, far, _held) = line();
     let error = in_time(move || {
         let mut bus = Driver::with(
-            |now| <Master>::new(MasterConfig::usb_adapter(), now),
+            |now| Master::new(MasterConfig::usb_adapter(), now),
             port,
             StdClock::new(),
         );

@@ -148,8 +148,8 @@ fn an_unplugged_node_is_abnormal_after_three_strikes_and_comes_back() {
 fn a_node_without_commands_stops_after_its_watchdog() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let slave: Slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
-    let master: Master = Master::new(MasterConfig::direct(), at(0));
+    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, Instant::from_micros(0));
+    let master = Master::new(MasterConfig::direct(), at(0));
     let mut line = Line::new(500_000, 0, master);
     line.add(MotorNode::from_parts(slave, Motor::new()));
     let now = line.now();
@@ -167,7 +167,7 @@ fn a_node_without_commands_stops_after_its_watchdog() {
 #[test]
 fn the_three_motors_of_a_board_turn_go_and_stop_independently() {
     let (config, nodes) = (MasterConfig::direct(), [NodeId::N1, NodeId::N2]);
-    let master: Master<ThreeMotors> = Master::new(config, at(0));
+    let master = Master::<ThreeMotors>::for_board(config, at(0));
     let mut line = Line::new(config.baud, 1, master);
     for node in nodes {
         line.add(MotorNode::three_motors(node, mode_of(node)));

@@ -163,7 +163,7 @@ fn a_command_that_waited_longer_than_the_watchdog_moves_no_simulated_motor() {
     config.watchdog = Some(MS(100));
     let turn = WriteRequest::velocity(NodeId::N1, Rps::new(2.0).unwrap());
     for (since, is_moved) in [(1, false), (950, true)] {
-        let slave = <Slave>::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
+        let slave = Slave::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
         let mut node = MotorNode::from_parts(slave, Motor::new());
         node.handle_old_input(turn.as_bytes(), at_ms(since), at_ms(1000));
         node.handle_timeout(at_ms(1020));
@@ -208,7 +208,7 @@ fn the_answer_of_a_motor_node_is_how_its_motor_moves() {
 fn a_motor_node_wants_to_be_called_when_its_watchdog_is_due() {
     let mut config = SlaveConfig::default();
     config.watchdog = Some(MS(100));
-    let slave = <Slave>::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
+    let slave = Slave::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
     let mut node = MotorNode::from_parts(slave, Motor::new());
     let turn = WriteRequest::velocity(NodeId::N1, Rps::new(2.0).unwrap());
     node.handle_input(turn.as_bytes(), at_ms(1));

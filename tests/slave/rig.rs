@@ -3,7 +3,7 @@ pub(crate) use axlewire::{
     endpoint::{Endpoint, Unsent},
     ikeya::{
         Mode, NodeId, Position, ReadRequest, Rps, Slave,
-        board::{OneMotor, Target, ThreeMotors},
+        board::{Target, ThreeMotors},
         slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},

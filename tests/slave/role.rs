@@ -89,7 +89,7 @@ fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
     // On two wires an answer can be cut off as well.
     for (two_wire, header) in [(false, 0xBB), (true, 0xBB), (true, 0x55)] {
         let config = with(SlaveConfig::direct(), |config| config.two_wire = two_wire);
-        let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
+        let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
         let line = [&[header][..], &read(NodeId::N2)].concat();
         assert_eq!(answers(&mut slave, &line, T0), Vec::<Vec<u8>>::new());
         let quiet = slave.poll_timeout().unwrap();
@@ -104,7 +104,7 @@ fn a_read_behind_a_false_header_is_answered_when_the_line_is_quiet() {
 fn the_watchdog_ends_a_command_and_reports_it_once() {
     let mut config = SlaveConfig::direct();
     config.watchdog = Some(Duration::from_millis(100));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(slave.poll_timeout(), None, "nothing is moving yet");
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     slave.poll_event();
@@ -125,30 +125,17 @@ fn the_watchdog_ends_a_command_and_reports_it_once() {
 #[test]
 fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
     let dip: DipSwitch = "0101".parse().unwrap();
-    let slave: Slave = Slave::from_dip(
-        dip,
-        IdReading::ValuePlusOne,
-        SlaveConfig::direct(),
-        Instant::from_micros(0),
-    )
-    .unwrap();
+    let node = dip.node_id(IdReading::ValuePlusOne).unwrap();
+    let slave = Slave::new(node, dip.mode(), SlaveConfig::direct(), Instant::from_micros(0));
     assert_eq!((slave.node(), slave.mode()), (NodeId::N3, Mode::Position));
     let dip: DipSwitch = "0000".parse().unwrap();
-    assert!(
-        Slave::<OneMotor>::from_dip(
-            dip,
-            IdReading::Value,
-            SlaveConfig::direct(),
-            Instant::from_micros(0)
-        )
-        .is_err()
-    );
+    assert!(dip.node_id(IdReading::Value).is_err());
 }
 
 #[test]
 fn a_turnaround_gap_holds_the_answer_back() {
     let config = with(SlaveConfig::direct(), |config| config.turnaround_gap = US(30));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), Vec::<Vec<u8>>::new());
     assert_eq!(slave.poll_timeout(), Some(T0 + US(30)));
     assert!(slave.poll_transmit(T0 + US(30)).is_some());
@@ -213,7 +200,7 @@ fn trap() -> Vec<u8> {
 #[test]
 fn on_two_wires_a_slave_finds_no_request_inside_another_nodes_answer() {
     let config = with(SlaveConfig::direct(), |config| config.two_wire = true);
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(answers(&mut slave, &trap(), T0), [[0; 0]; 0]);
     assert_eq!((slave.statistics().answers, slave.statistics().reads), (1, 0));
     // It still obeys and answers its own requests.
@@ -257,7 +244,7 @@ fn a_nan_speed_does_not_feed_the_watchdog() {
 #[test]
 fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
     let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     slave.handle_input(&write(NodeId::N2, 1.0), T0);
     let mut damaged = write(NodeId::N2, 2.0);
     damaged[4] ^= 1;
@@ -272,7 +259,7 @@ fn a_foreign_or_damaged_write_does_not_feed_the_watchdog() {
 #[test]
 fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
     let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
-    let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
     slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
     assert_eq!(slave.command(now), Some(Target::Velocity(rps(1.0))), "it is accepted");
@@ -289,7 +276,7 @@ fn an_old_command_for_which_the_watchdog_is_over_is_no_command_but_a_watchdog() 
     for (age_ms, event) in
         [(99, SlaveEvent::Command(Target::Velocity(rps(5.0)))), (100, SlaveEvent::Watchdog)]
     {
-        let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
+        let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
         slave.handle_old_input(&write(NodeId::N2, 5.0), T0, T0 + MS(age_ms));
         assert_eq!(slave.poll_event(), Some(event), "{age_ms} ms");
         assert_eq!(slave.poll_event(), None);
@@ -316,7 +303,7 @@ fn a_slave_drops_an_answer_that_pauses_for_five_byte_times() {
     assert_eq!(slave(Mode::Velocity).frame_pause(), US(100));
     assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
     let config = with(SlaveConfig::direct(), |config| config.idle = MS(3));
-    let patient: Slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
+    let patient = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     assert_eq!(patient.frame_pause(), MS(3), "as long as its own wait");
 }
 

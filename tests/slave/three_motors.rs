@@ -14,7 +14,7 @@ fn speeds() -> [Rps; 3] {
 }
 
 fn slave(mode: Mode, config: SlaveConfig) -> Slave<ThreeMotors> {
-    Slave::new(NODE, mode, config, T0)
+    Slave::for_board(NODE, mode, config, T0)
 }
 
 /// Hands in a packet, and returns the answer.

@@ -7,7 +7,7 @@ const NODE: NodeId = NodeId::N1;
 
 fn watched() -> Slave {
     let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
-    let mut slave: Slave = Slave::new(NODE, Mode::Velocity, config, T0);
+    let mut slave = Slave::new(NODE, Mode::Velocity, config, T0);
     slave.handle_input(&write(NODE, 2.0), T0);
     slave
 }
@@ -33,7 +33,7 @@ fn a_switch_that_is_moved_drops_the_command_with_its_event_and_its_watchdog() {
 #[test]
 fn a_switch_that_is_moved_the_other_way_does_the_same() {
     let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
-    let mut slave: Slave = Slave::new(NODE, Mode::Position, config, T0);
+    let mut slave = Slave::new(NODE, Mode::Position, config, T0);
     slave.set_position(turns(5));
     slave.handle_input(&hold(NODE, Position::new(3, 4)), T0);
     slave.set_mode(Mode::Velocity);
@@ -48,7 +48,7 @@ fn a_switch_that_is_moved_the_other_way_does_the_same() {
 
 #[test]
 fn a_speed_from_before_the_switch_was_moved_is_not_reported() {
-    let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+    let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
     slave.set_mode(Mode::Position);
     slave.set_mode(Mode::Velocity);
     slave.handle_input(&read(NODE), T0);
@@ -60,7 +60,7 @@ fn a_speed_from_before_the_switch_was_moved_is_not_reported() {
 
 #[test]
 fn a_position_from_before_the_switch_was_moved_is_not_reported() {
-    let mut slave: Slave = Slave::new(NODE, Mode::Position, SlaveConfig::direct(), T0);
+    let mut slave = Slave::new(NODE, Mode::Position, SlaveConfig::direct(), T0);
     slave.set_position(turns(5));
     slave.set_mode(Mode::Velocity);
     slave.set_mode(Mode::Position);
@@ -76,7 +76,7 @@ fn anything_behind_a_read_in_the_same_chunk_means_that_the_master_has_moved_on()
     let packets = [read(NODE), read(NodeId::N2), write(NodeId::N2, 1.0), write(NODE, 1.0)];
     for packet in packets {
         for len in 1..=packet.len() {
-            let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+            let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
             slave.handle_input(&[&read(NODE), &packet[..len]].concat(), T0);
             let is_own_read = packet == read(NODE) && len == packet.len();
             assert_eq!(slave.poll_transmit(T0).is_some(), is_own_read, "{:02x?}", &packet[..len]);
@@ -112,7 +112,7 @@ fn a_slave_is_held_up_after_the_time_for_an_answer_but_at_least_4_and_at_most_20
             .chain([(US(19_999), 19_999), (MS(20), 20_000), (US(20_001), 20_000)])
     {
         let config = with(SlaveConfig::direct(), |config| config.answer_within = within);
-        let slave: Slave = Slave::new(NODE, Mode::Velocity, config, T0);
+        let slave = Slave::new(NODE, Mode::Velocity, config, T0);
         assert_eq!(slave.held_up_after(), Some(US(limit)));
         assert_eq!(slave.frame_pause(), US(100), "as long as it waits for the rest of a packet");
     }
@@ -125,7 +125,7 @@ fn the_time_for_an_answer_begins_after_the_gap_and_its_end_is_in_time() {
     for (after_us, is_sent, expired) in
         [(29, false, 0), (30, true, 0), (229, true, 0), (230, true, 0), (231, false, 1)]
     {
-        let mut slave: Slave = Slave::new(NODE, Mode::Velocity, config, T0);
+        let mut slave = Slave::new(NODE, Mode::Velocity, config, T0);
         slave.set_velocity(rps(1.0));
         slave.handle_input(&read(NODE), T0);
         assert_eq!(slave.poll_timeout(), Some(T0 + US(30)));
@@ -156,7 +156,7 @@ fn each_candidate_behind_one_that_a_pause_ends_waits_for_as_long_again() {
     // The start of a WRITE, or of nothing but a byte that looks like one, and a READ behind it.
     let start = [&[0xBB][..], &read[..2]].concat();
     for (rest_at, reads) in [(US(150), 1), (US(199), 1), (US(200), 0)] {
-        let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+        let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
         slave.handle_input(&start, T0);
         assert_eq!(slave.poll_timeout(), Some(T0 + US(100)));
         slave.handle_timeout(T0 + US(100));
@@ -169,7 +169,7 @@ fn each_candidate_behind_one_that_a_pause_ends_waits_for_as_long_again() {
 
 #[test]
 fn an_answer_that_is_being_sent_is_outdated_once_another_byte_is_heard() {
-    let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+    let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
     slave.handle_input(&read(NODE), T0);
     assert!(slave.poll_transmit(T0).is_some());
     assert!(!slave.is_outdated());
@@ -184,7 +184,7 @@ fn an_answer_that_is_being_sent_is_outdated_once_another_byte_is_heard() {
 fn a_read_that_a_false_header_held_back_is_not_answered_if_more_is_held_behind_it() {
     // Eight bytes that begin as a WRITE: its CRC is wrong, and a READ is found inside it.
     for behind in [[0xAA, 2, 0], [0xBB, 2, 0], [0, 0, 0xAA], [0, 0xBB, 1]] {
-        let mut slave: Slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+        let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
         slave.handle_input(&[&[0xBB][..], &read(NODE), &behind].concat(), T0);
         assert_eq!(slave.poll_transmit(T0), None, "{behind:02x?}");
         assert_eq!((slave.statistics().reads, slave.statistics().overtaken), (1, 1));

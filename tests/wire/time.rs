@@ -54,7 +54,7 @@ fn an_instant_wraps_and_the_later_one_stays_the_greater() {
 
 #[test]
 fn a_counter_of_32_bits_can_wrap_any_number_of_times() {
-    let mut clock = Wrapping32::new();
+    let clock = Wrapping32::new();
     let mut last = AT(0);
     // Readings 50 minutes apart.
     for step in 0..10_u64 {

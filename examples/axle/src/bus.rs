@@ -165,7 +165,7 @@ impl<B: Boards> Bus<B> {
     }
 
     pub(crate) fn new(line: Line, config: MasterConfig) -> Self {
-        let session = Session::new(line, |now| Master::new(config, now));
+        let session = Session::new(line, |now| Master::for_board(config, now));
         Self { session, baud: config.baud, has_dead_man_fired: false }
     }
 

@@ -101,7 +101,7 @@ pub fn milliseconds(now: Instant) -> u32 {
 }
 
 impl DriverClock for Clock {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         self.wrapping.at(self.timer.cnt().read().bits())
     }
 

@@ -59,7 +59,8 @@ mod app {
         config.watchdog = Some(Duration::from_millis(500));
         // With the reading that covers ids 1 to 8, every switch setting is a valid id (ruling I2).
         let slave = DipSwitch::from_bits(dip).and_then(|dip| {
-            Slave::from_dip(dip, IdReading::ValuePlusOne, config, Instant::from_micros(0))
+            let node = dip.node_id(IdReading::ValuePlusOne)?;
+            Ok(Slave::new(node, dip.mode(), config, Instant::from_micros(0)))
         });
         let Ok(mut slave) = slave else { panic!("every 4-bit switch setting has an id") };
         // The motor of this example starts at position 0.
@@ -96,7 +97,7 @@ mod app {
     #[task(priority = 1, shared = [micros], local = [slave, hear, say, woken])]
     async fn talk(mut cx: talk::Context) {
         let talk::LocalResources { slave, hear, say, woken, .. } = cx.local;
-        let mut clock = Wrapping32::new();
+        let clock = Wrapping32::new();
         loop {
             let now = clock.at(cx.shared.micros.lock(|micros| micros.now()));
             while let Some(byte) = hear.dequeue() {

@@ -105,7 +105,7 @@ fn spans(one: u32, other: u32, times: u32) {
 
 /// The counter is read at least once per turn, so it counts all steps.
 fn counter(start: u32, steps: &[u32]) {
-    let mut clock = Wrapping32::new();
+    let clock = Wrapping32::new();
     let mut total = u128::from(start);
     let mut last = clock.at(start);
     assert_eq!(u128::from(last.as_micros()), total);

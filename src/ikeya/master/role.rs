@@ -85,7 +85,7 @@ const EVENTS: usize = 16;
 /// use axlewire::{endpoint::Endpoint, ikeya::{master::MasterConfig, Master}, time::Instant};
 ///
 /// let now = Instant::from_micros(0);
-/// let mut master: Master = Master::new(MasterConfig::direct(), now);
+/// let mut master = Master::new(MasterConfig::direct(), now);
 /// master.discover(now);
 /// assert_eq!(master.poll_transmit(now), Some(&[0xAA, 0x01, 0xBE, 0xD0][..])); // READ 1
 /// assert_eq!(master.poll_transmit(now), None); // until the window closes
@@ -107,11 +107,28 @@ pub struct Master<B: Board = OneMotor> {
     pub(super) nodes: [Node<B>; 8],
 }
 
-/// Commands.
-impl<B: Board> Master<B> {
+impl Master {
     /// Creates a master that knows no nodes yet; call [`discover`](Self::discover) to find them.
+    /// For the usual board; see [`for_board`](Self::for_board) for the other one.
     #[must_use]
     pub fn new(config: MasterConfig, now: Instant) -> Self {
+        Self::for_board(config, now)
+    }
+}
+
+/// Commands.
+impl<B: Board> Master<B> {
+    /// Creates a master of nodes with this [`Board`].
+    ///
+    /// ```
+    /// use axlewire::{ikeya::{Master, ThreeMotors, master::MasterConfig}, time::Instant};
+    ///
+    /// let now = Instant::from_micros(0);
+    /// let master = Master::<ThreeMotors>::for_board(MasterConfig::direct(), now);
+    /// # let _ = master;
+    /// ```
+    #[must_use]
+    pub fn for_board(config: MasterConfig, now: Instant) -> Self {
         let mut config = config;
         config.attempts = config.attempts.max(1);
         Self {

@@ -4,7 +4,6 @@ use heapless::Vec;
 
 use super::{
     config::SlaveConfig,
-    dip::{DipSwitch, IdReading},
     event::SlaveEvent,
     requests::{Found, Requests},
     statistics::SlaveStatistics,
@@ -12,7 +11,6 @@ use super::{
 use crate::{
     encode::Encode,
     endpoint::{Endpoint, Unsent},
-    error::EncodeError,
     events::Latest,
     ikeya::{
         board::{Board, Command, OneMotor, PACKET_LEN, Target},
@@ -40,7 +38,7 @@ use crate::{
 /// use axlewire::{endpoint::Endpoint, time::Instant};
 ///
 /// let now = Instant::from_micros(0);
-/// let mut slave: Slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
+/// let mut slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), now);
 /// let current = Rps::new(1.0)?;
 /// slave.set_velocity(current);
 /// slave.handle_input(ReadRequest::new(NodeId::N2).as_bytes(), now);
@@ -82,10 +80,19 @@ impl Answer {
     }
 }
 
-impl<B: Board> Slave<B> {
-    /// Creates a slave that is not moving and has heard nothing yet.
+impl Slave {
+    /// Creates a slave that is not moving and has heard nothing yet. For the usual board; see
+    /// [`for_board`](Self::for_board) for the other one.
     #[must_use]
     pub fn new(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
+        Self::for_board(node, mode, config, now)
+    }
+}
+
+impl<B: Board> Slave<B> {
+    /// Creates a slave with this [`Board`], which is not moving and has heard nothing yet.
+    #[must_use]
+    pub fn for_board(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
         Self {
             node,
             mode,
@@ -101,21 +108,6 @@ impl<B: Board> Slave<B> {
             event: Latest::new(),
             statistics: SlaveStatistics::default(),
         }
-    }
-
-    /// Creates a slave with the id and mode of a DIP switch, in the reading that the board's maker
-    /// meant (ruling I2).
-    ///
-    /// # Errors
-    ///
-    /// [`EncodeError::DipSwitch`] if that reading gives no id.
-    pub fn from_dip(
-        dip: DipSwitch,
-        reading: IdReading,
-        config: SlaveConfig,
-        now: Instant,
-    ) -> Result<Self, EncodeError> {
-        Ok(Self::new(dip.node_id(reading)?, dip.mode(), config, now))
     }
 
     /// Sets the speed that a velocity node reports from now on; at first it reports 0. After a

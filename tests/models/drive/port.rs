@@ -267,7 +267,7 @@ impl Shared {
 }
 
 impl Clock for Shared {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         self.line().clock()
     }
 

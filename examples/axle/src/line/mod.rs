@@ -133,7 +133,7 @@ impl Line {
     /// A clock that starts now and that idles until bytes have come.
     pub(crate) fn clock(&self) -> LineClock {
         let (wire, start) = (Rc::clone(&self.wire), clock::now());
-        LineClock { wire, start, seen_at: Instant::from_micros(0), awake: Rc::default() }
+        LineClock { wire, start, seen_at: Cell::new(Instant::from_micros(0)), awake: Rc::default() }
     }
 
     /// The bytes that come within `patience`, as soon as there are some.
@@ -219,7 +219,7 @@ impl Wire for WithoutEcho<Line> {
 pub(crate) struct LineClock {
     wire: Rc<RefCell<dyn Wire>>,
     start: Clock,
-    seen_at: Instant,
+    seen_at: Cell<Instant>,
     awake: Rc<Cell<Duration>>,
 }
 
@@ -232,11 +232,10 @@ impl LineClock {
 }
 
 impl drive::Clock for LineClock {
-    fn now(&mut self) -> Instant {
+    fn now(&self) -> Instant {
         let now = Instant::from_micros(clock::since(self.start).as_micros() as u64);
-        let step = (now - self.seen_at).min(ABSENCE).as_micros();
+        let step = (now - self.seen_at.replace(now)).min(ABSENCE).as_micros();
         self.awake.set(self.awake.get() + Duration::from_micros(step.into()));
-        self.seen_at = now;
         now
     }
 
@@ -298,7 +297,7 @@ mod tests {
 
     #[test]
     fn a_suspension_is_no_time_for_which_the_tool_was_running() {
-        let mut ours = played::silence(true).clock();
+        let ours = played::silence(true).clock();
         for (millis, awake) in [(400, 400), (60_000, 900), (100, 1000)] {
             clock::sleep(Duration::from_millis(millis));
             ours.now();

@@ -195,7 +195,7 @@ impl<B: Simulated> Node<B> {
         config.watchdog = args
             .watchdog
             .map(|micros| Duration::from_micros(micros.try_into().unwrap_or(u32::MAX)));
-        let slave = Slave::new(node, mode, config, Instant::from_micros(0));
+        let slave = Slave::for_board(node, mode, config, Instant::from_micros(0));
         let motors = B::motors(Motor::new().with_time_constant(TIME_CONSTANT));
         Self {
             motor: MotorNode::from_parts(slave, motors),

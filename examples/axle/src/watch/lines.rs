@@ -32,7 +32,7 @@ where
     let mut recorder = Recorder::<F>::new(watched)?;
     // A recording and a datagram have the same time.
     let stamp = Stamp::new();
-    let mut clock = line.clock();
+    let clock = line.clock();
     let mut buffer = [0; 4096];
     let mut out = io::stdout().lock();
     let mut decoder = Decoder::<F, BUFFER_LEN>::new();

@@ -243,7 +243,7 @@ fn boards_with_three_motors_are_stopped_by_their_own_protocol() {
     let now = move || time::Instant::from_micros(start.elapsed().as_micros() as u64);
     let id = NodeId::new(3).unwrap();
     let mut slave =
-        Slave::<ThreeMotors>::new(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
+        Slave::<ThreeMotors>::for_board(id, Mode::Velocity, SlaveConfig::usb_adapter(), now());
     slave.set_velocity([Rps::new(2.0).unwrap(); 3]);
     let line = played::PlayedLine::new(Vec::new(), move |told, bytes| {
         slave.handle_input(bytes, now());

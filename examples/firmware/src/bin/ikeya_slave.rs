@@ -47,7 +47,7 @@ fn main() -> ! {
 fn run(mut board: Board, node: NodeId, mode: Mode) {
     let config = board.configs.slave();
     let mut motor = Motor::new();
-    let mut slave: Slave = Slave::new(node, mode, config, Instant::from_micros(0));
+    let mut slave = Slave::new(node, mode, config, Instant::from_micros(0));
     slave.set_position(motor.position());
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut last = board.clock.now();

@@ -13,7 +13,7 @@ axlewire_firmware::size_program!(run);
 
 fn run(bytes: &[u8]) -> u32 {
     let now = core::hint::black_box(Instant::from_micros(0));
-    let mut role: Master = Master::new(MasterConfig::direct(), now);
+    let mut role = Master::new(MasterConfig::direct(), now);
     role.discover(now);
     drive(&mut role, bytes, now)
 }

@@ -13,6 +13,6 @@ axlewire_firmware::size_program!(run);
 
 fn run(bytes: &[u8]) -> u32 {
     let now = core::hint::black_box(Instant::from_micros(0));
-    let mut role: Slave = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now);
+    let mut role = Slave::new(NodeId::N1, Mode::Velocity, SlaveConfig::direct(), now);
     drive(&mut role, bytes, now)
 }

@@ -15,7 +15,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut config = MasterConfig::usb_adapter();
     config.nodes = NodeId::N1.into(); // the whole bus
     config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
-    let mut bus = Driver::with(|now| <Master>::new(config, now), port, TokioClock::new());
+    let mut bus = Driver::with(|now| Master::new(config, now), port, TokioClock::new());
     println!("found: {:?}", bus.discover_async().await?);
     let turned = tokio::select! {
         turned = bus.drive_for_async(NodeId::N1, Rps::new(2.0)?, Duration::from_millis(3000)) => turned,

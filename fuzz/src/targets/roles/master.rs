@@ -125,7 +125,7 @@ fn master<B: BoardPackets>(
         config.nodes = [NodeId::N1, NodeId::N5].into_iter().collect();
     }
     let mut clock = Clock::new(u)?;
-    let mut master = Master::<B>::new(config, clock.0);
+    let mut master = Master::<B>::for_board(config, clock.0);
     let mut wishes = Wishes { orders: [None; 8], owed: NodeSet::NONE };
     // The node that was read and may answer.
     let mut asked = None;

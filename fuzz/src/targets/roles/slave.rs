@@ -33,7 +33,7 @@ fn slave<B: Kit>(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
     let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };
     let mut clock = Clock::new(u)?;
     let id = *u.choose(&NodeId::ALL)?;
-    let mut slave = Slave::<B>::new(id, mode, config, clock.0);
+    let mut slave = Slave::<B>::for_board(id, mode, config, clock.0);
     let long = if B::ANSWERS_WRITE { 16 } else { 8 };
     let mut heard = Heard { id, long, tail: Vec::new(), writes: Vec::new() };
     let (mut speed, mut place, mut given) = (B::speed(0.0), None, 0);

@@ -40,7 +40,7 @@ impl<B: Kit> Station<B> {
         let long = if B::ANSWERS_WRITE { 16 } else { 8 };
         Self {
             id,
-            slave: Slave::new(id, mode, config, now),
+            slave: Slave::for_board(id, mode, config, now),
             is_plugged: true,
             config,
             ears: Ears::new(Rules::Ikeya { to_slave: true, to_master: false, long }),

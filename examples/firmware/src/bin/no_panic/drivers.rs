@@ -116,7 +116,7 @@ fn driver<R: Endpoint>(role: R) -> Driver<R, Port, fn() -> Instant> {
 
 #[inline(never)]
 fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
-    let mut driver = driver(Master::<B>::new(any(MasterConfig::direct()), now()));
+    let mut driver = driver(Master::<B>::for_board(any(MasterConfig::direct()), now()));
     while any(true) {
         let node = any(NodeId::N1);
         match any(0) {
@@ -135,7 +135,7 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 #[inline(never)]
 fn slave<B: Board>() {
     let config = any(SlaveConfig::direct());
-    let mut driver = driver(Slave::<B>::new(
+    let mut driver = driver(Slave::<B>::for_board(
         any(NodeId::N1),
         any(Mode::Velocity),
         config,

@@ -30,7 +30,7 @@ pub fn all() {
 
 #[inline(never)]
 fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
-    let mut master = any(Master::<B>::new(any(MasterConfig::usb_adapter()), now()));
+    let mut master = any(Master::<B>::for_board(any(MasterConfig::usb_adapter()), now()));
     while any(true) {
         let (node, now) = (any(NodeId::N1), now());
         match any(0) {
@@ -66,9 +66,9 @@ fn master<B: Board>(velocity: B::Velocity, position: B::Position) {
 fn slave<B: Board>(velocity: B::Velocity, position: B::Position) {
     let config = any(SlaveConfig::at(any(0)));
     if let Ok(dip) = DipSwitch::from_bits(any(0)) {
-        keep(Slave::<B>::from_dip(dip, any(IdReading::Value), config, now()));
+        keep(dip.node_id(any(IdReading::Value)));
     }
-    let mut slave = any(Slave::<B>::new(any(NodeId::N1), any(Mode::Velocity), config, now()));
+    let mut slave = any(Slave::<B>::for_board(any(NodeId::N1), any(Mode::Velocity), config, now()));
     while any(true) {
         match any(0) {
             0 => slave.set_velocity(any(velocity)),

@@ -224,7 +224,7 @@ impl<B: Kit> Session<B> {
     }
 
     fn reset_master(&mut self) {
-        self.master = Master::new(self.config, self.now);
+        self.master = Master::for_board(self.config, self.now);
         self.model = NodeId::ALL.map(|_| Node::default()).into();
         self.dead_man.alive_at = self.now;
         self.to_master.clear();

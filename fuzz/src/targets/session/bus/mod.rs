@@ -119,7 +119,7 @@ impl<B: Kit> Session<B> {
         let long = if B::ANSWERS_WRITE { 16 } else { 8 };
         Self {
             now,
-            master: Master::new(config, now),
+            master: Master::for_board(config, now),
             config,
             model: NodeId::ALL.map(|_| Node::default()).into(),
             dead_man: DeadMan { limit: config.dead_man, alive_at: now },
