@@ -111,6 +111,7 @@ impl Master {
     /// Creates a master that knows no nodes yet; call [`discover`](Self::discover) to find them.
     /// For the usual board; see [`for_board`](Self::for_board) for the other one.
     #[must_use]
+    #[inline] // Otherwise it would be compiled here, apart from the program that uses it.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self::for_board(config, now)
     }

@@ -84,6 +84,7 @@ impl Slave {
     /// Creates a slave that is not moving and has heard nothing yet. For the usual board; see
     /// [`for_board`](Self::for_board) for the other one.
     #[must_use]
+    #[inline] // Otherwise it would be compiled here, apart from the program that uses it.
     pub fn new(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
         Self::for_board(node, mode, config, now)
     }
