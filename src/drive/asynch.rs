@@ -90,31 +90,32 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         result
     }
 
-    /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least
-    /// one round, even after `deadline`.
+    /// Returns the next event; waits for it for this long, then returns `None`. Runs at least one
+    /// round, even with [`Duration::ZERO`].
     ///
     /// # Errors
     ///
     /// Same as [`service_async`](Self::service_async). Events from before the failure are not lost.
     pub async fn next_event_async(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<R::Event>, DriveError<P::Error>> {
-        self.until_async(deadline, Self::poll_event).await
+        self.until_async(self.now() + within, Self::poll_event).await
     }
 
-    /// Runs until `deadline`, and passes every event to `on_event`, with the role, to give it
-    /// commands, and the time.
+    /// Runs for `span`, and passes every event to `on_event`, with the role, to give it commands,
+    /// and the time.
     ///
     /// # Errors
     ///
     /// Same as [`service_async`](Self::service_async).
-    pub async fn run_until_async(
+    pub async fn run_for_async(
         &mut self,
-        deadline: Instant,
+        span: Duration,
         mut on_event: impl FnMut(&mut R, R::Event, Instant),
     ) -> Result<(), DriveError<P::Error>> {
-        while let Some(event) = self.next_event_async(deadline).await? {
+        let deadline = self.now() + span;
+        while let Some(event) = self.until_async(deadline, Self::poll_event).await? {
             let now = self.now();
             on_event(&mut self.role, event, now);
             if now >= deadline {

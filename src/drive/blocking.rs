@@ -7,7 +7,10 @@ use super::{
     driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
     error::DriveError,
 };
-use crate::{endpoint::Endpoint, time::Instant};
+use crate::{
+    endpoint::Endpoint,
+    time::{Duration, Instant},
+};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
@@ -56,31 +59,32 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         result
     }
 
-    /// Returns the next event; waits for it until `deadline`, then returns `None`. Runs at least
-    /// one round, even after `deadline`.
+    /// Returns the next event; waits for it for this long, then returns `None`. Runs at least one
+    /// round, even with [`Duration::ZERO`].
     ///
     /// # Errors
     ///
     /// Same as [`service`](Self::service). Events from before the failure are not lost.
     pub fn next_event(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<R::Event>, DriveError<P::Error>> {
-        self.until(deadline, Self::poll_event)
+        self.until(self.now() + within, Self::poll_event)
     }
 
-    /// Runs until `deadline`, and passes every event to `on_event`, with the role, to give it
-    /// commands, and the time.
+    /// Runs for `span`, and passes every event to `on_event`, with the role, to give it commands,
+    /// and the time.
     ///
     /// # Errors
     ///
     /// Same as [`service`](Self::service).
-    pub fn run_until(
+    pub fn run_for(
         &mut self,
-        deadline: Instant,
+        span: Duration,
         mut on_event: impl FnMut(&mut R, R::Event, Instant),
     ) -> Result<(), DriveError<P::Error>> {
-        while let Some(event) = self.next_event(deadline)? {
+        let deadline = self.now() + span;
+        while let Some(event) = self.until(deadline, Self::poll_event)? {
             let now = self.now();
             on_event(&mut self.role, event, now);
             if now >= deadline {

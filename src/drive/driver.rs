@@ -50,7 +50,7 @@ impl Needs {
 pub(super) const ERROR_NAP: Duration = Duration::from_millis(1);
 
 /// Longest time for which an async port may take no byte, or stay unflushed.
-pub(super) const STALL: Duration = Duration::from_millis(1000);
+pub(super) const STALL: Duration = Duration::from_secs(1);
 
 /// Time after which a receiver that keeps failing counts as one that has received nothing.
 const RECOVERY: Duration = Duration::from_millis(20);
@@ -138,7 +138,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// The latest time given to the role.
-    pub(super) const fn latest(&self) -> Instant {
+    pub(super) fn latest(&self) -> Instant {
         self.time.latest()
     }
 

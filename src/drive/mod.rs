@@ -31,19 +31,16 @@
 //! {
 //!     let mut config = MasterConfig::usb_adapter();
 //!     config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus
-//!     let mut bus: Driver<Master, _, _> =
-//!         Driver::with(|now| Master::new(config, now), port, clock);
+//!     let mut bus = Driver::with(|now| Master::new(config, now), port, clock);
 //!     let moved = (|| {
 //!         for (node, mode) in bus.discover()? {
 //!             if mode == Mode::Velocity {
 //!                 bus.set_velocity(node, target)?;
 //!             }
 //!         }
-//!         let end = bus.now() + Duration::from_millis(1000);
-//!         while let Some(event) = bus.next_event(end)? {
+//!         bus.run_for(Duration::from_secs(1), |_, event, _| {
 //!             let _ = event; // a measurement, a change of a node's health, ...
-//!         }
-//!         Ok(())
+//!         })
 //!     })();
 //!     bus.stop_all()?; // whatever has failed; waits until every motor is seen to be still
 //!     moved
@@ -53,7 +50,7 @@
 //!
 //! # How long a call takes
 //!
-//! [`service`](Driver::service) does not wait. All other calls end at a deadline, which is an
+//! [`service`](Driver::service) does not wait. All other calls end after a time that is an
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
 //! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for it
@@ -136,8 +133,8 @@
 //! let mut bus = Driver::with(|now| Master::new(MasterConfig::direct(), now), uart, time);
 //! let nodes = bus.discover_async().await?;
 //! loop {
-//!     let deadline = bus.now() + Duration::from_millis(100);
-//!     match select(bus.next_event_async(deadline), COMMANDS.receive()).await {
+//!     let event = bus.next_event_async(Duration::from_millis(100));
+//!     match select(event, COMMANDS.receive()).await {
 //!         Either::First(event) => show(event?),
 //!         Either::Second((node, target)) => bus.set_velocity_async(node, target).await?,
 //!     }

@@ -24,7 +24,7 @@
 //!     line.add(MotorNode::new(node, Mode::Position));
 //! }
 //! *line.pair_mut(Direction::ToHead) = Faults::noise(1e-3); // one bit in 1000 is wrong
-//! line.run_for(Duration::from_millis(1000))?;
+//! line.run_for(Duration::from_secs(1))?;
 //! assert_ne!(line.head().health(NodeId::N2), None);
 //! assert!(line.statistics(Direction::ToHead).bit_errors > 0);
 //! # }

@@ -27,7 +27,7 @@ use crate::{
 ///
 /// let mut rover = Rover::new();
 /// rover.command(&MotorControl::turn_right(60, 50)?);
-/// rover.step(Duration::from_millis(1000));
+/// rover.step(Duration::from_secs(1));
 /// let [front_left, front_right, ..] = rover.telemetry().rpm;
 /// assert_eq!((front_left, front_right), (97, 47)); // 81 % and 39 % of 120 rpm
 /// assert!(rover.heading_deg() > 0.0);

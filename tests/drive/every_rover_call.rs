@@ -17,13 +17,16 @@ fn unplugged() -> Rover {
 /// The result of both forms of a call, each with a host of its own.
 macro_rules! result {
     ($host:ident, $name:ident, $name_async:ident($($argument:expr),*)) => {
-        both(|is_async| call!(is_async, $host(), $name, $name_async($($argument),*)))
+        both(|is_async| {
+            let mut driver = $host();
+            call!(is_async, driver, $name, $name_async($($argument),*))
+        })
     };
 }
 
 #[test]
 fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
-    let (soon, span) = (at_ms(5), ms(5));
+    let (soon, span) = (ms(5), ms(5));
     assert_eq!(result!(unplugged, ping, ping_async(soon)), Err(GONE));
     assert_eq!(result!(unplugged, drive, drive_async(5, 5)), Err(GONE));
     assert_eq!(result!(unplugged, drive_for, drive_for_async(5, 5, span)), Err(GONE));
@@ -43,7 +46,7 @@ fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
 
 #[test]
 fn a_robot_that_is_silent_is_a_timeout_at_the_deadline_of_the_call() {
-    let soon = at_ms(5);
+    let soon = ms(5);
     let timeout = |operation| Err(DriveError::Timeout(operation));
     let ping = result!(host, ping, ping_async(soon));
     assert_eq!(ping, timeout(Operation::Ping).map(|()| Duration::ZERO));
@@ -56,7 +59,7 @@ fn a_robot_that_is_silent_is_a_timeout_at_the_deadline_of_the_call() {
 
 #[test]
 fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
-    let (soon, span) = (at_ms(5), ms(5));
+    let (soon, span) = (ms(5), ms(5));
     let refused = |error| Err(DriveError::<Unplugged>::Rover(error));
     let unknown = refused(CommandError::CalibrationKind { kind: 9 });
     let begun = result!(host, start_calibration, start_calibration_async(NOBODY, soon));
@@ -121,7 +124,8 @@ fn a_port_that_has_gone_is_the_error_of_a_robot_that_waits_for_a_command() {
     for is_async in BOTH {
         let (mut robot, _far) = robot();
         robot.port().unplugged.set(true);
-        let command = call!(is_async, robot, next_command, next_command_async(at_ms(5)));
+        let command =
+            call!(is_async, robot, next_command, next_command_async(at_ms(5) - robot.now()));
         assert_eq!(command, Err(GONE));
     }
 }

@@ -26,7 +26,8 @@ fn a_command_counts_although_the_answers_cannot_be_sent() {
         far.write_all(ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
         far.world.step(500);
         let deadline = at_ms(10);
-        let mut next = || call!(is_async, driver, next_command, next_command_async(deadline));
+        let mut next =
+            || call!(is_async, driver, next_command, next_command_async(deadline - driver.now()));
         assert_eq!(next(), Ok(Some(Target::Velocity(rps(1.5)))));
         // Without a command to report, a failure is reported.
         far.write_all(ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
@@ -72,7 +73,8 @@ fn a_command_of_a_rover_counts_although_its_reports_cannot_be_sent() {
         far.write_all(command.frame(0).as_bytes()).unwrap();
         far.world.step(3000);
         let deadline = at_ms(10);
-        let mut next = || call!(is_async, driver, next_command, next_command_async(deadline));
+        let mut next =
+            || call!(is_async, driver, next_command, next_command_async(deadline - driver.now()));
         assert_eq!(next(), Ok(Some(command)));
         assert_eq!(next(), Err(GONE));
     }

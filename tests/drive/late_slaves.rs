@@ -75,7 +75,8 @@ fn a_command_does_not_outlive_its_watchdog_while_an_answer_is_flushed() {
             if is_polled {
                 let _ = call!(is_async, slave, service, service_async());
             } else {
-                let heard = call!(is_async, slave, next_command, next_command_async(at_ms(0)));
+                let heard =
+                    call!(is_async, slave, next_command, next_command_async(Duration::ZERO));
                 assert_eq!(heard, Ok(None), "a command whose watchdog has fired");
             }
             assert_eq!(events(&mut slave), [SlaveEvent::Watchdog]);
@@ -91,7 +92,7 @@ fn a_command_does_not_outlive_its_watchdog_while_another_task_runs() {
     wire.world.step(200);
     slave.port_mut().reads = [Step::Few(usize::MAX), Step::Error].into();
     let heard = {
-        let mut call = std::pin::pin!(slave.next_command_async(at_ms(60_000)));
+        let mut call = std::pin::pin!(slave.next_command_async(at_ms(60_000) - slave.now()));
         assert!(poll(call.as_mut()).is_pending(), "it yields behind an error");
         wire.world.step(5_000_000);
         wire.world.block_on(call)
@@ -134,8 +135,11 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
     let mut slave = idle_slave(&wire, with_watchdog());
     let bytes =
         [FIVE_RPS().as_bytes().repeat(20), ReadRequest::new(NodeId::N1).as_bytes().to_vec()];
-    let by = slave.now() + Duration::from_millis(1000);
-    let event = wire.block_on_held(slave.next_event_async(by), &bytes.concat(), 3_000_000);
+    let event = wire.block_on_held(
+        slave.next_event_async(Duration::from_millis(1000)),
+        &bytes.concat(),
+        3_000_000,
+    );
     // Events reported before the rest has been taken in do not count.
     let _ = event.unwrap();
     wire.world.block_on(slave.service_async()).unwrap();
@@ -152,8 +156,8 @@ fn an_idle_slave_answers_a_request_after_a_long_silence() {
         let mut slave = idle_slave(&wire, SlaveConfig::direct());
         let begin_us = wire.world.now_us();
         wire.receive_in(silence_us, ReadRequest::new(NodeId::N1).as_bytes());
-        let by = slave.now() + Duration::from_millis(3000);
-        call!(is_async, slave, run_until, run_until_async(by, |_, _, _| ())).unwrap();
+        call!(is_async, slave, run_for, run_for_async(Duration::from_millis(3000), |_, _, _| ()))
+            .unwrap();
         assert_eq!(wire.sent().len(), 8, "async {is_async}");
         let delay_us = wire.sent()[0].0 - begin_us - silence_us;
         assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");
@@ -198,13 +202,12 @@ fn a_slave_whose_port_takes_no_answer_hears_of_its_watchdog_in_time() {
     let wire = Wire::bus(None);
     let mut slave = one_slave(&wire, config);
     wire.receive(FIVE_RPS().as_bytes());
-    wire.world.block_on(slave.next_command_async(wire.world.now() + ms(1))).unwrap().unwrap();
+    wire.world.block_on(slave.next_command_async(ms(1))).unwrap().unwrap();
     let commanded = wire.world.now();
     wire.write_with(|_| Step::Stall);
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     while command(&slave).is_some() {
-        let deadline = wire.world.now() + ms(1000);
-        wire.world.block_on(slave.next_command_async(deadline)).unwrap();
+        wire.world.block_on(slave.next_command_async(ms(1000))).unwrap();
     }
     assert!(wire.world.now() - commanded <= watchdog + ms(5), "{:?}", wire.world.now());
 }

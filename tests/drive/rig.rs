@@ -43,16 +43,15 @@ pub(crate) use crate::{
 
 /// The blocking form of a call, or the async one.
 macro_rules! call {
-    ($is_async:expr, $driver:expr, $name:ident, $name_async:ident($($argument:expr),*)) => {{
-        let driver = &mut $driver;
+    ($is_async:expr, $driver:expr, $name:ident, $name_async:ident($($argument:expr),*)) => {
         match $is_async {
             true => {
-                let world = driver.port().world.clone();
-                world.block_on(driver.$name_async($($argument),*))
+                let world = $driver.port().world.clone();
+                world.block_on($driver.$name_async($($argument),*))
             }
-            false => driver.$name($($argument),*),
+            false => $driver.$name($($argument),*),
         }
-    }};
+    };
 }
 
 /// Drops a call before its first poll, then after one, and so on, until it is done within them.
@@ -173,8 +172,7 @@ impl Story {
 
     /// Runs the master's driver for a while.
     pub(crate) fn run(&mut self, millis: u32) {
-        let end = self.world.now() + ms(millis);
-        self.bus.run_until(end, |_, _, _| ()).unwrap();
+        self.bus.run_for(ms(millis), |_, _, _| ()).unwrap();
     }
 
     /// What node 2 is told to do, once everything on the line has arrived, whether or not the

@@ -29,9 +29,8 @@ fn after(world: &World, millis: u32) -> Instant {
 #[test]
 fn a_ping_comes_back_with_its_round_trip() {
     for is_async in BOTH {
-        let (world, mut rover, _) = story();
-        let deadline = after(&world, 700);
-        let trip = call!(is_async, rover, ping, ping_async(deadline));
+        let (_, mut rover, _) = story();
+        let trip = call!(is_async, rover, ping, ping_async(ms(700)));
         // 8 bytes there, 9 back, and up to one report before the pong.
         let micros = u64::from(trip.unwrap().as_micros());
         assert!((17 * BYTE_US..70 * BYTE_US).contains(&micros), "{micros}");
@@ -48,8 +47,7 @@ fn an_earlier_pong_is_not_the_answer_to_a_ping() {
         run(&world, &mut rover, 500, 20);
         assert_eq!(rover.role().statistics().round_trip.count(), 1);
         robot.borrow().port().unplugged.set(true);
-        let deadline = after(&world, 700);
-        let pong = call!(is_async, rover, ping, ping_async(deadline));
+        let pong = call!(is_async, rover, ping, ping_async(ms(700)));
         assert_eq!(pong, Err(DriveError::Timeout(Operation::Ping)));
     }
 }
@@ -60,8 +58,7 @@ fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
         let (world, mut rover, _) = story();
         run(&world, &mut rover, 500, 20);
         rover.port_mut().reads.push_back(Step::Error);
-        let deadline = after(&world, 700);
-        let pong = call!(is_async, rover, ping, ping_async(deadline));
+        let pong = call!(is_async, rover, ping, ping_async(ms(700)));
         assert!(matches!(pong, Err(DriveError::Port(_))), "{pong:?}");
         let told: Vec<_> = events(&mut rover);
         assert!(told.iter().any(|event| matches!(event, HostEvent::Pong { .. })), "{told:?}");
@@ -74,7 +71,7 @@ fn a_robot_that_never_answers_is_a_timeout_and_a_lost_link() {
         let (world, mut rover, robot) = story();
         robot.borrow_mut().port().unplugged.set(true);
         let deadline = after(&world, 700);
-        let error = call!(is_async, rover, ping, ping_async(deadline)).unwrap_err();
+        let error = call!(is_async, rover, ping, ping_async(deadline - rover.now())).unwrap_err();
         assert_eq!(error, DriveError::Timeout(Operation::Ping));
         assert_eq!(error.to_string(), "the robot did not answer a ping in time");
         assert_eq!(world.now(), deadline);
@@ -121,9 +118,9 @@ fn a_command_taken_leaves_the_other_events_of_a_robot() {
     let state = NetworkState::from(2);
     rover.role_mut().set_network_state(state, world.now()).unwrap();
     rover.drive(10, 0).unwrap();
-    assert_eq!(rover.run_until(after(&world, 100), |_, _, _| ()), Ok(()));
+    assert_eq!(rover.run_for(ms(100), |_, _, _| ()), Ok(()));
     let mut robot = robot.borrow_mut();
-    assert_eq!(robot.next_command(world.now()), Ok(MotorControl::new(10, 0).ok()));
+    assert_eq!(robot.next_command(Duration::ZERO), Ok(MotorControl::new(10, 0).ok()));
     let events: Vec<_> = events(&mut robot);
     assert!(events.contains(&RobotEvent::NetworkState(state)), "{events:?}");
 }
@@ -143,14 +140,13 @@ fn reports_come_one_by_one_and_in_time() {
     for is_async in BOTH {
         let (world, mut rover, robot) = story();
         for index in 0..10 {
-            let deadline = after(&world, 25);
-            let report = call!(is_async, rover, next_report, next_report_async(deadline));
+            let report = call!(is_async, rover, next_report, next_report_async(ms(25)));
             let report = report.unwrap().unwrap();
             assert_eq!((report.index, report.lost, report.telemetry.battery_pct), (index, 0, 87));
         }
         robot.borrow_mut().port().unplugged.set(true);
         let deadline = after(&world, 25);
-        let none = call!(is_async, rover, next_report, next_report_async(deadline));
+        let none = call!(is_async, rover, next_report, next_report_async(deadline - rover.now()));
         assert_eq!((none, world.now()), (Ok(None), deadline));
     }
 }
@@ -161,9 +157,21 @@ fn a_calibration_is_begun_and_ended_when_the_calls_return() {
         let (world, mut rover, robot) = story();
         let kind = CalibrationKind::Magnetometer;
         let deadline = after(&world, 1000);
-        call!(is_async, rover, start_calibration, start_calibration_async(kind, deadline)).unwrap();
+        call!(
+            is_async,
+            rover,
+            start_calibration,
+            start_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap();
         assert_eq!(robot.borrow().role().calibrating(), Some(kind));
-        call!(is_async, rover, end_calibration, end_calibration_async(kind, deadline)).unwrap();
+        call!(
+            is_async,
+            rover,
+            end_calibration,
+            end_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap();
         assert_eq!(robot.borrow().role().calibrating(), None);
     }
 }
@@ -175,7 +183,12 @@ fn an_outcome_that_came_after_its_call_is_not_an_event_during_the_next() {
         let kind = CalibrationKind::Imu;
         let start = |rover: &mut Rover, millis| {
             let deadline = after(&world, millis);
-            call!(is_async, *rover, start_calibration, start_calibration_async(kind, deadline))
+            call!(
+                is_async,
+                *rover,
+                start_calibration,
+                start_calibration_async(kind, deadline - rover.now())
+            )
         };
         let timeout = Err(DriveError::Timeout(Operation::Calibration));
         assert_eq!(start(&mut rover, 1), timeout);
@@ -197,17 +210,26 @@ fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
         let kind = CalibrationKind::Imu;
         let bound = world.now() + HostConfig::default().calibration_bound();
         let deadline = bound + ms(100);
-        let error =
-            call!(is_async, rover, start_calibration, start_calibration_async(kind, deadline))
-                .unwrap_err();
+        let error = call!(
+            is_async,
+            rover,
+            start_calibration,
+            start_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap_err();
         let DriveError::Calibration(failure) = error else { panic!("{error:?}") };
         assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
         assert_eq!(error.to_string(), "calibration of Imu did not start: no answer to 3 requests");
         assert!(world.now() < deadline);
         // An earlier deadline takes precedence.
         let deadline = after(&world, 50);
-        let error = call!(is_async, rover, end_calibration, end_calibration_async(kind, deadline))
-            .unwrap_err();
+        let error = call!(
+            is_async,
+            rover,
+            end_calibration,
+            end_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap_err();
         assert_eq!((error, world.now()), (DriveError::Timeout(Operation::Calibration), deadline));
     }
 }
@@ -226,8 +248,10 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
         host.service().unwrap();
         let robot = Robot::new(RobotConfig::default(), world.now());
         let mut robot = on(robot, far);
-        let mut next =
-            |deadline| call!(is_async, robot, next_command, next_command_async(deadline));
+        let mut next = |end| {
+            let within = end - robot.now();
+            call!(is_async, robot, next_command, next_command_async(within))
+        };
         assert_eq!(next(at_ms(100)), Ok(Some(command)));
         assert_eq!(next(at_ms(100)), Ok(None));
         assert_eq!(world.now(), at_ms(100));
@@ -244,8 +268,8 @@ fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
         (rover.port_mut().most, rover.port_mut().stutters) = (1, true);
         rover.role_mut().drive(MotorControl::new(10, 0).unwrap(), world.now()).unwrap();
         let deadline = after(&world, 2000);
-        let done = world.poll_times(polls, rover.ping_async(deadline)).is_some();
-        world.block_on(rover.ping_async(deadline)).unwrap();
+        let done = world.poll_times(polls, rover.ping_async(deadline - rover.now())).is_some();
+        world.block_on(rover.ping_async(deadline - rover.now())).unwrap();
         assert_eq!(robot.borrow().role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().statistics().reports_lost, 0);
@@ -327,12 +351,23 @@ fn calls_take_only_frequent_events_and_those_that_they_return() {
         let (world, mut rover, _) = story();
         let kind = CalibrationKind::Imu;
         for _ in 0..10 {
-            let deadline = after(&world, 700);
-            call!(is_async, rover, ping, ping_async(deadline)).unwrap();
+            call!(is_async, rover, ping, ping_async(ms(700))).unwrap();
         }
         let deadline = after(&world, 700);
-        call!(is_async, rover, start_calibration, start_calibration_async(kind, deadline)).unwrap();
-        call!(is_async, rover, end_calibration, end_calibration_async(kind, deadline)).unwrap();
+        call!(
+            is_async,
+            rover,
+            start_calibration,
+            start_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap();
+        call!(
+            is_async,
+            rover,
+            end_calibration,
+            end_calibration_async(kind, deadline - rover.now())
+        )
+        .unwrap();
         call!(is_async, rover, stop, stop_async()).unwrap();
         let kept = events(&mut rover);
         assert!(kept.contains(&HostEvent::LinkUp), "{kept:?}");

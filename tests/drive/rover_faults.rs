@@ -194,8 +194,8 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
                 let now = robot.now();
                 robot.role_mut().set_telemetry(&Telemetry::default(), now);
             }
-            let by = robot.now() + Duration::from_millis(1);
-            let command = call!(is_async, robot, next_command, next_command_async(by));
+            let command =
+                call!(is_async, robot, next_command, next_command_async(Duration::from_millis(1)));
             match command {
                 Ok(Some(command)) => speeds.push(command.speed()),
                 Ok(None) => {}
@@ -217,8 +217,8 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
         let (wire, mut robot) = robot();
         wire.receive(&drive());
         wire.world.step(10_000_000);
-        let by = robot.now() + Duration::from_millis(1);
-        let command = call!(is_async, robot, next_command, next_command_async(by));
+        let command =
+            call!(is_async, robot, next_command, next_command_async(Duration::from_millis(1)));
         let speed = command.unwrap().map_or(0, |command| command.speed());
         assert_eq!(speed, 0, "it drives on a ten-second-old command");
     }
@@ -229,7 +229,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
     for is_async in [false, true] {
         let (wire, mut robot) = robot();
         let by = robot.now() + Duration::from_millis(5);
-        robot.run_until(by, |_, _, _| ()).unwrap();
+        robot.run_for(by - robot.now(), |_, _, _| ()).unwrap();
         wire.receive(&drive());
         wire.world.step(2_000_000);
         let by = robot.now() + Duration::from_millis(5);
@@ -238,7 +238,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
                 assert_eq!((command.speed(), command.angular()), (0, 0));
             }
         };
-        call!(is_async, robot, run_until, run_until_async(by, speed)).unwrap();
+        call!(is_async, robot, run_for, run_for_async(by - robot.now(), speed)).unwrap();
         assert_eq!(robot.role().statistics().commands, 1, "it was valid");
         assert_eq!(robot.role().statistics().watchdog, 1);
     }
@@ -246,8 +246,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
 
 /// The next command of a robot that is called continuously, for 5 ms.
 fn next(robot: &mut On<Robot>, is_async: bool) {
-    let by = robot.now() + Duration::from_millis(5);
-    call!(is_async, *robot, next_command, next_command_async(by)).unwrap();
+    call!(is_async, *robot, next_command, next_command_async(Duration::from_millis(5))).unwrap();
 }
 
 /// A robot that reports every 20 ms and has been called for a while.
@@ -293,9 +292,9 @@ fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up()
     for count in 1..=4 {
         let (wire, mut robot) = reporting(true);
         let begin_us = wire.world.now_us();
-        let by = robot.now() + Duration::from_millis(100);
         let bytes = drive().repeat(count);
-        wire.block_on_held(robot.next_command_async(by), &bytes, 3_000_000).unwrap();
+        wire.block_on_held(robot.next_command_async(Duration::from_millis(100)), &bytes, 3_000_000)
+            .unwrap();
         let drove_us = drives_until(&mut robot, true, begin_us);
         assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
@@ -341,8 +340,8 @@ fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence()
         let (wire, mut robot) = silent();
         let begin_us = wire.world.now_us();
         wire.receive_in(3_000_000, &drive());
-        let by = robot.now() + Duration::from_millis(10_000);
-        let command = call!(is_async, robot, next_command, next_command_async(by));
+        let command =
+            call!(is_async, robot, next_command, next_command_async(Duration::from_millis(10_000)));
         assert_eq!(command.unwrap().map(|command| command.speed()), Some(60));
         let drove_us = drives_until(&mut robot, is_async, begin_us + 3_000_000);
         assert!((485_000..=500_000).contains(&drove_us), "async {is_async}: {drove_us} us");

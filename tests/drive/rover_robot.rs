@@ -18,7 +18,7 @@ fn held_up(last: i16) -> (World, Driver<Robot, Port, World>, Port) {
     let robot = Robot::new(RobotConfig::default(), world.now());
     let mut robot = Driver::new(robot, near, world.clone());
     far.write(&bytes(go(50))).unwrap();
-    let command = robot.next_command(ms(100)).unwrap();
+    let command = robot.next_command(ms(100) - robot.now()).unwrap();
     assert_eq!(command.map(|command| command.speed()), Some(50));
     for speed in 60..80 {
         far.write(&bytes(go(speed))).unwrap();
@@ -32,8 +32,8 @@ fn held_up(last: i16) -> (World, Driver<Robot, Port, World>, Port) {
 #[test]
 fn the_command_that_is_handed_out_after_a_pause_is_the_one_in_force() {
     let (world, mut robot, _far) = held_up(33);
-    let deadline = world.now() + Duration::from_millis(100);
-    let command = robot.next_command(deadline).unwrap().map(|command| command.speed());
+    let command =
+        robot.next_command(Duration::from_millis(100)).unwrap().map(|command| command.speed());
     assert_eq!(robot.role().command(world.now()).speed(), 33);
     assert_eq!(command, Some(33), "a replaced command is handed out");
 }
@@ -47,8 +47,8 @@ fn a_stop_is_handed_out_however_many_commands_came_before_it() {
             far.write(&bytes(go(0))).unwrap();
             let deadline = world.now() + Duration::from_millis(100);
             let command = match is_async {
-                true => world.block_on(robot.next_command_async(deadline)),
-                false => robot.next_command(deadline),
+                true => world.block_on(robot.next_command_async(deadline - robot.now())),
+                false => robot.next_command(deadline - robot.now()),
             };
             speed = command.unwrap().map_or(speed, |command| command.speed());
         }
@@ -76,8 +76,8 @@ fn told_to_stand_still(is_async: bool, write_us: u64, most: usize, call_ms: u32)
     while speed != 0 || world.now_us() < 10_000 {
         let deadline = world.now() + Duration::from_millis(call_ms);
         let command = match is_async {
-            true => world.block_on(robot.next_command_async(deadline)),
-            false => robot.next_command(deadline),
+            true => world.block_on(robot.next_command_async(deadline - robot.now())),
+            false => robot.next_command(deadline - robot.now()),
         };
         speed = command.unwrap_or_default().map_or(speed, |command| command.speed());
         assert!(world.now_us() < 5_000_000 && (speed == 0 || speed == 50));
@@ -119,8 +119,8 @@ fn an_event_that_moves_the_robot_is_not_told_behind_its_watchdog() {
         world.step(10_000);
         let deadline = world.now();
         let told = match is_async {
-            true => world.block_on(robot.next_event_async(deadline)),
-            false => robot.next_event(deadline),
+            true => world.block_on(robot.next_event_async(deadline - robot.now())),
+            false => robot.next_event(deadline - robot.now()),
         };
         assert_eq!(told.unwrap(), Some(RobotEvent::Motor(go(0))), "async {is_async}");
         assert_eq!(robot.poll_event(), Some(RobotEvent::Watchdog));
@@ -142,8 +142,8 @@ fn commands_that_arrive_while_a_report_is_flushed_are_taken_whatever_parts_it_is
             far.write(&bytes(go(turn))).unwrap();
             let end = world.now() + Duration::from_micros(25_100);
             let run = match is_async {
-                true => world.block_on(robot.run_until_async(end, |_, _, _| ())),
-                false => robot.run_until(end, |_, _, _| ()),
+                true => world.block_on(robot.run_for_async(end - robot.now(), |_, _, _| ())),
+                false => robot.run_for(end - robot.now(), |_, _, _| ()),
             };
             run.unwrap();
         }
@@ -163,9 +163,8 @@ fn an_application_whose_calls_are_all_dropped_hears_of_the_watchdog() {
     far.write(&bytes(go(50))).unwrap();
     let mut told = vec![];
     while world.now_us() < 1_000_000 {
-        let deadline = world.now() + Duration::from_millis(1000);
         {
-            let mut call = pin!(robot.next_command_async(deadline));
+            let mut call = pin!(robot.next_command_async(Duration::from_millis(1000)));
             if let Poll::Ready(command) = poll(call.as_mut()) {
                 told.push((world.now_us(), command.unwrap().unwrap().speed()));
             }
@@ -184,15 +183,15 @@ fn a_command_that_arrives_before_a_read_fails_is_told_through_a_slow_port_too() 
         let mut robot = Robot::new(RobotConfig::default(), world.now());
         robot.set_telemetry(&Telemetry::default(), world.now());
         let mut robot = Driver::new(robot, port, world.clone());
-        assert!(poll(pin!(robot.next_command_async(world.now()))).is_pending());
+        assert!(poll(pin!(robot.next_command_async(Duration::ZERO))).is_pending());
         robot.port_mut().reads.extend([Step::Bytes(bytes(go(50))), Step::Error]);
         let deadline = world.now();
         if is_event {
-            assert!(world.block_on(robot.next_event_async(deadline)).is_err());
-            let event = world.block_on(robot.next_event_async(deadline));
+            assert!(world.block_on(robot.next_event_async(deadline - robot.now())).is_err());
+            let event = world.block_on(robot.next_event_async(deadline - robot.now()));
             assert_eq!(event, Ok(Some(RobotEvent::Motor(go(50)))));
         } else {
-            let command = world.block_on(robot.next_command_async(deadline));
+            let command = world.block_on(robot.next_command_async(deadline - robot.now()));
             assert_eq!(command, Ok(Some(go(50))));
         }
     }

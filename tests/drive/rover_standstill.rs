@@ -62,7 +62,12 @@ fn a_rover_without_reports_is_no_success_at_the_deadline_and_one_that_is_not_hea
         let mut rover = on(Host::new(HostConfig::default(), at_ms(0)), near);
         call!(is_async, rover, stop, stop_async()).unwrap();
         let deadline = at_ms(400);
-        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        let waited = call!(
+            is_async,
+            rover,
+            await_standstill,
+            await_standstill_async(deadline - rover.now())
+        );
         assert_eq!((waited, rover.now()), (not_still(StopProgress::NoReports), deadline));
         let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(5000)));
         assert_eq!(driven, not_still(StopProgress::NoReports));
@@ -78,10 +83,10 @@ fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_t
     for (is_async, (average, is_moved)) in BOTH.into_iter().flat_map(|it| averages.map(|a| (it, a)))
     {
         let (world, mut rover, robot) = rover(|config| config.rpm_average = average);
-        rover.run_until(at_ms(200), |_, _, _| ()).unwrap();
+        rover.run_for(at_ms(200) - rover.now(), |_, _, _| ()).unwrap();
         robot.borrow().port().unplugged.set(true);
         rover.drive(40, 0).unwrap();
-        rover.run_until(at_ms(240), |_, _, _| ()).unwrap();
+        rover.run_for(at_ms(240) - rover.now(), |_, _, _| ()).unwrap();
         let report = FirmwareReport::new(&Telemetry::default(), 38);
         (0..5).for_each(|index| rover.port().receive(report.frame(index).as_bytes()));
         rover.port_mut().flushes = [Step::Blocks(100_000)].into();
@@ -90,8 +95,7 @@ fn reports_that_arrive_while_a_stop_is_flushed_show_no_standstill_however_late_t
         if is_moved {
             rover = in_another_driver(rover);
         }
-        let deadline = rover.now() + ms(300);
-        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        let waited = call!(is_async, rover, await_standstill, await_standstill_async(ms(300)));
         assert_eq!(waited, not_still(StopProgress::NoReports), "async {is_async}, {average:?}");
     }
 }
@@ -102,7 +106,12 @@ fn without_a_stop_the_wait_for_a_standstill_ends_at_once() {
         let (world, mut rover, _robot) = coasting(ms(0));
         rover.drive(1, 0).unwrap();
         let deadline = at_ms(5000);
-        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        let waited = call!(
+            is_async,
+            rover,
+            await_standstill,
+            await_standstill_async(deadline - rover.now())
+        );
         assert_eq!(waited, not_still(StopProgress::NotAsked));
         assert!(world.now() < at_ms(10));
     }
@@ -113,12 +122,17 @@ fn the_wait_for_a_standstill_goes_through_errors_of_the_port_and_ends_with_the_l
     for (is_async, is_gone) in BOTH.into_iter().flat_map(|it| BOTH.map(|gone| (it, gone))) {
         let (world, mut rover, _robot) = coasting(ms(100));
         rover.drive(40, 0).unwrap();
-        rover.run_until(at_ms(100), |_, _, _| ()).unwrap();
+        rover.run_for(at_ms(100) - rover.now(), |_, _, _| ()).unwrap();
         rover.stop().unwrap();
         rover.port_mut().reads.extend([Step::Error, Step::Error]);
         rover.port().unplugged.set(is_gone);
         let deadline = at_ms(1000);
-        let waited = call!(is_async, rover, await_standstill, await_standstill_async(deadline));
+        let waited = call!(
+            is_async,
+            rover,
+            await_standstill,
+            await_standstill_async(deadline - rover.now())
+        );
         assert_eq!(waited, if is_gone { Err(GONE) } else { Ok(()) });
         assert_eq!(world.now() >= deadline, is_gone);
     }
@@ -130,7 +144,7 @@ fn a_dropped_wait_for_a_standstill_goes_on_in_the_next() {
     assert!(world.poll_times(6000, rover.drive_for_async(40, 0, ms(100))).is_none(), "it coasts");
     assert!(robot.borrow().role().command(world.now()).stands_still());
     let mut waits = 0;
-    while world.poll_times(50, rover.await_standstill_async(at_ms(5000))).is_none() {
+    while world.poll_times(50, rover.await_standstill_async(at_ms(5000) - rover.now())).is_none() {
         waits += 1;
     }
     assert!(waits > 3 && world.now() < at_ms(400), "{waits}, {:?}", world.now());

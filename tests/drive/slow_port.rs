@@ -104,7 +104,7 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
     let now = rover.now();
     rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
     let end = now + ms(1500);
-    world.block_on(rover.run_until_async(end, |_, _, _| ())).unwrap();
+    world.block_on(rover.run_for_async(end - rover.now(), |_, _, _| ())).unwrap();
     let speeds = speeds(rover.port());
     assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{speeds:?}");
 }

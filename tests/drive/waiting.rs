@@ -7,16 +7,16 @@ fn on_a_silent_line_next_event_waits_until_the_deadline_and_no_longer() {
     let world = World::default();
     let (near, _far) = Port::pair(&world, 20);
     let mut driver = on(Recorder::default(), near);
-    assert_eq!(driver.next_event(at_ms(10)), Ok(None));
+    assert_eq!(driver.next_event(at_ms(10) - driver.now()), Ok(None));
     assert_eq!(world.now(), at_ms(10));
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(20))), Ok(None));
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(20) - driver.now())), Ok(None));
     assert_eq!(world.now(), at_ms(20));
     // A deadline in the past takes no time, but still runs a round.
     driver.role_mut().frames.push_back(b"12".into());
-    assert_eq!(driver.next_event(at_ms(0)), Ok(None));
+    assert_eq!(driver.next_event(at_ms(0) - driver.now()), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 2);
     driver.role_mut().frames.push_back(b"34".into());
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(0))), Ok(None));
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(0) - driver.now())), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 4);
     assert_eq!(world.now(), at_ms(20));
 }
@@ -27,7 +27,7 @@ fn a_waiting_driver_wakes_for_its_role() {
     let (near, _far) = Port::pair(&world, 20);
     let mut driver = on(Recorder::default(), near);
     driver.role_mut().timeout = Some(at_ms(5));
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(10))), Ok(None));
+    assert_eq!(world.block_on(driver.next_event_async(at_ms(10) - driver.now())), Ok(None));
     let is_none = |call: &Call| matches!(call, Call::Input(bytes) if bytes.is_empty());
     let calls: Vec<_> = driver.role().calls.iter().filter(|call| !is_none(call)).collect();
     assert_eq!(calls.iter().filter(|call| ***call == Call::Timeout).count(), 1);
@@ -42,10 +42,10 @@ fn every_event_is_handed_out_until_the_deadline() {
     embedded_io::Write::write(&mut far, b"abc").unwrap();
     let mut driver = on(Recorder::default(), near);
     let mut events = vec![];
-    driver.run_until(at_ms(1), |_, event, _| events.push(event)).unwrap();
+    driver.run_for(at_ms(1) - driver.now(), |_, event, _| events.push(event)).unwrap();
     assert_eq!((&events[..], world.now()), (&b"abc"[..], at_ms(1)));
     embedded_io::Write::write(&mut far, b"def").unwrap();
-    let run = driver.run_until_async(at_ms(2), |role, event, _| {
+    let run = driver.run_for_async(at_ms(2) - driver.now(), |role, event, _| {
         events.push(event);
         role.frames.push_back(vec![event]);
     });
@@ -69,7 +69,7 @@ fn a_run_ends_at_its_deadline_although_more_events_wait() {
             times.push(now);
             world.step(4000);
         };
-        call!(is_async, driver, run_until, run_until_async(at_ms(5), slow)).unwrap();
+        call!(is_async, driver, run_for, run_for_async(at_ms(5) - driver.now(), slow)).unwrap();
         assert_eq!((&events[..], &times[..]), (&b"ab"[..], &[at_ms(1), at_ms(5)][..]));
         assert_eq!(driver.poll_event(), Some(b'c'), "it waits");
     }
@@ -104,7 +104,7 @@ fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
     let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
     let world = World::default();
     let mut driver = on(late, Port::new(&world, 20));
-    assert_eq!(driver.next_event(at_ms(1)), Ok(None));
+    assert_eq!(driver.next_event(at_ms(1) - driver.now()), Ok(None));
     assert_eq!(world.now(), at_ms(1));
 }
 

@@ -37,7 +37,7 @@ fn a_byte_that_arrives_wakes_a_task_that_waits_for_an_event() {
     let (near, mut far) = Port::pair(&World::default(), 20);
     let world = near.world.clone();
     let mut driver = on(Recorder::default(), near);
-    let mut task = Task::new(driver.next_event_async(at_ms(60_000)));
+    let mut task = Task::new(driver.next_event_async(at_ms(60_000) - driver.now()));
     assert!(task.poll().is_pending() && !task.is_woken());
     embedded_io::Write::write(&mut far, &[7]).unwrap();
     world.step(20);
@@ -49,7 +49,7 @@ fn a_byte_that_arrives_wakes_a_task_that_waits_for_an_event() {
 fn a_delay_that_is_over_wakes_a_task_that_waits_for_an_event() {
     let mut driver = on(Recorder::default(), Port::default());
     let world = driver.port().world.clone();
-    let mut task = Task::new(driver.next_event_async(at_ms(5)));
+    let mut task = Task::new(driver.next_event_async(at_ms(5) - driver.now()));
     assert!(task.poll().is_pending() && !task.is_woken());
     world.step(5000);
     assert!(task.is_woken(), "by the delay");
@@ -107,7 +107,9 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
     for waits in BOTH {
         let mut driver = on(Recorder::sending(&[b"stop"]), failing());
         let mut task = match waits {
-            true => Task::new(async { driver.next_event_async(at_ms(1000)).await.map(drop) }),
+            true => Task::new(async {
+                driver.next_event_async(at_ms(1000) - driver.now()).await.map(drop)
+            }),
             false => Task::new(driver.service_async()),
         };
         assert_eq!((task.poll(), task.wakes.count()), (Poll::Pending, 1));
@@ -119,7 +121,7 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
 fn a_read_that_fails_while_the_driver_waits_also_yields() {
     // The first read finds nothing, the waiting one fails.
     let mut driver = on(Recorder::default(), Port::reading([Step::Stall, Step::Error]));
-    let mut task = Task::new(driver.next_event_async(at_ms(1000)));
+    let mut task = Task::new(driver.next_event_async(at_ms(1000) - driver.now()));
     assert_eq!((task.poll(), task.wakes.count()), (Poll::Pending, 1));
     assert_eq!(task.poll(), Poll::Ready(Err(GONE)));
 }

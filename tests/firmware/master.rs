@@ -72,7 +72,7 @@ fn written(board: &Board, bus: &mut Driver<Nodes, Wire, WireClock>, wanted: &[&s
     let end = std::time::Instant::now() + PATIENCE;
     while !board.has_written(wanted) {
         let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |_, _, _| {}).unwrap();
+        bus.run_for(pause, |_, _, _| {}).unwrap();
         assert!(
             std::time::Instant::now() < end,
             "timed out waiting for {wanted:?}: {:#?}",
@@ -100,7 +100,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
     let end = std::time::Instant::now() + PATIENCE;
     while [0, 1].map(|index| bus.role().command(index)) != wanted {
         let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |_, _, _| {}).unwrap();
+        bus.run_for(pause, |_, _, _| {}).unwrap();
         assert!(std::time::Instant::now() < end, "not commanded: {:#?}", board.lines());
     }
 
@@ -113,7 +113,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
     let end = std::time::Instant::now() + PATIENCE;
     while heard.last().is_none_or(|&(target, _)| target != Target::Velocity(turn)) {
         let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |nodes, event, _| {
+        bus.run_for(pause, |nodes, event, _| {
             if let SlaveEvent::Command(target @ Target::Velocity(_)) = event {
                 heard.push((target, nodes.nodes[0].slave().statistics().replies));
             }

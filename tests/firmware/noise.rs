@@ -147,7 +147,7 @@ fn the_board_masters_a_noisy_bus_and_no_slave_gets_a_command_that_its_program_do
     let (end, mut turns_when_back) = (Instant::now() + 2 * PATIENCE, None);
     while turns_when_back.is_none_or(|then| turns == then) || goes == 0 {
         let pause = bus.now() + Duration::from_millis(20);
-        bus.run_until(pause, |nodes, event, _| match event {
+        bus.run_for(pause, |nodes, event, _| match event {
             // A node that looked abnormal is stopped: 0 rps, or the position where it was.
             SlaveEvent::Command(Target::Velocity(Rps::ZERO)) => {}
             SlaveEvent::Command(Target::Position(to)) if nodes.told.contains(&to.counts()) => {}

@@ -261,7 +261,7 @@ pub(crate) fn board_shows(
     let end = end_of(rover);
     loop {
         let pause = rover.now() + Duration::from_millis(20);
-        rover.run_until(pause, |_, _, _| {}).unwrap();
+        rover.run_for(pause, |_, _, _| {}).unwrap();
         let told = board.report_when("told", |_| true);
         if done(&told) {
             return told;

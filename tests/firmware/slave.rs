@@ -88,7 +88,7 @@ fn a_paid_stop_is_two_commands_each_followed_by_an_answer_and_the_motor_is_at_re
 
     let here = board.report_when("at rest", |report| report.at("mrps") == 0);
     let end = bus.now() + Duration::from_millis(300);
-    bus.run_until(end, |_, _, _| {}).unwrap();
+    bus.run_for(end, |_, _, _| {}).unwrap();
     let there = board.report_when("read again", |report| report.at("reads") > here.at("reads"));
     let way = there.at("counts") - here.at("counts");
     assert!(way.abs() <= 8, "{here:?} {there:?}");

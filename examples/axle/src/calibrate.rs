@@ -56,7 +56,7 @@ pub(crate) struct Args {
 }
 
 /// Longest wait for the result: the robot repeats it every second until it is then acknowledged.
-const RESULT_PATIENCE: Duration = Duration::from_millis(5000);
+const RESULT_PATIENCE: Duration = Duration::from_secs(5);
 
 /// What happens.
 #[derive(Debug, Serialize)]

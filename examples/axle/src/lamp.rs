@@ -40,7 +40,7 @@ enum State {
 const COMMANDS: u32 = 3;
 
 /// Longest time for sending them; they are 100 ms apart.
-const PATIENCE: Duration = Duration::from_millis(2000);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {

@@ -30,7 +30,7 @@ pub(crate) struct Args {
 }
 
 /// Longest wait for an answer to a ping behind the message.
-const PATIENCE: Duration = Duration::from_millis(2000);
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {

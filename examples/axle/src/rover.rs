@@ -23,7 +23,7 @@ mod pings;
 use pings::{LONGEST_TRIP, Pings};
 
 /// Time allowed for a robot to be heard for the first time.
-const LINK_PATIENCE: Duration = Duration::from_millis(2000);
+const LINK_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Time allowed for the wheels to come to rest after the first stop, and for the average that the
 /// robot reports to show it.

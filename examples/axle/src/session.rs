@@ -76,7 +76,7 @@ impl<R: Endpoint> Session<R> {
     /// round, if it has to stop something.
     pub(crate) fn round(&mut self, until: Instant) -> Result<Option<R::Event>, Failure> {
         let until = until.min(self.now() + PATIENCE);
-        match self.driver.next_event(until) {
+        match self.driver.next_event(until - self.driver.now()) {
             Ok(event) => {
                 self.stuck_since = None;
                 Ok(event)

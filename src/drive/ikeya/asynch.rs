@@ -14,7 +14,7 @@ use crate::{
         master::{Master, NodeSet},
         slave::Slave,
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// The async calls of a master: the same as the blocking ones, and cancel safe as the
@@ -143,7 +143,8 @@ where
         self.await_stops_async(NodeSet::ALL).await
     }
 
-    /// Reads a node; returns a measurement received after this call was made.
+    /// Reads a node; returns a measurement received after this call was made. Waits for at most
+    /// four times [`Master::read_bound`].
     ///
     /// # Errors
     ///
@@ -228,16 +229,18 @@ where
     P: embedded_io_async::Read + embedded_io_async::Write,
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
-    /// Returns the next command, and answers requests meanwhile. `None` at `deadline`, and at once
-    /// when the watchdog has fired: its event is then the next of [`poll_event`](Self::poll_event).
+    /// Returns the next command, and answers requests meanwhile; waits for it for this long. `None`
+    /// if there was none, and at once when the watchdog has fired: its event is then the next of
+    /// [`poll_event`](Self::poll_event).
     ///
     /// # Errors
     ///
     /// Port errors.
     pub async fn next_command_async(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.until_with_async(deadline, Needs::HalfPort, Self::command).await.map(Option::flatten)
     }
 }

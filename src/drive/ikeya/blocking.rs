@@ -14,7 +14,7 @@ use crate::{
         master::{Master, NodeSet},
         slave::Slave,
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// The blocking calls of a master.
@@ -134,7 +134,8 @@ where
         self.await_stops(NodeSet::ALL)
     }
 
-    /// Reads a node; returns a measurement received after this call was made.
+    /// Reads a node; returns a measurement received after this call was made. Waits for at most
+    /// four times [`Master::read_bound`].
     ///
     /// # Errors
     ///
@@ -203,16 +204,18 @@ impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C>
 where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
-    /// Returns the next command, and answers requests meanwhile. `None` at `deadline`, and at once
-    /// when the watchdog has fired: its event is then the next of [`poll_event`](Self::poll_event).
+    /// Returns the next command, and answers requests meanwhile; waits for it for this long. `None`
+    /// if there was none, and at once when the watchdog has fired: its event is then the next of
+    /// [`poll_event`](Self::poll_event).
     ///
     /// # Errors
     ///
     /// Port errors.
     pub fn next_command(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.until_with(deadline, Needs::HalfPort, Self::command).map(Option::flatten)
     }
 }

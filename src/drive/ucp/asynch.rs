@@ -10,7 +10,7 @@ use crate::{
     time::{Duration, Instant},
     ucp::{
         MotorControl,
-        host::{BiasStore, CalibrationStep, Host, ReceivedReport},
+        host::{BiasStore, COAST, CalibrationStep, Host, ReceivedReport},
         message::CalibrationKind,
         robot::Robot,
     },
@@ -31,13 +31,10 @@ where
     ///
     /// # Errors
     ///
-    /// [`DriveError::Timeout`] at `deadline`, and port errors.
-    pub async fn ping_async(
-        &mut self,
-        deadline: Instant,
-    ) -> Result<Duration, DriveError<P::Error>> {
+    /// [`DriveError::Timeout`] if nothing came within this time, and port errors.
+    pub async fn ping_async(&mut self, within: Duration) -> Result<Duration, DriveError<P::Error>> {
         self.role.take_round_trip();
-        let pong = self.until_async(deadline, |driver| driver.pong()).await?;
+        let pong = self.until_async(self.now() + within, |driver| driver.pong()).await?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
@@ -82,8 +79,7 @@ where
         let driven = guard.0.hold_command_async(speed, angular, span).await;
         drop(guard);
         self.send_stop_async().await?;
-        let deadline = self.coast_deadline();
-        self.await_standstill_async(deadline).await?;
+        self.await_standstill_async(COAST).await?;
         driven
     }
 
@@ -107,24 +103,24 @@ where
     /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less, and the
     /// last is an average of the time since ([`Host::stop_progress`]). So this takes at least
     /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average). Continues through
-    /// errors of the port. For a rover that coasts, set `deadline` at least
-    /// [`COAST`](crate::ucp::host::COAST) from now.
+    /// errors of the port. For a rover that coasts, allow at least
+    /// [`COAST`](crate::ucp::host::COAST).
     ///
     /// # Errors
     ///
-    /// [`DriveError::NoStandstill`] at `deadline`, and at once if the latest command is to move;
+    /// [`DriveError::NoStandstill`] after this time, and at once if the latest command is to move;
     /// [`DriveError::Timeout`] if the stop has not left by then; port errors, if the port still
-    /// fails at `deadline`. **The robot may be moving.** The stop is repeated as long as the driver
+    /// fails then. **The robot may be moving.** The stop is repeated as long as the driver
     /// is called.
     pub async fn await_standstill_async(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
-        let standing = self.until_through_errors_async(deadline, Self::standing).await?;
+        let standing = self.until_through_errors_async(self.now() + within, Self::standing).await?;
         standing.unwrap_or_else(|| Err(self.no_standstill()))
     }
 
-    /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
+    /// Returns the latest report not returned yet; waits for one for this long, then returns
     /// `None`. Reports in between are skipped: to see every report, take events.
     ///
     /// # Errors
@@ -132,24 +128,25 @@ where
     /// Port errors.
     pub async fn next_report_async(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<ReceivedReport>, DriveError<P::Error>> {
-        self.until_async(deadline, Self::report).await
+        self.until_async(self.now() + within, Self::report).await
     }
 
     /// Begins a calibration, and returns when the robot has agreed; see
-    /// [`Host::start_calibration`]. For all attempts to fit, set `deadline` at least
-    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound) from now.
+    /// [`Host::start_calibration`]. For all attempts to fit, allow at least
+    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound).
     ///
     /// # Errors
     ///
-    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
-    /// and port errors.
+    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] after this
+    /// time, and port errors.
     pub async fn start_calibration_async(
         &mut self,
         kind: CalibrationKind,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.begin_calibration(CalibrationStep::Start, kind)?;
         let outcome = self.until_async(deadline, Self::calibration).await?;
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
@@ -164,8 +161,9 @@ where
     pub async fn end_calibration_async(
         &mut self,
         kind: CalibrationKind,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.begin_calibration(CalibrationStep::End, kind)?;
         let outcome = self.until_async(deadline, Self::calibration).await?;
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
@@ -234,7 +232,8 @@ where
     C: Clock + embedded_hal_async::delay::DelayNs,
 {
     /// Returns the current command, once it has changed since the last call, including a standstill
-    /// by the watchdog. Answers and reports meanwhile. `None` at `deadline`.
+    /// by the watchdog. Answers and reports meanwhile; waits for this
+    /// long, then returns `None`.
     ///
     /// # Errors
     ///
@@ -242,8 +241,9 @@ where
     /// [`Robot::command`].
     pub async fn next_command_async(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<MotorControl>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.until_with_async(deadline, Needs::HalfPort, Self::new_command).await
     }
 }

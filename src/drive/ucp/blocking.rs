@@ -10,7 +10,7 @@ use crate::{
     time::{Duration, Instant},
     ucp::{
         MotorControl,
-        host::{BiasStore, CalibrationStep, Host, ReceivedReport},
+        host::{BiasStore, COAST, CalibrationStep, Host, ReceivedReport},
         message::CalibrationKind,
         robot::Robot,
     },
@@ -29,10 +29,10 @@ where
     ///
     /// # Errors
     ///
-    /// [`DriveError::Timeout`] at `deadline`, and port errors.
-    pub fn ping(&mut self, deadline: Instant) -> Result<Duration, DriveError<P::Error>> {
+    /// [`DriveError::Timeout`] if nothing came within this time, and port errors.
+    pub fn ping(&mut self, within: Duration) -> Result<Duration, DriveError<P::Error>> {
         self.role.take_round_trip();
-        let pong = self.until(deadline, |driver| driver.pong())?;
+        let pong = self.until(self.now() + within, |driver| driver.pong())?;
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
@@ -68,8 +68,7 @@ where
         self.command(speed, angular)?;
         let driven = self.hold_command(speed, angular, span);
         self.stop()?;
-        let deadline = self.coast_deadline();
-        self.await_standstill(deadline)?;
+        self.await_standstill(COAST)?;
         driven
     }
 
@@ -93,21 +92,21 @@ where
     /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less, and the
     /// last is an average of the time since ([`Host::stop_progress`]). So this takes at least
     /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average). Continues through
-    /// errors of the port. For a rover that coasts, set `deadline` at least
-    /// [`COAST`](crate::ucp::host::COAST) from now.
+    /// errors of the port. For a rover that coasts, allow at least
+    /// [`COAST`](crate::ucp::host::COAST).
     ///
     /// # Errors
     ///
-    /// [`DriveError::NoStandstill`] at `deadline`, and at once if the latest command is to move;
+    /// [`DriveError::NoStandstill`] after this time, and at once if the latest command is to move;
     /// [`DriveError::Timeout`] if the stop has not left by then; port errors, if the port still
-    /// fails at `deadline`. **The robot may be moving.** The stop is repeated as long as the driver
+    /// fails then. **The robot may be moving.** The stop is repeated as long as the driver
     /// is called.
-    pub fn await_standstill(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
-        let standing = self.until_through_errors(deadline, Self::standing)?;
+    pub fn await_standstill(&mut self, within: Duration) -> Result<(), DriveError<P::Error>> {
+        let standing = self.until_through_errors(self.now() + within, Self::standing)?;
         standing.unwrap_or_else(|| Err(self.no_standstill()))
     }
 
-    /// Returns the latest report not returned yet; waits for one until `deadline`, then returns
+    /// Returns the latest report not returned yet; waits for one for this long, then returns
     /// `None`. Reports in between are skipped: to see every report, take events.
     ///
     /// # Errors
@@ -115,24 +114,25 @@ where
     /// Port errors.
     pub fn next_report(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<ReceivedReport>, DriveError<P::Error>> {
-        self.until(deadline, Self::report)
+        self.until(self.now() + within, Self::report)
     }
 
     /// Begins a calibration, and returns when the robot has agreed; see
-    /// [`Host::start_calibration`]. For all attempts to fit, set `deadline` at least
-    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound) from now.
+    /// [`Host::start_calibration`]. For all attempts to fit, allow at least
+    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound).
     ///
     /// # Errors
     ///
-    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] at `deadline`,
-    /// and port errors.
+    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] after this
+    /// time, and port errors.
     pub fn start_calibration(
         &mut self,
         kind: CalibrationKind,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.begin_calibration(CalibrationStep::Start, kind)?;
         let outcome = self.until(deadline, Self::calibration)?;
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
@@ -147,8 +147,9 @@ where
     pub fn end_calibration(
         &mut self,
         kind: CalibrationKind,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.begin_calibration(CalibrationStep::End, kind)?;
         let outcome = self.until(deadline, Self::calibration)?;
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
@@ -211,7 +212,8 @@ where
     P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady,
 {
     /// Returns the current command, once it has changed since the last call, including a standstill
-    /// by the watchdog. Answers and reports meanwhile. `None` at `deadline`.
+    /// by the watchdog. Answers and reports meanwhile; waits for this
+    /// long, then returns `None`.
     ///
     /// # Errors
     ///
@@ -219,8 +221,9 @@ where
     /// [`Robot::command`].
     pub fn next_command(
         &mut self,
-        deadline: Instant,
+        within: Duration,
     ) -> Result<Option<MotorControl>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
         self.until_with(deadline, Needs::HalfPort, Self::new_command)
     }
 }

@@ -10,8 +10,7 @@ use crate::{
     ucp::{
         MotorControl,
         host::{
-            BiasStore, COAST, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport,
-            StopProgress,
+            BiasStore, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport, StopProgress,
         },
         message::CalibrationKind,
         robot::{Robot, RobotEvent},
@@ -41,7 +40,7 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
         self.role.stop(now);
     }
 
-    pub(super) fn stop_deadline(&mut self) -> Instant {
+    pub(super) fn stop_deadline(&self) -> Instant {
         self.now() + STOP_BOUND
     }
 
@@ -49,10 +48,6 @@ impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     pub(super) fn stopped(&mut self) -> Option<()> {
         self.drop_routine();
         (self.role.is_stop_sent() && self.is_sent()).then_some(())
-    }
-
-    pub(super) fn coast_deadline(&mut self) -> Instant {
-        self.now() + COAST
     }
 
     /// `Ok` once the robot stands still; an error if it was not even told to.

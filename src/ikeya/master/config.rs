@@ -93,7 +93,7 @@ impl MasterConfig {
             recovery_share_pct: 5,
             accepts_early: false,
             hold_age: Duration::ZERO,
-            coast: Duration::from_millis(2000),
+            coast: Duration::from_secs(2),
             dead_man: None,
             stops_abnormal: true,
         }

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Longest time for which the line is kept free for a request that the port holds.
-const HELD: Duration = Duration::from_millis(1000);
+const HELD: Duration = Duration::from_secs(1);
 
 #[derive(Clone, Debug)]
 #[repr(C)]

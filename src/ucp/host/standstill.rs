@@ -6,7 +6,7 @@ use crate::time::{Duration, Instant};
 
 /// Time in which a rover is seen to stand still after its stop, 3 s: 2 s to coast, and one more
 /// until the average that it reports shows it. `Driver::drive_for` waits that long.
-pub const COAST: Duration = Duration::from_millis(3000);
+pub const COAST: Duration = Duration::from_secs(3);
 
 /// Number of reports in a row that must show all wheels still, 3: one alone may show wheels that
 /// are just reversing.

@@ -77,8 +77,8 @@ impl RobotConfig {
             watchdog: Duration::from_millis(500),
             report_period: Duration::from_millis(20),
             layout: ReportLayout::Firmware { version: 38 },
-            result_period: Duration::from_millis(1000),
-            bias_request_period: Some(Duration::from_millis(1000)),
+            result_period: Duration::from_secs(1),
+            bias_request_period: Some(Duration::from_secs(1)),
             idle_margin: Duration::from_millis(5),
         }
     }

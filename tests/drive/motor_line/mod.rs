@@ -164,7 +164,7 @@ impl Wire {
 pub(crate) fn run<R: Endpoint>(driver: &mut On<R>, millis: u32) {
     let end = driver.now() + ms(millis);
     while driver.now() < end {
-        if driver.run_until(end, |_, _, _| ()).is_err() {
+        if driver.run_for(end - driver.now(), |_, _, _| ()).is_err() {
             driver.port().world.step(100);
         }
     }

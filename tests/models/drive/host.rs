@@ -104,14 +104,13 @@ impl<P: Wired> HostLife<P> {
 
     fn blocking(&mut self, call: Call) -> Outcome {
         let driver = &mut self.driver;
-        let now = driver.now();
         match call {
             Call::Service => Self::told(driver.service()),
-            Call::Idle => Self::told(driver.run_until(now + IDLE, |_, _, _| ())),
+            Call::Idle => Self::told(driver.run_for(IDLE, |_, _, _| ())),
             Call::Drive(speed) => Self::told(driver.drive(speed, 0)),
             Call::Stop => Self::told(driver.stop()),
             Call::DriveFor => Self::told(driver.drive_for(60, 0, SPAN)),
-            Call::Ping => Self::told(driver.ping(now + Duration::from_millis(60))),
+            Call::Ping => Self::told(driver.ping(Duration::from_millis(60))),
             Call::Discard => {
                 driver.discard();
                 Ok(())

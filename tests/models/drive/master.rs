@@ -63,10 +63,7 @@ impl<P: Wired> MasterLife<P> {
         let (driver, target) = (&mut self.driver, target(self.setup.mode, 2));
         match (call, target) {
             (Call::Service, _) => told::<_, P>(driver.service()),
-            (Call::Idle, _) => {
-                let end = driver.now() + IDLE;
-                told::<_, P>(driver.run_until(end, |_, _, _| ()))
-            }
+            (Call::Idle, _) => told::<_, P>(driver.run_for(IDLE, |_, _, _| ())),
             (Call::Discover, _) => told::<_, P>(driver.discover()),
             (Call::Set(number), _) => told::<_, P>(match self::target(self.setup.mode, number) {
                 Target::Velocity(velocity) => driver.set_velocity(N1, velocity),
@@ -86,10 +83,7 @@ impl<P: Wired> MasterLife<P> {
         let (driver, target) = (&mut self.driver, target(self.setup.mode, 2));
         match (call, target) {
             (Call::Service, _) => told::<_, P>(driver.service_async().await),
-            (Call::Idle, _) => {
-                let end = driver.now() + IDLE;
-                told::<_, P>(driver.run_until_async(end, |_, _, _| ()).await)
-            }
+            (Call::Idle, _) => told::<_, P>(driver.run_for_async(IDLE, |_, _, _| ()).await),
             (Call::Discover, _) => told::<_, P>(driver.discover_async().await),
             (Call::Set(number), _) => told::<_, P>(match self::target(self.setup.mode, number) {
                 Target::Velocity(velocity) => driver.set_velocity_async(N1, velocity).await,

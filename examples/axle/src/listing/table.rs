@@ -15,7 +15,7 @@ use super::{Modes, Out, REASONS, Shown, pending, print_summary};
 use crate::args::Protocol;
 
 /// The time over which a rate is measured.
-const RATE_PERIOD: Duration = Duration::from_millis(1000);
+const RATE_PERIOD: Duration = Duration::from_secs(1);
 
 /// Traffic per message. There are few kinds of messages, so the table stays small.
 pub(crate) struct Table {

@@ -14,7 +14,7 @@ use crate::{args::Protocol, failure::Failure};
 const QUEUE: usize = 16 * 1024;
 
 /// Time allowed for the disk to take the last packets.
-const FAREWELL: Duration = Duration::from_millis(2000);
+const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Records without ever waiting for the disk.
 pub(crate) struct Background {

@@ -155,7 +155,7 @@ fn from_the_stop_on_a_rover_gets_nothing_but_stops() {
 fn the_wheels_of_a_report_are_told_in_their_order() {
     let line = played::rover(|rover| rover.wheels = Some([1, -2, 3, -4]));
     let mut rover = Rover::on(line.line.clone(), &PortArgs::new(None));
-    let end = rover.now() + Duration::from_millis(5000);
+    let end = rover.now() + Duration::from_secs(5);
     while rover.describe().is_none() && rover.now() < end {
         rover.round(end).unwrap();
     }

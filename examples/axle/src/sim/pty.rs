@@ -17,7 +17,7 @@ use crate::{failure::Failure, line::Wire};
 const UNREAD_LIMIT: u32 = 2048;
 
 /// Silence after which the program that had the path open may be gone.
-const GONE: Duration = Duration::from_millis(1000);
+const GONE: Duration = Duration::from_secs(1);
 
 /// Longest wait in one call.
 const LOOK: Duration = Duration::from_millis(5);

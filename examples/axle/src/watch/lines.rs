@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Interval at which a line is printed.
-const PRINT_PERIOD: Duration = Duration::from_millis(1000);
+const PRINT_PERIOD: Duration = Duration::from_secs(1);
 
 pub(super) fn watch<F>(watched: &Watched<'_>) -> Result<(), Failure>
 where

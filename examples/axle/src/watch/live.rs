@@ -31,7 +31,7 @@ const QUEUE: usize = 16 * 1024;
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Time allowed for the page to end, longer than for its terminal.
-const FAREWELL: Duration = Duration::from_millis(1000);
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// An update for the page, and its time, microseconds.
 struct News(u64, What);

@@ -226,7 +226,7 @@ fn what_was_due_while_the_tool_was_suspended_is_not_sent() {
     wait_until("a command", || speeds(&line.said()).contains(&2.0));
     send.signal("STOP");
     wait_until("a suspension", || send.state() == 'T');
-    thread::sleep(Duration::from_millis(1000));
+    thread::sleep(Duration::from_secs(1));
     let before = line.said().len();
     send.signal("CONT");
     let error = send.complaint(1);

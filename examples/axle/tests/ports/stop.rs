@@ -206,7 +206,7 @@ fn a_stop_is_not_interrupted() {
         thread::sleep(Duration::from_millis(100));
     }
     // While nothing moves, a second one, a second later, ends a tool.
-    thread::sleep(Duration::from_millis(1000));
+    thread::sleep(Duration::from_secs(1));
     stop.signal("INT");
     thread::sleep(Duration::from_millis(100));
     line.change(|node| node.rps = 0.0);

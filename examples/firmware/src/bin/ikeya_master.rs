@@ -26,7 +26,7 @@ serve_usarts!();
 const CYCLE: Duration = Duration::from_millis(10);
 
 /// Interval between lines of counts, and between a discovery without nodes and the next one.
-const REPORT: Duration = Duration::from_millis(1000);
+const REPORT: Duration = Duration::from_secs(1);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -49,7 +49,7 @@ fn run(mut board: Board) {
     driver.role_mut().discover(now);
     loop {
         // Neither the port nor the pin can fail.
-        if let Ok(Some(event)) = driver.next_event(report_at) {
+        if let Ok(Some(event)) = driver.next_event(report_at - driver.now()) {
             if let MasterEvent::Status { .. } = event {
                 exchanges = exchanges.wrapping_add(1);
             }

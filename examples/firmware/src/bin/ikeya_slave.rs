@@ -29,7 +29,7 @@ const READING: IdReading = IdReading::ValuePlusOne;
 const STEP: Duration = Duration::from_millis(5);
 
 /// Interval between lines of text.
-const REPORT: Duration = Duration::from_millis(1000);
+const REPORT: Duration = Duration::from_secs(1);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -57,7 +57,7 @@ fn run(mut board: Board, node: NodeId, mode: Mode) {
         // Answers are sent in here, right after wake-up and before anything else. Neither the port
         // nor the pin can fail.
         let until = last + STEP;
-        let _ = driver.run_until(until, |_, event, _| {
+        let _ = driver.run_for(until - driver.now(), |_, event, _| {
             if event == ikeya::slave::SlaveEvent::Watchdog {
                 stops = stops.wrapping_add(1);
             }

@@ -26,7 +26,7 @@ const NODE: NodeId = NodeId::N1;
 const SPEED: f32 = 2.0;
 
 /// Interval between lines of text.
-const REPORT: Duration = Duration::from_millis(1000);
+const REPORT: Duration = Duration::from_secs(1);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -50,7 +50,7 @@ fn run(mut board: Board) {
     driver.role_mut().discover(now);
     loop {
         // Neither the port nor the pin can fail.
-        if let Ok(Some(event)) = driver.next_event(report_at) {
+        if let Ok(Some(event)) = driver.next_event(report_at - driver.now()) {
             let now = driver.now();
             match event {
                 MasterEvent::Status { .. } => exchanges = exchanges.wrapping_add(1),

@@ -28,7 +28,7 @@ serve_usarts!();
 const STEP: Duration = Duration::from_millis(10);
 
 /// Interval between lines of text.
-const REPORT: Duration = Duration::from_millis(1000);
+const REPORT: Duration = Duration::from_secs(1);
 
 /// Results of a calibration; the model has no real biases.
 const ACC_BIAS: [i16; 3] = [12, -7, 3];
@@ -58,7 +58,7 @@ fn run(mut board: Board) {
         // cannot fail. A report is 44 bytes and takes 4 ms to send; the interrupt receives bytes
         // meanwhile.
         let until = last + STEP;
-        while let Ok(Some(event)) = driver.next_event(until) {
+        while let Ok(Some(event)) = driver.next_event(until - driver.now()) {
             let now = driver.now();
             shown.answer(driver.role_mut(), event, now);
             if now >= until {

@@ -25,18 +25,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     if rover.role().last_report().is_none() {
         return Err("no robot answers".into());
     }
-    let deadline = rover.now() + COAST;
-    rover.await_standstill(deadline)?;
+    rover.await_standstill(COAST)?;
     println!("standing still");
     Ok(driven?)
 }
 
 fn drive(rover: &mut Driver<Host, SerialPort, StdClock>) -> Result<(), DriveError<io::Error>> {
-    let end = rover.now() + Duration::from_millis(2000);
+    let end = rover.now() + Duration::from_secs(2);
     while rover.now() < end {
         rover.drive(30, 0)?; // percent; counts for half a second
-        let soon = rover.now() + Duration::from_millis(100);
-        if let Some(report) = rover.next_report(soon)? {
+        if let Some(report) = rover.next_report(Duration::from_millis(100))? {
             let seen = report.telemetry;
             println!("{:?} rpm, {:.1} V", seen.rpm, seen.volts());
         }

@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
     let mut bus = Driver::with(|now| Master::new(config, now), port, StdClock::new());
     println!("found: {:?}", bus.discover()?);
-    let turned = bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_millis(3000));
+    let turned = bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3));
     bus.stop_all()?; // an error here means that the motor may be running: say so
     Ok(turned?)
 }

@@ -18,7 +18,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut bus = Driver::with(|now| Master::new(config, now), port, TokioClock::new());
     println!("found: {:?}", bus.discover_async().await?);
     let turned = tokio::select! {
-        turned = bus.drive_for_async(NodeId::N1, Rps::new(2.0)?, Duration::from_millis(3000)) => turned,
+        turned = bus.drive_for_async(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3)) => turned,
         signal = tokio::signal::ctrl_c() => Ok(signal?),
     };
     // A turn that was dropped leaves its stop to this call.

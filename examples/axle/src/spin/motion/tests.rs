@@ -169,7 +169,7 @@ fn a_mode_in_doubt_is_told_with_the_mode_of_the_answer() {
     });
     let (mut spin, _) = ready(&line);
     spin.bus.command(spin.node, speed(2.0), spin.start).unwrap();
-    let end = spin.bus.now() + Duration::from_millis(2000);
+    let end = spin.bus.now() + Duration::from_secs(2);
     while !spin.bus.master().is_mode_in_doubt(NodeId::N1) && spin.bus.now() < end {
         let soon = spin.bus.now() + Duration::from_millis(5);
         spin.bus.round(soon).unwrap();

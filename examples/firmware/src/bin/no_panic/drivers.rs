@@ -101,8 +101,8 @@ impl DelayNs for Delay {
 fn turn<R: Endpoint>(driver: &mut Driver<R, Port, fn() -> Instant>) {
     match any(0) {
         0 => keep(driver.service()),
-        1 => keep(driver.next_event(now())),
-        2 => keep(driver.run_until(now(), |_, event, _| keep(event))),
+        1 => keep(driver.next_event(duration())),
+        2 => keep(driver.run_for(duration(), |_, event, _| keep(event))),
         3 => keep(driver.poll_event()),
         4 => keep((driver.poll_timeout(), driver.now())),
         5 => keep(driver.unsent()),
@@ -143,7 +143,7 @@ fn slave<B: Board>() {
     ));
     while any(true) {
         match any(0) {
-            0 => keep(driver.next_command(now())),
+            0 => keep(driver.next_command(duration())),
             _ => turn(&mut driver),
         }
     }
@@ -156,14 +156,14 @@ fn host() {
     while any(true) {
         let kind = any(CalibrationKind::Imu);
         match any(0) {
-            0 => keep(driver.ping(now())),
+            0 => keep(driver.ping(duration())),
             1 => keep(driver.drive(any(0), any(0))),
             2 => keep(driver.stop()),
-            3 => keep(driver.next_report(now())),
-            4 => keep(driver.start_calibration(kind, now())),
-            5 => keep(driver.end_calibration(kind, now())),
+            3 => keep(driver.next_report(duration())),
+            4 => keep(driver.start_calibration(kind, duration())),
+            5 => keep(driver.end_calibration(kind, duration())),
             6 => keep(driver.drive_for(any(0), any(0), duration())),
-            7 => keep(driver.await_standstill(now())),
+            7 => keep(driver.await_standstill(duration())),
             _ => turn(&mut driver),
         }
     }
@@ -174,7 +174,7 @@ fn robot() {
     let mut driver = driver(Robot::new(any(RobotConfig::default()), now()));
     while any(true) {
         match any(0) {
-            0 => keep(driver.next_command(now())),
+            0 => keep(driver.next_command(duration())),
             _ => turn(&mut driver),
         }
     }

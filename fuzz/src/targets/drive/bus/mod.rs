@@ -154,13 +154,19 @@ where
             }
             Do::NextEvent { ms } => {
                 let by = by(ms, &mut self.rig);
-                let done = call!(self.rig, how, next_event, next_event_async(by));
+                let done =
+                    call!(self.rig, how, next_event, next_event_async(by - self.rig.driver.now()));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 1
             }
             Do::RunUntil { ms } => {
                 let by = by(ms, &mut self.rig);
-                let done = call!(self.rig, how, run_until, run_until_async(by, |_, _, _| ()));
+                let done = call!(
+                    self.rig,
+                    how,
+                    run_for,
+                    run_for_async(by - self.rig.driver.now(), |_, _, _| ())
+                );
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 2
             }

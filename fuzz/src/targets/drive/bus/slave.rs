@@ -50,8 +50,7 @@ where
                 rig.end(&before, MS(0), done.as_ref());
             }
             Do::NextEvent { ms } | Do::RunUntil { ms } => {
-                let by = rig.driver.now() + MS(ms.into());
-                let done = call!(rig, how, next_command, next_command_async(by));
+                let done = call!(rig, how, next_command, next_command_async(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
                 if let Some(Ok(Some(target))) = done {
                     assert!(written.iter().any(|(_, write)| means(write, target)), "{target:?}");

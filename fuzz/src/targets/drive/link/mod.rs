@@ -146,13 +146,19 @@ where
             }
             Do::NextEvent { ms } => {
                 let at = by(ms.into(), &mut self.rig);
-                let done = call!(self.rig, how, next_event, next_event_async(at));
+                let done =
+                    call!(self.rig, how, next_event, next_event_async(at - self.rig.driver.now()));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 1
             }
             Do::RunUntil { ms } => {
                 let at = by(ms.into(), &mut self.rig);
-                let done = call!(self.rig, how, run_until, run_until_async(at, |_, _, _| ()));
+                let done = call!(
+                    self.rig,
+                    how,
+                    run_for,
+                    run_for_async(at - self.rig.driver.now(), |_, _, _| ())
+                );
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 2
             }
@@ -188,13 +194,18 @@ where
             }
             Do::Ping { ms } => {
                 let at = by(ms.into(), &mut self.rig);
-                let done = call!(self.rig, how, ping, ping_async(at));
+                let done = call!(self.rig, how, ping, ping_async(at - self.rig.driver.now()));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 6
             }
             Do::NextReport { ms } => {
                 let at = by(ms.into(), &mut self.rig);
-                let done = call!(self.rig, how, next_report, next_report_async(at));
+                let done = call!(
+                    self.rig,
+                    how,
+                    next_report,
+                    next_report_async(at - self.rig.driver.now())
+                );
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 7
             }
@@ -204,9 +215,19 @@ where
                 let ms = u32::from(ms) % 1000;
                 let at = by(ms, &mut self.rig);
                 let done = match is_end {
-                    true => call!(self.rig, how, end_calibration, end_calibration_async(kind, at)),
+                    true => call!(
+                        self.rig,
+                        how,
+                        end_calibration,
+                        end_calibration_async(kind, at - self.rig.driver.now())
+                    ),
                     false => {
-                        call!(self.rig, how, start_calibration, start_calibration_async(kind, at))
+                        call!(
+                            self.rig,
+                            how,
+                            start_calibration,
+                            start_calibration_async(kind, at - self.rig.driver.now())
+                        )
                     }
                 };
                 self.rig.end(&before, MS(ms), done.as_ref());

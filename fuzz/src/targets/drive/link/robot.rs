@@ -57,13 +57,11 @@ where
                 rig.end(&before, MS(0), done.as_ref());
             }
             Do::NextEvent { ms } | Do::Ping { ms } => {
-                let by = rig.driver.now() + MS(ms.into());
-                let done = call!(rig, how, next_event, next_event_async(by));
+                let done = call!(rig, how, next_event, next_event_async(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
             }
             Do::RunUntil { ms } | Do::NextReport { ms } => {
-                let by = rig.driver.now() + MS(ms.into());
-                let done = call!(rig, how, next_command, next_command_async(by));
+                let done = call!(rig, how, next_command, next_command_async(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
                 if let Some(Ok(Some(command))) = done {
                     check_motion(&told, (command.speed(), command.angular()), rig.driver.now());
