@@ -31,7 +31,7 @@
 //! {
 //!     let mut config = MasterConfig::usb_adapter();
 //!     config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus
-//!     let mut bus = Driver::with(|now| Master::new(config, now), port, clock);
+//!     let mut bus = Driver::master(config, port, clock);
 //!     let moved = (|| {
 //!         for (node, mode) in bus.discover()? {
 //!             if mode == Mode::Velocity {
@@ -130,7 +130,7 @@
 //! let uart = BufferedUart::new(..);
 //! let clock = || Instant::from_micros(embassy_time::Instant::now().as_micros());
 //! let time = WithDelay { clock, delay: embassy_time::Delay };
-//! let mut bus = Driver::with(|now| Master::new(MasterConfig::direct(), now), uart, time);
+//! let mut bus = Driver::master(MasterConfig::direct(), uart, time);
 //! let nodes = bus.discover_async().await?;
 //! loop {
 //!     let event = bus.next_event_async(Duration::from_millis(100));
@@ -180,6 +180,8 @@ mod driver;
 mod error;
 #[cfg(feature = "ikeya")]
 mod ikeya;
+#[cfg(feature = "serialport")]
+mod opened;
 #[cfg(feature = "embedded-hal")]
 mod rs485;
 mod sending;
@@ -202,6 +204,10 @@ pub use driver::Driver;
 pub use error::{DriveError, Operation};
 #[cfg(feature = "ikeya")]
 pub use ikeya::OnlineNodes;
+#[cfg(all(feature = "serialport", feature = "ikeya"))]
+pub use opened::Bus;
+#[cfg(all(feature = "serialport", feature = "ucp"))]
+pub use opened::Rover;
 #[cfg(feature = "embedded-hal")]
 pub use rs485::{NoDelay, Rs485, Rs485Error};
 #[cfg(feature = "serialport")]

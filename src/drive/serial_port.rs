@@ -37,7 +37,7 @@ const NAP: Duration = Duration::from_micros(200);
 /// let port = SerialPort::open("/dev/ttyUSB0", BAUD)?;
 /// let mut config = MasterConfig::usb_adapter();
 /// config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
-/// let mut bus = Driver::with(|now| Master::new(config, now), port, StdClock::new());
+/// let mut bus = Driver::master(config, port, StdClock::new());
 /// println!("{} nodes", bus.discover()?.len());
 /// # }
 /// # Ok::<(), Box<dyn std::error::Error>>(())

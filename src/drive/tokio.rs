@@ -29,7 +29,7 @@ const NAP: Duration = Duration::from_millis(1);
 /// let port = TokioSerialPort::open("/dev/ttyUSB0", BAUD)?;
 /// let mut config = MasterConfig::usb_adapter();
 /// config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
-/// let mut bus = Driver::with(|now| Master::new(config, now), port, TokioClock::new());
+/// let mut bus = Driver::master(config, port, TokioClock::new());
 /// println!("{} nodes", bus.discover_async().await?.len());
 /// # Ok(())
 /// # }

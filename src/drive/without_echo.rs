@@ -19,7 +19,7 @@ use crate::stream::Echo;
 ///
 /// let port = WithoutEcho::new(port); // around an `Rs485`, if there is a pin
 /// let config = MasterConfig::direct();
-/// let mut bus = Driver::with(|now| Master::new(config, now), port, clock);
+/// let mut bus = Driver::master(config, port, clock);
 /// bus.discover()?;
 /// println!("{} echoes were damaged", bus.port().echo().errors());
 /// # Ok::<(), axlewire::drive::DriveError<P::Error>>(())

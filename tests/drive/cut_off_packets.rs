@@ -214,7 +214,7 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
         let mut port = wire.port();
         let pin = enable(&wire, &mut port);
         let Ok(port) = Rs485::new(port, pin.clone());
-        let mut bus = Driver::with(|now| Master::new(config, now), port, wire.world.clone());
+        let mut bus = Driver::master(config, port, wire.world.clone());
         bus.discover().unwrap();
         bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
         assert_eq!(wire.rps(), 10.0);

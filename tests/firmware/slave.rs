@@ -17,7 +17,7 @@ pub(crate) fn master_on(wire: Wire, mut config: MasterConfig) -> Bus {
     // A socket is faster than any line.
     config.accepts_early = true;
     let clock = wire.clock();
-    Driver::with(|now| Master::new(config, now), wire, clock)
+    Driver::master(config, wire, clock)
 }
 
 /// A board, and a master that has found it.

@@ -6,9 +6,15 @@ use std::{
     time::Duration,
 };
 
+#[cfg(feature = "ucp")]
 use axlewire::{
-    drive::{DriveError, Driver, SerialPort, StdClock},
-    ikeya::{BAUD, Master, Mode, NodeId, Rps, master::MasterConfig},
+    drive::Rover,
+    stream::Frames,
+    ucp::{self, Message, Ucp},
+};
+use axlewire::{
+    drive::{Bus, DriveError, Driver, SerialPort, StdClock},
+    ikeya::{BAUD, Mode, NodeId, Rps, master::MasterConfig},
     time,
 };
 use embedded_io::{Read as _, ReadReady, Write as _};
@@ -28,7 +34,7 @@ fn a_master_turns_a_motor_and_stops_it() {
     let port = SerialPort::open(&motor.path, BAUD).unwrap();
     assert!(port.is_pseudo_terminal());
     let turned = in_time(move || {
-        let mut bus = Driver::with(|now| Master::new(patient(), now), port, StdClock::new());
+        let mut bus = Driver::master(patient(), port, StdClock::new());
         assert_eq!(bus.discover()?[..], [(NodeId::N1, Mode::Velocity)]);
         let speed = Rps::new(2.0).unwrap();
         bus.drive_for(NodeId::N1, speed, time::Duration::from_millis(100))?;
@@ -36,6 +42,39 @@ fn a_master_turns_a_motor_and_stops_it() {
     });
     turned.unwrap();
     assert_eq!(motor.speeds(), [2.0, 0.0]);
+}
+
+#[test]
+fn a_bus_that_is_dropped_stops_the_motor_that_it_turned() {
+    let motor = Motor::new();
+    let path = motor.path.clone();
+    in_time(move || {
+        let mut bus = Bus::open_with(&path, patient()).unwrap();
+        bus.discover().unwrap();
+        bus.set_velocity(NodeId::N1, Rps::new(2.0).unwrap()).unwrap();
+    });
+    wait_until(|| motor.speeds().len() == 2);
+    assert_eq!(motor.speeds(), [2.0, 0.0]);
+}
+
+#[cfg(feature = "ucp")]
+#[test]
+fn a_rover_that_is_dropped_sends_the_stop_that_it_owes() {
+    let (mut far, held) = TTYPort::pair().unwrap();
+    let path = held.name().unwrap();
+    in_time(move || Rover::open(&path).unwrap().drive(30, 0).unwrap());
+    far.set_timeout(Duration::from_millis(5)).unwrap();
+    let (mut bytes, mut buffer) = (vec![], [0; 256]);
+    while let Ok(count @ 1..) = far.read(&mut buffer) {
+        bytes.extend_from_slice(&buffer[..count]);
+    }
+    let speed = |frame: &ucp::Frame| match frame.message() {
+        Message::MotorControl(command) => Some(command.speed()),
+        _ => None,
+    };
+    let mut speeds: Vec<_> = Frames::<Ucp>::new(&bytes).filter_map(speed).collect();
+    speeds.dedup();
+    assert_eq!(speeds, [0, 30, 0]);
 }
 
 #[test]
@@ -118,18 +157,14 @@ fn a_read_that_waits_ends_when_the_port_is_unplugged() {
 fn a_driver_whose_port_is_unplugged_says_so_and_does_not_wait() {
     let (port, far, _held) = line();
     let error = in_time(move || {
-        let mut bus = Driver::with(
-            |now| Master::new(MasterConfig::usb_adapter(), now),
-            port,
-            StdClock::new(),
-        );
-        let in_an_hour = bus.now() + time::Duration::from_millis(3_600_000);
+        let mut bus = Driver::master(MasterConfig::usb_adapter(), port, StdClock::new());
+        let an_hour = time::Duration::from_secs(3600);
         let unplugging = thread::spawn(move || {
             thread::sleep(Duration::from_millis(100));
             drop(far);
         });
         loop {
-            match bus.next_event(in_an_hour) {
+            match bus.next_event(an_hour) {
                 Ok(_) => {}
                 Err(error) => {
                     unplugging.join().unwrap();

@@ -11,7 +11,7 @@ use std::{
 
 use axlewire::{
     drive::{Clock, DriveError, Driver, TokioClock, TokioSerialPort},
-    ikeya::{BAUD, Master, Mode, NodeId, Rps, master::MasterConfig},
+    ikeya::{BAUD, Mode, NodeId, Rps, master::MasterConfig},
     time,
 };
 use embedded_hal_async::delay::DelayNs;
@@ -51,7 +51,7 @@ fn a_master_turns_a_motor_and_stops_it() {
     let turned = run(move || async move {
         let port = TokioSerialPort::open(&path, BAUD).unwrap();
         assert!(port.is_pseudo_terminal());
-        let mut bus = Driver::with(|now| Master::new(patient(), now), port, TokioClock::new());
+        let mut bus = Driver::master(patient(), port, TokioClock::new());
         assert_eq!(bus.discover_async().await?[..], [(NodeId::N1, Mode::Velocity)]);
         let speed = Rps::new(2.0).unwrap();
         bus.drive_for_async(NodeId::N1, speed, time::Duration::from_millis(100)).await?;
@@ -161,14 +161,14 @@ fn a_driver_whose_port_is_unplugged_says_so_and_does_not_wait() {
     let error = run(|| async {
         let (port, far, _held) = line();
         let config = MasterConfig::usb_adapter();
-        let mut bus = Driver::with(|now| Master::new(config, now), port, TokioClock::new());
-        let in_an_hour = bus.now() + time::Duration::from_millis(3_600_000);
+        let mut bus = Driver::master(config, port, TokioClock::new());
+        let an_hour = time::Duration::from_secs(3600);
         thread::spawn(move || {
             thread::sleep(Duration::from_millis(100));
             drop(far);
         });
         loop {
-            if let Err(error) = bus.next_event_async(in_an_hour).await {
+            if let Err(error) = bus.next_event_async(an_hour).await {
                 return error;
             }
         }

@@ -17,6 +17,10 @@ use crate::{
     time::Duration,
 };
 
+/// Longest time to send stops when a bus is dropped.
+#[cfg(feature = "serialport")]
+const DROP_BOUND: Duration = Duration::from_millis(100);
+
 /// The blocking calls of a master.
 ///
 /// Each ends within four times [`Master::read_bound`], or at its deadline argument; those that stop
@@ -146,6 +150,23 @@ where
         let bound = self.bound();
         let answer = self.until(bound, |driver| driver.answer(node))?;
         answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
+    }
+
+    /// Tries for 100 ms to stop every node that was told to move or is owed a stop.
+    #[cfg(feature = "serialport")]
+    pub(in crate::drive) fn try_stop(&mut self) {
+        self.begin_stop(self.moving());
+        let deadline = self.now() + DROP_BOUND;
+        while self.now() < deadline {
+            let stopped = |driver: &mut Self| {
+                driver.drop_readings();
+                driver.role.stops_owed().is_empty().then_some(())
+            };
+            match self.until(deadline, stopped) {
+                Ok(_) => break,
+                Err(_) => self.clock.idle_until(self.on_clock(self.now() + ERROR_NAP)),
+            }
+        }
     }
 
     fn send_target(&mut self, node: NodeId, target: Target<B>) -> Result<(), DriveError<P::Error>> {

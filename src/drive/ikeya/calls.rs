@@ -8,8 +8,8 @@ use crate::{
     ikeya::{
         Mode, NodeId,
         board::{Board, Status, Target},
-        master::{CommandError, Health, Master, MasterEvent, NodeSet, StopProgress},
-        slave::{Slave, SlaveEvent},
+        master::{CommandError, Health, Master, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        slave::{Slave, SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},
 };
@@ -33,6 +33,67 @@ impl StopWait {
     }
 }
 
+impl<P, C: Clock> Driver<Master, P, C> {
+    /// A new [master](Master) with a port and a clock. For another board, see
+    /// [`with`](Driver::with).
+    ///
+    /// ```
+    /// # #[cfg(feature = "embedded-io")] {
+    /// use axlewire::{drive::{Clock, DriveError, Driver}, ikeya::{NodeId, Rps, master::MasterConfig}};
+    /// use axlewire::time::Duration;
+    /// use embedded_io::{Read, ReadReady, Write};
+    ///
+    /// /// Turns node 1 for three seconds.
+    /// fn turn<P, C>(port: P, clock: C) -> Result<(), DriveError<P::Error>>
+    /// where
+    ///     P: Read + ReadReady + Write,
+    ///     C: Clock,
+    /// {
+    ///     let mut bus = Driver::master(MasterConfig::direct(), port, clock);
+    ///     bus.discover()?;
+    ///     bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3))
+    /// }
+    /// # }
+    /// ```
+    pub fn master(config: MasterConfig, port: P, clock: C) -> Self {
+        Self::with(|now| Master::new(config, now), port, clock)
+    }
+}
+
+impl<P, C: Clock> Driver<Slave, P, C> {
+    /// A new [slave](Slave) with a port and a clock. For another board, see
+    /// [`with`](Driver::with).
+    ///
+    /// ```
+    /// # #[cfg(feature = "embedded-io")] {
+    /// use axlewire::drive::{Clock, DriveError, Driver};
+    /// use axlewire::ikeya::{Mode, NodeId, Rps, Target, slave::SlaveConfig};
+    /// use axlewire::time::Duration;
+    /// use embedded_io::{Read, ReadReady, Write};
+    ///
+    /// fn run<P, C>(port: P, clock: C, set_motor: fn(Rps)) -> Result<(), DriveError<P::Error>>
+    /// where
+    ///     P: Read + ReadReady + Write,
+    ///     C: Clock,
+    /// {
+    ///     let mut config = SlaveConfig::direct();
+    ///     config.watchdog = Some(Duration::from_millis(100)); // off unless you set it
+    ///     let mut slave = Driver::slave(NodeId::N1, Mode::Velocity, config, port, clock);
+    ///     loop {
+    ///         slave.next_command(Duration::from_millis(10))?;
+    ///         match slave.role().command() {
+    ///             Some(Target::Velocity(speed)) => set_motor(speed),
+    ///             _ => set_motor(Rps::ZERO), // none yet, or the watchdog has fired
+    ///         }
+    ///     }
+    /// }
+    /// # }
+    /// ```
+    pub fn slave(node: NodeId, mode: Mode, config: SlaveConfig, port: P, clock: C) -> Self {
+        Self::with(|now| Slave::new(node, mode, config, now), port, clock)
+    }
+}
+
 impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// Deadline of a call: a discovery may run before it, each takes no longer than a read may, and
     /// a driver on a host is late now and then.
@@ -49,6 +110,16 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
 
     pub(super) fn is_online(&self, node: NodeId) -> bool {
         matches!(self.role.health(node), Some(Health::Online | Health::Suspect(_)))
+    }
+
+    /// Nodes that were told to move.
+    #[cfg(feature = "serialport")]
+    pub(super) fn moving(&self) -> NodeSet {
+        let is_moving = |&node: &NodeId| {
+            self.role.set_point(node).is_some()
+                && self.role.stop_progress(node) == StopProgress::NotAsked
+        };
+        NodeId::ALL.into_iter().filter(is_moving).collect()
     }
 
     pub(super) fn begin_discovery(&mut self) {

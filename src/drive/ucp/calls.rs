@@ -10,15 +10,70 @@ use crate::{
     ucp::{
         MotorControl,
         host::{
-            BiasStore, CalibrationStep, CommandError, Host, HostEvent, ReceivedReport, StopProgress,
+            BiasStore, CalibrationStep, CommandError, Host, HostConfig, HostEvent, ReceivedReport,
+            StopProgress,
         },
         message::CalibrationKind,
-        robot::{Robot, RobotEvent},
+        robot::{Robot, RobotConfig, RobotEvent},
     },
 };
 
 /// Time within which a stop must be flushed: the period of motor commands (ruling U16).
 const STOP_BOUND: Duration = Duration::from_millis(100);
+
+impl<P, C: Clock> Driver<Host, P, C> {
+    /// A new [host](Host) with a port and a clock, which keeps no biases. To keep them, see
+    /// [`with`](Driver::with) and [`Host::with_store`].
+    ///
+    /// ```
+    /// # #[cfg(feature = "embedded-io")] {
+    /// use axlewire::{drive::{Clock, DriveError, Driver}, time::Duration, ucp::host::HostConfig};
+    /// use embedded_io::{Read, ReadReady, Write};
+    ///
+    /// /// Drives ahead for two seconds.
+    /// fn go<P, C>(port: P, clock: C) -> Result<(), DriveError<P::Error>>
+    /// where
+    ///     P: Read + ReadReady + Write,
+    ///     C: Clock,
+    /// {
+    ///     let mut rover = Driver::host(HostConfig::direct(), port, clock);
+    ///     rover.ping(Duration::from_secs(1))?;
+    ///     rover.drive_for(30, 0, Duration::from_secs(2)) // percent ahead, percent of turn
+    /// }
+    /// # }
+    /// ```
+    pub fn host(config: HostConfig, port: P, clock: C) -> Self {
+        Self::with(|now| Host::new(config, now), port, clock)
+    }
+}
+
+impl<P, C: Clock> Driver<Robot, P, C> {
+    /// A new [robot](Robot) with a port and a clock.
+    ///
+    /// ```
+    /// # #[cfg(feature = "embedded-io")] {
+    /// use axlewire::drive::{Clock, DriveError, Driver};
+    /// use axlewire::{time::Duration, ucp::{MotorControl, robot::RobotConfig}};
+    /// use embedded_io::{Read, ReadReady, Write};
+    ///
+    /// fn run<P, C>(port: P, clock: C, set: fn(MotorControl)) -> Result<(), DriveError<P::Error>>
+    /// where
+    ///     P: Read + ReadReady + Write,
+    ///     C: Clock,
+    /// {
+    ///     let mut robot = Driver::robot(RobotConfig::direct(), port, clock);
+    ///     loop {
+    ///         robot.next_command(Duration::from_millis(10))?;
+    ///         let now = robot.now();
+    ///         set(robot.role().command(now)); // a standstill once the watchdog has fired
+    ///     }
+    /// }
+    /// # }
+    /// ```
+    pub fn robot(config: RobotConfig, port: P, clock: C) -> Self {
+        Self::with(|now| Robot::new(config, now), port, clock)
+    }
+}
 
 impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
     pub(super) fn command(&mut self, speed: i16, angular: i16) -> Result<(), CommandError> {

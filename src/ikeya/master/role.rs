@@ -122,7 +122,7 @@ impl<B: Board> Master<B> {
     /// Creates a master of nodes with this [`Board`].
     ///
     /// ```
-    /// use axlewire::{ikeya::{Master, ThreeMotors, master::MasterConfig}, time::Instant};
+    /// use axlewire::{ikeya::{Master, board::ThreeMotors, master::MasterConfig}, time::Instant};
     ///
     /// let now = Instant::from_micros(0);
     /// let master = Master::<ThreeMotors>::for_board(MasterConfig::direct(), now);

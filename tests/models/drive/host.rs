@@ -135,7 +135,7 @@ impl<P: Wired> Life for HostLife<P> {
         config.ping_timeout = Duration::from_millis(50);
         config.link_timeout = Duration::from_millis(80);
         config.rpm_average = Duration::ZERO;
-        let driver = Driver::with(|now| Host::new(config, now), P::plug(&line), line.clone());
+        let driver = Driver::host(config, P::plug(&line), line.clone());
         Self { line, driver, account: Account::default() }
     }
 

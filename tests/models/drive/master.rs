@@ -158,7 +158,7 @@ impl<P: Wired> Life for MasterLife<P> {
         config.coast = COAST;
         config.polling = Polling::Every(Duration::from_millis(1));
         config.dead_man = setup.dead_man_ms.map(Duration::from_millis);
-        let driver = Driver::with(|now| Master::new(config, now), P::plug(&line), line.clone());
+        let driver = Driver::master(config, P::plug(&line), line.clone());
         Self { setup, line, node, driver, account: Account::default() }
     }
 

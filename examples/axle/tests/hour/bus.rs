@@ -41,7 +41,7 @@ pub(crate) fn run(path: &str, length: Duration, control: Control, sim: u32) -> O
     config.accepts_early = true;
     // As often as the line could carry it.
     config.polling = Polling::Every(Schedule::new(8).cycle_time());
-    let mut bus: Bus = Driver::with(|now| Master::new(config, now), port, StdClock::new());
+    let mut bus: Bus = Driver::master(config, port, StdClock::new());
     while bus.discover().unwrap().len() < 8 {}
     command(&mut bus);
     while bus.poll_event().is_some() {}

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use axlewire::{
     drive::{Driver, SerialPort, StdClock},
     ucp::{
-        BAUD, Host, MotorControl,
+        BAUD, MotorControl,
         host::{HostConfig, HostEvent, HostStatistics},
     },
 };
@@ -34,8 +34,7 @@ pub(crate) struct Outcome {
 
 pub(crate) fn run(path: &str, length: Duration, control: Control, sim: u32) -> Outcome {
     let port = SerialPort::open(path, BAUD).unwrap();
-    let mut link =
-        Driver::with(|now| <Host>::new(HostConfig::usb_adapter(), now), port, StdClock::new());
+    let mut link = Driver::host(HostConfig::usb_adapter(), port, StdClock::new());
     let mut gaps = None;
     let (begin, mut driven) = (Instant::now(), None::<Instant>);
     let (mut first, mut last, mut reports) = (None::<Instant>, begin, 0);

@@ -43,7 +43,7 @@ fn run(mut board: Board) {
     config.polling = Polling::Every(CYCLE);
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut report_at = board.clock.now();
-    let mut driver = Driver::with(|now| Master::new(config, now), port, board.clock);
+    let mut driver = Driver::master(config, port, board.clock);
     let (mut program, mut exchanges) = (Program::default(), 0u32);
     let now = driver.now();
     driver.role_mut().discover(now);

@@ -44,7 +44,7 @@ fn run(mut board: Board) {
     config.polling = Polling::Fastest;
     let Ok(port) = Rs485::new(board.bus, board.driver_enable);
     let mut report_at = board.clock.now();
-    let mut driver = Driver::with(|now| Master::new(config, now), port, board.clock);
+    let mut driver = Driver::master(config, port, board.clock);
     let (mut exchanges, mut abnormal) = (0u32, 0u32);
     let now = driver.now();
     driver.role_mut().discover(now);

@@ -5,19 +5,14 @@
 use std::{env, error::Error, io};
 
 use axlewire::{
-    drive::{DriveError, Driver, SerialPort, StdClock},
+    drive::{DriveError, Rover},
     time::Duration,
-    ucp::{
-        BAUD, Host,
-        host::{COAST, HostConfig},
-    },
+    ucp::host::COAST,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = env::args().nth(1).ok_or("which port?")?;
-    let port = SerialPort::open(&path, BAUD)?;
-    let host = |now| Host::new(HostConfig::usb_adapter(), now);
-    let mut rover = Driver::with(host, port, StdClock::new());
+    let mut rover = Rover::open(&path)?;
     let driven = drive(&mut rover);
     // Whatever has happened. An error here means that the rover may be driving: say so.
     rover.stop()?;
@@ -30,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(driven?)
 }
 
-fn drive(rover: &mut Driver<Host, SerialPort, StdClock>) -> Result<(), DriveError<io::Error>> {
+fn drive(rover: &mut Rover) -> Result<(), DriveError<io::Error>> {
     let end = rover.now() + Duration::from_secs(2);
     while rover.now() < end {
         rover.drive(30, 0)?; // percent; counts for half a second

@@ -4,7 +4,7 @@ use std::{env, error::Error};
 
 use axlewire::{
     drive::{Driver, TokioClock, TokioSerialPort},
-    ikeya::{BAUD, Master, NodeId, Rps, master::MasterConfig},
+    ikeya::{BAUD, NodeId, Rps, master::MasterConfig},
     time::Duration,
 };
 
@@ -15,7 +15,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut config = MasterConfig::usb_adapter();
     config.nodes = NodeId::N1.into(); // the whole bus
     config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
-    let mut bus = Driver::with(|now| Master::new(config, now), port, TokioClock::new());
+    let mut bus = Driver::master(config, port, TokioClock::new());
     println!("found: {:?}", bus.discover_async().await?);
     let turned = tokio::select! {
         turned = bus.drive_for_async(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3)) => turned,
