@@ -1,6 +1,6 @@
 //! The contract that every role fulfils.
 
-use crate::time::{Duration, Instant};
+use crate::time::{self, Duration, Instant};
 
 /// A role without a clock or a port: bytes and time go in; bytes, events and a deadline come out.
 ///
@@ -23,61 +23,21 @@ use crate::time::{Duration, Instant};
 ///
 /// Hand in *all* received bytes before the next `poll_transmit`: a master uses this order to tell
 /// answers from stale bytes (ruling I7). If you cannot, because the port fails or is full, hand in
-/// the bytes behind it with [`handle_old_input`](Self::handle_old_input).
+/// the bytes behind it with an older [`Arrival`].
 ///
 /// # When a port fails
 ///
-/// If a frame was handed out but did not reach the line whole, call
-/// [`handle_unsent`](Self::handle_unsent) before any other call. The role then decides again what
-/// to send next: an old command is never sent late because a port was down, and a stop that was not
-/// sent is due again (rulings I12, U16).
+/// If a frame was handed out but did not reach the line whole, tell the role with
+/// [`handle_transmit`](Self::handle_transmit) before any other call. The role then decides again
+/// what to send next: an old command is never sent late because a port was down, and a stop that
+/// was not sent is due again (rulings I12, U16).
 pub trait Endpoint {
     /// What the role reports to its application: small, owned values.
     type Event;
 
-    /// Takes in all received bytes. All of them have arrived by `now`.
-    fn handle_input(&mut self, bytes: &[u8], now: Instant);
-
-    /// Takes in received bytes that may have arrived at any time from `since` to `now`: the caller
-    /// was held up, or handed out a frame before it had read all of them. `since` may be before the
-    /// time of earlier calls.
-    ///
-    /// By default the bytes count as received at `now`. A role that acts on commands dates them
-    /// `since`, so that a stale command is not treated as new; a master does not take them for the
-    /// answer to a request that was handed out after `since` (ruling I7).
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        let _ = since;
-        self.handle_input(bytes, now);
-    }
-
-    /// How long the port may go unread before the bytes found in it count as old. By default
-    /// `None`: they never do.
-    ///
-    /// A role that acts on commands has such a limit. Check its port at least twice within it, and
-    /// hand bytes that may have waited longer to [`handle_old_input`](Self::handle_old_input). Zero
-    /// does not ask for more checks: all bytes then count from when the port was last seen empty.
-    fn held_up_after(&self) -> Option<Duration> {
-        None
-    }
-
-    /// Longest pause inside a frame that is sent, from the end of one byte to the end of the next;
-    /// 20 ms by default (ruling U16).
-    ///
-    /// A frame with a longer pause is given up: the other end no longer waits for the rest, and
-    /// would take it for something else.
-    fn frame_pause(&self) -> Duration {
-        Duration::from_millis(20)
-    }
-
-    /// The shortest time that `bytes` bytes take on the line; zero by default.
-    ///
-    /// If a port accepts a frame in parts, a driver has to know whether the frame paused between
-    /// them for longer than [`frame_pause`](Self::frame_pause). The time of the bytes before the
-    /// pause does not count. With zero, some frames that did not pause are given up.
-    fn wire_time(&self, bytes: usize) -> Duration {
-        let _ = bytes;
-        Duration::ZERO
-    }
+    /// Takes in all received bytes. Pass the time as an [`Instant`] if all of them have just
+    /// arrived, and as an [`Arrival`] if some may have waited.
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>);
 
     /// Lets time pass. Does nothing before [`poll_timeout`](Self::poll_timeout).
     fn handle_timeout(&mut self, now: Instant);
@@ -85,22 +45,15 @@ pub trait Endpoint {
     /// The next bytes to send, if any: one frame, handed out once, to be sent from `now` on.
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]>;
 
-    /// The port has taken all of the last frame from [`poll_transmit`](Self::poll_transmit), but
-    /// may still hold it. Does nothing by default.
+    /// What has become of the frames from [`poll_transmit`](Self::poll_transmit): a [`Transmit`],
+    /// or an [`Unsent`]. Does nothing by default: a frame that did not leave is lost.
     ///
-    /// A driver whose port can hold bytes back calls this after the write that ended the frame,
-    /// also of one that it then gives up, and [`handle_flushed`](Self::handle_flushed) once they
-    /// have left: both or neither. A request that leaves late is answered late, and a master must
-    /// not take that answer for the one to its next request (ruling I7).
-    fn handle_taken(&mut self, now: Instant) {
-        let _ = now;
-    }
-
-    /// All bytes that the port has taken have left by `now`. Does nothing by default.
-    ///
-    /// That a frame was given up is told before, by [`handle_unsent`](Self::handle_unsent).
-    fn handle_flushed(&mut self, now: Instant) {
-        let _ = now;
+    /// If the port can hold bytes back, tell of [`Transmit::Taken`] after the write that ended a
+    /// frame, also of one that is then given up, and of [`Transmit::Flushed`] once the bytes have
+    /// left: both or neither. A request that leaves late is answered late, and a master must not
+    /// take that answer for the one to its next request (ruling I7).
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
+        let _ = (outcome, now);
     }
 
     /// Whether the last frame from `poll_transmit` has become wrong since: its command was dropped
@@ -112,12 +65,9 @@ pub trait Endpoint {
         false
     }
 
-    /// The last frame from `poll_transmit` did not reach the line whole, and no more of it will be
-    /// sent.
-    ///
-    /// Does nothing by default: the frame is lost.
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        let _ = (unsent, now);
+    /// What the role requires of its line. Ask again when the settings have changed.
+    fn line_rules(&self) -> LineRules {
+        LineRules::default()
     }
 
     /// The next event, if any, in the order of occurrence.
@@ -133,6 +83,111 @@ pub trait Endpoint {
     /// [`poll_transmit`](Self::poll_transmit) again at the latest; `None` if only bytes or commands
     /// can change anything. Ask again after every other call.
     fn poll_timeout(&self) -> Option<Instant>;
+}
+
+/// When received bytes have arrived: at a time, or at any time from one to another.
+///
+/// An [`Instant`] converts into it.
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Arrival {
+    /// All of them have just arrived.
+    Now(Instant),
+    /// They may have waited: the caller was held up, or handed out a frame before it had read all
+    /// of them.
+    ///
+    /// A role that acts on commands dates such bytes `since`, so that a stale command is not
+    /// treated as new; a master does not take them for the answer to a request that was handed
+    /// out after `since` (ruling I7).
+    Between {
+        /// The earliest time at which they can have arrived. May be before the time of earlier
+        /// calls.
+        since: Instant,
+        /// The current time.
+        now: Instant,
+    },
+}
+
+impl Arrival {
+    /// The current time: they have arrived by now.
+    #[must_use]
+    pub const fn now(self) -> Instant {
+        match self {
+            Self::Now(now) | Self::Between { now, .. } => now,
+        }
+    }
+
+    /// The earliest time at which they can have arrived.
+    #[must_use]
+    pub const fn since(self) -> Instant {
+        match self {
+            Self::Now(since) | Self::Between { since, .. } => since,
+        }
+    }
+}
+
+impl From<Instant> for Arrival {
+    fn from(now: Instant) -> Self {
+        Self::Now(now)
+    }
+}
+
+/// What a role requires of its line, see [`Endpoint::line_rules`].
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LineRules {
+    /// Longest pause inside a frame that is sent, from the end of one byte to the end of the next.
+    ///
+    /// A frame with a longer pause is given up: the other end no longer waits for the rest, and
+    /// would take it for something else.
+    pub frame_pause: Duration,
+    /// Speed of the line, bit/s, 10 bits per byte; 0 if it is not known.
+    ///
+    /// If a port accepts a frame in parts, a driver has to know whether the frame paused between
+    /// them for longer than `frame_pause`. The time of the bytes before the pause does not count.
+    /// With 0, some frames that did not pause are given up.
+    pub baud: u32,
+    /// How long the port may go unread before the bytes found in it count as old; `None` if they
+    /// never do.
+    ///
+    /// A role that acts on commands has such a limit. Check its port at least twice within it, and
+    /// hand in bytes that may have waited longer with an older [`Arrival`]. Zero does not ask for
+    /// more checks: all bytes then count from when the port was last seen empty.
+    pub held_up_after: Option<Duration>,
+}
+
+/// A pause of 20 ms (ruling U16), a line of unknown speed, and bytes that are never old.
+impl Default for LineRules {
+    fn default() -> Self {
+        Self { frame_pause: Duration::from_millis(20), baud: 0, held_up_after: None }
+    }
+}
+
+impl LineRules {
+    /// The shortest time that `bytes` bytes take on the line; zero if its speed is not known.
+    #[must_use]
+    pub const fn wire_time(&self, bytes: usize) -> Duration {
+        if self.baud == 0 { Duration::ZERO } else { time::wire_time(bytes, self.baud) }
+    }
+}
+
+/// What has become of a frame, see [`Endpoint::handle_transmit`].
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Transmit {
+    /// The port has taken all of the last frame, but may still hold it.
+    Taken,
+    /// All bytes that the port has taken have left by now. That a frame was given up is told
+    /// before.
+    Flushed,
+    /// The last frame did not reach the line whole, and no more of it will be sent.
+    Unsent(Unsent),
+}
+
+impl From<Unsent> for Transmit {
+    fn from(unsent: Unsent) -> Self {
+        Self::Unsent(unsent)
+    }
 }
 
 /// How much of a frame has left, when a port could not send it whole.

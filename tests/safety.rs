@@ -114,10 +114,10 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     let held_up = |within| {
         let mut config = SlaveConfig::direct();
         config.answer_within = Duration::from_millis(within);
-        ms(Slave::new(NodeId::N1, Mode::Velocity, config, now).held_up_after().unwrap())
+        ms(Slave::new(NodeId::N1, Mode::Velocity, config, now).line_rules().held_up_after.unwrap())
     };
     let (robot_held_up, watchdog) =
-        (ms(Robot::new(robot, now).held_up_after().unwrap()), ms(robot.watchdog));
+        (ms(Robot::new(robot, now).line_rules().held_up_after.unwrap()), ms(robot.watchdog));
     let (dead_man, period) = (ms(host.dead_man), ms(host.command_period));
     assert_eq!(dead_man, ms(host.link_timeout), "the page has one figure for both");
     let (order, board) = ("src/ikeya/master/order.rs", "src/ikeya/board.rs");

@@ -6,7 +6,7 @@ use super::{
     sending::{FRAME_LEN, Sending},
 };
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Transmit, Unsent},
     time::{Duration, Instant, earliest, reached},
 };
 
@@ -80,9 +80,9 @@ pub struct Driver<R, P, C> {
 }
 
 /// How often the port of a role that acts on commands must be read, see
-/// [`Endpoint::held_up_after`].
+/// [`LineRules::held_up_after`](crate::endpoint::LineRules::held_up_after).
 pub(super) fn look_period<R: Endpoint>(role: &R) -> Option<Duration> {
-    let limit = role.held_up_after().filter(|&limit| limit != Duration::ZERO)?;
+    let limit = role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO)?;
     Some(Duration::from_micros(limit.as_micros() / 2))
 }
 
@@ -180,7 +180,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.discard();
         // Nobody flushes it any more: the role must not wait for that.
         let now = self.now();
-        self.role.handle_flushed(now);
+        self.role.handle_transmit(Transmit::Flushed, now);
         (self.role, self.port, self.clock)
     }
 
@@ -200,7 +200,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// later, if the port has not taken or flushed a frame yet.
     ///
     /// Never `None` for a slave or a robot, even an idle one: bytes found after a longer time may
-    /// be old, and do not count as new ([`Endpoint::held_up_after`]).
+    /// be old, and do not count as new
+    /// ([`LineRules::held_up_after`](crate::endpoint::LineRules::held_up_after)).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let look_at = look_period(&self.role).map(|period| self.looked_at + period);
@@ -240,14 +241,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Longest silence inside a frame. The other end measures from byte to byte, which includes the
     /// time of the byte after the silence.
     pub(super) fn silence(&self) -> Duration {
-        let (pause, byte) = (self.role.frame_pause(), self.role.wire_time(1));
+        let rules = self.role.line_rules();
+        let (pause, byte) = (rules.frame_pause, rules.wire_time(1));
         Duration::from_micros(pause.as_micros().saturating_sub(byte.as_micros()))
     }
 
     pub(super) fn tell_unsent(&mut self, unsent: Option<Unsent>) {
         let now = self.now();
         if let Some(unsent) = unsent {
-            self.role.handle_unsent(unsent, now);
+            self.role.handle_transmit(unsent, now);
         }
     }
 
@@ -264,15 +266,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
         let now = self.now();
         let bytes = chunk.get(..count).unwrap_or(chunk);
-        let is_old = match self.role.held_up_after() {
+        let is_old = match self.role.line_rules().held_up_after {
             Some(limit) => now - self.empty_at > limit,
             None => self.has_overtaken,
         };
-        if is_old {
-            self.role.handle_old_input(bytes, self.empty_at, now);
-        } else {
-            self.role.handle_input(bytes, now);
-        }
+        let arrived = match is_old {
+            true => Arrival::Between { since: self.empty_at, now },
+            false => Arrival::Now(now),
+        };
+        self.role.handle_input(bytes, arrived);
         Ok(())
     }
 
@@ -308,7 +310,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Time within which a healthy port takes or flushes a frame.
     pub(super) fn frame_time(&self) -> Duration {
-        self.role.wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
+        self.role.line_rules().wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
     }
 
     /// Whether the port of a slave or a robot may hold more, because its receiver has failed, or
@@ -384,11 +386,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let failure = match written {
             Ok(0) => DriveError::WriteZero,
             Ok(count) => {
-                let (time, silence) = (self.role.wire_time(count), self.silence());
+                let (time, silence) = (self.role.line_rules().wire_time(count), self.silence());
                 let is_whole = count >= self.sending.rest().len();
                 let unsent = self.sending.sent(count, time, now, silence);
                 if is_whole {
-                    self.role.handle_taken(now);
+                    self.role.handle_transmit(Transmit::Taken, now);
                 }
                 self.tell_unsent(unsent);
                 return Ok(());
@@ -407,7 +409,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         let now = self.now();
         let unsent = self.sending.flushed(now, self.silence());
         self.tell_unsent(unsent);
-        self.role.handle_flushed(now);
+        self.role.handle_transmit(Transmit::Flushed, now);
         Ok(())
     }
 

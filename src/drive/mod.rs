@@ -64,9 +64,9 @@
 //!
 //! Received bytes carry no time of arrival. A slave or a robot must not treat a ten-second-old
 //! command as new, so its driver checks the port repeatedly while it waits, twice per
-//! [`Endpoint::held_up_after`]. If it has not seen the port empty for longer than that, because of
+//! [`LineRules::held_up_after`]. If it has not seen the port empty for longer than that, because of
 //! its caller, another task, or a slow `write` or `flush`, the bytes that it finds count as
-//! received when the port was last seen empty ([`Endpoint::handle_old_input`]). A host's reports
+//! received when the port was last seen empty ([`Arrival::Between`]). A host's reports
 //! always do, where it matters whether they are from before a stop.
 //!
 //! So call the driver of a slave or a robot no later than [`poll_timeout`](Driver::poll_timeout): a
@@ -85,21 +85,21 @@
 //! * *A frame of which no byte has left* goes back to its role, which decides again what to send:
 //!   an old command is never sent late.
 //! * *A frame that was cut off* continues with the next call, unless its last byte left too long
-//!   ago: the other end no longer waits for the rest ([`Endpoint::frame_pause`], at most 20 ms); or
-//!   unless the frame has become wrong since ([`Endpoint::is_outdated`]: a command that was
+//!   ago: the other end no longer waits for the rest ([`LineRules::frame_pause`], at most 20 ms);
+//!   or unless the frame has become wrong since ([`Endpoint::is_outdated`]: a command that was
 //!   replaced or stopped, an answer that others have overtaken). In these cases the driver gives it
 //!   up and tells the role, which sends a stop twice (ruling U16).
 //! * *A frame that the port took in parts* counts as sent only if it cannot have paused for that
 //!   long in between: it is flushed at once, and must be out in hardly more than its time on the
-//!   line ([`Endpoint::wire_time`]). Otherwise it is given up as well. So `flush` must wait until
-//!   the bytes are out, and a port should take whole frames: of one that it took in a single
-//!   `write`, it must not send a part and hold the rest.
+//!   line ([`LineRules::baud`]). Otherwise it is given up as well. So `flush` must wait until the
+//!   bytes are out, and a port should take whole frames: of one that it took in a single `write`,
+//!   it must not send a part and hold the rest.
 //! * *After a failed `flush`* the role counts its latest commands as not sent, and a frame that was
 //!   cut off has no rest. The port is flushed once more before it takes the next frame.
 //! * *A request that the port still holds*, because its `flush` has failed or its call was dropped,
 //!   will be answered late. A master keeps the line free for that answer, for a second at most. As
 //!   long as no `flush` succeeds it sends on after that, stops included, but takes no answer: it
-//!   could be that of an earlier request ([`Endpoint::handle_taken`]).
+//!   could be that of an earlier request ([`Transmit::Taken`]).
 //!
 //! # What is kept
 //!
@@ -164,12 +164,12 @@
 //! two-wire line whose receiver stays on while sending, put a [`WithoutEcho`] around the port.
 //!
 //! [`Endpoint`]: crate::endpoint::Endpoint
-//! [`Endpoint::frame_pause`]: crate::endpoint::Endpoint::frame_pause
-//! [`Endpoint::handle_old_input`]: crate::endpoint::Endpoint::handle_old_input
-//! [`Endpoint::handle_taken`]: crate::endpoint::Endpoint::handle_taken
-//! [`Endpoint::held_up_after`]: crate::endpoint::Endpoint::held_up_after
+//! [`Arrival::Between`]: crate::endpoint::Arrival::Between
+//! [`LineRules::baud`]: crate::endpoint::LineRules::baud
+//! [`LineRules::frame_pause`]: crate::endpoint::LineRules::frame_pause
+//! [`LineRules::held_up_after`]: crate::endpoint::LineRules::held_up_after
+//! [`Transmit::Taken`]: crate::endpoint::Transmit::Taken
 //! [`Endpoint::is_outdated`]: crate::endpoint::Endpoint::is_outdated
-//! [`Endpoint::wire_time`]: crate::endpoint::Endpoint::wire_time
 
 #[cfg(feature = "embedded-io-async")]
 mod asynch;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::motor::Motor;
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit},
     ikeya::{
         Mode, NodeId, Position, Rps,
         board::{Board, OneMotor, Target, ThreeMotors, Units},
@@ -215,28 +215,16 @@ impl<B: MotorBoard> MotorNode<B> {
 impl<B: MotorBoard> Endpoint for MotorNode<B> {
     type Event = SlaveEvent<B>;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let now = arrived.now();
         self.run(now);
-        self.slave.handle_input(bytes, now);
+        self.slave.handle_input(bytes, arrived);
         self.obey(now);
     }
 
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        self.run(now);
-        self.slave.handle_old_input(bytes, since, now);
-        self.obey(now);
-    }
-
-    fn held_up_after(&self) -> Option<Duration> {
-        self.slave.held_up_after()
-    }
-
-    fn frame_pause(&self) -> Duration {
-        self.slave.frame_pause()
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        self.slave.wire_time(bytes)
+    fn line_rules(&self) -> LineRules {
+        self.slave.line_rules()
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -254,8 +242,8 @@ impl<B: MotorBoard> Endpoint for MotorNode<B> {
         self.slave.is_outdated()
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.slave.handle_unsent(unsent, now);
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
+        self.slave.handle_transmit(outcome, now);
     }
 
     fn poll_event(&mut self) -> Option<SlaveEvent<B>> {

@@ -2,7 +2,7 @@
 
 use super::rover::Rover;
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit},
     time::{Duration, Instant},
     ucp::robot::{Robot, RobotConfig, RobotEvent},
 };
@@ -76,28 +76,16 @@ impl RoverNode {
 impl Endpoint for RoverNode {
     type Event = RobotEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let now = arrived.now();
         self.run(now);
-        self.robot.handle_input(bytes, now);
+        self.robot.handle_input(bytes, arrived);
         self.rover.command(&self.robot.command(now));
     }
 
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        self.run(now);
-        self.robot.handle_old_input(bytes, since, now);
-        self.rover.command(&self.robot.command(now));
-    }
-
-    fn held_up_after(&self) -> Option<Duration> {
-        self.robot.held_up_after()
-    }
-
-    fn frame_pause(&self) -> Duration {
-        self.robot.frame_pause()
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        self.robot.wire_time(bytes)
+    fn line_rules(&self) -> LineRules {
+        self.robot.line_rules()
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -115,8 +103,8 @@ impl Endpoint for RoverNode {
         self.robot.is_outdated()
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.robot.handle_unsent(unsent, now);
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
+        self.robot.handle_transmit(outcome, now);
     }
 
     fn poll_event(&mut self) -> Option<RobotEvent> {

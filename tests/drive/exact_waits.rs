@@ -55,23 +55,23 @@ pub(crate) struct Pausing {
 
 impl Endpoint for Pausing {
     type Event = ();
-    fn handle_input(&mut self, _: &[u8], _: Instant) {}
+    fn handle_input(&mut self, _: &[u8], _: impl Into<Arrival>) {}
     fn handle_timeout(&mut self, _: Instant) {}
     fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {
         (!core::mem::replace(&mut self.is_sent, true)).then_some(&b"0123456789"[..])
     }
-    fn frame_pause(&self) -> Duration {
-        Duration::from_millis(1)
+    fn line_rules(&self) -> LineRules {
+        LineRules { frame_pause: ms(1), baud: 500_000, held_up_after: None }
     }
-    fn wire_time(&self, bytes: usize) -> Duration {
-        Duration::from_micros(bytes as u32 * 20)
-    }
-    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
-        self.unsent.push(unsent);
-        self.is_sent &= !self.repeats;
-    }
-    fn handle_flushed(&mut self, _: Instant) {
-        self.unsent_when_flushed = Some(self.unsent.clone());
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, _: Instant) {
+        match outcome.into() {
+            Transmit::Taken => {}
+            Transmit::Flushed => self.unsent_when_flushed = Some(self.unsent.clone()),
+            Transmit::Unsent(unsent) => {
+                self.unsent.push(unsent);
+                self.is_sent &= !self.repeats;
+            }
+        }
     }
     fn poll_event(&mut self) -> Option<()> {
         None

@@ -8,14 +8,16 @@ struct Dated(Vec<(Option<u64>, u64)>);
 
 impl Endpoint for Dated {
     type Event = ();
-    fn handle_input(&mut self, _: &[u8], now: Instant) {
-        self.0.push((None, now.as_micros()));
+    fn handle_input(&mut self, _: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let since = match arrived {
+            Arrival::Now(_) => None,
+            Arrival::Between { since, .. } => Some(since.as_micros()),
+        };
+        self.0.push((since, arrived.now().as_micros()));
     }
-    fn handle_old_input(&mut self, _: &[u8], since: Instant, now: Instant) {
-        self.0.push((Some(since.as_micros()), now.as_micros()));
-    }
-    fn held_up_after(&self) -> Option<Duration> {
-        Some(Duration::from_millis(4))
+    fn line_rules(&self) -> LineRules {
+        LineRules { held_up_after: Some(ms(4)), ..LineRules::default() }
     }
     fn handle_timeout(&mut self, _: Instant) {}
     fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {

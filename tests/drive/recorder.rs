@@ -51,8 +51,8 @@ impl Recorder {
 impl Endpoint for Recorder {
     type Event = u8;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.at(now);
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        self.at(arrived.into().now());
         self.calls.push(Call::Input(bytes.to_vec()));
         self.received.extend(bytes);
         self.events.extend(bytes);
@@ -77,21 +77,17 @@ impl Endpoint for Recorder {
         Some(&self.packet)
     }
 
-    fn handle_taken(&mut self, now: Instant) {
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         self.at(now);
-        self.taken_at.push(now);
-    }
-
-    fn handle_flushed(&mut self, now: Instant) {
-        self.at(now);
-        self.flushed_at.push(now);
-    }
-
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.at(now);
-        self.calls.push(Call::Unsent(unsent));
-        if self.repeats && unsent == Unsent::Untouched {
-            self.frames.push_front(self.packet.clone());
+        match outcome.into() {
+            Transmit::Taken => self.taken_at.push(now),
+            Transmit::Flushed => self.flushed_at.push(now),
+            Transmit::Unsent(unsent) => {
+                self.calls.push(Call::Unsent(unsent));
+                if self.repeats && unsent == Unsent::Untouched {
+                    self.frames.push_front(self.packet.clone());
+                }
+            }
         }
     }
 

@@ -21,7 +21,7 @@ pub(crate) fn clock_that_says(readings: impl IntoIterator<Item = u64>) -> impl F
 /// What the scenarios use of the library, and their port.
 pub(crate) use axlewire::{
     drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay},
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Status, Target,
         VelocityResponse, WriteRequest,

@@ -84,7 +84,8 @@ struct Plain {
 
 impl Endpoint for Plain {
     type Event = ();
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.heard.push((bytes.to_vec(), now));
     }
     fn handle_timeout(&mut self, _: Instant) {}
@@ -111,18 +112,17 @@ fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
 #[test]
 fn by_default_a_role_treats_old_bytes_as_new_and_loses_what_did_not_leave() {
     let mut role = Plain::default();
-    role.handle_old_input(b"12", at_ms(1), at_ms(9));
-    role.handle_unsent(Unsent::CutOff, at_ms(9));
+    role.handle_input(b"12", Arrival::Between { since: at_ms(1), now: at_ms(9) });
+    role.handle_transmit(Unsent::CutOff, at_ms(9));
     assert_eq!(role.heard, [(b"12".to_vec(), at_ms(9))]);
     assert!(role.poll_transmit(at_ms(9)).is_none() && !role.is_outdated());
 }
 
 #[test]
 fn by_default_frames_may_pause_for_20_ms_and_take_no_time() {
-    let role = Plain::default();
-    assert_eq!(role.held_up_after(), None);
-    assert_eq!(role.frame_pause(), Duration::from_millis(20));
-    assert_eq!(role.wire_time(64), Duration::ZERO);
+    let rules = Plain::default().line_rules();
+    assert_eq!(rules, LineRules { frame_pause: ms(20), baud: 0, held_up_after: None });
+    assert_eq!(rules.wire_time(64), Duration::ZERO);
 }
 
 #[test]

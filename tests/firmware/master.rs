@@ -40,7 +40,8 @@ impl Nodes {
 impl Endpoint for Nodes {
     type Event = SlaveEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.alive().iter_mut().for_each(|node| node.handle_input(bytes, now));
     }
 

@@ -42,7 +42,8 @@ struct Untaken(Master);
 impl Endpoint for Untaken {
     type Event = MasterEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.0.handle_input(bytes, now);
     }
 

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 pub(crate) use axlewire::{
     encode::Encode,
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     time::{Duration, Instant, wire_time},
     ucp::{
         BAUD, Body, Frame, FrameOf, Host, Message, MotorControl, RawFrame, Robot, Telemetry,

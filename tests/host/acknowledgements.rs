@@ -53,11 +53,11 @@ fn a_result_that_is_refused_withdraws_the_acknowledgement_of_the_one_before() {
             host.handle_input(&first, ms(1));
             assert!(host.poll_transmit(ms(1)).is_some());
             if is_told_before {
-                host.handle_unsent(Unsent::Untouched, ms(2));
+                host.handle_transmit(Unsent::Untouched, ms(2));
             }
             host.handle_input(&second, ms(3));
             if !is_told_before {
-                host.handle_unsent(Unsent::Untouched, ms(4));
+                host.handle_transmit(Unsent::Untouched, ms(4));
             }
             assert_eq!(sent(&mut host, ms(4)), [] as [Vec<u8>; 0], "{is_told_before}");
             // The indices of those that do leave have no gap.

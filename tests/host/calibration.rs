@@ -305,7 +305,7 @@ fn each_boot_of_a_robot_is_reported_once_however_often_its_biases_are_sent() {
         host.handle_input(&bytes(BiasRequest {}), at);
         events(&mut host);
         assert_eq!(host.poll_transmit(at).unwrap()[4], 8);
-        host.handle_unsent(Unsent::Untouched, at);
+        host.handle_transmit(Unsent::Untouched, at);
         assert_eq!(host.poll_transmit(at).unwrap()[4], 8);
         assert_eq!(events(&mut host), [HostEvent::BiasesSent]);
         assert_eq!((host.statistics().biases, host.statistics().bias_requests), (boot, boot));

@@ -73,7 +73,7 @@ fn every_event_of_a_host_is_counted_once_and_in_one_place() {
             *host.store_mut() = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
             host.handle_input(&bytes(BiasRequest {}), ms(1));
             host.poll_transmit(ms(1)).unwrap();
-            host.handle_unsent(Unsent::Untouched, ms(1));
+            host.handle_transmit(Unsent::Untouched, ms(1));
             sent(host, ms(1));
         }
         "an unknown frame": unknown => |host| {
@@ -113,6 +113,6 @@ fn every_ping_of_a_host_is_counted_as_sent_and_as_answered_damaged_or_lost() {
     assert_eq!(*host.statistics(), expected);
     // A ping that was due during the wait is due now, and not counted if it did not leave.
     host.poll_transmit(ms(900)).unwrap();
-    host.handle_unsent(Unsent::CutOff, ms(900));
+    host.handle_transmit(Unsent::CutOff, ms(900));
     assert_eq!(*host.statistics(), expected);
 }

@@ -27,7 +27,7 @@ fn with_low_ids_only_no_id_from_5_to_10_is_ever_sent() {
         let _ = host.start_calibration(IMU, at);
         let _ = host.end_calibration(MAG, at);
         let frames = sent(&mut host, at);
-        host.handle_unsent(Unsent::Unflushed, at);
+        host.handle_transmit(Unsent::Unflushed, at);
         ids.extend(frames.into_iter().chain(sent(&mut host, at)).map(|frame| frame[4]));
     }
     ids.sort_unstable();

@@ -76,7 +76,7 @@ fn an_update_is_refused_until_the_stop_has_left() {
         host.stop(ms(40));
         assert_eq!(host.start_firmware_update(40, ms(40)), refused, "requested");
         assert_eq!(host.poll_transmit(ms(40)).and_then(speed), Some(0));
-        host.handle_unsent(unsent, ms(41));
+        host.handle_transmit(unsent, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "{unsent:?}");
         sent(&mut host, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "handed out");
@@ -116,7 +116,7 @@ fn an_update_request_waits_for_a_stop_that_did_not_leave() {
             flushed(&mut host, ms(41));
             host.start_firmware_update(40, ms(42)).unwrap();
             (0..frames).for_each(|_| assert!(host.poll_transmit(ms(42)).is_some()));
-            host.handle_unsent(unsent, ms(43));
+            host.handle_transmit(unsent, ms(43));
             assert!(!host.is_stop_sent(), "{unsent:?}");
             let again = sent(&mut host, ms(43));
             assert_eq!(ids(&again), [&stops[..], &[9]].concat(), "{unsent:?}");

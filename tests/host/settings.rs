@@ -75,8 +75,8 @@ fn a_pause_of_two_bytes_and_the_margin_but_at_least_a_millisecond_cuts_off_a_fra
 
 #[test]
 fn a_robot_is_held_up_after_20_ms_and_a_host_at_once() {
-    assert_eq!(quiet_robot().held_up_after(), Some(Duration::from_millis(20)));
-    assert_eq!(quiet_host().held_up_after(), Some(Duration::ZERO));
+    assert_eq!(quiet_robot().line_rules().held_up_after, Some(Duration::from_millis(20)));
+    assert_eq!(quiet_host().line_rules().held_up_after, Some(Duration::ZERO));
 }
 
 #[test]

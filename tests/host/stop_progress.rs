@@ -33,9 +33,9 @@ fn stopped(tells: bool, reports: &[Vec<u8>]) -> Host {
     host.stop(ms(90));
     assert!(host.poll_transmit(ms(90)).is_some());
     if tells {
-        host.handle_taken(ms(90));
+        host.handle_transmit(Transmit::Taken, ms(90));
         assert_eq!((sent(&mut host, ms(95)).len(), host.stop_progress()), (0, Due));
-        host.handle_flushed(ms(100));
+        host.handle_transmit(Transmit::Flushed, ms(100));
     }
     assert_eq!(host.stop_progress(), if tells { NoReports } else { Due });
     (0..2).for_each(|_| assert_eq!(sent(&mut host, ms(100)).len(), 0));
@@ -75,7 +75,9 @@ fn reports_from_before_a_stop_was_flushed_do_not_count() {
         let mut host = stopped(tells, &[]);
         // 44 bytes take 3.82 ms: this one began before.
         host.handle_input(&wheels([0; 4]), us(103_819));
-        (0..90).for_each(|_| host.handle_old_input(&wheels([0; 4]), ms(103), ms(400)));
+        (0..90).for_each(|_| {
+            host.handle_input(&wheels([0; 4]), Arrival::Between { since: ms(103), now: ms(400) })
+        });
         assert_eq!(host.stop_progress(), NoReports);
         host.handle_input(&wheels([7; 4]), us(103_820));
         assert_eq!(host.stop_progress(), StillMoving { rpm: [7; 4] });
@@ -86,13 +88,13 @@ fn reports_from_before_a_stop_was_flushed_do_not_count() {
 fn a_stop_that_is_due_again_shows_nothing_until_it_has_been_flushed_as_often_as_needed() {
     for unsent in EVERY {
         let mut host = stopped(true, &[(); 3].map(|()| wheels([0; 4])));
-        host.handle_unsent(unsent, ms(170));
+        host.handle_transmit(unsent, ms(170));
         for copy in 0..=copies(unsent) {
             let expected = if copy == copies(unsent) { NoReports } else { Due };
             assert_eq!(host.stop_progress(), expected, "{unsent:?}");
             assert_eq!(host.poll_transmit(ms(171)).is_some(), expected == Due);
-            host.handle_taken(ms(171));
-            host.handle_flushed(ms(171));
+            host.handle_transmit(Transmit::Taken, ms(171));
+            host.handle_transmit(Transmit::Flushed, ms(171));
         }
     }
 }

@@ -19,7 +19,7 @@ fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
             if lost.iter().any(|other: &Vec<u8>| other[4] == frame[4]) {
                 frames.push(frame);
             } else {
-                host.handle_unsent(unsent, ms(1));
+                host.handle_transmit(unsent, ms(1));
                 lost.push(frame);
             }
             assert!(frames.len() < 40);
@@ -52,7 +52,7 @@ fn a_calibration_request_that_never_left_does_not_count_as_an_attempt() {
         if speed(&frame).is_some() {
             host.poll_transmit(ms(at)).unwrap();
         }
-        host.handle_unsent(Unsent::Untouched, ms(at));
+        host.handle_transmit(Unsent::Untouched, ms(at));
     }
     let failure = wait(&mut host, ms(5000));
     assert_eq!(failure.iter().filter(|(_, frame)| frame[4] == 3).count(), 3, "three attempts left");
@@ -68,7 +68,7 @@ fn a_failed_flush_repeats_no_acknowledgement() {
     host.set_network_state(NetworkState::Connected, ms(1)).unwrap();
     host.stop(ms(1));
     assert_eq!(sent(&mut host, ms(1)).len(), 4);
-    host.handle_unsent(Unsent::Unflushed, ms(2));
+    host.handle_transmit(Unsent::Unflushed, ms(2));
     // The robot asks again for the others.
     assert_eq!(ids(&sent(&mut host, ms(2))), [2, 2, 10]);
     assert_eq!(host.statistics().commands, 3, "what may have left counts");
@@ -79,7 +79,7 @@ fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
     let mut host = quiet_host();
     host.start_firmware_update(50, ms(3)).unwrap();
     assert_eq!(sent(&mut host, ms(3)).len(), 1);
-    host.handle_unsent(Unsent::Unflushed, ms(4));
+    host.handle_transmit(Unsent::Unflushed, ms(4));
     assert_eq!(wait(&mut host, ms(60_000)), [], "it may have arrived");
     host.stop(ms(60_000));
     assert_eq!(speeds(&wait(&mut host, ms(60_000))), [(60_000_000, 0); 2]);
@@ -92,7 +92,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
         assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
         host.start_firmware_update(50, ms(10)).unwrap();
         assert_eq!(sent(&mut host, ms(10)).len(), 2);
-        host.handle_unsent(unsent, ms(11));
+        host.handle_transmit(unsent, ms(11));
         assert_eq!(
             ids(&sent(&mut host, ms(11))),
             if unsent == Unsent::CutOff { vec![2, 2, 9] } else { vec![2, 9] }
@@ -105,7 +105,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
         host.start_firmware_update(50, ms(10)).unwrap();
         sent(&mut host, ms(10));
         host.stop(ms(11));
-        host.handle_unsent(unsent, ms(12));
+        host.handle_transmit(unsent, ms(12));
         let mut frames = wait(&mut host, ms(500)).into_iter();
         assert!(frames.all(|(_, frame)| frame[4] == 2), "{unsent:?}");
     }
@@ -120,7 +120,7 @@ fn the_acknowledgement_of_a_result_that_was_refused_before_is_due_again_if_it_di
         assert!(events(&mut host).contains(&HostEvent::BiasNotStored(kind)));
         host.handle_input(&result, ms(1001));
         let acknowledgement = host.poll_transmit(ms(1001)).unwrap().to_vec();
-        host.handle_unsent(Unsent::Untouched, ms(1001));
+        host.handle_transmit(Unsent::Untouched, ms(1001));
         assert_eq!(sent(&mut host, ms(1002)), [acknowledgement]);
     }
 }

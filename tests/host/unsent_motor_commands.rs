@@ -10,7 +10,7 @@ fn a_failed_write_or_a_discarded_stop_makes_the_stop_due_again() {
         assert_eq!(sent(&mut host, ms(30)).len(), 1);
         host.stop(ms(31));
         assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
-        host.handle_unsent(unsent, ms(40));
+        host.handle_transmit(unsent, ms(40));
         let frames = sent(&mut host, ms(40));
         assert_eq!(frames.len(), copies(unsent), "{unsent:?}");
         assert!(frames.iter().all(|frame| speed(frame) == Some(0)));
@@ -24,12 +24,12 @@ fn an_old_command_is_never_sent_late() {
         let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
         host.stop(ms(35));
-        host.handle_unsent(unsent, ms(36));
+        host.handle_transmit(unsent, ms(36));
         assert!(sent(&mut host, ms(36)).iter().all(|frame| speed(frame) == Some(0)), "{unsent:?}");
 
         let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
-        host.handle_unsent(unsent, ms(5000));
+        host.handle_transmit(unsent, ms(5000));
         host.handle_timeout(ms(5000));
         let frames = sent(&mut host, ms(5000));
         assert!(!frames.is_empty());
@@ -41,7 +41,7 @@ fn an_old_command_is_never_sent_late() {
 fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
     let mut host = driven(begun(), 40, 30);
     sent(&mut host, ms(30));
-    host.handle_unsent(Unsent::CutOff, ms(32));
+    host.handle_transmit(Unsent::CutOff, ms(32));
     let frames = sent(&mut host, ms(32));
     assert_eq!(frames.iter().filter_map(|frame| speed(frame)).collect::<Vec<_>>(), [40, 40]);
 }
@@ -50,7 +50,7 @@ fn behind_a_frame_that_was_cut_off_every_motor_command_goes_twice() {
 fn both_frames_after_a_cut_off_one_are_sent_at_once_even_if_the_command_changes_in_between() {
     let mut host = driven(begun(), 10, 20);
     sent(&mut host, ms(20));
-    host.handle_unsent(Unsent::CutOff, ms(30));
+    host.handle_transmit(Unsent::CutOff, ms(30));
     assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(10));
     host.drive(go(40), ms(30)).unwrap();
     assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
@@ -63,7 +63,7 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
         let mut host = begun();
         host.stop(ms(10));
         assert!(host.is_stop_sent());
-        host.handle_unsent(unsent, ms(20));
+        host.handle_transmit(unsent, ms(20));
         assert!(!host.is_stop_sent(), "{unsent:?}");
         for copy in 1..=copies(unsent) {
             assert_eq!(host.poll_transmit(ms(20)).and_then(speed), Some(0));
@@ -78,7 +78,7 @@ fn a_stop_requested_after_the_failure_is_sent_at_once_and_alone() {
     for unsent in EVERY {
         let mut host = driven(begun(), 40, 30);
         sent(&mut host, ms(30));
-        host.handle_unsent(unsent, ms(35));
+        host.handle_transmit(unsent, ms(35));
         host.stop(ms(36));
         let frames = sent(&mut host, ms(36));
         assert_eq!(frames.len(), copies(unsent));
@@ -94,7 +94,7 @@ fn the_first_frame_is_zero_however_often_it_does_not_reach_the_line() {
         host.drive(go(40), ms(0)).unwrap();
         for at in 0..10 {
             assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(0), "{unsent:?}");
-            host.handle_unsent(unsent, ms(at));
+            host.handle_transmit(unsent, ms(at));
         }
         let speeds: Vec<_> = sent(&mut host, ms(10)).iter().filter_map(|it| speed(it)).collect();
         assert_eq!(speeds, [&vec![0; copies(unsent)][..], &[40]].concat(), "{unsent:?}");
@@ -107,17 +107,17 @@ fn a_first_frame_that_may_not_have_been_flushed_comes_first_again() {
     let ids: Vec<_> = sent(&mut host, ms(0)).iter().map(|frame| frame[4]).collect();
     assert_eq!(ids, [2, 1]);
     host.drive(go(40), ms(1)).unwrap();
-    host.handle_unsent(Unsent::Unflushed, ms(2));
+    host.handle_transmit(Unsent::Unflushed, ms(2));
     let speeds = |host: &mut Host, now| -> Vec<_> {
         sent(host, now).iter().filter_map(|frame| speed(frame)).collect()
     };
     assert_eq!(speeds(&mut host, ms(2)), [0, 0, 40]);
     // The flush may fail repeatedly.
-    host.handle_unsent(Unsent::Unflushed, ms(3));
+    host.handle_transmit(Unsent::Unflushed, ms(3));
     assert_eq!(speeds(&mut host, ms(3)), [0, 0, 40]);
     // The next round shows that it was flushed.
     assert_eq!(speeds(&mut host, ms(103)), [40]);
-    host.handle_unsent(Unsent::Unflushed, ms(104));
+    host.handle_transmit(Unsent::Unflushed, ms(104));
     assert_eq!(speeds(&mut host, ms(104)), [40, 40]);
 }
 
@@ -131,13 +131,13 @@ fn the_first_frame_is_zero_even_when_its_flush_and_that_of_a_command_fail() {
         }
         assert_eq!(host.poll_transmit(ms(at)).and_then(speed), Some(60));
         // Nothing of either has left, or the robot has received both.
-        host.handle_unsent(Unsent::Unflushed, ms(at));
+        host.handle_transmit(Unsent::Unflushed, ms(at));
     }
     // A command refused by the port is not the first frame, which the port did take.
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(0));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(0));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(60));
-    host.handle_unsent(Unsent::Untouched, ms(5));
+    host.handle_transmit(Unsent::Untouched, ms(5));
     assert_eq!(host.poll_transmit(ms(5)).and_then(speed), Some(60));
 }
 
@@ -146,29 +146,29 @@ fn the_first_frame_is_due_again_if_its_flush_was_dropped_and_its_port_replaced()
     for is_flushed in [false, true] {
         let mut host = fresh_host();
         assert_eq!(host.poll_transmit(ms(0)).and_then(speed), Some(0));
-        host.handle_taken(ms(0));
+        host.handle_transmit(Transmit::Taken, ms(0));
         assert_eq!(host.poll_transmit(ms(0)), None);
         if is_flushed {
-            host.handle_flushed(ms(1));
+            host.handle_transmit(Transmit::Flushed, ms(1));
         }
         host.drive(go(60), ms(30)).unwrap();
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(60));
-        host.handle_taken(ms(30));
-        host.handle_unsent(Unsent::Unflushed, ms(31));
+        host.handle_transmit(Transmit::Taken, ms(30));
+        host.handle_transmit(Unsent::Unflushed, ms(31));
         let first = host.poll_transmit(ms(31)).and_then(speed);
         assert_eq!(first, Some(if is_flushed { 60 } else { 0 }));
     }
 }
 
 #[test]
-fn a_spurious_handle_unsent_only_repeats_the_motor_command() {
+fn a_spurious_unsent_only_repeats_the_motor_command() {
     let mut host = begun();
-    host.handle_unsent(Unsent::Untouched, ms(1));
-    host.handle_unsent(Unsent::Untouched, ms(1));
+    host.handle_transmit(Unsent::Untouched, ms(1));
+    host.handle_transmit(Unsent::Untouched, ms(1));
     let frames = sent(&mut host, ms(1));
     assert_eq!((frames.len(), frames[0][4], frames[0][5]), (1, 2, 0));
     let mut robot = quiet_robot();
-    robot.handle_unsent(Unsent::CutOff, ms(1));
+    robot.handle_transmit(Unsent::CutOff, ms(1));
     assert_eq!((sent(&mut robot, ms(1)), robot.poll_timeout()), (vec![], None));
 }
 
@@ -207,7 +207,7 @@ fn behind_any_frame_that_was_cut_off_or_not_flushed_a_stop_reaches_a_simple_rece
         {
             let mut host = begun();
             host.stop(ms(1));
-            host.handle_unsent(unsent, ms(1));
+            host.handle_transmit(unsent, ms(1));
             let stops = sent(&mut host, ms(1)).concat();
             let heard = heard_by_a_simple_receiver(&[&frame[..cut], &stops].concat());
             let last = heard.last().unwrap_or_else(|| panic!("{cut}: nothing"));
@@ -221,7 +221,7 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     let cut = || {
         let mut host = driven(begun(), 40, 30);
         assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(40));
-        host.handle_unsent(Unsent::CutOff, ms(31));
+        host.handle_transmit(Unsent::CutOff, ms(31));
         host.stop(ms(31));
         assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0), "the first copy");
         host
@@ -233,15 +233,15 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     // The port refuses the second, and may have lost the first.
     let mut host = cut();
     assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
-    host.handle_unsent(Unsent::Untouched, ms(32));
-    host.handle_unsent(Unsent::Unflushed, ms(32));
+    host.handle_transmit(Unsent::Untouched, ms(32));
+    host.handle_transmit(Unsent::Unflushed, ms(32));
     assert_eq!(copies(&mut host, ms(33)), 2);
     // It may have lost both, along with the frames after them.
     let mut host = cut();
     assert_eq!(host.poll_transmit(ms(31)).and_then(speed), Some(0));
     host.set_network_state(NetworkState::Connected, ms(32)).unwrap();
     sent(&mut host, ms(32));
-    host.handle_unsent(Unsent::Unflushed, ms(33));
+    host.handle_transmit(Unsent::Unflushed, ms(33));
     assert_eq!(copies(&mut host, ms(33)), 2);
     // Both have left; the port has only refused a later frame.
     let mut host = cut();
@@ -249,7 +249,7 @@ fn the_two_copies_behind_a_frame_that_was_cut_off_count_once_they_are_flushed() 
     sent(&mut host, ms(40));
     host.stop(ms(50));
     sent(&mut host, ms(50));
-    host.handle_unsent(Unsent::Untouched, ms(50));
+    host.handle_transmit(Unsent::Untouched, ms(50));
     assert_eq!(copies(&mut host, ms(51)), 1);
 }
 
@@ -258,11 +258,11 @@ fn the_rest_of_a_command_is_outdated_by_a_stop_although_a_flush_has_failed_meanw
     let mut host = driven(begun(), 60, 30);
     assert_eq!(host.poll_transmit(ms(30)).and_then(speed), Some(60));
     // Of its bytes the port has taken some, and has not flushed them.
-    host.handle_unsent(Unsent::Unflushed, ms(31));
+    host.handle_transmit(Unsent::Unflushed, ms(31));
     assert!(!host.is_outdated());
     host.stop(ms(32));
     assert!(host.is_outdated(), "so a driver gives it up");
-    host.handle_unsent(Unsent::CutOff, ms(32));
+    host.handle_transmit(Unsent::CutOff, ms(32));
     let frames = sent(&mut host, ms(32));
     assert_eq!(frames.iter().map(|frame| speed(frame)).collect::<Vec<_>>(), [Some(0); 2]);
     let indices: Vec<_> = frames.iter().map(|frame| frame[5]).collect();
@@ -275,10 +275,10 @@ fn the_first_of_two_copies_that_the_port_did_not_touch_goes_twice_again() {
         let mut host = driven(begun(), 40, 30);
         sent(&mut host, ms(30));
         host.stop(ms(31));
-        host.handle_unsent(Unsent::CutOff, ms(32));
+        host.handle_transmit(Unsent::CutOff, ms(32));
         assert_eq!(speed(host.poll_transmit(ms(32)).unwrap()), Some(0));
         assert!(!host.is_stop_sent(), "one of two");
-        host.handle_unsent(unsent, ms(33));
+        host.handle_transmit(unsent, ms(33));
         let frames = sent(&mut host, ms(33));
         assert_eq!(frames.iter().filter_map(|it| speed(it)).collect::<Vec<_>>(), [0, 0]);
         assert!(host.is_stop_sent());

@@ -157,7 +157,7 @@ fn zero_periods_do_not_make_a_driver_spin() {
 #[test]
 fn both_roles_say_how_long_a_frame_may_pause_and_takes_on_the_line() {
     fn answers(role: &impl Endpoint) -> (Duration, Duration) {
-        (role.frame_pause(), role.wire_time(64))
+        (role.line_rules().frame_pause, role.line_rules().wire_time(64))
     }
     let expected = (Duration::from_millis(5), Duration::from_micros(5556));
     assert_eq!(answers(&quiet_host()), expected);

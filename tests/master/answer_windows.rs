@@ -24,8 +24,8 @@ fn a_request_that_the_port_held_back_within_its_window_has_a_window_from_there()
     for (flushed_us, deadline_us) in [(0, 740), (80, 740), (81, 741), (400, 1060), (740, 1400)] {
         let mut desk = Desk::asking(direct());
         let begin = desk.now;
-        desk.master.handle_taken(begin);
-        desk.master.handle_flushed(begin + US(flushed_us));
+        desk.master.handle_transmit(Transmit::Taken, begin);
+        desk.master.handle_transmit(Transmit::Flushed, begin + US(flushed_us));
         assert_eq!(desk.master.poll_timeout(), Some(begin + US(deadline_us)), "{flushed_us} us");
         let mut late = desk.clone();
         desk.hear(deadline_us, &velocity(NodeId::N1, 1.0));
@@ -46,12 +46,12 @@ fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_i
         let mut desk = Desk::with_nodes(direct(), &[N1, N3]);
         desk.turn();
         let begin = desk.now;
-        desk.master.handle_taken(begin + US(taken_us));
+        desk.master.handle_transmit(Transmit::Taken, begin + US(taken_us));
         desk.now = begin + US(740.max(taken_us));
         desk.master.handle_timeout(desk.now);
         assert_eq!(desk.told(), [turned(NodeId::N1, Health::Suspect(1))]);
         assert_eq!(desk.master.poll_transmit(desk.now), None);
-        desk.master.handle_flushed(begin + US(flushed_us));
+        desk.master.handle_transmit(Transmit::Flushed, begin + US(flushed_us));
         desk.now = begin + US(flushed_us);
         desk.hear(210, &velocity(NodeId::N1, 1.0));
         assert_eq!(desk.told(), []);
@@ -75,10 +75,10 @@ fn a_request_that_left_after_its_window_keeps_the_line_free_for_an_answer_that_i
 fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answer() {
     let mut desk = Desk::asking(direct());
     let begin = desk.now;
-    desk.master.handle_taken(begin);
+    desk.master.handle_transmit(Transmit::Taken, begin);
     // Nobody has let time pass meanwhile.
     desk.now = begin + US(741);
-    desk.master.handle_flushed(desk.now);
+    desk.master.handle_transmit(Transmit::Flushed, desk.now);
     assert_eq!(desk.told(), [turned(NodeId::N1, Health::Suspect(1))]);
     desk.hear(1, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.told(), []);
@@ -89,11 +89,11 @@ fn a_flush_that_begins_in_the_window_and_ends_after_it_closes_it_without_an_answ
 #[test]
 fn an_answer_shows_that_its_request_has_left() {
     let mut desk = Desk::asking(direct());
-    desk.master.handle_taken(desk.now);
+    desk.master.handle_transmit(Transmit::Taken, desk.now);
     desk.hear(290, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.turn(), read(NodeId::N1), "the line is free");
     let begin = desk.now;
-    desk.master.handle_taken(begin);
+    desk.master.handle_transmit(Transmit::Taken, begin);
     desk.hear(290, &velocity(NodeId::N1, 2.0));
     assert_eq!(desk.told().len(), 2, "and the next answer counts");
 }
@@ -102,11 +102,11 @@ fn an_answer_shows_that_its_request_has_left() {
 fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_counts() {
     let mut desk = Desk::asking(direct());
     let held_at = desk.now;
-    desk.master.handle_taken(held_at);
+    desk.master.handle_transmit(Transmit::Taken, held_at);
     for _ in 0..2 {
         assert_eq!(desk.turn(), read(NodeId::N1));
         assert!(desk.now >= held_at + MS(1000));
-        desk.master.handle_taken(desk.now);
+        desk.master.handle_transmit(Transmit::Taken, desk.now);
         // Whose answer is it?
         desk.hear(290, &velocity(NodeId::N1, 1.0));
         desk.silence();
@@ -118,7 +118,7 @@ fn while_a_port_does_not_flush_requests_go_on_after_a_second_but_no_answer_count
 
     // Everything has left: an answer to one of those may come, and then they count again.
     let flushed_at = desk.now + US(100);
-    desk.master.handle_flushed(flushed_at);
+    desk.master.handle_transmit(Transmit::Flushed, flushed_at);
     assert_eq!(desk.turn(), read(NodeId::N1));
     assert!(desk.now >= flushed_at + US(660));
     desk.hear(290, &velocity(NodeId::N1, 3.0));
@@ -130,7 +130,7 @@ fn holding_back() -> Desk {
     let mut desk = Desk::with_nodes(manual(), &[N1, N3]);
     desk.master.read(NodeId::N3, desk.now).unwrap();
     desk.turn();
-    desk.master.handle_taken(desk.now);
+    desk.master.handle_transmit(Transmit::Taken, desk.now);
     desk.silence();
     desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
     assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
@@ -141,8 +141,8 @@ fn holding_back() -> Desk {
 fn a_late_flush_keeps_the_line_free_for_the_answer_also_behind_a_write() {
     for next_is_stop in [false, true] {
         let mut desk = holding_back();
-        desk.master.handle_taken(desk.now);
-        desk.master.handle_flushed(desk.now);
+        desk.master.handle_transmit(Transmit::Taken, desk.now);
+        desk.master.handle_transmit(Transmit::Flushed, desk.now);
         let end = desk.now + US(660);
         if next_is_stop {
             desk.master.stop(NodeId::N1, desk.now);
@@ -165,9 +165,9 @@ fn every_node_whose_request_left_late_is_guarded_and_no_node_that_was_only_told_
         desk.master.read(NodeId::N1, desk.now).unwrap();
         if is_asked {
             assert_eq!(desk.turn(), read(NodeId::N1), "both have been asked");
-            desk.master.handle_taken(desk.now);
+            desk.master.handle_transmit(Transmit::Taken, desk.now);
         }
-        desk.master.handle_flushed(desk.now);
+        desk.master.handle_transmit(Transmit::Flushed, desk.now);
         let end = desk.now + US(660);
         if !is_asked {
             assert_eq!((desk.turn(), desk.now), (read(NodeId::N1), end));
@@ -189,10 +189,10 @@ fn every_node_whose_request_left_late_is_guarded_and_no_node_that_was_only_told_
 #[test]
 fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() {
     let mut desk = Desk::asking(direct());
-    desk.master.handle_taken(desk.now);
+    desk.master.handle_transmit(Transmit::Taken, desk.now);
     desk.turn();
-    desk.master.handle_taken(desk.now);
-    desk.master.handle_flushed(desk.now + US(10));
+    desk.master.handle_transmit(Transmit::Taken, desk.now);
+    desk.master.handle_transmit(Transmit::Flushed, desk.now + US(10));
     desk.told();
     // In the window that it had.
     desk.hear(290, &velocity(NodeId::N1, 1.0));
@@ -204,9 +204,9 @@ fn a_flush_that_ends_while_several_requests_may_be_answered_closes_the_window() 
 fn a_request_given_up_in_doubt_keeps_the_line_free_for_its_answer() {
     let mut desk = Desk::asking(direct());
     let begin = desk.now;
-    desk.master.handle_taken(begin + US(400));
-    desk.master.handle_unsent(Unsent::CutOff, begin + US(400));
-    desk.master.handle_flushed(begin + US(400));
+    desk.master.handle_transmit(Transmit::Taken, begin + US(400));
+    desk.master.handle_transmit(Unsent::CutOff, begin + US(400));
+    desk.master.handle_transmit(Transmit::Flushed, begin + US(400));
     desk.now = begin + US(400);
     desk.hear(300, &velocity(NodeId::N1, 1.0));
     assert_eq!(desk.told(), []);
@@ -364,7 +364,10 @@ fn bytes_that_may_be_older_than_the_request_are_no_answer_and_are_told_as_unexpe
         let asked = desk.now;
         assert_eq!(desk.turn(), read(NodeId::N1));
         desk.now += US(290);
-        desk.master.handle_old_input(&velocity(NodeId::N1, 1.0), asked, desk.now);
+        desk.master.handle_input(
+            &velocity(NodeId::N1, 1.0),
+            Arrival::Between { since: asked, now: desk.now },
+        );
         assert!(desk.told().is_empty(), "it is no answer");
         desk.silence();
         told.append(&mut desk.told());
@@ -376,7 +379,7 @@ fn bytes_that_may_be_older_than_the_request_are_no_answer_and_are_told_as_unexpe
     // Those that came behind it are.
     assert_eq!(desk.turn(), read(NodeId::N1));
     let now = desk.now + US(290);
-    desk.master.handle_old_input(&velocity(NodeId::N1, 1.0), now, now);
+    desk.master.handle_input(&velocity(NodeId::N1, 1.0), Arrival::Between { since: now, now });
     desk.now = now;
     assert_eq!(desk.master.health(NodeId::N1), Some(Health::Online));
 }

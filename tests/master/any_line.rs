@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     ikeya::{
         Master, Mode, NodeId, Position, Slave, Status,
         master::{Health, MasterConfig, MasterEvent},
@@ -48,7 +48,8 @@ impl Counting {
 impl Endpoint for Counting {
     type Event = SlaveEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.slave.handle_input(bytes, now);
         self.number();
     }
@@ -133,7 +134,8 @@ impl Watched {
 impl Endpoint for Watched {
     type Event = (MasterEvent, Option<Instant>);
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.master.handle_input(bytes, now);
         self.note(now);
     }

@@ -30,7 +30,7 @@ fn the_silence_after_a_cut_off_packet_begins_when_the_failure_was_noticed() {
         desk.master.read(NodeId::N1, desk.now).unwrap();
         assert_eq!(desk.packet(), read(NodeId::N1));
         desk.now += US(noticed_us);
-        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        desk.master.handle_transmit(Unsent::CutOff, desk.now);
         let noticed = desk.now;
         assert_eq!(desk.packet(), read(NodeId::N1));
         // The packet may still be leaving: 80 us, twice the five byte times of a pause, and the
@@ -62,7 +62,7 @@ fn a_flush_that_fails_behind_a_paid_half_does_not_move_the_held_position() {
     desk.answer(NodeId::N3, Answer::Position(turns(40)));
     assert_eq!(desk.packets(1), [read(NodeId::N3)]);
     for _ in 0..3 {
-        desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+        desk.master.handle_transmit(Unsent::Unflushed, desk.now);
         desk.now += MS(100);
     }
     assert_eq!(desk.packet(), hold(NodeId::N3, turns(30)));
@@ -129,7 +129,7 @@ fn nothing_follows_a_cut_off_write_before_the_silence_is_over() {
         }
         assert_eq!(kind(&desk.packet()), (WRITE, 1));
         desk.now += US(noticed_us);
-        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        desk.master.handle_transmit(Unsent::CutOff, desk.now);
         let noticed = desk.now;
         // The same again, or the READ of the other node.
         assert!([(WRITE, 1), (READ, 3)].contains(&kind(&desk.packet())));
@@ -190,7 +190,7 @@ fn behind_a_part_of_a_packet_the_line_is_silent_for_as_long_as_a_node_waits_for_
         let mut desk = Desk::with_nodes(config, &[N1]);
         desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
         assert_eq!(kind(&desk.packet()), (WRITE, 1));
-        desk.master.handle_unsent(Unsent::CutOff, desk.now);
+        desk.master.handle_transmit(Unsent::CutOff, desk.now);
         let noticed = desk.now;
         assert_eq!(kind(&desk.packet()), (WRITE, 1));
         assert!(desk.now - noticed > idle, "{:?}", desk.now - noticed);

@@ -2,7 +2,7 @@
 
 /// What the scenarios use of the library.
 pub(crate) use axlewire::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Transmit, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, Slave, Status, Target, WriteRequest,
         board::ThreeMotors,

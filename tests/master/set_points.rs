@@ -141,7 +141,7 @@ fn after_a_failed_flush_an_answer_does_not_confirm_the_write_in_front_of_its_rea
     let mut desk = confirming();
     desk.turn();
     assert_eq!(desk.sent, [write(NodeId::N1, 1.0)]);
-    desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+    desk.master.handle_transmit(Unsent::Unflushed, desk.now);
     desk.hear(450, &velocity(NodeId::N1, 0.0));
     assert_eq!(desk.news(), [], "the WRITE may not have left");
     desk.sent.clear();

@@ -146,7 +146,7 @@ fn a_read_of_a_node_that_was_turned_by_hand_does_not_drive_it_back() {
         desk.master.read(node.0, desk.now).unwrap();
         assert_eq!(desk.packets(4), [read(node.0)]);
         // A failed flush of something else does not make it due either.
-        desk.master.handle_unsent(Unsent::Unflushed, desk.now);
+        desk.master.handle_transmit(Unsent::Unflushed, desk.now);
         assert_eq!(desk.packets(4), Vec::<Vec<u8>>::new());
         assert_eq!(desk.master.stops_owed(), NodeSet::NONE);
     }
@@ -242,7 +242,7 @@ fn a_hold_that_is_kept_and_cannot_be_written_for_20_ms_is_looked_at_again() {
         let begin = desk.now;
         desk.answer(NodeId::N3, Answer::Position(turns(90)));
         assert_eq!(desk.packet(), hold(NodeId::N3, turns(40)));
-        desk.master.handle_unsent(Unsent::Untouched, desk.now);
+        desk.master.handle_transmit(Unsent::Untouched, desk.now);
         desk.now = begin + US(late_us);
         let place = if is_read { turns(90) } else { turns(40) };
         let written = writes(&desk.packets(3));

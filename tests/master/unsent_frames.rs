@@ -6,7 +6,7 @@ const STOPPED_1: MasterEvent = MasterEvent::Stopped { node: NodeId::N1 };
 
 /// The last packet handed out did not leave.
 fn fail(desk: &mut Desk, unsent: Unsent) {
-    desk.master.handle_unsent(unsent, desk.now);
+    desk.master.handle_transmit(unsent, desk.now);
 }
 
 #[test]
@@ -372,7 +372,7 @@ fn behind_a_packet_that_was_cut_off_the_silence_begins_with_its_flush() {
         desk.now += MS(5);
         fail(&mut desk, unsent);
         desk.now += MS(5);
-        desk.master.handle_flushed(desk.now);
+        desk.master.handle_transmit(Transmit::Flushed, desk.now);
         // Ten bytes of silence, twice what ends a packet.
         desk.now += Duration::from_micros(199);
         assert_eq!(desk.master.poll_transmit(desk.now), None, "{unsent:?}");
@@ -398,7 +398,7 @@ fn through_a_port_that_spoils_every_write_each_node_has_its_turn_of_the_stops() 
         }
         fail(&mut desk, Unsent::CutOff);
         desk.now += MS(1);
-        desk.master.handle_flushed(desk.now);
+        desk.master.handle_transmit(Transmit::Flushed, desk.now);
     }
     assert_eq!(stops[..4], [4, 1, 4, 1]);
     assert!(stops.len() >= 10, "{stops:?}");

@@ -247,7 +247,7 @@ impl<B: Kit> Bus<B> {
             Fate::CutOff | Fate::GivenUp => Unsent::CutOff,
             Fate::UnflushedArrives | Fate::UnflushedLost => Unsent::Unflushed,
         };
-        self.master.handle_unsent(unsent, self.now);
+        self.master.handle_transmit(unsent, self.now);
         if sent.is_exchange::<B>() {
             // It is repeated, and was no turn.
             self.accounts.iter_mut().for_each(|it| it.waits = it.waits.saturating_sub(1));

@@ -2,7 +2,7 @@
 
 pub(crate) use axlewire::{
     drive::{DriveError, Driver, Rs485},
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Target, VelocityResponse,
         board::{OneMotor, ThreeMotors},

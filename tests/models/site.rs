@@ -194,7 +194,7 @@ where
             Part::Whole => self.feed.push(hear, bytes.len(), false),
             _ => {}
         }
-        self.role.handle_old_input(&bytes, since, self.now);
+        self.role.handle_input(&bytes, Arrival::Between { since, now: self.now });
         let counters = S::counters(&self.role);
         for (arrived, at) in self.feed.arrived(&counters, since)? {
             self.heard(arrived, at, &before)?;
@@ -216,7 +216,7 @@ where
     }
 
     fn fail(&mut self, unsent: Unsent) {
-        self.role.handle_unsent(unsent, self.now);
+        self.role.handle_transmit(unsent, self.now);
         self.unsent(unsent);
         self.is_unflushed &= unsent != Unsent::Unflushed;
     }

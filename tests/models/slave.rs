@@ -193,7 +193,7 @@ impl<B: Kit> SlaveLine<B> {
         broken_if!(self.is_inside, "an answer to what is inside another node's packet");
         broken_if!(self.is_answered || self.now > until, "a second answer, or a late one");
         if let Some(unsent) = unsent {
-            self.slave.handle_unsent(unsent, self.now);
+            self.slave.handle_transmit(unsent, self.now);
         }
         self.is_answered = unsent != Some(Unsent::Untouched);
         Ok(())

@@ -128,7 +128,7 @@ fn a_command_that_comes_at_the_end_of_the_last_one_does_not_hide_the_watchdog() 
     assert_eq!(robot.poll_event(), Some(RobotEvent::Watchdog));
     assert_eq!(robot.poll_event(), Some(RobotEvent::Motor(go(40))));
     // One that came in time has no watchdog before it, also if it is taken in late.
-    robot.handle_old_input(&bytes(go(30)), ms(990), ms(1010));
+    robot.handle_input(&bytes(go(30)), Arrival::Between { since: ms(990), now: ms(1010) });
     assert_eq!(robot.poll_event(), Some(RobotEvent::Motor(go(30))));
     assert_eq!(robot.statistics().watchdog, 1);
 }
@@ -138,7 +138,10 @@ fn a_command_that_waited_too_long_for_the_driver_moves_nothing() {
     for (waited_us, is_too_old) in [(499_999, false), (500_000, true), (900_000, true)] {
         let mut robot = quiet_robot();
         let now = us(waited_us);
-        robot.handle_old_input(&bytes(go(50).with_front_led(true)), ms(0), now);
+        robot.handle_input(
+            &bytes(go(50).with_front_led(true)),
+            Arrival::Between { since: ms(0), now },
+        );
         let expected = if is_too_old { MotorControl::STOP } else { go(50) }.with_front_led(true);
         assert_eq!(robot.command(now), expected);
         assert_eq!(events(&mut robot), [RobotEvent::Motor(expected)], "{waited_us} us");

@@ -26,7 +26,7 @@ fn every_event_of_a_robot_is_counted_once_and_in_one_place() {
             robot.handle_input(&bytes(Ping {}), ms(1));
             robot.handle_input(&bytes(Ping {}), ms(1));
             robot.poll_transmit(ms(1)).unwrap();
-            robot.handle_unsent(Unsent::Untouched, ms(1));
+            robot.handle_transmit(Unsent::Untouched, ms(1));
             sent(robot, ms(1));
         }
         "a start, repeated": calibration_repeats => |robot| {

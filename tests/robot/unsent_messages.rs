@@ -15,7 +15,7 @@ fn an_answer_of_a_robot_that_never_left_is_due_again() {
         assert!(robot.answer_update(OtaStatus::Forbidden, ms(0)));
         let mut frames = Vec::new();
         while let Some(lost) = robot.poll_transmit(ms(0)).map(<[u8]>::to_vec) {
-            robot.handle_unsent(unsent, ms(0));
+            robot.handle_transmit(unsent, ms(0));
             assert_eq!(robot.poll_transmit(ms(0)), Some(&lost[..]), "{unsent:?}");
             frames.push(lost);
             assert!(frames.len() <= 8);
@@ -51,7 +51,7 @@ fn a_result_that_never_left_is_not_ended_by_the_acknowledgement_of_the_one_befor
             assert_eq!(sent(&mut robot, ms(10)).len(), 1);
             begin(&mut robot, 2, ms(20));
             assert!(robot.poll_transmit(ms(20)).is_some());
-            robot.handle_unsent(unsent, ms(20));
+            robot.handle_transmit(unsent, ms(20));
             robot.handle_input(&ack, ms(21)); // acknowledges the first
             assert_eq!(events(&mut robot), [], "{unsent:?}");
             assert_eq!(robot.statistics().acks_refused, 1);
@@ -69,7 +69,7 @@ fn a_repetition_that_did_not_leave_leaves_the_result_sent() {
         robot.calibration_result_imu(imu_bias(), ms(0));
         sent(&mut robot, ms(0));
         assert!(robot.poll_transmit(ms(1000)).is_some());
-        robot.handle_unsent(unsent, ms(1000));
+        robot.handle_transmit(unsent, ms(1000));
         robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(1001));
         assert_eq!(events(&mut robot), [RobotEvent::ImuBiasTaken], "{unsent:?}");
     }
@@ -82,7 +82,7 @@ fn skipped_reports_are_counted_once_even_if_the_next_did_not_leave() {
         robot.set_telemetry(&Telemetry::default(), ms(0));
         sent(&mut robot, ms(0));
         assert_eq!(robot.poll_transmit(ms(85)).map(|frame| frame[5]), Some(1));
-        robot.handle_unsent(unsent, ms(86));
+        robot.handle_transmit(unsent, ms(86));
         assert_eq!(robot.poll_transmit(ms(86)).map(|frame| frame[5]), Some(1));
         let seen = robot.statistics();
         assert_eq!((seen.reports, seen.reports_skipped), (2, 3));
@@ -96,7 +96,7 @@ fn a_robot_whose_flush_failed_repeats_results_and_requests_at_once() {
     both_results(&mut robot, 0);
     robot.handle_input(&bytes(Ping {}), ms(0));
     assert_eq!(sent(&mut robot, ms(0)).len(), 4);
-    robot.handle_unsent(Unsent::Unflushed, ms(5));
+    robot.handle_transmit(Unsent::Unflushed, ms(5));
     assert_eq!(ids(&sent(&mut robot, ms(5))), [6, 7, 8], "the host pings again");
 }
 
@@ -106,7 +106,7 @@ fn a_robot_whose_flush_failed_answers_an_update_again_and_takes_the_acknowledgem
     let mut robot = quiet_robot();
     both_results(&mut robot, 0);
     assert_eq!(sent(&mut robot, ms(0)).len(), 2);
-    robot.handle_unsent(Unsent::Unflushed, ms(1));
+    robot.handle_transmit(Unsent::Unflushed, ms(1));
     // They may have left all the same.
     robot.handle_input(&bytes(ImuBiasAck::new(ErrorCode::Fine)), ms(2));
     robot.handle_input(&bytes(MagBiasAck::new(ErrorCode::Fine)), ms(2));
@@ -117,7 +117,7 @@ fn a_robot_whose_flush_failed_answers_an_update_again_and_takes_the_acknowledgem
     assert!(robot.answer_update(OtaStatus::Forbidden, ms(10)));
     let answer = sent(&mut robot, ms(10));
     assert_eq!(answer.len(), 1);
-    robot.handle_unsent(Unsent::Unflushed, ms(11));
+    robot.handle_transmit(Unsent::Unflushed, ms(11));
     assert_eq!(sent(&mut robot, ms(11)), answer);
 }
 
@@ -127,8 +127,8 @@ fn an_answer_of_a_robot_that_is_cut_off_after_a_failed_flush_is_due_again() {
     robot.handle_input(&bytes(CalibrationStart::new(IMU)), ms(0));
     let lost = robot.poll_transmit(ms(0)).map(<[u8]>::to_vec).unwrap();
     assert_eq!(lost[4], 3);
-    robot.handle_unsent(Unsent::Unflushed, ms(0));
-    robot.handle_unsent(Unsent::CutOff, ms(1));
+    robot.handle_transmit(Unsent::Unflushed, ms(0));
+    robot.handle_transmit(Unsent::CutOff, ms(1));
     assert_eq!(robot.poll_transmit(ms(1)), Some(&lost[..]));
 }
 
@@ -143,7 +143,7 @@ fn an_answer_to_an_update_request_that_did_not_leave_does_not_replace_a_newer_on
         robot.poll_transmit(ms(0)).unwrap();
         robot.handle_input(&asks, ms(1));
         assert!(robot.answer_update(OtaStatus::Forbidden, ms(1)));
-        robot.handle_unsent(unsent, ms(1));
+        robot.handle_transmit(unsent, ms(1));
         assert_eq!(sent(&mut robot, ms(1)), [bytes(OtaAck::new(OtaStatus::Forbidden))]);
     }
 }

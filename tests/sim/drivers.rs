@@ -41,7 +41,7 @@ enum Bad {
 
 impl Endpoint for Bad {
     type Event = ();
-    fn handle_input(&mut self, _: &[u8], _: Instant) {}
+    fn handle_input(&mut self, _: &[u8], _: impl Into<Arrival>) {}
     fn handle_timeout(&mut self, _: Instant) {}
 
     fn poll_transmit(&mut self, _: Instant) -> Option<&[u8]> {

@@ -136,7 +136,7 @@ struct Restless {
 
 impl Endpoint for Restless {
     type Event = ();
-    fn handle_input(&mut self, _: &[u8], _: Instant) {}
+    fn handle_input(&mut self, _: &[u8], _: impl Into<Arrival>) {}
     fn handle_timeout(&mut self, now: Instant) {
         self.has_news = true;
         self.rounds += 1;

@@ -2,7 +2,7 @@
 //! is how the thing moves.
 
 use axlewire::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Unsent},
     ikeya::{Mode, NodeId, Position, ReadRequest, Rps, Slave, WriteRequest, slave::SlaveConfig},
     sim::{Motor, MotorNode, Rover, RoverNode},
     time::{Duration, Instant},
@@ -23,7 +23,7 @@ fn an_answer_of_a_motor_node_that_did_not_leave_is_due_again_and_outdated_by_mor
     let answer = node.poll_transmit(at_ms(1)).unwrap().to_vec();
     assert!(!node.is_outdated());
     assert_eq!(node.poll_transmit(at_ms(1)), None, "handed out once");
-    node.handle_unsent(Unsent::Untouched, at_ms(1));
+    node.handle_transmit(Unsent::Untouched, at_ms(1));
     assert_eq!(node.poll_transmit(at_ms(1)), Some(&answer[..]));
     node.handle_input(&[0], at_ms(1));
     assert!(node.is_outdated());
@@ -77,7 +77,7 @@ fn a_report_of_a_rover_node_that_did_not_leave_is_due_again_with_its_index() {
     };
     assert_eq!(index(node.poll_transmit(at_ms(0)).unwrap()), 0);
     assert_eq!(node.poll_transmit(at_ms(0)), None);
-    node.handle_unsent(Unsent::Untouched, at_ms(0));
+    node.handle_transmit(Unsent::Untouched, at_ms(0));
     assert_eq!(index(node.poll_transmit(at_ms(0)).unwrap()), 0);
     assert_eq!(node.robot().statistics().reports, 1);
     assert_eq!(index(node.poll_transmit(at_ms(20)).unwrap()), 1);
@@ -144,17 +144,12 @@ fn a_rover_that_turns_right_on_the_spot_measures_that() {
 fn what_a_driver_asks_a_node_is_answered_by_its_role() {
     let node = MotorNode::new(NodeId::N1, Mode::Velocity);
     let rover = RoverNode::new(RobotConfig::default(), at_ms(0));
-    let slave = node.slave();
-    assert_eq!(node.held_up_after(), slave.held_up_after());
-    assert_eq!(node.frame_pause(), slave.frame_pause());
-    assert_eq!(node.wire_time(8), slave.wire_time(8));
-    assert_eq!(rover.held_up_after(), rover.robot().held_up_after());
-    assert_eq!(rover.frame_pause(), rover.robot().frame_pause());
-    assert_eq!(rover.wire_time(44), rover.robot().wire_time(44));
+    assert_eq!(node.line_rules(), node.slave().line_rules());
+    assert_eq!(rover.line_rules(), rover.robot().line_rules());
     // These differ from the defaults of the trait.
-    assert!(node.held_up_after().is_some() && rover.held_up_after().is_some());
-    assert!(node.wire_time(8) > Duration::ZERO && rover.wire_time(44) > Duration::ZERO);
-    assert_ne!(node.frame_pause(), MS(20));
+    let (node, rover, default) = (node.line_rules(), rover.line_rules(), LineRules::default());
+    assert!(node.held_up_after.is_some() && rover.held_up_after.is_some());
+    assert!(node.baud > 0 && rover.baud > 0 && node.frame_pause != default.frame_pause);
 }
 
 #[test]
@@ -165,7 +160,10 @@ fn a_command_that_waited_longer_than_the_watchdog_moves_no_simulated_motor() {
     for (since, is_moved) in [(1, false), (950, true)] {
         let slave = Slave::new(NodeId::N1, Mode::Velocity, config, at_ms(0));
         let mut node = MotorNode::from_parts(slave, Motor::new());
-        node.handle_old_input(turn.as_bytes(), at_ms(since), at_ms(1000));
+        node.handle_input(
+            turn.as_bytes(),
+            Arrival::Between { since: at_ms(since), now: at_ms(1000) },
+        );
         node.handle_timeout(at_ms(1020));
         assert_eq!(node.motor().velocity() != Rps::ZERO, is_moved, "{since} ms");
     }
@@ -177,7 +175,10 @@ fn a_command_that_waited_longer_than_the_watchdog_moves_no_simulated_rover() {
     let frame = drive.frame(0);
     for (since, is_moved) in [(1, false), (900, true)] {
         let mut node = RoverNode::new(RobotConfig::default(), at_ms(0));
-        node.handle_old_input(frame.as_bytes(), at_ms(since), at_ms(1000));
+        node.handle_input(
+            frame.as_bytes(),
+            Arrival::Between { since: at_ms(since), now: at_ms(1000) },
+        );
         node.handle_timeout(at_ms(1100));
         assert_eq!(node.rover().distance_m() > 0.0, is_moved, "{since} ms");
     }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 #[cfg(feature = "ikeya")]
 pub(crate) use axlewire::sim::Motor;
 pub(crate) use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     sim::{Direction, Faults, Input, Line, Rng, Stuck, Who},
     time::{Duration, Instant},
 };
@@ -49,7 +49,8 @@ impl Talker {
 impl Endpoint for Talker {
     type Event = usize;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.heard.push((now.as_micros(), bytes.to_vec()));
     }
 

@@ -1,6 +1,6 @@
 //! What the scenarios use of the library.
 pub(crate) use axlewire::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Unsent},
     ikeya::{
         Mode, NodeId, Position, ReadRequest, Rps, Slave,
         board::{Target, ThreeMotors},

@@ -261,11 +261,11 @@ fn a_held_up_slave_dates_old_bytes_to_their_earliest_arrival() {
     let config = with(SlaveConfig::direct(), |config| config.watchdog = Some(MS(100)));
     let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
     let now = T0 + MS(70);
-    slave.handle_old_input(&write(NodeId::N2, 1.0), T0, now);
+    slave.handle_input(&write(NodeId::N2, 1.0), Arrival::Between { since: T0, now });
     assert_eq!(slave.command(now), Some(Target::Velocity(rps(1.0))), "it is accepted");
     assert_eq!(slave.poll_timeout(), Some(T0 + MS(100)), "70 ms have passed");
     // The master no longer waits for an answer to an old READ.
-    slave.handle_old_input(&read(NodeId::N2), T0, now);
+    slave.handle_input(&read(NodeId::N2), Arrival::Between { since: T0, now });
     assert_eq!(slave.poll_transmit(now), None);
     assert_eq!((slave.statistics().reads, slave.statistics().expired), (1, 1));
 }
@@ -277,7 +277,10 @@ fn an_old_command_for_which_the_watchdog_is_over_is_no_command_but_a_watchdog() 
         [(99, SlaveEvent::Command(Target::Velocity(rps(5.0)))), (100, SlaveEvent::Watchdog)]
     {
         let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, T0);
-        slave.handle_old_input(&write(NodeId::N2, 5.0), T0, T0 + MS(age_ms));
+        slave.handle_input(
+            &write(NodeId::N2, 5.0),
+            Arrival::Between { since: T0, now: T0 + MS(age_ms) },
+        );
         assert_eq!(slave.poll_event(), Some(event), "{age_ms} ms");
         assert_eq!(slave.poll_event(), None);
     }
@@ -289,7 +292,7 @@ fn an_old_request_that_a_false_header_held_back_is_not_answered() {
     let held = [&[0xBB, 0x02], &read(NodeId::N2)[..]].concat();
     for (since, replies) in [(now, 1), (T0, 0)] {
         let mut slave = slave(Mode::Velocity);
-        slave.handle_old_input(&held, since, now);
+        slave.handle_input(&held, Arrival::Between { since, now });
         assert_eq!(slave.poll_timeout(), Some(now + US(100)), "the rest may still come");
         slave.handle_timeout(now + US(100));
         slave.poll_transmit(now + US(100));
@@ -300,11 +303,11 @@ fn an_old_request_that_a_false_header_held_back_is_not_answered() {
 
 #[test]
 fn a_slave_drops_an_answer_that_pauses_for_five_byte_times() {
-    assert_eq!(slave(Mode::Velocity).frame_pause(), US(100));
-    assert_eq!(slave(Mode::Velocity).wire_time(8), US(160));
+    assert_eq!(slave(Mode::Velocity).line_rules().frame_pause, US(100));
+    assert_eq!(slave(Mode::Velocity).line_rules().wire_time(8), US(160));
     let config = with(SlaveConfig::direct(), |config| config.idle = MS(3));
     let patient = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));
-    assert_eq!(patient.frame_pause(), MS(3), "as long as its own wait");
+    assert_eq!(patient.line_rules().frame_pause, MS(3), "as long as its own wait");
 }
 
 #[test]
@@ -328,7 +331,7 @@ fn an_answer_of_which_no_byte_has_left_is_sent_within_its_time() {
     {
         let mut slave = slave(Mode::Velocity);
         assert_eq!(answers(&mut slave, &read(NodeId::N2), T0), std::slice::from_ref(&answer));
-        slave.handle_unsent(unsent, T0 + US(10));
+        slave.handle_transmit(unsent, T0 + US(10));
         let again = slave.poll_transmit(T0 + US(500)).map(<[u8]>::to_vec);
         assert_eq!(again, is_due.then(|| answer.clone()), "{unsent:?}");
         assert_eq!(slave.statistics().replies, 1);
@@ -336,13 +339,13 @@ fn an_answer_of_which_no_byte_has_left_is_sent_within_its_time() {
     // Not later, and not when the master has moved on.
     let mut late = slave(Mode::Velocity);
     answers(&mut late, &read(NodeId::N2), T0);
-    late.handle_unsent(Unsent::Untouched, T0 + US(10));
+    late.handle_transmit(Unsent::Untouched, T0 + US(10));
     assert_eq!(late.poll_transmit(T0 + US(501)), None);
     assert_eq!(late.statistics().replies, 0);
     let mut overtaken = slave(Mode::Velocity);
     answers(&mut overtaken, &read(NodeId::N2), T0);
     overtaken.handle_input(&[0xAA], T0 + US(5));
-    overtaken.handle_unsent(Unsent::Untouched, T0 + US(10));
+    overtaken.handle_transmit(Unsent::Untouched, T0 + US(10));
     assert_eq!(overtaken.poll_transmit(T0 + US(10)), None);
 }
 

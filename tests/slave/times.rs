@@ -113,8 +113,12 @@ fn a_slave_is_held_up_after_the_time_for_an_answer_but_at_least_4_and_at_most_20
     {
         let config = with(SlaveConfig::direct(), |config| config.answer_within = within);
         let slave = Slave::new(NODE, Mode::Velocity, config, T0);
-        assert_eq!(slave.held_up_after(), Some(US(limit)));
-        assert_eq!(slave.frame_pause(), US(100), "as long as it waits for the rest of a packet");
+        assert_eq!(slave.line_rules().held_up_after, Some(US(limit)));
+        assert_eq!(
+            slave.line_rules().frame_pause,
+            US(100),
+            "as long as it waits for the rest of a packet"
+        );
     }
 }
 

@@ -1,6 +1,9 @@
 //! A role with an account of its own beside it, and with the clock of its processor.
 
-use axlewire::{endpoint::Unsent, time::Wrapping32};
+use axlewire::{
+    endpoint::{Arrival, Transmit},
+    time::Wrapping32,
+};
 
 use super::*;
 
@@ -82,7 +85,8 @@ impl<E> Station<E> {
 impl<E: Endpoint> Endpoint for Station<E> {
     type Event = E::Event;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         let now = self.at(now);
         self.bytes_in += bytes.len() as u64;
         self.role.handle_input(bytes, now);
@@ -107,23 +111,13 @@ impl<E: Endpoint> Endpoint for Station<E> {
         Some(frame)
     }
 
-    fn handle_taken(&mut self, now: Instant) {
-        let now = self.at(now);
-        self.role.handle_taken(now);
-    }
-
-    fn handle_flushed(&mut self, now: Instant) {
-        let now = self.at(now);
-        self.role.handle_flushed(now);
-    }
-
     fn is_outdated(&self) -> bool {
         self.role.is_outdated()
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         let now = self.at(now);
-        self.role.handle_unsent(unsent, now);
+        self.role.handle_transmit(outcome, now);
     }
 
     fn poll_event(&mut self) -> Option<E::Event> {

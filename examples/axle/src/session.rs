@@ -101,7 +101,7 @@ impl<R: Endpoint> Session<R> {
             Ok(()) => Ok(true),
             Err(error) => {
                 // The other end may take the role's next frame for the rest of this one.
-                self.role_mut().handle_unsent(Unsent::CutOff, now);
+                self.role_mut().handle_transmit(Unsent::CutOff, now);
                 self.judge(DriveError::Port(error)).map_or(Ok(false), Err)
             }
         }

@@ -9,14 +9,14 @@ use super::{
     statistics::MasterStatistics,
 };
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     events::Events,
     ikeya::{
         board::{Board, OneMotor, PACKET_LEN, Target},
         units::NodeId,
     },
     stats::count_apart,
-    time::{Duration, Instant, reached, wire_time},
+    time::{Instant, reached, wire_time},
 };
 
 /// Capacity of the event queue.
@@ -348,6 +348,28 @@ impl<B: Board> Master<B> {
         self.line.packet()
     }
 
+    /// Takes in received bytes.
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
+        self.now = now;
+        let mut bytes = bytes;
+        self.line.note(bytes);
+        while let Some((node, status)) = self.line.next_response(&mut bytes) {
+            self.hear(node, status, now);
+        }
+    }
+
+    /// All packets have left.
+    fn flushed(&mut self, now: Instant) {
+        let Some(overdue) = self.line.flushed(now, &self.config) else { return };
+        self.miss(overdue.closed);
+        let guard = overdue.answer_by + self.config.late_guard;
+        for id in NodeId::ALL {
+            if overdue.concerns(id) {
+                self.node_mut(id).guard_until(guard);
+            }
+        }
+    }
+
     /// Whether the packet handed out last is a WRITE that the node would not get now: its set-point
     /// was dropped or replaced, or its mode is in doubt or another one (I11).
     fn has_sent_old_write(&self) -> bool {
@@ -386,20 +408,16 @@ impl<B: Board> Master<B> {
 impl<B: Board> Endpoint for Master<B> {
     type Event = MasterEvent<B>;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.now = now;
-        let mut bytes = bytes;
-        self.line.note(bytes);
-        while let Some((node, status)) = self.line.next_response(&mut bytes) {
-            self.hear(node, status, now);
-        }
-    }
-
     /// Bytes that may be from before the request are no answer to it: its window opens behind them.
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        let aside = self.line.set_window_aside(since);
-        self.handle_input(bytes, now);
-        self.line.put_window_back(aside, !bytes.is_empty());
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        match arrived.into() {
+            Arrival::Now(now) => self.receive(bytes, now),
+            Arrival::Between { since, now } => {
+                let aside = self.line.set_window_aside(since);
+                self.receive(bytes, now);
+                self.line.put_window_back(aside, !bytes.is_empty());
+            }
+        }
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -419,29 +437,12 @@ impl<B: Board> Endpoint for Master<B> {
         self.send_next(now)
     }
 
-    /// Five byte times: as long as a slave on a UART waits for the rest of a packet.
-    fn frame_pause(&self) -> Duration {
-        frame_pause(&self.config)
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        wire_time(bytes, self.config.baud)
-    }
-
-    fn handle_taken(&mut self, now: Instant) {
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         self.now = now;
-        self.line.hold(now);
-    }
-
-    fn handle_flushed(&mut self, now: Instant) {
-        self.now = now;
-        let Some(overdue) = self.line.flushed(now, &self.config) else { return };
-        self.miss(overdue.closed);
-        let guard = overdue.answer_by + self.config.late_guard;
-        for id in NodeId::ALL {
-            if overdue.concerns(id) {
-                self.node_mut(id).guard_until(guard);
-            }
+        match outcome.into() {
+            Transmit::Taken => self.line.hold(now),
+            Transmit::Flushed => self.flushed(now),
+            Transmit::Unsent(unsent) => self.take_back(unsent, now),
         }
     }
 
@@ -450,9 +451,12 @@ impl<B: Board> Endpoint for Master<B> {
         self.has_sent_old_write()
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.now = now;
-        self.take_back(unsent, now);
+    fn line_rules(&self) -> LineRules {
+        LineRules {
+            frame_pause: frame_pause(&self.config),
+            baud: self.config.baud,
+            held_up_after: None,
+        }
     }
 
     fn poll_event(&mut self) -> Option<MasterEvent<B>> {

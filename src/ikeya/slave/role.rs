@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     encode::Encode,
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     events::Latest,
     ikeya::{
         board::{Board, Command, OneMotor, PACKET_LEN, Target},
@@ -18,7 +18,7 @@ use crate::{
     },
     stats::{count, uncount},
     stream::Counters,
-    time::{Duration, Instant, earliest, reached, wire_time},
+    time::{Duration, Instant, earliest, reached},
 };
 
 /// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that
@@ -261,8 +261,18 @@ impl<B: Board> Slave<B> {
 impl<B: Board> Endpoint for Slave<B> {
     type Event = SlaveEvent<B>;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.handle_old_input(bytes, now, now);
+    /// Treats commands and requests as old as they can be.
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let (since, now) = (arrived.since(), arrived.now());
+        if !bytes.is_empty() {
+            self.sent = None;
+            self.overtake();
+            self.requests.receive(since, now);
+            self.receive(bytes, since);
+        }
+        // A command may be too old already.
+        self.expire_command(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -291,32 +301,6 @@ impl<B: Board> Endpoint for Slave<B> {
         Some(&self.packet)
     }
 
-    fn frame_pause(&self) -> Duration {
-        self.config.idle
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        wire_time(bytes, self.config.baud)
-    }
-
-    /// [`SlaveConfig::answer_within`], but at least 4 ms, for timers of 1 ms, and at most 20 ms.
-    fn held_up_after(&self) -> Option<Duration> {
-        const SHORTEST: Duration = Duration::from_millis(4);
-        Some(self.config.answer_within.clamp(SHORTEST, Duration::from_millis(20)))
-    }
-
-    /// Treats commands and requests as old as they can be.
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        if !bytes.is_empty() {
-            self.sent = None;
-            self.overtake();
-            self.requests.receive(since, now);
-            self.receive(bytes, since);
-        }
-        // A command may be too old already.
-        self.expire_command(now);
-    }
-
     /// Whether more has been heard since the answer was handed out (I14).
     fn is_outdated(&self) -> bool {
         self.sent.is_none()
@@ -324,10 +308,23 @@ impl<B: Board> Endpoint for Slave<B> {
 
     /// An answer of which no byte has left remains due, within its time. One that was cut off is
     /// not repeated: the master asks again.
-    fn handle_unsent(&mut self, unsent: Unsent, _: Instant) {
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, _: Instant) {
+        let Transmit::Unsent(unsent) = outcome.into() else { return };
         if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
             uncount(&mut self.statistics.replies);
             self.answer = Some(answer);
+        }
+    }
+
+    /// Old are bytes that may have waited for longer than [`SlaveConfig::answer_within`], but at
+    /// least 4 ms, for timers of 1 ms, and at most 20 ms.
+    fn line_rules(&self) -> LineRules {
+        const SHORTEST: Duration = Duration::from_millis(4);
+        let limit = self.config.answer_within.clamp(SHORTEST, Duration::from_millis(20));
+        LineRules {
+            frame_pause: self.config.idle,
+            baud: self.config.baud,
+            held_up_after: Some(limit),
         }
     }
 

@@ -11,9 +11,9 @@ use super::{
     statistics::HostStatistics,
 };
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit},
     stream::Counters,
-    time::{Duration, Instant, earliest, wire_time},
+    time::{Duration, Instant, earliest},
     ucp::{
         codes::{CalibrationKind, NetworkState},
         header::MAX_LEN,
@@ -36,9 +36,9 @@ use crate::{
 ///   moving, speed and turn 0 are sent and repeated until the next call; the lamp stays as it is.
 /// * **Stops (U16).** Motor frames are never answered, so a stop is done when
 ///   [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since.
-///   [`handle_unsent`](Endpoint::handle_unsent) makes every motor command due again, twice after a
-///   frame that was cut off or whose flush failed, because the robot may take the first for the
-///   rest of that frame. Whether the robot obeys is in its reports:
+///   [`handle_transmit`](Endpoint::handle_transmit) makes every motor command due again, twice
+///   after a frame that was cut off or whose flush failed, because the robot may take the first for
+///   the rest of that frame. Whether the robot obeys is in its reports:
 ///   [`stop_progress`](Self::stop_progress).
 /// * **Link (U10).** Pings are sent every 200 ms. The link goes up with the first valid frame from
 ///   a robot, and down after 500 ms without one. While it is down, speed and turn 0 are sent, and
@@ -144,8 +144,8 @@ impl<S: BiasStore> Host<S> {
     /// Whether the robot has been told to stand still, and nothing else since (ruling U16).
     ///
     /// `true` if the latest command is to stand still and has been handed out, twice where that is
-    /// needed, and [`handle_unsent`](Endpoint::handle_unsent) has not taken it back. Once the port
-    /// has then been flushed, the stop is done; motor frames are never answered.
+    /// needed, and [`handle_transmit`](Endpoint::handle_transmit) has not taken it back. Once the
+    /// port has then been flushed, the stop is done; motor frames are never answered.
     #[must_use]
     pub fn is_stop_sent(&self) -> bool {
         self.state.motor.is_stop_sent()
@@ -158,8 +158,8 @@ impl<S: BiasStore> Host<S> {
     /// [`StopProgress::StandingStill`] takes three reports in a row that show all four wheels at
     /// 2 rpm or less. Both report layouts have wheel speeds, so both count. A report counts if it
     /// was complete at least its time on the line after the stop had been flushed: that is when
-    /// [`handle_flushed`](Endpoint::handle_flushed) was called, or, by a driver that never calls
-    /// it, when the next round began. And the last must have begun to arrive 1.1 s after that
+    /// [`Transmit::Flushed`] was told, or, by a driver that never tells it, when the next round
+    /// began. And the last must have begun to arrive 1.1 s after that
     /// ([`HostConfig::rpm_average`]): a vendor robot reports averages, in which wheels that began
     /// to turn a moment ago still stand still. A wheel that moves again, or 500 ms without a report
     /// ([`HostConfig::link_timeout`]), ends it, with the next call of the driver.
@@ -241,7 +241,7 @@ impl<S: BiasStore> Host<S> {
     /// During an update the robot hears no stop either, so the call is refused until a stop has
     /// been flushed: **call `stop` of the driver before, and go on only if it is `Ok`**. One
     /// more stop precedes the request, and the request waits for one that did not leave. If
-    /// both may have been lost ([`handle_unsent`](Endpoint::handle_unsent)), both are sent
+    /// both may have been lost ([`handle_transmit`](Endpoint::handle_transmit)), both are sent
     /// again.
     ///
     /// # Errors
@@ -341,25 +341,18 @@ impl<S: BiasStore> Host<S> {
 impl<S: BiasStore> Endpoint for Host<S> {
     type Event = HostEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    /// Reports among the bytes count as received at the earliest possible time where it matters
+    /// whether a stop was before them (U16), and otherwise now.
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let now = arrived.now();
         if bytes.is_empty() {
             return self.state.expire_dead_man(now);
         }
+        self.state.arrived_since = Some(arrived.since());
         self.inbox.receive(bytes, now, now);
         self.receive(bytes);
-    }
-
-    /// Reports among the bytes count as received at `since` where it matters whether a stop was
-    /// before them (U16), and otherwise at `now`.
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        self.state.old_since = Some(since);
-        self.handle_input(bytes, now);
-        self.state.old_since = None;
-    }
-
-    /// Zero: a report may have waited while a stop was flushed, or while the application was away.
-    fn held_up_after(&self) -> Option<Duration> {
-        Some(Duration::ZERO)
+        self.state.arrived_since = None;
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -376,20 +369,12 @@ impl<S: BiasStore> Endpoint for Host<S> {
         self.outgoing.get(..len)
     }
 
-    fn frame_pause(&self) -> Duration {
-        FRAME_PAUSE
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        wire_time(bytes, self.state.config.baud)
-    }
-
-    fn handle_taken(&mut self, _: Instant) {
-        self.state.taken();
-    }
-
-    fn handle_flushed(&mut self, now: Instant) {
-        self.state.motor.flushed(now);
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
+        match outcome.into() {
+            Transmit::Taken => self.state.taken(),
+            Transmit::Flushed => self.state.motor.flushed(now),
+            Transmit::Unsent(unsent) => self.state.unsent(unsent, now),
+        }
     }
 
     /// Whether it is a motor command that moves the robot and is no longer the latest.
@@ -397,8 +382,14 @@ impl<S: BiasStore> Endpoint for Host<S> {
         self.state.has_sent_old_command()
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.state.unsent(unsent, now);
+    /// All bytes count from when the port was last seen empty: a report may have waited while a
+    /// stop was flushed, or while the application was away.
+    fn line_rules(&self) -> LineRules {
+        LineRules {
+            frame_pause: FRAME_PAUSE,
+            baud: self.state.config.baud,
+            held_up_after: Some(Duration::ZERO),
+        }
     }
 
     fn poll_event(&mut self) -> Option<HostEvent> {

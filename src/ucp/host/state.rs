@@ -67,8 +67,8 @@ pub(super) struct State<S> {
     pub(super) network_due: Option<Instant>,
     /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
-    /// While old bytes are taken in: the earliest time at which they may have arrived.
-    pub(super) old_since: Option<Instant>,
+    /// While bytes are taken in: the earliest time at which they can have arrived.
+    pub(super) arrived_since: Option<Instant>,
 }
 
 /// Progress of a firmware update.
@@ -112,7 +112,7 @@ impl<S: BiasStore> State<S> {
             biases_told: false,
             network_due: None,
             last: None,
-            old_since: None,
+            arrived_since: None,
         }
     }
 
@@ -276,7 +276,7 @@ impl<S: BiasStore> State<S> {
         count(&mut self.stats.reports);
         self.stats.reports_lost = self.stats.reports_lost.saturating_add(lost.into());
         let report = ReceivedReport::new(report, index, lost);
-        let at = self.old_since.map_or(at, |since| at.min(since));
+        let at = self.arrived_since.map_or(at, |since| at.min(since));
         self.motor.standstill().report(&Wheels {
             rpm: report.telemetry.rpm,
             at,

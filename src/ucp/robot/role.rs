@@ -2,9 +2,9 @@
 
 use super::{config::RobotConfig, event::RobotEvent, state::State, statistics::RobotStatistics};
 use crate::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit},
     stream::Counters,
-    time::{Duration, Instant, earliest, reached, wire_time},
+    time::{Duration, Instant, earliest, reached},
     ucp::{
         body::{ImuBias, MagBias},
         codes::{CalibrationKind, NetworkState, OtaStatus},
@@ -180,8 +180,15 @@ impl Robot {
 impl Endpoint for Robot {
     type Event = RobotEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.handle_old_input(bytes, now, now);
+    /// Treats commands as old as they can be (U10).
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        let (since, now) = (arrived.since(), arrived.now());
+        if bytes.is_empty() {
+            return self.state.watch(now);
+        }
+        self.inbox.receive(bytes, since, now);
+        self.receive(bytes, now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -196,30 +203,20 @@ impl Endpoint for Robot {
         self.outgoing.get(..len)
     }
 
-    fn frame_pause(&self) -> Duration {
-        FRAME_PAUSE
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        wire_time(bytes, self.state.config.baud)
-    }
-
-    /// 20 ms of the 500 ms for which a command is valid (U10).
-    fn held_up_after(&self) -> Option<Duration> {
-        Some(Duration::from_millis(20))
-    }
-
-    /// Treats commands as old as they can be (U10).
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        if bytes.is_empty() {
-            return self.state.watch(now);
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
+        if let Transmit::Unsent(unsent) = outcome.into() {
+            self.state.unsent(unsent, now);
         }
-        self.inbox.receive(bytes, since, now);
-        self.receive(bytes, now);
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
-        self.state.unsent(unsent, now);
+    /// Old are bytes that may have waited for 20 ms of the 500 ms for which a command is valid
+    /// (U10).
+    fn line_rules(&self) -> LineRules {
+        LineRules {
+            frame_pause: FRAME_PAUSE,
+            baud: self.state.config.baud,
+            held_up_after: Some(Duration::from_millis(20)),
+        }
     }
 
     fn poll_event(&mut self) -> Option<RobotEvent> {

@@ -271,7 +271,7 @@ fn the_host_of_a_rover_has_the_speed_of_its_line() {
         let args = PortArgs { port: theirs.name().unwrap(), ..PortArgs::new(baud) };
         let opened = Rover::open(&args).unwrap();
         for rover in [opened, Rover::on(played::silence(true), &args)] {
-            assert_eq!(rover.host().wire_time(100), wire_time(100, expected));
+            assert_eq!(rover.host().line_rules().wire_time(100), wire_time(100, expected));
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use axlewire::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, LineRules, Transmit},
     ikeya::{
         Mode, NodeId, Slave, Status, Target,
         board::{OneMotor, ThreeMotors},
@@ -262,25 +262,14 @@ struct Nodes<B: Simulated> {
 impl<B: Simulated> Endpoint for Nodes<B> {
     type Event = Event;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
-        self.all.iter_mut().for_each(|node| node.motor.handle_input(bytes, now));
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let arrived = arrived.into();
+        self.all.iter_mut().for_each(|node| node.motor.handle_input(bytes, arrived));
     }
 
-    fn handle_old_input(&mut self, bytes: &[u8], since: Instant, now: Instant) {
-        self.all.iter_mut().for_each(|node| node.motor.handle_old_input(bytes, since, now));
-    }
-
-    fn held_up_after(&self) -> Option<Duration> {
-        self.all.iter().filter_map(|node| node.motor.held_up_after()).min()
-    }
-
-    fn frame_pause(&self) -> Duration {
-        let pauses = self.all.iter().map(|node| node.motor.frame_pause());
-        pauses.min().unwrap_or(Duration::ZERO)
-    }
-
-    fn wire_time(&self, bytes: usize) -> Duration {
-        self.all.first().map_or(Duration::ZERO, |node| node.motor.wire_time(bytes))
+    /// All nodes have the same settings.
+    fn line_rules(&self) -> LineRules {
+        self.all.first().map_or_else(LineRules::default, |node| node.motor.line_rules())
     }
 
     fn handle_timeout(&mut self, now: Instant) {
@@ -305,9 +294,9 @@ impl<B: Simulated> Endpoint for Nodes<B> {
         self.all.get(self.sender).is_some_and(|node| node.motor.is_outdated())
     }
 
-    fn handle_unsent(&mut self, unsent: Unsent, now: Instant) {
+    fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         if let Some(node) = self.all.get_mut(self.sender) {
-            node.motor.handle_unsent(unsent, now);
+            node.motor.handle_transmit(outcome, now);
         }
     }
 

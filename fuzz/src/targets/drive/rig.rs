@@ -201,7 +201,8 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         if let Some(Ok(_)) = result {
             // A slave and a robot leave a port that is slow to the next call, and tell a command
             // before they wait for one that a dropped call has left.
-            let leaves = self.driver.role().held_up_after().is_some_and(|it| it > Duration::ZERO);
+            let leaves =
+                self.driver.role().line_rules().held_up_after.is_some_and(|it| it > Duration::ZERO);
             let is_slow = leaves && (faults > 0 || before.was_on);
             assert!(!P::HAS_PIN || !is_on || is_slow, "the driver-enable pin stays on");
         }

@@ -110,7 +110,7 @@ fn host(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
             8 => drop(host.end_calibration(u.arbitrary()?, now)),
             9 => updating |= host.start_firmware_update(u.arbitrary()?, now).is_ok(),
             10 => host.end_firmware_update(now),
-            11 => host.handle_unsent(unsent(u)?, now),
+            11 => host.handle_transmit(unsent(u)?, now),
             12 => host.store_mut().fails = u.arbitrary()?,
             // Our own bytes on a line with an echo, or another host.
             _ => input = from_host(u)?,

@@ -165,7 +165,7 @@ fn master<B: BoardPackets>(
             }
             7 => drop(master.read(id, now)),
             8 => master.keep_alive(now),
-            9 => master.handle_unsent(unsent(u)?, now),
+            9 => master.handle_transmit(unsent(u)?, now),
             10 => input = raw(u)?.to_vec(),
             11 => {
                 let mode = if u.arbitrary()? { Mode::Velocity } else { Mode::Position };

@@ -3,7 +3,7 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     time::{Duration, Instant},
     ucp::{
         Frame, Message, Robot, Telemetry,
@@ -60,7 +60,7 @@ fn robot(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
             6 => robot.calibration_result_mag(MagBias::new(u.arbitrary()?), now),
             7 => drop(robot.answer_update(u.arbitrary()?, now)),
             8 => drop(robot.abort_calibration()),
-            9 => robot.handle_unsent(unsent(u)?, now),
+            9 => robot.handle_transmit(unsent(u)?, now),
             _ => {
                 // Bytes that have waited are as old as they may be.
                 let since = now;
@@ -68,7 +68,7 @@ fn robot(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
                 let old = from_host(u)?;
                 given += old.len() as u64;
                 history.take(&old, since);
-                robot.handle_old_input(&old, since, now);
+                robot.handle_input(&old, Arrival::Between { since, now });
             }
         }
         let now = now.max(clock.0);

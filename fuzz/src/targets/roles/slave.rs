@@ -3,7 +3,7 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     ikeya::{
         Mode, NodeId, Position, ReadRequest, Rps, Slave, Target,
         board::{OneMotor, ThreeMotors},
@@ -49,7 +49,7 @@ fn slave<B: Kit>(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
                 speed = any_speed::<B>(u)?;
                 slave.set_velocity(speed);
             }
-            4 => slave.handle_unsent(unsent(u)?, now),
+            4 => slave.handle_transmit(unsent(u)?, now),
             5 => {
                 // The start of the next packet is enough.
                 let read = ReadRequest::new(id);
@@ -79,7 +79,7 @@ fn slave<B: Kit>(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
                 let write = B::write(id, Target::Velocity(any_speed::<B>(u)?));
                 given += write.len() as u64;
                 heard.take(&write, since);
-                slave.handle_old_input(&write, since, now);
+                slave.handle_input(&write, Arrival::Between { since, now });
             }
         }
         let now = clock.0.max(now);

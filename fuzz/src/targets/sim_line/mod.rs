@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use axlewire::{
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     sim::{Direction, Faults, Input, Line, Stuck, Who, Wire},
     time::{Duration, Instant},
 };
@@ -106,7 +106,8 @@ struct Talker {
 impl Endpoint for Talker {
     type Event = ();
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.heard.extend(bytes.iter().map(|&byte| (now, byte)));
     }
 
@@ -240,7 +241,8 @@ struct Bad {
 impl Endpoint for Bad {
     type Event = ();
 
-    fn handle_input(&mut self, _: &[u8], now: Instant) {
+    fn handle_input(&mut self, _: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.now = now;
     }
 

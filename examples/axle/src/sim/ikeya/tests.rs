@@ -2,6 +2,8 @@
 
 use axlewire::ikeya::{ReadRequest, Rps, WriteRequest};
 
+use axlewire::endpoint::Unsent;
+
 use super::*;
 
 const WATCHDOG: Duration = Duration::from_millis(200);
@@ -49,11 +51,8 @@ fn same<T: fmt::Debug + PartialEq>(
 #[test]
 fn a_driver_is_told_the_limits_of_a_single_node() {
     let (nodes, one) = nodes();
-    assert!(nodes.held_up_after().is_some_and(|limit| limit > Duration::ZERO));
-    assert_eq!(nodes.held_up_after(), one.held_up_after());
-    assert!(nodes.frame_pause() > Duration::ZERO && nodes.wire_time(8) > Duration::ZERO);
-    assert_eq!(nodes.frame_pause(), one.frame_pause());
-    assert_eq!(nodes.wire_time(8), one.wire_time(8));
+    assert_eq!(nodes.line_rules(), one.line_rules());
+    assert_ne!(nodes.line_rules(), LineRules::default());
 }
 
 #[test]
@@ -71,8 +70,8 @@ fn an_answer_that_does_not_leave_is_given_back_to_the_node_that_sent_it() {
         assert!(!pair.0.is_outdated() && pair.0.sender == 1);
         same(
             &mut pair,
-            |it| it.handle_unsent(Unsent::Untouched, due),
-            |it| it.handle_unsent(Unsent::Untouched, due),
+            |it| it.handle_transmit(Unsent::Untouched, due),
+            |it| it.handle_transmit(Unsent::Untouched, due),
         );
     }
     same(&mut pair, |it| it.poll_transmit(due).is_some(), |it| it.poll_transmit(due).is_some());
@@ -96,8 +95,8 @@ fn a_command_that_has_waited_longer_than_the_watchdog_turns_nothing() {
     let (since, now) = (at(1), at(500));
     same(
         &mut pair,
-        |it| it.handle_old_input(&write(), since, now),
-        |it| it.handle_old_input(&write(), since, now),
+        |it| it.handle_input(&write(), Arrival::Between { since, now }),
+        |it| it.handle_input(&write(), Arrival::Between { since, now }),
     );
     assert_eq!(pair.0.all[1].motor.slave().statistics().writes, 1, "it was heard");
     assert_eq!(pair.0.all[1].motor.motor().velocity(), pair.1.motor().velocity());

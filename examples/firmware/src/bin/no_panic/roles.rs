@@ -134,7 +134,7 @@ fn turn(role: &mut impl Endpoint) {
         1 => role.handle_timeout(now()),
         2 => keep(role.poll_event()),
         3 => keep(role.poll_transmit(now())),
-        4 => role.handle_unsent(any(Unsent::Untouched), now()),
+        4 => role.handle_transmit(any(Unsent::Untouched), now()),
         _ => keep(role.poll_timeout()),
     }
 }

@@ -4,7 +4,7 @@ use std::error::Error;
 
 use axlewire::{
     crc16,
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     ikeya::{
         BAUD, BothDirections, Master, Mode, NodeId, Position, Rps, Slave,
         board::{OneMotor, Target},
@@ -183,7 +183,8 @@ impl Driver {
 impl Endpoint for Driver {
     type Event = SlaveEvent;
 
-    fn handle_input(&mut self, bytes: &[u8], now: Instant) {
+    fn handle_input(&mut self, bytes: &[u8], arrived: impl Into<Arrival>) {
+        let now = arrived.into().now();
         self.node.handle_input(bytes, now);
         self.coast();
     }

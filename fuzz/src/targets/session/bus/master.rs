@@ -131,7 +131,7 @@ impl<B: Kit> Session<B> {
         self.frames.push(packet.clone());
         match fail {
             Some((Unsent::Untouched, _)) => {
-                self.master.handle_unsent(Unsent::Untouched, self.now);
+                self.master.handle_transmit(Unsent::Untouched, self.now);
                 return false;
             }
             Some((Unsent::CutOff, cut)) => {
@@ -139,7 +139,7 @@ impl<B: Kit> Session<B> {
                 self.to_slaves.send(&packet[..cut], number, self.now);
                 self.echo(&packet[..cut]);
                 self.echo.iter_mut().for_each(Echo::forget);
-                self.master.handle_unsent(Unsent::CutOff, self.now);
+                self.master.handle_transmit(Unsent::CutOff, self.now);
                 return false;
             }
             _ => {}
@@ -150,7 +150,7 @@ impl<B: Kit> Session<B> {
         self.to_slaves.send(&packet, number, self.now);
         self.echo(&packet);
         if fail.is_some() {
-            self.master.handle_unsent(Unsent::Unflushed, self.now);
+            self.master.handle_transmit(Unsent::Unflushed, self.now);
             self.model.iter_mut().for_each(Node::unflushed);
             return false;
         }

@@ -2,7 +2,7 @@
 
 use arbitrary::{Arbitrary, Result, Unstructured};
 use axlewire::{
-    endpoint::{Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Unsent},
     time::{Duration, Instant},
     ucp::{
         Host, Robot, Telemetry,
@@ -229,7 +229,7 @@ impl Link {
             let since = self.ends[end].seen_at;
             // As a driver does that was held up.
             match self.now - since > MS(20) && self.ends[end].asleep_until > since {
-                true => self.robot.handle_old_input(&bytes, since, self.now),
+                true => self.robot.handle_input(&bytes, Arrival::Between { since, now: self.now }),
                 false => self.robot.handle_input(&bytes, self.now),
             }
             self.took(end, self.robot.counters().frames - before.frames);
@@ -269,9 +269,9 @@ impl Link {
             match end {
                 HOST => {
                     self.told = None;
-                    self.host.handle_unsent(unsent, self.now);
+                    self.host.handle_transmit(unsent, self.now);
                 }
-                _ => self.robot.handle_unsent(unsent, self.now),
+                _ => self.robot.handle_transmit(unsent, self.now),
             }
             break;
         }
