@@ -238,17 +238,16 @@ impl<S: BiasStore> Host<S> {
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
-    /// During an update the robot hears no stop either, so the call is refused until a stop has
-    /// been flushed: **call `stop` of the driver before, and go on only if it is `Ok`**. One
-    /// more stop precedes the request, and the request waits for one that did not leave. If
-    /// both may have been lost ([`handle_unsent`](Endpoint::handle_unsent)), both are sent
-    /// again.
+    /// During an update the robot hears no stop either, so the call is refused unless
+    /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`], or
+    /// [`StopProgress::NoReports`] of a robot that sends none: **call `stop` and `await_standstill`
+    /// of the driver before**. Two more stops precede the request. If they may have been lost with
+    /// it ([`handle_unsent`](Endpoint::handle_unsent)), all are sent again.
     ///
     /// # Errors
     ///
-    /// [`CommandError::Moving`] unless the latest command is a stop that has been flushed
-    /// ([`stop_progress`](Self::stop_progress) is past [`StopProgress::Due`]); without
-    /// [`HostConfig::sends_first_stop`] the call is also accepted before the first motor command.
+    /// [`CommandError::Moving`] as said. Without [`HostConfig::sends_first_stop`] the call is also
+    /// accepted before the first motor command: **it is not known then whether the robot moves.**
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].
@@ -389,7 +388,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 
     fn handle_flushed(&mut self, now: Instant) {
-        self.state.motor.flushed(now);
+        self.state.flushed(now);
     }
 
     /// Whether it is a motor command that moves the robot and is no longer the latest.

@@ -67,6 +67,8 @@ pub(super) struct State<S> {
     pub(super) network_due: Option<Instant>,
     /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
+    /// The port has taken all of it.
+    pub(super) is_last_taken: bool,
     /// While old bytes are taken in: the earliest time at which they may have arrived.
     pub(super) old_since: Option<Instant>,
 }
@@ -112,6 +114,7 @@ impl<S: BiasStore> State<S> {
             biases_told: false,
             network_due: None,
             last: None,
+            is_last_taken: false,
             old_since: None,
         }
     }
@@ -167,8 +170,8 @@ impl<S: BiasStore> State<S> {
         if !self.motor.allows_update() {
             return Err(CommandError::Moving);
         }
-        // A robot that is being updated hears no stop, so a single damaged stop must not be enough
-        // to update it while it drives.
+        // A robot that is being updated hears no stop, so a damaged stop must not be enough to
+        // update it while it drives.
         self.motor.repeat(at);
         self.update = Update::Asked { version, at };
         Ok(())
