@@ -169,7 +169,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         "only 500 ms of silence",
         "vendor robot stops 500 ms",
         "turnaround gap of at most 2 ms",
-        "or for longer than 20 ms, takes",
+        "or for longer than 0.2 ms and `reply_timeout`, 20 ms of it at most, takes",
         "until the second stop, some 1 ms later",
         "until the second stop, some 2 ms later",
         "the next one follows 100 ms later",

@@ -94,7 +94,9 @@ fn long_before(now: Instant) -> Instant {
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Combines a role, a port and a clock. The role must have been made with a time of the same
-    /// clock; [`with`](Self::with) ensures that.
+    /// clock; [`with`](Self::with) ensures that. It must be new or come from
+    /// [`into_parts`](Self::into_parts): a copy of a role that has sent a stop through another port
+    /// takes it for sent through this one.
     ///
     /// A master takes nothing that is in the port already for an answer, and a host no report for
     /// one from after a stop.
@@ -171,8 +173,8 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     ///
     /// To reopen a port, replace it by [`port_mut`](Self::port_mut) and call `discard`: another
     /// driver does not know whether the clock has stepped back. If it has, a role that is given to
-    /// another driver waits for as long as the step was. A firmware update that was requested is
-    /// requested again: a stop or [`end_firmware_update`] prevents that.
+    /// another driver waits for as long as the step was. A firmware update whose request has not
+    /// been flushed is requested again: a stop or [`end_firmware_update`] prevents that.
     ///
     /// [`end_firmware_update`]: crate::ucp::Host::end_firmware_update
     #[must_use]

@@ -6,9 +6,9 @@ use crate::{encode::Encode, time::Duration};
 /// Shortest period or timeout of a role: a shorter one would make its driver spin.
 pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 
-/// Longest pause inside a frame that is sent: a robot of this crate gives the frame up soon after.
-/// Ruling U16 allows 20 ms.
-pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(5);
+/// Longest pause inside a frame that is sent: a robot of this crate gives the frame up a
+/// millisecond later, which a clock that counts milliseconds may not see. Ruling U16 allows 20 ms.
+pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(4);
 
 /// Encodes a frame to the front of `buffer`; returns its length.
 pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {

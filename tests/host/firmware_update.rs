@@ -1,5 +1,7 @@
 //! A firmware update starts only on request, after a stop, and is followed by silence (U7, U13).
 
+use axlewire::ucp::host::StopProgress;
+
 use crate::rig::*;
 
 #[test]
@@ -20,9 +22,9 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     assert_eq!(host.drive(go(10), ms(110)), Err(CommandError::Updating));
     assert_eq!(host.start_calibration(IMU, ms(110)), Err(CommandError::Updating));
     let frames = sent(&mut host, ms(110));
-    assert_eq!(speed(&frames[0]), Some(0));
-    assert!(matches!(message(&frames[1]), Message::OtaRequest(request) if request.version() == 40));
-    assert_eq!(frames.len(), 2);
+    assert_eq!((speed(&frames[0]), speed(&frames[1])), (Some(0), Some(0)));
+    assert!(matches!(message(&frames[2]), Message::OtaRequest(request) if request.version() == 40));
+    assert_eq!(frames.len(), 3);
     // Whatever arrives meanwhile, nothing is sent.
     host.handle_input(&bytes(imu_bias()), ms(120));
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), ms(130));
@@ -86,7 +88,7 @@ fn an_update_is_refused_until_the_stop_has_left() {
 }
 
 #[test]
-fn one_more_stop_precedes_an_update_request() {
+fn two_more_stops_precede_an_update_request() {
     let mut host = driving();
     let mut robot = quiet_robot();
     robot.handle_input(&bytes(go(60)), ms(30));
@@ -107,9 +109,10 @@ fn one_more_stop_precedes_an_update_request() {
 #[test]
 fn an_update_request_waits_for_a_stop_that_did_not_leave() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let stops = vec![2; copies(unsent)];
-        // The stop is lost before the request, or along with it.
-        for frames in [1, 2] {
+        // A stop is lost before the request, or along with it.
+        for frames in [1, 3] {
+            // The stops before an untouched request may have left.
+            let stops = vec![2; if frames == 3 { copies(unsent) } else { 2 }];
             let mut host = driving();
             host.stop(ms(40));
             sent(&mut host, ms(40));
@@ -167,4 +170,47 @@ fn the_rest_of_an_update_request_that_was_ended_is_outdated() {
         end(&mut host, ms(41));
         assert!(host.is_outdated(), "a robot in an update hears no stop");
     }
+}
+
+#[test]
+fn an_update_is_refused_while_reports_show_that_a_wheel_turns() {
+    let report = |rpm| {
+        let telemetry = Telemetry { rpm: [0, 0, 0, rpm], ..Telemetry::default() };
+        bytes(FirmwareReport::new(&telemetry, 38))
+    };
+    let mut host = begun();
+    flushed(&mut host, ms(10));
+    for at in 2..200 {
+        host.handle_input(&report(if at < 100 { 20 } else { 0 }), ms(20 * at));
+        sent(&mut host, ms(20 * at));
+        let is_still = host.stop_progress() == StopProgress::StandingStill;
+        let mut asked = host.clone();
+        let answer = asked.start_firmware_update(40, ms(20 * at));
+        assert_eq!(answer, if is_still { Ok(()) } else { Err(CommandError::Moving) }, "{at}");
+        assert_eq!(is_still, at >= 102);
+    }
+}
+
+#[test]
+fn a_stop_behind_a_command_that_never_left_is_sent_at_once_and_then_allows_an_update() {
+    let mut host = begun();
+    flushed(&mut host, ms(10));
+    host.drive(go(60), ms(11)).unwrap(); // waits for the pause between two commands
+    host.stop(ms(12));
+    assert_eq!(speeds(&wait(&mut host, ms(12))), [(12_000, 0)]);
+    flushed(&mut host, ms(13));
+    assert_eq!(host.start_firmware_update(40, ms(13)), Ok(()));
+}
+
+#[test]
+fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced() {
+    let mut host = begun();
+    flushed(&mut host, ms(10));
+    host.start_firmware_update(40, ms(10)).unwrap();
+    while host.poll_transmit(ms(10)).is_some() {
+        host.handle_transmit(Transmit::Taken, ms(10));
+    }
+    host.handle_transmit(Transmit::Flushed, ms(11));
+    host.handle_transmit(Unsent::Unflushed, ms(60_000));
+    assert_eq!(wait(&mut host, ms(120_000)), [], "the robot may be waiting for YMODEM");
 }

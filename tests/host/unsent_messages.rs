@@ -91,7 +91,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
         let mut host = begun();
         assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
         host.start_firmware_update(50, ms(10)).unwrap();
-        assert_eq!(sent(&mut host, ms(10)).len(), 2);
+        assert_eq!(sent(&mut host, ms(10)).len(), 3);
         host.handle_transmit(unsent, ms(11));
         assert_eq!(
             ids(&sent(&mut host, ms(11))),

@@ -159,7 +159,7 @@ fn both_roles_say_how_long_a_frame_may_pause_and_takes_on_the_line() {
     fn answers(role: &impl Endpoint) -> (Duration, Duration) {
         (role.line_rules().frame_pause, role.line_rules().wire_time(64))
     }
-    let expected = (Duration::from_millis(5), Duration::from_micros(5556));
+    let expected = (Duration::from_millis(4), Duration::from_micros(5556));
     assert_eq!(answers(&quiet_host()), expected);
     assert_eq!(answers(&quiet_robot()), expected);
 }

@@ -234,6 +234,24 @@ fn a_stop_still_blocked_after_six_exchanges_is_reported_and_retried_at_the_searc
 }
 
 #[test]
+fn a_still_node_that_is_lost_in_doubt_is_searched_for_and_stopped() {
+    let config = with(direct(), |config| config.stops_abnormal = false);
+    let mut desk = Desk::stopping(config, N1);
+    desk.until(NodeId::N1, StopProgress::StandingStill);
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    while !desk.master.is_mode_in_doubt(NodeId::N1) {
+        desk.exchange();
+    }
+    desk.answer(NodeId::N1, Answer::Silence);
+    desk.run(MS(100));
+    assert_eq!(desk.master.health(NodeId::N1), Some(Health::Abnormal));
+    assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+    desk.answer(NodeId::N1, Answer::Position(turns(7)));
+    desk.until(NodeId::N1, StopProgress::StandingStill);
+    assert_eq!(desk.master.mode(NodeId::N1), Some(Mode::Position));
+}
+
+#[test]
 fn a_stop_requested_during_an_old_doubt_is_reported_as_blocked_at_once() {
     let mut desk = Desk::tuned(|config| config.stops_abnormal = false, &[N1]);
     desk.answer(NodeId::N1, Answer::Position(turns(-7)));
@@ -325,8 +343,8 @@ fn a_changed_mode_ends_a_paid_stop_and_owes_another() {
 }
 
 #[test]
-fn a_still_velocity_node_in_doubt_measures_no_position_to_hold() {
-    // The only exception in a doubt is for a stop that is owed (I11).
+fn a_still_velocity_node_in_doubt_is_owed_its_stop_again() {
+    // Of what is written in a doubt, only a hold above 0 is harmless to a velocity node (I11).
     for at in [turns(7), turns(-7)] {
         let mut desk = Desk::stopping(direct(), N1);
         desk.until(NodeId::N1, StopProgress::StandingStill);
@@ -334,11 +352,16 @@ fn a_still_velocity_node_in_doubt_measures_no_position_to_hold() {
         while !desk.master.is_mode_in_doubt(NodeId::N1) {
             desk.exchange();
         }
+        assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::Owed);
+        assert_eq!(desk.master.stops_owed(), NodeSet::from(NodeId::N1));
         desk.answer(NodeId::N1, Answer::Velocity(0.0));
+        let hold = WriteRequest::position(NodeId::N1, turns(7)).as_bytes().to_vec();
         let written = writes(&desk.run(MS(50)));
-        assert!(written.iter().all(|it| *it == write(NodeId::N1, 0.0)), "{written:02x?}");
+        let is_harmless = |it: &Vec<u8>| *it == write(NodeId::N1, 0.0) || *it == hold;
+        assert!(written.iter().all(is_harmless), "{written:02x?}");
         assert!(!desk.master.is_mode_in_doubt(NodeId::N1) && written.len() > 10);
         assert_eq!(desk.master.set_point(NodeId::N1), Some(Target::Velocity(rps(0.0))));
+        assert_eq!(desk.master.stop_progress(NodeId::N1), StopProgress::StandingStill);
     }
 }
 

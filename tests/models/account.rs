@@ -96,6 +96,8 @@ pub(crate) struct Account {
     /// When the last answer in front of its WRITE was heard.
     hold_heard_at: Option<Instant>,
     pub(crate) is_released: bool,
+    /// Released since the stop, which continues until the node is still.
+    pub(crate) is_let_go: bool,
     /// Its last answer showed it away from that position.
     pub(crate) is_away: bool,
     /// How often the node has measured a position for this stop, and when the last ones were
@@ -142,6 +144,7 @@ impl Account {
     /// The application asks for a stop; it joins one whose node is not still yet. If it was told
     /// that the node still moves, that begins anew.
     pub(crate) fn stop(&mut self, is_told: bool, now: Instant) {
+        self.is_let_go = false;
         match self.coasting_since {
             Some(_) => {
                 self.drop_target();
@@ -287,9 +290,9 @@ impl Account {
         if !self.is_in_doubt {
             (self.is_in_doubt, self.undecided) = (true, 0);
             (self.is_doubt_told, self.is_block_told) = (false, false);
-            // The stop is owed again, unless 0 rps was obeyed: that ends its confirmation.
-            let is_hold = self.record == Some(Mode::Position) || !self.is_still;
-            if self.is_halted && is_hold && self.confirm != Confirm::Unasked {
+            // The stop is owed again, unless the node was released: that ends its confirmation.
+            let is_left = self.is_still && self.is_let_go;
+            if self.is_halted && !is_left && self.confirm != Confirm::Unasked {
                 self.confirm = Confirm::Fails;
             }
             // A WRITE that may have been read in the other mode confirms nothing.
@@ -331,6 +334,7 @@ impl Account {
         match self.record {
             Some(record) if record != mode && !self.is_in_doubt => return self.begin_doubt(),
             Some(record) if record != mode => {
+                self.is_let_go &= !self.is_still;
                 self.restart_stop();
                 let was_commanded = self.is_under_order || self.was_written;
                 self.drop_target();

@@ -140,6 +140,7 @@ impl<B: Kit> Bus<B> {
                 account.drop_target();
                 account.may_hold_anew |= !account.is_owed;
                 account.is_released = account.is_halted && !account.is_owed;
+                account.is_let_go = account.is_halted;
             }
             Call::Confirm(node) => {
                 if self.master.confirm(node, now).is_ok() {

@@ -149,6 +149,10 @@ impl<B: Kit> Bus<B> {
                     account.moves_again(self.now);
                 }
             }
+            if progress == StopProgress::StandingStill && account.is_in_doubt && !account.is_let_go
+            {
+                return Err(format!("node {node} stands still although its mode is in doubt"));
+            }
             if !account.is_owed && owed.contains(node) {
                 // The stop of a still node is owed again if it is abnormal or in doubt.
                 let is_renewed = account.is_in_doubt || !account.is_online();

@@ -57,6 +57,9 @@ impl Site {
                 if result.is_ok() {
                     let needs_stop = motion.wanted.is_some();
                     motion.is_called |= needs_stop;
+                    if needs_stop {
+                        motion.owe_two();
+                    }
                     self.account.update = Update::Asked { version: VERSION, needs_stop };
                 }
                 (result, expected)

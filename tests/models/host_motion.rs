@@ -127,6 +127,11 @@ impl Motion {
         }
     }
 
+    /// Two stops precede the request of an update.
+    pub(crate) fn owe_two(&mut self) {
+        self.behind_cut = Some(0);
+    }
+
     fn owes_copies(&self) -> bool {
         self.behind_cut.is_some_and(|out| out < 2)
     }

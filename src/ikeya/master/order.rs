@@ -146,12 +146,11 @@ impl<B: Board> Order<B> {
         self.state = State::Stop(Stop::new(held));
     }
 
-    /// The mode is in doubt: what was measured does not count, and a position that is held must be
-    /// measured again. Returns whether that ends a confirmation.
+    /// The mode is in doubt: what was measured does not count, so a motor that was still may move,
+    /// unless the node was released. Returns whether that ends a confirmation.
     pub(super) fn doubt(&mut self) -> bool {
         if let State::Stop(stop) = &mut self.state {
-            let is_held = stop.held().is_some() && !stop.is_released;
-            if stop.stage != Stage::Still || is_held {
+            if stop.stage != Stage::Still || !stop.is_released {
                 stop.restart();
                 return self.end_confirmation();
             }
@@ -703,6 +702,7 @@ pub enum StopProgress {
     /// positions within 8 counts, no more than 1/32 of a turn away from the position to hold. An
     /// answer above 0.05 rps, or more than 1/16 of a turn away, ends this, unless the node was
     /// [released](super::Master::release) or is polled by hand
-    /// ([`Polling::Manual`](super::Polling::Manual)).
+    /// ([`Polling::Manual`](super::Polling::Manual)). So does an answer in another mode (I11),
+    /// unless the node was released.
     StandingStill,
 }

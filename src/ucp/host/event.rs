@@ -190,8 +190,9 @@ pub enum CommandError {
         /// The id.
         id: u8,
     },
-    /// A firmware update requires that the robot has been told to stand still, and that the stop
-    /// has been flushed ([`Host::stop_progress`](super::Host::stop_progress)).
+    /// A firmware update requires that the robot has been told to stand still, that the stop has
+    /// been flushed, and that reports, if there are any, show a standstill
+    /// ([`Host::stop_progress`](super::Host::stop_progress)).
     Moving,
     /// A firmware update is in progress: the frame would end up in it.
     Updating,

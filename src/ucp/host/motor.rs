@@ -147,12 +147,13 @@ impl Motor {
     }
 
     /// Whether an update may be asked for: the latest command is a stop that has left, or there has
-    /// been none at all. One that was only handed out may be lost together with the request's stop.
+    /// been none at all. One that was only handed out may be lost together with the request's
+    /// stops. Where reports arrive, they must show a standstill.
     pub(super) fn allows_update(&self) -> bool {
         match self.stop_progress() {
             StopProgress::NotAsked => self.latest.is_none(),
-            StopProgress::Due => false,
-            _ => true,
+            StopProgress::Due | StopProgress::StillMoving { .. } => false,
+            StopProgress::NoReports | StopProgress::StandingStill => true,
         }
     }
 
@@ -161,9 +162,13 @@ impl Motor {
         self.latest.is_none() || self.is_stop_sent()
     }
 
-    /// Repeats the latest command at once.
+    /// Repeats the latest command at once, twice: what the robot was sent before may have left it
+    /// with a false length, which swallows stops (ruling U16).
     pub(super) fn repeat(&mut self, now: Instant) {
         self.due = self.latest.map(|_| now);
+        if self.due.is_some() {
+            self.copies = Copies::BOTH;
+        }
     }
 
     pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
@@ -177,6 +182,8 @@ impl Motor {
         let earliest = match self.sent {
             // The first frame takes precedence, and so do its copies.
             _ if self.first == First::Due || self.copies.are_due() => now,
+            // The command before this stop may not have left, but the robot must be told again.
+            _ if still && self.standstill.is_untold() && self.stop == Stop::Done => now,
             // A command that the robot already has can wait for its turn.
             Some((sent, _)) if sent == command && self.due.is_some() => return,
             Some((sent, at)) if !still || sent.stands_still() => now.max(at + config.command_gap),

@@ -238,17 +238,16 @@ impl<S: BiasStore> Host<S> {
     /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
     /// shipped robot does not answer the request.
     ///
-    /// During an update the robot hears no stop either, so the call is refused until a stop has
-    /// been flushed: **call `stop` of the driver before, and go on only if it is `Ok`**. One
-    /// more stop precedes the request, and the request waits for one that did not leave. If
-    /// both may have been lost ([`handle_transmit`](Endpoint::handle_transmit)), both are sent
-    /// again.
+    /// During an update the robot hears no stop either, so the call is refused unless
+    /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`], or
+    /// [`StopProgress::NoReports`] of a robot that sends none: **call `stop` and `await_standstill`
+    /// of the driver before**. Two more stops precede the request. If they may have been lost with
+    /// it ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again.
     ///
     /// # Errors
     ///
-    /// [`CommandError::Moving`] unless the latest command is a stop that has been flushed
-    /// ([`stop_progress`](Self::stop_progress) is past [`StopProgress::Due`]); without
-    /// [`HostConfig::sends_first_stop`] the call is also accepted before the first motor command.
+    /// [`CommandError::Moving`] as said. Without [`HostConfig::sends_first_stop`] the call is also
+    /// accepted before the first motor command: **it is not known then whether the robot moves.**
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].
@@ -372,7 +371,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         match outcome.into() {
             Transmit::Taken => self.state.taken(),
-            Transmit::Flushed => self.state.motor.flushed(now),
+            Transmit::Flushed => self.state.flushed(now),
             Transmit::Unsent(unsent) => self.state.unsent(unsent, now),
         }
     }

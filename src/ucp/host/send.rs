@@ -28,7 +28,7 @@ impl<S: BiasStore> State<S> {
             self.motor.end_round();
             return None;
         };
-        self.last = Some(outgoing);
+        (self.last, self.is_last_taken) = (Some(outgoing), false);
         let index = self.index;
         self.index = index.wrapping_add(1);
         Some(match outgoing {
@@ -113,8 +113,17 @@ impl<S: BiasStore> State<S> {
 
     /// The port has taken all of the frame handed out last.
     pub(super) fn taken(&mut self) {
+        self.is_last_taken = true;
         if matches!(self.last, Some(Outgoing::Motor(_))) {
             self.motor.taken();
+        }
+    }
+
+    /// All that the port has taken has left, so it cannot come back.
+    pub(super) fn flushed(&mut self, now: Instant) {
+        self.motor.flushed(now);
+        if self.is_last_taken {
+            self.last = None;
         }
     }
 

@@ -69,6 +69,8 @@ pub(super) struct State<S> {
     pub(super) last: Option<Outgoing>,
     /// While bytes are taken in: the earliest time at which they can have arrived.
     pub(super) arrived_since: Option<Instant>,
+    /// The port has taken all of the last frame.
+    pub(super) is_last_taken: bool,
 }
 
 /// Progress of a firmware update.
@@ -113,6 +115,7 @@ impl<S: BiasStore> State<S> {
             network_due: None,
             last: None,
             arrived_since: None,
+            is_last_taken: false,
         }
     }
 
@@ -167,8 +170,8 @@ impl<S: BiasStore> State<S> {
         if !self.motor.allows_update() {
             return Err(CommandError::Moving);
         }
-        // A robot that is being updated hears no stop, so a single damaged stop must not be enough
-        // to update it while it drives.
+        // A robot that is being updated hears no stop, so a damaged stop must not be enough to
+        // update it while it drives.
         self.motor.repeat(at);
         self.update = Update::Asked { version, at };
         Ok(())
