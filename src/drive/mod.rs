@@ -160,7 +160,7 @@
 //!
 //! # Half duplex
 //!
-//! `Rs485` (feature `embedded-hal`) switches the driver-enable pin of an RS485 transceiver. On a
+//! [`Rs485`] switches the driver-enable pin of an RS485 transceiver. On a
 //! two-wire line whose receiver stays on while sending, put a [`WithoutEcho`] around the port.
 //!
 //! [`Endpoint`]: crate::endpoint::Endpoint
@@ -182,7 +182,6 @@ mod error;
 mod ikeya;
 #[cfg(feature = "serialport")]
 mod opened;
-#[cfg(feature = "embedded-hal")]
 mod rs485;
 mod sending;
 #[cfg(feature = "serialport")]
@@ -208,7 +207,6 @@ pub use ikeya::OnlineNodes;
 pub use opened::Bus;
 #[cfg(all(feature = "serialport", feature = "ucp"))]
 pub use opened::Rover;
-#[cfg(feature = "embedded-hal")]
 pub use rs485::{NoDelay, Rs485, Rs485Error};
 #[cfg(feature = "serialport")]
 pub use serial_port::SerialPort;
