@@ -55,7 +55,30 @@ pub(super) const STALL: Duration = Duration::from_secs(1);
 /// Time after which a receiver that keeps failing counts as one that has received nothing.
 const RECOVERY: Duration = Duration::from_millis(20);
 
-/// A role with its port and its clock; see the [module](super).
+/// A role with its port and its clock.
+///
+/// ```
+/// # #[cfg(all(feature = "embedded-io", feature = "ikeya"))]
+/// # fn turn<P, C>(port: P, clock: C) -> Result<(), axlewire::drive::DriveError<P::Error>>
+/// # where
+/// #     P: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write,
+/// #     C: axlewire::drive::Clock,
+/// # {
+/// use axlewire::drive::Driver;
+/// use axlewire::ikeya::{NodeId, Rps, master::MasterConfig};
+/// use axlewire::time::Duration;
+///
+/// let mut bus = Driver::master(MasterConfig::direct(), port, clock);
+/// println!("{} nodes", bus.discover()?.len());
+/// bus.set_velocity(NodeId::N2, Rps::new(1.5)?)?;
+/// bus.run_for(Duration::from_secs(2), |_master, event, _now| println!("{event:?}"))?;
+/// bus.stop(NodeId::N2)?; // `Ok` only once the motor is seen to be still
+/// # Ok(())
+/// # }
+/// ```
+///
+/// No call of it loses received bytes, sends an old command late, or waits longer than it says, and
+/// after any error the next call continues; see the [module](super).
 #[derive(Clone, Debug)]
 pub struct Driver<R, P, C> {
     pub(super) role: R,

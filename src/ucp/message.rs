@@ -1,4 +1,5 @@
 //! The content of frames: the messages, their bodies and their values (ruling U4).
+#![doc = include_str!("messages.md")]
 //!
 //! [`Frame::message`] reads one, [`Body::frame`](super::Body::frame) builds one. A message prints
 //! itself, as a whole or without its name: [`Message::contents`].

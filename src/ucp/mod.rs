@@ -8,23 +8,9 @@
 //! byte        0     1     2     3     4     5      6 ...
 //! frame       FD    FF    len: u16    id    index  body ...   crc: u16
 //! ```
+#![doc = include_str!("messages.md")]
 //!
-//! ```text
-//! id          to the robot                    to the host
-//! 1           Ping 0                          Pong 1
-//! 2           MotorControl 16, every 100 ms
-//! 3           CalibrationStart 1              CalibrationStartAck 2
-//! 4           CalibrationEnd 1                CalibrationEndAck 2
-//! 5                                           FirmwareReport 36 or DocumentReport 34, every 20 ms
-//! 6           ImuBiasAck 1                    ImuBias 12
-//! 7           MagBiasAck 1                    MagBias 6
-//! 8           Biases 19                       BiasRequest 0
-//! 9           OtaRequest 2                    OtaAck 1
-//! 0A          SetNetworkState 1, or 4
-//! ```
-//!
-//! The numbers are body lengths in bytes. Id and body length together identify the message, so the
-//! direction need not be known.
+//! Id and body length together identify the message, so the direction need not be known.
 //!
 //! # Decoding
 //!

@@ -81,7 +81,8 @@ impl<P, C: Clock> Driver<Slave, P, C> {
     ///     let mut slave = Driver::slave(NodeId::N1, Mode::Velocity, config, port, clock);
     ///     loop {
     ///         slave.next_command(Duration::from_millis(10))?;
-    ///         match slave.role().command() {
+    ///         let now = slave.now();
+    ///         match slave.role().command(now) {
     ///             Some(Target::Velocity(speed)) => set_motor(speed),
     ///             _ => set_motor(Rps::ZERO), // none yet, or the watchdog has fired
     ///         }

@@ -25,6 +25,17 @@ const EVENTS: usize = 16;
 /// The master: discovers nodes, repeats the latest set-points, reads every node in turn, sends
 /// stops until the motors are seen to be still, and accepts only genuine replies.
 ///
+/// ```
+/// use axlewire::{endpoint::Endpoint, ikeya::{master::MasterConfig, Master}, time::Instant};
+///
+/// let now = Instant::from_micros(0);
+/// let mut master = Master::new(MasterConfig::direct(), now);
+/// master.discover(now);
+/// assert_eq!(master.poll_transmit(now), Some(&[0xAA, 0x01, 0xBE, 0xD0][..])); // READ 1
+/// assert_eq!(master.poll_transmit(now), None); // until the window closes
+/// assert_eq!(master.poll_timeout(), Some(Instant::from_micros(80 + 500 + 160)));
+/// ```
+///
 /// It has no clock and no port; see [`Endpoint`] for what to call when. A cycle visits every online
 /// node: a WRITE if it has a set-point, then a READ (I8). With
 /// [`ThreeMotors`](crate::ikeya::board::ThreeMotors) the WRITE is answered, so it also serves as
@@ -80,17 +91,6 @@ const EVENTS: usize = 16;
 /// A window without the answer is a strike, whatever else was heard in it. Three in a row make the
 /// node abnormal, one answer brings it back online, and a WRITE changes nothing (I7). The set-point
 /// of a node that becomes abnormal is dropped.
-///
-/// ```
-/// use axlewire::{endpoint::Endpoint, ikeya::{master::MasterConfig, Master}, time::Instant};
-///
-/// let now = Instant::from_micros(0);
-/// let mut master = Master::new(MasterConfig::direct(), now);
-/// master.discover(now);
-/// assert_eq!(master.poll_transmit(now), Some(&[0xAA, 0x01, 0xBE, 0xD0][..])); // READ 1
-/// assert_eq!(master.poll_transmit(now), None); // until the window closes
-/// assert_eq!(master.poll_timeout(), Some(Instant::from_micros(80 + 500 + 160)));
-/// ```
 // Most used fields first: short instructions can reach them there.
 #[derive(Clone, Debug)]
 #[repr(C)]

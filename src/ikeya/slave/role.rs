@@ -24,14 +24,6 @@ use crate::{
 /// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that
 /// the application has set, and passes on the commands for it (ruling I9).
 ///
-/// * Only [`ThreeMotors`](crate::ikeya::board::ThreeMotors) boards answer a WRITE (I3, I10).
-/// * On any error the previous command stays: a damaged packet is ignored, and a NaN or infinite
-///   speed is counted and refused (I4).
-/// * A request is not answered if another byte follows it or the answer is too late (I14): the
-///   master has moved on, and the answer would collide with the next node's.
-/// * On two wires it follows the answers of other nodes, so that it finds no request inside them
-///   (I14).
-///
 /// ```
 /// use axlewire::ikeya::{slave::SlaveConfig, Mode, NodeId, Rps, Slave};
 /// use axlewire::ikeya::{ReadRequest, VelocityResponse};
@@ -46,6 +38,14 @@ use crate::{
 /// assert_eq!(slave.poll_transmit(now), Some(&answer.as_bytes()[..]));
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
+///
+/// * Only [`ThreeMotors`](crate::ikeya::board::ThreeMotors) boards answer a WRITE (I3, I10).
+/// * On any error the previous command stays: a damaged packet is ignored, and a NaN or infinite
+///   speed is counted and refused (I4).
+/// * A request is not answered if another byte follows it or the answer is too late (I14): the
+///   master has moved on, and the answer would collide with the next node's.
+/// * On two wires it follows the answers of other nodes, so that it finds no request inside them
+///   (I14).
 #[derive(Clone, Debug)]
 pub struct Slave<B: Board = OneMotor> {
     node: NodeId,

@@ -25,6 +25,22 @@ use crate::{
 
 /// The host of a rover: a pure state machine, driven as described in [`Endpoint`].
 ///
+/// ```
+/// use axlewire::{endpoint::Endpoint, time::Instant, ucp::{host::HostConfig, Host, MotorControl}};
+///
+/// let now = Instant::from_millis(0);
+/// let mut host = Host::new(HostConfig::default(), now);
+/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // stand still
+/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(8)); // a ping
+/// assert_eq!(host.poll_transmit(now), None);
+///
+/// let now = Instant::from_millis(50);
+/// host.drive(MotorControl::turn_right(50, 10)?, now)?;
+/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // the command
+/// assert_eq!(host.poll_timeout(), Some(Instant::from_millis(150))); // the command again
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// * **First frame (U16).** A zero motor command, before any ping or answer; it is sent first again
 ///   if it did not leave or its flush failed. If the application drives at once, its command
 ///   follows directly. The zero command is repeated every 100 ms until the first call, in case it
@@ -66,22 +82,6 @@ use crate::{
 ///
 /// Frames are sent in this order: motor commands, answers, requests, the network state for the
 /// lamp, pings. Every frame takes the next `index`.
-///
-/// ```
-/// use axlewire::{endpoint::Endpoint, time::Instant, ucp::{host::HostConfig, Host, MotorControl}};
-///
-/// let now = Instant::from_millis(0);
-/// let mut host = Host::new(HostConfig::default(), now);
-/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // stand still
-/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(8)); // a ping
-/// assert_eq!(host.poll_transmit(now), None);
-///
-/// let now = Instant::from_millis(50);
-/// host.drive(MotorControl::turn_right(50, 10)?, now)?;
-/// assert_eq!(host.poll_transmit(now).map(|frame| frame.len()), Some(24)); // the command
-/// assert_eq!(host.poll_timeout(), Some(Instant::from_millis(150))); // the command again
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone, Debug)]
 pub struct Host<S = NoStore> {
     inbox: Inbox,

@@ -18,6 +18,18 @@ use crate::{
 
 /// A rover as seen by its host: a pure state machine, driven as described in [`Endpoint`].
 ///
+/// ```
+/// use axlewire::{endpoint::Endpoint, time::Instant};
+/// use axlewire::ucp::{robot::RobotConfig, Body, MotorControl, Robot};
+///
+/// let mut robot = Robot::new(RobotConfig::default(), Instant::from_millis(0));
+/// let received = MotorControl::new(60, 0)?.frame(0);
+/// robot.handle_input(received.as_bytes(), Instant::from_millis(10));
+/// assert_eq!(robot.command(Instant::from_millis(509)).speed(), 60);
+/// assert_eq!(robot.command(Instant::from_millis(510)).speed(), 0);
+/// # Ok::<(), axlewire::error::EncodeError>(())
+/// ```
+///
 /// * **Commands (U10).** A valid command holds for 500 ms; then speed and turn are 0 until the
 ///   next. Only valid commands count: the vendor firmware accepts any byte, and drives on through
 ///   noise. Values out of range are clamped to -100..=100, as in the vendor firmware: a sender of
@@ -41,18 +53,6 @@ use crate::{
 ///   the latest replaces the newest of its kind, and both have getters.
 /// * **Firmware update (U7).** Never starts by itself: it is an event, and the application decides.
 /// * **Frames that only a robot sends (U13)** are counted and ignored. Shipped robots hang on id 5.
-///
-/// ```
-/// use axlewire::{endpoint::Endpoint, time::Instant};
-/// use axlewire::ucp::{robot::RobotConfig, Body, MotorControl, Robot};
-///
-/// let mut robot = Robot::new(RobotConfig::default(), Instant::from_millis(0));
-/// let received = MotorControl::new(60, 0)?.frame(0);
-/// robot.handle_input(received.as_bytes(), Instant::from_millis(10));
-/// assert_eq!(robot.command(Instant::from_millis(509)).speed(), 60);
-/// assert_eq!(robot.command(Instant::from_millis(510)).speed(), 0);
-/// # Ok::<(), axlewire::error::EncodeError>(())
-/// ```
 #[derive(Clone, Debug)]
 pub struct Robot {
     inbox: Inbox,
