@@ -5,9 +5,12 @@ use std::io;
 
 use super::{Driver, SerialPort, StdClock};
 #[cfg(feature = "ikeya")]
-use crate::ikeya::master::{Master, MasterConfig};
+use crate::ikeya::{Master, master::MasterConfig};
 #[cfg(feature = "ucp")]
-use crate::ucp::host::{Host, HostConfig, StopProgress};
+use crate::ucp::{
+    Host,
+    host::{HostConfig, StopProgress},
+};
 
 /// A master on a serial port of a PC: a [`Driver`], with all of its calls.
 ///

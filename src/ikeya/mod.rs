@@ -168,9 +168,7 @@ mod wire;
 pub use board::{Status, Target};
 pub use contents::Contents;
 pub use framing::{BothDirections, Decoder, MAX_LEN, Packet, Request, Response, ToMaster, ToSlave};
-#[doc(inline)]
-pub use master::Master;
-#[doc(inline)]
-pub use slave::Slave;
+pub use master::role::Master;
+pub use slave::role::Slave;
 pub use units::{BAUD, Mode, NodeId, Position, Rps};
 pub use wire::{PositionResponse, ReadRequest, VelocityResponse, WriteRequest};

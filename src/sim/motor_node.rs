@@ -6,9 +6,9 @@ use super::motor::Motor;
 use crate::{
     endpoint::{Arrival, Endpoint, LineRules, Transmit},
     ikeya::{
-        Mode, NodeId, Position, Rps,
+        Mode, NodeId, Position, Rps, Slave,
         board::{Board, OneMotor, Target, ThreeMotors, Units},
-        slave::{Slave, SlaveConfig, SlaveEvent},
+        slave::{SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},
 };

@@ -4,7 +4,10 @@ use super::rover::Rover;
 use crate::{
     endpoint::{Arrival, Endpoint, LineRules, Transmit},
     time::{Duration, Instant},
-    ucp::robot::{Robot, RobotConfig, RobotEvent},
+    ucp::{
+        Robot,
+        robot::{RobotConfig, RobotEvent},
+    },
 };
 
 /// The far end of a rover's link: a [`Robot`] whose commands drive a [`Rover`], and whose reports

@@ -162,11 +162,9 @@ pub use contents::Contents;
 pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};
 pub use framing::{Decoder, Ucp};
 pub use header::{BAUD, Header, MAX_BODY_LEN, MAX_LEN, MessageId, SYNC};
-#[doc(inline)]
-pub use host::Host;
+pub use host::role::Host;
 #[doc(inline)]
 pub use message::Message;
 pub use motor::MotorControl;
 pub use report::Telemetry;
-#[doc(inline)]
-pub use robot::Robot;
+pub use robot::role::Robot;

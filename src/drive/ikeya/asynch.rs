@@ -9,10 +9,9 @@ use crate::{
         error::Operation,
     },
     ikeya::{
-        NodeId,
+        Master, NodeId, Slave,
         board::{Board, Status, Target},
-        master::{Master, NodeSet},
-        slave::Slave,
+        master::NodeSet,
     },
     time::Duration,
 };

@@ -6,10 +6,10 @@ use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
     endpoint::Endpoint,
     ikeya::{
-        Mode, NodeId,
+        Master, Mode, NodeId, Slave,
         board::{Board, Status, Target},
-        master::{CommandError, Health, Master, MasterConfig, MasterEvent, NodeSet, StopProgress},
-        slave::{Slave, SlaveConfig, SlaveEvent},
+        master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
+        slave::{SlaveConfig, SlaveEvent},
     },
     time::{Duration, Instant},
 };

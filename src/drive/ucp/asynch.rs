@@ -9,10 +9,9 @@ use crate::{
     },
     time::{Duration, Instant},
     ucp::{
-        MotorControl,
-        host::{BiasStore, COAST, CalibrationStep, Host, ReceivedReport},
+        Host, MotorControl, Robot,
+        host::{BiasStore, COAST, CalibrationStep, ReceivedReport},
         message::CalibrationKind,
-        robot::Robot,
     },
 };
 

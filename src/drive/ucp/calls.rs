@@ -8,13 +8,13 @@ use crate::drive::{
 use crate::{
     time::{Duration, Instant},
     ucp::{
-        MotorControl,
+        Host, MotorControl, Robot,
         host::{
-            BiasStore, CalibrationStep, CommandError, Host, HostConfig, HostEvent, ReceivedReport,
+            BiasStore, CalibrationStep, CommandError, HostConfig, HostEvent, ReceivedReport,
             StopProgress,
         },
         message::CalibrationKind,
-        robot::{Robot, RobotConfig, RobotEvent},
+        robot::{RobotConfig, RobotEvent},
     },
 };
 

@@ -1,6 +1,7 @@
 //! The master's side of the bus: settings, events, node health and statistics.
 //!
-//! [`Master`] is the role. Its code is in the files of this module, one concept each:
+//! [`Master`](super::Master) is the role. Its code is in the files of this module, one concept
+//! each:
 //!
 //! | file | what it owns |
 //! |---|---|
@@ -21,7 +22,7 @@ mod node;
 mod order;
 mod queue;
 mod replies;
-mod role;
+pub(super) mod role;
 mod statistics;
 mod view;
 
@@ -29,5 +30,4 @@ pub use super::{node_set::NodeSet, schedule::Schedule};
 pub use config::{MasterConfig, Polling};
 pub use event::{Cause, CommandError, Health, MasterEvent};
 pub use order::StopProgress;
-pub use role::Master;
 pub use statistics::{MasterStatistics, NodeStatistics};

@@ -680,7 +680,7 @@ enum Sight {
     Unclear,
 }
 
-/// Progress of a stop, see [`Master::stop_progress`](super::Master::stop_progress) (I12).
+/// Progress of a stop, see [`Master::stop_progress`](crate::ikeya::Master::stop_progress) (I12).
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StopProgress {
@@ -701,7 +701,7 @@ pub enum StopProgress {
     /// Answers at least 20 ms apart have shown a motor that is still: two below 0.05 rps, or three
     /// positions within 8 counts, no more than 1/32 of a turn away from the position to hold. An
     /// answer above 0.05 rps, or more than 1/16 of a turn away, ends this, unless the node was
-    /// [released](super::Master::release) or is polled by hand
+    /// [released](crate::ikeya::Master::release) or is polled by hand
     /// ([`Polling::Manual`](super::Polling::Manual)). So does an answer in another mode (I11),
     /// unless the node was released.
     StandingStill,

@@ -5,7 +5,7 @@ use crate::{
     time::{Duration, wire_time},
 };
 
-/// Settings of a [`Slave`](super::Slave): start from [`direct`](Self::direct) or
+/// Settings of a [`Slave`](crate::ikeya::Slave): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

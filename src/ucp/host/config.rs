@@ -5,7 +5,7 @@ use crate::{
     ucp::{body::CalibrationStart, frame::FrameOf, header::BAUD, role::SHORTEST},
 };
 
-/// Settings of a [`Host`](super::Host): start from [`direct`](Self::direct) or
+/// Settings of a [`Host`](crate::ucp::Host): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
 /// A period or timeout below 1 ms counts as 1 ms, because a driver would spin otherwise.
@@ -72,8 +72,8 @@ pub struct HostConfig {
     /// If set, calibration results are kept but not acknowledged, so the robot repeats them every
     /// 1000 ms. Its requests for biases are not answered, so its measurements are off; each is a
     /// [`HostEvent::BiasesNotAnswered`](super::HostEvent::BiasesNotAnswered).
-    /// [`Host::set_network_state`](super::Host::set_network_state) and
-    /// [`Host::start_firmware_update`](super::Host::start_firmware_update) are refused with
+    /// [`Host::set_network_state`](crate::ucp::Host::set_network_state) and
+    /// [`Host::start_firmware_update`](crate::ucp::Host::start_firmware_update) are refused with
     /// [`CommandError::LowIdsOnly`](super::CommandError::LowIdsOnly).
     pub low_ids_only: bool,
 }

@@ -192,7 +192,7 @@ pub enum CommandError {
     },
     /// A firmware update requires that the robot has been told to stand still, that the stop has
     /// been flushed, and that reports, if there are any, show a standstill
-    /// ([`Host::stop_progress`](super::Host::stop_progress)).
+    /// ([`Host::stop_progress`](crate::ucp::Host::stop_progress)).
     Moving,
     /// A firmware update is in progress: the frame would end up in it.
     Updating,

@@ -1,6 +1,6 @@
 //! The host's side of the link: settings, events, statistics and the store of biases.
 //!
-//! [`Host`] is the role. Its code is in the files of this module, one concept each:
+//! [`Host`](crate::ucp::Host) is the role. Its code is in the files of this module, one concept each:
 //!
 //! | file | what it decides |
 //! |---|---|
@@ -21,7 +21,7 @@ mod motor;
 mod outgoing;
 mod ping;
 mod results;
-mod role;
+pub(super) mod role;
 mod send;
 mod standstill;
 mod state;
@@ -34,6 +34,5 @@ pub use event::{
     UnknownFrame,
 };
 pub use link::Link;
-pub use role::Host;
 pub use standstill::{COAST, STILL_REPORTS, StopProgress};
 pub use statistics::HostStatistics;

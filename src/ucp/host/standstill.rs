@@ -15,7 +15,7 @@ pub const STILL_REPORTS: u8 = 3;
 /// Fastest turn of a wheel that stands still, rpm.
 const STILL_RPM: u16 = 2;
 
-/// Progress of a stop, see [`Host::stop_progress`](super::Host::stop_progress).
+/// Progress of a stop, see [`Host::stop_progress`](crate::ucp::Host::stop_progress).
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StopProgress {

@@ -3,7 +3,7 @@
 use crate::stats::Latency;
 
 /// Counts of a host. They saturate at 2^32 - 1. Bytes lost to noise are in
-/// [`counters`](super::Host::counters).
+/// [`counters`](crate::ucp::Host::counters).
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

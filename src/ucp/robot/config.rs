@@ -5,7 +5,7 @@ use crate::{
     ucp::{header::BAUD, role::SHORTEST},
 };
 
-/// Settings of a [`Robot`](super::Robot): start from [`direct`](Self::direct) or
+/// Settings of a [`Robot`](crate::ucp::Robot): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
 /// A period or timeout below 1 ms counts as 1 ms, because a driver would spin otherwise.

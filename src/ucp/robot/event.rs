@@ -14,7 +14,7 @@ pub enum RobotEvent {
     /// The command has changed, or is back after a [`Watchdog`](Self::Watchdog). It is in range,
     /// the lamp field is 100 or 0, and all other fields are 0.
     ///
-    /// To move the robot, use [`Robot::command`](super::Robot::command) instead: it is correct at
+    /// To move the robot, use [`Robot::command`](crate::ucp::Robot::command) instead: it is correct at
     /// any time. In a queue that fills up, only the latest command is sure to be reported. One
     /// that the watchdog has ended before it was reported is reported with 0 for speed and turn.
     Motor(MotorControl),
@@ -43,7 +43,7 @@ pub enum RobotEvent {
     NetworkState(NetworkState),
     /// The host asks for a firmware update. The role does nothing about it: the application
     /// decides, and answers a [`Request`](UpdateSource::Request) with
-    /// [`Robot::answer_update`](super::Robot::answer_update).
+    /// [`Robot::answer_update`](crate::ucp::Robot::answer_update).
     UpdateRequested {
         /// The version offered.
         version: i16,

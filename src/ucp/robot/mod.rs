@@ -1,6 +1,6 @@
 //! The robot's side of the link: settings, events and statistics.
 //!
-//! [`Robot`] is the role. Its code is in the files of this module, one concept each:
+//! [`Robot`](crate::ucp::Robot) is the role. Its code is in the files of this module, one concept each:
 //!
 //! | file | what it decides |
 //! |---|---|
@@ -13,12 +13,11 @@ mod config;
 mod event;
 mod outgoing;
 mod repeat;
-mod role;
+pub(super) mod role;
 mod send;
 mod state;
 mod statistics;
 
 pub use config::{ReportLayout, RobotConfig};
 pub use event::{RobotEvent, UpdateSource};
-pub use role::Robot;
 pub use statistics::RobotStatistics;

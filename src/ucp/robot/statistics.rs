@@ -1,7 +1,7 @@
 //! Counts of a robot.
 
 /// Counts of the robot. They saturate at 2^32 - 1. Bytes lost to noise are in
-/// [`counters`](super::Robot::counters).
+/// [`counters`](crate::ucp::Robot::counters).
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
