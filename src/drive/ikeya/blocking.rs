@@ -153,7 +153,7 @@ where
 
     /// Tries for 100 ms to stop every node that was told to move or is owed a stop.
     #[cfg(feature = "serialport")]
-    pub(in crate::drive) fn try_stop(&mut self) {
+    pub(crate) fn try_stop(&mut self) {
         self.begin_stop(self.moving());
         let deadline = self.now() + DROP_BOUND;
         while self.now() < deadline {

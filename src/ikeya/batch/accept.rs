@@ -13,7 +13,7 @@ const PACKETS: usize = 16;
 /// Number of packets of 8 bytes with a valid CRC at the front. Their header and id are checked when
 /// they are handed out.
 #[inline(always)]
-pub(in crate::ikeya) fn accept_batch(bytes: &[u8]) -> usize {
+pub(crate) fn accept_batch(bytes: &[u8]) -> usize {
     let Some(bytes) = bytes.first_chunk::<{ 8 * PACKETS }>() else { return 0 };
     let packets: &[[U32; 2]; PACKETS] = transmute_ref!(bytes);
     let mut right = 0_u32;

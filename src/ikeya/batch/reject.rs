@@ -48,11 +48,7 @@ const BLOCK: usize = 2 * WORDS + 1;
 /// Counts the bytes at the front that start no frame. Ends before the first that does, or where
 /// less than a block is left.
 #[inline(always)]
-pub(in crate::ikeya) fn reject_batch<
-    const LONG: usize,
-    const TO_SLAVE: bool,
-    const TO_MASTER: bool,
->(
+pub(crate) fn reject_batch<const LONG: usize, const TO_SLAVE: bool, const TO_MASTER: bool>(
     bytes: &[u8],
 ) -> Rejected {
     let mut rejected = Rejected::default();

@@ -23,7 +23,8 @@ pub struct MasterConfig {
     /// as its time on the line.
     pub baud: u32,
     /// Ids on this bus; all eight by default. A discovery polls these, and
-    /// [`stop_all`](crate::ikeya::Master::stop_all) is done only when each of them has stopped (I12).
+    /// [`stop_all`](crate::ikeya::Master::stop_all) is done only when each of them has stopped
+    /// (I12).
     pub nodes: NodeSet,
     /// Longest time from the end of the request on the wire to the start of the answer. The wire
     /// time of the answer is added (I7).
@@ -57,8 +58,8 @@ pub struct MasterConfig {
     /// or is not where it was told to hold (I12).
     pub coast: Duration,
     /// Dead-man: after this much time without an accepted set-point, a stop or
-    /// [`keep_alive`](crate::ikeya::Master::keep_alive), every node under a set-point is owed a stop
-    /// (I13). `None`, the default, disables it.
+    /// [`keep_alive`](crate::ikeya::Master::keep_alive), every node under a set-point is owed a
+    /// stop (I13). `None`, the default, disables it.
     pub dead_man: Option<Duration>,
     /// Whether a node that becomes abnormal while under a set-point is owed a stop (I12); on by
     /// default, because a slave keeps its last command.

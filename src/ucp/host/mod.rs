@@ -1,6 +1,7 @@
 //! The host's side of the link: settings, events, statistics and the store of biases.
 //!
-//! [`Host`](crate::ucp::Host) is the role. Its code is in the files of this module, one concept each:
+//! [`Host`](crate::ucp::Host) is the role. Its code is in the files of this module, one concept
+//! each:
 //!
 //! | file | what it decides |
 //! |---|---|

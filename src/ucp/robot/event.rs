@@ -14,9 +14,10 @@ pub enum RobotEvent {
     /// The command has changed, or is back after a [`Watchdog`](Self::Watchdog). It is in range,
     /// the lamp field is 100 or 0, and all other fields are 0.
     ///
-    /// To move the robot, use [`Robot::command`](crate::ucp::Robot::command) instead: it is correct at
-    /// any time. In a queue that fills up, only the latest command is sure to be reported. One
-    /// that the watchdog has ended before it was reported is reported with 0 for speed and turn.
+    /// To move the robot, use [`Robot::command`](crate::ucp::Robot::command) instead: it is correct
+    /// at any time. In a queue that fills up, only the latest command is sure to be reported.
+    /// One that the watchdog has ended before it was reported is reported with 0 for speed and
+    /// turn.
     Motor(MotorControl),
     /// No valid command for 500 ms: speed and turn are 0, the lamp is unchanged (ruling U10).
     Watchdog,

@@ -1,6 +1,7 @@
 //! The robot's side of the link: settings, events and statistics.
 //!
-//! [`Robot`](crate::ucp::Robot) is the role. Its code is in the files of this module, one concept each:
+//! [`Robot`](crate::ucp::Robot) is the role. Its code is in the files of this module, one concept
+//! each:
 //!
 //! | file | what it decides |
 //! |---|---|
