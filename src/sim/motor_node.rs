@@ -127,7 +127,7 @@ impl Motion<ThreeMotors> for [Motor; 3] {
 /// assert_eq!(second.velocity(), Rps::ZERO);
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct MotorNode<B: MotorBoard = OneMotor> {
     slave: Slave<B>,
     motor: B::Motor,

@@ -109,7 +109,7 @@ impl Frame {
 }
 
 /// A received frame to be passed on byte for byte; see [`Frame::relay_unchecked`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RelayedFrame<'a>(&'a Frame);
 

@@ -105,7 +105,7 @@ pub enum MasterEvent<B: Board = OneMotor> {
 }
 
 /// Reason for a missing answer or confirmation.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Cause {
@@ -169,7 +169,7 @@ impl fmt::Display for CommandError {
 impl core::error::Error for CommandError {}
 
 /// Health of a node (ruling I7).
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Health {

@@ -123,7 +123,7 @@ impl UnknownFrame {
 }
 
 /// The two requests of a calibration.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationStep {
     /// To start the calibration.
@@ -159,7 +159,7 @@ impl CalibrationFailure {
 }
 
 /// Cause of a failed request: the outcome of its last attempt.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FailureCause {

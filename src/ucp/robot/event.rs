@@ -54,7 +54,7 @@ pub enum RobotEvent {
 }
 
 /// How a host asks for a firmware update.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum UpdateSource {
     /// By the dedicated request (id 9).

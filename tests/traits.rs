@@ -1,0 +1,98 @@
+//! Which traits public types have, by kind: the table is in CONTRIBUTING.md.
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "embedded-io", feature = "sim"))]
+#![allow(unused_qualifications, reason = "two modules have the same names")]
+
+use std::{collections::BTreeSet, error::Error, fmt, hash::Hash};
+
+use axlewire::{
+    drive::*,
+    endpoint::*,
+    error::*,
+    fields::*,
+    ikeya::{self, board::*, master::*, slave::*, three, *},
+    io::{FrameReader, FrameWriter, WriteError},
+    sim,
+    stats::Latency,
+    stream::{self, *},
+    time::{Duration, Instant, Wrapping32},
+    ucp::{self, host::*, message::*, robot::*, *},
+};
+
+/// Checks at compile time that these types have these traits, and lists their names.
+macro_rules! kinds {
+    ($($name:ident: $($bound:path),+ => $($ty:ty),+;)+) => {
+        $(#[allow(dead_code, reason = "it need only compile")]
+        fn $name() {
+            fn has<T: $($bound +)+ ?Sized>() {}
+            $(has::<$ty>();)+
+        })+
+        const LISTED: &[&str] = &[$($(stringify!($ty)),+),+];
+    };
+}
+
+kinds! {
+    values: fmt::Debug, Copy, PartialEq, Eq, Hash, Send, Sync =>
+        Arrival, Transmit, Unsent, ikeya::Mode, ikeya::NodeId, ikeya::Position, DipSwitch,
+        IdReading, NodeSet, Cause, Health, ikeya::master::StopProgress, ucp::host::StopProgress,
+        CalibrationKind, CalibrationStep, ErrorCode, NetworkState, OtaStatus, FailureCause, Link,
+        MessageId, ReportLayout, UpdateSource, Reason, Duration, Instant, sim::Direction, sim::Who;
+    numbers: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        Rps, Telemetry, Status<OneMotor>, Target<OneMotor>, Polling, Verdict, Gap, Counters,
+        Latency, LineRules, Operation, ReceivedReport, CalibrationFailure, Schedule, sim::Faults,
+        sim::Input, sim::Timing, sim::PairStatistics;
+    events: fmt::Debug, Clone, PartialEq, Send, Sync =>
+        MasterEvent, SlaveEvent, HostEvent, RobotEvent, UnknownFrame;
+    settings: fmt::Debug, Copy, PartialEq, Default, Send, Sync =>
+        MasterConfig, SlaveConfig, HostConfig, RobotConfig;
+    statistics: fmt::Debug, Copy, PartialEq, Default, Send, Sync =>
+        MasterStatistics, NodeStatistics, SlaveStatistics, HostStatistics, RobotStatistics;
+    errors: fmt::Debug, fmt::Display, Error, Clone, PartialEq, Send, Sync =>
+        EncodeError, ParseError, ikeya::master::CommandError, ucp::host::CommandError, NotStored,
+        DriveError<NotStored>, Rs485Error<NotStored, NotStored>, WriteError<NotStored>, sim::Stuck;
+    packets: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        ikeya::ReadRequest, ikeya::WriteRequest, ikeya::VelocityResponse, ikeya::PositionResponse,
+        three::ReadRequest, three::WriteRequest, three::VelocityResponse, three::PositionResponse,
+        Ping, Pong, MotorControl, RawMotorControl, CalibrationStart, CalibrationStartAck,
+        CalibrationEnd, CalibrationEndAck, DocumentReport, FirmwareReport, ImuBias, ImuBiasAck,
+        MagBias, MagBiasAck, Biases, BiasRequest, OtaRequest, RawOtaRequest, OtaAck,
+        SetNetworkState, SetNetworkStateWide, Header, FrameOf<Ping>;
+    views: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        ikeya::Packet<'static>, ikeya::Request<'static>, ikeya::Response<'static>,
+        three::Packet<'static>, three::Request<'static>, three::Response<'static>,
+        Message<'static>, Report<'static>, RawFrame<'static>, RelayedFrame<'static>,
+        stream::Event<&'static ucp::Frame>;
+    printers: fmt::Debug, fmt::Display =>
+        ikeya::Contents, ucp::Contents<'static>, ucp::Frame;
+    markers: fmt::Debug, Copy =>
+        OneMotor, ThreeMotors, ToSlave, ToMaster, BothDirections, three::ToSlave, three::ToMaster,
+        three::BothDirections, Ucp, NoStore, MemoryStore;
+    described: fmt::Debug, Copy => Field, Kind, Shape, Record;
+    machines: fmt::Debug, Clone =>
+        Master, Slave, Host, Robot, stream::Decoder<Ucp, 64>, Frames<'static, Ucp>, stream::Echo,
+        Parts<'static, Ucp>, Wrapping32, StdClock, sim::Motor, sim::MotorNode, sim::Rover,
+        sim::RoverNode, sim::Rng;
+    ports: fmt::Debug =>
+        Driver<Host, (), StdClock>, Rs485<(), ()>, NoDelay, WithoutEcho<()>,
+        FrameReader<(), Ucp, 64>, FrameWriter<(), 64>, sim::Line<Master, sim::MotorNode>,
+        sim::Traced, sim::Wire;
+}
+
+#[test]
+fn every_public_type_has_the_traits_of_its_kind() {
+    let last = |path: &str| {
+        let path = path.split('<').next().unwrap().trim();
+        path.rsplit("::").next().unwrap().trim().to_owned()
+    };
+    let listed: BTreeSet<String> = LISTED.iter().map(|name| last(name)).collect();
+    let public: BTreeSet<String> = include_str!("../api.txt")
+        .lines()
+        .filter_map(|line| {
+            let (_, name) = line.split_once("pub struct ").or(line.split_once("pub enum "))?;
+            Some(last(name.split(['(', ' ']).next()?))
+        })
+        // Made by derives, or behind features that this test does without.
+        .filter(|name| !name.ends_with("Bits") && !name.starts_with("Tokio"))
+        .filter(|name| !["Bus", "Rover", "SerialPort", "WithDelay"].contains(&name.as_str()))
+        .collect();
+    assert_eq!(public.difference(&listed).collect::<Vec<_>>(), [""; 0], "not listed");
+}
