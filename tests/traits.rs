@@ -18,6 +18,15 @@ use axlewire::{
     ucp::{self, host::*, message::*, robot::*, *},
 };
 
+#[cfg(feature = "defmt")]
+use defmt::Format;
+
+/// Without the feature, everything has it.
+#[cfg(not(feature = "defmt"))]
+trait Format {}
+#[cfg(not(feature = "defmt"))]
+impl<T: ?Sized> Format for T {}
+
 /// Checks at compile time that these types have these traits, and lists their names.
 macro_rules! kinds {
     ($($name:ident: $($bound:path),+ => $($ty:ty),+;)+) => {
@@ -31,32 +40,31 @@ macro_rules! kinds {
 }
 
 kinds! {
-    values: fmt::Debug, Copy, PartialEq, Eq, Hash, Send, Sync =>
+    values: fmt::Debug, Format, Copy, PartialEq, Eq, Hash, Send, Sync =>
         Arrival, Transmit, Unsent, ikeya::Mode, ikeya::NodeId, ikeya::Position, DipSwitch,
         IdReading, NodeSet, Cause, Health, ikeya::master::StopProgress, ucp::host::StopProgress,
         CalibrationKind, CalibrationStep, ErrorCode, NetworkState, OtaStatus, FailureCause, Link,
-        MessageId, ReportLayout, UpdateSource, Reason, Duration, Instant, sim::Direction, sim::Who;
-    numbers: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        MessageId, ReportLayout, UpdateSource, Reason, Duration, Instant;
+    numbers: fmt::Debug, Format, Copy, PartialEq, Send, Sync =>
         Rps, Telemetry, Status<OneMotor>, Target<OneMotor>, Polling, Verdict, Gap, Counters,
-        Latency, LineRules, Operation, ReceivedReport, CalibrationFailure, Schedule, sim::Faults,
-        sim::Input, sim::Timing, sim::PairStatistics;
-    events: fmt::Debug, Clone, PartialEq, Send, Sync =>
+        Latency, LineRules, Operation, ReceivedReport, CalibrationFailure, Schedule;
+    events: fmt::Debug, Format, Clone, PartialEq, Send, Sync =>
         MasterEvent, SlaveEvent, HostEvent, RobotEvent, UnknownFrame;
-    settings: fmt::Debug, Copy, PartialEq, Default, Send, Sync =>
+    settings: fmt::Debug, Format, Copy, PartialEq, Default, Send, Sync =>
         MasterConfig, SlaveConfig, HostConfig, RobotConfig;
-    statistics: fmt::Debug, Copy, PartialEq, Default, Send, Sync =>
+    statistics: fmt::Debug, Format, Copy, PartialEq, Default, Send, Sync =>
         MasterStatistics, NodeStatistics, SlaveStatistics, HostStatistics, RobotStatistics;
-    errors: fmt::Debug, fmt::Display, Error, Clone, PartialEq, Send, Sync =>
+    errors: fmt::Debug, Format, fmt::Display, Error, Clone, PartialEq, Send, Sync =>
         EncodeError, ParseError, ikeya::master::CommandError, ucp::host::CommandError, NotStored,
-        DriveError<NotStored>, Rs485Error<NotStored, NotStored>, WriteError<NotStored>, sim::Stuck;
-    packets: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        DriveError<NotStored>, Rs485Error<NotStored, NotStored>, WriteError<NotStored>;
+    packets: fmt::Debug, Format, Copy, PartialEq, Send, Sync =>
         ikeya::ReadRequest, ikeya::WriteRequest, ikeya::VelocityResponse, ikeya::PositionResponse,
         three::ReadRequest, three::WriteRequest, three::VelocityResponse, three::PositionResponse,
         Ping, Pong, MotorControl, RawMotorControl, CalibrationStart, CalibrationStartAck,
         CalibrationEnd, CalibrationEndAck, DocumentReport, FirmwareReport, ImuBias, ImuBiasAck,
         MagBias, MagBiasAck, Biases, BiasRequest, OtaRequest, RawOtaRequest, OtaAck,
         SetNetworkState, SetNetworkStateWide, Header, FrameOf<Ping>;
-    views: fmt::Debug, Copy, PartialEq, Send, Sync =>
+    views: fmt::Debug, Format, Copy, PartialEq, Send, Sync =>
         ikeya::Packet<'static>, ikeya::Request<'static>, ikeya::Response<'static>,
         three::Packet<'static>, three::Request<'static>, three::Response<'static>,
         Message<'static>, Report<'static>, RawFrame<'static>, RelayedFrame<'static>,
@@ -67,6 +75,9 @@ kinds! {
         OneMotor, ThreeMotors, ToSlave, ToMaster, BothDirections, three::ToSlave, three::ToMaster,
         three::BothDirections, Ucp, NoStore, MemoryStore;
     described: fmt::Debug, Copy => Field, Kind, Shape, Record;
+    simulated: fmt::Debug, Copy, PartialEq, Send, Sync =>
+        sim::Direction, sim::Who, sim::Faults, sim::Input, sim::Timing, sim::PairStatistics,
+        sim::Stuck;
     machines: fmt::Debug, Clone =>
         Master, Slave, Host, Robot, stream::Decoder<Ucp, 64>, Frames<'static, Ucp>, stream::Echo,
         Parts<'static, Ucp>, Wrapping32, StdClock, sim::Motor, sim::MotorNode, sim::Rover,
