@@ -31,6 +31,43 @@ use crate::time::{self, Duration, Instant};
 /// [`handle_transmit`](Self::handle_transmit) before any other call. The role then decides again
 /// what to send next: an old command is never sent late because a port was down, and a stop that
 /// was not sent is due again (rulings I12, U16).
+///
+/// # A role of your own
+///
+/// Five methods are enough; the others have defaults. This one sends back what it hears:
+///
+/// ```
+/// use axlewire::{endpoint::{Arrival, Endpoint}, time::Instant};
+///
+/// #[derive(Default)]
+/// struct Mirror {
+///     heard: Vec<u8>,
+///     sent: Vec<u8>,
+/// }
+///
+/// impl Endpoint for Mirror {
+///     type Event = ();
+///     fn handle_input(&mut self, bytes: &[u8], _arrived: impl Into<Arrival>) {
+///         self.heard.extend(bytes);
+///     }
+///     fn handle_timeout(&mut self, _now: Instant) {}
+///     fn poll_transmit(&mut self, _now: Instant) -> Option<&[u8]> {
+///         self.sent = std::mem::take(&mut self.heard);
+///         (!self.sent.is_empty()).then_some(&self.sent)
+///     }
+///     fn poll_event(&mut self) -> Option<()> {
+///         None
+///     }
+///     fn poll_timeout(&self) -> Option<Instant> {
+///         None
+///     }
+/// }
+///
+/// let (mut mirror, now) = (Mirror::default(), Instant::from_micros(0));
+/// mirror.handle_input(b"hello", now);
+/// assert_eq!(mirror.poll_transmit(now), Some(&b"hello"[..]));
+/// assert_eq!(mirror.poll_transmit(now), None);
+/// ```
 pub trait Endpoint {
     /// What the role reports to its application: small, owned values.
     type Event;
