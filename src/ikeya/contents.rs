@@ -7,7 +7,7 @@ use super::{
     three::{Packet as PacketOfThree, Request as RequestOfThree, Response as ResponseOfThree},
     units::{Mode, NodeId, Position},
 };
-use crate::text::{Line, Shortest};
+use crate::text::Line;
 
 /// Contents of a packet as text without its name and node, on one line, with units; empty for a
 /// READ. From `contents` of a packet, such as [`Packet::contents`]; three motors give three values.
@@ -272,7 +272,7 @@ impl Contents {
 }
 
 fn speeds(line: &mut Line<'_>, speeds: &Motors<f32>) {
-    line.spaced(speeds.as_slice(), |line, speed| Shortest(*speed).print(line));
+    line.spaced(speeds.as_slice(), |line, speed| line.float(*speed));
     line.text(" rps");
 }
 

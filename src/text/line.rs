@@ -103,6 +103,13 @@ impl<'a> Line<'a> {
         }
     }
 
+    /// Appends the shortest number that reads back as this value, as core prints it.
+    #[cfg(feature = "ikeya")]
+    pub(crate) fn float(&mut self, value: f32) {
+        // A failure of the writer is in `result`.
+        let _ = fmt::Write::write_fmt(self, format_args!("{value:?}"));
+    }
+
     /// Appends the values that `print` appends for each of `values`, separated by spaces.
     #[inline(always)]
     pub(crate) fn spaced<T>(
@@ -133,5 +140,14 @@ impl<'a> Line<'a> {
         let text = str::from_utf8(text).unwrap_or_default();
         self.result = self.result.and_then(|()| self.out.write_str(text));
         self.len = 0;
+    }
+}
+
+/// For core, which writes a float in a few short pieces.
+#[cfg(feature = "ikeya")]
+impl fmt::Write for Line<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.text(text);
+        Ok(())
     }
 }

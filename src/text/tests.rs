@@ -104,37 +104,3 @@ fn hex_digits_are_those_of_core() {
 fn more_bytes_than_a_frame_can_have_are_an_error() {
     assert!(serde_json::to_string(&Hex(&[0; 257])).is_err());
 }
-
-#[cfg(feature = "ikeya")]
-fn assert_same_float(bits: u32) {
-    let value = f32::from_bits(bits);
-    assert_eq!(line(|line| Shortest(value).print(line)), format!("{value:?}"), "{bits:#010x}");
-}
-
-#[cfg(feature = "ikeya")]
-#[test]
-fn a_float_has_the_text_that_core_gives_it() {
-    // Every exponent with the edges of the significand, the neighbours of powers of ten, and every
-    // 2^16th or so.
-    for exponent in 0..=0x1FF {
-        for fraction in [0, 1, 2, 3, 0x3F_FFFF, 0x40_0000, 0x7F_FFFD, 0x7F_FFFE, 0x7F_FFFF] {
-            assert_same_float(exponent << 23 | fraction);
-        }
-    }
-    for power in -45..=38 {
-        let value: f32 = format!("1e{power}").parse().unwrap();
-        for bits in value.to_bits().saturating_sub(3)..value.to_bits() + 3 {
-            assert_same_float(bits);
-        }
-    }
-    for step in 0..100_000u32 {
-        assert_same_float(step.wrapping_mul(2_654_435_761));
-    }
-}
-
-#[cfg(feature = "ikeya")]
-#[test]
-#[ignore = "all 2^32 floats: 20 minutes with --release"]
-fn every_float_has_the_text_that_core_gives_it() {
-    (0..=u32::MAX).for_each(assert_same_float);
-}
