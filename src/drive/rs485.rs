@@ -83,6 +83,10 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
     ///
     /// Pin errors: it may still be on.
     pub fn release(&mut self) -> Result<(), O::Error> {
+        if self.is_on() {
+            // A pin that fails may have switched anyway.
+            self.state = State::Settling;
+        }
         self.pin.set_low()?;
         self.state = State::Off;
         Ok(())
@@ -109,9 +113,8 @@ impl<P, O: OutputPin, D> Rs485<P, O, D> {
     fn engage(&mut self) -> Result<Duration, O::Error> {
         match self.state {
             State::On => return Ok(Duration::ZERO),
-            // A cancelled write has not waited until the end.
-            State::Settling => return Ok(self.before),
-            State::Off => {}
+            // A cancelled write has not waited until the end, or the pin has failed.
+            State::Settling | State::Off => {}
         }
         // A pin that fails may have switched anyway.
         self.state = State::Settling;

@@ -69,7 +69,9 @@ fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
 
     /// A host that updates its robot.
     fn updating() -> Rover {
-        let mut rover = host();
+        let mut config = HostConfig::default();
+        config.sends_first_stop = false; // so that nothing is known of a motion
+        let mut rover = on(Host::new(config, at_ms(0)), Port::new(&World::default(), BYTE_US));
         rover.service().unwrap();
         let now = rover.now();
         rover.role_mut().start_firmware_update(50, now).unwrap();

@@ -151,7 +151,7 @@ fn a_cancelled_write_keeps_the_pin_on_until_it_is_finished_or_dropped() {
     };
     cancelled(&mut port, b"12"); // in the delay before the write, which is then repeated
     assert_eq!(write(&mut port, true, b"12"), Ok(1));
-    assert_eq!(drain(&log), "off on 5000 ns 5000 ns write");
+    assert_eq!(drain(&log), "off on 5000 ns on 5000 ns write");
     cancelled(&mut port, b"2");
     assert!(port.is_on());
     assert_eq!(write(&mut port, true, b"2"), Ok(1));
@@ -206,4 +206,18 @@ fn the_error_distinguishes_port_and_pin() {
     let text = "bytes may have been lost: the port failed while sending them";
     assert_eq!((lost.to_string().as_str(), lost.source().is_none()), (text, true));
     assert_eq!(lost.kind(), embedded_io::ErrorKind::Other);
+}
+
+#[test]
+fn a_pin_that_failed_to_go_off_is_switched_on_again_before_the_next_byte() {
+    for is_async in BOTH {
+        let (mut port, log, pin) = undelayed(Port::default());
+        assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
+        pin.failures.set(1);
+        assert_eq!(flush(&mut port, is_async), Err(Rs485Error::Pin(Stuck)));
+        drain(&log);
+        // It may be off all the same.
+        assert_eq!(write(&mut port, is_async, b"12"), Ok(2));
+        assert_eq!(drain(&log), "on write");
+    }
 }

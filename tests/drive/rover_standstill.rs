@@ -71,7 +71,7 @@ fn a_rover_without_reports_is_no_success_at_the_deadline_and_one_that_is_not_hea
         assert_eq!((waited, rover.now()), (not_still(StopProgress::NoReports), deadline));
         let driven = call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(5000)));
         assert_eq!(driven, not_still(StopProgress::NoReports));
-        assert_eq!(rover.now() < at_ms(510) + COAST, !is_heard);
+        assert_eq!(rover.now() < at_ms(540) + COAST, !is_heard);
         let unheard = Err(DriveError::Rover(CommandError::LinkDown));
         assert_eq!(rover.drive(40, 0), if is_heard { Ok(()) } else { unheard });
     }

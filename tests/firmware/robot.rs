@@ -211,6 +211,8 @@ fn calibrations_are_agreed_found_and_kept_and_an_update_is_refused() {
     rover.role_mut().set_network_state(NetworkState::Connected, now).unwrap();
     board_shows(&mut board, &mut rover, |told| told.at("network") == 3 && told.at("biases") >= 1);
 
+    let end = end_of(&mut rover);
+    rover.await_standstill(end).unwrap();
     let now = rover.now();
     rover.role_mut().start_firmware_update(39, now).unwrap();
     let refused = HostEvent::UpdateAnswered(OtaStatus::Forbidden);

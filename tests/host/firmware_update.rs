@@ -17,17 +17,17 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
     assert_eq!(sent(&mut host, ms(100)), [] as [Vec<u8>; 0], "a refused call sends nothing");
     host.stop(ms(110));
     assert_eq!(speeds(&wait(&mut host, ms(110))), [(110_000, 0)]);
-    flushed(&mut host, ms(110));
-    host.start_firmware_update(40, ms(110)).unwrap();
-    assert_eq!(host.drive(go(10), ms(110)), Err(CommandError::Updating));
-    assert_eq!(host.start_calibration(IMU, ms(110)), Err(CommandError::Updating));
-    let frames = sent(&mut host, ms(110));
+    let now = seen_still(&mut host, 120);
+    host.start_firmware_update(40, now).unwrap();
+    assert_eq!(host.drive(go(10), now), Err(CommandError::Updating));
+    assert_eq!(host.start_calibration(IMU, now), Err(CommandError::Updating));
+    let frames = sent(&mut host, now);
     assert_eq!((speed(&frames[0]), speed(&frames[1])), (Some(0), Some(0)));
     assert!(matches!(message(&frames[2]), Message::OtaRequest(request) if request.version() == 40));
     assert_eq!(frames.len(), 3);
     // Whatever arrives meanwhile, nothing is sent.
-    host.handle_input(&bytes(imu_bias()), ms(120));
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), ms(130));
+    host.handle_input(&bytes(imu_bias()), ms(2000));
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), ms(2000));
     assert_eq!(wait(&mut host, ms(60_000)), []);
     assert!(events(&mut host).contains(&HostEvent::UpdateAnswered(OtaStatus::Accepted)));
     host.end_firmware_update(ms(60_000));
@@ -46,11 +46,28 @@ fn a_refused_update_and_a_stop_end_the_silence() {
     assert_eq!(sent(&mut host, ms(20)).len(), 1);
     host.stop(ms(30));
     sent(&mut host, ms(30));
-    flushed(&mut host, ms(30));
-    host.start_firmware_update(40, ms(30)).unwrap();
-    sent(&mut host, ms(30));
-    host.stop(ms(60));
-    assert_eq!(speeds(&wait(&mut host, ms(60))), [(60_000, 0)]);
+    let now = seen_still(&mut host, 40);
+    host.start_firmware_update(40, now).unwrap();
+    sent(&mut host, now);
+    host.stop(ms(2000));
+    assert_eq!(speeds(&wait(&mut host, ms(2000))), [(2_000_000, 0)]);
+}
+
+/// A report of wheels of which one turns so fast.
+fn report(rpm: i16) -> Vec<u8> {
+    let telemetry = Telemetry { rpm: [0, 0, 0, rpm], ..Telemetry::default() };
+    bytes(FirmwareReport::new(&telemetry, 38))
+}
+
+/// Reports of wheels that stand still, one each 20 ms, until the host has seen it; returns when.
+pub(crate) fn seen_still(host: &mut Host, from: u64) -> Instant {
+    let mut at = ms(from);
+    while host.stop_progress() != StopProgress::StandingStill {
+        at += Duration::from_millis(20);
+        host.handle_input(&report(0), at);
+        wait(host, at);
+    }
+    at
 }
 
 /// The port has been flushed: the host is asked for the next frame.
@@ -82,8 +99,10 @@ fn an_update_is_refused_until_the_stop_has_left() {
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "{unsent:?}");
         sent(&mut host, ms(41));
         assert_eq!(host.start_firmware_update(40, ms(41)), refused, "handed out");
-        flushed(&mut host, ms(41));
-        assert_eq!(host.start_firmware_update(40, ms(41)), Ok(()));
+        flushed(&mut host, ms(42));
+        assert_eq!(host.start_firmware_update(40, ms(42)), refused, "no report has come since");
+        let now = seen_still(&mut host, 42);
+        assert_eq!(host.start_firmware_update(40, now), Ok(()));
     }
 }
 
@@ -96,14 +115,15 @@ fn two_more_stops_precede_an_update_request() {
     let mut stop = sent(&mut host, ms(40)).concat();
     stop[7] ^= 4; // damaged on the line
     robot.handle_input(&stop, ms(41));
-    flushed(&mut host, ms(41));
-    host.start_firmware_update(40, ms(42)).unwrap();
-    for frame in sent(&mut host, ms(42)) {
-        robot.handle_input(&frame, ms(43));
+    // It began to move only after these reports.
+    let now = seen_still(&mut host, 41);
+    host.start_firmware_update(40, now).unwrap();
+    for frame in sent(&mut host, now) {
+        robot.handle_input(&frame, now);
     }
     let asked = RobotEvent::UpdateRequested { version: 40, by: UpdateSource::Request };
     assert!(events(&mut robot).contains(&asked));
-    assert_eq!(robot.command(ms(43)).speed(), 0);
+    assert_eq!(robot.command(now).speed(), 0);
 }
 
 #[test]
@@ -116,12 +136,12 @@ fn an_update_request_waits_for_a_stop_that_did_not_leave() {
             let mut host = driving();
             host.stop(ms(40));
             sent(&mut host, ms(40));
-            flushed(&mut host, ms(41));
-            host.start_firmware_update(40, ms(42)).unwrap();
-            (0..frames).for_each(|_| assert!(host.poll_transmit(ms(42)).is_some()));
-            host.handle_transmit(unsent, ms(43));
+            let now = seen_still(&mut host, 40);
+            host.start_firmware_update(40, now).unwrap();
+            (0..frames).for_each(|_| assert!(host.poll_transmit(now).is_some()));
+            host.handle_transmit(unsent, now);
             assert!(!host.is_stop_sent(), "{unsent:?}");
-            let again = sent(&mut host, ms(43));
+            let again = sent(&mut host, now);
             assert_eq!(ids(&again), [&stops[..], &[9]].concat(), "{unsent:?}");
             assert_eq!(wait(&mut host, ms(60_000)), [], "and then silence");
         }
@@ -156,28 +176,22 @@ fn whatever_was_asked_for_during_an_update_is_due_when_it_ends() {
 #[test]
 fn the_rest_of_an_update_request_that_was_ended_is_outdated() {
     for end in [Host::stop as fn(&mut Host, Instant), Host::end_firmware_update] {
-        let mut host = Host::new(HostConfig::default(), ms(0));
-        while host.poll_transmit(ms(0)).is_some() {}
-        host.stop(ms(30));
-        while host.poll_transmit(ms(30)).is_some() {}
-        host.start_firmware_update(50, ms(40)).unwrap();
-        while let Some(frame) = host.poll_transmit(ms(40)) {
+        let mut host = begun();
+        let now = seen_still(&mut host, 30);
+        host.start_firmware_update(50, now).unwrap();
+        while let Some(frame) = host.poll_transmit(now) {
             if frame[4] == 9 {
                 break;
             }
         }
         assert!(!host.is_outdated());
-        end(&mut host, ms(41));
+        end(&mut host, now);
         assert!(host.is_outdated(), "a robot in an update hears no stop");
     }
 }
 
 #[test]
 fn an_update_is_refused_while_reports_show_that_a_wheel_turns() {
-    let report = |rpm| {
-        let telemetry = Telemetry { rpm: [0, 0, 0, rpm], ..Telemetry::default() };
-        bytes(FirmwareReport::new(&telemetry, 38))
-    };
     let mut host = begun();
     flushed(&mut host, ms(10));
     for at in 2..200 {
@@ -192,25 +206,63 @@ fn an_update_is_refused_while_reports_show_that_a_wheel_turns() {
 }
 
 #[test]
-fn a_stop_behind_a_command_that_never_left_is_sent_at_once_and_then_allows_an_update() {
+fn a_robot_that_sends_no_reports_is_updated_once_they_would_have_come() {
+    let mut host = Host::new(HostConfig::default(), ms(0));
+    sent(&mut host, ms(0));
+    sent(&mut host, ms(1));
+    for at in 2..501 {
+        host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(at));
+        wait(&mut host, ms(at));
+        assert_eq!(host.start_firmware_update(40, ms(at)), Err(CommandError::Moving), "{at}");
+    }
+    assert_eq!(host.clone().start_firmware_update(40, ms(501)), Ok(()));
+    // Not if it has ever sent one.
+    host.handle_input(&report(0), ms(501));
+    wait(&mut host, ms(900));
+    assert_eq!(host.start_firmware_update(40, ms(900)), Err(CommandError::Moving));
+    wait(&mut host, ms(1100));
+    assert_eq!(host.start_firmware_update(40, ms(1100)), Err(CommandError::LinkDown));
+}
+
+#[test]
+fn a_repeated_stop_is_sent_20_ms_behind_the_last_one_and_counts_once_it_was() {
     let mut host = begun();
-    flushed(&mut host, ms(10));
-    host.drive(go(60), ms(11)).unwrap(); // waits for the pause between two commands
-    host.stop(ms(12));
-    assert_eq!(speeds(&wait(&mut host, ms(12))), [(12_000, 0)]);
-    flushed(&mut host, ms(13));
-    assert_eq!(host.start_firmware_update(40, ms(13)), Ok(()));
+    host.stop(ms(100));
+    assert_eq!(speeds(&wait(&mut host, ms(100))), [(100_000, 0)]);
+    assert!(host.is_stop_sent());
+    host.stop(ms(101));
+    assert!(!host.is_stop_sent(), "the robot may have been moved since");
+    assert_eq!(speeds(&wait(&mut host, ms(150))), [(120_000, 0)]);
+    assert!(host.is_stop_sent());
+    // Also if a command in between never left.
+    host.drive(go(60), ms(151)).unwrap();
+    let _ = host.poll_transmit(ms(151)).unwrap();
+    host.handle_transmit(Unsent::Untouched, ms(151));
+    host.stop(ms(152));
+    assert_eq!(speeds(&wait(&mut host, ms(152))), [(152_000, 0)]);
+}
+
+#[test]
+fn a_stop_asked_for_at_a_standstill_needs_new_reports() {
+    let mut host = begun();
+    let now = seen_still(&mut host, 30);
+    host.stop(now);
+    assert_eq!(host.stop_progress(), StopProgress::Due, "another host may have moved it");
+    wait(&mut host, now + Duration::from_millis(20));
+    assert!(
+        seen_still(&mut host, now.as_micros() / 1000) - now >= HostConfig::default().rpm_average
+    );
 }
 
 #[test]
 fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced() {
     let mut host = begun();
-    flushed(&mut host, ms(10));
-    host.start_firmware_update(40, ms(10)).unwrap();
-    while host.poll_transmit(ms(10)).is_some() {
-        host.handle_transmit(Transmit::Taken, ms(10));
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    while host.poll_transmit(now).is_some() {
+        host.handle_transmit(Transmit::Taken, now);
     }
-    host.handle_transmit(Transmit::Flushed, ms(11));
+    host.handle_transmit(Transmit::Flushed, now);
     host.handle_transmit(Unsent::Unflushed, ms(60_000));
     assert_eq!(wait(&mut host, ms(120_000)), [], "the robot may be waiting for YMODEM");
 }

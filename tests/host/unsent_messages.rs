@@ -1,6 +1,6 @@
 //! Requests and answers that did not reach the line: due again, and counted once (U16).
 
-use crate::rig::*;
+use crate::{firmware_update::seen_still, rig::*};
 
 #[test]
 fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
@@ -89,24 +89,24 @@ fn a_failed_flush_repeats_no_update_request_if_no_stop_can_be_lost_with_it() {
 fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
         let mut host = begun();
-        assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
-        host.start_firmware_update(50, ms(10)).unwrap();
-        assert_eq!(sent(&mut host, ms(10)).len(), 3);
-        host.handle_transmit(unsent, ms(11));
+        let now = seen_still(&mut host, 10);
+        host.start_firmware_update(50, now).unwrap();
+        assert_eq!(sent(&mut host, now).len(), 3);
+        host.handle_transmit(unsent, now);
         assert_eq!(
-            ids(&sent(&mut host, ms(11))),
+            ids(&sent(&mut host, now)),
             if unsent == Unsent::CutOff { vec![2, 2, 9] } else { vec![2, 9] }
         );
         assert_eq!(wait(&mut host, ms(60_000)), [], "and then silence");
 
         // Unless the application has changed its mind.
         let mut host = begun();
-        assert_eq!(sent(&mut host, ms(10)), [] as [Vec<u8>; 0], "the first stop has left");
-        host.start_firmware_update(50, ms(10)).unwrap();
-        sent(&mut host, ms(10));
-        host.stop(ms(11));
-        host.handle_transmit(unsent, ms(12));
-        let mut frames = wait(&mut host, ms(500)).into_iter();
+        let now = seen_still(&mut host, 10);
+        host.start_firmware_update(50, now).unwrap();
+        sent(&mut host, now);
+        host.stop(now);
+        host.handle_transmit(unsent, now);
+        let mut frames = wait(&mut host, ms(3000)).into_iter();
         assert!(frames.all(|(_, frame)| frame[4] == 2), "{unsent:?}");
     }
 }

@@ -62,6 +62,8 @@ fn a_stop_that_was_taken_back_is_not_sent_until_it_is_handed_out_again() {
     for unsent in EVERY {
         let mut host = begun();
         host.stop(ms(10));
+        assert!(!host.is_stop_sent());
+        sent(&mut host, ms(20));
         assert!(host.is_stop_sent());
         host.handle_transmit(unsent, ms(20));
         assert!(!host.is_stop_sent(), "{unsent:?}");

@@ -575,3 +575,20 @@ fn a_position_is_held_however_long_the_gap_between_packets() {
         assert_eq!(sent[1], stop, "{gap:?}: {sent:02x?}");
     }
 }
+
+#[test]
+fn a_stop_of_a_position_node_that_moves_away_from_its_hold_measures_it_again() {
+    for polling in [Polling::Fastest, Polling::Manual, Polling::Every(MS(20))] {
+        let config = with(direct(), |config| config.polling = polling);
+        let mut desk = Desk::stopping_at(config, turns(12));
+        desk.run(MS(10));
+        // Its counter restarts: it runs towards a place 12 turns away.
+        desk.answer(NodeId::N3, Answer::Position(turns(0)));
+        desk.until(NodeId::N3, StopProgress::StillMoving);
+        desk.run(MS(100));
+        desk.master.stop(NodeId::N3, desk.now);
+        let sent = desk.until(NodeId::N3, StopProgress::StandingStill);
+        let last = writes(&sent).pop();
+        assert_eq!(last, Some(hold(NodeId::N3, turns(0))), "{polling:?}");
+    }
+}

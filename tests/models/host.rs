@@ -90,7 +90,7 @@ impl Acts<HostSide> for Site {
 
     fn hand_out(&mut self) -> Result<bool, String> {
         let (shelf, now) = (self.role.store().clone(), self.now);
-        self.account.motion.asked();
+        self.account.motion.asked(now);
         self.step.is_halted |= self.account.expire_command(now);
         let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
         self.account.frame(frame, &shelf, now)?;

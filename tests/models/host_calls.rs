@@ -45,13 +45,21 @@ impl Site {
                 (result, is_barred.then_some(CommandError::LowIdsOnly { id: 0x0A }))
             }
             _ => {
+                let progress = self.role.stop_progress();
+                let never_reports = self.role.last_report().is_none();
                 let result = self.role.start_firmware_update(VERSION, now);
+                let is_down = self.account.link == Link::Down;
                 let motion = &mut self.account.motion;
+                let is_allowed = match progress {
+                    axlewire::ucp::host::StopProgress::StandingStill => true,
+                    _ => motion.allows_update(now) && (never_reports || motion.wanted.is_none()),
+                };
                 let expected = match () {
                     () if self.account.low_ids_only => Some(CommandError::LowIdsOnly { id: 9 }),
                     () if is_updating => Some(CommandError::Updating),
                     () if is_calibrating => Some(CommandError::Calibrating),
-                    () if !motion.allows_update() => Some(CommandError::Moving),
+                    () if is_down => Some(CommandError::LinkDown),
+                    () if !is_allowed => Some(CommandError::Moving),
                     () => None,
                 };
                 if result.is_ok() {

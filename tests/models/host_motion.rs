@@ -24,7 +24,8 @@ enum Stop {
     Handed,
     /// Flushed, which the host learns when it is next asked for a frame.
     Flushed,
-    Left,
+    /// Known to have left since then.
+    Left(Instant),
 }
 
 #[derive(Clone, Debug)]
@@ -47,6 +48,8 @@ pub(crate) struct Motion {
     /// The last frame handed out is the very first one.
     is_greeting_last: bool,
     stop: Stop,
+    /// The application has asked for a stop since the last motor frame.
+    is_stop_new: bool,
 }
 
 impl Motion {
@@ -63,10 +66,12 @@ impl Motion {
             greeting: if sends_first_stop { Greeting::Due } else { Greeting::Done },
             is_greeting_last: false,
             stop: Stop::No,
+            is_stop_new: false,
         }
     }
 
     pub(crate) fn call(&mut self, command: MotorControl, now: Instant) {
+        self.is_stop_new = command.stands_still();
         if !command.stands_still() {
             self.stop = Stop::No;
         }
@@ -98,6 +103,7 @@ impl Motion {
         let Some(told) = self.told else { return Some(now) };
         Some(match () {
             () if self.owes_copies() || self.greeting == Greeting::Due => now,
+            () if self.is_called && wanted.stands_still() && told.stands_still() => self.gap_until,
             () if told == wanted => self.repeat_at,
             () if wanted.stands_still() && !told.stands_still() => now,
             () => self.gap_until,
@@ -112,18 +118,21 @@ impl Motion {
     pub(crate) fn is_stop_sent(&self) -> bool {
         let stands_still =
             |command: Option<MotorControl>| command.is_some_and(|it| it.stands_still());
-        stands_still(self.wanted) && stands_still(self.told) && !self.owes_copies()
+        let is_handed_out = stands_still(self.told) && !self.is_stop_new;
+        stands_still(self.wanted) && is_handed_out && !self.owes_copies()
     }
 
-    /// Whether an update may be asked for: the robot was never told anything, or its stop has left.
-    pub(crate) fn allows_update(&self) -> bool {
-        self.wanted.is_none_or(|wanted| wanted.stands_still() && self.stop == Stop::Left)
+    /// Whether a robot without reports may be updated: it was never told anything, or its stop left
+    /// 500 ms ago.
+    pub(crate) fn allows_update(&self, now: Instant) -> bool {
+        let is_old = matches!(self.stop, Stop::Left(at) if now - at >= ms(500));
+        self.wanted.is_none_or(|wanted| wanted.stands_still() && is_old)
     }
 
     /// The host is asked for a frame, and so learns that the port has been flushed.
-    pub(crate) fn asked(&mut self) {
+    pub(crate) fn asked(&mut self, now: Instant) {
         if self.stop == Stop::Flushed {
-            self.stop = Stop::Left;
+            self.stop = Stop::Left(now);
         }
     }
 
@@ -156,11 +165,12 @@ impl Motion {
             return Err("a motor frame without a reason".into());
         }
         self.told = Some(if is_zero { halted(wanted) } else { wanted });
+        self.is_stop_new = false;
         self.is_motor_last = true;
         self.behind_cut = self.behind_cut.map(|out| (out + 1).min(2));
         (self.gap_until, self.repeat_at) = (now + ms(20), now + ms(100));
         self.is_greeting_last = false;
-        if self.is_stop_sent() && self.stop != Stop::Left {
+        if self.is_stop_sent() && !matches!(self.stop, Stop::Left(_)) {
             self.stop = Stop::Handed;
         }
         if !self.owes_copies() {

@@ -96,11 +96,14 @@ pub(crate) fn motion(run: &mut Run) {
 
 pub(crate) fn updates(run: &mut Run) {
     run.world("standing", Depth(2, 5), site(UPDATE).after(&[DONE]));
-    run.world("requested", Depth(2, 5), site(UPDATE).after(&[DONE, Act::Call(Update)]));
-    let silent = [DONE, Act::Call(Update), DONE];
-    run.world("updating", Depth(2, 5), site(UPDATE).after(&silent));
-    let in_flight = [DONE, Act::Call(Update), Act::One, Act::One];
-    let asking = site(UPDATE).after(&in_flight);
+    // A robot that answers, and sends no reports.
+    let heard = Act::Hear(Hear::Pong);
+    let standing = site(UPDATE).after(&[DONE, heard, Act::Run(400), heard, Act::Run(200)]);
+    let requested = standing.clone().after(&[Act::Call(Update)]);
+    run.world("heard", Depth(2, 5), standing);
+    run.world("requested", Depth(2, 5), requested.clone());
+    run.world("updating", Depth(2, 5), requested.clone().after(&[DONE]));
+    let asking = requested.after(&[Act::One, Act::One]);
     run.world("stopped while requesting", Depth(2, 5), asking.clone().after(&[Act::Call(Stop)]));
     run.world("requesting", Depth(2, 5), asking);
     run.world("listening", Depth(2, 5), listening(UPDATE));

@@ -16,6 +16,8 @@ pub(super) struct Motor {
     latest: Option<MotorControl>,
     /// The command handed out last, and when; `None` if it may not have left.
     sent: Option<(MotorControl, Instant)>,
+    /// A stop was asked for since.
+    is_stop_new: bool,
     /// Time at which the latest command is to be sent.
     due: Option<Instant>,
     /// Time at which the application has been silent for too long; set while the robot moves.
@@ -111,6 +113,7 @@ impl Motor {
         Self {
             latest,
             sent: None,
+            is_stop_new: false,
             due,
             dead_man: None,
             first,
@@ -130,6 +133,7 @@ impl Motor {
         let stands_still = |command: &MotorControl| command.stands_still();
         self.latest.as_ref().is_some_and(stands_still)
             && self.sent.is_some_and(|(sent, _)| stands_still(&sent))
+            && !self.is_stop_new
             && !self.copies.are_due()
     }
 
@@ -146,14 +150,22 @@ impl Motor {
         &mut self.standstill
     }
 
-    /// Whether an update may be asked for: the latest command is a stop that has left, or there has
-    /// been none at all. One that was only handed out may be lost together with the request's
-    /// stops. Where reports arrive, they must show a standstill.
-    pub(super) fn allows_update(&self) -> bool {
+    /// Whether an update may be asked for: the reports show a standstill behind a stop. Of a robot
+    /// that `never_reports`, a stop must have left so long ago that its reports would have come; a
+    /// host may also have sent no motor command at all.
+    pub(super) fn allows_update(
+        &self,
+        never_reports: bool,
+        now: Instant,
+        config: &HostConfig,
+    ) -> bool {
         match self.stop_progress() {
             StopProgress::NotAsked => self.latest.is_none(),
             StopProgress::Due | StopProgress::StillMoving { .. } => false,
-            StopProgress::NoReports | StopProgress::StandingStill => true,
+            StopProgress::NoReports => {
+                never_reports && self.standstill.is_told_for(now, config.link_timeout)
+            }
+            StopProgress::StandingStill => true,
         }
     }
 
@@ -173,19 +185,20 @@ impl Motor {
 
     pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
         let still = command.stands_still();
-        // A stop joins the one before.
-        if !still {
+        // A stop joins the one before, but is sent as well. If that one was obeyed, the robot may
+        // have been moved since.
+        let was_obeyed = self.standstill.progress() == StopProgress::StandingStill;
+        if !still || was_obeyed {
             self.expect_stop();
         }
+        self.is_stop_new = still;
         self.latest = Some(command);
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
             // The first frame takes precedence, and so do its copies.
             _ if self.first == First::Due || self.copies.are_due() => now,
-            // The command before this stop may not have left, but the robot must be told again.
-            _ if still && self.standstill.is_untold() && self.stop == Stop::Done => now,
-            // A command that the robot already has can wait for its turn.
-            Some((sent, _)) if sent == command && self.due.is_some() => return,
+            // A command to move that the robot already has can wait for its turn.
+            Some((sent, _)) if sent == command && !still && self.due.is_some() => return,
             Some((sent, at)) if !still || sent.stands_still() => now.max(at + config.command_gap),
             _ => now,
         };
@@ -226,7 +239,7 @@ impl Motor {
         let latest = self.latest.filter(|_| reached(self.due, now))?;
         let command = if self.first == First::Due { latest.halted() } else { latest };
         self.copies = self.copies.take();
-        self.sent = Some((command, now));
+        (self.sent, self.is_stop_new) = (Some((command, now)), false);
         // A repetition tells nothing new.
         if latest.stands_still() && self.standstill.is_untold() {
             self.stop = Stop::Out;

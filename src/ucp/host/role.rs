@@ -130,7 +130,8 @@ impl<S: BiasStore> Host<S> {
         Ok(())
     }
 
-    /// Stops the robot: speed and turn 0 are sent at once, and the lamp stays as it is.
+    /// Stops the robot: speed and turn 0 are sent at once, or 20 ms behind the last stop, and the
+    /// lamp stays as it is.
     ///
     /// Always accepted; it ends the silence of a firmware update. The stop is done when
     /// [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since
@@ -239,15 +240,17 @@ impl<S: BiasStore> Host<S> {
     /// shipped robot does not answer the request.
     ///
     /// During an update the robot hears no stop either, so the call is refused unless
-    /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`], or
-    /// [`StopProgress::NoReports`] of a robot that sends none: **call `stop` and `await_standstill`
-    /// of the driver before**. Two more stops precede the request. If they may have been lost with
-    /// it ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again.
+    /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`]: **call `stop` and
+    /// `await_standstill` of the driver before**. Of a robot that answers, but has never sent a
+    /// report, it is accepted once the stop was flushed [`HostConfig::link_timeout`] ago. Two more
+    /// stops precede the request. If they may have been lost with it
+    /// ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again.
     ///
     /// # Errors
     ///
-    /// [`CommandError::Moving`] as said. Without [`HostConfig::sends_first_stop`] the call is also
-    /// accepted before the first motor command: **it is not known then whether the robot moves.**
+    /// [`CommandError::LinkDown`] if the robot is not heard; [`CommandError::Moving`] as said.
+    /// Without [`HostConfig::sends_first_stop`] the call is also accepted before the first
+    /// motor command: **it is not known then whether the robot moves.**
     /// [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].

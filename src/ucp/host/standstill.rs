@@ -92,6 +92,11 @@ impl Standstill {
         matches!(self, Self::Untold)
     }
 
+    /// Whether the stop was flushed that long ago, and no report counts.
+    pub(super) fn is_told_for(&self, now: Instant, span: Duration) -> bool {
+        matches!(*self, Self::Told(told) if now - told >= span)
+    }
+
     /// The stop has been flushed.
     pub(super) const fn tell(&mut self, now: Instant) {
         *self = Self::Told(now);

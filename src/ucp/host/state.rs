@@ -167,7 +167,10 @@ impl<S: BiasStore> State<S> {
         if self.is_calibrating() {
             return Err(CommandError::Calibrating);
         }
-        if !self.motor.allows_update() {
+        if self.link == Link::Down {
+            return Err(CommandError::LinkDown);
+        }
+        if !self.motor.allows_update(self.last_report.is_none(), at, &self.config) {
             return Err(CommandError::Moving);
         }
         // A robot that is being updated hears no stop, so a damaged stop must not be enough to

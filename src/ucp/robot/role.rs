@@ -113,8 +113,9 @@ impl Robot {
 
     /// Answers the host's firmware update request; returns `false` if there is no unanswered one.
     ///
-    /// The application performs the update: after [`OtaStatus::Accepted`] it takes the port away
-    /// from this role.
+    /// The application performs the update: **it stops the motors first**, because the command
+    /// stays in force for its 500 ms. After [`OtaStatus::Accepted`] it takes the port away from
+    /// this role.
     pub fn answer_update(&mut self, status: OtaStatus, now: Instant) -> bool {
         self.state.answer_update(status, now)
     }
