@@ -72,8 +72,7 @@ impl Endpoint for Nodes {
 fn written(board: &Board, bus: &mut Driver<Nodes, Wire, WireClock>, wanted: &[&str]) {
     let end = std::time::Instant::now() + PATIENCE;
     while !board.has_written(wanted) {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_for(pause, |_, _, _| {}).unwrap();
+        bus.run_for(Duration::from_millis(20), |_, _, _| {}).unwrap();
         assert!(
             std::time::Instant::now() < end,
             "timed out waiting for {wanted:?}: {:#?}",
@@ -100,8 +99,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
     let wanted = [Some(Target::Velocity(turn)), Some(Target::Position(go))];
     let end = std::time::Instant::now() + PATIENCE;
     while [0, 1].map(|index| bus.role().command(index)) != wanted {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_for(pause, |_, _, _| {}).unwrap();
+        bus.run_for(Duration::from_millis(20), |_, _, _| {}).unwrap();
         assert!(std::time::Instant::now() < end, "not commanded: {:#?}", board.lines());
     }
 
@@ -113,8 +111,7 @@ fn the_board_commands_each_node_in_its_mode_and_stops_one_that_comes_back_before
     let mut heard: Vec<(Target, u32)> = Vec::new();
     let end = std::time::Instant::now() + PATIENCE;
     while heard.last().is_none_or(|&(target, _)| target != Target::Velocity(turn)) {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_for(pause, |nodes, event, _| {
+        bus.run_for(Duration::from_millis(20), |nodes, event, _| {
             if let SlaveEvent::Command(target @ Target::Velocity(_)) = event {
                 heard.push((target, nodes.nodes[0].slave().statistics().replies));
             }

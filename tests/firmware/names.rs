@@ -3,7 +3,7 @@
 pub(crate) use axlewire::{
     drive::{DriveError, Driver},
     encode::Encode,
-    endpoint::Endpoint,
+    endpoint::{Arrival, Endpoint},
     ikeya::{
         Master, Mode, NodeId, Position, ReadRequest, Response, Rps, Target, ToMaster, WriteRequest,
         master::{Health, MasterConfig, MasterEvent, Polling},

@@ -18,7 +18,7 @@ fn keep(bus: &mut Bus, board: &mut Board, speed: f32, readings: u32) {
     let mut is_dropped = bus.role_mut().set_velocity(NODE, rps(speed), now).is_err();
     let mut in_a_row = 0;
     while in_a_row < readings {
-        let event = bus.next_event(end).unwrap().expect("the speed within 30 s");
+        let event = bus.next_event(end - bus.now()).unwrap().expect("the speed within 30 s");
         let now = bus.now();
         match event {
             MasterEvent::Health { health: Health::Abnormal, .. } => is_dropped = true,
@@ -95,7 +95,7 @@ fn a_rover_on_a_noisy_link_reports_in_order_keeps_its_command_and_stops_when_the
         let now = rover.now();
         assert!(now < end, "at speed {at_speed} times: {:?}", rover.role().statistics());
         rover.role_mut().drive(ahead, now).unwrap();
-        let event = rover.next_event(now + Duration::from_millis(50)).unwrap();
+        let event = rover.next_event(Duration::from_millis(50)).unwrap();
         if let Some(event @ HostEvent::Report(report)) = event {
             if let Some(before) = before.replace(report.index) {
                 assert_eq!(report.index, before.wrapping_add(1).wrapping_add(report.lost));
@@ -146,8 +146,7 @@ fn the_board_masters_a_noisy_bus_and_no_slave_gets_a_command_that_its_program_do
     let back = ["event health node 2 abnormal", "event health node 2 online"];
     let (end, mut turns_when_back) = (Instant::now() + 2 * PATIENCE, None);
     while turns_when_back.is_none_or(|then| turns == then) || goes == 0 {
-        let pause = bus.now() + Duration::from_millis(20);
-        bus.run_for(pause, |nodes, event, _| match event {
+        bus.run_for(Duration::from_millis(20), |nodes, event, _| match event {
             // A node that looked abnormal is stopped: 0 rps, or the position where it was.
             SlaveEvent::Command(Target::Velocity(Rps::ZERO)) => {}
             SlaveEvent::Command(Target::Position(to)) if nodes.told.contains(&to.counts()) => {}

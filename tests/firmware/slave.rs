@@ -41,7 +41,7 @@ fn discovered_with(coast: Duration) -> Option<(Board, Bus)> {
 /// Runs the master until an event matches.
 fn event_when(bus: &mut Bus, what: &str, done: impl Fn(&MasterEvent) -> bool) {
     let end = bus.now() + Duration::from_millis(PATIENCE.as_millis() as u32);
-    while let Some(event) = bus.next_event(end).unwrap() {
+    while let Some(event) = bus.next_event(end - bus.now()).unwrap() {
         if done(&event) {
             return;
         }
@@ -87,8 +87,7 @@ fn a_paid_stop_is_two_commands_each_followed_by_an_answer_and_the_motor_is_at_re
     assert_eq!(told.at("stops"), 0, "{told:?}");
 
     let here = board.report_when("at rest", |report| report.at("mrps") == 0);
-    let end = bus.now() + Duration::from_millis(300);
-    bus.run_for(end, |_, _, _| {}).unwrap();
+    bus.run_for(Duration::from_millis(300), |_, _, _| {}).unwrap();
     let there = board.report_when("read again", |report| report.at("reads") > here.at("reads"));
     let way = there.at("counts") - here.at("counts");
     assert!(way.abs() <= 8, "{here:?} {there:?}");
