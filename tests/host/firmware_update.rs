@@ -266,3 +266,36 @@ fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced
     host.handle_transmit(Unsent::Unflushed, ms(60_000));
     assert_eq!(wait(&mut host, ms(120_000)), [], "the robot may be waiting for YMODEM");
 }
+
+#[test]
+fn an_update_request_waits_while_reports_that_came_since_show_no_standstill() {
+    let mut host = Host::new(HostConfig::default(), ms(0));
+    sent(&mut host, ms(0));
+    wait(&mut host, ms(100));
+    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(450));
+    wait(&mut host, ms(600));
+    host.start_firmware_update(40, ms(600)).unwrap();
+    host.handle_input(&report(30), ms(601)); // it waited in the port
+    let early: Vec<_> = wait(&mut host, ms(700)).into_iter().map(|(_, frame)| frame).collect();
+    assert!(early.iter().all(|frame| frame[4] != 9), "{early:?}");
+    assert_eq!(host.stop_progress(), StopProgress::StillMoving { rpm: [0, 0, 0, 30] });
+    let mut at = ms(700);
+    let mut request = None;
+    while request.is_none() {
+        at += Duration::from_millis(20);
+        host.handle_input(&report(0), at);
+        request = wait(&mut host, at).into_iter().find(|(_, frame)| frame[4] == 9);
+        assert!(at < ms(3000), "it is sent in the end");
+    }
+    assert_eq!(host.stop_progress(), StopProgress::StandingStill);
+}
+
+#[test]
+fn a_repeated_stop_puts_off_no_repetition_however_long_the_pause_between_commands() {
+    let mut config = unheard_config(true);
+    config.command_gap = Duration::from_millis(1000);
+    let mut host = Host::new(config, ms(0));
+    assert_eq!(speeds(&wait(&mut host, ms(0))), [(0, 0)]);
+    host.stop(ms(10));
+    assert_eq!(speeds(&wait(&mut host, ms(250))), [(100_000, 0), (200_000, 0)]);
+}

@@ -15,7 +15,8 @@ fn the_latest_motor_command_is_repeated_every_100_ms() {
 
 #[test]
 fn called_a_thousand_times_a_second_a_command_is_sent_every_100_ms_and_a_stop_every_20() {
-    let calls: [(fn(&mut Host, Instant), usize); 2] =
+    type Call = fn(&mut Host, Instant);
+    let calls: [(Call, usize); 2] =
         [(|host, now| host.drive(go(40), now).unwrap(), 10), (|host, now| host.stop(now), 50)];
     for (call, expected) in calls {
         let mut host = quiet_host();

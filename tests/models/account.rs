@@ -149,12 +149,7 @@ impl Account {
             Some(_) => {
                 self.drop_target();
                 self.is_released = false;
-                if is_told && self.record == Some(Mode::Position) {
-                    // It is not where it was told to hold: it may hold another place.
-                    self.begin_coasting(Some(now));
-                    self.owe_again();
-                    self.may_hold_anew = true;
-                } else if is_told {
+                if is_told {
                     self.begin_coasting(Some(now));
                     self.coast(now);
                 }

@@ -1,5 +1,7 @@
 //! A host, its application, its port, and a robot that sends anything at any time.
 
+use axlewire::ucp::host::{self, StopProgress};
+
 use super::{
     host_account::Account,
     host_store::Shelf,
@@ -70,6 +72,18 @@ impl Site {
     }
 }
 
+impl Site {
+    /// The robot is not heard, or its reports show no standstill.
+    fn is_update_barred(&self) -> bool {
+        let may_move = match self.role.stop_progress() {
+            StopProgress::NoReports | StopProgress::StillMoving { .. } => true,
+            StopProgress::NotAsked | StopProgress::Due | StopProgress::StandingStill => false,
+        };
+        let is_barred = may_move && self.role.last_report().is_some();
+        self.account.link == host::Link::Down || is_barred
+    }
+}
+
 impl Acts<HostSide> for Site {
     fn call(&mut self, call: Call) -> Checked {
         match call {
@@ -92,7 +106,9 @@ impl Acts<HostSide> for Site {
         let (shelf, now) = (self.role.store().clone(), self.now);
         self.account.motion.asked(now);
         self.step.is_halted |= self.account.expire_command(now);
+        let is_barred = self.is_update_barred();
         let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
+        broken_if!(is_barred && frame[4] == 9, "an update of a robot that may move");
         self.account.frame(frame, &shelf, now)?;
         Ok(true)
     }
@@ -111,7 +127,7 @@ impl Acts<HostSide> for Site {
     }
 
     fn owed(&self) -> Option<Instant> {
-        self.account.owed(self.now)
+        self.account.owed(self.now, self.is_update_barred())
     }
 
     fn settled(&mut self) -> Checked {

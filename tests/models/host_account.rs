@@ -260,12 +260,12 @@ impl Account {
     }
 
     /// The latest time for the next action.
-    pub(crate) fn owed(&self, now: Instant) -> Option<Instant> {
+    pub(crate) fn owed(&self, now: Instant, is_update_barred: bool) -> Option<Instant> {
         if self.update == Update::Silent {
             return self.link_until;
         }
         let is_due = self.is_network_due
-            || self.update != Update::None
+            || self.update != Update::None && !is_update_barred
             || [self.imu.ack, self.mag.ack, self.biases].contains(&Ack::Must);
         let ping = self.pings.then(|| self.ping_until.unwrap_or(self.ping_at));
         let request = self.request.as_ref().map(|request| request.until.unwrap_or(now));

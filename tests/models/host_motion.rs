@@ -132,7 +132,8 @@ impl Motion {
     /// The host is asked for a frame, and so learns that the port has been flushed.
     pub(crate) fn asked(&mut self, now: Instant) {
         if self.stop == Stop::Flushed {
-            self.stop = Stop::Left(now);
+            // Another stop that was asked for meanwhile has yet to leave.
+            self.stop = if self.is_stop_sent() { Stop::Left(now) } else { Stop::No };
         }
     }
 

@@ -530,12 +530,6 @@ impl<B: Board> Stop<B> {
         self.is_released = false;
         if core::mem::take(&mut self.is_told) {
             self.confirmed_at = now;
-            if self.hold.is_some() {
-                // It does not come to rest where it was told to hold: it is read again.
-                (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
-                (self.is_there, self.is_asked, self.is_second) = (false, false, false);
-                (self.is_written, self.written_at, self.patience) = (false, None, HOLD_PATIENCE);
-            }
         }
     }
 

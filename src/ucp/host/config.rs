@@ -25,7 +25,7 @@ pub struct HostConfig {
     /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
     pub command_period: Duration,
     /// Shortest pause between two different motor commands; 20 ms, a tenth of the line. Within it
-    /// the latest wins. A command to stand still does not wait for it.
+    /// the latest wins. A command to stand still does not wait for it, but behind another one.
     pub command_gap: Duration,
     /// Whether the first frame is a zero motor command, before any ping or answer (ruling U16);
     /// `true`.

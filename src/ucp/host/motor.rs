@@ -199,7 +199,12 @@ impl Motor {
             _ if self.first == First::Due || self.copies.are_due() => now,
             // A command to move that the robot already has can wait for its turn.
             Some((sent, _)) if sent == command && !still && self.due.is_some() => return,
-            Some((sent, at)) if !still || sent.stands_still() => now.max(at + config.command_gap),
+            Some((_, at)) if !still => now.max(at + config.command_gap),
+            // A repetition that is due earlier is not put off.
+            Some((sent, at)) if sent.stands_still() => {
+                let at = now.max(at + config.command_gap);
+                self.due.map_or(at, |due| due.min(at))
+            }
             _ => now,
         };
         self.due = Some(earliest);

@@ -4,7 +4,9 @@ use super::{
     bias::BiasStore,
     calibration::Request,
     event::{CalibrationStep, HostEvent},
+    link::Link,
     outgoing::Outgoing,
+    standstill::StopProgress,
     state::{State, Update},
 };
 use crate::{
@@ -81,7 +83,7 @@ impl<S: BiasStore> State<S> {
             return Some(Outgoing::Network(body));
         }
         match self.update {
-            Update::Asked { version, .. } if self.motor.is_ready_for_update() => {
+            Update::Asked { version, .. } if self.is_ready_for_update() => {
                 self.update = Update::Silent;
                 self.motor.pause();
                 return Some(Outgoing::Update(version));
@@ -93,6 +95,17 @@ impl<S: BiasStore> State<S> {
             return Some(Outgoing::Ping);
         }
         None
+    }
+
+    /// Whether the request of an update may be sent. What allowed it may be over: reports waited in
+    /// the port when it was asked for, or the robot is no longer heard.
+    fn is_ready_for_update(&self) -> bool {
+        let progress = self.motor.stop_progress();
+        let may_move =
+            matches!(progress, StopProgress::NoReports | StopProgress::StillMoving { .. });
+        self.motor.is_ready_for_update()
+            && self.link != Link::Down
+            && !(may_move && self.last_report.is_some())
     }
 
     /// The biases stored at this moment, if they were requested.
@@ -201,7 +214,7 @@ impl<S: BiasStore> State<S> {
             return self.link_until;
         }
         let asked = match self.update {
-            Update::Asked { at, .. } if self.motor.is_ready_for_update() => Some(at),
+            Update::Asked { at, .. } if self.is_ready_for_update() => Some(at),
             _ => None,
         };
         earliest(&[

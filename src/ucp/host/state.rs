@@ -12,7 +12,7 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
-    standstill::Wheels,
+    standstill::{Wheels, are_still},
     statistics::HostStatistics,
 };
 use crate::{
@@ -170,7 +170,8 @@ impl<S: BiasStore> State<S> {
         if self.link == Link::Down {
             return Err(CommandError::LinkDown);
         }
-        if !self.motor.allows_update(self.last_report.is_none(), at, &self.config) {
+        let turns = self.last_report.is_some_and(|report| !are_still(&report.telemetry.rpm));
+        if turns || !self.motor.allows_update(self.last_report.is_none(), at, &self.config) {
             return Err(CommandError::Moving);
         }
         // A robot that is being updated hears no stop, so a damaged stop must not be enough to
