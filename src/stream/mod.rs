@@ -21,8 +21,8 @@
 //! * **Bounded work.** A byte is examined once for each candidate that it may belong to, at most
 //!   `MAX_LEN` times; batches on a host add a bounded factor. Nothing allocates, nothing panics.
 
-#[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod batch;
+#[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod buffered;
 #[cfg(feature = "alloc")]
 mod capture;
