@@ -180,7 +180,7 @@ mod driver;
 mod error;
 #[cfg(feature = "ikeya")]
 mod ikeya;
-#[cfg(feature = "serialport")]
+#[cfg(all(feature = "serialport", any(feature = "ikeya", feature = "ucp")))]
 mod opened;
 mod rs485;
 mod sending;
