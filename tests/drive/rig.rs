@@ -12,12 +12,6 @@ pub(crate) use axlewire::ucp::{
     message::CalibrationKind,
     robot::{RobotConfig, RobotEvent},
 };
-/// A clock with these readings, microseconds.
-pub(crate) fn clock_that_says(readings: impl IntoIterator<Item = u64>) -> impl Fn() -> Instant {
-    let readings = RefCell::new(readings.into_iter());
-    move || Instant::from_micros(readings.borrow_mut().next().unwrap())
-}
-
 /// What the scenarios use of the library, and their port.
 pub(crate) use axlewire::{
     drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay},
@@ -88,6 +82,12 @@ pub(crate) type Running<R> = Rc<RefCell<On<R>>>;
 pub(crate) fn on<R: Endpoint>(role: R, port: Port) -> On<R> {
     let world = port.world.clone();
     Driver::new(role, port, world)
+}
+
+/// A clock with these readings, microseconds.
+pub(crate) fn clock_that_says(readings: impl IntoIterator<Item = u64>) -> impl Fn() -> Instant {
+    let readings = RefCell::new(readings.into_iter());
+    move || Instant::from_micros(readings.borrow_mut().next().unwrap())
 }
 
 /// The same role and port in another driver.

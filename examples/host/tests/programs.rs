@@ -41,14 +41,17 @@ fn spin_turns_a_motor_for_three_seconds_and_stops_it() {
 
 #[test]
 fn spin_fails_and_commands_nobody_if_its_node_is_missing_or_in_the_other_mode() {
-    for (node, found) in [("2:velocity", "found: []"), ("1:position", "found: [(N1, Position)]")] {
+    let position = "found: [(N1, Position)]";
+    for (node, found, of_one) in
+        [("2:velocity", "found: [(N2, Velocity)]", "found: []"), ("1:position", position, position)]
+    {
         let (sim, port) = sim(&format!("ikeya --node {node}"));
         let ended = start(env!("CARGO_BIN_EXE_spin"), &port).end();
         assert_eq!((ended.code, &*ended.stdout), (Some(1), &[found.to_owned()][..]));
         #[cfg(feature = "tokio")]
         {
             let ended = start(env!("CARGO_BIN_EXE_spin_tokio"), &port).end();
-            assert_eq!((ended.code, &*ended.stdout[0]), (Some(1), found));
+            assert_eq!((ended.code, &*ended.stdout[0]), (Some(1), of_one));
         }
         assert!(!sim.lines().iter().any(|line| line.contains("rps")), "{:?}", sim.lines());
     }
