@@ -71,7 +71,7 @@ impl Motion {
     }
 
     pub(crate) fn call(&mut self, command: MotorControl, now: Instant) {
-        self.is_stop_new = command.stands_still();
+        self.is_stop_new = false;
         if !command.stands_still() {
             self.stop = Stop::No;
         }
@@ -81,6 +81,7 @@ impl Motion {
 
     pub(crate) fn stop(&mut self, now: Instant) {
         self.call(self.wanted.map_or(MotorControl::STOP, halted), now);
+        self.is_stop_new = true;
     }
 
     /// The application has been silent for 500 ms; returns whether that is new.
@@ -103,7 +104,7 @@ impl Motion {
         let Some(told) = self.told else { return Some(now) };
         Some(match () {
             () if self.owes_copies() || self.greeting == Greeting::Due => now,
-            () if self.is_called && wanted.stands_still() && told.stands_still() => self.gap_until,
+            () if self.is_stop_new && told.stands_still() => self.gap_until.min(self.repeat_at),
             () if told == wanted => self.repeat_at,
             () if wanted.stands_still() && !told.stands_still() => now,
             () => self.gap_until,

@@ -183,22 +183,33 @@ impl Motor {
         }
     }
 
-    pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
-        let still = command.stands_still();
-        // A stop joins the one before, but is sent as well. If that one was obeyed, the robot may
-        // have been moved since.
-        let was_obeyed = self.standstill.progress() == StopProgress::StandingStill;
-        if !still || was_obeyed {
+    /// Stops: joins the stop before, but is sent as well. If that one was obeyed, the robot may
+    /// have been moved since.
+    pub(super) fn stop(&mut self, now: Instant, config: &HostConfig) {
+        if self.standstill.progress() == StopProgress::StandingStill {
             self.expect_stop();
         }
-        self.is_stop_new = still;
+        self.is_stop_new = true;
+        self.take(self.latest.map_or(MotorControl::STOP, |latest| latest.halted()), now, config);
+    }
+
+    pub(super) fn command(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
+        if !command.stands_still() {
+            self.expect_stop();
+        }
+        self.is_stop_new = false;
+        self.take(command, now, config);
+    }
+
+    fn take(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
+        let still = command.stands_still();
         self.latest = Some(command);
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
             // The first frame takes precedence, and so do its copies.
             _ if self.first == First::Due || self.copies.are_due() => now,
-            // A command to move that the robot already has can wait for its turn.
-            Some((sent, _)) if sent == command && !still && self.due.is_some() => return,
+            // A command that the robot already has can wait for its turn.
+            Some((sent, _)) if sent == command && !self.is_stop_new && self.due.is_some() => return,
             Some((_, at)) if !still => now.max(at + config.command_gap),
             // A repetition that is due earlier is not put off.
             Some((sent, at)) if sent.stands_still() => {

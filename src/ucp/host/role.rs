@@ -138,8 +138,7 @@ impl<S: BiasStore> Host<S> {
     /// (U16).
     pub fn stop(&mut self, now: Instant) {
         self.state.end_update(now);
-        let command = self.state.motor.latest().map_or(MotorControl::STOP, |it| it.halted());
-        self.state.motor.command(command, now, &self.state.config);
+        self.state.motor.stop(now, &self.state.config);
     }
 
     /// Whether the robot has been told to stand still, and nothing else since (ruling U16).
