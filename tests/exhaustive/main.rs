@@ -6,7 +6,7 @@
 //! cargo test --release --test exhaustive -- --ignored --nocapture
 //! ```
 
-#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "alloc"))]
 
 /// Random damage: how often the CRC misses it.
 mod chance;

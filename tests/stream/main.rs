@@ -1,5 +1,5 @@
 //! The stream layer: against the slow oracle on hostile streams, and as single scenarios.
-#![cfg(all(feature = "ikeya", feature = "ucp"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "alloc"))]
 
 mod batches;
 mod buffer;
