@@ -73,7 +73,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     }
 
     /// Runs for `span`, and passes every event to `on_event`, with the role, to give it commands,
-    /// and the time.
+    /// and the time. A command that is given at the end, a stop too, leaves with the next call.
     ///
     /// # Errors
     ///

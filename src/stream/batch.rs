@@ -20,6 +20,7 @@ pub(crate) mod tests {
     use crate::stream::{Decoder, Frames, Framing, Reason, Verdict};
 
     /// Checks that batches agree with `judge`.
+    #[cfg(any(feature = "ikeya", feature = "ucp"))]
     pub(crate) fn check_batches<F: Framing>(bytes: &[u8]) {
         check_rejected::<F>(bytes);
         check_accepted::<F>(bytes);

@@ -14,6 +14,8 @@ pub(super) struct Inbox {
     times: inbox::Inbox,
     /// Arrival time of the oldest byte that the decoder holds.
     since: Instant,
+    /// Earliest arrival of the newest chunk, and of the oldest byte that the decoder holds.
+    early: (Instant, Instant),
     /// Length of the newest chunk, bytes.
     chunk_len: usize,
 }
@@ -23,13 +25,22 @@ impl Inbox {
     pub(super) fn new(baud: u32, margin: Duration, now: Instant) -> Self {
         let idle = (wire_time(2, baud) + margin).max(SHORTEST);
         let times = inbox::Inbox::new(idle, AfterIdle::GiveUpAll, now);
-        Self { decoder: Decoder::new(), times, since: now, chunk_len: 0 }
+        Self { decoder: Decoder::new(), times, since: now, early: (now, now), chunk_len: 0 }
     }
 
     /// Announces a chunk of bytes handed in at `now`, which may have arrived at any time since
     /// `at`. Then call [`next`](Self::next) with it until that returns `None`.
-    pub(super) const fn receive(&mut self, chunk: &[u8], at: Instant, now: Instant) {
+    ///
+    /// A frame counts as received at `at`, and can have arrived as early as `since`.
+    pub(super) const fn receive(
+        &mut self,
+        chunk: &[u8],
+        at: Instant,
+        since: Instant,
+        now: Instant,
+    ) {
         self.times.receive(at, now);
+        self.early.0 = since;
         self.chunk_len = chunk.len();
     }
 
@@ -51,7 +62,7 @@ impl Inbox {
     ///
     /// A frame that had arrived completely before the newest chunk was held back by a false header.
     /// It is dated to the oldest byte held, because a command found late is an old command.
-    pub(super) fn next(&mut self, bytes: &mut &[u8]) -> Option<(&Frame, Instant)> {
+    pub(super) fn next(&mut self, bytes: &mut &[u8]) -> Option<(&Frame, Instant, Instant)> {
         loop {
             match self.decoder.advance_buffered(bytes) {
                 // The counters already include the gap.
@@ -60,14 +71,16 @@ impl Inbox {
                     let behind = self.decoder.pending() + bytes.len();
                     let is_held_back = behind >= self.chunk_len;
                     let at = if is_held_back { self.since } else { self.times.last() };
+                    let early = if is_held_back { self.early.1 } else { self.early.0 };
                     return match self.decoder.held_event(held)? {
-                        Event::Frame(frame) => Some((frame, at)),
+                        Event::Frame(frame) => Some((frame, at, early)),
                         Event::Skipped(_) => None,
                     };
                 }
                 None => {
                     if self.decoder.pending() <= self.chunk_len {
                         self.since = self.times.last();
+                        self.early.1 = self.early.0;
                     }
                     return None;
                 }

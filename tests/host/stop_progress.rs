@@ -238,3 +238,15 @@ fn a_robot_that_reports_averages_never_stands_still_while_a_wheel_turns_faster_t
     // The setting is what does it.
     assert!(all.any(|it| is_wrong(Duration::ZERO, it)));
 }
+
+#[test]
+fn a_report_that_a_false_header_held_back_counts_as_old_as_it_may_be() {
+    let mut host = stopped(true, &[wheels([0; 4]), wheels([0; 4])]);
+    assert_eq!(host.stop_progress(), StillMoving { rpm: [0; 4] });
+    // Found in the port after a hold-up: it may be from before the stop was flushed.
+    let late = ms(1000);
+    let held = [&[0xFD, 0xFF, 56, 0][..], &wheels([0; 4])].concat();
+    host.handle_input(&held, Arrival::Between { since: ms(50), now: late });
+    wait(&mut host, ms(1100));
+    assert_ne!(host.stop_progress(), StandingStill);
+}

@@ -75,10 +75,7 @@ impl Site {
 impl Site {
     /// The robot is not heard, or its reports show no standstill.
     fn is_update_barred(&self) -> bool {
-        let may_move = match self.role.stop_progress() {
-            StopProgress::NoReports | StopProgress::StillMoving { .. } => true,
-            StopProgress::NotAsked | StopProgress::Due | StopProgress::StandingStill => false,
-        };
+        let may_move = self.role.stop_progress() != StopProgress::StandingStill;
         let is_barred = may_move && self.role.last_report().is_some();
         self.account.link == host::Link::Down || is_barred
     }

@@ -322,7 +322,8 @@ impl<S: BiasStore> Host<S> {
 
     /// Processes the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8]) {
-        while let Some((frame, at)) = self.inbox.next(&mut bytes) {
+        while let Some((frame, at, early)) = self.inbox.next(&mut bytes) {
+            self.state.arrived_since = Some(early);
             self.state.receive(frame, at);
         }
     }
@@ -350,8 +351,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
         if bytes.is_empty() {
             return self.state.expire_dead_man(now);
         }
-        self.state.arrived_since = Some(arrived.since());
-        self.inbox.receive(bytes, now, now);
+        self.inbox.receive(bytes, now, arrived.since(), now);
         self.receive(bytes);
         self.state.arrived_since = None;
     }

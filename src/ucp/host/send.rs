@@ -101,8 +101,7 @@ impl<S: BiasStore> State<S> {
     /// the port when it was asked for, or the robot is no longer heard.
     fn is_ready_for_update(&self) -> bool {
         let progress = self.motor.stop_progress();
-        let may_move =
-            matches!(progress, StopProgress::NoReports | StopProgress::StillMoving { .. });
+        let may_move = progress != StopProgress::StandingStill;
         self.motor.is_ready_for_update()
             && self.link != Link::Down
             && !(may_move && self.last_report.is_some())

@@ -160,7 +160,7 @@ impl Robot {
 
     /// Processes the frames that `bytes` complete.
     fn receive(&mut self, mut bytes: &[u8], now: Instant) {
-        while let Some((frame, at)) = self.inbox.next(&mut bytes) {
+        while let Some((frame, at, _)) = self.inbox.next(&mut bytes) {
             self.state.receive(frame, at, now);
         }
     }
@@ -188,7 +188,7 @@ impl Endpoint for Robot {
         if bytes.is_empty() {
             return self.state.watch(now);
         }
-        self.inbox.receive(bytes, since, now);
+        self.inbox.receive(bytes, since, since, now);
         self.receive(bytes, now);
     }
 
