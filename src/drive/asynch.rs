@@ -1,7 +1,48 @@
-//! The async calls, over `embedded-io-async`.
+//! The [`Driver`] of async code, over the traits of `embedded-io-async`.
+//!
+//! It has the calls of the [blocking one](super::Driver), under the same names, and what that one
+//! has for both worlds: its role, its events, its port. It waits with `DelayNs` of
+//! `embedded-hal-async`, which the clock must implement as well:
+//! [`WithDelay`](super::WithDelay) combines a clock and a delay.
+//!
+//! # Cancelling
+//!
+//! You can drop a call at any await. Received bytes are in the role, bytes to send are in the role
+//! or in the driver, and the next call continues:
+//!
+//! * a set-point or a command is sent once its call has been polled, and a stop is still owed;
+//! * a dropped `drive_for` leaves a stop that the next call sends. **If there is no next call, a
+//!   motor on a bus runs on, and a robot drives until its watchdog stops it**; that of a vendor
+//!   robot waits for silence on the line;
+//! * a calibration continues, and reports its end as an event;
+//! * call a discovery or a read again.
+//!
+//! The port must do its part: a `read` or `write` that is dropped before it is ready must not have
+//! moved any bytes, and each round drops one `read`. Buffered ports, such as embassy's
+//! `BufferedUart`, comply; ports that lend the caller's buffer to a DMA channel for one call do
+//! not.
+//!
+//! # With embassy
+//!
+//! ```text
+//! use axlewire::drive::{WithDelay, asynch::Driver};
+//!
+//! let uart = BufferedUart::new(..);
+//! let clock = || Instant::from_micros(embassy_time::Instant::now().as_micros());
+//! let time = WithDelay { clock, delay: embassy_time::Delay };
+//! let mut bus = Driver::master(MasterConfig::direct(), uart, time);
+//! let nodes = bus.discover().await?;
+//! loop {
+//!     match select(bus.next_event(Duration::from_millis(100)), COMMANDS.receive()).await {
+//!         Either::First(event) => show(event?),
+//!         Either::Second((node, target)) => bus.set_velocity(node, target).await?,
+//!     }
+//! }
+//! ```
 
 use core::{
     future::{Future, poll_fn, ready},
+    ops::{Deref, DerefMut},
     pin::pin,
     task::Poll,
 };
@@ -11,7 +52,7 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS, STALL},
+    driver::{self, CHUNK_LEN, ERROR_NAP, FRAMES, Needs, READS, STALL},
     error::DriveError,
 };
 use crate::{
@@ -24,6 +65,77 @@ const LOOK_US: u32 = 1000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
+
+/// A role with its port and its clock, for async code.
+///
+/// ```
+/// # #[cfg(feature = "ikeya")]
+/// # async fn turn<P, C>(port: P, time: C) -> Result<(), axlewire::drive::DriveError<P::Error>>
+/// # where
+/// #     P: embedded_io_async::Read + embedded_io_async::Write,
+/// #     C: axlewire::drive::Clock + embedded_hal_async::delay::DelayNs,
+/// # {
+/// use axlewire::drive::asynch::Driver;
+/// use axlewire::ikeya::{NodeId, Rps, master::MasterConfig};
+/// use axlewire::time::Duration;
+///
+/// let mut bus = Driver::master(MasterConfig::direct(), port, time);
+/// println!("{} nodes", bus.discover().await?.len());
+/// bus.set_velocity(NodeId::N2, Rps::new(1.5)?).await?;
+/// bus.run_for(Duration::from_secs(2), |_master, event, _now| println!("{event:?}")).await?;
+/// bus.stop(NodeId::N2).await?; // `Ok` only once the motor is seen to be still
+/// # Ok(())
+/// # }
+/// ```
+///
+/// No call of it loses received bytes, sends an old command late, or waits longer than it says, and
+/// after any error the next call continues; each can be dropped at any await. See the
+/// [module](self).
+#[derive(Clone, Debug)]
+pub struct Driver<R, P, C> {
+    pub(super) inner: driver::Driver<R, P, C>,
+    /// The latest wait for a slow port began with a look at what has been received.
+    has_told: bool,
+}
+
+impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
+    /// Combines a role, a port and a clock, as [`drive::Driver::new`](super::Driver::new) does.
+    pub fn new(role: R, port: P, clock: C) -> Self {
+        driver::Driver::new(role, port, clock).into()
+    }
+
+    /// The same, with a role made here, at the time of this clock.
+    pub fn with(role: impl FnOnce(Instant) -> R, port: P, clock: C) -> Self {
+        driver::Driver::with(role, port, clock).into()
+    }
+
+    /// Role, port and clock, as [`drive::Driver::into_parts`](super::Driver::into_parts) returns
+    /// them.
+    #[must_use]
+    pub fn into_parts(self) -> (R, P, C) {
+        self.inner.into_parts()
+    }
+}
+
+impl<R, P, C> From<driver::Driver<R, P, C>> for Driver<R, P, C> {
+    fn from(inner: driver::Driver<R, P, C>) -> Self {
+        Self { inner, has_told: false }
+    }
+}
+
+impl<R, P, C> Deref for Driver<R, P, C> {
+    type Target = driver::Driver<R, P, C>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.inner
+    }
+}
+
+impl<R, P, C> DerefMut for Driver<R, P, C> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.inner
+    }
+}
 
 impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
@@ -38,8 +150,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// [`Rs485`](super::Rs485) port cannot be flushed after a failed `write`, the error is
     /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
     /// call has yielded once, so a loop that ignores errors does not starve other tasks.
-    pub async fn service_async(&mut self) -> Result<(), DriveError<P::Error>> {
-        let result = self.round_async().await;
+    pub async fn service(&mut self) -> Result<(), DriveError<P::Error>> {
+        let result = self.round().await;
         // A runaway port, which always has more, must not starve other tasks either.
         if result.is_err() || self.unsure_since.is_some() {
             yield_once().await;
@@ -47,7 +159,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         result
     }
 
-    async fn round_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    async fn round(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
         if begin - self.looked_at >= STALL {
@@ -55,7 +167,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             self.sending.end_waits();
         }
         for _ in 0..FRAMES {
-            result = result.and(self.receive_async().await);
+            result = result.and(self.receive().await);
             self.expire();
             match self.load() {
                 Ok(false) => break,
@@ -65,11 +177,11 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     break;
                 }
             }
-            let (received, sent) = self.send_async(begin).await;
+            let (received, sent) = self.send(begin).await;
             let has_failed = sent.is_err();
             result = result.and(received).and(sent);
             if !has_failed && self.sending.is_in_doubt() {
-                let flushed = self.flush_async().await;
+                let flushed = self.flush().await;
                 if flushed.is_err() {
                     // The next round tries it again.
                     return result.and(flushed);
@@ -84,62 +196,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
         }
         if self.sending.needs_flush() {
-            let flushed = self.flush_async().await;
+            let flushed = self.flush().await;
             result = result.and(flushed);
         }
         result
     }
 
-    /// Returns the next event; waits for it for this long, then returns `None`. Runs at least one
-    /// round, even with [`Duration::ZERO`].
-    ///
-    /// # Errors
-    ///
-    /// Same as [`service_async`](Self::service_async). Events from before the failure are not lost.
-    pub async fn next_event_async(
-        &mut self,
-        within: Duration,
-    ) -> Result<Option<R::Event>, DriveError<P::Error>> {
-        self.until_async(self.now() + within, Self::poll_event).await
-    }
-
-    /// Runs for `span`, and passes every event to `on_event`, with the role, to give it commands,
-    /// and the time. A command that is given at the end, a stop too, leaves with the next call.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`service_async`](Self::service_async).
-    pub async fn run_for_async(
-        &mut self,
-        span: Duration,
-        mut on_event: impl FnMut(&mut R, R::Event, Instant),
-    ) -> Result<(), DriveError<P::Error>> {
-        let deadline = self.now() + span;
-        while let Some(event) = self.until_async(deadline, Self::poll_event).await? {
-            let now = self.now();
-            on_event(&mut self.role, event, now);
-            if now >= deadline {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Runs until `done` returns a value; `None` at `deadline`. A failing port ends it.
-    pub(super) async fn until_async<T>(
-        &mut self,
-        deadline: Instant,
-        done: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Result<Option<T>, DriveError<P::Error>> {
-        self.until_with_async(deadline, Needs::WholePort, done).await
-    }
-
-    /// The same; `needs` tells whether to call `done` after a failure as well.
-    pub(super) async fn until_with_async<T>(
+    /// Runs until `done` returns a value; `None` at `deadline`. `needs` tells whether a failing
+    /// port ends it, or `done` is called then as well.
+    pub(super) async fn until_with<T>(
         &mut self,
         deadline: Instant,
         needs: Needs,
-        mut done: impl FnMut(&mut Self) -> Option<T>,
+        mut done: impl FnMut(&mut driver::Driver<R, P, C>) -> Option<T>,
     ) -> Result<Option<T>, DriveError<P::Error>> {
         self.ends_at = needs.ends_at(deadline);
         loop {
@@ -148,7 +217,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // told before that, but not twice in a row, so that the port is asked again.
             self.has_told = !self.has_told && self.round_time().is_some() && self.is_pending();
             if self.has_told {
-                result = self.receive_async().await;
+                result = self.receive().await;
                 self.expire();
                 if result.is_ok() || needs.is_half() {
                     if let Some(found) = done(self) {
@@ -156,7 +225,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     }
                 }
             }
-            result = result.and(self.service_async().await);
+            result = result.and(self.service().await);
             if result.is_ok() || needs.is_half() {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));
@@ -168,7 +237,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
             // A port that is slow is waited for first: its driver may be on.
             if self.is_sent() {
-                self.wait_async(deadline).await?;
+                self.wait(deadline).await?;
             }
             if self.is_over() {
                 return Ok(None);
@@ -176,8 +245,18 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
+    /// Pauses before a port that has failed is asked again, until this deadline at the latest.
+    #[cfg_attr(
+        not(any(feature = "ikeya", feature = "ucp")),
+        allow(dead_code, reason = "only the calls of a role use it")
+    )]
+    pub(super) async fn nap(&mut self, deadline: Instant) {
+        let pause = (deadline - self.now()).min(ERROR_NAP);
+        self.inner.clock.delay_us(pause.as_micros()).await;
+    }
+
     /// Takes in received bytes: polls each read once, without waiting.
-    async fn receive_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    async fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
         self.look();
         for _ in 0..READS {
@@ -196,14 +275,14 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Sends the unsent bytes. Between two parts of a frame it takes in what has been received:
     /// that may forbid the rest. A failing receiver does not stop the sending.
-    async fn send_async(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
+    async fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
             self.before_write();
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
             let (wait_us, is_last) = self.patience(waited);
-            let written = self.write_async(wait_us).await;
+            let written = self.write_rest(wait_us).await;
             if written.is_none() && self.role.is_outdated() {
                 // The role decides again, within the time that this frame had.
                 self.give_up_outdated();
@@ -219,13 +298,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             self.sending.write_wait.end();
             let Some(written) = written else {
                 self.reclaim();
-                return (received, self.stalled_async().await);
+                return (received, self.stalled().await);
             };
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));
             }
             if !self.sending.rest().is_empty() {
-                received = received.and(self.receive_async().await);
+                received = received.and(self.receive().await);
                 self.give_up_outdated();
                 if self.is_held_up(begin) {
                     return (received, Ok(()));
@@ -237,8 +316,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Asks the port to take the unsent bytes; `None` if it does not within this time, or if they
     /// have become wrong meanwhile: then none of them has left.
-    async fn write_async(&mut self, wait_us: u32) -> Option<Result<usize, P::Error>> {
-        let Self { role, port, clock, time, sending, ends_at, .. } = self;
+    async fn write_rest(&mut self, wait_us: u32) -> Option<Result<usize, P::Error>> {
+        let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
         let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
         loop {
@@ -262,18 +341,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         }
     }
 
-    async fn flush_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    async fn flush(&mut self) -> Result<(), DriveError<P::Error>> {
         let now = self.now();
         let waited = self.sending.flush_wait.begin(now);
         let (wait_us, is_last) = self.patience(waited);
-        let flushed = first(self.port.flush(), self.clock.delay_us(wait_us)).await;
+        let driver::Driver { port, clock, .. } = &mut self.inner;
+        let flushed = first(port.flush(), clock.delay_us(wait_us)).await;
         if flushed.is_none() && !is_last {
             return Ok(());
         }
         self.sending.flush_wait.end();
         match flushed {
             Some(flushed) => self.after_flush(flushed),
-            None => self.stalled_async().await,
+            None => self.stalled().await,
         }
     }
 
@@ -292,18 +372,19 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Handles a stalled port. A write of no bytes, which takes no time, lets an
     /// [`Rs485`](super::Rs485) port switch its pin off, perhaps with bytes still in it.
-    async fn stalled_async(&mut self) -> Result<(), DriveError<P::Error>> {
+    async fn stalled(&mut self) -> Result<(), DriveError<P::Error>> {
         self.unflushed();
         let _ = first(self.port.write(&[]), ready(())).await;
         Err(DriveError::Stalled)
     }
 
     /// Waits for bytes, for the role's next deadline or for `deadline`, whichever comes first.
-    async fn wait_async(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
+    async fn wait(&mut self, deadline: Instant) -> Result<(), DriveError<P::Error>> {
         let wake_at = self.wake_at(deadline);
         let nap = (wake_at - self.now()).as_micros().min(NAP_US);
         let mut chunk = [0; CHUNK_LEN];
-        match first(self.port.read(&mut chunk), self.clock.delay_us(nap)).await {
+        let driver::Driver { port, clock, .. } = &mut self.inner;
+        match first(port.read(&mut chunk), clock.delay_us(nap)).await {
             Some(count) => {
                 let result = count.map_err(DriveError::Port);
                 let result = result.and_then(|count| self.receive_chunk(&chunk, count));

@@ -1,16 +1,13 @@
-//! The blocking calls, over `embedded-io`.
+//! The blocking rounds, over `embedded-io`.
 
 use embedded_io::{Read, ReadReady, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, FRAMES, Needs, READS},
+    driver::{CHUNK_LEN, Driver, ERROR_NAP, FRAMES, Needs, READS},
     error::DriveError,
 };
-use crate::{
-    endpoint::Endpoint,
-    time::{Duration, Instant},
-};
+use crate::{endpoint::Endpoint, time::Instant};
 
 impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
@@ -59,51 +56,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
         result
     }
 
-    /// Returns the next event; waits for it for this long, then returns `None`. Runs at least one
-    /// round, even with [`Duration::ZERO`].
-    ///
-    /// # Errors
-    ///
-    /// Same as [`service`](Self::service). Events from before the failure are not lost.
-    pub fn next_event(
-        &mut self,
-        within: Duration,
-    ) -> Result<Option<R::Event>, DriveError<P::Error>> {
-        self.until(self.now() + within, Self::poll_event)
-    }
-
-    /// Runs for `span`, and passes every event to `on_event`, with the role, to give it commands,
-    /// and the time. A command that is given at the end, a stop too, leaves with the next call.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`service`](Self::service).
-    pub fn run_for(
-        &mut self,
-        span: Duration,
-        mut on_event: impl FnMut(&mut R, R::Event, Instant),
-    ) -> Result<(), DriveError<P::Error>> {
-        let deadline = self.now() + span;
-        while let Some(event) = self.until(deadline, Self::poll_event)? {
-            let now = self.now();
-            on_event(&mut self.role, event, now);
-            if now >= deadline {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Runs until `done` returns a value; `None` at `deadline`. A failing port ends it.
-    pub(super) fn until<T>(
-        &mut self,
-        deadline: Instant,
-        done: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Result<Option<T>, DriveError<P::Error>> {
-        self.until_with(deadline, Needs::WholePort, done)
-    }
-
-    /// The same; `needs` tells whether to call `done` after a failure as well.
+    /// Runs until `done` returns a value; `None` at `deadline`. `needs` tells whether a failing
+    /// port ends it, or `done` is called then as well.
     pub(super) fn until_with<T>(
         &mut self,
         deadline: Instant,
@@ -128,6 +82,16 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
                 return Ok(None);
             }
         }
+    }
+
+    /// Pauses before a port that has failed is asked again, until this deadline at the latest.
+    #[cfg_attr(
+        not(any(feature = "ikeya", feature = "ucp")),
+        allow(dead_code, reason = "only the calls of a role use it")
+    )]
+    pub(super) fn nap(&mut self, deadline: Instant) {
+        let until = self.on_clock((self.now() + ERROR_NAP).min(deadline));
+        self.clock.idle_until(until);
     }
 
     /// Takes in received bytes.

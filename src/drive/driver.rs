@@ -94,9 +94,6 @@ pub struct Driver<R, P, C> {
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
-    /// The latest wait for a slow port began with a look at what has been received.
-    #[cfg(feature = "embedded-io-async")]
-    pub(super) has_told: bool,
     /// When the call that is running ends, if its command must not be sent after that.
     pub(super) ends_at: Option<Instant>,
     pub(super) sending: Sending,
@@ -149,8 +146,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             empty_at,
             unsure_since: Some(latest),
             has_overtaken: true,
-            #[cfg(feature = "embedded-io-async")]
-            has_told: false,
             ends_at: None,
             sending: Sending::new(latest),
         }

@@ -2,13 +2,10 @@
 //!
 //! A [`Driver`] runs the loop that [`Endpoint`] describes, and nothing else: it moves bytes between
 //! a port and a role, tells the role the time, and keeps bytes that the port has not taken yet. The
-//! role decides when to speak, what to repeat and what a timeout means. A driver has
-//!
-//! * blocking calls over the traits of `embedded-io` (feature `embedded-io`). The port must
-//!   implement `ReadReady`, and the calls idle with [`Clock::idle_until`];
-//! * the same calls with the suffix `_async`, over the traits of `embedded-io-async` (feature
-//!   `embedded-io-async`). They wait with `DelayNs` of `embedded-hal-async`, which the clock must
-//!   implement as well: `WithDelay` combines a clock and a delay.
+//! role decides when to speak, what to repeat and what a timeout means. Its calls block, over the
+//! traits of `embedded-io` (feature `embedded-io`): the port must implement `ReadReady`, and a call
+//! idles with [`Clock::idle_until`]. [`asynch::Driver`] has the same calls for async code, over the
+//! traits of `embedded-io-async` (feature `embedded-io-async`).
 //!
 //! Each role has high-level calls, such as [`discover`](Driver::discover) and
 //! [`read`](Driver::read) of a master, [`drive`](Driver::drive) and
@@ -110,43 +107,17 @@
 //!   host's reports and pongs) never take the room of rare ones, and calls that wait for something
 //!   else drop them: the role has the latest.
 //!
-//! # Cancelling
-//!
-//! You can drop an async call at any await. Received bytes are in the role, bytes to send are in
-//! the role or in the driver, and the next call continues; a dropped `drive_for_async` leaves a
-//! stop that the next call sends. The port must do its part: a `read` or `write` that is dropped
-//! before it is ready must not have moved any bytes, and each round drops one `read`. Buffered
-//! ports, such as embassy's `BufferedUart`, comply; ports that lend the caller's buffer to a DMA
-//! channel for one call do not.
-//!
 //! # On a PC
 //!
 //! `SerialPort` (feature `serialport`) with `StdClock`, or `TokioSerialPort` with `TokioClock`
 //! (feature `tokio`): see `guide::start_on_a_pc`.
 //!
-//! # With embassy
-//!
-//! ```text
-//! let uart = BufferedUart::new(..);
-//! let clock = || Instant::from_micros(embassy_time::Instant::now().as_micros());
-//! let time = WithDelay { clock, delay: embassy_time::Delay };
-//! let mut bus = Driver::master(MasterConfig::direct(), uart, time);
-//! let nodes = bus.discover_async().await?;
-//! loop {
-//!     let event = bus.next_event_async(Duration::from_millis(100));
-//!     match select(event, COMMANDS.receive()).await {
-//!         Either::First(event) => show(event?),
-//!         Either::Second((node, target)) => bus.set_velocity_async(node, target).await?,
-//!     }
-//! }
-//! ```
-//!
 //! # With RTIC
 //!
-//! RTIC 2 has async tasks: proceed as with embassy, with `Mono::now()` as the clock and `Mono` as
-//! the delay. Without async tasks, call the blocking [`service`](Driver::service), which does not
-//! wait, from a task. Spawn the task when the receiver's interrupt has filled a queue, and at
-//! [`poll_timeout`](Driver::poll_timeout):
+//! RTIC 2 has async tasks: proceed as [with embassy](asynch), with `Mono::now()` as the clock and
+//! `Mono` as the delay. Without async tasks, call the blocking [`service`](Driver::service), which
+//! does not wait, from a task. Spawn the task when the receiver's interrupt has filled a queue, and
+//! at [`poll_timeout`](Driver::poll_timeout):
 //!
 //! ```text
 //! #[task(local = [bus])]
@@ -171,10 +142,14 @@
 //! [`Transmit::Taken`]: crate::endpoint::Transmit::Taken
 //! [`Endpoint::is_outdated`]: crate::endpoint::Endpoint::is_outdated
 
+#[macro_use]
+mod worlds;
+
 #[cfg(feature = "embedded-io-async")]
-mod asynch;
+pub mod asynch;
 #[cfg(feature = "embedded-io")]
 mod blocking;
+mod calls;
 mod clock;
 mod driver;
 mod error;

@@ -17,20 +17,20 @@ use crate::time::Instant;
 /// Pause between two looks at bytes that are being sent: the shortest that tokio has.
 const NAP: Duration = Duration::from_millis(1);
 
-/// A serial port of a PC, for the async calls of a [`Driver`](super::Driver) in a tokio runtime.
+/// A serial port of a PC, for an [async driver](super::asynch::Driver) in a tokio runtime.
 /// See `guide::start_on_a_pc` for permissions, adapters and their delays.
 ///
 /// ```no_run
 /// # #[cfg(feature = "ikeya")]
 /// # async fn run() -> Result<(), Box<dyn std::error::Error>> {
-/// use axlewire::drive::{Driver, TokioClock, TokioSerialPort};
+/// use axlewire::drive::{TokioClock, TokioSerialPort, asynch::Driver};
 /// use axlewire::ikeya::{BAUD, Master, master::MasterConfig};
 ///
 /// let port = TokioSerialPort::open("/dev/ttyUSB0", BAUD)?;
 /// let mut config = MasterConfig::usb_adapter();
 /// config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
 /// let mut bus = Driver::master(config, port, TokioClock::new());
-/// println!("{} nodes", bus.discover_async().await?.len());
+/// println!("{} nodes", bus.discover().await?.len());
 /// # Ok(())
 /// # }
 /// ```

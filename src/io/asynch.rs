@@ -1,70 +1,80 @@
-//! The same calls for `embedded-io-async`.
+//! Frames in and out of an async port, over the traits of `embedded-io-async`.
+//!
+//! [`FrameReader`] and [`FrameWriter`] have the calls of their [blocking namesakes](super), and
+//! what those have for both worlds: the decoder, the unsent bytes, the port.
 
-use embedded_io_async::{Read, Write};
+use core::ops::{Deref, DerefMut};
 
-use super::{error::WriteError, reader::FrameReader, writer::FrameWriter};
-use crate::{
-    encode::Encode,
-    stream::{Event, Framing},
-};
+use super::{reader, writer};
+use crate::stream::{Decoder, Framing};
 
-impl<R: Read, F: Framing, const N: usize> FrameReader<R, F, N> {
-    /// Returns the next event; waits for the port if there is none yet. `None` at end of file.
-    ///
-    /// Cancel safe if the port's `read` is.
-    ///
-    /// # Errors
-    ///
-    /// Port errors. No received bytes are lost: the next call continues where this one
-    /// stopped.
-    pub async fn read_event_async(&mut self) -> Result<Option<Event<F::Frame<'_>>>, R::Error> {
-        loop {
-            if let Some(found) = self.decoder.advance_held() {
-                return Ok(self.decoder.held_event(found));
-            }
-            let count = self.port.read(self.decoder.spare()).await?;
-            if count == 0 {
-                return Ok(None);
-            }
-            self.decoder.commit(count);
-        }
+/// Reads the events of a stream from an async port: see [`io::FrameReader`](super::FrameReader).
+#[derive(Debug)]
+pub struct FrameReader<R, F, const N: usize>(pub(super) reader::FrameReader<R, F, N>);
+
+impl<R, F: Framing, const N: usize> FrameReader<R, F, N> {
+    /// Reads from `port`, starting with the next byte.
+    #[must_use]
+    pub const fn new(port: R) -> Self {
+        Self(reader::FrameReader::new(port))
+    }
+
+    /// The port, and the decoder with the bytes that it still holds.
+    #[must_use]
+    pub fn into_parts(self) -> (R, Decoder<F, N>) {
+        self.0.into_parts()
     }
 }
 
-impl<W: Write, const N: usize> FrameWriter<W, N> {
-    /// Sends the unsent bytes, then `frame`, and returns when the port has taken them all. The line
-    /// may still be busy; see [`flush_async`](Self::flush_async).
-    ///
-    /// Cancel safe if the port's `write` is: the next call finishes a frame that was begun. If
-    /// cancelled before that, the frame is not queued.
-    ///
-    /// # Errors
-    ///
-    /// [`WriteError`]; after [`Port`](WriteError::Port) or [`Zero`](WriteError::Zero) during
-    /// `frame`, its rest stays unsent, and [`flush_async`](Self::flush_async) continues with it.
-    pub async fn write_async(&mut self, frame: &impl Encode) -> Result<(), WriteError<W::Error>> {
-        self.send_async().await?;
-        self.queue(frame)?;
-        self.send_async().await
+impl<R, F, const N: usize> Deref for FrameReader<R, F, N> {
+    type Target = reader::FrameReader<R, F, N>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<R, F, const N: usize> DerefMut for FrameReader<R, F, N> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
+// By hand: a derive would require `F: Clone`.
+impl<R: Clone, F, const N: usize> Clone for FrameReader<R, F, N> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
+
+/// Sends frames through an async port: see [`io::FrameWriter`](super::FrameWriter).
+#[derive(Clone, Debug)]
+pub struct FrameWriter<W, const N: usize>(pub(super) writer::FrameWriter<W, N>);
+
+impl<W, const N: usize> FrameWriter<W, N> {
+    /// Sends through `port`.
+    #[must_use]
+    pub const fn new(port: W) -> Self {
+        Self(writer::FrameWriter::new(port))
     }
 
-    /// Sends the unsent bytes, and returns when the port reports that the last of them is out.
-    ///
-    /// # Errors
-    ///
-    /// [`WriteError::Port`] or [`WriteError::Zero`]; the rest stays unsent.
-    pub async fn flush_async(&mut self) -> Result<(), WriteError<W::Error>> {
-        self.send_async().await?;
-        self.port.flush().await.map_err(WriteError::Port)
+    /// The port. Unsent bytes are discarded.
+    #[must_use]
+    pub fn into_port(self) -> W {
+        self.0.into_port()
     }
+}
 
-    async fn send_async(&mut self) -> Result<(), WriteError<W::Error>> {
-        while !self.outbox.is_empty() {
-            match self.port.write(self.outbox.unsent()).await.map_err(WriteError::Port)? {
-                0 => return Err(WriteError::Zero),
-                count => self.outbox.taken(count),
-            }
-        }
-        Ok(())
+impl<W, const N: usize> Deref for FrameWriter<W, N> {
+    type Target = writer::FrameWriter<W, N>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<W, const N: usize> DerefMut for FrameWriter<W, N> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
     }
 }

@@ -4,8 +4,8 @@
 //! a small buffer, and add no rules. Received bytes stay in the reader through read errors, end of
 //! file and cancelled futures; unsent bytes stay in the writer.
 //!
-//! Both have blocking calls with feature `embedded-io`, and the same calls with the suffix `_async`
-//! with feature `embedded-io-async`.
+//! These have blocking calls (feature `embedded-io`); their namesakes in [`asynch`] have the same
+//! calls for async code (feature `embedded-io-async`).
 //!
 //! ```
 //! # #[cfg(all(feature = "embedded-io", feature = "ucp"))] {
@@ -23,9 +23,8 @@
 //! ```
 
 #[cfg(feature = "embedded-io-async")]
-mod asynch;
-#[cfg(feature = "embedded-io")]
-mod blocking;
+pub mod asynch;
+mod calls;
 mod error;
 mod reader;
 mod writer;

@@ -11,8 +11,8 @@ use crate::stream::{Decoder, Framing};
 /// * At end of file the result is `None`, and a possible start of a frame is kept, because a file
 ///   can grow and a line can come back. If nothing will follow, call [`idle`](Self::idle) until
 ///   [`pending`](Self::pending) is 0.
-/// * A cancelled `read_event_async` loses nothing, as long as the port's own `read` loses nothing
-///   when cancelled: received bytes are in the decoder before the next await.
+/// * An async `read_event` that is dropped loses nothing, as long as the port's own `read` loses
+///   nothing when cancelled: received bytes are in the decoder before the next await.
 #[derive(Debug)]
 pub struct FrameReader<R, F, const N: usize> {
     pub(super) port: R,

@@ -7,7 +7,7 @@ fn discovery_finds_all_nodes_within_its_bound() {
     for is_async in BOTH {
         let mut story = Story::new(MasterConfig::direct());
         let bound = story.bus.role().read_bound();
-        let found = call!(is_async, story.bus, discover, discover_async());
+        let found = call!(is_async, story.bus, discover());
         assert_eq!(found.unwrap(), FOUND);
         assert!(story.world.now() < at_ms(0) + bound);
     }
@@ -17,7 +17,7 @@ fn discovery_finds_all_nodes_within_its_bound() {
 fn an_empty_bus_is_discovered_as_empty() {
     for is_async in BOTH {
         let mut bus: Bus = on(Master::new(MasterConfig::direct(), at_ms(0)), Port::default());
-        assert!(call!(is_async, bus, discover, discover_async()).unwrap().is_empty());
+        assert!(call!(is_async, bus, discover()).unwrap().is_empty());
     }
 }
 
@@ -31,7 +31,7 @@ fn a_discovery_does_not_list_a_node_that_has_gone() {
             story.run(1);
         }
         assert_eq!(story.bus.role().mode(NodeId::N2), Some(Mode::Velocity));
-        let found = call!(is_async, story.bus, discover, discover_async());
+        let found = call!(is_async, story.bus, discover());
         assert_eq!(found.unwrap(), [(NodeId::N5, Mode::Position)]);
     }
 }
@@ -41,8 +41,8 @@ fn set_points_have_been_sent_when_the_call_returns_and_reach_the_right_node() {
     for is_async in BOTH {
         let mut story = Story::new(MasterConfig::direct()).discovered();
         let (to, at) = (rps(-2.5), Position::new(100, -3));
-        call!(is_async, story.bus, set_velocity, set_velocity_async(NodeId::N2, to)).unwrap();
-        call!(is_async, story.bus, set_position, set_position_async(NodeId::N5, at)).unwrap();
+        call!(is_async, story.bus, set_velocity(NodeId::N2, to)).unwrap();
+        call!(is_async, story.bus, set_position(NodeId::N5, at)).unwrap();
         assert_eq!(story.told_two(), Some(Target::Velocity(to)));
         assert_eq!(story.told_five(), Some(Target::Position(at)));
     }
@@ -61,7 +61,7 @@ fn a_read_gives_what_the_node_measures_now() {
                 story.five.borrow_mut().role_mut().set_position(place);
                 // Anything that was in flight has arrived by now.
                 story.run(1);
-                let mut read = |node| call!(is_async, story.bus, read, read_async(node));
+                let mut read = |node| call!(is_async, story.bus, read(node));
                 assert_eq!(read(NodeId::N2), Ok(Status::Velocity(speed.get())));
                 assert_eq!(read(NodeId::N5), Ok(Status::Position(place)));
             }
@@ -88,13 +88,13 @@ fn stop_and_stop_all_have_been_confirmed_when_they_return() {
         let mut story = Story::new(only_two_and_five()).discovered();
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
         story.bus.set_position(NodeId::N5, Position::new(0, 9)).unwrap();
-        let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
+        let stopped = call!(is_async, story.bus, stop_all());
         assert_eq!(stopped, Ok(()));
         assert_eq!(story.told_two(), STOPPED);
         assert_eq!(story.told_five(), HELD);
 
         story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
-        call!(is_async, story.bus, stop, stop_async(NodeId::N2)).unwrap();
+        call!(is_async, story.bus, stop(NodeId::N2)).unwrap();
         assert_eq!(story.told_two(), STOPPED);
     }
 }
@@ -118,9 +118,9 @@ fn a_command_whose_node_is_lost_before_it_was_sent_is_not_reported_as_sent() {
             story
         };
         let (mut one, mut other, two) = (lost(), lost(), NodeId::N2);
-        let turned = call!(is_async, one.bus, set_velocity, set_velocity_async(two, rps(1.0)));
+        let turned = call!(is_async, one.bus, set_velocity(two, rps(1.0)));
         assert_eq!(turned, Err(DriveError::Bus(CommandError::NotOnline { node: two })));
-        let not_stopped = call!(is_async, other.bus, stop_all, stop_all_async());
+        let not_stopped = call!(is_async, other.bus, stop_all());
         assert_eq!(not_stopped, Err(DriveError::StopsOwed(two.into())));
     }
 }
@@ -132,7 +132,7 @@ fn a_read_of_an_unplugged_node_fails_with_its_id_and_its_health_is_reported() {
         events(&mut story.bus);
         story.unplug_two(true);
         let start = story.world.now();
-        let error = call!(is_async, story.bus, read, read_async(NodeId::N2)).unwrap_err();
+        let error = call!(is_async, story.bus, read(NodeId::N2)).unwrap_err();
         assert_eq!(error, DriveError::ReadFailed { node: NodeId::N2, cause: Cause::Silent });
         assert_eq!(error.to_string(), "node 2 did not answer: nothing was heard");
         assert!(story.world.now() - start < ms(10));
@@ -188,10 +188,10 @@ fn a_stop_is_not_given_up_with_its_port_and_goes_on_when_the_port_is_back() {
         let unplugged = story.bus.port().unplugged.clone();
         unplugged.set(true);
         let bus = &mut story.bus;
-        let set = call!(is_async, *bus, set_velocity, set_velocity_async(NodeId::N2, rps(1.0)));
+        let set = call!(is_async, *bus, set_velocity(NodeId::N2, rps(1.0)));
         assert_eq!(set, Err(GONE));
         let owed = DriveError::StopsOwed(only_two_and_five().nodes);
-        assert_eq!(call!(is_async, *bus, stop_all, stop_all_async()), Err(owed));
+        assert_eq!(call!(is_async, *bus, stop_all()), Err(owed));
         // The port comes back: the driver continues, and the last command is the one in force.
         unplugged.set(false);
         // A silence follows what may have been cut off.
@@ -206,10 +206,10 @@ fn a_repeated_discovery_has_the_same_result_after_a_drop_and_cuts_no_packet() {
     dropped_at_any_await(100, |polls| {
         let mut story = Story::new(manual());
         (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
-        let done = story.world.poll_times(polls, story.bus.discover_async());
+        let done = story.world.poll_times(polls, story.bus.asynch().discover());
         let found = match done.clone() {
             Some(found) => found,
-            None => story.world.block_on(story.bus.discover_async()),
+            None => story.world.block_on(story.bus.asynch().discover()),
         };
         assert_eq!(found.unwrap(), FOUND, "dropped after {polls} polls");
         for node in [&story.two, &story.five] {
@@ -227,12 +227,12 @@ fn a_repeated_read_or_command_has_the_same_result_after_a_drop() {
         let (world, bus) = (&story.world, &mut story.bus);
         let done = world
             .poll_times(polls, async {
-                bus.set_velocity_async(NodeId::N2, rps(4.0)).await?;
-                bus.read_async(NodeId::N5).await
+                bus.asynch().set_velocity(NodeId::N2, rps(4.0)).await?;
+                bus.asynch().read(NodeId::N5).await
             })
             .is_some();
-        world.block_on(bus.set_velocity_async(NodeId::N2, rps(4.0))).unwrap();
-        let read = world.block_on(bus.read_async(NodeId::N5));
+        world.block_on(bus.asynch().set_velocity(NodeId::N2, rps(4.0))).unwrap();
+        let read = world.block_on(bus.asynch().read(NodeId::N5));
         assert_eq!(read, Ok(Status::Position(Position::new(7, 1))), "after {polls} polls");
         assert_eq!(story.told_two(), Some(Target::Velocity(rps(4.0))));
         for node in [&story.two, &story.five] {
@@ -255,7 +255,7 @@ fn a_read_that_fails_takes_no_failure_of_another_node() {
             story.bus.service().unwrap();
             story.world.pass(20);
         }
-        let failed = call!(is_async, story.bus, read, read_async(NodeId::N2));
+        let failed = call!(is_async, story.bus, read(NodeId::N2));
         assert!(matches!(failed, Err(DriveError::ReadFailed { node: NodeId::N2, .. })));
         let failures: Vec<_> = events(&mut story.bus)
             .into_iter()
@@ -275,7 +275,7 @@ fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
         config.watchdog = Some(ms(5));
         let (mut driver, mut far) = slave(config);
         let world = far.world.clone();
-        let mut next = |within| call!(is_async, driver, next_command, next_command_async(within));
+        let mut next = |within| call!(is_async, driver, next_command(within));
         assert_eq!(next(ms(2)), Ok(None));
         assert_eq!(world.now(), at_ms(2));
         let write = WriteRequest::velocity(NodeId::N2, rps(1.5));
@@ -298,7 +298,7 @@ fn an_answer_to_a_request_that_left_after_its_window_is_not_taken_for_the_next_o
         let mut story = Story::new(config).discovered();
         let asked = story.bus.port().written.len();
         story.bus.port_mut().writes.push_back(Step::Blocks(3_000_000));
-        let first = call!(is_async, story.bus, read, read_async(NodeId::N5));
+        let first = call!(is_async, story.bus, read(NodeId::N5));
         assert_eq!(first, Err(DriveError::Timeout(Operation::Read { node: NodeId::N5 })));
         assert_eq!(story.bus.port().written.len(), asked + 4, "one READ");
         // The node has answered, and turns.
@@ -321,14 +321,14 @@ fn an_answer_to_a_request_whose_flush_was_dropped_and_came_late_is_not_taken_for
     story.ask(NodeId::N5);
     // Every call is dropped while the port flushes.
     while story.world.now().as_micros() < held_us + 300 {
-        story.world.poll_times(2, story.bus.service_async());
+        story.world.poll_times(2, story.bus.asynch().service());
         story.world.pass(20);
     }
     assert_eq!(story.bus.port().written.len(), asked + 4, "one READ");
     let turned = Position::new(9, 2);
     story.five.borrow_mut().role_mut().set_position(turned);
     assert_eq!(
-        story.world.block_on(story.bus.read_async(NodeId::N5)),
+        story.world.block_on(story.bus.asynch().read(NodeId::N5)),
         Ok(Status::Position(turned))
     );
     assert_eq!(story.bus.role().node_statistics(NodeId::N5).late, 1);
@@ -340,11 +340,11 @@ fn a_port_that_never_flushes_delays_the_next_request_by_a_second() {
     let (asked, begin) = (story.bus.port().written.len(), story.world.now());
     story.bus.port_mut().holds_until_us = 60_000_000;
     story.ask(NodeId::N5);
-    story.world.poll_times(2, story.bus.service_async());
+    story.world.poll_times(2, story.bus.asynch().service());
     story.ask(NodeId::N2);
     let mut next_at = None;
     while next_at.is_none() && story.world.now() - begin < ms(3000) {
-        story.world.poll_times(2, story.bus.service_async());
+        story.world.poll_times(2, story.bus.asynch().service());
         story.world.pass(200);
         next_at = (story.bus.port().written.len() > asked + 4).then(|| story.world.now() - begin);
     }

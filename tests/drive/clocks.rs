@@ -11,14 +11,14 @@ fn role_time_continues_after_a_clock_goes_backwards() {
     let clock = clock_that_says([100, 50, 70, 120].into_iter().cycle());
     let flood = (0..100).map(|_| bytes(1));
     // The recorder itself asserts that time never goes backwards.
-    let mut driver = Driver::new(Recorder::default(), Port::reading(flood), clock);
+    let mut driver = On::new(Recorder::default(), Port::reading(flood), clock);
     driver.service().unwrap();
     assert_eq!(driver.role().received.len(), 64);
 
     // One reading is an hour ahead: the steps before and after it still count.
     let hour = 3_600_000_000;
     let clock = clock_that_says([1000, hour + 1000, 1500, 2500, 2400, 2700]);
-    let driver = Driver::new(Recorder::default(), Port::default(), clock);
+    let driver = On::new(Recorder::default(), Port::default(), clock);
     let times: Vec<u64> = (0..5).map(|_| driver.now().as_micros() - hour).collect();
     assert_eq!(times, [1000, 1000, 2000, 2000, 2300]);
 }

@@ -48,7 +48,7 @@ fn a_cut_off_set_point_is_not_completed_by_the_call_that_stops() {
     for is_async in [false, true] {
         let (wire, mut bus) = cut_after(5);
         wire.write_all();
-        call!(is_async, bus, stop, stop_async(NodeId::N1)).unwrap();
+        call!(is_async, bus, stop(NodeId::N1)).unwrap();
         assert_eq!(wire.turns(), 0.0, "it was at rest when stopped, and has turned");
         // A set-point still in force is completed.
         let (wire, mut bus) = cut_after(5);
@@ -141,7 +141,7 @@ fn a_stop_write_that_a_port_cut_in_two_pays_nothing() {
             wire.world.step(300_000);
             let _ = bus.service();
             wire.write_with(cut_in_two());
-            let stopped = call!(is_async, bus, stop, stop_async(NodeId::N1));
+            let stopped = call!(is_async, bus, stop(NodeId::N1));
             let rps = wire.rps();
             assert!(stopped.is_err() || rps == 0.0, "reported as stopped, but turns at {rps} rps");
             wire.write_all();
@@ -214,13 +214,13 @@ fn behind_a_driver_enable_pin_a_stop_is_paid_only_if_it_was_heard_whatever_write
         let mut port = wire.port();
         let pin = enable(&wire, &mut port);
         let Ok(port) = Rs485::new(port, pin.clone());
-        let mut bus = Driver::master(config, port, wire.world.clone());
+        let mut bus = On::with(|now| Master::new(config, now), port, wire.world.clone());
         bus.discover().unwrap();
         bus.set_velocity(NodeId::N1, rps(10.0)).unwrap();
         assert_eq!(wire.rps(), 10.0);
         fail(&wire, &pin);
         let stopped = match is_async {
-            true => wire.world.block_on(bus.stop_async(NodeId::N1)),
+            true => wire.world.block_on(bus.asynch().stop(NodeId::N1)),
             false => bus.stop(NodeId::N1),
         };
         let rps = wire.rps();
@@ -239,10 +239,10 @@ fn a_port_is_flushed_behind_the_part_of_a_frame_before_it_is_asked_to_take_the_n
         let log = crate::port::Log::default();
         driver.port_mut().log = Some(log.clone());
         // The first flush fails to be asked: the call is dropped, or it is too late for the rest.
-        assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+        assert_eq!(call!(is_async, driver, service()), Err(GONE));
         driver.port().world.step(50_000);
         log.borrow_mut().clear();
-        assert_eq!(call!(is_async, driver, service, service_async()), Ok(()));
+        assert_eq!(call!(is_async, driver, service()), Ok(()));
         assert_eq!(log.borrow().join(" "), "flush write flush");
         assert_eq!(driver.port().written, b"12456");
     }
@@ -259,14 +259,14 @@ fn a_port_whose_flush_failed_behind_a_part_is_flushed_once_more_before_it_takes_
         driver.port_mut().flushes = vec![Step::Error; failures].into();
         let log = crate::port::Log::default();
         driver.port_mut().log = Some(log.clone());
-        assert_eq!(call!(is_async, driver, service, service_async()), Err(GONE));
+        assert_eq!(call!(is_async, driver, service()), Err(GONE));
         assert_eq!(log.borrow().join(" "), "write write flush");
         driver.port().world.step(50_000);
         log.borrow_mut().clear();
-        let second = call!(is_async, driver, service, service_async());
+        let second = call!(is_async, driver, service());
         assert_eq!((second.is_ok(), log.borrow().join(" ").as_str()), (failures == 1, calls));
         // A port that cannot be flushed at all still gets the frame.
-        let _ = call!(is_async, driver, service, service_async());
+        let _ = call!(is_async, driver, service());
         assert_eq!(driver.port().written, b"12456");
     }
 }

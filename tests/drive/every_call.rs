@@ -19,22 +19,22 @@ fn a_port_that_has_gone_is_the_error_of_every_call_of_a_master() {
     let (two, five, span, turn) = (NodeId::N2, NodeId::N5, ms(5), rps(1.0));
     /// The result of both forms of a call.
     macro_rules! gone {
-        ($name:ident, $name_async:ident($($argument:expr),*)) => {
+        ($name:ident($($argument:expr),*)) => {
             both(|is_async| {
                 let mut story = unplugged();
-                call!(is_async, story.bus, $name, $name_async($($argument),*))
+                call!(is_async, story.bus, $name($($argument),*))
             })
         };
     }
-    assert_eq!(gone!(discover, discover_async()), Err(GONE));
-    assert_eq!(gone!(read, read_async(five)), Err(GONE));
-    assert_eq!(gone!(set_velocity, set_velocity_async(two, turn)), Err(GONE));
-    assert_eq!(gone!(set_position, set_position_async(five, PLACE)), Err(GONE));
+    assert_eq!(gone!(discover()), Err(GONE));
+    assert_eq!(gone!(read(five)), Err(GONE));
+    assert_eq!(gone!(set_velocity(two, turn)), Err(GONE));
+    assert_eq!(gone!(set_position(five, PLACE)), Err(GONE));
     let owed = |node| Err(DriveError::StopsOwed(only(node)));
-    assert_eq!(gone!(drive_for, drive_for_async(two, turn, span)), owed(two));
-    assert_eq!(gone!(stop, stop_async(five)), owed(five));
-    assert_eq!(gone!(next_event, next_event_async(span)), Err(GONE));
-    assert_eq!(gone!(run_for, run_for_async(span, |_, _, _| {})), Err(GONE));
+    assert_eq!(gone!(drive_for(two, turn, span)), owed(two));
+    assert_eq!(gone!(stop(five)), owed(five));
+    assert_eq!(gone!(next_event(span)), Err(GONE));
+    assert_eq!(gone!(run_for(span, |_, _, _| {})), Err(GONE));
 }
 
 #[test]
@@ -48,10 +48,10 @@ fn a_refusal_of_the_master_is_the_error_of_its_call_and_sends_nothing() {
     for is_async in BOTH {
         let mut story = story();
         let bus = &mut story.bus;
-        let read = call!(is_async, *bus, read, read_async(NodeId::N7)).map(drop);
-        let aimed = call!(is_async, *bus, set_velocity, set_velocity_async(five, rps(1.0)));
-        let placed = call!(is_async, *bus, set_position, set_position_async(two, PLACE));
-        let driven = call!(is_async, *bus, drive_for, drive_for_async(five, rps(1.0), ms(5)));
+        let read = call!(is_async, *bus, read(NodeId::N7)).map(drop);
+        let aimed = call!(is_async, *bus, set_velocity(five, rps(1.0)));
+        let placed = call!(is_async, *bus, set_position(two, PLACE));
+        let driven = call!(is_async, *bus, drive_for(five, rps(1.0), ms(5)));
         assert_eq!((read, aimed), (Err(absent), Err(is_position)));
         assert_eq!((placed, driven), (Err(is_velocity), Err(is_position)));
         assert_eq!((written(&story), story.bus.role().stops_owed()), (before, NodeSet::NONE));
@@ -63,8 +63,8 @@ fn a_port_that_has_gone_is_the_error_of_a_slave_that_waits_for_a_command() {
     for is_async in BOTH {
         let (mut slave, _far) = slave(SlaveConfig::direct());
         slave.port().unplugged.set(true);
-        let command =
-            call!(is_async, slave, next_command, next_command_async(at_ms(5) - slave.now()));
+        let within = at_ms(5) - slave.now();
+        let command = call!(is_async, slave, next_command(within));
         assert_eq!(command, Err(GONE));
     }
 }
@@ -84,7 +84,7 @@ fn a_stop_of_all_lists_a_silent_node_although_the_settings_do_not_name_it() {
     for is_async in BOTH {
         let mut story = five_is_not_named();
         story.five.borrow().port().unplugged.set(true);
-        let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
+        let stopped = call!(is_async, story.bus, stop_all());
         assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N5.into())));
     }
 }

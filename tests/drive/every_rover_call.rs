@@ -16,10 +16,10 @@ fn unplugged() -> Rover {
 
 /// The result of both forms of a call, each with a host of its own.
 macro_rules! result {
-    ($host:ident, $name:ident, $name_async:ident($($argument:expr),*)) => {
+    ($host:ident, $name:ident($($argument:expr),*)) => {
         both(|is_async| {
             let mut driver = $host();
-            call!(is_async, driver, $name, $name_async($($argument),*))
+            call!(is_async, driver, $name($($argument),*))
         })
     };
 }
@@ -27,19 +27,19 @@ macro_rules! result {
 #[test]
 fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
     let (soon, span) = (ms(5), ms(5));
-    assert_eq!(result!(unplugged, ping, ping_async(soon)), Err(GONE));
-    assert_eq!(result!(unplugged, drive, drive_async(5, 5)), Err(GONE));
-    assert_eq!(result!(unplugged, drive_for, drive_for_async(5, 5, span)), Err(GONE));
-    let begun = result!(unplugged, start_calibration, start_calibration_async(IMU, soon));
+    assert_eq!(result!(unplugged, ping(soon)), Err(GONE));
+    assert_eq!(result!(unplugged, drive(5, 5)), Err(GONE));
+    assert_eq!(result!(unplugged, drive_for(5, 5, span)), Err(GONE));
+    let begun = result!(unplugged, start_calibration(IMU, soon));
     assert_eq!(begun, Err(GONE));
-    let ended = result!(unplugged, end_calibration, end_calibration_async(IMU, soon));
+    let ended = result!(unplugged, end_calibration(IMU, soon));
     assert_eq!(ended, Err(GONE));
     for is_async in BOTH {
         let mut rover = unplugged();
         // A report is not waited for; a stop is retried for 100 ms.
-        let report = call!(is_async, rover, next_report, next_report_async(soon));
+        let report = call!(is_async, rover, next_report(soon));
         assert_eq!((report, rover.now()), (Err(GONE), at_ms(0)));
-        assert_eq!(call!(is_async, rover, stop, stop_async()), Err(GONE));
+        assert_eq!(call!(is_async, rover, stop()), Err(GONE));
         assert!((100_000..102_000).contains(&rover.now().as_micros()), "{:?}", rover.now());
     }
 }
@@ -48,13 +48,13 @@ fn a_port_that_has_gone_is_the_error_of_every_call_of_a_host() {
 fn a_robot_that_is_silent_is_a_timeout_at_the_deadline_of_the_call() {
     let soon = ms(5);
     let timeout = |operation| Err(DriveError::Timeout(operation));
-    let ping = result!(host, ping, ping_async(soon));
+    let ping = result!(host, ping(soon));
     assert_eq!(ping, timeout(Operation::Ping).map(|()| Duration::ZERO));
-    let begun = result!(host, start_calibration, start_calibration_async(IMU, soon));
+    let begun = result!(host, start_calibration(IMU, soon));
     assert_eq!(begun, timeout(Operation::Calibration));
-    let ended = result!(host, end_calibration, end_calibration_async(IMU, soon));
+    let ended = result!(host, end_calibration(IMU, soon));
     assert_eq!(ended, timeout(Operation::Calibration));
-    assert_eq!(result!(host, next_report, next_report_async(soon)), Ok(None));
+    assert_eq!(result!(host, next_report(soon)), Ok(None));
 }
 
 #[test]
@@ -62,9 +62,9 @@ fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
     let (soon, span) = (ms(5), ms(5));
     let refused = |error| Err(DriveError::<Unplugged>::Rover(error));
     let unknown = refused(CommandError::CalibrationKind { kind: 9 });
-    let begun = result!(host, start_calibration, start_calibration_async(NOBODY, soon));
+    let begun = result!(host, start_calibration(NOBODY, soon));
     assert_eq!(begun, unknown);
-    let ended = result!(host, end_calibration, end_calibration_async(NOBODY, soon));
+    let ended = result!(host, end_calibration(NOBODY, soon));
     assert_eq!(ended, unknown);
 
     /// A host that updates its robot.
@@ -79,17 +79,17 @@ fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
         rover
     }
     let updating_now = refused(CommandError::Updating);
-    assert_eq!(result!(updating, drive, drive_async(5, 5)), updating_now);
-    assert_eq!(result!(updating, drive_for, drive_for_async(5, 5, span)), updating_now);
-    let begun = result!(updating, start_calibration, start_calibration_async(IMU, soon));
+    assert_eq!(result!(updating, drive(5, 5)), updating_now);
+    assert_eq!(result!(updating, drive_for(5, 5, span)), updating_now);
+    let begun = result!(updating, start_calibration(IMU, soon));
     assert_eq!(begun, updating_now);
     for (speed, angular) in [(101, 0), (0, -101)] {
         let value = MotorControl::new(speed, angular).unwrap_err();
         let out = refused(CommandError::Value(value));
         for is_async in BOTH {
             let mut rover = host();
-            assert_eq!(call!(is_async, rover, drive, drive_async(speed, angular)), out);
-            let driven = call!(is_async, rover, drive_for, drive_for_async(speed, angular, span));
+            assert_eq!(call!(is_async, rover, drive(speed, angular)), out);
+            let driven = call!(is_async, rover, drive_for(speed, angular, span));
             assert_eq!(driven, out);
             assert_eq!(rover.port().written, [], "not even a round");
         }
@@ -109,7 +109,7 @@ fn a_drive_whose_port_fails_on_the_way_ends_with_a_stop_and_returns_the_error() 
             let (_, mut rover, _robot) = rover(|_| ());
             rover.service().unwrap();
             fault(rover.port_mut());
-            let driven = call!(is_async, rover, drive_for, drive_for_async(50, 0, ms(50)));
+            let driven = call!(is_async, rover, drive_for(50, 0, ms(50)));
             assert_eq!(driven, Err(GONE));
             assert!(rover.role().is_stop_sent());
             assert_eq!(rover.role().command().map(|it| it.speed()), Some(0));
@@ -126,8 +126,8 @@ fn a_port_that_has_gone_is_the_error_of_a_robot_that_waits_for_a_command() {
     for is_async in BOTH {
         let (mut robot, _far) = robot();
         robot.port().unplugged.set(true);
-        let command =
-            call!(is_async, robot, next_command, next_command_async(at_ms(5) - robot.now()));
+        let within = at_ms(5) - robot.now();
+        let command = call!(is_async, robot, next_command(within));
         assert_eq!(command, Err(GONE));
     }
 }

@@ -21,7 +21,7 @@ fn a_stop_is_tried_again_a_millisecond_after_the_port_has_failed() {
         let world = story.world.clone();
         let begin = world.now().as_micros();
         replug(&world, story.bus.port(), begin + 5500);
-        call!(is_async, story.bus, stop, stop_async(NodeId::N2)).unwrap();
+        call!(is_async, story.bus, stop(NodeId::N2)).unwrap();
         // Exchanges follow for 20 ms, until the motor is seen to be still.
         let took = world.now().as_micros() - begin;
         assert!((25_500..28_500).contains(&took), "{took} us, async {is_async}");
@@ -36,7 +36,7 @@ fn a_stop_of_a_rover_is_tried_again_a_millisecond_after_the_port_has_failed() {
         let mut rover = host();
         let world = rover.port().world.clone();
         replug(&world, rover.port(), 5500);
-        call!(is_async, rover, stop, stop_async()).unwrap();
+        call!(is_async, rover, stop()).unwrap();
         let took = world.now_us();
         assert!((5500..7500).contains(&took), "{took} us, async {is_async}");
     }
@@ -171,9 +171,10 @@ fn an_async_call_delays_for_a_second_at_most_and_asks_its_clock_in_between() {
     let (world, asked) = (World::default(), Rc::default());
     let delay = Late(world.clone(), Rc::clone(&asked));
     let time = WithDelay { clock: world.clone(), delay };
-    let mut driver = Driver::new(Recorder::default(), Port::new(&world, 20), time);
+    let mut driver = On::new(Recorder::default(), Port::new(&world, 20), time);
     let deadline = Instant::from_micros(2_500_000);
-    assert_eq!(world.block_on(driver.next_event_async(deadline - driver.now())), Ok(None));
+    let within = deadline - driver.now();
+    assert_eq!(world.block_on(driver.asynch().next_event(within)), Ok(None));
     assert_eq!(*asked.borrow(), [1_000_000, 1_000_000, 480_000]);
     assert_eq!(world.now() - deadline, Duration::from_micros(4800), "errors do not add up");
 }
@@ -199,11 +200,12 @@ impl Clock for SetBack {
 fn a_driver_whose_clock_was_set_back_idles_until_the_deadline_on_that_clock() {
     let clock = SetBack::default();
     clock.0.borrow_mut().0 = vec![1000, 500];
-    let mut driver = Driver::new(Recorder::default(), Port::default(), clock.clone());
+    let mut driver = On::new(Recorder::default(), Port::default(), clock.clone());
     let now = driver.now();
     assert_eq!(now, Instant::from_micros(1000), "the role's time goes on");
     let deadline = now + Duration::from_micros(2000);
-    assert_eq!(driver.next_event(deadline - driver.now()), Ok(None));
+    let within = deadline - driver.now();
+    assert_eq!(driver.next_event(within), Ok(None));
     assert_eq!(clock.0.borrow().1, [2500]);
     assert_eq!(driver.now(), deadline);
 }
@@ -213,7 +215,7 @@ fn a_stop_behind_a_failing_port_naps_for_a_millisecond_on_a_clock_that_was_set_b
     let clock = SetBack::default();
     clock.0.borrow_mut().0 = vec![1000, 500];
     let master = Master::new(MasterConfig::direct(), Instant::from_micros(0));
-    let mut bus = Driver::new(master, Port::writing([Step::Error]), clock.clone());
+    let mut bus = On::new(master, Port::writing([Step::Error]), clock.clone());
     let _ = bus.stop(NodeId::N1);
     // The clock stays at 500; the time of the role goes on from 1000.
     assert_eq!(clock.0.borrow().1.first(), Some(&1500));
@@ -225,7 +227,7 @@ fn a_stop_of_a_rover_naps_for_a_millisecond_on_a_clock_that_was_set_back() {
     let clock = SetBack::default();
     clock.0.borrow_mut().0 = vec![1000, 500];
     let host = Host::new(HostConfig::default(), Instant::from_micros(0));
-    let mut rover = Driver::new(host, Port::writing([Step::Error]), clock.clone());
+    let mut rover = On::new(host, Port::writing([Step::Error]), clock.clone());
     rover.stop().unwrap();
     assert_eq!(clock.0.borrow().1.first(), Some(&1500));
 }
@@ -236,7 +238,8 @@ fn a_driver_idles_until_its_role_wants_something_and_then_until_the_deadline() {
     clock.0.borrow_mut().0 = vec![1000];
     let mut role = Recorder::default();
     role.timeout = Some(Instant::from_micros(4000));
-    let mut driver = Driver::new(role, Port::default(), clock.clone());
-    assert_eq!(driver.next_event(Instant::from_micros(9000) - driver.now()), Ok(None));
+    let mut driver = On::new(role, Port::default(), clock.clone());
+    let within = Instant::from_micros(9000) - driver.now();
+    assert_eq!(driver.next_event(within), Ok(None));
     assert_eq!(clock.0.borrow().1, [4000, 9000]);
 }

@@ -84,7 +84,8 @@ fn an_async_call_dropped_at_any_await_and_repeated_loses_no_byte_and_cuts_no_fra
         let mut dropped = 0;
         // Every call is dropped after this many polls, again and again.
         for _ in 0..1000 {
-            match world.poll_times(polls, driver.next_event_async(at_ms(1000) - driver.now())) {
+            let within = at_ms(1000) - driver.now();
+            match world.poll_times(polls, driver.asynch().next_event(within)) {
                 Some(event) => events.extend(event.unwrap()),
                 None => dropped += 1,
             }

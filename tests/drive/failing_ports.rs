@@ -17,7 +17,7 @@ fn set_velocity(bus: &mut Bus, value: f32) -> Result<(), DriveError<Unplugged>> 
 }
 
 fn stop(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> {
-    call!(is_async, story.bus, stop, stop_async(NodeId::N1))
+    call!(is_async, story.bus, stop(NodeId::N1))
 }
 
 // The bus.
@@ -56,7 +56,8 @@ impl Story {
     fn run(&mut self, millis: u32) {
         let end = self.world.now() + ms(millis);
         while self.world.now() < end {
-            let _ = self.bus.run_for(end - self.bus.now(), |_, _, _| ());
+            let span = end - self.bus.now();
+            let _ = self.bus.run_for(span, |_, _, _| ());
             self.world.step(20);
         }
     }
@@ -190,7 +191,7 @@ fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
     let mut story = Story::at_10_rps(MasterConfig::direct());
     story.bus.port_mut().flushes = vec![Step::Stall].into();
     while !story.bus.port().flushes.is_empty() {
-        let _ = story.world.run(Some(2), story.bus.service_async());
+        let _ = story.world.run(Some(2), story.bus.asynch().service());
         story.world.step(20);
     }
     story.world.step(500);
@@ -207,7 +208,7 @@ fn a_stop_in_another_driver_does_not_wait_for_a_flush_that_was_not_made() {
     });
     assert!(is_sent, "the stop is late");
     role.stop(NodeId::N1, now);
-    story.bus = Driver::new(role, port, clock);
+    story.bus = On::new(role, port, clock);
     story.run(5);
     let command = story.node.borrow().role().slave().command(now);
     assert_eq!(command, Some(Target::Velocity(Rps::ZERO)), "the stop is late");
@@ -256,7 +257,7 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
         rover.port_mut().is_deaf = true;
         let world = rover.port().world.clone();
         for _ in 0..1000 {
-            let stopped = call!(is_async, rover, stop, stop_async());
+            let stopped = call!(is_async, rover, stop());
             assert_eq!(stopped, Ok(()), "nothing can be received, but the stop has left");
             world.step(100);
         }
@@ -264,7 +265,7 @@ fn a_receiver_that_fails_does_not_hold_up_the_stop_of_a_rover() {
         let id = rover.port().written.get(4);
         assert_eq!(id, Some(&2), "a thousand stops, but not a byte");
         // A call that needs an answer fails.
-        let report = call!(is_async, rover, next_report, next_report_async(ms(50)));
+        let report = call!(is_async, rover, next_report(ms(50)));
         assert_eq!(report, Err(GONE));
     }
 }
@@ -277,13 +278,13 @@ fn a_receiver_that_fails_does_not_leave_the_driver_enable_pin_on() {
         port.is_deafened = true;
         let slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), at_ms(0));
         let port = Rs485::new(port, pin.clone()).unwrap();
-        let mut node = Driver::new(slave, port, world.clone());
+        let mut node = On::new(slave, port, world.clone());
         let read = ReadRequest::new(NodeId::N2);
         embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();
         world.step(100);
         for _ in 0..1000 {
             let _ = match is_async {
-                true => world.block_on(node.service_async()),
+                true => world.block_on(node.asynch().service()),
                 false => node.service(),
             };
             world.step(10);
@@ -302,7 +303,8 @@ fn an_async_call_on_a_port_that_fails_at_once_lets_other_tasks_run() {
     bus.role_mut().stop(NodeId::N1, now);
     let mut careless = pin!(async {
         for _ in 0..100 {
-            let _ = bus.next_event_async(at_ms(60_000) - bus.now()).await;
+            let within = at_ms(60_000) - bus.now();
+            let _ = bus.asynch().next_event(within).await;
         }
     });
     let wakes = Arc::new(Wakes::default());

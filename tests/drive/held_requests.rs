@@ -59,7 +59,7 @@ impl Clocked {
         }
         let _ = match self.is_async {
             false => Some(self.story.bus.service()),
-            true => self.story.world.run(drops.then_some(polls), self.story.bus.service_async()),
+            true => self.story.world.run(drops.then_some(polls), self.story.bus.asynch().service()),
         };
         let wake_at = self.story.bus.poll_timeout().unwrap_or_default();
         while self.story.world.now() < wake_at && !self.story.bus.port().has_arrived() {

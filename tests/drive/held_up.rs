@@ -45,17 +45,17 @@ fn bytes_count_as_old_if_the_port_was_not_seen_empty_for_longer_than_the_limit()
         {
             let (world, mut driver, mut far) = story();
             world.step(5000);
-            call!(is_async, driver, service, service_async()).unwrap();
+            call!(is_async, driver, service()).unwrap();
             // Nothing was there at 6 ms.
             embedded_io::Write::write(&mut far, b"a").unwrap();
             world.step(late_us);
-            call!(is_async, driver, service, service_async()).unwrap();
+            call!(is_async, driver, service()).unwrap();
             let now = 6000 + late_us;
             assert_eq!(driver.role().0, [(since, now)], "{late_us} us, async {is_async}");
             // That round saw the port empty again.
             embedded_io::Write::write(&mut far, b"b").unwrap();
             world.step(4000);
-            call!(is_async, driver, service, service_async()).unwrap();
+            call!(is_async, driver, service()).unwrap();
             assert_eq!(driver.role().0[1], (None, now + 4000));
         }
     }
@@ -79,11 +79,12 @@ fn a_driver_looks_at_its_port_twice_within_the_limit_even_if_the_role_waits_for_
         let at = |micros| Some(Instant::from_micros(micros));
         assert_eq!(driver.poll_timeout(), at(3000));
         world.step(500);
-        call!(is_async, driver, service, service_async()).unwrap();
+        call!(is_async, driver, service()).unwrap();
         assert_eq!(driver.poll_timeout(), at(3500));
         // Waiting, it does so by itself.
         let deadline = at_ms(100);
-        let event = call!(is_async, driver, next_event, next_event_async(deadline - driver.now()));
+        let within = deadline - driver.now();
+        let event = call!(is_async, driver, next_event(within));
         assert_eq!(event, Ok(None));
         assert_eq!(driver.poll_timeout(), at(102_000));
     }

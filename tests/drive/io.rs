@@ -5,7 +5,10 @@ use std::{future::Future, pin::pin, task::Poll};
 use axlewire::{
     error::EncodeError,
     ikeya::{Response, ToMaster},
-    io::{FrameReader, FrameWriter, WriteError},
+    io::{
+        self, WriteError,
+        asynch::{FrameReader, FrameWriter},
+    },
     stream::{Framing, Gap, Reason},
     ucp::{
         RawFrame, Ucp,
@@ -41,6 +44,7 @@ enum Owned {
 }
 
 fn next_blocking(reader: &mut FrameReader<Port, Ucp, 64>) -> Owned {
+    let reader: &mut io::FrameReader<_, _, 64> = reader;
     match reader.read_event() {
         Ok(Some(event)) => owned::<Ucp>(event, |frame| frame.as_bytes().to_vec()),
         Ok(None) => Owned::End,
@@ -49,7 +53,7 @@ fn next_blocking(reader: &mut FrameReader<Port, Ucp, 64>) -> Owned {
 }
 
 fn next_async(reader: &mut FrameReader<Port, Ucp, 64>) -> Owned {
-    match poll_once(reader.read_event_async()) {
+    match poll_once(reader.read_event()) {
         Some(Ok(Some(event))) => owned::<Ucp>(event, |frame| frame.as_bytes().to_vec()),
         Some(Ok(None)) => Owned::End,
         Some(Err(Unplugged)) => Owned::Error,
@@ -167,7 +171,7 @@ fn a_cancelled_read_loses_nothing_wherever_it_is_cancelled() {
 fn the_reader_serves_the_motor_bus_with_the_smallest_buffer() {
     let response = VelocityResponse::new(NodeId::N4, Rps::ZERO);
     let line = [&[0xAA][..], response.as_bytes(), response.as_bytes()].concat();
-    let mut reader = FrameReader::<_, ToMaster, 8>::new(Port::file([Step::Bytes(line)]));
+    let mut reader = io::FrameReader::<_, ToMaster, 8>::new(Port::file([Step::Bytes(line)]));
     assert!(matches!(reader.read_event(), Ok(Some(Event::Skipped(Gap { len: 1, .. })))));
     for _ in 0..2 {
         let Ok(Some(Event::Frame(Response::Velocity(found)))) = reader.read_event() else {
@@ -182,11 +186,12 @@ fn the_reader_serves_the_motor_bus_with_the_smallest_buffer() {
 type Writer = FrameWriter<Port, 24>;
 
 fn write_blocking(writer: &mut Writer, index: u8) -> Result<(), WriteError<Unplugged>> {
+    let writer: &mut io::FrameWriter<_, 24> = writer;
     writer.write(&Ping {}.frame(index))
 }
 
 fn write_async(writer: &mut Writer, index: u8) -> Result<(), WriteError<Unplugged>> {
-    poll_once(writer.write_async(&Ping {}.frame(index))).expect("ready")
+    poll_once(writer.write(&Ping {}.frame(index))).expect("ready")
 }
 
 type WritePing = fn(&mut Writer, u8) -> Result<(), WriteError<Unplugged>>;
@@ -234,16 +239,16 @@ fn a_write_error_in_the_middle_of_a_frame_leaves_the_rest_for_the_next_call() {
 fn a_cancelled_write_is_finished_by_the_next_call() {
     let steps = [Step::Few(3), Step::Stall];
     let mut writer = Writer::new(Port::writing(steps));
-    assert_eq!(poll_once(writer.write_async(&Ping {}.frame(1))), None);
+    assert_eq!(poll_once(writer.write(&Ping {}.frame(1))), None);
     assert_eq!(writer.unsent(), &ping(1)[3..]);
-    assert_eq!(poll_once(writer.flush_async()), Some(Ok(())));
+    assert_eq!(poll_once(writer.flush()), Some(Ok(())));
     let port = writer.into_port();
     assert_eq!((port.written, port.flushed), (ping(1), 1));
 }
 
 #[test]
 fn flush_sends_what_is_queued_and_flushes_the_port() {
-    let mut writer = Writer::new(Port::default());
+    let mut writer = io::FrameWriter::<_, 24>::new(Port::default());
     writer.queue(&Ping {}.frame(1)).unwrap();
     writer.queue(&Ping {}.frame(2)).unwrap();
     assert!(writer.port_mut().written.is_empty());
@@ -254,7 +259,7 @@ fn flush_sends_what_is_queued_and_flushes_the_port() {
 
 #[test]
 fn a_frame_without_room_is_refused_and_the_queue_stays_as_it_was() {
-    let mut writer = Writer::new(Port::default());
+    let mut writer = io::FrameWriter::<_, 24>::new(Port::default());
     for index in 0..3 {
         writer.queue(&Ping {}.frame(index)).unwrap();
     }
@@ -287,7 +292,7 @@ fn a_write_error_keeps_the_ports_own_as_its_source() {
 #[test]
 fn a_reader_and_its_copy_go_on_with_the_bytes_that_it_holds() {
     let bytes = ping(1);
-    let mut reader = FrameReader::<&[u8], Ucp, 64>::new(&bytes[..5]);
+    let mut reader = io::FrameReader::<&[u8], Ucp, 64>::new(&bytes[..5]);
     assert_eq!(reader.read_event(), Ok(None));
     assert_eq!((reader.pending(), reader.decoder().pending()), (5, 5));
     let mut copy = reader.clone();
@@ -307,14 +312,14 @@ fn a_reader_and_its_copy_go_on_with_the_bytes_that_it_holds() {
 #[test]
 fn a_failed_flush_is_an_error_of_the_port_and_the_next_one_goes_on() {
     let port = || Port { flushes: [Step::Error].into(), ..Port::default() };
-    let (mut one, mut other) = (Writer::new(port()), Writer::new(port()));
+    let (mut one, mut other) = (io::FrameWriter::<_, 24>::new(port()), Writer::new(port()));
     for (is_first, expected) in [(true, Err(WriteError::Port(Unplugged))), (false, Ok(()))] {
         if is_first {
             one.queue(&Ping {}.frame(1)).unwrap();
             other.queue(&Ping {}.frame(1)).unwrap();
         }
         assert_eq!(one.flush(), expected);
-        assert_eq!(poll_once(other.flush_async()), Some(expected));
+        assert_eq!(poll_once(other.flush()), Some(expected));
         assert!(one.unsent().is_empty() && other.unsent().is_empty());
     }
     assert_eq!((one.into_port().written, other.into_port().written), (ping(1), ping(1)));

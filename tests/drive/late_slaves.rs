@@ -25,7 +25,7 @@ fn an_answer_that_was_cut_off_is_given_up_when_another_request_is_heard_at_once(
         wire.world.step(late_us);
         wire.receive(ReadRequest::new(NodeId::N2).as_bytes());
         wire.write_all();
-        call!(is_async, slave, service, service_async()).unwrap();
+        call!(is_async, slave, service()).unwrap();
         assert_eq!(wire.sent().len(), 4, "it talks during node 2's turn");
         // Nothing was received: the rest may be sent.
         let wire = Wire::bus(None);
@@ -73,10 +73,9 @@ fn a_command_does_not_outlive_its_watchdog_while_an_answer_is_flushed() {
             wire.world.step(200);
             slave.port_mut().flushes = [flush.clone()].into();
             if is_polled {
-                let _ = call!(is_async, slave, service, service_async());
+                let _ = call!(is_async, slave, service());
             } else {
-                let heard =
-                    call!(is_async, slave, next_command, next_command_async(Duration::ZERO));
+                let heard = call!(is_async, slave, next_command(Duration::ZERO));
                 assert_eq!(heard, Ok(None), "a command whose watchdog has fired");
             }
             assert_eq!(events(&mut slave), [SlaveEvent::Watchdog]);
@@ -92,7 +91,8 @@ fn a_command_does_not_outlive_its_watchdog_while_another_task_runs() {
     wire.world.step(200);
     slave.port_mut().reads = [Step::Few(usize::MAX), Step::Error].into();
     let heard = {
-        let mut call = std::pin::pin!(slave.next_command_async(at_ms(60_000) - slave.now()));
+        let within = at_ms(60_000) - slave.now();
+        let mut call = std::pin::pin!(slave.asynch().next_command(within));
         assert!(poll(call.as_mut()).is_pending(), "it yields behind an error");
         wire.world.step(5_000_000);
         wire.world.block_on(call)
@@ -121,7 +121,7 @@ fn an_idle_slave_that_was_held_up_neither_obeys_nor_answers() {
         wire.receive(FIVE_RPS().as_bytes());
         wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
         wire.world.step(10_000_000);
-        call!(is_async, slave, service, service_async()).unwrap();
+        call!(is_async, slave, service()).unwrap();
         assert_eq!(command(&slave), None, "it turns on a ten-second-old command");
         assert_eq!(*wire.sent(), [], "it answers a ten-second-old request");
         assert_eq!(slave.role().statistics().expired, 1);
@@ -136,13 +136,13 @@ fn a_slave_whose_executor_was_held_neither_obeys_nor_answers() {
     let bytes =
         [FIVE_RPS().as_bytes().repeat(20), ReadRequest::new(NodeId::N1).as_bytes().to_vec()];
     let event = wire.block_on_held(
-        slave.next_event_async(Duration::from_millis(1000)),
+        slave.asynch().next_event(Duration::from_millis(1000)),
         &bytes.concat(),
         3_000_000,
     );
     // Events reported before the rest has been taken in do not count.
     let _ = event.unwrap();
-    wire.world.block_on(slave.service_async()).unwrap();
+    wire.world.block_on(slave.asynch().service()).unwrap();
     assert_eq!(command(&slave), None, "it turns on a three-second-old command");
     assert_eq!(*wire.sent(), [], "it answers a three-second-old request");
 }
@@ -156,8 +156,7 @@ fn an_idle_slave_answers_a_request_after_a_long_silence() {
         let mut slave = idle_slave(&wire, SlaveConfig::direct());
         let begin_us = wire.world.now_us();
         wire.receive_in(silence_us, ReadRequest::new(NodeId::N1).as_bytes());
-        call!(is_async, slave, run_for, run_for_async(Duration::from_millis(3000), |_, _, _| ()))
-            .unwrap();
+        call!(is_async, slave, run_for(Duration::from_millis(3000), |_, _, _| ())).unwrap();
         assert_eq!(wire.sent().len(), 8, "async {is_async}");
         let delay_us = wire.sent()[0].0 - begin_us - silence_us;
         assert!(delay_us < 200, "async {is_async}: it answered after {delay_us} us");
@@ -202,12 +201,12 @@ fn a_slave_whose_port_takes_no_answer_hears_of_its_watchdog_in_time() {
     let wire = Wire::bus(None);
     let mut slave = one_slave(&wire, config);
     wire.receive(FIVE_RPS().as_bytes());
-    wire.world.block_on(slave.next_command_async(ms(1))).unwrap().unwrap();
+    wire.world.block_on(slave.asynch().next_command(ms(1))).unwrap().unwrap();
     let commanded = wire.world.now();
     wire.write_with(|_| Step::Stall);
     wire.receive(ReadRequest::new(NodeId::N1).as_bytes());
     while command(&slave).is_some() {
-        wire.world.block_on(slave.next_command_async(ms(1000))).unwrap();
+        wire.world.block_on(slave.asynch().next_command(ms(1000))).unwrap();
     }
     assert!(wire.world.now() - commanded <= watchdog + ms(5), "{:?}", wire.world.now());
 }

@@ -122,7 +122,7 @@ fn a_set_point_that_failed_is_not_sent_by_a_later_call() {
             Wire::one_motor(Mode::Velocity, |config| config.polling = Polling::Manual);
         wire.world.step(1000);
         wire.write_only(0);
-        let failed = call!(is_async, bus, set_velocity, set_velocity_async(NodeId::N1, rps(10.0)));
+        let failed = call!(is_async, bus, set_velocity(NodeId::N1, rps(10.0)));
         assert_eq!(failed, Err(DriveError::Port(Unplugged)));
         wire.world.step(10_000_000);
         wire.write_all();

@@ -6,7 +6,7 @@ use crate::rig::*;
 #[test]
 fn a_driver_gives_back_its_role_its_port_and_its_clock() {
     let clock = || Instant::from_micros(7);
-    let mut driver = Driver::new(Recorder::default(), Port::reading([bytes(3)]), clock);
+    let mut driver = On::new(Recorder::default(), Port::reading([bytes(3)]), clock);
     driver.service().unwrap();
     let (role, mut port, clock) = driver.into_parts();
     assert_eq!(role.received.len(), 3);

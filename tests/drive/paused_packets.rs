@@ -38,7 +38,7 @@ fn turning(parts: impl Fn(usize) -> Step + 'static) -> (Wire, Bus) {
 fn is_paid(parts: impl Fn(usize) -> Step + Copy + 'static) -> [bool; 2] {
     [false, true].map(|is_async| {
         let (wire, mut bus) = turning(parts);
-        let stopped = call!(is_async, bus, stop, stop_async(NodeId::N1));
+        let stopped = call!(is_async, bus, stop(NodeId::N1));
         assert!(
             stopped.is_err() || wire.rps() == 0.0,
             "reported as stopped, but turns at {}",
@@ -125,13 +125,13 @@ fn a_packet_in_doubt_whose_flush_is_cancelled_or_stalls_counts_as_cut_off() {
         bus.port_mut().flushes.extend(vec![Step::Stall; 9]);
         owe_stop(&mut bus);
         if is_cancelled {
-            assert!(poll(pin!(bus.service_async())).is_pending());
+            assert!(poll(pin!(bus.asynch().service())).is_pending());
             assert_eq!(bus.role().statistics().writes, writes + 1);
             bus.port_mut().flushes.clear();
             wire.write_with(|_| Step::Error);
             let _ = bus.service();
         } else {
-            assert_eq!(wire.world.block_on(bus.service_async()), Err(DriveError::Stalled));
+            assert_eq!(wire.world.block_on(bus.asynch().service()), Err(DriveError::Stalled));
         }
         assert_eq!(bus.role().statistics().writes, writes, "the stop was not written");
         bus.port_mut().flushes.clear();

@@ -139,13 +139,13 @@ where
 }
 
 /// A role whose port has a pin.
-pub(crate) type PinnedDriver = Driver<Recorder, Pinned<NoDelay>, World>;
+pub(crate) type PinnedDriver = On<Recorder, Pinned<NoDelay>, World>;
 
 pub(crate) fn serve(
     driver: &mut PinnedDriver,
     is_async: bool,
 ) -> Result<(), DriveError<Rs485Error<Unplugged, Stuck>>> {
-    if is_async { ready(driver.service_async()) } else { driver.service() }
+    if is_async { ready(driver.asynch().service()) } else { driver.service() }
 }
 
 /// Whether the pin is on, as far as it has followed its calls.

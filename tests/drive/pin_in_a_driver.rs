@@ -8,7 +8,7 @@ fn a_driver_switches_the_pin_once_per_round_and_releases_it_when_its_port_fails(
         let (port, log, _) = undelayed(Port::writing([Step::Few(2)]));
         drain(&log);
         let role = Recorder::sending(&[b"12", b"34"]);
-        let mut driver = Driver::new(role, port, World::default());
+        let mut driver = On::new(role, port, World::default());
         assert_eq!(serve(&mut driver, is_async), Ok(()));
         assert_eq!(drain(&log), "on write write flush off");
         driver.role_mut().frames.push_back(b"56".into());
@@ -45,7 +45,7 @@ fn the_pin_is_off_after_every_call_whatever_fails() {
             };
             let (port, log, _) = undelayed(script);
             let role = Recorder::sending(&[b"12", b"34"]);
-            let mut driver = Driver::new(role, port, World::default());
+            let mut driver = On::new(role, port, World::default());
             for call in 0..5 {
                 let _ = serve(&mut driver, is_async);
                 let story = (read, write, flush, call);
@@ -64,7 +64,7 @@ fn a_pin_that_failed_to_go_off_goes_off_with_the_next_call_whatever_else_fails()
                 let world = World::default();
                 let (port, log, pin) = undelayed(Port::writing(write.clone()));
                 let role = Recorder::sending(&[b"12", b"34"]);
-                let mut driver = Driver::new(role, port, world.clone());
+                let mut driver = On::new(role, port, world.clone());
                 for call in 0..8 {
                     if call == calls {
                         pin.failures.set(failures);
@@ -99,14 +99,14 @@ fn a_pin_left_on_by_a_dropped_call_goes_off_with_the_next_one() {
             };
             let (port, log, _) = undelayed(script);
             let role = Recorder::sending(&[b"12"]);
-            let mut driver = Driver::new(role, port, world.clone());
-            let is_dropped = |driver: &mut Driver<_, _, _>| {
-                let mut call = std::pin::pin!(driver.service_async());
+            let mut driver = On::new(role, port, world.clone());
+            let is_dropped = |driver: &mut On<_, _, _>| {
+                let mut call = std::pin::pin!(driver.asynch().service());
                 poll(call.as_mut()).is_pending() && poll(call.as_mut()).is_pending()
             };
             while !is_dropped(&mut driver) {}
             world.step(late_us);
-            assert_eq!(ready(driver.service_async()), Ok(()));
+            assert_eq!(ready(driver.asynch().service()), Ok(()));
             assert!(!is_on(&log), "{writes:?} {late_us}");
         }
     }
@@ -128,10 +128,10 @@ fn a_port_that_stalls_for_a_second_does_not_leave_the_driver_enable_pin_on() {
         let script = Port { writes: writes.into(), flushes: flushes.into(), ..Port::default() };
         let (port, log, _) = undelayed(script);
         let role = Recorder::sending(&[b"12", b"34", b"56"]);
-        let mut driver = Driver::new(role, port, world.clone());
+        let mut driver = On::new(role, port, world.clone());
         let mut stalls = 0;
         for _ in 0..count + 1 {
-            let mut call = std::pin::pin!(driver.service_async());
+            let mut call = std::pin::pin!(driver.asynch().service());
             if poll(call.as_mut()).is_pending() {
                 assert!(is_on(&log) || stalls > 0, "{story}");
                 world.step(1_000_000);
@@ -150,10 +150,13 @@ fn a_slave_whose_call_ends_while_its_answer_leaves_returns_with_its_pin_off() {
     let (near, mut far) = Port::pair(&world, 20);
     let (port, _log, _pin) = undelayed(Port { drains: true, ..near });
     let role = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
-    let mut slave = Driver::new(role, port, world.clone());
+    let mut slave = On::new(role, port, world.clone());
     embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
     // The request takes 80 us, the answer 160 us.
-    assert_eq!(world.block_on(slave.next_command_async(Duration::from_micros(180))).unwrap(), None);
+    assert_eq!(
+        world.block_on(slave.asynch().next_command(Duration::from_micros(180))).unwrap(),
+        None
+    );
     assert!(!slave.port_mut().is_on());
     assert_eq!(slave.port_mut().port_mut().written.len(), 8);
     assert!(world.now() >= at_ms(0) + Duration::from_micros(240));
@@ -166,15 +169,15 @@ fn a_pin_that_was_left_on_goes_off_in_the_first_round_of_another_driver() {
     let (mut near, log, _) = undelayed(near);
     near.port_mut().flushes.push_back(Step::Stall);
     let role = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::direct(), world.now());
-    let mut slave: Driver<Slave, _, _> = Driver::new(role, near, world.clone());
+    let mut slave: On<Slave, _, _> = On::new(role, near, world.clone());
     embedded_io::Write::write_all(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
     world.step(100);
     // A call that is dropped while the answer leaves.
-    assert_eq!(world.poll_times(1, slave.service_async()), None);
+    assert_eq!(world.poll_times(1, slave.asynch().service()), None);
     assert!(is_on(&log));
     let (role, port, clock) = slave.into_parts();
-    let mut slave = Driver::new(role, port, clock);
+    let mut slave = On::new(role, port, clock);
     world.step(10_000);
-    world.block_on(slave.service_async()).unwrap();
+    world.block_on(slave.asynch().service()).unwrap();
     assert!(!is_on(&log), "the pair is jammed for all nodes");
 }

@@ -108,7 +108,7 @@ fn round_blocking(driver: &mut On<Recorder>) -> Option<Result<(), DriveError<Unp
 }
 
 fn round_async(driver: &mut On<Recorder>) -> Option<Result<(), DriveError<Unplugged>>> {
-    let mut round = pin!(driver.service_async());
+    let mut round = pin!(driver.asynch().service());
     // A call that fails yields once.
     for _ in 0..2 {
         if let Poll::Ready(result) = poll(round.as_mut()) {

@@ -2,6 +2,7 @@
 
 use std::{
     cell::{Cell, RefCell},
+    ops::{Deref, DerefMut},
     rc::Rc,
 };
 
@@ -14,7 +15,7 @@ pub(crate) use axlewire::ucp::{
 };
 /// What the scenarios use of the library, and their port.
 pub(crate) use axlewire::{
-    drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay},
+    drive::{Clock, DriveError, Driver, Operation, Rs485, Rs485Error, WithDelay, asynch},
     endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Status, Target,
@@ -37,11 +38,11 @@ pub(crate) use crate::{
 
 /// The blocking form of a call, or the async one.
 macro_rules! call {
-    ($is_async:expr, $driver:expr, $name:ident, $name_async:ident($($argument:expr),*)) => {
+    ($is_async:expr, $driver:expr, $name:ident($($argument:expr),*)) => {
         match $is_async {
             true => {
                 let world = $driver.port().world.clone();
-                world.block_on($driver.$name_async($($argument),*))
+                world.block_on($driver.asynch().$name($($argument),*))
             }
             false => $driver.$name($($argument),*),
         }
@@ -73,15 +74,50 @@ pub(crate) fn both<T: PartialEq + core::fmt::Debug>(call: impl Fn(bool) -> T) ->
     blocking
 }
 
-/// A role behind a driver on a port of its own.
-pub(crate) type On<R> = Driver<R, Port, World>;
+/// A role behind a driver on a port: its calls are blocking.
+#[derive(Clone, Debug)]
+pub(crate) struct On<R, P = Port, C = World>(asynch::Driver<R, P, C>);
+
+impl<R: Endpoint, P, C: Clock> On<R, P, C> {
+    pub(crate) fn new(role: R, port: P, clock: C) -> Self {
+        Self(asynch::Driver::new(role, port, clock))
+    }
+
+    pub(crate) fn with(role: impl FnOnce(Instant) -> R, port: P, clock: C) -> Self {
+        Self(asynch::Driver::with(role, port, clock))
+    }
+
+    /// The same driver, with async calls.
+    pub(crate) fn asynch(&mut self) -> &mut asynch::Driver<R, P, C> {
+        &mut self.0
+    }
+
+    pub(crate) fn into_parts(self) -> (R, P, C) {
+        self.0.into_parts()
+    }
+}
+
+impl<R, P, C> Deref for On<R, P, C> {
+    type Target = Driver<R, P, C>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<R, P, C> DerefMut for On<R, P, C> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
 /// A role that runs whenever virtual time passes.
 pub(crate) type Running<R> = Rc<RefCell<On<R>>>;
 
 /// A role on a port.
 pub(crate) fn on<R: Endpoint>(role: R, port: Port) -> On<R> {
     let world = port.world.clone();
-    Driver::new(role, port, world)
+    On::new(role, port, world)
 }
 
 /// A clock with these readings, microseconds.
@@ -93,7 +129,7 @@ pub(crate) fn clock_that_says(readings: impl IntoIterator<Item = u64>) -> impl F
 /// The same role and port in another driver.
 pub(crate) fn in_another_driver<R: Endpoint>(driver: On<R>) -> On<R> {
     let (role, port, clock) = driver.into_parts();
-    Driver::new(role, port, clock)
+    On::new(role, port, clock)
 }
 
 /// A role that runs whenever virtual time passes, unless it is unplugged: then it hears nothing.

@@ -34,7 +34,7 @@ fn a_role_is_told_when_its_frame_was_taken_and_when_it_was_flushed() {
         port.flushes.push_back(Step::Late(4000));
         let role = Recorder::sending(&[b"123", b"45"]);
         let mut driver = on(role, port);
-        let sent = call!(is_async, driver, service, service_async());
+        let sent = call!(is_async, driver, service());
         assert_eq!(sent, Ok(()));
         assert_eq!(driver.role().taken_at, [3, 7].map(at_ms), "async {is_async}");
         assert_eq!(driver.role().flushed_at, [7, 7].map(at_ms), "async {is_async}");
@@ -77,7 +77,7 @@ fn bytes_arriving_while_a_frame_is_sent_are_taken_in_before_the_next_one() {
         });
         let mut driver = on(role, near);
         if is_async {
-            world.block_on(driver.service_async()).unwrap();
+            world.block_on(driver.asynch().service()).unwrap();
         } else {
             world.step(20);
             world.step(20);

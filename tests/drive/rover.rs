@@ -30,7 +30,7 @@ fn after(world: &World, millis: u32) -> Instant {
 fn a_ping_comes_back_with_its_round_trip() {
     for is_async in BOTH {
         let (_, mut rover, _) = story();
-        let trip = call!(is_async, rover, ping, ping_async(ms(700)));
+        let trip = call!(is_async, rover, ping(ms(700)));
         // 8 bytes there, 9 back, and up to one report before the pong.
         let micros = u64::from(trip.unwrap().as_micros());
         assert!((17 * BYTE_US..70 * BYTE_US).contains(&micros), "{micros}");
@@ -47,7 +47,7 @@ fn an_earlier_pong_is_not_the_answer_to_a_ping() {
         run(&world, &mut rover, 500, 20);
         assert_eq!(rover.role().statistics().round_trip.count(), 1);
         robot.borrow().port().unplugged.set(true);
-        let pong = call!(is_async, rover, ping, ping_async(ms(700)));
+        let pong = call!(is_async, rover, ping(ms(700)));
         assert_eq!(pong, Err(DriveError::Timeout(Operation::Ping)));
     }
 }
@@ -58,7 +58,7 @@ fn a_ping_whose_port_fails_at_once_leaves_the_events_that_wait() {
         let (world, mut rover, _) = story();
         run(&world, &mut rover, 500, 20);
         rover.port_mut().reads.push_back(Step::Error);
-        let pong = call!(is_async, rover, ping, ping_async(ms(700)));
+        let pong = call!(is_async, rover, ping(ms(700)));
         assert!(matches!(pong, Err(DriveError::Port(_))), "{pong:?}");
         let told: Vec<_> = events(&mut rover);
         assert!(told.iter().any(|event| matches!(event, HostEvent::Pong { .. })), "{told:?}");
@@ -71,7 +71,8 @@ fn a_robot_that_never_answers_is_a_timeout_and_a_lost_link() {
         let (world, mut rover, robot) = story();
         robot.borrow_mut().port().unplugged.set(true);
         let deadline = after(&world, 700);
-        let error = call!(is_async, rover, ping, ping_async(deadline - rover.now())).unwrap_err();
+        let within = deadline - rover.now();
+        let error = call!(is_async, rover, ping(within)).unwrap_err();
         assert_eq!(error, DriveError::Timeout(Operation::Ping));
         assert_eq!(error.to_string(), "the robot did not answer a ping in time");
         assert_eq!(world.now(), deadline);
@@ -84,12 +85,12 @@ fn driving_reaches_the_robot_and_a_stop_is_on_the_line_when_it_returns() {
     for is_async in BOTH {
         let (world, mut rover, robot) = story();
         let commanded = || robot.borrow().role().command(world.now());
-        call!(is_async, rover, drive, drive_async(60, -20)).unwrap();
+        call!(is_async, rover, drive(60, -20)).unwrap();
         // The host's first frame, which is zero, and the command: 48 bytes.
         world.pass(8000);
         assert_eq!((commanded().speed(), commanded().angular()), (60, -20));
         // Without calling the driver again.
-        call!(is_async, rover, stop, stop_async()).unwrap();
+        call!(is_async, rover, stop()).unwrap();
         world.pass(4000);
         assert_eq!((commanded().speed(), commanded().angular()), (0, 0));
     }
@@ -140,13 +141,14 @@ fn reports_come_one_by_one_and_in_time() {
     for is_async in BOTH {
         let (world, mut rover, robot) = story();
         for index in 0..10 {
-            let report = call!(is_async, rover, next_report, next_report_async(ms(25)));
+            let report = call!(is_async, rover, next_report(ms(25)));
             let report = report.unwrap().unwrap();
             assert_eq!((report.index, report.lost, report.telemetry.battery_pct), (index, 0, 87));
         }
         robot.borrow_mut().port().unplugged.set(true);
         let deadline = after(&world, 25);
-        let none = call!(is_async, rover, next_report, next_report_async(deadline - rover.now()));
+        let within = deadline - rover.now();
+        let none = call!(is_async, rover, next_report(within));
         assert_eq!((none, world.now()), (Ok(None), deadline));
     }
 }
@@ -157,21 +159,11 @@ fn a_calibration_is_begun_and_ended_when_the_calls_return() {
         let (world, mut rover, robot) = story();
         let kind = CalibrationKind::Magnetometer;
         let deadline = after(&world, 1000);
-        call!(
-            is_async,
-            rover,
-            start_calibration,
-            start_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap();
+        let within = deadline - rover.now();
+        call!(is_async, rover, start_calibration(kind, within)).unwrap();
         assert_eq!(robot.borrow().role().calibrating(), Some(kind));
-        call!(
-            is_async,
-            rover,
-            end_calibration,
-            end_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap();
+        let within = deadline - rover.now();
+        call!(is_async, rover, end_calibration(kind, within)).unwrap();
         assert_eq!(robot.borrow().role().calibrating(), None);
     }
 }
@@ -183,12 +175,8 @@ fn an_outcome_that_came_after_its_call_is_not_an_event_during_the_next() {
         let kind = CalibrationKind::Imu;
         let start = |rover: &mut Rover, millis| {
             let deadline = after(&world, millis);
-            call!(
-                is_async,
-                *rover,
-                start_calibration,
-                start_calibration_async(kind, deadline - rover.now())
-            )
+            let within = deadline - rover.now();
+            call!(is_async, *rover, start_calibration(kind, within))
         };
         let timeout = Err(DriveError::Timeout(Operation::Calibration));
         assert_eq!(start(&mut rover, 1), timeout);
@@ -210,26 +198,16 @@ fn a_calibration_without_an_answer_fails_with_the_error_of_its_role() {
         let kind = CalibrationKind::Imu;
         let bound = world.now() + HostConfig::default().calibration_bound();
         let deadline = bound + ms(100);
-        let error = call!(
-            is_async,
-            rover,
-            start_calibration,
-            start_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap_err();
+        let within = deadline - rover.now();
+        let error = call!(is_async, rover, start_calibration(kind, within)).unwrap_err();
         let DriveError::Calibration(failure) = error else { panic!("{error:?}") };
         assert_eq!((failure.step, failure.cause), (CalibrationStep::Start, FailureCause::NoAnswer));
         assert_eq!(error.to_string(), "calibration of Imu did not start: no answer to 3 requests");
         assert!(world.now() < deadline);
         // An earlier deadline takes precedence.
         let deadline = after(&world, 50);
-        let error = call!(
-            is_async,
-            rover,
-            end_calibration,
-            end_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap_err();
+        let within = deadline - rover.now();
+        let error = call!(is_async, rover, end_calibration(kind, within)).unwrap_err();
         assert_eq!((error, world.now()), (DriveError::Timeout(Operation::Calibration), deadline));
     }
 }
@@ -250,7 +228,7 @@ fn a_robots_next_command_is_the_next_change_and_the_watchdogs_stop_is_one() {
         let mut robot = on(robot, far);
         let mut next = |end| {
             let within = end - robot.now();
-            call!(is_async, robot, next_command, next_command_async(within))
+            call!(is_async, robot, next_command(within))
         };
         assert_eq!(next(at_ms(100)), Ok(Some(command)));
         assert_eq!(next(at_ms(100)), Ok(None));
@@ -268,8 +246,10 @@ fn a_dropped_ping_made_again_is_answered_and_cuts_no_frame() {
         (rover.port_mut().most, rover.port_mut().stutters) = (1, true);
         rover.role_mut().drive(MotorControl::new(10, 0).unwrap(), world.now()).unwrap();
         let deadline = after(&world, 2000);
-        let done = world.poll_times(polls, rover.ping_async(deadline - rover.now())).is_some();
-        world.block_on(rover.ping_async(deadline - rover.now())).unwrap();
+        let within = deadline - rover.now();
+        let done = world.poll_times(polls, rover.asynch().ping(within)).is_some();
+        let within = deadline - rover.now();
+        world.block_on(rover.asynch().ping(within)).unwrap();
         assert_eq!(robot.borrow().role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().counters().skipped(), 0, "dropped after {polls} polls");
         assert_eq!(rover.role().statistics().reports_lost, 0);
@@ -285,7 +265,7 @@ fn a_stop_goes_through_errors_of_the_port_and_is_on_the_line_when_it_returns() {
         rover.port().unplugged.set(true);
         let (plug, time) = (rover.port().unplugged.clone(), world.clone());
         world.add(move || plug.set(time.now() < at_ms(70)));
-        call!(is_async, rover, stop, stop_async()).unwrap();
+        call!(is_async, rover, stop()).unwrap();
         assert!(world.now() < at_ms(80), "{:?}", world.now());
         // Without calling the driver again.
         world.pass(10_000);
@@ -305,7 +285,7 @@ fn driving_for_a_while_keeps_the_command_alive_and_ends_with_a_stop() {
             }
         });
         let span = ms(1200);
-        call!(is_async, rover, drive_for, drive_for_async(40, 0, span)).unwrap();
+        call!(is_async, rover, drive_for(40, 0, span)).unwrap();
         assert!((2300..2390).contains(&(world.now().as_micros() / 1000)));
         world.pass(10_000);
         assert_eq!(robot.borrow().role().command(world.now()).speed(), 0);
@@ -321,7 +301,7 @@ fn a_drive_that_is_dropped_leaves_a_stop_that_the_next_call_sends() {
     for polls in [1, 50, 5000] {
         let (world, mut rover, robot) = story();
         let span = ms(60_000);
-        let done = world.poll_times(polls, rover.drive_for_async(40, 0, span));
+        let done = world.poll_times(polls, rover.asynch().drive_for(40, 0, span));
         assert!(done.is_none(), "not dropped");
         assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
         rover.service().unwrap();
@@ -351,24 +331,14 @@ fn calls_take_only_frequent_events_and_those_that_they_return() {
         let (world, mut rover, _) = story();
         let kind = CalibrationKind::Imu;
         for _ in 0..10 {
-            call!(is_async, rover, ping, ping_async(ms(700))).unwrap();
+            call!(is_async, rover, ping(ms(700))).unwrap();
         }
         let deadline = after(&world, 700);
-        call!(
-            is_async,
-            rover,
-            start_calibration,
-            start_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap();
-        call!(
-            is_async,
-            rover,
-            end_calibration,
-            end_calibration_async(kind, deadline - rover.now())
-        )
-        .unwrap();
-        call!(is_async, rover, stop, stop_async()).unwrap();
+        let within = deadline - rover.now();
+        call!(is_async, rover, start_calibration(kind, within)).unwrap();
+        let within = deadline - rover.now();
+        call!(is_async, rover, end_calibration(kind, within)).unwrap();
+        call!(is_async, rover, stop()).unwrap();
         let kept = events(&mut rover);
         assert!(kept.contains(&HostEvent::LinkUp), "{kept:?}");
         let is_out = |event: &HostEvent| {
@@ -390,7 +360,7 @@ fn driving_for_a_while_keeps_the_command_alive_whatever_the_dead_man_is() {
     for timeout_ms in [2, 30, 100, 150] {
         for is_async in BOTH {
             let (_, mut rover, _robot) = rover(|config| config.dead_man = ms(timeout_ms));
-            call!(is_async, rover, drive_for, drive_for_async(40, 0, ms(600))).unwrap();
+            call!(is_async, rover, drive_for(40, 0, ms(600))).unwrap();
             assert_eq!(rover.role().statistics().dead_man, 0, "{timeout_ms} ms");
         }
     }

@@ -56,7 +56,7 @@ fn a_cut_off_command_is_not_completed_by_the_call_that_stops() {
         assert!(host.drive(99, 0).is_err());
         let cut = wire.sent().len();
         wire.write_all();
-        call!(is_async, host, stop, stop_async()).unwrap();
+        call!(is_async, host, stop()).unwrap();
         let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
         assert_eq!(sent.len(), 2 * stop, "the rest of the command was sent, or only one stop");
@@ -78,7 +78,7 @@ fn a_stop_of_which_a_part_has_left_is_sent_twice_through_a_reopened_port() {
         let cut = wire.sent().len();
         wire.write_all();
         let mut host = in_another_driver(host);
-        call!(is_async, host, stop, stop_async()).unwrap();
+        call!(is_async, host, stop()).unwrap();
         let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
         let stop = FrameOf::<MotorControl>::LEN;
         assert_eq!(sent.len(), 2 * stop);
@@ -98,7 +98,7 @@ fn a_stop_whose_first_part_was_flushed_alone_is_sent_twice_more_unless_its_rest_
             assert!(host.service().is_err());
             wire.world.step(3000);
             host.port_mut().flushes = [Step::Blocks(flush_us)].into();
-            call!(is_async, host, stop, stop_async()).unwrap();
+            call!(is_async, host, stop()).unwrap();
             // The call adds a stop of its own.
             let copies = if is_late { 3 } else { 2 };
             assert_eq!(
@@ -114,14 +114,14 @@ fn a_stop_whose_first_part_was_flushed_alone_is_sent_twice_more_unless_its_rest_
 fn a_stop_is_sent_again_once_its_port_was_replaced() {
     for (is_async, is_moved) in BOTH.into_iter().flat_map(|it| BOTH.map(|moved| (it, moved))) {
         let (wire, mut host) = host();
-        call!(is_async, host, stop, stop_async()).unwrap();
+        call!(is_async, host, stop()).unwrap();
         let before = wire.sent().len();
         if is_moved {
             host = in_another_driver(host);
         } else {
             host.discard();
         }
-        call!(is_async, host, stop, stop_async()).unwrap();
+        call!(is_async, host, stop()).unwrap();
         assert_eq!(wire.sent().len() - before, 2 * FrameOf::<MotorControl>::LEN);
     }
 }
@@ -136,7 +136,7 @@ fn behind_a_failed_flush_no_rest_of_a_stop_is_sent() {
         wire.write_as([Step::Few(10), Step::Error]);
         host.port_mut().flushes = [Step::Error].into();
         assert!(host.service().is_err());
-        call!(is_async, host, stop, stop_async()).unwrap();
+        call!(is_async, host, stop()).unwrap();
         let sent: Vec<u8> = wire.sent()[cut..].iter().map(|&(_, byte)| byte).collect();
         let copies = sent.chunks(FrameOf::<MotorControl>::LEN);
         assert_eq!(copies.map(|it| it.starts_with(&[0xFD, 0xFF])).collect::<Vec<_>>(), [true; 2]);
@@ -157,7 +157,7 @@ fn a_stop_that_a_port_cut_in_two_is_sent_again() {
         for is_async in [false, true] {
             let (wire, mut host) = host();
             wire.write_as(steps.iter().cloned());
-            let stopped = call!(is_async, host, stop, stop_async());
+            let stopped = call!(is_async, host, stop());
             let drives_on = robot_drives_on(&wire);
             let is_true = stopped.is_err() || drives_on <= Duration::from_millis(1);
             assert!(is_true, "{steps:?}: {stopped:?}, but it keeps driving for {drives_on:?}");
@@ -171,7 +171,7 @@ fn a_stop_through_a_port_whose_receiver_fails_is_sent_and_returns_ok() {
         let (wire, mut host) = host();
         (host.port_mut().is_deaf, host.port_mut().is_blind) = (true, true);
         let begin_us = wire.world.now_us();
-        let stopped = call!(is_async, host, stop, stop_async());
+        let stopped = call!(is_async, host, stop());
         assert_eq!(stopped, Ok(()), "it was written and flushed");
         assert!(wire.world.now_us() - begin_us < 10_000, "not immediate");
         assert!(robot_drives_on(&wire) <= Duration::from_millis(1));
@@ -195,8 +195,7 @@ fn a_robot_whose_transmitter_fails_still_hears_its_stop() {
                 let now = robot.now();
                 robot.role_mut().set_telemetry(&Telemetry::default(), now);
             }
-            let command =
-                call!(is_async, robot, next_command, next_command_async(Duration::from_millis(1)));
+            let command = call!(is_async, robot, next_command(Duration::from_millis(1)));
             match command {
                 Ok(Some(command)) => speeds.push(command.speed()),
                 Ok(None) => {}
@@ -218,8 +217,7 @@ fn bytes_from_before_a_hold_up_do_not_drive_a_robot() {
         let (wire, mut robot) = robot();
         wire.receive(&drive());
         wire.world.step(10_000_000);
-        let command =
-            call!(is_async, robot, next_command, next_command_async(Duration::from_millis(1)));
+        let command = call!(is_async, robot, next_command(Duration::from_millis(1)));
         let speed = command.unwrap().map_or(0, |command| command.speed());
         assert_eq!(speed, 0, "it drives on a ten-second-old command");
     }
@@ -230,7 +228,8 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
     for is_async in [false, true] {
         let (wire, mut robot) = robot();
         let by = robot.now() + Duration::from_millis(5);
-        robot.run_for(by - robot.now(), |_, _, _| ()).unwrap();
+        let span = by - robot.now();
+        robot.run_for(span, |_, _, _| ()).unwrap();
         wire.receive(&drive());
         wire.world.step(2_000_000);
         let by = robot.now() + Duration::from_millis(5);
@@ -239,7 +238,8 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
                 assert_eq!((command.speed(), command.angular()), (0, 0));
             }
         };
-        call!(is_async, robot, run_for, run_for_async(by - robot.now(), speed)).unwrap();
+        let span = by - robot.now();
+        call!(is_async, robot, run_for(span, speed)).unwrap();
         assert_eq!(robot.role().statistics().commands, 1, "it was valid");
         assert_eq!(robot.role().statistics().watchdog, 1);
     }
@@ -247,7 +247,7 @@ fn a_command_that_is_too_old_when_it_is_read_is_not_told_as_one_that_moves() {
 
 /// The next command of a robot that is called continuously, for 5 ms.
 fn next(robot: &mut On<Robot>, is_async: bool) {
-    call!(is_async, *robot, next_command, next_command_async(Duration::from_millis(5))).unwrap();
+    call!(is_async, *robot, next_command(Duration::from_millis(5))).unwrap();
 }
 
 /// A robot that reports every 20 ms and has been called for a while.
@@ -294,8 +294,12 @@ fn commands_that_wait_while_the_executor_is_held_are_all_as_old_as_the_hold_up()
         let (wire, mut robot) = reporting(true);
         let begin_us = wire.world.now_us();
         let bytes = drive().repeat(count);
-        wire.block_on_held(robot.next_command_async(Duration::from_millis(100)), &bytes, 3_000_000)
-            .unwrap();
+        wire.block_on_held(
+            robot.asynch().next_command(Duration::from_millis(100)),
+            &bytes,
+            3_000_000,
+        )
+        .unwrap();
         let drove_us = drives_until(&mut robot, true, begin_us);
         assert!(drove_us <= 500_000, "{count} commands: until {drove_us} us after they arrived");
     }
@@ -341,8 +345,7 @@ fn a_robot_without_reports_drives_for_500_ms_on_a_command_after_a_long_silence()
         let (wire, mut robot) = silent();
         let begin_us = wire.world.now_us();
         wire.receive_in(3_000_000, &drive());
-        let command =
-            call!(is_async, robot, next_command, next_command_async(Duration::from_millis(10_000)));
+        let command = call!(is_async, robot, next_command(Duration::from_millis(10_000)));
         assert_eq!(command.unwrap().map(|command| command.speed()), Some(60));
         let drove_us = drives_until(&mut robot, is_async, begin_us + 3_000_000);
         assert!((485_000..=500_000).contains(&drove_us), "async {is_async}: {drove_us} us");

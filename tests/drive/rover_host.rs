@@ -3,13 +3,14 @@
 use std::{cell::RefCell, rc::Rc};
 
 use axlewire::{
-    drive::{DriveError, Driver, Operation},
+    drive::{DriveError, Operation},
     stream::Frames,
     ucp::Ucp,
 };
 
 use crate::{
     port::{Port, Step, World},
+    rig::On,
     rover_rig::*,
 };
 
@@ -19,10 +20,10 @@ fn written_speeds(written: &[u8]) -> Vec<i16> {
 }
 
 /// A host behind a driver whose port is controlled by the test.
-fn scripted() -> (World, Driver<Host, Port, World>) {
+fn scripted() -> (World, On<Host, Port, World>) {
     let world = World::default();
     let port = Port::new(&world, 0);
-    (world.clone(), Driver::new(fresh_host(), port, world))
+    (world.clone(), On::new(fresh_host(), port, world))
 }
 
 #[test]
@@ -74,9 +75,10 @@ fn the_answer_to_a_start_is_not_taken_for_the_answer_to_an_end() {
         let (world, kind) = (World::default(), CalibrationKind::Imu);
         let (near, mut far) = Port::pair(&world, 87);
         let clock = world.clone();
-        let mut rover = Driver::new(fresh_host(), near, clock);
+        let mut rover = On::new(fresh_host(), near, clock);
         let deadline = world.now() + Duration::from_millis(10);
-        let started = rover.start_calibration(kind, deadline - rover.now());
+        let within = deadline - rover.now();
+        let started = rover.start_calibration(kind, within);
         assert_eq!(started, Err(DriveError::Timeout(Operation::Calibration)));
         let answer = bytes(CalibrationStartAck::new(kind, ErrorCode::Fine));
         embedded_io::Write::write(&mut far, &answer).unwrap();
@@ -84,9 +86,10 @@ fn the_answer_to_a_start_is_not_taken_for_the_answer_to_an_end() {
         rover.service().unwrap();
         // From here on the line is silent.
         let deadline = world.now() + Duration::from_millis(2000);
+        let within = deadline - rover.now();
         let ended = match is_async {
-            true => world.block_on(rover.end_calibration_async(kind, deadline - rover.now())),
-            false => rover.end_calibration(kind, deadline - rover.now()),
+            true => world.block_on(rover.asynch().end_calibration(kind, within)),
+            false => rover.end_calibration(kind, within),
         };
         assert!(ended.is_err(), "a silent robot is reported to have ended its calibration");
     }
@@ -97,7 +100,7 @@ fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
     let world = World::default();
     let (near, far) = Port::pair(&world, 87);
     let robot = Robot::new(RobotConfig::default(), world.now());
-    let robot = Rc::new(RefCell::new(Driver::new(robot, far, world.clone())));
+    let robot = Rc::new(RefCell::new(On::new(robot, far, world.clone())));
     let time = world.clone();
     world.add(move || {
         // The heading encodes the measurement time, in hundredths of a second.
@@ -108,7 +111,7 @@ fn a_report_taken_ten_times_a_second_is_not_older_than_200_ms() {
         robot.service().unwrap();
     });
     let clock = world.clone();
-    let mut rover = Driver::new(fresh_host(), near, clock);
+    let mut rover = On::new(fresh_host(), near, clock);
     let mut age_ms = 0;
     for _ in 0..40 {
         (0..1000).for_each(|_| world.step(100));

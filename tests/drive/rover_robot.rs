@@ -2,23 +2,24 @@
 
 use std::{pin::pin, task::Poll};
 
-use axlewire::drive::Driver;
 use embedded_io::Write;
 
 use crate::{
     port::{Port, Step, World, poll},
+    rig::On,
     rover_rig::*,
 };
 
 /// A robot whose application drives at 50 and was then held up for 400 ms, during which twenty
 /// commands arrived, then this one.
-fn held_up(last: i16) -> (World, Driver<Robot, Port, World>, Port) {
+fn held_up(last: i16) -> (World, On<Robot, Port, World>, Port) {
     let world = World::default();
     let (near, mut far) = Port::pair(&world, 87);
     let robot = Robot::new(RobotConfig::default(), world.now());
-    let mut robot = Driver::new(robot, near, world.clone());
+    let mut robot = On::new(robot, near, world.clone());
     far.write(&bytes(go(50))).unwrap();
-    let command = robot.next_command(ms(100) - robot.now()).unwrap();
+    let within = ms(100) - robot.now();
+    let command = robot.next_command(within).unwrap();
     assert_eq!(command.map(|command| command.speed()), Some(50));
     for speed in 60..80 {
         far.write(&bytes(go(speed))).unwrap();
@@ -46,9 +47,10 @@ fn a_stop_is_handed_out_however_many_commands_came_before_it() {
         for _ in 0..30 {
             far.write(&bytes(go(0))).unwrap();
             let deadline = world.now() + Duration::from_millis(100);
+            let within = deadline - robot.now();
             let command = match is_async {
-                true => world.block_on(robot.next_command_async(deadline - robot.now())),
-                false => robot.next_command(deadline - robot.now()),
+                true => world.block_on(robot.asynch().next_command(within)),
+                false => robot.next_command(within),
             };
             speed = command.unwrap().map_or(speed, |command| command.speed());
         }
@@ -68,16 +70,17 @@ fn told_to_stand_still(is_async: bool, write_us: u64, most: usize, call_ms: u32)
     near.most = most;
     let mut robot = Robot::new(RobotConfig::default(), world.now());
     robot.set_telemetry(&Telemetry::default(), world.now());
-    let mut robot = Driver::new(robot, near, world.clone());
+    let mut robot = On::new(robot, near, world.clone());
     far.write(&bytes(go(50))).unwrap();
     // A pong that waits behind a report, and is due all the time.
     far.write(&bytes(Ping {})).unwrap();
     let mut speed = 0;
     while speed != 0 || world.now_us() < 10_000 {
         let deadline = world.now() + Duration::from_millis(call_ms);
+        let within = deadline - robot.now();
         let command = match is_async {
-            true => world.block_on(robot.next_command_async(deadline - robot.now())),
-            false => robot.next_command(deadline - robot.now()),
+            true => world.block_on(robot.asynch().next_command(within)),
+            false => robot.next_command(within),
         };
         speed = command.unwrap_or_default().map_or(speed, |command| command.speed());
         assert!(world.now_us() < 5_000_000 && (speed == 0 || speed == 50));
@@ -112,15 +115,16 @@ fn an_event_that_moves_the_robot_is_not_told_behind_its_watchdog() {
         let world = World::default();
         let (mut near, mut far) = Port::pair(&world, 87);
         near.flushes.push_back(Step::Blocks(700_000));
-        let mut robot = Driver::new(Robot::new(RobotConfig::default(), world.now()), near, world);
+        let mut robot = On::new(Robot::new(RobotConfig::default(), world.now()), near, world);
         let world = robot.port().world.clone();
         far.write(&bytes(go(50))).unwrap();
         far.write(&bytes(Ping {})).unwrap();
         world.step(10_000);
         let deadline = world.now();
+        let within = deadline - robot.now();
         let told = match is_async {
-            true => world.block_on(robot.next_event_async(deadline - robot.now())),
-            false => robot.next_event(deadline - robot.now()),
+            true => world.block_on(robot.asynch().next_event(within)),
+            false => robot.next_event(within),
         };
         assert_eq!(told.unwrap(), Some(RobotEvent::Motor(go(0))), "async {is_async}");
         assert_eq!(robot.poll_event(), Some(RobotEvent::Watchdog));
@@ -135,15 +139,16 @@ fn commands_that_arrive_while_a_report_is_flushed_are_taken_whatever_parts_it_is
         (near.most, near.drains) = (most, true);
         let mut config = RobotConfig::default();
         config.baud = 38_400;
-        let mut robot = Driver::new(Robot::new(config, world.now()), near, world.clone());
+        let mut robot = On::new(Robot::new(config, world.now()), near, world.clone());
         let now = world.now();
         robot.role_mut().set_telemetry(&Telemetry::default(), now);
         for turn in 0..100 {
             far.write(&bytes(go(turn))).unwrap();
             let end = world.now() + Duration::from_micros(25_100);
+            let span = end - robot.now();
             let run = match is_async {
-                true => world.block_on(robot.run_for_async(end - robot.now(), |_, _, _| ())),
-                false => robot.run_for(end - robot.now(), |_, _, _| ()),
+                true => world.block_on(robot.asynch().run_for(span, |_, _, _| ())),
+                false => robot.run_for(span, |_, _, _| ()),
             };
             run.unwrap();
         }
@@ -159,12 +164,12 @@ fn an_application_whose_calls_are_all_dropped_hears_of_the_watchdog() {
     near.writes.extend(vec![Step::Stall; 1000]);
     let mut robot = Robot::new(RobotConfig::default(), world.now());
     robot.set_telemetry(&Telemetry::default(), world.now());
-    let mut robot = Driver::new(robot, near, world.clone());
+    let mut robot = On::new(robot, near, world.clone());
     far.write(&bytes(go(50))).unwrap();
     let mut told = vec![];
     while world.now_us() < 1_000_000 {
         {
-            let mut call = pin!(robot.next_command_async(Duration::from_millis(1000)));
+            let mut call = pin!(robot.asynch().next_command(Duration::from_millis(1000)));
             if let Poll::Ready(command) = poll(call.as_mut()) {
                 told.push((world.now_us(), command.unwrap().unwrap().speed()));
             }
@@ -182,16 +187,19 @@ fn a_command_that_arrives_before_a_read_fails_is_told_through_a_slow_port_too() 
         port.writes.extend(vec![Step::Stall; 4]);
         let mut robot = Robot::new(RobotConfig::default(), world.now());
         robot.set_telemetry(&Telemetry::default(), world.now());
-        let mut robot = Driver::new(robot, port, world.clone());
-        assert!(poll(pin!(robot.next_command_async(Duration::ZERO))).is_pending());
+        let mut robot = On::new(robot, port, world.clone());
+        assert!(poll(pin!(robot.asynch().next_command(Duration::ZERO))).is_pending());
         robot.port_mut().reads.extend([Step::Bytes(bytes(go(50))), Step::Error]);
         let deadline = world.now();
         if is_event {
-            assert!(world.block_on(robot.next_event_async(deadline - robot.now())).is_err());
-            let event = world.block_on(robot.next_event_async(deadline - robot.now()));
+            let within = deadline - robot.now();
+            assert!(world.block_on(robot.asynch().next_event(within)).is_err());
+            let within = deadline - robot.now();
+            let event = world.block_on(robot.asynch().next_event(within));
             assert_eq!(event, Ok(Some(RobotEvent::Motor(go(50)))));
         } else {
-            let command = world.block_on(robot.next_command_async(deadline - robot.now()));
+            let within = deadline - robot.now();
+            let command = world.block_on(robot.asynch().next_command(within));
             assert_eq!(command, Ok(Some(go(50))));
         }
     }

@@ -17,7 +17,7 @@ fn a_port_has_stalled_after_a_second_in_a_write_or_in_a_flush() {
         let role = Recorder::sending(&[b"123"]);
         let mut driver = slow(role, write_ms * 1000, flush_ms * 1000);
         let world = driver.port().world.clone();
-        let sent = world.block_on(driver.service_async());
+        let sent = world.block_on(driver.asynch().service());
         assert_eq!(sent, expected.map_err(|()| DriveError::Stalled), "{write_ms}, {flush_ms}");
         let took = world.now().as_micros();
         assert!((999_000..=1_000_040).contains(&took), "{took} us: {write_ms}, {flush_ms}");
@@ -39,7 +39,7 @@ fn each_frame_has_a_second_of_its_own() {
         let mut driver = slow(role, write_ms * 1000, flush_ms * 1000);
         let world = driver.port().world.clone();
         for frame in 1..4 {
-            assert_eq!(world.block_on(driver.service_async()), Ok(()), "{write_ms}, {flush_ms}");
+            assert_eq!(world.block_on(driver.asynch().service()), Ok(()), "{write_ms}, {flush_ms}");
             assert_eq!(driver.port().written, b"123".repeat(frame));
             driver.role_mut().frames.push_back(b"123".into());
             world.step(5_000_000);
@@ -56,10 +56,10 @@ fn a_port_that_was_not_asked_for_seconds_has_the_time_of_a_frame_to_take_it() {
         let mut driver = on(role, Port::new(&world, 20));
         driver.port_mut().stutters = true;
         // A call that is dropped while it waits for the write, or for the flush.
-        assert_eq!(world.poll_times(if is_flush { 2 } else { 1 }, driver.service_async()), None);
+        assert_eq!(world.poll_times(if is_flush { 2 } else { 1 }, driver.asynch().service()), None);
         world.step(5_000_000);
         // The port needs a moment, as before.
-        assert_eq!(world.block_on(driver.service_async()), Ok(()), "flush {is_flush}");
+        assert_eq!(world.block_on(driver.asynch().service()), Ok(()), "flush {is_flush}");
         assert_eq!(driver.port().written, b"123");
     }
 }
@@ -71,9 +71,9 @@ fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
         let role = Pausing { repeats: true, ..Pausing::default() };
         let mut driver = slow(role, write_us, 0);
         let world = driver.port().world.clone();
-        assert_eq!(world.poll_times(1, driver.service_async()), None);
+        assert_eq!(world.poll_times(1, driver.asynch().service()), None);
         world.step(999_000 - write_us);
-        assert_eq!(world.block_on(driver.service_async()), expected, "{write_us} us");
+        assert_eq!(world.block_on(driver.asynch().service()), expected, "{write_us} us");
     }
 }
 
@@ -97,14 +97,15 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_it_has_ended() {
     use axlewire::ucp::MotorControl;
     let mut rover = host();
     let world = rover.port().world.clone();
-    world.block_on(rover.stop_async()).unwrap();
+    world.block_on(rover.asynch().stop()).unwrap();
     rover.port_mut().written.clear();
     // It would take the command after 900 ms, if it were still asked to.
     rover.port_mut().writes = vec![Step::Late(900_000)].into();
     let now = rover.now();
     rover.role_mut().drive(MotorControl::new(50, 0).unwrap(), now).unwrap();
     let end = now + ms(1500);
-    world.block_on(rover.run_for_async(end - rover.now(), |_, _, _| ())).unwrap();
+    let span = end - rover.now();
+    world.block_on(rover.asynch().run_for(span, |_, _, _| ())).unwrap();
     let speeds = speeds(rover.port());
     assert!(!speeds.is_empty() && speeds.iter().all(|&speed| speed == 0), "{speeds:?}");
 }
@@ -115,11 +116,11 @@ fn a_command_that_waits_for_a_slow_port_is_not_sent_after_its_call_or_after_a_ho
     for hold_ms in [0, 2000] {
         let mut rover = host();
         let world = rover.port().world.clone();
-        world.block_on(rover.stop_async()).unwrap();
+        world.block_on(rover.asynch().stop()).unwrap();
         rover.port_mut().written.clear();
         rover.port_mut().writes = vec![Step::Late(300_000)].into();
         {
-            let mut drive = std::pin::pin!(rover.drive_for_async(50, 0, ms(100)));
+            let mut drive = std::pin::pin!(rover.asynch().drive_for(50, 0, ms(100)));
             assert!(poll(drive.as_mut()).is_pending());
             world.step(hold_ms * 1000);
             // No robot answers, so nobody sees it stand still.
@@ -148,7 +149,7 @@ fn a_thread_that_wakes_late_does_not_repeat_a_command_behind_the_end_of_its_call
     let role = Host::new(HostConfig::default(), at_ms(0));
     let late_us = std::rc::Rc::default();
     let clock = WakesLate(world.clone(), std::rc::Rc::clone(&late_us));
-    let mut rover = Driver::new(role, Port::new(&world, 87), clock);
+    let mut rover = On::new(role, Port::new(&world, 87), clock);
     rover.stop().unwrap();
     rover.port_mut().written.clear();
     world.step(30_000);
@@ -162,7 +163,7 @@ fn a_thread_that_wakes_late_does_not_repeat_a_command_behind_the_end_of_its_call
 fn a_port_that_always_has_more_does_not_starve_other_tasks() {
     let endless = (0..1000).map(|_| Step::Bytes(vec![0; 64]));
     let mut driver = on(Recorder::default(), Port::reading(endless));
-    let mut call = std::pin::pin!(driver.service_async());
+    let mut call = std::pin::pin!(driver.asynch().service());
     assert!(poll(call.as_mut()).is_pending(), "it yields after 4096 bytes");
     assert_eq!(poll(call.as_mut()), std::task::Poll::Ready(Ok(())));
 }

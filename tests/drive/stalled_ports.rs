@@ -32,17 +32,17 @@ fn an_async_port_that_never_becomes_ready_does_not_delay_a_stop_forever() {
     for flushes_hang in [false, true] {
         let (wire, mut bus) = hanging(flushes_hang);
         let begin_us = wire.world.now_us();
-        let stopped = wire.world.block_on(bus.stop_async(NodeId::N1));
+        let stopped = wire.world.block_on(bus.asynch().stop(NodeId::N1));
         assert_eq!(stopped, Err(DriveError::StopsOwed(NodeId::N1.into())));
         let took_us = wire.world.now_us() - begin_us;
         assert!(took_us < 1_500_000, "it gives up after {took_us} us");
         // A silence follows what may have been cut off.
         wire.world.step(2000);
-        let stalled = wire.world.block_on(bus.service_async());
+        let stalled = wire.world.block_on(bus.asynch().service());
         assert_eq!(stalled, Err(DriveError::Stalled), "flushes hang: {flushes_hang}");
         // The port works again: the stop is sent again.
         script(&mut bus, flushes_hang).clear();
-        assert_eq!(wire.world.block_on(bus.stop_async(NodeId::N1)), Ok(()));
+        assert_eq!(wire.world.block_on(bus.asynch().stop(NodeId::N1)), Ok(()));
         assert_eq!(wire.rps(), 0.0);
     }
 }
@@ -53,7 +53,7 @@ fn a_stalled_port_is_found_by_calls_that_are_dropped_before_a_second_is_over() {
         let (wire, mut bus) = hanging(flushes_hang);
         let begin_us = wire.world.now_us();
         loop {
-            let mut call = pin!(bus.service_async());
+            let mut call = pin!(bus.asynch().service());
             let mut context = Context::from_waker(Waker::noop());
             if call.as_mut().poll(&mut context).is_ready() {
                 // Nothing is due yet.
@@ -80,9 +80,9 @@ fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
     // Then it takes its time, but no longer.
     bus.port_mut().flushes.extend([Step::Stall, Step::Late(2000)]);
     let mut context = Context::from_waker(Waker::noop());
-    assert!(pin!(bus.service_async()).poll(&mut context).is_pending());
+    assert!(pin!(bus.asynch().service()).poll(&mut context).is_pending());
     wire.world.step(10_000_000);
-    let mut call = pin!(bus.service_async());
+    let mut call = pin!(bus.asynch().service());
     assert!(call.as_mut().poll(&mut context).is_pending());
     wire.world.step(2000);
     assert_eq!(call.as_mut().poll(&mut context), Poll::Ready(Ok(())));
@@ -92,7 +92,7 @@ fn a_port_not_polled_for_a_while_after_a_dropped_call_has_not_stalled() {
 fn a_port_that_has_stalled_is_given_a_second_again() {
     for flushes_hang in [false, true] {
         let (wire, mut bus) = hanging(flushes_hang);
-        while wire.world.block_on(bus.service_async()) != Err(DriveError::Stalled) {
+        while wire.world.block_on(bus.asynch().service()) != Err(DriveError::Stalled) {
             wire.world.step(100);
         }
         // It needs half a second for the next frame.
@@ -100,7 +100,7 @@ fn a_port_that_has_stalled_is_given_a_second_again() {
         script(&mut bus, flushes_hang).push_back(Step::Late(500_100));
         let mut context = Context::from_waker(Waker::noop());
         for _ in 0..30 {
-            let mut call = pin!(bus.service_async());
+            let mut call = pin!(bus.asynch().service());
             if call.as_mut().poll(&mut context).is_ready() {
                 wire.world.step(100);
                 continue;
@@ -122,13 +122,13 @@ fn a_call_that_was_dropped_long_ago_does_not_make_a_slow_port_a_stalled_one() {
         let (wire, mut bus) = turning();
         script(&mut bus, flushes_hang).push_back(Step::Stall);
         let mut context = Context::from_waker(Waker::noop());
-        while pin!(bus.service_async()).poll(&mut context).is_ready() {
+        while pin!(bus.asynch().service()).poll(&mut context).is_ready() {
             wire.world.step(100);
         }
         wire.world.step(5_000_000);
         script(&mut bus, flushes_hang).push_back(Step::Late(50_000));
         while !script(&mut bus, flushes_hang).is_empty() {
-            assert_eq!(wire.world.block_on(bus.service_async()), Ok(()), "{flushes_hang}");
+            assert_eq!(wire.world.block_on(bus.asynch().service()), Ok(()), "{flushes_hang}");
             wire.world.step(100);
         }
     }
@@ -143,7 +143,7 @@ fn settings_without_a_line_speed_are_slow_but_no_panic() {
     let world = bus.port().world.clone();
     let now = bus.now();
     bus.role_mut().discover(now);
-    assert_eq!(world.block_on(bus.service_async()), Ok(()));
+    assert_eq!(world.block_on(bus.asynch().service()), Ok(()));
     assert_eq!(bus.service(), Ok(()));
 }
 
@@ -151,13 +151,13 @@ fn settings_without_a_line_speed_are_slow_but_no_panic() {
 fn a_write_that_was_given_up_long_ago_does_not_make_a_slow_port_a_stalled_one() {
     let mut driver = on(Recorder::sending(&[b"123"]), Port::writing([Step::Stall]));
     let world = driver.port().world.clone();
-    assert!(poll(pin!(driver.service_async())).is_pending());
+    assert!(poll(pin!(driver.asynch().service())).is_pending());
     for _ in 0..30 {
         world.step(100_000);
-        assert_eq!(world.block_on(driver.service_async()), Ok(()));
+        assert_eq!(world.block_on(driver.asynch().service()), Ok(()));
     }
     driver.port_mut().writes.push_back(Step::Late(9000));
     driver.role_mut().frames.push_back(b"456".into());
-    assert_eq!(world.block_on(driver.service_async()), Ok(()));
+    assert_eq!(world.block_on(driver.asynch().service()), Ok(()));
     assert_eq!(driver.port().written, b"456");
 }

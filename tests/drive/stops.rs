@@ -8,11 +8,11 @@ type Outcome = Result<(), DriveError<Unplugged>>;
 const OWED_2: DriveError<Unplugged> = DriveError::StopsOwed(only(NodeId::N2));
 
 fn stop(story: &mut Story, is_async: bool) -> Outcome {
-    call!(is_async, story.bus, stop, stop_async(NodeId::N2))
+    call!(is_async, story.bus, stop(NodeId::N2))
 }
 
 fn drive_for(story: &mut Story, span: Duration, is_async: bool) -> Outcome {
-    call!(is_async, story.bus, drive_for, drive_for_async(NodeId::N2, rps(3.0), span))
+    call!(is_async, story.bus, drive_for(NodeId::N2, rps(3.0), span))
 }
 
 /// From now on the port fails, for this long.
@@ -63,7 +63,7 @@ fn a_stop_continues_through_errors_of_the_port() {
 fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
     for is_async in BOTH {
         let mut story = Story::new(MasterConfig::direct());
-        let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
+        let stopped = call!(is_async, story.bus, stop_all());
         let mut silent = NodeSet::ALL;
         silent.remove(NodeId::N2);
         silent.remove(NodeId::N5);
@@ -71,11 +71,11 @@ fn a_stop_of_all_lists_the_ids_that_have_never_answered() {
         assert_eq!(story.told_two(), STOPPED, "nodes that answer are stopped");
         assert_eq!(story.told_five(), HELD);
         let mut story = Story::new(only_two_and_five());
-        let stopped = call!(is_async, story.bus, stop_all, stop_all_async());
+        let stopped = call!(is_async, story.bus, stop_all());
         assert_eq!(stopped, Ok(()), "no discovery is needed first");
         let mut story = Story::new(MasterConfig::direct());
         let both = only_two_and_five().nodes;
-        let stopped = call!(is_async, story.bus, stop, stop_async(both));
+        let stopped = call!(is_async, story.bus, stop(both));
         assert_eq!((stopped, story.told_two()), (Ok(()), STOPPED), "nobody waits for other ids");
     }
 }
@@ -149,7 +149,7 @@ fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
     dropped_at_any_await(30, |polls| {
         let mut story = Story::new(manual()).discovered();
         (story.bus.port_mut().most, story.bus.port_mut().stutters) = (1, true);
-        let drive = story.bus.drive_for_async(NodeId::N2, rps(3.0), ms(1));
+        let drive = story.bus.asynch().drive_for(NodeId::N2, rps(3.0), ms(1));
         let is_done = story.world.poll_times(polls, drive).is_some();
         if polls > 0 && !is_done {
             let progress = story.bus.role().stop_progress(NodeId::N2);
@@ -158,8 +158,8 @@ fn a_dropped_drive_for_leaves_a_stop_that_the_next_call_sends() {
         }
         assert_eq!(story.bus.role().set_point(NodeId::N2).filter(|it| Some(*it) != STOPPED), None);
         // Any call.
-        story.world.block_on(story.bus.next_event_async(Duration::ZERO)).unwrap();
-        story.world.block_on(story.bus.run_for_async(ms(30), |_, _, _| ())).unwrap();
+        story.world.block_on(story.bus.asynch().next_event(Duration::ZERO)).unwrap();
+        story.world.block_on(story.bus.asynch().run_for(ms(30), |_, _, _| ())).unwrap();
         assert_eq!(story.bus.role().stops_owed(), NodeSet::NONE);
         let was_told = story.two.borrow().role().statistics().writes > 0;
         assert_eq!(story.told_two(), STOPPED.filter(|_| was_told), "after {polls} polls");
@@ -175,7 +175,7 @@ fn a_dropped_stop_is_owed_and_the_next_call_sends_it() {
     let mut story = Story::new(manual()).discovered();
     story.bus.set_velocity(NodeId::N2, rps(3.0)).unwrap();
     story.bus.port_mut().stutters = true;
-    assert_eq!(story.world.poll_times(1, story.bus.stop_async(NodeId::N2)), None);
+    assert_eq!(story.world.poll_times(1, story.bus.asynch().stop(NodeId::N2)), None);
     assert_eq!(story.bus.role().stops_owed(), only(NodeId::N2));
     story.run(10);
     assert_eq!(story.told_two(), STOPPED);

@@ -6,7 +6,7 @@ use embedded_io::{Read, ReadReady, Write};
 use crate::rig::*;
 
 /// A bus of node 2 whose adapter hears what it sends.
-fn two_wires(change: impl FnOnce(&mut Port)) -> (World, Driver<Master, WithoutEcho<Port>, World>) {
+fn two_wires(change: impl FnOnce(&mut Port)) -> (World, On<Master, WithoutEcho<Port>, World>) {
     let world = World::default();
     let mut near = Port::new(&world, 20);
     near.outboxes.push(near.inbox.clone());
@@ -24,20 +24,20 @@ fn two_wires(change: impl FnOnce(&mut Port)) -> (World, Driver<Master, WithoutEc
         }
     });
     let master = Master::new(only_two_and_five(), world.now());
-    (world.clone(), Driver::new(master, WithoutEcho::new(near), world))
+    (world.clone(), On::new(master, WithoutEcho::new(near), world))
 }
 
 /// Finds node 2, turns it and stops it.
 fn turn_and_stop(
     world: &World,
-    bus: &mut Driver<Master, WithoutEcho<Port>, World>,
+    bus: &mut On<Master, WithoutEcho<Port>, World>,
     is_async: bool,
 ) -> Result<(), DriveError<Unplugged>> {
     let (two, speed) = (NodeId::N2, rps(1.0));
     if is_async {
         return world.block_on(async {
-            assert_eq!(bus.discover_async().await?, [(two, Mode::Velocity)]);
-            bus.drive_for_async(two, speed, ms(50)).await
+            assert_eq!(bus.asynch().discover().await?, [(two, Mode::Velocity)]);
+            bus.asynch().drive_for(two, speed, ms(50)).await
         });
     }
     assert_eq!(bus.discover()?, [(two, Mode::Velocity)]);
@@ -74,7 +74,7 @@ fn a_line_without_an_echo_works_and_its_missing_echo_is_counted() {
 fn without_the_removal_nodes_are_found_but_silent_ids_look_damaged() {
     let (world, bus) = two_wires(|_| ());
     let (role, port, _) = bus.into_parts();
-    let mut plain = Driver::new(role, port.into_inner(), world);
+    let mut plain = On::new(role, port.into_inner(), world);
     let (_, mut bus) = two_wires(|_| ());
     assert_eq!(plain.discover().unwrap(), [(NodeId::N2, Mode::Velocity)]);
     assert_eq!(bus.discover().unwrap(), [(NodeId::N2, Mode::Velocity)]);

@@ -7,16 +7,20 @@ fn on_a_silent_line_next_event_waits_until_the_deadline_and_no_longer() {
     let world = World::default();
     let (near, _far) = Port::pair(&world, 20);
     let mut driver = on(Recorder::default(), near);
-    assert_eq!(driver.next_event(at_ms(10) - driver.now()), Ok(None));
+    let within = at_ms(10) - driver.now();
+    assert_eq!(driver.next_event(within), Ok(None));
     assert_eq!(world.now(), at_ms(10));
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(20) - driver.now())), Ok(None));
+    let within = at_ms(20) - driver.now();
+    assert_eq!(world.block_on(driver.asynch().next_event(within)), Ok(None));
     assert_eq!(world.now(), at_ms(20));
     // A deadline in the past takes no time, but still runs a round.
     driver.role_mut().frames.push_back(b"12".into());
-    assert_eq!(driver.next_event(at_ms(0) - driver.now()), Ok(None));
+    let within = at_ms(0) - driver.now();
+    assert_eq!(driver.next_event(within), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 2);
     driver.role_mut().frames.push_back(b"34".into());
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(0) - driver.now())), Ok(None));
+    let within = at_ms(0) - driver.now();
+    assert_eq!(world.block_on(driver.asynch().next_event(within)), Ok(None));
     assert_eq!(driver.port().outboxes[0].borrow().len(), 4);
     assert_eq!(world.now(), at_ms(20));
 }
@@ -27,7 +31,8 @@ fn a_waiting_driver_wakes_for_its_role() {
     let (near, _far) = Port::pair(&world, 20);
     let mut driver = on(Recorder::default(), near);
     driver.role_mut().timeout = Some(at_ms(5));
-    assert_eq!(world.block_on(driver.next_event_async(at_ms(10) - driver.now())), Ok(None));
+    let within = at_ms(10) - driver.now();
+    assert_eq!(world.block_on(driver.asynch().next_event(within)), Ok(None));
     let is_none = |call: &Call| matches!(call, Call::Input(bytes) if bytes.is_empty());
     let calls: Vec<_> = driver.role().calls.iter().filter(|call| !is_none(call)).collect();
     assert_eq!(calls.iter().filter(|call| ***call == Call::Timeout).count(), 1);
@@ -42,10 +47,12 @@ fn every_event_is_handed_out_until_the_deadline() {
     embedded_io::Write::write(&mut far, b"abc").unwrap();
     let mut driver = on(Recorder::default(), near);
     let mut events = vec![];
-    driver.run_for(at_ms(1) - driver.now(), |_, event, _| events.push(event)).unwrap();
+    let span = at_ms(1) - driver.now();
+    driver.run_for(span, |_, event, _| events.push(event)).unwrap();
     assert_eq!((&events[..], world.now()), (&b"abc"[..], at_ms(1)));
     embedded_io::Write::write(&mut far, b"def").unwrap();
-    let run = driver.run_for_async(at_ms(2) - driver.now(), |role, event, _| {
+    let span = at_ms(2) - driver.now();
+    let run = driver.asynch().run_for(span, |role, event, _| {
         events.push(event);
         role.frames.push_back(vec![event]);
     });
@@ -69,7 +76,8 @@ fn a_run_ends_at_its_deadline_although_more_events_wait() {
             times.push(now);
             world.step(4000);
         };
-        call!(is_async, driver, run_for, run_for_async(at_ms(5) - driver.now(), slow)).unwrap();
+        let span = at_ms(5) - driver.now();
+        call!(is_async, driver, run_for(span, slow)).unwrap();
         assert_eq!((&events[..], &times[..]), (&b"ab"[..], &[at_ms(1), at_ms(5)][..]));
         assert_eq!(driver.poll_event(), Some(b'c'), "it waits");
     }
@@ -105,7 +113,8 @@ fn a_role_whose_deadline_has_always_passed_does_not_block_its_driver() {
     let late = Plain { timeout: Some(at_ms(0)), ..Plain::default() };
     let world = World::default();
     let mut driver = on(late, Port::new(&world, 20));
-    assert_eq!(driver.next_event(at_ms(1) - driver.now()), Ok(None));
+    let within = at_ms(1) - driver.now();
+    assert_eq!(driver.next_event(within), Ok(None));
     assert_eq!(world.now(), at_ms(1));
 }
 
@@ -140,10 +149,10 @@ fn while_a_frame_or_its_flush_is_pending_the_next_round_is_due_within_a_millisec
         let mut driver = on(Recorder::sending(&[b"123"]), Port::new(&World::default(), 20));
         driver.port_mut().stutters = true;
         let world = driver.port().world.clone();
-        assert_eq!(world.poll_times(polls, driver.service_async()), None);
+        assert_eq!(world.poll_times(polls, driver.asynch().service()), None);
         let now = driver.now();
         assert!(driver.poll_timeout() <= Some(now + ms(1)) && driver.poll_timeout().is_some());
-        assert_eq!(world.block_on(driver.service_async()), Ok(()));
+        assert_eq!(world.block_on(driver.asynch().service()), Ok(()));
         assert_eq!(driver.poll_timeout(), None, "{polls}");
     }
 }

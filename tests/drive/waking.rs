@@ -37,7 +37,8 @@ fn a_byte_that_arrives_wakes_a_task_that_waits_for_an_event() {
     let (near, mut far) = Port::pair(&World::default(), 20);
     let world = near.world.clone();
     let mut driver = on(Recorder::default(), near);
-    let mut task = Task::new(driver.next_event_async(at_ms(60_000) - driver.now()));
+    let within = at_ms(60_000) - driver.now();
+    let mut task = Task::new(driver.asynch().next_event(within));
     assert!(task.poll().is_pending() && !task.is_woken());
     embedded_io::Write::write(&mut far, &[7]).unwrap();
     world.step(20);
@@ -49,7 +50,8 @@ fn a_byte_that_arrives_wakes_a_task_that_waits_for_an_event() {
 fn a_delay_that_is_over_wakes_a_task_that_waits_for_an_event() {
     let mut driver = on(Recorder::default(), Port::default());
     let world = driver.port().world.clone();
-    let mut task = Task::new(driver.next_event_async(at_ms(5) - driver.now()));
+    let within = at_ms(5) - driver.now();
+    let mut task = Task::new(driver.asynch().next_event(within));
     assert!(task.poll().is_pending() && !task.is_woken());
     world.step(5000);
     assert!(task.is_woken(), "by the delay");
@@ -62,7 +64,7 @@ fn a_port_that_goes_on_wakes_a_task_that_writes_or_flushes() {
     port.flushes.push_back(Step::Late(100));
     let world = port.world.clone();
     let mut driver = on(Recorder::sending(&[b"12"]), port);
-    let mut task = Task::new(driver.service_async());
+    let mut task = Task::new(driver.asynch().service());
     for _ in 0..2 {
         assert!(task.poll().is_pending() && !task.is_woken());
         world.step(100);
@@ -78,7 +80,7 @@ fn a_delay_that_is_over_wakes_a_task_whose_port_has_stalled() {
         port.flushes.push_back(Step::Stall);
         let world = port.world.clone();
         let mut driver = on(Recorder::sending(&[b"12"]), port);
-        let mut task = Task::new(driver.service_async());
+        let mut task = Task::new(driver.asynch().service());
         assert!(task.poll().is_pending() && !task.is_woken());
         // A write that has stalled is followed by a flush, which stalls as well.
         let mut rounds = 0;
@@ -108,9 +110,10 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
         let mut driver = on(Recorder::sending(&[b"stop"]), failing());
         let mut task = match waits {
             true => Task::new(async {
-                driver.next_event_async(at_ms(1000) - driver.now()).await.map(drop)
+                let within = at_ms(1000) - driver.now();
+                driver.asynch().next_event(within).await.map(drop)
             }),
-            false => Task::new(driver.service_async()),
+            false => Task::new(driver.asynch().service()),
         };
         assert_eq!((task.poll(), task.wakes.count()), (Poll::Pending, 1));
         assert_eq!(task.poll(), Poll::Ready(Err(GONE)));
@@ -121,7 +124,8 @@ fn an_async_call_that_fails_at_once_has_yielded_once_and_been_woken() {
 fn a_read_that_fails_while_the_driver_waits_also_yields() {
     // The first read finds nothing, the waiting one fails.
     let mut driver = on(Recorder::default(), Port::reading([Step::Stall, Step::Error]));
-    let mut task = Task::new(driver.next_event_async(at_ms(1000) - driver.now()));
+    let within = at_ms(1000) - driver.now();
+    let mut task = Task::new(driver.asynch().next_event(within));
     assert_eq!((task.poll(), task.wakes.count()), (Poll::Pending, 1));
     assert_eq!(task.poll(), Poll::Ready(Err(GONE)));
 }

@@ -3,7 +3,7 @@
 use crate::rig::*;
 
 fn set(story: &mut Story, is_async: bool) -> Result<(), DriveError<Unplugged>> {
-    call!(is_async, story.bus, set_velocity, set_velocity_async(NodeId::N2, rps(3.0)))
+    call!(is_async, story.bus, set_velocity(NodeId::N2, rps(3.0)))
 }
 
 /// How a port fails a set-point: it takes this many bytes, or all bytes and fails to flush.
@@ -43,8 +43,7 @@ fn a_position_that_is_withdrawn_because_its_call_fails_is_held_where_the_node_is
             let mut story = Story::new(manual()).discovered();
             fail_packet(&mut story, taken);
             let far = Position::new(0, 100);
-            let moved =
-                call!(is_async, story.bus, set_position, set_position_async(NodeId::N5, far));
+            let moved = call!(is_async, story.bus, set_position(NodeId::N5, far));
             assert_eq!(moved, Err(DriveError::Port(Unplugged)));
             assert_eq!(story.bus.role().stops_owed(), only(NodeId::N5));
             story.run(20);

@@ -50,6 +50,6 @@ fn a_driver_and_its_role_begin_at_the_same_reading_of_the_clock() {
         Recorder::default()
     };
     // The clock has gone back when it is read next.
-    let driver = Driver::with(make, Port::default(), clock);
+    let driver = On::with(make, Port::default(), clock);
     assert_eq!((begun, driver.now()), (Some(at_ms(5000)), at_ms(5000)));
 }

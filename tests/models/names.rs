@@ -1,7 +1,7 @@
 //! What the models use of the library, and of their frame.
 
 pub(crate) use axlewire::{
-    drive::{DriveError, Driver, Rs485},
+    drive::{DriveError, Driver, Rs485, asynch},
     endpoint::{Arrival, Endpoint, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, Rps, Target, VelocityResponse,

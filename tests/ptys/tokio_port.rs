@@ -10,7 +10,7 @@ use std::{
 };
 
 use axlewire::{
-    drive::{Clock, DriveError, Driver, TokioClock, TokioSerialPort},
+    drive::{Clock, DriveError, TokioClock, TokioSerialPort, asynch::Driver},
     ikeya::{BAUD, Mode, NodeId, Rps, master::MasterConfig},
     time,
 };
@@ -52,10 +52,10 @@ fn a_master_turns_a_motor_and_stops_it() {
         let port = TokioSerialPort::open(&path, BAUD).unwrap();
         assert!(port.is_pseudo_terminal());
         let mut bus = Driver::master(patient(), port, TokioClock::new());
-        assert_eq!(bus.discover_async().await?[..], [(NodeId::N1, Mode::Velocity)]);
+        assert_eq!(bus.discover().await?[..], [(NodeId::N1, Mode::Velocity)]);
         let speed = Rps::new(2.0).unwrap();
-        bus.drive_for_async(NodeId::N1, speed, time::Duration::from_millis(100)).await?;
-        bus.stop_all_async().await
+        bus.drive_for(NodeId::N1, speed, time::Duration::from_millis(100)).await?;
+        bus.stop_all().await
     });
     turned.unwrap();
     assert_eq!(motor.speeds(), [2.0, 0.0]);
@@ -168,7 +168,7 @@ fn a_driver_whose_port_is_unplugged_says_so_and_does_not_wait() {
             drop(far);
         });
         loop {
-            if let Err(error) = bus.next_event_async(an_hour).await {
+            if let Err(error) = bus.next_event(an_hour).await {
                 return error;
             }
         }

@@ -9,7 +9,7 @@
 #![no_main]
 
 use axlewire::{
-    drive::{Driver, WithDelay},
+    drive::{WithDelay, asynch::Driver},
     time::{Duration, Instant},
     ucp::{
         BAUD, Robot, Telemetry,
@@ -86,7 +86,7 @@ async fn main(_spawner: Spawner) {
         // Returns early when the command changes. A failed port is retried, and meanwhile the
         // robot's watchdog keeps running, so the command is queried below whatever this call
         // returns.
-        let _ = rover.next_command_async(PERIOD).await;
+        let _ = rover.next_command(PERIOD).await;
         while let Some(event) = rover.poll_event() {
             if let RobotEvent::UpdateRequested { .. } = event {
                 // This board has no boot loader. An update requested by a motor command expects no

@@ -1,273 +1,228 @@
-//! High-level motor-bus calls: the common part of the blocking and the async ones.
+//! The motor-bus calls, written once for both worlds.
 
-use heapless::Vec;
-
-use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
-    endpoint::Endpoint,
-    ikeya::{
-        Master, Mode, NodeId, Slave,
-        board::{Board, Status, Target},
-        master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
-        slave::{SlaveConfig, SlaveEvent},
+    drive::{
+        clock::Clock,
+        driver::{Driver, Needs},
+        error::{DriveError, Operation},
+        worlds::AtEnd,
     },
-    time::{Duration, Instant},
+    ikeya::{
+        Master, NodeId, Slave,
+        board::{Board, Status, Target},
+        master::NodeSet,
+    },
+    time::Duration,
 };
 
-/// The online nodes, in order of their ids, with their modes.
-pub type OnlineNodes = Vec<(NodeId, Mode), 8>;
+use super::steps::OnlineNodes;
 
-/// A call that waits until nodes are still.
-pub(super) struct StopWait {
-    nodes: NodeSet,
-    /// Those of them whose stop has not been confirmed since the call.
-    unconfirmed: NodeSet,
-    confirmed_by: Instant,
-    still_by: Instant,
-}
-
-impl StopWait {
-    /// The next time limit.
-    pub(super) fn until(&self, now: Instant) -> Instant {
-        if now < self.confirmed_by { self.confirmed_by } else { self.still_by }
-    }
-}
-
-impl<P, C: Clock> Driver<Master, P, C> {
-    /// A new [master](Master) with a port and a clock. For another board, see
-    /// [`with`](Driver::with).
+macro_rules! calls {
+    ($Driver:ident, [$($Port:tt)+], [$($Clock:tt)+], [$($async:tt)?], [$($await:tt)*]) => {
+/// The calls of a master.
+///
+/// Each ends within four times [`Master::read_bound`], or at its deadline argument; those that stop
+/// within [`Master::stop_bound`] and the time to coast. Readings received meanwhile are not kept as
+/// events, because [`Master::status`] has the latest; all other events are kept.
+impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
+    /// Asks every id on the bus and returns the nodes that are online. Removes the events of the
+    /// discovery itself.
     ///
-    /// ```
-    /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::{drive::{Clock, DriveError, Driver}, ikeya::{NodeId, Rps, master::MasterConfig}};
-    /// use axlewire::time::Duration;
-    /// use embedded_io::{Read, ReadReady, Write};
+    /// # Errors
     ///
-    /// /// Turns node 1 for three seconds.
-    /// fn turn<P, C>(port: P, clock: C) -> Result<(), DriveError<P::Error>>
-    /// where
-    ///     P: Read + ReadReady + Write,
-    ///     C: Clock,
-    /// {
-    ///     let mut bus = Driver::master(MasterConfig::direct(), port, clock);
-    ///     bus.discover()?;
-    ///     bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3))
-    /// }
-    /// # }
-    /// ```
-    pub fn master(config: MasterConfig, port: P, clock: C) -> Self {
-        Self::with(|now| Master::new(config, now), port, clock)
+    /// Port errors. It is not an error if no node answers.
+    pub $($async)? fn discover(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
+        self.begin_discovery();
+        let bound = self.bound();
+        let found = self.until(bound, Driver::discovered)$($await)*?;
+        found.ok_or(DriveError::Timeout(Operation::Discovery))
     }
-}
 
-impl<P, C: Clock> Driver<Slave, P, C> {
-    /// A new [slave](Slave) with a port and a clock. For another board, see
-    /// [`with`](Driver::with).
+    /// Turns a velocity node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called, except with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual).
     ///
-    /// ```
-    /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::drive::{Clock, DriveError, Driver};
-    /// use axlewire::ikeya::{Mode, NodeId, Rps, Target, slave::SlaveConfig};
-    /// use axlewire::time::Duration;
-    /// use embedded_io::{Read, ReadReady, Write};
+    /// # Errors
     ///
-    /// fn run<P, C>(port: P, clock: C, set_motor: fn(Rps)) -> Result<(), DriveError<P::Error>>
-    /// where
-    ///     P: Read + ReadReady + Write,
-    ///     C: Clock,
-    /// {
-    ///     let mut config = SlaveConfig::direct();
-    ///     config.watchdog = Some(Duration::from_millis(100)); // off unless you set it
-    ///     let mut slave = Driver::slave(NodeId::N1, Mode::Velocity, config, port, clock);
-    ///     loop {
-    ///         slave.next_command(Duration::from_millis(10))?;
-    ///         let now = slave.now();
-    ///         match slave.role().command(now) {
-    ///             Some(Target::Velocity(speed)) => set_motor(speed),
-    ///             _ => set_motor(Rps::ZERO), // none yet, or the watchdog has fired
-    ///         }
-    ///     }
-    /// }
-    /// # }
-    /// ```
-    pub fn slave(node: NodeId, mode: Mode, config: SlaveConfig, port: P, clock: C) -> Self {
-        Self::with(|now| Slave::new(node, mode, config, now), port, clock)
-    }
-}
-
-impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
-    /// Deadline of a call: a discovery may run before it, each takes no longer than a read may, and
-    /// a driver on a host is late now and then.
-    pub(super) fn bound(&mut self) -> Instant {
-        self.now() + self.role.read_bound().saturating_mul(4)
+    /// [`DriveError::Bus`] if the master refuses the command, or drops it before it was sent;
+    /// [`DriveError::Timeout`] if it could not be sent within four times [`Master::read_bound`];
+    /// and port errors, even if only its receiver failed. After any of them but a refusal the
+    /// command is withdrawn: neither it nor its rest is sent later, and **the node is owed a stop**
+    /// (ruling I12), because it may have heard the command. Keep calling the driver, or call
+    /// [`stop`](Self::stop), until the stop is confirmed: until then, set-points are refused with
+    /// [`CommandError::StopOwed`](crate::ikeya::master::CommandError::StopOwed).
+    pub $($async)? fn set_velocity(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target(node, Target::Velocity(target))$($await)*
     }
 
-    /// Begins to wait until these nodes are still.
-    pub(super) fn wait_for_stops(&mut self, nodes: NodeSet) -> StopWait {
-        let confirmed_by = self.now() + self.role.stop_bound();
-        let still_by = confirmed_by + self.role.config().coast;
-        StopWait { nodes, unconfirmed: nodes, confirmed_by, still_by }
+    /// Moves a position node, and returns when the command is on the line. The command is repeated
+    /// as long as the driver is called, except with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual).
+    ///
+    /// # Errors
+    ///
+    /// Same as [`set_velocity`](Self::set_velocity).
+    pub $($async)? fn set_position(
+        &mut self,
+        node: NodeId,
+        target: B::Position,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.send_target(node, Target::Position(target))$($await)*
     }
 
-    pub(super) fn is_online(&self, node: NodeId) -> bool {
-        matches!(self.role.health(node), Some(Health::Online | Health::Suspect(_)))
-    }
-
-    /// Nodes that were told to move.
-    #[cfg(feature = "serialport")]
-    pub(super) fn moving(&self) -> NodeSet {
-        let is_moving = |&node: &NodeId| {
-            self.role.set_point(node).is_some()
-                && self.role.stop_progress(node) == StopProgress::NotAsked
+    /// Turns a velocity node for `span`, then stops it and returns when it is seen to be
+    /// still. Meanwhile the set-point is repeated, and counts as a sign of life; with
+    /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual) it is sent once, and the motor
+    /// does not turn if it is lost.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`stop`](Self::stop), whatever else failed before. Otherwise
+    /// the errors of [`set_velocity`](Self::set_velocity), returned at once if the node loses its
+    /// set-point on the way.
+    pub $($async)? fn drive_for(
+        &mut self,
+        node: NodeId,
+        target: B::Velocity,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let target = Target::Velocity(target);
+        self.role.check(node, &target)?;
+        let guard = AtEnd { driver: self, then: |driver| driver.begin_stop(node.into()) };
+        let moved = match guard.driver.send_target(node, target)$($await)* {
+            Ok(()) => guard.driver.hold_target(node, target, span)$($await)*,
+            failed => failed,
         };
-        NodeId::ALL.into_iter().filter(is_moving).collect()
+        drop(guard);
+        self.await_stops(node.into())$($await)*?;
+        moved
     }
 
-    pub(super) fn begin_discovery(&mut self) {
-        let now = self.now();
-        self.role.discover(now);
+    /// Stops a node, or all of a [`NodeSet`], as [`Master::stop`] does, and returns when each is
+    /// **seen to be still** ([`StopProgress::StandingStill`](crate::ikeya::master::StopProgress),
+    /// ruling I12). Continues through errors of the port.
+    ///
+    /// To go on with other work meanwhile, call [`Master::stop`], keep calling the driver, and
+    /// watch [`Master::stop_progress`].
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::StopsOwed`] if the stop is not confirmed within [`Master::stop_bound`], and
+    /// [`DriveError::StillMoving`] if the motor moves for longer than
+    /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
+    /// ends after the sum of both at the latest. **The motor may be running.** The stop is repeated
+    /// as long as the driver is called.
+    pub $($async)? fn stop(
+        &mut self,
+        nodes: impl Into<NodeSet>,
+    ) -> Result<(), DriveError<P::Error>> {
+        let nodes = nodes.into();
+        self.begin_stop(nodes);
+        self.await_stops(nodes)$($await)*
     }
 
-    /// The online nodes, once the discovery is over; removes its events.
-    pub(super) fn discovered(&mut self) -> Option<OnlineNodes> {
-        self.role.retain_events(|event| {
-            !matches!(
-                event,
-                MasterEvent::Discovered { .. }
-                    | MasterEvent::DiscoveryDone { .. }
-                    | MasterEvent::Status { .. }
-            )
-        });
-        if self.role.is_discovering() {
-            return None;
-        }
-        // Not `collect`: the compiler does not see that it cannot panic here.
-        let mut found = Vec::new();
-        for node in NodeId::ALL.into_iter().filter(|&node| self.is_online(node)) {
-            if let Some(mode) = self.role.mode(node) {
-                let _ = found.push((node, mode));
-            }
-        }
-        Some(found)
+    /// Stops every node of [`MasterConfig::nodes`](crate::ikeya::master::MasterConfig::nodes), and
+    /// every other node that has ever answered, as [`stop`](Self::stop) does.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`stop`](Self::stop), with all nodes that they concern. The stops owed include
+    /// ids that have never answered: only you know whether they have a motor. On a bus of fewer
+    /// than eight nodes, set `MasterConfig::nodes`.
+    pub $($async)? fn stop_all(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop_all();
+        self.await_stops(NodeSet::ALL)$($await)*
     }
 
-    /// Removes readings from the events: the role has the latest of each node.
-    pub(super) fn drop_readings(&mut self) {
-        self.role.retain_events(|event| !matches!(event, MasterEvent::Status { .. }));
+    /// Reads a node; returns a measurement received after this call was made. Waits for at most
+    /// four times [`Master::read_bound`].
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
+    /// online, and port errors.
+    pub $($async)? fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
+        self.begin_read(node)?;
+        let bound = self.bound();
+        let answer = self.until(bound, |driver| driver.answer(node))$($await)*?;
+        answer.ok_or(DriveError::Timeout(Operation::Read { node }))?
     }
 
-    pub(super) fn aim(&mut self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
-        let now = self.now();
-        match target {
-            Target::Velocity(velocity) => self.role.set_velocity(node, velocity, now),
-            Target::Position(position) => self.role.set_position(node, position, now),
-        }
-    }
-
-    /// Whether the set-point has left, once that is known: it may be dropped while it waits.
-    pub(super) fn aimed(
+    $($async)? fn send_target(
         &mut self,
         node: NodeId,
         target: Target<B>,
-    ) -> Option<Result<(), CommandError>> {
-        self.drop_readings();
-        if let Err(error) = self.still_aimed(node, target) {
-            return Some(Err(error));
+    ) -> Result<(), DriveError<P::Error>> {
+        self.aim(node, target)?;
+        let bound = self.bound();
+        let sent = self.until(bound, |driver| driver.aimed(node, target))$($await)*;
+        if !matches!(sent, Ok(Some(Ok(())))) {
+            self.withdraw(node);
         }
-        (self.role.is_set_point_sent(node) && self.is_sent()).then_some(Ok(()))
+        Ok(sent?.ok_or(DriveError::Timeout(Operation::SetPoint))??)
     }
 
-    /// Withdraws the set-point of a failed call, and the rest of a packet, which would complete a
-    /// cut-off set-point. The node may have heard it anyway, and its previous order is gone: it is
-    /// owed a stop.
-    pub(super) fn withdraw(&mut self, node: NodeId) {
-        let cut_off = self.sending.give_up();
-        self.tell_unsent(cut_off);
-        self.begin_stop(node.into());
-    }
-
-    /// Whether a node still has this set-point, and if not, why.
-    pub(super) fn still_aimed(&self, node: NodeId, target: Target<B>) -> Result<(), CommandError> {
-        if self.role.set_point(node) == Some(target) {
-            return Ok(());
-        }
-        self.role.check(node, &target)?;
-        Err(CommandError::NoSetPoint { node })
-    }
-
-    /// Requests a READ; readings from before do not count as its answer.
-    pub(super) fn begin_read(&mut self, node: NodeId) -> Result<(), CommandError> {
-        let now = self.now();
-        self.drop_readings();
-        self.role.read(node, now)
-    }
-
-    /// The answer of a node, or why there is none.
-    pub(super) fn answer<E>(&mut self, node: NodeId) -> Option<Result<Status<B>, DriveError<E>>> {
-        self.drop_readings();
-        let outcome = self.role.read_outcome(node)?;
-        let Err(cause) = outcome else {
-            return self.role.status(node).map(|(status, _)| Ok(status));
+    /// Keeps a set-point alive for `span`, as long as the node has it.
+    $($async)? fn hold_target(
+        &mut self,
+        node: NodeId,
+        target: Target<B>,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let lost = |driver: &mut Driver<_, _, _>| {
+            driver.drop_readings();
+            driver.still_aimed(node, target).err()
         };
-        self.role.retain_events(
-            |event| !matches!(event, MasterEvent::ReadFailed { node: failed, .. } if *failed == node),
-        );
-        Some(Err(DriveError::ReadFailed { node, cause }))
-    }
-
-    pub(super) fn begin_stop(&mut self, nodes: NodeSet) {
-        let now = self.now();
-        self.ends_at = None;
-        nodes.iter().for_each(|node| self.role.stop(node, now));
-    }
-
-    pub(super) fn begin_stop_all(&mut self) {
-        let now = self.now();
-        self.role.stop_all(now);
-    }
-
-    /// How the stops have ended, once they have: all nodes are still, or one is not confirmed or
-    /// still in time.
-    pub(super) fn stopped<E>(&mut self, wait: &mut StopWait) -> Option<Result<(), DriveError<E>>> {
-        self.drop_readings();
-        let now = self.now();
-        let owed = self.role.stops_owed().and(wait.nodes);
-        let coasting = self.role.coasting().and(wait.nodes);
-        if owed.is_empty() && coasting.is_empty() {
-            return Some(Ok(()));
-        }
-        // A node that loses its confirmation, by damage or another mode, has time to be still too.
-        wait.unconfirmed = wait.unconfirmed.and(owed);
-        if now >= wait.still_by || now >= wait.confirmed_by && !wait.unconfirmed.is_empty() {
-            return Some(Err(match owed.is_empty() {
-                true => DriveError::StillMoving(coasting),
-                false => DriveError::StopsOwed(owed),
-            }));
-        }
-        let is_moving = |node| self.role.stop_progress(node) == StopProgress::StillMoving;
-        let are_moving = owed.is_empty() && coasting.iter().all(is_moving);
-        are_moving.then_some(Err(DriveError::StillMoving(coasting)))
-    }
-
-    /// Gives a sign of life; returns when to give the next, well before the dead-man fires.
-    pub(super) fn keep_alive(&mut self) -> Instant {
-        let now = self.now();
-        self.role.keep_alive(now);
-        let limit = self.role.config().dead_man.map_or(u32::MAX, |limit| limit.as_micros() / 2);
-        now + Duration::from_micros(limit.max(1))
-    }
-}
-
-impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
-    /// A command; `Some(None)` for the watchdog, whose event stays in the queue.
-    pub(super) fn command(&mut self) -> Option<Option<Target<B>>> {
-        self.tell_time();
-        match *self.role.peek_event()? {
-            SlaveEvent::Command(target) => {
-                self.role.poll_event();
-                Some(Some(target))
+        while self.now() < end {
+            let next = self.keep_alive().min(end);
+            let kept = self.until_with(next, Needs::WholePortInTime, lost)$($await)*?;
+            if let Some(error) = kept {
+                return Err(error.into());
             }
-            SlaveEvent::Watchdog => Some(None),
+        }
+        Ok(())
+    }
+
+    /// Runs until these nodes are still, through errors of the port.
+    $($async)? fn await_stops(&mut self, nodes: NodeSet) -> Result<(), DriveError<P::Error>> {
+        let mut wait = self.wait_for_stops(nodes);
+        loop {
+            let until = wait.until(self.now());
+            let stopped = |driver: &mut Driver<_, _, _>| driver.stopped::<P::Error>(&mut wait);
+            let result = self.until(until, stopped)$($await)*;
+            if let Some(stopped) = self.stopped(&mut wait) {
+                return stopped;
+            }
+            if result.is_err() {
+                self.nap(until)$($await)*;
+            }
         }
     }
 }
+
+/// The calls of a slave.
+impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Slave<B>, P, C> {
+    /// Returns the next command, and answers requests meanwhile; waits for it for this long. `None`
+    /// if there was none, and at once when the watchdog has fired: its event is then the next of
+    /// [`poll_event`](crate::drive::Driver::poll_event).
+    ///
+    /// # Errors
+    ///
+    /// Port errors.
+    pub $($async)? fn next_command(
+        &mut self,
+        within: Duration,
+    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
+        self.until_with(deadline, Needs::HalfPort, Driver::command)$($await)*.map(Option::flatten)
+    }
+}
+};
+}
+
+in_both_worlds!(calls);

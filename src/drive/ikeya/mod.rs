@@ -1,9 +1,6 @@
-//! High-level motor-bus calls, blocking and async.
+//! High-level motor-bus calls.
 
-#[cfg(feature = "embedded-io-async")]
-mod asynch;
-#[cfg(feature = "embedded-io")]
-mod blocking;
 mod calls;
+mod steps;
 
-pub use calls::OnlineNodes;
+pub use steps::OnlineNodes;

@@ -1,187 +1,233 @@
-//! High-level rover-link calls: the common part of the blocking and the async ones.
+//! The rover-link calls, written once for both worlds.
 
-use crate::drive::{
-    clock::Clock,
-    driver::Driver,
-    error::{DriveError, Operation},
-};
 use crate::{
+    drive::{
+        clock::Clock,
+        driver::{Driver, Needs},
+        error::{DriveError, Operation},
+        worlds::AtEnd,
+    },
     time::{Duration, Instant},
     ucp::{
         Host, MotorControl, Robot,
-        host::{
-            BiasStore, CalibrationStep, CommandError, HostConfig, HostEvent, ReceivedReport,
-            StopProgress,
-        },
+        host::{BiasStore, COAST, CalibrationStep, ReceivedReport},
         message::CalibrationKind,
-        robot::{RobotConfig, RobotEvent},
     },
 };
 
-/// Time within which a stop must be flushed: the period of motor commands (ruling U16).
-const STOP_BOUND: Duration = Duration::from_millis(100);
-
-impl<P, C: Clock> Driver<Host, P, C> {
-    /// A new [host](Host) with a port and a clock, which keeps no biases. To keep them, see
-    /// [`with`](Driver::with) and [`Host::with_store`].
+macro_rules! calls {
+    ($Driver:ident, [$($Port:tt)+], [$($Clock:tt)+], [$($async:tt)?], [$($await:tt)*]) => {
+/// The calls of a host.
+///
+/// Reports and pongs received meanwhile are not kept as events, because [`Host::last_report`] and
+/// [`Host::statistics`] have their contents; all other events are kept.
+impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
+    /// Waits for the robot to answer a ping, and returns the round trip. A ping is sent every
+    /// [`HostConfig::ping_period`](crate::ucp::host::HostConfig::ping_period).
     ///
-    /// ```
-    /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::{drive::{Clock, DriveError, Driver}, time::Duration, ucp::host::HostConfig};
-    /// use embedded_io::{Read, ReadReady, Write};
+    /// # Errors
     ///
-    /// /// Drives ahead for two seconds.
-    /// fn go<P, C>(port: P, clock: C) -> Result<(), DriveError<P::Error>>
-    /// where
-    ///     P: Read + ReadReady + Write,
-    ///     C: Clock,
-    /// {
-    ///     let mut rover = Driver::host(HostConfig::direct(), port, clock);
-    ///     rover.ping(Duration::from_secs(1))?;
-    ///     rover.drive_for(30, 0, Duration::from_secs(2)) // percent ahead, percent of turn
-    /// }
-    /// # }
-    /// ```
-    pub fn host(config: HostConfig, port: P, clock: C) -> Self {
-        Self::with(|now| Host::new(config, now), port, clock)
+    /// [`DriveError::Timeout`] if nothing came within this time, and port errors.
+    pub $($async)? fn ping(&mut self, within: Duration) -> Result<Duration, DriveError<P::Error>> {
+        self.role.take_round_trip();
+        let pong = self.until(self.now() + within, |driver| driver.pong())$($await)*?;
+        pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
-}
 
-impl<P, C: Clock> Driver<Robot, P, C> {
-    /// A new [robot](Robot) with a port and a clock.
+    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. The command is
+    /// sent now or, right after another command, within the next 20 ms, and repeated as long as the
+    /// driver is called. Call it again within 500 ms (see [`Host::drive`]), or use
+    /// [`drive_for`](Self::drive_for), which does.
     ///
-    /// ```
-    /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::drive::{Clock, DriveError, Driver};
-    /// use axlewire::{time::Duration, ucp::{MotorControl, robot::RobotConfig}};
-    /// use embedded_io::{Read, ReadReady, Write};
+    /// # Errors
     ///
-    /// fn run<P, C>(port: P, clock: C, set: fn(MotorControl)) -> Result<(), DriveError<P::Error>>
-    /// where
-    ///     P: Read + ReadReady + Write,
-    ///     C: Clock,
-    /// {
-    ///     let mut robot = Driver::robot(RobotConfig::direct(), port, clock);
-    ///     loop {
-    ///         robot.next_command(Duration::from_millis(10))?;
-    ///         let now = robot.now();
-    ///         set(robot.role().command(now)); // a standstill once the watchdog has fired
-    ///     }
-    /// }
-    /// # }
-    /// ```
-    pub fn robot(config: RobotConfig, port: P, clock: C) -> Self {
-        Self::with(|now| Robot::new(config, now), port, clock)
-    }
-}
-
-impl<S: BiasStore, P, C: Clock> Driver<Host<S>, P, C> {
-    pub(super) fn command(&mut self, speed: i16, angular: i16) -> Result<(), CommandError> {
-        let now = self.now();
-        let is_lit = self.role.command().is_some_and(|command| command.front_led() != 0);
-        let command = MotorControl::new(speed, angular).map_err(CommandError::Value)?;
-        self.role.drive(command.with_front_led(is_lit), now)
-    }
-
-    /// When to renew a command that is to continue: long before the host's dead-man fires.
-    pub(super) fn renew_at(&mut self) -> Instant {
-        let half_us = self.role.config().dead_man.as_micros() / 2;
-        self.now() + Duration::from_micros(half_us.max(1))
-    }
-
-    pub(super) fn begin_stop(&mut self) {
-        let now = self.now();
-        self.ends_at = None;
-        self.role.stop(now);
-    }
-
-    pub(super) fn stop_deadline(&self) -> Instant {
-        self.now() + STOP_BOUND
-    }
-
-    /// Whether the stop has left the port.
-    pub(super) fn stopped(&mut self) -> Option<()> {
-        self.drop_routine();
-        (self.role.is_stop_sent() && self.is_sent()).then_some(())
-    }
-
-    /// `Ok` once the robot stands still; an error if it was not even told to.
-    pub(super) fn standing<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
-        self.drop_routine();
-        match self.role.stop_progress() {
-            StopProgress::StandingStill => Some(Ok(())),
-            StopProgress::NotAsked => Some(Err(DriveError::NoStandstill(StopProgress::NotAsked))),
-            _ => None,
-        }
-    }
-
-    /// Why the robot was not seen to stand still in time.
-    pub(super) fn no_standstill<E>(&self) -> DriveError<E> {
-        match self.role.stop_progress() {
-            StopProgress::Due => DriveError::Timeout(Operation::Stop),
-            progress => DriveError::NoStandstill(progress),
-        }
-    }
-
-    /// Removes reports and pongs from the events: the host has the latest report and counts both.
-    pub(super) fn drop_routine(&mut self) {
-        self.role
-            .retain_events(|event| !matches!(event, HostEvent::Report(_) | HostEvent::Pong { .. }));
-    }
-
-    /// The round trip of the next pong. Call it once before, to discard the current one.
-    pub(super) fn pong(&mut self) -> Option<Duration> {
-        self.drop_routine();
-        self.role.take_round_trip()
-    }
-
-    pub(super) fn report(&mut self) -> Option<ReceivedReport> {
-        self.drop_routine();
-        self.role.take_report()
-    }
-
-    pub(super) fn begin_calibration(
+    /// [`DriveError::Rover`], and port errors. **After a port error the command stays in force**
+    /// until 500 ms after this call, and is sent when the port works again: call
+    /// [`stop`](Self::stop).
+    pub $($async)? fn drive(
         &mut self,
-        step: CalibrationStep,
+        speed: i16,
+        angular: i16,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        self.service()$($await)*
+    }
+
+    /// Drives for `span`, then stops, and waits until the robot is seen to stand still, for at most
+    /// [`COAST`](crate::ucp::host::COAST).
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`stop`](Self::stop), then those of
+    /// [`await_standstill`](Self::await_standstill), whatever else failed before; otherwise
+    /// [`DriveError::Rover`] and port errors. A refused call changes nothing, and stops nothing.
+    pub $($async)? fn drive_for(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        self.command(speed, angular)?;
+        let guard = AtEnd { driver: self, then: |driver| driver.begin_stop() };
+        let driven = guard.driver.hold_command(speed, angular, span)$($await)*;
+        drop(guard);
+        self.send_stop()$($await)*?;
+        self.await_standstill(COAST)$($await)*?;
+        driven
+    }
+
+    /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
+    /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
+    /// is called; see [`Host::stop`]. A robot does not answer a stop: whether it obeys is in its
+    /// reports, see [`await_standstill`](Self::await_standstill).
+    ///
+    /// After a failed flush, two whole copies are flushed before this returns `Ok`.
+    ///
+    /// # Errors
+    ///
+    /// Port errors, or [`DriveError::Timeout`]. **The robot may be driving.** The stop stays
+    /// due, and the next call sends it.
+    pub $($async)? fn stop(&mut self) -> Result<(), DriveError<P::Error>> {
+        self.begin_stop();
+        self.send_stop()$($await)*
+    }
+
+    /// Waits until the robot, which was told to stop, is seen to stand still: three reports in a
+    /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less, and the
+    /// last is an average of the time since ([`Host::stop_progress`]). So this takes at least
+    /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average). Continues through
+    /// errors of the port. For a rover that coasts, allow at least
+    /// [`COAST`](crate::ucp::host::COAST).
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::NoStandstill`] after this time, and at once if the latest command is to move;
+    /// [`DriveError::Timeout`] if the stop has not left by then; port errors, if the port still
+    /// fails then. **The robot may be moving.** The stop is repeated as long as the driver
+    /// is called.
+    pub $($async)? fn await_standstill(
+        &mut self,
+        within: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
+        let standing = self.until_through_errors(deadline, Driver::standing)$($await)*?;
+        standing.unwrap_or_else(|| Err(self.no_standstill()))
+    }
+
+    /// Returns the latest report not returned yet; waits for one for this long, then returns
+    /// `None`. Reports in between are skipped: to see every report, take events.
+    ///
+    /// # Errors
+    ///
+    /// Port errors.
+    pub $($async)? fn next_report(
+        &mut self,
+        within: Duration,
+    ) -> Result<Option<ReceivedReport>, DriveError<P::Error>> {
+        self.until(self.now() + within, Driver::report)$($await)*
+    }
+
+    /// Begins a calibration, and returns when the robot has agreed; see
+    /// [`Host::start_calibration`]. For all attempts to fit, allow at least
+    /// [`HostConfig::calibration_bound`](crate::ucp::host::HostConfig::calibration_bound).
+    ///
+    /// # Errors
+    ///
+    /// [`DriveError::Calibration`] or [`DriveError::Rover`], [`DriveError::Timeout`] after this
+    /// time, and port errors.
+    pub $($async)? fn start_calibration(
+        &mut self,
         kind: CalibrationKind,
-    ) -> Result<(), CommandError> {
-        let now = self.now();
-        if self.role.calibration_outcome().is_some() {
-            // An outcome that came after its call had given up takes no room from the next.
-            self.drop_calibration_events();
-        }
-        match step {
-            CalibrationStep::Start => self.role.start_calibration(kind, now),
-            CalibrationStep::End => self.role.end_calibration(kind, now),
-        }
+        within: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
+        self.begin_calibration(CalibrationStep::Start, kind)?;
+        let outcome = self.until(deadline, Driver::calibration)$($await)*?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
     }
 
-    pub(super) fn drop_calibration_events(&mut self) {
-        self.role.retain_events(|event| {
-            !matches!(
-                event,
-                HostEvent::CalibrationStarted(_)
-                    | HostEvent::CalibrationEnded(_)
-                    | HostEvent::CalibrationFailed(_)
-            )
-        });
+    /// Ends a calibration, and returns when the robot has agreed. The result comes later, as an
+    /// event.
+    ///
+    /// # Errors
+    ///
+    /// Same as [`start_calibration`](Self::start_calibration).
+    pub $($async)? fn end_calibration(
+        &mut self,
+        kind: CalibrationKind,
+        within: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.now() + within;
+        self.begin_calibration(CalibrationStep::End, kind)?;
+        let outcome = self.until(deadline, Driver::calibration)$($await)*?;
+        outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
     }
 
-    /// The outcome of the request. There is one request at a time, so it is that of this call.
-    pub(super) fn calibration<E>(&mut self) -> Option<Result<(), DriveError<E>>> {
-        self.drop_routine();
-        let outcome = self.role.calibration_outcome()?;
-        // The call returns the outcome, so it is not an event.
-        self.drop_calibration_events();
-        Some(outcome.map_err(DriveError::Calibration))
+    /// Keeps a command alive for `span`.
+    $($async)? fn hold_command(
+        &mut self,
+        speed: i16,
+        angular: i16,
+        span: Duration,
+    ) -> Result<(), DriveError<P::Error>> {
+        let end = self.now() + span;
+        let refused = |driver: &mut Driver<_, _, _>| {
+            driver.drop_routine();
+            driver.command(speed, angular).err()
+        };
+        while self.now() < end {
+            let next = self.renew_at().min(end);
+            let kept = self.until_with(next, Needs::WholePortInTime, refused)$($await)*?;
+            if let Some(error) = kept {
+                return Err(error.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs until the stop has left, through errors of the port.
+    $($async)? fn send_stop(&mut self) -> Result<(), DriveError<P::Error>> {
+        let deadline = self.stop_deadline();
+        let left = self.until_through_errors(deadline, Driver::stopped)$($await)*?;
+        left.ok_or(DriveError::Timeout(Operation::Stop))
+    }
+
+    /// Runs until `done` returns a value; `None` at `deadline`. A port that fails ends it only
+    /// then.
+    $($async)? fn until_through_errors<T>(
+        &mut self,
+        deadline: Instant,
+        mut done: impl FnMut(&mut Driver<Host<S>, P, C>) -> Option<T>,
+    ) -> Result<Option<T>, DriveError<P::Error>> {
+        loop {
+            match self.until_with(deadline, Needs::HalfPort, &mut done)$($await)* {
+                Err(error) if self.now() >= deadline => return Err(error),
+                Err(_) => self.nap(deadline)$($await)*,
+                found => return found,
+            }
+        }
     }
 }
 
-impl<P, C: Clock> Driver<Robot, P, C> {
-    pub(super) fn new_command(&mut self) -> Option<MotorControl> {
-        let now = self.now();
-        self.role
-            .retain_events(|event| !matches!(event, RobotEvent::Motor(_) | RobotEvent::Watchdog));
-        self.role.take_command(now)
+/// The calls of a robot.
+impl<P: $($Port)+, C: $($Clock)+> $Driver<Robot, P, C> {
+    /// Returns the current command, once it has changed since the last call, including a standstill
+    /// by the watchdog. Answers and reports meanwhile; waits for this
+    /// long, then returns `None`.
+    ///
+    /// # Errors
+    ///
+    /// Port errors. The command stays in force until its watchdog ends it: see
+    /// [`Robot::command`].
+    pub $($async)? fn next_command(
+        &mut self,
+        within: Duration,
+    ) -> Result<Option<MotorControl>, DriveError<P::Error>> {
+        let deadline = self.now() + within;
+        self.until_with(deadline, Needs::HalfPort, Driver::new_command)$($await)*
     }
 }
+};
+}
+
+in_both_worlds!(calls);

@@ -1,7 +1,4 @@
-//! High-level rover calls, blocking and async.
+//! High-level rover calls.
 
-#[cfg(feature = "embedded-io-async")]
-mod asynch;
-#[cfg(feature = "embedded-io")]
-mod blocking;
 mod calls;
+mod steps;

@@ -78,7 +78,7 @@ impl Wire {
     }
 
     pub(crate) fn driver<R: Endpoint>(&self, role: impl FnOnce(Instant) -> R) -> On<R> {
-        Driver::with(role, self.port(), self.world.clone())
+        On::with(role, self.port(), self.world.clone())
     }
 
     pub(crate) fn port(&self) -> Port {
@@ -164,7 +164,8 @@ impl Wire {
 pub(crate) fn run<R: Endpoint>(driver: &mut On<R>, millis: u32) {
     let end = driver.now() + ms(millis);
     while driver.now() < end {
-        if driver.run_for(end - driver.now(), |_, _, _| ()).is_err() {
+        let span = end - driver.now();
+        if driver.run_for(span, |_, _, _| ()).is_err() {
             driver.port().world.step(100);
         }
     }

@@ -27,7 +27,7 @@ pub(crate) struct MasterLife<P> {
     pub(super) setup: Setup,
     pub(super) line: Shared,
     pub(super) node: SharedNode,
-    pub(super) driver: Driver<Master, P, Shared>,
+    pub(super) driver: asynch::Driver<Master, P, Shared>,
     pub(super) account: Account,
 }
 
@@ -60,7 +60,8 @@ fn told<T, P: Wired>(result: Result<T, DriveError<P::Error>>) -> Outcome {
 
 impl<P: Wired> MasterLife<P> {
     fn blocking(&mut self, call: Call) -> Outcome {
-        let (driver, target) = (&mut self.driver, target(self.setup.mode, 2));
+        let target = target(self.setup.mode, 2);
+        let driver: &mut Driver<_, _, _> = &mut self.driver;
         match (call, target) {
             (Call::Service, _) => told::<_, P>(driver.service()),
             (Call::Idle, _) => told::<_, P>(driver.run_for(IDLE, |_, _, _| ())),
@@ -82,18 +83,18 @@ impl<P: Wired> MasterLife<P> {
     async fn waiting(&mut self, call: Call) -> Outcome {
         let (driver, target) = (&mut self.driver, target(self.setup.mode, 2));
         match (call, target) {
-            (Call::Service, _) => told::<_, P>(driver.service_async().await),
-            (Call::Idle, _) => told::<_, P>(driver.run_for_async(IDLE, |_, _, _| ()).await),
-            (Call::Discover, _) => told::<_, P>(driver.discover_async().await),
+            (Call::Service, _) => told::<_, P>(driver.service().await),
+            (Call::Idle, _) => told::<_, P>(driver.run_for(IDLE, |_, _, _| ()).await),
+            (Call::Discover, _) => told::<_, P>(driver.discover().await),
             (Call::Set(number), _) => told::<_, P>(match self::target(self.setup.mode, number) {
-                Target::Velocity(velocity) => driver.set_velocity_async(N1, velocity).await,
-                Target::Position(position) => driver.set_position_async(N1, position).await,
+                Target::Velocity(velocity) => driver.set_velocity(N1, velocity).await,
+                Target::Position(position) => driver.set_position(N1, position).await,
             }),
-            (Call::Stop, _) => told::<_, P>(driver.stop_async(N1).await),
-            (Call::StopAll, _) => told::<_, P>(driver.stop_all_async().await),
-            (Call::Read, _) => told::<_, P>(driver.read_async(N1).await),
+            (Call::Stop, _) => told::<_, P>(driver.stop(N1).await),
+            (Call::StopAll, _) => told::<_, P>(driver.stop_all().await),
+            (Call::Read, _) => told::<_, P>(driver.read(N1).await),
             (Call::DriveFor, Target::Velocity(velocity)) => {
-                told::<_, P>(driver.drive_for_async(N1, velocity, SPAN).await)
+                told::<_, P>(driver.drive_for(N1, velocity, SPAN).await)
             }
             (Call::DriveFor | Call::Discard | Call::KeepAlive, _) => Ok(()),
         }
@@ -158,7 +159,7 @@ impl<P: Wired> Life for MasterLife<P> {
         config.coast = COAST;
         config.polling = Polling::Every(Duration::from_millis(1));
         config.dead_man = setup.dead_man_ms.map(Duration::from_millis);
-        let driver = Driver::master(config, P::plug(&line), line.clone());
+        let driver = asynch::Driver::master(config, P::plug(&line), line.clone());
         Self { setup, line, node, driver, account: Account::default() }
     }
 

@@ -3,7 +3,7 @@
 use std::{env, error::Error};
 
 use axlewire::{
-    drive::{Driver, TokioClock, TokioSerialPort},
+    drive::{TokioClock, TokioSerialPort, asynch::Driver},
     ikeya::{BAUD, NodeId, Rps, master::MasterConfig},
     time::Duration,
 };
@@ -16,13 +16,13 @@ async fn main() -> Result<(), Box<dyn Error>> {
     config.nodes = NodeId::N1.into(); // the whole bus
     config.accepts_early = port.is_pseudo_terminal(); // a simulated line takes no time
     let mut bus = Driver::master(config, port, TokioClock::new());
-    println!("found: {:?}", bus.discover_async().await?);
+    println!("found: {:?}", bus.discover().await?);
     let turned = tokio::select! {
-        turned = bus.drive_for_async(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3)) => turned,
+        turned = bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3)) => turned,
         signal = tokio::signal::ctrl_c() => Ok(signal?),
     };
     // A turn that was dropped leaves its stop to this call.
-    bus.stop_all_async().await?; // an error here means that the motor may be running: say so
+    bus.stop_all().await?; // an error here means that the motor may be running: say so
     println!("stopped");
     Ok(turned?)
 }

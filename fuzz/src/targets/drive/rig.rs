@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use arbitrary::Arbitrary;
 use axlewire::{
-    drive::{DriveError, Driver, Rs485},
+    drive::{DriveError, Driver, Rs485, asynch},
     endpoint::Endpoint,
     time::{Duration, Instant},
 };
@@ -93,7 +93,7 @@ pub(super) struct Before {
 
 pub(super) struct Rig<R, P> {
     pub(super) world: World,
-    pub(super) driver: Driver<R, P, World>,
+    pub(super) driver: asynch::Driver<R, P, World>,
     pin: Pin,
     /// The frame that has been begun and not ended.
     open: Vec<u8>,
@@ -109,12 +109,17 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
         let world = World::starting_at(begin_us);
         let port = Port { drains: true, peer, ..Port::new(&world, byte_us) };
         let pin = Pin { world: world.clone(), state: Rc::default() };
-        let driver = Driver::with(role, P::plug(port, &pin), world.clone());
+        let driver = asynch::Driver::with(role, P::plug(port, &pin), world.clone());
         Self { world, driver, pin, open: Vec::new() }
     }
 
     pub(super) fn port(&mut self) -> &mut Port {
         self.driver.port_mut().port()
+    }
+
+    /// The driver, with blocking calls.
+    pub(super) fn blocking(&mut self) -> &mut Driver<R, P, World> {
+        &mut self.driver
     }
 
     pub(super) fn fault(&mut self, call: Call, fault: Fault) {
@@ -236,10 +241,10 @@ fn is_frame(bytes: &[u8]) -> bool {
 
 /// The blocking or the async form of a call; `None` if it was dropped.
 macro_rules! call {
-    ($rig:expr, $how:expr, $name:ident, $name_async:ident ($($argument:expr),*)) => {
+    ($rig:expr, $how:expr, $name:ident($($argument:expr),*)) => {
         match $how.is_async {
-            true => $rig.world.run($how.polls(), $rig.driver.$name_async($($argument),*)),
-            false => Some($rig.driver.$name($($argument),*)),
+            true => $rig.world.run($how.polls(), $rig.driver.$name($($argument),*)),
+            false => Some($rig.blocking().$name($($argument),*)),
         }
     };
 }

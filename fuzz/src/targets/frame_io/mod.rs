@@ -8,7 +8,7 @@ use axlewire::{
     encode::Encode,
     error::EncodeError,
     ikeya::{self, NodeId, Rps},
-    io::{FrameReader, FrameWriter, WriteError},
+    io::{FrameReader, FrameWriter, WriteError, asynch},
     stream::Event,
     ucp::{self, RawFrame},
 };
@@ -66,8 +66,8 @@ fn play(u: &mut Unstructured<'_>, tally: &mut Tally) -> Result<()> {
 
 struct Life<F, const N: usize> {
     world: World,
-    reader: FrameReader<Port, F, N>,
-    writer: FrameWriter<Port, 70>,
+    reader: asynch::FrameReader<Port, F, N>,
+    writer: asynch::FrameWriter<Port, 70>,
     /// Bytes that the line brings.
     stream: Vec<u8>,
     events: Vec<oracle::Event>,
@@ -84,8 +84,8 @@ fn run<F: Known, const N: usize>(plan: &Plan<'_>, tally: &mut Tally) {
     reading.receive(&stream);
     reading.empty = if plan.is_file { Empty::Ends } else { Empty::Fails };
     let mut life = Life::<F, N> {
-        reader: FrameReader::new(reading),
-        writer: FrameWriter::new(Port { drains: true, ..Port::new(&world, 20) }),
+        reader: asynch::FrameReader::new(reading),
+        writer: asynch::FrameWriter::new(Port { drains: true, ..Port::new(&world, 20) }),
         world,
         stream,
         events: Vec::new(),
@@ -104,7 +104,7 @@ fn run<F: Known, const N: usize>(plan: &Plan<'_>, tally: &mut Tally) {
     life.writer.port_mut().flushes.clear();
     life.world.step(1 << 20);
     while life.read(false, None) {}
-    assert_eq!(life.writer.flush(), Ok(()));
+    assert_eq!(life.blocking_writer().flush(), Ok(()));
     assert_eq!(life.writer.port_mut().written.len(), life.promised.len());
     life.check();
     life.check_events();
@@ -161,8 +161,8 @@ impl<F: Known, const N: usize> Life<F, N> {
             }
             What::Flush => {
                 let done = match step.is_async {
-                    true => self.world.run(polls, self.writer.flush_async()),
-                    false => Some(self.writer.flush()),
+                    true => self.world.run(polls, self.writer.flush()),
+                    false => Some(self.blocking_writer().flush()),
                 };
                 if done == Some(Ok(())) {
                     assert!(self.writer.unsent().is_empty());
@@ -220,8 +220,8 @@ impl<F: Known, const N: usize> Life<F, N> {
         let begun = self.world.calls();
         let found = {
             let event = match is_async {
-                true => self.world.run(polls, self.reader.read_event_async()),
-                false => Some(self.reader.read_event()),
+                true => self.world.run(polls, self.reader.read_event()),
+                false => Some(self.blocking_reader().read_event()),
             };
             match event {
                 Some(Ok(Some(Event::Frame(frame)))) => {
@@ -249,12 +249,22 @@ impl<F: Known, const N: usize> Life<F, N> {
         true
     }
 
+    /// The reader, with blocking calls.
+    fn blocking_reader(&mut self) -> &mut FrameReader<Port, F, N> {
+        &mut self.reader
+    }
+
+    /// The writer, with blocking calls.
+    fn blocking_writer(&mut self) -> &mut FrameWriter<Port, 70> {
+        &mut self.writer
+    }
+
     fn write(&mut self, frame: &impl Encode, bytes: &[u8], is_async: bool, polls: Option<usize>) {
         let before = self.writer.unsent().len();
         let taken = self.writer.port_mut().written.len();
         let done = match is_async {
-            true => self.world.run(polls, self.writer.write_async(frame)),
-            false => Some(self.writer.write(frame)),
+            true => self.world.run(polls, self.writer.write(frame)),
+            false => Some(self.blocking_writer().write(frame)),
         };
         let moved = self.writer.port_mut().written.len() - taken;
         let rest = self.writer.unsent().len();

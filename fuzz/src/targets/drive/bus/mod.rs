@@ -145,33 +145,26 @@ where
         let stop_bound = self.rig.driver.role().stop_bound() + COAST;
         // Nothing is in the way of a stop: no fault is planned, and every id on the bus answers.
         let is_calm = self.rig.is_clean() && self.peer.0.borrow().is_there == [true; 8];
-        let by = |ms: u8, rig: &mut Rig<Master, P>| rig.driver.now() + MS(ms.into());
         let kind = match what {
             Do::Service => {
-                let done = call!(self.rig, how, service, service_async());
+                let done = call!(self.rig, how, service());
                 self.rig.end(&before, MS(0), done.as_ref());
                 0
             }
             Do::NextEvent { ms } => {
-                let by = by(ms, &mut self.rig);
-                let done =
-                    call!(self.rig, how, next_event, next_event_async(by - self.rig.driver.now()));
+                let within = MS(ms.into());
+                let done = call!(self.rig, how, next_event(within));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 1
             }
             Do::RunUntil { ms } => {
-                let by = by(ms, &mut self.rig);
-                let done = call!(
-                    self.rig,
-                    how,
-                    run_for,
-                    run_for_async(by - self.rig.driver.now(), |_, _, _| ())
-                );
+                let span = MS(ms.into());
+                let done = call!(self.rig, how, run_for(span, |_, _, _| ()));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 2
             }
             Do::Discover => {
-                let done = call!(self.rig, how, discover, discover_async());
+                let done = call!(self.rig, how, discover());
                 self.rig.end(&before, bound, done.as_ref());
                 if let Some(Ok(found)) = done {
                     for (node, mode) in found {
@@ -183,21 +176,21 @@ where
                 3
             }
             Do::SetVelocity { node, rps: to } => {
-                let done = call!(self.rig, how, set_velocity, set_velocity_async(node, rps(to)));
+                let done = call!(self.rig, how, set_velocity(node, rps(to)));
                 self.rig.end(&before, bound, done.as_ref());
                 self.check_set(done, WriteRequest::velocity(node, rps(to)).as_bytes(), &before);
                 4
             }
             Do::SetPosition { node, turns } => {
                 let to = Position::new(-5, turns.into());
-                let done = call!(self.rig, how, set_position, set_position_async(node, to));
+                let done = call!(self.rig, how, set_position(node, to));
                 self.rig.end(&before, bound, done.as_ref());
                 self.check_set(done, WriteRequest::position(node, to).as_bytes(), &before);
                 5
             }
             Do::DriveFor { node, rps: to, ms } => {
                 let (to, span) = (rps(to), MS(u32::from(ms) / 4));
-                let done = call!(self.rig, how, drive_for, drive_for_async(node, to, span));
+                let done = call!(self.rig, how, drive_for(node, to, span));
                 self.rig.end(&before, bound + span + stop_bound, done.as_ref());
                 if done.is_some_and(|done| done.is_ok()) {
                     self.follow(&logs);
@@ -208,19 +201,19 @@ where
                 6
             }
             Do::Read { node } => {
-                let done = call!(self.rig, how, read, read_async(node));
+                let done = call!(self.rig, how, read(node));
                 self.rig.end(&before, bound, done.as_ref());
                 self.check_read(node, done, logs[index(node)]);
                 7
             }
             Do::Stop { node } => {
-                let done = call!(self.rig, how, stop, stop_async(node));
+                let done = call!(self.rig, how, stop(node));
                 self.rig.end(&before, stop_bound, done.as_ref());
                 self.check_stop(node.into(), done, &logs, is_calm);
                 8
             }
             Do::StopAll => {
-                let done = call!(self.rig, how, stop_all, stop_all_async());
+                let done = call!(self.rig, how, stop_all());
                 self.rig.end(&before, stop_bound, done.as_ref());
                 let nodes = self.rig.driver.role().config().nodes;
                 self.check_stop(nodes, done, &logs, is_calm);

@@ -46,11 +46,11 @@ where
                 written.extend((node == NodeId::N1).then_some((at, write)));
             }
             Do::Service => {
-                let done = call!(rig, how, service, service_async());
+                let done = call!(rig, how, service());
                 rig.end(&before, MS(0), done.as_ref());
             }
             Do::NextEvent { ms } | Do::RunUntil { ms } => {
-                let done = call!(rig, how, next_command, next_command_async(MS(ms.into())));
+                let done = call!(rig, how, next_command(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
                 if let Some(Ok(Some(target))) = done {
                     assert!(written.iter().any(|(_, write)| means(write, target)), "{target:?}");

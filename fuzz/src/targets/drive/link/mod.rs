@@ -137,34 +137,27 @@ where
 {
     fn perform(&mut self, what: Do, how: How) -> u8 {
         let (before, is_clean) = (self.rig.begin(), self.rig.is_clean());
-        let by = |ms: u32, rig: &mut Rig<Host<MemoryStore>, P>| rig.driver.now() + MS(ms);
         match what {
             Do::Service => {
-                let done = call!(self.rig, how, service, service_async());
+                let done = call!(self.rig, how, service());
                 self.rig.end(&before, MS(0), done.as_ref());
                 0
             }
             Do::NextEvent { ms } => {
-                let at = by(ms.into(), &mut self.rig);
-                let done =
-                    call!(self.rig, how, next_event, next_event_async(at - self.rig.driver.now()));
+                let within = MS(ms.into());
+                let done = call!(self.rig, how, next_event(within));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 1
             }
             Do::RunUntil { ms } => {
-                let at = by(ms.into(), &mut self.rig);
-                let done = call!(
-                    self.rig,
-                    how,
-                    run_for,
-                    run_for_async(at - self.rig.driver.now(), |_, _, _| ())
-                );
+                let span = MS(ms.into());
+                let done = call!(self.rig, how, run_for(span, |_, _, _| ()));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 2
             }
             Do::Drive { speed, angular } => {
                 self.asked.push((speed.into(), angular.into()));
-                let done = call!(self.rig, how, drive, drive_async(speed.into(), angular.into()));
+                let done = call!(self.rig, how, drive(speed.into(), angular.into()));
                 self.rig.end(&before, MS(0), done.as_ref());
                 if speed.unsigned_abs() > 100 || angular.unsigned_abs() > 100 {
                     assert!(!matches!(done, Some(Ok(()))), "out of range (U7)");
@@ -174,7 +167,7 @@ where
             Do::DriveFor { speed, ms } => {
                 let span = MS(u32::from(ms) % 1500);
                 self.asked.push((speed.into(), 3));
-                let done = call!(self.rig, how, drive_for, drive_for_async(speed.into(), 3, span));
+                let done = call!(self.rig, how, drive_for(speed.into(), 3, span));
                 self.rig.end(&before, span + MS(200) + COAST, done.as_ref());
                 if matches!(done, Some(Ok(()))) {
                     self.check_stopped();
@@ -182,7 +175,7 @@ where
                 4
             }
             Do::Stop => {
-                let done = call!(self.rig, how, stop, stop_async());
+                let done = call!(self.rig, how, stop());
                 self.rig.end(&before, MS(100), done.as_ref());
                 match done {
                     Some(Ok(())) => self.check_stopped(),
@@ -193,19 +186,14 @@ where
                 5
             }
             Do::Ping { ms } => {
-                let at = by(ms.into(), &mut self.rig);
-                let done = call!(self.rig, how, ping, ping_async(at - self.rig.driver.now()));
+                let within = MS(ms.into());
+                let done = call!(self.rig, how, ping(within));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 6
             }
             Do::NextReport { ms } => {
-                let at = by(ms.into(), &mut self.rig);
-                let done = call!(
-                    self.rig,
-                    how,
-                    next_report,
-                    next_report_async(at - self.rig.driver.now())
-                );
+                let within = MS(ms.into());
+                let done = call!(self.rig, how, next_report(within));
                 self.rig.end(&before, MS(ms.into()), done.as_ref());
                 7
             }
@@ -213,22 +201,10 @@ where
                 let kind =
                     if is_imu { CalibrationKind::Imu } else { CalibrationKind::Magnetometer };
                 let ms = u32::from(ms) % 1000;
-                let at = by(ms, &mut self.rig);
+                let within = MS(ms);
                 let done = match is_end {
-                    true => call!(
-                        self.rig,
-                        how,
-                        end_calibration,
-                        end_calibration_async(kind, at - self.rig.driver.now())
-                    ),
-                    false => {
-                        call!(
-                            self.rig,
-                            how,
-                            start_calibration,
-                            start_calibration_async(kind, at - self.rig.driver.now())
-                        )
-                    }
+                    true => call!(self.rig, how, end_calibration(kind, within)),
+                    false => call!(self.rig, how, start_calibration(kind, within)),
                 };
                 self.rig.end(&before, MS(ms), done.as_ref());
                 if matches!(done, Some(Ok(()))) {

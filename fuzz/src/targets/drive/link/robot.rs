@@ -53,15 +53,15 @@ where
                 told.push((rig.last_arrival(), motion));
             }
             Do::Service => {
-                let done = call!(rig, how, service, service_async());
+                let done = call!(rig, how, service());
                 rig.end(&before, MS(0), done.as_ref());
             }
             Do::NextEvent { ms } | Do::Ping { ms } => {
-                let done = call!(rig, how, next_event, next_event_async(MS(ms.into())));
+                let done = call!(rig, how, next_event(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
             }
             Do::RunUntil { ms } | Do::NextReport { ms } => {
-                let done = call!(rig, how, next_command, next_command_async(MS(ms.into())));
+                let done = call!(rig, how, next_command(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
                 if let Some(Ok(Some(command))) = done {
                     check_motion(&told, (command.speed(), command.angular()), rig.driver.now());
