@@ -151,6 +151,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// `Stalled`. What is due has still been sent and flushed, as far as the port could. A failed
     /// call has yielded once, so a loop that ignores errors does not starve other tasks.
     pub async fn service(&mut self) -> Result<(), DriveError<P::Error>> {
+        // A call that was leaked has not cleared it.
+        self.ends_at = None;
+        self.fair_round().await
+    }
+
+    /// One round that lets other tasks run if it fails.
+    async fn fair_round(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round().await;
         // A runaway port, which always has more, must not starve other tasks either.
         if result.is_err() || self.unsure_since.is_some() {
@@ -225,7 +232,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     }
                 }
             }
-            result = result.and(self.service().await);
+            result = result.and(self.fair_round().await);
             if result.is_ok() || needs.is_half() {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));

@@ -22,6 +22,12 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// [`WriteZero`](DriveError::WriteZero). What is due has still been sent and flushed, as far as
     /// the port could.
     pub fn service(&mut self) -> Result<(), DriveError<P::Error>> {
+        // A call of an async driver that was leaked has not cleared it.
+        self.ends_at = None;
+        self.round()
+    }
+
+    fn round(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
         for _ in 0..FRAMES {
@@ -66,7 +72,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     ) -> Result<Option<T>, DriveError<P::Error>> {
         self.ends_at = needs.ends_at(deadline);
         loop {
-            let result = self.service();
+            let result = self.round();
             if result.is_ok() || needs.is_half() {
                 if let Some(found) = done(self) {
                     return Ok(Some(found));

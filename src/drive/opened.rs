@@ -145,11 +145,8 @@ impl DerefMut for Rover {
 impl Drop for Rover {
     fn drop(&mut self) {
         let role = self.0.role();
-        let owes_stop = match role.stop_progress() {
-            StopProgress::NotAsked => role.command().is_some(),
-            progress => progress == StopProgress::Due,
-        };
-        if owes_stop {
+        let has_left = role.is_stop_sent() && role.stop_progress() != StopProgress::Due;
+        if role.command().is_some() && !has_left {
             // There is nobody to tell of an error.
             let _ = self.0.stop();
         }

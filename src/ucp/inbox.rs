@@ -12,20 +12,34 @@ use crate::{
 pub(super) struct Inbox {
     decoder: Decoder,
     times: inbox::Inbox,
-    /// Arrival time of the oldest byte that the decoder holds.
-    since: Instant,
-    /// Earliest arrival of the newest chunk, and of the oldest byte that the decoder holds.
-    early: (Instant, Instant),
-    /// Length of the newest chunk, bytes.
-    chunk_len: usize,
+    /// The newest chunk.
+    newest: Times,
+    newest_len: usize,
+    /// A chunk before it, and the number of bytes from its first one on.
+    between: Times,
+    between_len: usize,
+    /// The oldest byte that the decoder holds came in with this chunk or a later one.
+    oldest: Times,
 }
+
+/// Times of a chunk: at which it counts as received, and from which it can have arrived.
+type Times = (Instant, Instant);
 
 impl Inbox {
     /// Creates an inbox in which a pause of two byte times plus `margin` cuts off a frame.
     pub(super) fn new(baud: u32, margin: Duration, now: Instant) -> Self {
         let idle = (wire_time(2, baud) + margin).max(SHORTEST);
         let times = inbox::Inbox::new(idle, AfterIdle::GiveUpAll, now);
-        Self { decoder: Decoder::new(), times, since: now, early: (now, now), chunk_len: 0 }
+        let none = (now, now);
+        Self {
+            decoder: Decoder::new(),
+            times,
+            newest: none,
+            newest_len: 0,
+            between: none,
+            between_len: 0,
+            oldest: none,
+        }
     }
 
     /// Announces a chunk of bytes handed in at `now`, which may have arrived at any time since
@@ -40,8 +54,8 @@ impl Inbox {
         now: Instant,
     ) {
         self.times.receive(at, now);
-        self.early.0 = since;
-        self.chunk_len = chunk.len();
+        (self.newest, self.newest_len) = ((at, since), chunk.len());
+        self.between_len = self.between_len.saturating_add(chunk.len());
     }
 
     /// Gives up the pending candidate once the line has been idle long enough; returns whether it
@@ -53,7 +67,7 @@ impl Inbox {
         let is_idle = self.times.settle(self.decoder.pending(), now);
         if is_idle {
             self.decoder.idle();
-            self.chunk_len = 0;
+            self.newest_len = 0;
         }
         is_idle
     }
@@ -69,19 +83,22 @@ impl Inbox {
                 Some(Held::Gap(_)) => {}
                 Some(held) => {
                     let behind = self.decoder.pending() + bytes.len();
-                    let is_held_back = behind >= self.chunk_len;
-                    let at = if is_held_back { self.since } else { self.times.last() };
-                    let early = if is_held_back { self.early.1 } else { self.early.0 };
+                    let is_held_back = behind >= self.newest_len;
+                    let (at, early) = if is_held_back { self.oldest } else { self.newest };
                     return match self.decoder.held_event(held)? {
                         Event::Frame(frame) => Some((frame, at, early)),
                         Event::Skipped(_) => None,
                     };
                 }
                 None => {
-                    if self.decoder.pending() <= self.chunk_len {
-                        self.since = self.times.last();
-                        self.early.1 = self.early.0;
+                    let pending = self.decoder.pending();
+                    if pending <= self.newest_len {
+                        self.between = self.newest;
+                    } else if pending > self.between_len {
+                        return None;
                     }
+                    self.oldest = self.between;
+                    (self.between, self.between_len) = (self.newest, self.newest_len);
                     return None;
                 }
             }

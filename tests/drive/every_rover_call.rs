@@ -1,7 +1,7 @@
 //! Every high-level call of a host and of a robot, blocking and async: a failing port, a refusal
 //! and a silent robot come back as they are.
 
-use axlewire::ucp::host::CommandError;
+use axlewire::ucp::{Telemetry, host::CommandError, message::FirmwareReport};
 
 use crate::rig::*;
 
@@ -69,10 +69,16 @@ fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
 
     /// A host that updates its robot.
     fn updating() -> Rover {
-        let mut config = HostConfig::default();
-        config.sends_first_stop = false; // so that nothing is known of a motion
-        let mut rover = on(Host::new(config, at_ms(0)), Port::new(&World::default(), BYTE_US));
+        let mut rover =
+            on(Host::new(HostConfig::default(), at_ms(0)), Port::new(&World::default(), BYTE_US));
         rover.service().unwrap();
+        for index in 0..15 {
+            rover.port().world.step(100_000);
+            let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
+            let now = rover.now();
+            rover.role_mut().handle_input(report.as_bytes(), now);
+            rover.service().unwrap();
+        }
         let now = rover.now();
         rover.role_mut().start_firmware_update(50, now).unwrap();
         rover.service().unwrap();

@@ -38,19 +38,20 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
 
 #[test]
 fn a_refused_update_and_a_stop_end_the_silence() {
-    let mut host = quiet_host();
-    host.start_firmware_update(40, ms(0)).unwrap();
-    assert_eq!(sent(&mut host, ms(0)).len(), 1);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), ms(10));
-    host.drive(go(10), ms(20)).unwrap();
-    assert_eq!(sent(&mut host, ms(20)).len(), 1);
-    host.stop(ms(30));
-    sent(&mut host, ms(30));
-    let now = seen_still(&mut host, 40);
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), ms(2000));
+    host.drive(go(10), ms(2010)).unwrap();
+    assert_eq!(sent(&mut host, ms(2010)).len(), 1);
+    host.stop(ms(2030));
+    sent(&mut host, ms(2030));
+    let now = seen_still(&mut host, 2040);
     host.start_firmware_update(40, now).unwrap();
     sent(&mut host, now);
-    host.stop(ms(2000));
-    assert_eq!(speeds(&wait(&mut host, ms(2000))), [(2_000_000, 0)]);
+    host.stop(ms(5000));
+    assert_eq!(speeds(&wait(&mut host, ms(5000))), [(5_000_000, 0)]);
 }
 
 /// A report of wheels of which one turns so fast.
@@ -60,7 +61,7 @@ fn report(rpm: i16) -> Vec<u8> {
 }
 
 /// Reports of wheels that stand still, one each 20 ms, until the host has seen it; returns when.
-pub(crate) fn seen_still(host: &mut Host, from: u64) -> Instant {
+pub(crate) fn seen_still<S: BiasStore>(host: &mut Host<S>, from: u64) -> Instant {
     let mut at = ms(from);
     while host.stop_progress() != StopProgress::StandingStill {
         at += Duration::from_millis(20);
@@ -160,24 +161,23 @@ fn an_update_request_waits_for_a_stop_that_did_not_leave() {
 fn whatever_was_asked_for_during_an_update_is_due_when_it_ends() {
     type Ask = fn(&mut Host<MemoryStore>);
     let asks: [(u8, Ask); 4] = [
-        (6, |host| host.handle_input(&bytes(imu_bias()), ms(5))),
-        (7, |host| host.handle_input(&bytes(mag_bias()), ms(5))),
-        (8, |host| host.handle_input(&bytes(BiasRequest {}), ms(5))),
-        (10, |host| host.set_network_state(NetworkState::Connected, ms(5)).unwrap()),
+        (6, |host| host.handle_input(&bytes(imu_bias()), ms(2005))),
+        (7, |host| host.handle_input(&bytes(mag_bias()), ms(2005))),
+        (8, |host| host.handle_input(&bytes(BiasRequest {}), ms(2005))),
+        (10, |host| host.set_network_state(NetworkState::Connected, ms(2005)).unwrap()),
     ];
     for (id, ask) in asks {
         let store = MemoryStore { imu: Some(imu_bias()), mag: Some(mag_bias()) };
-        let mut config = quiet_config();
-        config.ping_period = Some(Duration::from_millis(2));
-        let mut host = Host::with_store(config, store, ms(0));
-        sent(&mut host, ms(0));
-        host.start_firmware_update(50, ms(1)).unwrap();
-        assert_eq!(sent(&mut host, ms(1)).last().unwrap()[4], 9);
+        let mut host = Host::with_store(unheard_config(true), store, ms(0));
+        wait(&mut host, ms(0));
+        let now = seen_still(&mut host, 10);
+        host.start_firmware_update(50, now).unwrap();
+        assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
         ask(&mut host);
-        assert_eq!(sent(&mut host, ms(7)), [] as [Vec<u8>; 0], "the line is silent");
-        host.end_firmware_update(ms(9));
-        assert_eq!(host.poll_timeout(), Some(ms(9)), "id {id}");
-        assert!(sent(&mut host, ms(9)).iter().any(|frame| frame[4] == id));
+        assert_eq!(sent(&mut host, ms(2007)), [] as [Vec<u8>; 0], "the line is silent");
+        host.end_firmware_update(ms(2009));
+        assert_eq!(host.poll_timeout(), Some(ms(2009)), "id {id}");
+        assert!(sent(&mut host, ms(2009)).iter().any(|frame| frame[4] == id));
     }
 }
 
@@ -214,22 +214,80 @@ fn an_update_is_refused_while_reports_show_that_a_wheel_turns() {
 }
 
 #[test]
-fn a_robot_that_sends_no_reports_is_updated_once_they_would_have_come() {
-    let mut host = Host::new(HostConfig::default(), ms(0));
-    sent(&mut host, ms(0));
-    sent(&mut host, ms(1));
-    for at in 2..501 {
-        host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(at));
-        wait(&mut host, ms(at));
-        assert_eq!(host.start_firmware_update(40, ms(at)), Err(CommandError::Moving), "{at}");
+fn a_robot_that_is_not_seen_to_stand_still_is_not_updated() {
+    // It answers, but sends no reports.
+    for sends_first_stop in [true, false] {
+        let mut host = Host::new(unheard_config(sends_first_stop), ms(0));
+        for at in 1..300 {
+            host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(at * 10));
+            wait(&mut host, ms(at * 10));
+            let asked = host.start_firmware_update(40, ms(at * 10));
+            assert_eq!(asked, Err(CommandError::Moving), "{at}");
+        }
     }
-    assert_eq!(host.clone().start_firmware_update(40, ms(501)), Ok(()));
-    // Not if it has ever sent one.
-    host.handle_input(&report(0), ms(501));
-    wait(&mut host, ms(900));
-    assert_eq!(host.start_firmware_update(40, ms(900)), Err(CommandError::Moving));
-    wait(&mut host, ms(1100));
-    assert_eq!(host.start_firmware_update(40, ms(1100)), Err(CommandError::LinkDown));
+    // Its reports show a standstill, but no stop was asked for.
+    let mut host = quiet_host();
+    for at in 1..300 {
+        host.handle_input(&report(0), ms(at * 20));
+        assert_eq!(host.start_firmware_update(40, ms(at * 20)), Err(CommandError::Moving), "{at}");
+    }
+    // They ended, and nobody has looked at the clock since.
+    let mut config = quiet_config();
+    config.sends_first_stop = true;
+    let mut host = Host::new(config, ms(0));
+    wait(&mut host, ms(0));
+    let now = seen_still(&mut host, 10);
+    let late = now + config.link_timeout;
+    assert_eq!(host.stop_progress(), StopProgress::StandingStill);
+    assert_eq!(host.start_firmware_update(40, late), Err(CommandError::Moving));
+}
+
+#[test]
+fn an_update_request_that_cannot_be_sent_for_3_s_is_given_up_with_an_event() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
+        let mut host = begun();
+        let now = seen_still(&mut host, 10);
+        host.start_firmware_update(40, now).unwrap();
+        sent(&mut host, now);
+        host.handle_transmit(unsent, now);
+        // No report arrives any more.
+        let before = wait(&mut host, now + Duration::from_micros(2_999_999));
+        assert!(before.iter().all(|(_, frame)| frame[4] == 2), "{unsent:?}");
+        assert_eq!(host.drive(go(10), ms(4000)), Err(CommandError::Updating));
+        assert!(!events(&mut host).contains(&HostEvent::UpdateNotSent));
+        let end = now + Duration::from_millis(3000);
+        wait(&mut host, end);
+        assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
+        assert_eq!(host.drive(go(10), end), Ok(()));
+        seen_still(&mut driven(host, 0, 5000), 5001);
+    }
+}
+
+#[test]
+fn an_accepted_update_whose_flush_failed_is_followed_by_silence() {
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    sent(&mut host, now);
+    host.handle_transmit(Unsent::Unflushed, now);
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
+    assert_eq!(wait(&mut host, ms(60_000)), [], "it had arrived");
+    host.handle_transmit(Unsent::Unflushed, ms(60_000));
+    assert_eq!(wait(&mut host, ms(120_000)), [], "and is not asked for again");
+    // A refusal ends it.
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    sent(&mut host, now);
+    host.handle_transmit(Unsent::Unflushed, now);
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
+    assert_eq!(host.drive(go(10), now), Ok(()));
+    // Not so if the request cannot have arrived.
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
 }
 
 #[test]
@@ -277,25 +335,21 @@ fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced
 
 #[test]
 fn an_update_request_waits_while_reports_that_came_since_show_no_standstill() {
-    let mut host = Host::new(HostConfig::default(), ms(0));
-    sent(&mut host, ms(0));
-    wait(&mut host, ms(100));
-    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(450));
-    wait(&mut host, ms(600));
-    host.start_firmware_update(40, ms(600)).unwrap();
-    host.handle_input(&report(30), ms(601)); // it waited in the port
-    let early: Vec<_> = wait(&mut host, ms(700)).into_iter().map(|(_, frame)| frame).collect();
-    assert!(early.iter().all(|frame| frame[4] != 9), "{early:?}");
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    host.handle_input(&report(30), now); // it waited in the port
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2]);
     assert_eq!(host.stop_progress(), StopProgress::StillMoving { rpm: [0, 0, 0, 30] });
-    let mut at = ms(700);
-    let mut request = None;
-    while request.is_none() {
-        at += Duration::from_millis(20);
-        host.handle_input(&report(0), at);
-        request = wait(&mut host, at).into_iter().find(|(_, frame)| frame[4] == 9);
-        assert!(at < ms(3000), "it is sent in the end");
+    let mut reports = 0;
+    while wait(&mut host, now + Duration::from_millis(20 * reports))
+        .iter()
+        .all(|(_, frame)| frame[4] != 9)
+    {
+        reports += 1;
+        host.handle_input(&report(0), now + Duration::from_millis(20 * reports));
     }
-    assert_eq!(host.stop_progress(), StopProgress::StandingStill);
+    assert_eq!(reports, 3, "which show a standstill again");
 }
 
 #[test]

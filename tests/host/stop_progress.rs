@@ -250,3 +250,22 @@ fn a_report_that_a_false_header_held_back_counts_as_old_as_it_may_be() {
     wait(&mut host, ms(1100));
     assert_ne!(host.stop_progress(), StandingStill);
 }
+
+#[test]
+fn a_report_that_false_headers_held_back_counts_however_small_the_chunks() {
+    for chunk in [1, 2, 4, 16, 64] {
+        let mut host = begun();
+        let (mut at, mut last) = (ms(1), Due);
+        while at < ms(3000) {
+            let noise = [&[0xFD, 0xFF, 60, 0, 2, 0][..], &[7; 26]].concat();
+            let line = [noise.repeat(5), noise[..8].to_vec(), wheels([0; 4]), noise].concat();
+            for bytes in line.chunks(chunk) {
+                at += Duration::from_micros(87 * chunk as u32);
+                host.handle_input(bytes, at);
+                wait(&mut host, at);
+            }
+            last = host.stop_progress();
+        }
+        assert_eq!(last, StandingStill, "{chunk}");
+    }
+}

@@ -1,6 +1,6 @@
 //! A host, its application, its port, and a robot that sends anything at any time.
 
-use axlewire::ucp::host::{self, StopProgress};
+use axlewire::ucp::host::StopProgress;
 
 use super::{
     host_account::Account,
@@ -73,11 +73,9 @@ impl Site {
 }
 
 impl Site {
-    /// The robot is not heard, or its reports show no standstill.
+    /// No reports show a standstill.
     fn is_update_barred(&self) -> bool {
-        let may_move = self.role.stop_progress() != StopProgress::StandingStill;
-        let is_barred = may_move && self.role.last_report().is_some();
-        self.account.link == host::Link::Down || is_barred
+        self.role.stop_progress() != StopProgress::StandingStill
     }
 }
 

@@ -12,10 +12,12 @@ use super::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Update {
     None,
-    /// The request goes after one more stop, if the robot has been sent anything.
+    /// The request goes after one more stop.
     Asked {
         version: i16,
         needs_stop: bool,
+        at: Instant,
+        may_have_left: bool,
     },
     /// Nothing is sent.
     Silent,
@@ -141,6 +143,9 @@ impl Account {
     /// the former is new.
     pub(crate) fn expire_command(&mut self, now: Instant) -> bool {
         let is_silent = self.motion.expire(now);
+        if matches!(self.update, Update::Asked { at, .. } if now - at >= ms(3000)) {
+            self.update = Update::None;
+        }
         if self.link_until.is_some_and(|at| at <= now) {
             (self.link, self.link_until) = (Link::Down, None);
             self.motion.halt();
@@ -210,8 +215,10 @@ impl Account {
             }
             Message::OtaRequest(request) => {
                 let version = request.version();
-                let is_right = self.update == Update::Asked { version, needs_stop: false }
-                    && (self.motion.is_stop_sent() || self.motion.wanted.is_none());
+                let is_right = matches!(
+                    self.update,
+                    Update::Asked { version: asked, needs_stop: false, .. } if asked == version
+                ) && self.motion.is_stop_sent();
                 self.update = Update::Silent;
                 (is_right, Last::Update(version))
             }
@@ -230,13 +237,11 @@ impl Account {
         let last = self.last.take();
         self.motion.unsent(unsent);
         if let (Some(Last::Update(version)), Update::Silent) = (last, self.update) {
-            let has_command = self.motion.wanted.is_some();
-            if unsent != Unsent::Unflushed || has_command {
-                self.update = Update::Asked { version, needs_stop: has_command };
-            }
+            let may_have_left = unsent == Unsent::Unflushed;
+            self.update = Update::Asked { version, needs_stop: true, at: now, may_have_left };
         }
         if let Update::Asked { needs_stop, .. } = &mut self.update {
-            *needs_stop = self.motion.wanted.is_some();
+            *needs_stop = true;
         }
         if unsent == Unsent::Unflushed {
             self.is_network_due = self.network.is_some();
@@ -259,18 +264,34 @@ impl Account {
         }
     }
 
+    /// The robot has accepted an update: its request has arrived.
+    pub(crate) fn accepted(&mut self) {
+        if self.may_have_asked() {
+            (self.update, self.last) = (Update::Silent, None);
+        }
+    }
+
+    /// The robot may have received the request of an update.
+    pub(crate) fn may_have_asked(&self) -> bool {
+        matches!(self.update, Update::Silent | Update::Asked { may_have_left: true, .. })
+    }
+
     /// The latest time for the next action.
     pub(crate) fn owed(&self, now: Instant, is_update_barred: bool) -> Option<Instant> {
         if self.update == Update::Silent {
             return self.link_until;
         }
+        let asked = match self.update {
+            Update::Asked { at, .. } => Some(at + ms(3000)),
+            _ => None,
+        };
         let is_due = self.is_network_due
-            || self.update != Update::None && !is_update_barred
+            || asked.is_some() && !is_update_barred
             || [self.imu.ack, self.mag.ack, self.biases].contains(&Ack::Must);
         let ping = self.pings.then(|| self.ping_until.unwrap_or(self.ping_at));
         let request = self.request.as_ref().map(|request| request.until.unwrap_or(now));
         let dead_man = self.motion.dead_man;
-        let times = [self.link_until, self.motion.due(now), dead_man, ping, request];
+        let times = [self.link_until, self.motion.due(now), dead_man, ping, request, asked];
         times.into_iter().flatten().chain(is_due.then_some(now)).min()
     }
 }

@@ -1,6 +1,6 @@
 //! The calls of a host's application, and those that are refused.
 
-use axlewire::ucp::host::{CommandError, Link};
+use axlewire::ucp::host::{CommandError, Link, StopProgress};
 
 use super::{
     host::{Call, Site, VERSION, command},
@@ -45,30 +45,27 @@ impl Site {
                 (result, is_barred.then_some(CommandError::LowIdsOnly { id: 0x0A }))
             }
             _ => {
-                let progress = self.role.stop_progress();
-                let never_reports = self.role.last_report().is_none();
                 let result = self.role.start_firmware_update(VERSION, now);
+                let is_still = self.role.stop_progress() == StopProgress::StandingStill;
                 let is_down = self.account.link == Link::Down;
                 let motion = &mut self.account.motion;
-                let is_allowed = match progress {
-                    axlewire::ucp::host::StopProgress::StandingStill => true,
-                    _ => motion.allows_update(now) && (never_reports || motion.wanted.is_none()),
-                };
                 let expected = match () {
                     () if self.account.low_ids_only => Some(CommandError::LowIdsOnly { id: 9 }),
                     () if is_updating => Some(CommandError::Updating),
                     () if is_calibrating => Some(CommandError::Calibrating),
                     () if is_down => Some(CommandError::LinkDown),
-                    () if !is_allowed => Some(CommandError::Moving),
+                    () if !is_still => Some(CommandError::Moving),
                     () => None,
                 };
                 if result.is_ok() {
-                    let needs_stop = motion.wanted.is_some();
-                    motion.is_called |= needs_stop;
-                    if needs_stop {
-                        motion.owe_two();
-                    }
-                    self.account.update = Update::Asked { version: VERSION, needs_stop };
+                    motion.is_called = true;
+                    motion.owe_two();
+                    self.account.update = Update::Asked {
+                        version: VERSION,
+                        needs_stop: true,
+                        at: now,
+                        may_have_left: false,
+                    };
                 }
                 (result, expected)
             }

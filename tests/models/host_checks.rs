@@ -93,11 +93,8 @@ impl Checks<HostSide> for Site {
                     false => Ack::May,
                 };
             }
-            Hear::UpdateAnswer(status)
-                if status != OtaStatus::Accepted && account.update == Update::Silent =>
-            {
-                self.end_update();
-            }
+            Hear::UpdateAnswer(OtaStatus::Accepted) => account.accepted(),
+            Hear::UpdateAnswer(_) if account.may_have_asked() => self.end_update(),
             _ => {}
         }
         Ok(())

@@ -76,6 +76,7 @@ impl Motion {
             self.stop = Stop::No;
         }
         (self.wanted, self.is_called) = (Some(command), true);
+        self.owe_two_stops();
         self.dead_man = (!command.stands_still()).then(|| now + ms(500));
     }
 
@@ -96,6 +97,16 @@ impl Motion {
     /// The application is silent, or the robot is no longer heard.
     pub(crate) fn halt(&mut self) {
         (self.wanted, self.dead_man) = (self.wanted.map(halted), None);
+        self.owe_two_stops();
+    }
+
+    /// Both copies are of the stop, if the first was of a command to move.
+    fn owe_two_stops(&mut self) {
+        let is_stop = self.wanted.is_some_and(|wanted| wanted.stands_still());
+        let has_moved = self.told.is_some_and(|told| !told.stands_still());
+        if self.owes_copies() && is_stop && has_moved {
+            self.behind_cut = Some(0);
+        }
     }
 
     /// The latest time for the next motor frame.
@@ -121,13 +132,6 @@ impl Motion {
             |command: Option<MotorControl>| command.is_some_and(|it| it.stands_still());
         let is_handed_out = stands_still(self.told) && !self.is_stop_new;
         stands_still(self.wanted) && is_handed_out && !self.owes_copies()
-    }
-
-    /// Whether a robot without reports may be updated: it was never told anything, or its stop left
-    /// 500 ms ago.
-    pub(crate) fn allows_update(&self, now: Instant) -> bool {
-        let is_old = matches!(self.stop, Stop::Left(at) if now - at >= ms(500));
-        self.wanted.is_none_or(|wanted| wanted.stands_still() && is_old)
     }
 
     /// The host is asked for a frame, and so learns that the port has been flushed.

@@ -32,7 +32,7 @@ const UPDATE: Menu = &[
         Hear::UpdateAnswer(OtaStatus::Forbidden),
     ]),
     &Act::hears([Hear::BiasRequest, Hear::Report, Hear::Imu(1)]),
-    &[Act::Fail(Unsent::CutOff), Act::ToDeadline(0), Act::Run(600)],
+    &[Act::Fail(Unsent::CutOff), Act::ToDeadline(0), Act::Run(600), Act::Run(3_000)],
 ];
 
 /// Calibrations, results and biases, with all kinds of answers.
@@ -96,11 +96,10 @@ pub(crate) fn motion(run: &mut Run) {
 
 pub(crate) fn updates(run: &mut Run) {
     run.world("standing", Depth(2, 5), site(UPDATE).after(&[DONE]));
-    // A robot that answers, and sends no reports.
-    let heard = Act::Hear(Hear::Pong);
-    let standing = site(UPDATE).after(&[DONE, heard, Act::Run(400), heard, Act::Run(200)]);
-    let requested = standing.clone().after(&[Act::Call(Update)]);
-    run.world("heard", Depth(2, 5), standing);
+    let reports = [Act::Hear(Hear::Report), Act::Run(200)].repeat(8);
+    let seen = site(UPDATE).after(&[DONE]).after(&reports);
+    let requested = seen.clone().after(&[Act::Call(Update)]);
+    run.world("seen to stand still", Depth(2, 5), seen);
     run.world("requested", Depth(2, 5), requested.clone());
     run.world("updating", Depth(2, 5), requested.clone().after(&[DONE]));
     let asking = requested.after(&[Act::One, Act::One]);

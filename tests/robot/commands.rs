@@ -185,3 +185,23 @@ fn a_command_that_a_false_header_held_back_is_as_old_as_its_bytes() {
     robot.handle_input(&[0; 36], ms(2000));
     assert_eq!(robot.command(ms(2000)).speed(), 0, "it is no longer wanted");
 }
+
+#[test]
+fn a_command_that_false_headers_held_back_is_obeyed_however_small_the_chunks() {
+    for chunk in [1, 2, 4, 16, 64] {
+        let mut robot = Robot::new(RobotConfig::default(), ms(0));
+        let (mut at, mut looks, mut obeyed) = (ms(1), 0, 0);
+        while at < ms(3000) {
+            let noise = [&[0xFD, 0xFF, 60, 0, 2, 0][..], &[7; 26]].concat();
+            let command = go(60).frame(0).as_bytes().to_vec();
+            for bytes in [noise.repeat(6), command, noise].concat().chunks(chunk) {
+                at += Duration::from_micros(87 * chunk as u32);
+                robot.handle_input(bytes, at);
+                robot.handle_timeout(at);
+                looks += 1;
+                obeyed += u32::from(robot.command(at).speed() == 60);
+            }
+        }
+        assert!(obeyed * 100 > looks * 95, "{chunk}: {obeyed} of {looks}");
+    }
+}

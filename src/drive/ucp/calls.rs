@@ -95,9 +95,10 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
     /// Waits until the robot, which was told to stop, is seen to stand still: three reports in a
     /// row, all received after the stop was flushed, show all four wheels at 2 rpm or less, and the
     /// last is an average of the time since ([`Host::stop_progress`]). So this takes at least
-    /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average). Continues through
-    /// errors of the port. For a rover that coasts, allow at least
-    /// [`COAST`](crate::ucp::host::COAST).
+    /// [`HostConfig::rpm_average`](crate::ucp::host::HostConfig::rpm_average); a stop that is asked
+    /// for again meanwhile joins the first. Continues through errors of the port. For a rover that
+    /// coasts, allow at least [`COAST`](crate::ucp::host::COAST). If another program drives the
+    /// robot meanwhile, its latest moves are not in the average yet.
     ///
     /// # Errors
     ///

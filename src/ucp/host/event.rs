@@ -72,6 +72,10 @@ pub enum HostEvent {
     /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids the answer (ruling
     /// U14). The robot asks again after a second.
     BiasesNotAnswered,
+    /// A firmware update was given up, because its request could not be sent behind a stop and a
+    /// seen standstill for 3 s ([`COAST`](super::COAST)): the reports ended or showed that a wheel
+    /// turns, or the port failed. After a failed flush, the robot may have the request anyway.
+    UpdateNotSent,
     /// The robot has answered the firmware update request.
     UpdateAnswered(OtaStatus),
     /// A good frame for which this crate has no message (ruling U3).
@@ -190,8 +194,7 @@ pub enum CommandError {
         /// The id.
         id: u8,
     },
-    /// A firmware update requires that the robot has been told to stand still, that the stop has
-    /// been flushed, and that reports, if there are any, show a standstill
+    /// A firmware update requires reports that show the robot at a standstill, behind a stop
     /// ([`Host::stop_progress`](crate::ucp::Host::stop_progress)).
     Moving,
     /// A firmware update is in progress: the frame would end up in it.
@@ -209,7 +212,9 @@ impl fmt::Display for CommandError {
             Self::LowIdsOnly { id } => {
                 write!(f, "frames with id {id:#04x} are disabled: this robot may hang on them")
             }
-            Self::Moving => f.write_str("stop the robot before a firmware update"),
+            Self::Moving => {
+                f.write_str("a firmware update needs a robot that is seen to stand still")
+            }
             Self::Updating => f.write_str("a firmware update is in progress"),
             Self::LinkDown => f.write_str("the robot is not heard"),
         }

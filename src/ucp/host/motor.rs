@@ -150,30 +150,6 @@ impl Motor {
         &mut self.standstill
     }
 
-    /// Whether an update may be asked for: the reports show a standstill behind a stop. Of a robot
-    /// that `never_reports`, a stop must have left so long ago that its reports would have come; a
-    /// host may also have sent no motor command at all.
-    pub(super) fn allows_update(
-        &self,
-        never_reports: bool,
-        now: Instant,
-        config: &HostConfig,
-    ) -> bool {
-        match self.stop_progress() {
-            StopProgress::NotAsked => self.latest.is_none(),
-            StopProgress::Due | StopProgress::StillMoving { .. } => false,
-            StopProgress::NoReports => {
-                never_reports && self.standstill.is_told_for(now, config.link_timeout)
-            }
-            StopProgress::StandingStill => true,
-        }
-    }
-
-    /// Whether the request of an update may be sent: one more stop has been sent before it.
-    pub(super) fn is_ready_for_update(&self) -> bool {
-        self.latest.is_none() || self.is_stop_sent()
-    }
-
     /// Repeats the latest command at once, twice: what the robot was sent before may have left it
     /// with a false length, which swallows stops (ruling U16).
     pub(super) fn repeat(&mut self, now: Instant) {
@@ -204,6 +180,7 @@ impl Motor {
     fn take(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
         let still = command.stands_still();
         self.latest = Some(command);
+        self.copy_stop();
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
             // The first frame takes precedence, and so do its copies.
@@ -242,7 +219,17 @@ impl Motor {
     fn halt(&mut self, now: Instant) {
         self.dead_man = None;
         self.latest = self.latest.as_ref().map(MotorControl::halted);
+        self.copy_stop();
         self.due = Some(now);
+    }
+
+    /// Both copies are of the stop, if the first was of a command to move.
+    fn copy_stop(&mut self) {
+        let has_moved = self.sent.is_some_and(|(sent, _)| !sent.stands_still());
+        let is_stop = self.latest.is_some_and(|latest| latest.stands_still());
+        if self.copies.are_due() && has_moved && is_stop {
+            self.copies = Copies::BOTH;
+        }
     }
 
     /// None of the motor commands so far is a stop that has left.

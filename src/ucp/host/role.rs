@@ -74,7 +74,7 @@ use crate::{
 ///   any result that the robot has found since, and would end its requests. To send zeros, store
 ///   zeros.
 /// * **Firmware update (U7, U13).** Only [`start_firmware_update`](Self::start_firmware_update)
-///   starts one, and only after a stop has been sent.
+///   starts one, and only while the reports show a standstill behind a stop.
 /// * **Builds that hang (U14)** on ids 5..=0x0A: set [`HostConfig::low_ids_only`] to send none of
 ///   these.
 /// * **Events (U15).** The queue holds 16 events. Reports, pongs and other recurring events take at
@@ -133,8 +133,9 @@ impl<S: BiasStore> Host<S> {
     /// Stops the robot: speed and turn 0 are sent at once, or 20 ms behind the last stop, and the
     /// lamp stays as it is.
     ///
-    /// Always accepted; it ends the silence of a firmware update. The stop is done when
-    /// [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since
+    /// Always accepted; it ends the silence of a firmware update. Asked for again before the robot
+    /// was seen to obey, it is sent again, and reports since the first stop count. The stop is done
+    /// when [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since
     /// (U16).
     pub fn stop(&mut self, now: Instant) {
         self.state.end_update(now);
@@ -240,17 +241,19 @@ impl<S: BiasStore> Host<S> {
     ///
     /// During an update the robot hears no stop either, so the call is refused unless
     /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`]: **call `stop` and
-    /// `await_standstill` of the driver before**. Of a robot that answers, but has never sent a
-    /// report, it is accepted once the stop was flushed [`HostConfig::link_timeout`] ago. Two more
-    /// stops precede the request. If they may have been lost with it
-    /// ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again.
+    /// `await_standstill` of the driver before**. Two more stops precede the request. If they may
+    /// have been lost with it ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again
+    /// once the reports show a standstill again. A request that cannot be sent for 3 s is given up:
+    /// [`HostEvent::UpdateNotSent`].
+    ///
+    /// A robot that sends no reports cannot be seen to stand still. To update it, make sure of that
+    /// yourself, take the port with `Driver::into_parts`, and write
+    /// [`OtaRequest`](crate::ucp::message::OtaRequest) to it.
     ///
     /// # Errors
     ///
-    /// [`CommandError::LinkDown`] if the robot is not heard; [`CommandError::Moving`] as said.
-    /// Without [`HostConfig::sends_first_stop`] the call is also accepted before the first
-    /// motor command: **it is not known then whether the robot moves.**
-    /// [`CommandError::Calibrating`] while a calibration request is unanswered,
+    /// [`CommandError::LinkDown`] if the robot is not heard, [`CommandError::Moving`] if it is not
+    /// seen to stand still, [`CommandError::Calibrating`] while a calibration request is unanswered,
     /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
     /// [`HostConfig::low_ids_only`].
     pub fn start_firmware_update(

@@ -4,9 +4,8 @@ use super::{
     bias::BiasStore,
     calibration::Request,
     event::{CalibrationStep, HostEvent},
-    link::Link,
     outgoing::Outgoing,
-    standstill::StopProgress,
+    standstill::{COAST, StopProgress},
     state::{State, Update},
 };
 use crate::{
@@ -84,8 +83,7 @@ impl<S: BiasStore> State<S> {
         }
         match self.update {
             Update::Asked { version, .. } if self.is_ready_for_update() => {
-                self.update = Update::Silent;
-                self.motor.pause();
+                self.begin_update();
                 return Some(Outgoing::Update(version));
             }
             _ => {}
@@ -97,14 +95,10 @@ impl<S: BiasStore> State<S> {
         None
     }
 
-    /// Whether the request of an update may be sent. What allowed it may be over: reports waited in
-    /// the port when it was asked for, or the robot is no longer heard.
+    /// Whether the request of an update may be sent: what allowed it may be over, because reports
+    /// waited in the port when it was asked for.
     fn is_ready_for_update(&self) -> bool {
-        let progress = self.motor.stop_progress();
-        let may_move = progress != StopProgress::StandingStill;
-        self.motor.is_ready_for_update()
-            && self.link != Link::Down
-            && !(may_move && self.last_report.is_some())
+        self.motor.is_stop_sent() && self.motor.stop_progress() == StopProgress::StandingStill
     }
 
     /// The biases stored at this moment, if they were requested.
@@ -167,16 +161,10 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if let (Some(Outgoing::Update(version)), false) = (last, self.motor.is_ready_for_update()) {
-            self.ask_update_again(version, now);
-        }
-    }
-
-    /// Makes the update request due again, unless the application has ended the update.
-    fn ask_update_again(&mut self, version: i16, now: Instant) {
-        if self.update == Update::Silent {
+        if let (Some(Outgoing::Update(version)), Update::Silent) = (last, self.update) {
             self.end_update(now);
-            self.update = Update::Asked { version, at: now };
+            let may_have_left = unsent == Unsent::Unflushed;
+            self.update = Update::Asked { version, at: now, may_have_left };
         }
     }
 
@@ -199,7 +187,7 @@ impl<S: BiasStore> State<S> {
                 }
             }
             Outgoing::Network(_) => self.network_due = self.network.map(|_| now),
-            Outgoing::Update(version) => self.ask_update_again(version, now),
+            Outgoing::Update(_) => {} // due again in any case
             Outgoing::Ping => {
                 if self.ping.unsent(now) {
                     uncount(&mut self.stats.pings);
@@ -214,6 +202,7 @@ impl<S: BiasStore> State<S> {
         }
         let asked = match self.update {
             Update::Asked { at, .. } if self.is_ready_for_update() => Some(at),
+            Update::Asked { at, .. } => Some(at + COAST),
             _ => None,
         };
         earliest(&[

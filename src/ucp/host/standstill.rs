@@ -83,18 +83,13 @@ pub(super) struct Wheels {
 }
 
 /// Whether all wheels stand still: turning on the spot is also motion.
-pub(super) fn are_still(rpm: &[i16; 4]) -> bool {
+fn are_still(rpm: &[i16; 4]) -> bool {
     rpm.iter().all(|wheel| wheel.unsigned_abs() <= STILL_RPM)
 }
 
 impl Standstill {
     pub(super) const fn is_untold(&self) -> bool {
         matches!(self, Self::Untold)
-    }
-
-    /// Whether the stop was flushed that long ago, and no report counts.
-    pub(super) fn is_told_for(&self, now: Instant, span: Duration) -> bool {
-        matches!(*self, Self::Told(told) if now - told >= span)
     }
 
     /// The stop has been flushed.

@@ -12,7 +12,7 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
-    standstill::{Wheels, are_still},
+    standstill::{COAST, StopProgress, Wheels},
     statistics::HostStatistics,
 };
 use crate::{
@@ -77,10 +77,13 @@ pub(super) struct State<S> {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Update {
     None,
-    /// The request is to be sent once the robot has been told to stand still.
+    /// The request is to be sent behind stops while the reports show a standstill.
     Asked {
         version: i16,
+        /// When it was asked for, or came back.
         at: Instant,
+        /// It was sent before, and its flush failed.
+        may_have_left: bool,
     },
     /// The request has been sent; the line belongs to the update.
     Silent,
@@ -170,15 +173,21 @@ impl<S: BiasStore> State<S> {
         if self.link == Link::Down {
             return Err(CommandError::LinkDown);
         }
-        let turns = self.last_report.is_some_and(|report| !are_still(&report.telemetry.rpm));
-        if turns || !self.motor.allows_update(self.last_report.is_none(), at, &self.config) {
+        self.motor.standstill().expire(at);
+        if self.motor.stop_progress() != StopProgress::StandingStill {
             return Err(CommandError::Moving);
         }
         // A robot that is being updated hears no stop, so a damaged stop must not be enough to
         // update it while it drives.
         self.motor.repeat(at);
-        self.update = Update::Asked { version, at };
+        self.update = Update::Asked { version, at, may_have_left: false };
         Ok(())
+    }
+
+    /// Leaves the line to the update.
+    pub(super) const fn begin_update(&mut self) {
+        self.update = Update::Silent;
+        self.motor.pause();
     }
 
     /// Ends an update: the line is the host's again.
@@ -395,8 +404,14 @@ impl<S: BiasStore> State<S> {
     }
 
     fn update_answer(&mut self, status: OtaStatus, at: Instant) {
-        if self.update == Update::Silent && status != OtaStatus::Accepted {
-            self.end_update(at);
+        // The request may have arrived, whatever its flush said.
+        if matches!(self.update, Update::Silent | Update::Asked { may_have_left: true, .. }) {
+            if status == OtaStatus::Accepted {
+                self.begin_update();
+                self.last = None;
+            } else {
+                self.end_update(at);
+            }
         }
         let is_answer = |event: &HostEvent| matches!(event, HostEvent::UpdateAnswered(_));
         self.events.push_latest(HostEvent::UpdateAnswered(status), is_answer);
@@ -429,9 +444,18 @@ impl<S: BiasStore> State<S> {
         }
     }
 
+    /// Ends an update whose request could not be sent for too long.
+    fn expire_update(&mut self, now: Instant) {
+        if matches!(self.update, Update::Asked { at, .. } if now - at >= COAST) {
+            self.end_update(now);
+            self.events.push(HostEvent::UpdateNotSent);
+        }
+    }
+
     /// Ends a command whose application has gone silent, or whose robot is no longer heard (U10).
     pub(super) fn expire_command(&mut self, now: Instant) {
         self.expire_dead_man(now);
+        self.expire_update(now);
         if reached(self.link_until, now) {
             self.link_until = None;
             self.link = Link::Down;

@@ -79,7 +79,7 @@ fn a_refused_command_says_why() {
             &Rover::LowIdsOnly { id: 10 },
             "frames with id 0x0a are disabled: this robot may hang on them",
         ),
-        (&Rover::Moving, "stop the robot before a firmware update"),
+        (&Rover::Moving, "a firmware update needs a robot that is seen to stand still"),
         (&Rover::Updating, "a firmware update is in progress"),
         (&ucp::host::NotStored, "the calibration result was not stored"),
     ]);
