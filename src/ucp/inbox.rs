@@ -12,8 +12,8 @@ use crate::{
 pub(super) struct Inbox {
     decoder: Decoder,
     times: inbox::Inbox,
-    /// The newest chunk.
-    newest: Times,
+    /// From when on the newest chunk can have arrived, and its length, bytes.
+    newest_since: Instant,
     newest_len: usize,
     /// A chunk before it, and the number of bytes from its first one on.
     between: Times,
@@ -34,7 +34,7 @@ impl Inbox {
         Self {
             decoder: Decoder::new(),
             times,
-            newest: none,
+            newest_since: now,
             newest_len: 0,
             between: none,
             between_len: 0,
@@ -54,7 +54,7 @@ impl Inbox {
         now: Instant,
     ) {
         self.times.receive(at, now);
-        (self.newest, self.newest_len) = ((at, since), chunk.len());
+        (self.newest_since, self.newest_len) = (since, chunk.len());
         self.between_len = self.between_len.saturating_add(chunk.len());
     }
 
@@ -84,7 +84,7 @@ impl Inbox {
                 Some(held) => {
                     let behind = self.decoder.pending() + bytes.len();
                     let is_held_back = behind >= self.newest_len;
-                    let (at, early) = if is_held_back { self.oldest } else { self.newest };
+                    let (at, early) = if is_held_back { self.oldest } else { self.newest() };
                     return match self.decoder.held_event(held)? {
                         Event::Frame(frame) => Some((frame, at, early)),
                         Event::Skipped(_) => None,
@@ -93,16 +93,20 @@ impl Inbox {
                 None => {
                     let pending = self.decoder.pending();
                     if pending <= self.newest_len {
-                        self.between = self.newest;
+                        self.between = self.newest();
                     } else if pending > self.between_len {
                         return None;
                     }
                     self.oldest = self.between;
-                    (self.between, self.between_len) = (self.newest, self.newest_len);
+                    (self.between, self.between_len) = (self.newest(), self.newest_len);
                     return None;
                 }
             }
         }
+    }
+
+    const fn newest(&self) -> Times {
+        (self.times.last(), self.newest_since)
     }
 
     /// Time at which the line counts as idle, if any byte is pending.

@@ -253,9 +253,9 @@ impl<S: BiasStore> Host<S> {
     /// # Errors
     ///
     /// [`CommandError::LinkDown`] if the robot is not heard, [`CommandError::Moving`] if it is not
-    /// seen to stand still, [`CommandError::Calibrating`] while a calibration request is unanswered,
-    /// [`CommandError::Updating`] during a firmware update, [`CommandError::LowIdsOnly`] with
-    /// [`HostConfig::low_ids_only`].
+    /// seen to stand still, [`CommandError::Calibrating`] while a calibration request is
+    /// unanswered, [`CommandError::Updating`] during a firmware update,
+    /// [`CommandError::LowIdsOnly`] with [`HostConfig::low_ids_only`].
     pub fn start_firmware_update(
         &mut self,
         version: i16,
