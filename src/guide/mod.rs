@@ -1,4 +1,4 @@
-//! The guide: from the first motor to a protocol of your own, in eight pages.
+//! The guide: from the first motor to a protocol of your own, in nine pages.
 //!
 //! Every example is run: the Rust code as tests of this crate, the `console` blocks by the tests of
 //! the tool, which compare what is printed.
@@ -10,7 +10,8 @@
 //! 5. [Streams and resync](streams): what a stray byte costs; the same for another protocol.
 //! 6. [Timing](timing): how fast a bus can be, computed and then measured.
 //! 7. [Recording and looking](recording): captures, and the tools that open them.
-//! 8. [Safety](crate::safety): which hazards there are, and what is left to you.
+//! 8. [Diagnosis](diagnosis): which counter or error says what about cable, other end and program.
+//! 9. [Safety](crate::safety): which hazards there are, and what is left to you.
 //!
 //! The page `fields` says what each field of the JSON means.
 
@@ -33,4 +34,5 @@ pages! {
     streams: "sim"
     timing: "sim"
     recording: "sim"
+    diagnosis: "sim"
 }

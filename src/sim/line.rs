@@ -312,26 +312,18 @@ impl<H: Endpoint, T: Endpoint> Line<H, T> {
         Ok(())
     }
 
-    /// Runs everything due up to and including `end`. The time is then `end`.
-    ///
-    /// # Errors
-    ///
-    /// [`Stuck`]: an endpoint breaks the contract.
-    pub fn run_until(&mut self, end: Instant) -> Result<(), Stuck> {
-        while let Some(at) = self.next().filter(|at| *at <= end) {
-            self.happen(at)?;
-        }
-        self.now = self.now.max(end);
-        Ok(())
-    }
-
-    /// Advances by `span`.
+    /// Advances by `span`, and runs everything that is due by then.
     ///
     /// # Errors
     ///
     /// [`Stuck`]: an endpoint breaks the contract.
     pub fn run_for(&mut self, span: Duration) -> Result<(), Stuck> {
-        self.run_until(self.now + span)
+        let end = self.now + span;
+        while let Some(at) = self.next().filter(|at| *at <= end) {
+            self.happen(at)?;
+        }
+        self.now = end;
+        Ok(())
     }
 
     fn run_port(&mut self, port: usize) -> Result<(), Stuck> {

@@ -62,7 +62,7 @@ fn an_endpoint_that_would_make_a_driver_spin_is_an_error() {
     let run = |bad| {
         let mut line: Line<Talker, Bad> = Line::new(500_000, 0, Talker::default());
         line.add(bad);
-        line.run_until(at(1000))
+        line.run_for(at(1000) - line.now())
     };
     let who = Who::Tail(0);
     assert_eq!(run(Bad::Impatient), Err(Stuck::BusyLoop { who, at: at(100) }));

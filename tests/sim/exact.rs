@@ -161,7 +161,7 @@ fn rounds_without_end_at_one_instant_are_an_error_and_at_many_instants_are_not()
     let run = |rests| {
         let mut line: Line<Talker, Restless> = Line::new(500_000, 0, Talker::default());
         line.add(Restless { rests, due: at(100), ..Restless::default() });
-        let result = line.run_until(at(20_100));
+        let result = line.run_for(at(20_100) - line.now());
         (result, line.tail(0).rounds)
     };
     let (result, rounds) = run(false);

@@ -121,7 +121,7 @@ fn an_unplugged_station_neither_receives_nor_sends_until_it_is_plugged_in_again(
     let mut line = one_way(500_000, 0, &[1; 10]);
     line.add(Talker::saying(at(0), &[2; 10]));
     line.stub_mut(Who::Tail(1)).unplugged = true;
-    line.run_until(at(100)).unwrap();
+    line.run_for(at(100) - line.now()).unwrap();
     line.stub_mut(Who::Tail(1)).unplugged = false;
     line.run_for(us(1000)).unwrap();
     assert_eq!(line.tail(0).bytes().len(), 10);
