@@ -5,11 +5,14 @@ use core::fmt;
 use crate::{encode::Encode, stream::Framing};
 
 use super::{
-    framing::{Packet, Request, Response},
     three,
     units::{Mode, NodeId, Position, Rps},
-    wire::WriteRequest,
 };
+
+/// The packets of a board with one motor.
+mod one {
+    pub(super) use crate::ikeya::{framing::*, wire::*};
+}
 
 /// A kind of board: its units, its packets, and whether it answers a WRITE (rulings I3, I10).
 ///
@@ -189,6 +192,59 @@ pub enum OneMotor {}
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ThreeMotors {}
 
+/// What the packets of both kinds of boards have in common: their types, in this module, and the
+/// values in them.
+macro_rules! packets {
+    ($packets:ident, $positions:ident) => {
+        type Write = $packets::WriteRequest;
+        type VelocityResponse = $packets::VelocityResponse;
+        type PositionResponse = $packets::PositionResponse;
+        type ToSlave = $packets::ToSlave;
+        type ToMaster = $packets::ToMaster;
+        type BothDirections = $packets::BothDirections;
+
+        fn write_velocity(id: NodeId, target: Self::Velocity) -> Self::Write {
+            $packets::WriteRequest::velocity(id, target)
+        }
+
+        fn write_position(id: NodeId, target: Self::Position) -> Self::Write {
+            $packets::WriteRequest::position(id, target)
+        }
+
+        fn velocity_response(id: NodeId, current: Self::Velocity) -> Self::VelocityResponse {
+            $packets::VelocityResponse::new(id, current)
+        }
+
+        fn position_response(id: NodeId, current: Self::Position) -> Self::PositionResponse {
+            $packets::PositionResponse::new(id, current)
+        }
+
+        fn request(frame: $packets::Request<'_>) -> Heard<Self> {
+            match frame {
+                $packets::Request::Read(read) => (read.id(), None),
+                $packets::Request::Write(write) => {
+                    let (velocity, position) = (write.as_velocity(), write.as_position());
+                    (write.id(), Some(Command { velocity, position }))
+                }
+            }
+        }
+
+        fn packet(frame: $packets::Packet<'_>) -> Option<Heard<Self>> {
+            match frame {
+                $packets::Packet::Request(request) => Some(Self::request(request)),
+                $packets::Packet::Response(_) => None,
+            }
+        }
+
+        fn response(frame: $packets::Response<'_>) -> (NodeId, Status<Self>) {
+            match frame {
+                $packets::Response::Velocity(it) => (it.id(), Status::Velocity(it.rps())),
+                $packets::Response::Position(it) => (it.id(), Status::Position(it.$positions())),
+            }
+        }
+    };
+}
+
 impl Units for OneMotor {
     type Velocity = Rps;
     type RawVelocity = f32;
@@ -199,28 +255,7 @@ impl Units for OneMotor {
 }
 
 impl Packets for OneMotor {
-    type Write = WriteRequest;
-    type VelocityResponse = super::VelocityResponse;
-    type PositionResponse = super::PositionResponse;
-    type ToSlave = super::ToSlave;
-    type ToMaster = super::ToMaster;
-    type BothDirections = super::BothDirections;
-
-    fn write_velocity(id: NodeId, target: Rps) -> WriteRequest {
-        WriteRequest::velocity(id, target)
-    }
-
-    fn write_position(id: NodeId, target: Position) -> WriteRequest {
-        WriteRequest::position(id, target)
-    }
-
-    fn velocity_response(id: NodeId, current: Rps) -> super::VelocityResponse {
-        super::VelocityResponse::new(id, current)
-    }
-
-    fn position_response(id: NodeId, current: Position) -> super::PositionResponse {
-        super::PositionResponse::new(id, current)
-    }
+    packets!(one, position);
 
     fn finite(raw: f32) -> Option<Rps> {
         Rps::new(raw).ok()
@@ -237,30 +272,6 @@ impl Packets for OneMotor {
     fn is_still_as_velocity(position: Position) -> bool {
         is_still_on_wire(position.to_le_bytes())
     }
-
-    fn request(frame: Request<'_>) -> Heard<Self> {
-        match frame {
-            Request::Read(read) => (read.id(), None),
-            Request::Write(write) => {
-                let (velocity, position) = (write.as_velocity(), write.as_position());
-                (write.id(), Some(Command { velocity, position }))
-            }
-        }
-    }
-
-    fn packet(frame: Packet<'_>) -> Option<Heard<Self>> {
-        match frame {
-            Packet::Request(request) => Some(Self::request(request)),
-            Packet::Response(_) => None,
-        }
-    }
-
-    fn response(frame: Response<'_>) -> (NodeId, Status<Self>) {
-        match frame {
-            Response::Velocity(response) => (response.id(), Status::Velocity(response.rps())),
-            Response::Position(response) => (response.id(), Status::Position(response.position())),
-        }
-    }
 }
 
 impl Units for ThreeMotors {
@@ -273,28 +284,7 @@ impl Units for ThreeMotors {
 }
 
 impl Packets for ThreeMotors {
-    type Write = three::WriteRequest;
-    type VelocityResponse = three::VelocityResponse;
-    type PositionResponse = three::PositionResponse;
-    type ToSlave = three::ToSlave;
-    type ToMaster = three::ToMaster;
-    type BothDirections = three::BothDirections;
-
-    fn write_velocity(id: NodeId, target: [Rps; 3]) -> three::WriteRequest {
-        three::WriteRequest::velocity(id, target)
-    }
-
-    fn write_position(id: NodeId, target: [Position; 3]) -> three::WriteRequest {
-        three::WriteRequest::position(id, target)
-    }
-
-    fn velocity_response(id: NodeId, current: [Rps; 3]) -> three::VelocityResponse {
-        three::VelocityResponse::new(id, current)
-    }
-
-    fn position_response(id: NodeId, current: [Position; 3]) -> three::PositionResponse {
-        three::PositionResponse::new(id, current)
-    }
+    packets!(three, positions);
 
     fn finite([a, b, c]: [f32; 3]) -> Option<[Rps; 3]> {
         Some([Rps::new(a).ok()?, Rps::new(b).ok()?, Rps::new(c).ok()?])
@@ -313,29 +303,5 @@ impl Packets for ThreeMotors {
         // The speed of one motor takes the bytes of several positions, so build the packet.
         let write = three::WriteRequest::position(NodeId::N1, positions);
         write.as_velocity().into_iter().all(|speed| is_still_on_wire(speed.to_le_bytes()))
-    }
-
-    fn request(frame: three::Request<'_>) -> Heard<Self> {
-        match frame {
-            three::Request::Read(read) => (read.id(), None),
-            three::Request::Write(write) => {
-                let (velocity, position) = (write.as_velocity(), write.as_position());
-                (write.id(), Some(Command { velocity, position }))
-            }
-        }
-    }
-
-    fn packet(frame: three::Packet<'_>) -> Option<Heard<Self>> {
-        match frame {
-            three::Packet::Request(request) => Some(Self::request(request)),
-            three::Packet::Response(_) => None,
-        }
-    }
-
-    fn response(frame: three::Response<'_>) -> (NodeId, Status<Self>) {
-        match frame {
-            three::Response::Velocity(it) => (it.id(), Status::Velocity(it.rps())),
-            three::Response::Position(it) => (it.id(), Status::Position(it.positions())),
-        }
     }
 }

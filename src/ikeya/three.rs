@@ -15,57 +15,13 @@ use zerocopy::{Immutable, IntoBytes, KnownLayout, TryFromBytes, Unaligned};
 
 pub use super::wire::ReadRequest;
 use super::{
+    framing::framings,
     units::{NodeId, Position, Rps},
     wire::{header, packet},
 };
 
-/// Longest packet of a bus of three-motor boards, bytes.
-pub const MAX_LEN: usize = WriteRequest::LEN;
-
-/// Decoder with the smallest buffer that such a bus needs.
-pub type Decoder<F = ToMaster> = crate::stream::Decoder<F, MAX_LEN>;
-
-/// Packets from a master to three-motor boards.
-#[derive(Clone, Copy, Debug)]
-pub enum ToSlave {}
-
-/// Packets from three-motor boards.
-#[derive(Clone, Copy, Debug)]
-pub enum ToMaster {}
-
-/// Everything on a bus of three-motor boards.
-#[derive(Clone, Copy, Debug)]
-pub enum BothDirections {}
-
-/// A packet for a three-motor board.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Request<'a> {
-    /// Request for the status.
-    Read(&'a ReadRequest),
-    /// Command to the motors; also requests the status.
-    Write(&'a WriteRequest),
-}
-
-/// A packet from a three-motor board.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Response<'a> {
-    /// Status of a velocity node.
-    Velocity(&'a VelocityResponse),
-    /// Status of a position node.
-    Position(&'a PositionResponse),
-}
-
-/// A packet of either direction.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Packet<'a> {
-    /// For a board.
-    Request(Request<'a>),
-    /// For the master.
-    Response(Response<'a>),
-}
+// Without batches: captures of such a bus are small.
+framings! { accept_batch: |_| 0 }
 
 /// Master to slave, commands three motors at once: 16 bytes, 320 µs at 500 kbit/s.
 ///

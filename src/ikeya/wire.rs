@@ -322,3 +322,12 @@ where
     crc16::verify(bytes)?;
     Ok(packet)
 }
+
+/// Views a judged packet as its type.
+#[inline(always)]
+pub(super) fn view<P>(frame: &[u8]) -> Option<&P>
+where
+    P: TryFromBytes + Immutable + KnownLayout + Unaligned,
+{
+    P::try_ref_from_bytes(frame).ok()
+}
