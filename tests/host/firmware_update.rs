@@ -361,3 +361,52 @@ fn a_repeated_stop_puts_off_no_repetition_however_long_the_pause_between_command
     host.stop(ms(10));
     assert_eq!(speeds(&wait(&mut host, ms(250))), [(100_000, 0), (200_000, 0)]);
 }
+
+#[test]
+fn an_update_request_that_comes_back_again_and_again_is_given_up_after_3_s_too() {
+    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
+        let mut host = begun();
+        let begin = seen_still(&mut host, 10);
+        host.start_firmware_update(40, begin).unwrap();
+        let (mut at, mut requests, mut is_over) = (begin, 0, false);
+        while !is_over {
+            at += Duration::from_millis(20);
+            assert!(at - begin <= Duration::from_millis(3000), "{unsent:?}");
+            host.handle_input(&report(0), at);
+            host.handle_timeout(at);
+            while let Some(frame) = host.poll_transmit(at) {
+                if frame[4] == 9 {
+                    requests += 1;
+                    host.handle_transmit(unsent, at);
+                }
+            }
+            is_over = events(&mut host).contains(&HostEvent::UpdateNotSent);
+        }
+        assert!(requests >= 2, "{unsent:?}: {requests}");
+        assert_eq!(host.drive(go(10), at), Ok(()));
+    }
+}
+
+#[test]
+fn a_request_that_may_have_left_once_is_answered_even_if_it_did_not_leave_again() {
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    sent(&mut host, now);
+    host.handle_transmit(Unsent::Unflushed, now);
+    let now = seen_still(&mut host, now.as_micros() / 1000);
+    host.handle_transmit(Unsent::Untouched, now);
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
+    assert_eq!(wait(&mut host, ms(60_000)), []);
+}
+
+#[test]
+fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    while host.poll_transmit(now).is_some_and(|frame| frame[4] != 9) {}
+    assert!(!host.is_outdated());
+    host.handle_input(&report(30), now);
+    assert!(host.is_outdated());
+}

@@ -246,3 +246,24 @@ fn a_network_state_that_is_refused_changes_nothing() {
     host.set_network_state(NetworkState::Connected, ms(4)).unwrap();
     assert_eq!(sent(&mut host, ms(4)), [] as [Vec<u8>; 0]);
 }
+
+#[test]
+fn a_move_that_waits_for_its_port_is_outdated_once_the_robot_may_not_be_heard_any_more() {
+    let mut config = quiet_config();
+    config.dead_man = Duration::from_millis(60_000);
+    let mut host = driven(Host::new(config, ms(0)), 60, 0);
+    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(10));
+    assert_eq!(host.poll_transmit(ms(10)).and_then(speed), Some(60));
+    host.handle_input(&[], ms(509));
+    assert!(!host.is_outdated());
+    host.handle_input(&[], ms(510));
+    assert!(host.is_outdated(), "bytes may wait in the port, but who knows");
+    assert_eq!(host.link(), Link::Up);
+    host.handle_input(&bytes(Pong::new(ErrorCode::Fine)), ms(510));
+    assert!(!host.is_outdated());
+    // A stop goes out all the same.
+    host.stop(ms(520));
+    assert_eq!(host.poll_transmit(ms(520)).and_then(speed), Some(0));
+    host.handle_input(&[], ms(2000));
+    assert!(!host.is_outdated());
+}

@@ -147,3 +147,18 @@ fn an_answer_to_an_update_request_that_did_not_leave_does_not_replace_a_newer_on
         assert_eq!(sent(&mut robot, ms(1)), [bytes(OtaAck::new(OtaStatus::Forbidden))]);
     }
 }
+
+#[test]
+fn an_answer_to_an_update_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(OtaRequest::start_firmware_update(50)), ms(0));
+    events(&mut robot);
+    assert!(robot.answer_update(OtaStatus::Forbidden, ms(1)));
+    assert_eq!(sent(&mut robot, ms(1)).len(), 1);
+    robot.handle_transmit(Transmit::Taken, ms(1));
+    robot.handle_transmit(Transmit::Flushed, ms(1));
+    for unsent in [Unsent::Unflushed, Unsent::Untouched] {
+        robot.handle_transmit(unsent, ms(2));
+        assert_eq!(sent(&mut robot, ms(2)), [] as [Vec<u8>; 0]);
+    }
+}

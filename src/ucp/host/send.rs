@@ -53,7 +53,7 @@ impl<S: BiasStore> State<S> {
 
     /// The most urgent frame to send; it counts as sent.
     fn next(&mut self, now: Instant) -> Option<Outgoing> {
-        if self.update == Update::Silent {
+        if self.update.is_silent() {
             return None;
         }
         if let Some(command) = self.motor.take_due(now, &self.config) {
@@ -134,13 +134,15 @@ impl<S: BiasStore> State<S> {
     }
 
     /// Whether the frame handed out last is a motor command that moves the robot, and is no longer
-    /// the latest, or asks for an update that was ended.
+    /// the latest or goes to a robot that may no longer be heard, or asks for an update that was
+    /// ended or is no longer allowed.
     pub(super) fn has_sent_old_command(&self) -> bool {
         match self.last {
             Some(Outgoing::Motor(command)) => {
-                !command.stands_still() && self.motor.latest() != Some(command)
+                let is_old = self.motor.latest() != Some(command) || self.is_link_overdue;
+                !command.stands_still() && is_old
             }
-            Some(Outgoing::Update(_)) => self.update != Update::Silent,
+            Some(Outgoing::Update(_)) => !self.update.is_silent() || !self.is_ready_for_update(),
             _ => false,
         }
     }
@@ -161,10 +163,12 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if let (Some(Outgoing::Update(version)), Update::Silent) = (last, self.update) {
+        if let (Some(Outgoing::Update(version)), Update::Silent { at, may_have_left }) =
+            (last, self.update)
+        {
             self.end_update(now);
-            let may_have_left = unsent == Unsent::Unflushed;
-            self.update = Update::Asked { version, at: now, may_have_left };
+            let may_have_left = may_have_left || unsent == Unsent::Unflushed;
+            self.update = Update::Asked { version, at, may_have_left };
         }
     }
 
@@ -197,7 +201,7 @@ impl<S: BiasStore> State<S> {
     }
 
     pub(super) fn deadline(&self) -> Option<Instant> {
-        if self.update == Update::Silent {
+        if self.update.is_silent() {
             return self.link_until;
         }
         let asked = match self.update {

@@ -71,6 +71,8 @@ pub(super) struct State<S> {
     pub(super) arrived_since: Option<Instant>,
     /// The port has taken all of the last frame.
     pub(super) is_last_taken: bool,
+    /// The link timeout has passed, but what has been received may not have been taken in.
+    pub(super) is_link_overdue: bool,
 }
 
 /// Progress of a firmware update.
@@ -80,13 +82,23 @@ pub(super) enum Update {
     /// The request is to be sent behind stops while the reports show a standstill.
     Asked {
         version: i16,
-        /// When it was asked for, or came back.
+        /// When it was asked for.
         at: Instant,
         /// It was sent before, and its flush failed.
         may_have_left: bool,
     },
     /// The request has been sent; the line belongs to the update.
-    Silent,
+    Silent {
+        at: Instant,
+        /// It had been sent before, and its flush had failed.
+        may_have_left: bool,
+    },
+}
+
+impl Update {
+    pub(super) const fn is_silent(self) -> bool {
+        matches!(self, Self::Silent { .. })
+    }
 }
 
 impl<S: BiasStore> State<S> {
@@ -119,6 +131,7 @@ impl<S: BiasStore> State<S> {
             last: None,
             arrived_since: None,
             is_last_taken: false,
+            is_link_overdue: false,
         }
     }
 
@@ -184,10 +197,12 @@ impl<S: BiasStore> State<S> {
         Ok(())
     }
 
-    /// Leaves the line to the update.
+    /// Leaves the line to the update that was asked for.
     pub(super) const fn begin_update(&mut self) {
-        self.update = Update::Silent;
-        self.motor.pause();
+        if let Update::Asked { at, may_have_left, .. } = self.update {
+            self.update = Update::Silent { at, may_have_left };
+            self.motor.pause();
+        }
     }
 
     /// Ends an update: the line is the host's again.
@@ -258,6 +273,7 @@ impl<S: BiasStore> State<S> {
     /// Records that a valid frame of a robot has arrived.
     fn heard(&mut self, at: Instant) {
         self.link_until = Some(at + self.config.link_timeout);
+        self.is_link_overdue = false;
         if self.link != Link::Up {
             self.link = Link::Up;
             self.events.push_latest(HostEvent::LinkUp, is_link);
@@ -405,7 +421,8 @@ impl<S: BiasStore> State<S> {
 
     fn update_answer(&mut self, status: OtaStatus, at: Instant) {
         // The request may have arrived, whatever its flush said.
-        if matches!(self.update, Update::Silent | Update::Asked { may_have_left: true, .. }) {
+        if matches!(self.update, Update::Silent { .. } | Update::Asked { may_have_left: true, .. })
+        {
             if status == OtaStatus::Accepted {
                 self.begin_update();
                 self.last = None;
@@ -436,8 +453,10 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Ends a command whose application has gone silent (U10).
+    /// Ends a command whose application has gone silent (U10), and notes that the robot may no
+    /// longer be heard.
     pub(super) fn expire_dead_man(&mut self, now: Instant) {
+        self.is_link_overdue = reached(self.link_until, now);
         if self.motor.expire(now) {
             count(&mut self.stats.dead_man);
             self.events.push(HostEvent::DeadMan);
@@ -457,8 +476,7 @@ impl<S: BiasStore> State<S> {
         self.expire_dead_man(now);
         self.expire_update(now);
         if reached(self.link_until, now) {
-            self.link_until = None;
-            self.link = Link::Down;
+            (self.link, self.link_until) = (Link::Down, None);
             self.last_index = None;
             self.motor.lose_link(now);
             count(&mut self.stats.links_lost);

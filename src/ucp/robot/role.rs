@@ -205,8 +205,10 @@ impl Endpoint for Robot {
     }
 
     fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
-        if let Transmit::Unsent(unsent) = outcome.into() {
-            self.state.unsent(unsent, now);
+        match outcome.into() {
+            Transmit::Taken => self.state.is_last_taken = true,
+            Transmit::Flushed => self.state.flushed(),
+            Transmit::Unsent(unsent) => self.state.unsent(unsent, now),
         }
     }
 

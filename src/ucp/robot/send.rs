@@ -18,7 +18,7 @@ impl State {
     /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         let outgoing = self.next(now)?;
-        self.last = Some(outgoing);
+        (self.last, self.is_last_taken) = (Some(outgoing), false);
         Some(match outgoing {
             Outgoing::StartAck(kind) => {
                 write(CalibrationStartAck::new(kind, ErrorCode::Fine), 0, buffer)
@@ -70,6 +70,13 @@ impl State {
                 write(FirmwareReport::new(&self.telemetry, version), index, buffer)
             }
             ReportLayout::Document => write(DocumentReport::new(&self.telemetry), index, buffer),
+        }
+    }
+
+    /// All that the port has taken has left, so it cannot come back.
+    pub(super) fn flushed(&mut self) {
+        if self.is_last_taken {
+            self.last = None;
         }
     }
 

@@ -46,6 +46,8 @@ pub(super) struct State {
     pub(super) update_asked: bool,
     /// The frame handed out last, while it may still come back.
     pub(super) last: Option<Outgoing>,
+    /// The port has taken all of it.
+    pub(super) is_last_taken: bool,
 }
 
 /// A running calibration.
@@ -76,6 +78,7 @@ impl State {
             network: None,
             update_asked: false,
             last: None,
+            is_last_taken: false,
         }
     }
 
