@@ -344,7 +344,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Lets time pass.
     pub(super) fn expire(&mut self) {
         let now = self.now();
-        if self.may_hold_more() {
+        // The rest of a frame may wait in a port whose receiver fails.
+        let is_unsure = self.unsure_since.is_some_and(|since| now - since < RECOVERY);
+        if is_unsure && self.role.line_rules().held_up_after.is_some() {
             self.role.handle_input(&[], now);
         } else if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);

@@ -1,6 +1,6 @@
 //! A rover's link: stops cut by a port, failing receivers and transmitters, robots held up.
 
-use axlewire::ucp::{FrameOf, Telemetry};
+use axlewire::ucp::{FrameOf, Telemetry, message::FirmwareReport};
 
 use crate::{motor_line::Wire, rig::*};
 
@@ -400,5 +400,25 @@ fn a_stop_leaves_on_a_slow_link_through_a_port_that_takes_a_few_bytes_at_a_time(
         let last = sent.len() - 24;
         let stop = MotorControl::STOP.frame(sent[last + 5]);
         assert_eq!(sent[last..], *stop.as_bytes());
+    }
+}
+
+#[test]
+fn a_frame_whose_rest_waits_behind_a_failing_receiver_is_not_given_up() {
+    for errors in [1, 5, 15] {
+        for is_async in BOTH {
+            let frame = FirmwareReport::new(&Telemetry::default(), 38).frame(0);
+            let (front, rest) = frame.as_bytes().split_at(20);
+            let mut port = Port::new(&World::default(), BYTE_US);
+            port.reads.push_back(Step::Bytes(front.into()));
+            port.reads.extend(vec![Step::Error; errors]);
+            port.reads.push_back(Step::Bytes(rest.into()));
+            let mut host = on(Host::new(HostConfig::direct(), at_ms(0)), port);
+            for _ in 0..errors + 2 {
+                let _ = call!(is_async, host, service());
+                host.port().world.step(1_000);
+            }
+            assert_eq!(host.role().statistics().reports, 1, "{errors} errors, async {is_async}");
+        }
     }
 }

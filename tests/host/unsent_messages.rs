@@ -127,3 +127,26 @@ fn the_acknowledgement_of_a_result_that_was_refused_before_is_due_again_if_it_di
         assert_eq!(sent(&mut host, ms(1002)), [acknowledgement]);
     }
 }
+
+#[test]
+fn a_calibration_request_that_its_port_does_not_take_is_given_up_at_its_bound() {
+    let mut host = begun();
+    host.start_calibration(IMU, ms(100)).unwrap();
+    let mut at = ms(100);
+    while host.calibration_outcome().is_none() {
+        host.handle_timeout(at);
+        while let Some(frame) = host.poll_transmit(at) {
+            let is_request = frame[4] == 3;
+            if is_request {
+                host.handle_transmit(Unsent::Untouched, at);
+                break;
+            }
+        }
+        at += Duration::from_millis(1);
+    }
+    let bound = host.config().calibration_bound();
+    assert!(at - ms(100) <= bound + Duration::from_millis(2), "{at:?}");
+    let failure = host.calibration_outcome().unwrap().unwrap_err();
+    assert_eq!((failure.attempts, failure.cause), (0, FailureCause::NoAnswer));
+    assert!(wait(&mut host, ms(60_000)).iter().all(|(_, frame)| frame[4] == 2), "and not sent");
+}

@@ -47,6 +47,8 @@ pub(crate) struct Account {
     link_until: Option<Instant>,
     pub(crate) update: Update,
     pub(crate) request: Option<Request>,
+    /// Attempts of the latest request that could not be sent again in time.
+    pub(crate) given_up: Option<u8>,
     /// The outcome of the latest request.
     pub(crate) settled: Option<bool>,
     /// Ends of requests whose events have not been taken.
@@ -72,6 +74,7 @@ impl Account {
             link_until: Some(now + ms(500)),
             update: Update::None,
             request: None,
+            given_up: None,
             settled: None,
             untold: Vec::new(),
             imu: Results::new(),
@@ -97,8 +100,8 @@ impl Account {
         self.ping_until = None;
     }
 
-    pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind) {
-        (self.request, self.settled) = (Some(Request::new(step, kind)), None);
+    pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind, now: Instant) {
+        (self.request, self.settled) = (Some(Request::new(step, kind, now)), None);
         match kind {
             _ if step == CalibrationStep::End => {}
             CalibrationKind::Imu => self.imu.popped = None,
@@ -161,6 +164,9 @@ impl Account {
         }
         if is_reached(self.request.as_ref().and_then(|request| request.until)) {
             self.retry();
+        } else if self.request.as_ref().is_some_and(|it| it.until.is_none() && it.bound <= now) {
+            self.given_up = self.request.as_ref().map(|it| it.attempts);
+            self.settle(false);
         }
     }
 

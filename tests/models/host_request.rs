@@ -12,6 +12,13 @@ pub(crate) struct Request {
     pub(crate) attempts: u8,
     /// `None`: has to be sent now.
     pub(crate) until: Option<Instant>,
+    /// When it is given up if it cannot be sent.
+    pub(crate) bound: Instant,
+}
+
+/// Time for the acknowledgement of a request.
+fn wait() -> Duration {
+    wire_time(9, BAUD) + ms(200)
 }
 
 /// Whether a result may be acknowledged (U15).
@@ -33,8 +40,8 @@ pub(crate) struct Results {
 }
 
 impl Request {
-    pub(crate) const fn new(step: CalibrationStep, kind: CalibrationKind) -> Self {
-        Self { step, kind, attempts: 0, until: None }
+    pub(crate) fn new(step: CalibrationStep, kind: CalibrationKind, now: Instant) -> Self {
+        Self { step, kind, attempts: 0, until: None, bound: now + wait().saturating_mul(3) }
     }
 
     /// The request is sent; returns whether that is allowed.
@@ -47,7 +54,7 @@ impl Request {
         let is_this = (self.step, self.kind) == (step, kind);
         let is_due = self.until.is_none() && self.attempts < 3;
         self.attempts += 1;
-        self.until = Some(now + wire_time(9, BAUD) + ms(200));
+        self.until = Some(now + wait());
         is_this && is_due
     }
 }

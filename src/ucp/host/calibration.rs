@@ -20,6 +20,8 @@ pub(super) struct Request {
     /// Outcome of the latest attempt so far.
     cause: FailureCause,
     wait: Wait,
+    /// When it is given up if its port still does not take it.
+    until: Instant,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -42,14 +44,16 @@ pub(super) enum Answer {
 }
 
 impl Request {
-    pub(super) const fn new(
+    pub(super) fn new(
         step: CalibrationStep,
         kind: CalibrationKind,
         last_start: Option<CalibrationKind>,
         now: Instant,
+        config: &HostConfig,
     ) -> Self {
         let (cause, wait) = (FailureCause::NoAnswer, Wait::Send(now));
-        Self { step, kind, last_start, attempts: 0, cause, wait }
+        let until = now + config.calibration_bound();
+        Self { step, kind, last_start, attempts: 0, cause, wait, until }
     }
 
     /// The request to send now, if any, and whether it is a repetition.
@@ -111,7 +115,7 @@ impl Request {
         })
     }
 
-    /// Sends again, or gives up, when the acknowledgement is late.
+    /// Sends again, or gives up, when the acknowledgement is late. Gives up what could not be sent.
     pub(super) fn expire(
         &mut self,
         now: Instant,
@@ -119,6 +123,7 @@ impl Request {
     ) -> Option<CalibrationFailure> {
         match self.wait {
             Wait::Ack(until) if until <= now => self.retry(now, config),
+            Wait::Send(_) if self.until <= now => Some(self.failure()),
             _ => None,
         }
     }
@@ -134,6 +139,10 @@ impl Request {
             self.wait = Wait::Send(now);
             return None;
         }
-        Some(CalibrationFailure::new(self.step, self.kind, self.cause, self.attempts))
+        Some(self.failure())
+    }
+
+    const fn failure(&self) -> CalibrationFailure {
+        CalibrationFailure::new(self.step, self.kind, self.cause, self.attempts)
     }
 }
