@@ -16,12 +16,13 @@
 //! | learn it step by step | the pages of `guide` |
 //! | turn a motor or drive a rover over a port | `drive::Driver` |
 //! | run a role in your own loop, without a port and a clock | [`endpoint::Endpoint`] |
-//! | decode a capture or a stream, build a packet | the pages `ikeya` and `ucp` |
+//! | build a packet, decode a stream | the pages `ikeya` and `ucp` |
+//! | decode a file of recorded bytes | `stream::decode_capture` |
 //! | decode another protocol with the same resync | [`stream::Framing`] |
 //! | bring it to a board | `guide::start_on_a_board` |
 //! | use a serial port or a USB adapter of a PC | `guide::start_on_a_pc` |
 //! | read packets as JSON, or elsewhere with `serde` | the page `fields` |
-//! | test an application without hardware | `sim` |
+//! | test roles and applications in virtual time, without ports | `sim` |
 //!
 //! # The floors
 //!

@@ -8,15 +8,23 @@
 use core::{
     cell::Cell,
     cmp::Ordering,
+    fmt,
     ops::{Add, AddAssign, Sub},
 };
 
 /// A span of time in microseconds, up to 71 minutes.
-#[derive(Clone, Copy, Debug, Default, Eq, Hash, Ord, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Default, Eq, Hash, Ord, PartialEq, PartialOrd)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Duration {
     micros: u32,
+}
+
+/// As that of [`core::time::Duration`]: `1.5ms`.
+impl fmt::Debug for Duration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        core::time::Duration::from(*self).fmt(f)
+    }
 }
 
 impl Duration {

@@ -88,6 +88,39 @@ const NAP_US: u32 = 1_000_000;
 /// # }
 /// ```
 ///
+/// A host is driven in the same way, and its reports can be read meanwhile:
+///
+/// ```
+/// # #[cfg(feature = "ucp")]
+/// # async fn tour<P, C>(port: P, time: C) -> Result<(), axlewire::drive::DriveError<P::Error>>
+/// # where
+/// #     P: embedded_io_async::Read + embedded_io_async::Write,
+/// #     C: axlewire::drive::Clock + embedded_hal_async::delay::DelayNs,
+/// # {
+/// use axlewire::drive::asynch::Driver;
+/// use axlewire::{time::Duration, ucp::host::{COAST, HostConfig}};
+///
+/// let mut rover = Driver::host(HostConfig::direct(), port, time);
+/// let end = rover.now() + Duration::from_secs(2);
+/// let driven = async {
+///     while rover.now() < end {
+///         rover.drive(30, 0).await?; // percent; counts for half a second
+///         if let Some(report) = rover.next_report(Duration::from_millis(100)).await? {
+///             println!("{:?} rpm", report.telemetry.rpm);
+///         }
+///     }
+///     Ok(())
+/// }
+/// .await;
+/// rover.stop().await?; // whatever has failed
+/// rover.await_standstill(COAST).await?;
+/// driven
+/// # }
+/// ```
+///
+/// What it has from [`Deref`] serves both worlds, but calls that it has itself, such as `service`
+/// and `next_event`, are the blocking ones there: they need a blocking port.
+///
 /// No call of it loses received bytes, sends an old command late, or waits longer than it says, and
 /// after any error the next call continues; each can be dropped at any await. See the
 /// [module](self).

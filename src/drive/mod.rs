@@ -50,10 +50,10 @@
 //! [`service`](Driver::service) does not wait. All other calls end after a time that is an
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
-//! either after one second ([`DriveError::Stalled`]). Those of a slave and of a robot wait for it
-//! for 10 ms at a time, or for the time of two of the longest frames and a millisecond if that is
-//! longer: a healthy port is done by then. The application hears of a watchdog at most four such
-//! times late, and a call may leave a frame, and a driver-enable pin, to the next. A
+//! either after one second ([`DriveError::Stalled`]). A slave or a robot waits for its port for
+//! less in each call: for 10 ms, or for two of its longest frames and a millisecond if that is
+//! longer, by which time a healthy port is done. Then its application hears of a watchdog at most
+//! four such times late, and a call may leave a frame, and a driver-enable pin, to the next one. A
 //! command that ends while a write of its first bytes waits, by the dead-man of a host or because
 //! its call is over, does not leave.
 //!

@@ -61,7 +61,8 @@ impl TokioSerialPort {
     ///
     /// # Panics
     ///
-    /// In a runtime without I/O (`enable_io` of its builder).
+    /// In a runtime without I/O (`enable_io` of its builder). `#[tokio::main(flavor =
+    /// "current_thread")]` has it, and timers; it needs the features `macros` and `rt` of tokio.
     pub fn open(path: &str, baud: u32) -> io::Result<Self> {
         tokio::runtime::Handle::try_current().map_err(io::Error::other)?;
         let tty = tty::open(path, baud, SerialStream::open)?;

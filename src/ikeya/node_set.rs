@@ -14,7 +14,7 @@ use crate::ikeya::units::NodeId;
 /// assert_eq!(nodes.to_string(), "1, 3 and 8");
 /// assert_eq!((nodes.len(), nodes.contains(NodeId::N2)), (3, false));
 /// ```
-#[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
+#[derive(Clone, Copy, Default, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeSet {
@@ -83,6 +83,12 @@ impl FromIterator<NodeId> for NodeSet {
         let mut set = Self::NONE;
         nodes.into_iter().for_each(|node| set.insert(node));
         set
+    }
+}
+
+impl fmt::Debug for NodeSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.iter()).finish()
     }
 }
 

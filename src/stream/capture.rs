@@ -13,7 +13,8 @@ use super::{
 pub type Located<T> = (usize, Event<T>);
 
 /// Decodes a capture that is already in memory: each event with the offset of its first byte, and
-/// the account.
+/// the account. The capture is the bytes of a line and nothing else; for pcapng files there is
+/// `axle decode`.
 ///
 /// Nothing follows a capture, so a candidate cut off by its end is refused as
 /// [`Reason::Idle`](super::Reason::Idle), and whole frames inside it are found. Needs feature

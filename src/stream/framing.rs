@@ -6,7 +6,7 @@ use super::{batch::Rejected, ledger::Reason};
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
-    /// A whole frame with a correct CRC.
+    /// A whole frame with a correct CRC, or whatever else the protocol has.
     Frame {
         /// Length of the frame, bytes.
         len: usize,

@@ -68,12 +68,13 @@ impl<P, C: Clock> Driver<Slave, P, C> {
     ///
     /// ```
     /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::drive::{Clock, DriveError, Driver};
+    /// use axlewire::drive::{Clock, Driver};
     /// use axlewire::ikeya::{Mode, NodeId, Rps, Target, slave::SlaveConfig};
     /// use axlewire::time::Duration;
     /// use embedded_io::{Read, ReadReady, Write};
     ///
-    /// fn run<P, C>(port: P, clock: C, set_motor: fn(Rps)) -> Result<(), DriveError<P::Error>>
+    /// /// Never returns: a motor must stop when the port fails, too.
+    /// fn run<P, C>(port: P, clock: C, set: fn(Rps), measure: fn() -> Rps) -> !
     /// where
     ///     P: Read + ReadReady + Write,
     ///     C: Clock,
@@ -82,12 +83,13 @@ impl<P, C: Clock> Driver<Slave, P, C> {
     ///     config.watchdog = Some(Duration::from_millis(100)); // off unless you set it
     ///     let mut slave = Driver::slave(NodeId::N1, Mode::Velocity, config, port, clock);
     ///     loop {
-    ///         slave.next_command(Duration::from_millis(10))?;
+    ///         let _ = slave.next_command(Duration::from_millis(10)); // an error: show it
     ///         let now = slave.now();
     ///         match slave.role().command(now) {
-    ///             Some(Target::Velocity(speed)) => set_motor(speed),
-    ///             _ => set_motor(Rps::ZERO), // none yet, or the watchdog has fired
+    ///             Some(Target::Velocity(speed)) => set(speed),
+    ///             _ => set(Rps::ZERO), // none yet, or the watchdog has fired
     ///         }
+    ///         slave.role_mut().set_velocity(measure()); // what it answers
     ///     }
     /// }
     /// # }

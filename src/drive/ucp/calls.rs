@@ -34,10 +34,11 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
-    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. The command is
-    /// sent now or, right after another command, within the next 20 ms, and repeated as long as the
-    /// driver is called. Call it again within 500 ms (see [`Host::drive`]), or use
-    /// [`drive_for`](Self::drive_for), which does.
+    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. A new command is
+    /// sent now or, right after another one, within the next 20 ms, and repeated every 100 ms as
+    /// long as the driver is called. The same command again is not sent more often, and only feeds
+    /// the dead-man: call it as often as you like, and at least every 500 ms (see [`Host::drive`]),
+    /// or use [`drive_for`](Self::drive_for), which does.
     ///
     /// # Errors
     ///

@@ -54,20 +54,22 @@ impl<P, C: Clock> Driver<Robot, P, C> {
     ///
     /// ```
     /// # #[cfg(feature = "embedded-io")] {
-    /// use axlewire::drive::{Clock, DriveError, Driver};
-    /// use axlewire::{time::Duration, ucp::{MotorControl, robot::RobotConfig}};
+    /// use axlewire::drive::{Clock, Driver};
+    /// use axlewire::{time::Duration, ucp::{MotorControl, Telemetry, robot::RobotConfig}};
     /// use embedded_io::{Read, ReadReady, Write};
     ///
-    /// fn run<P, C>(port: P, clock: C, set: fn(MotorControl)) -> Result<(), DriveError<P::Error>>
+    /// /// Never returns: a motor must stop when the port fails, too.
+    /// fn run<P, C>(port: P, clock: C, set: fn(MotorControl), measure: fn() -> Telemetry) -> !
     /// where
     ///     P: Read + ReadReady + Write,
     ///     C: Clock,
     /// {
     ///     let mut robot = Driver::robot(RobotConfig::direct(), port, clock);
     ///     loop {
-    ///         robot.next_command(Duration::from_millis(10))?;
+    ///         let _ = robot.next_command(Duration::from_millis(10)); // an error: show it
     ///         let now = robot.now();
     ///         set(robot.role().command(now)); // a standstill once the watchdog has fired
+    ///         robot.role_mut().set_telemetry(&measure(), now);
     ///     }
     /// }
     /// # }

@@ -109,9 +109,9 @@ impl<S: BiasStore> Host<S> {
         }
     }
 
-    /// Drives the robot. The command is sent at once, but no sooner than 20 ms after a different
-    /// one, and is repeated every 100 ms. Call this at least every 500 ms, even with the same
-    /// command: see [`HostEvent::DeadMan`].
+    /// Drives the robot. A new command is sent at once, but no sooner than 20 ms after a different
+    /// one, and is repeated every 100 ms. The same command again only feeds the dead-man: call this
+    /// at least every 500 ms, see [`HostEvent::DeadMan`].
     ///
     /// To pass on a received command, convert it with [`MotorControl::try_from`] (U7).
     ///
