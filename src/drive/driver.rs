@@ -341,9 +341,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         look_period(&self.role).is_some() && self.now() - since < RECOVERY
     }
 
-    /// Lets time pass.
+    /// Lets time pass, but only until the port was seen empty: whatever has arrived since is still
+    /// in it.
     pub(super) fn expire(&mut self) {
-        let now = self.now();
+        let now = if self.unsure_since.is_none() { self.empty_at } else { self.now() };
         // The rest of a frame may wait in a port whose receiver fails.
         let is_unsure = self.unsure_since.is_some_and(|since| now - since < RECOVERY);
         if is_unsure && self.role.line_rules().held_up_after.is_some() {

@@ -1,6 +1,7 @@
 //! A rover's link: stops cut by a port, failing receivers and transmitters, robots held up.
 
 use axlewire::ucp::{FrameOf, Telemetry, message::FirmwareReport};
+use embedded_io::{Read, ReadReady, Write};
 
 use crate::{motor_line::Wire, rig::*};
 
@@ -421,4 +422,48 @@ fn a_frame_whose_rest_waits_behind_a_failing_receiver_is_not_given_up() {
             assert_eq!(host.role().statistics().reports, 1, "{errors} errors, async {is_async}");
         }
     }
+}
+
+/// A port that says what it held when it was asked, 1.5 ms later.
+struct LateAnswers(Port);
+
+impl embedded_io::ErrorType for LateAnswers {
+    type Error = Unplugged;
+}
+
+impl ReadReady for LateAnswers {
+    fn read_ready(&mut self) -> Result<bool, Unplugged> {
+        let is_ready = self.0.read_ready();
+        self.0.world.step(1_500);
+        is_ready
+    }
+}
+
+impl Read for LateAnswers {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Unplugged> {
+        Read::read(&mut self.0, buffer)
+    }
+}
+
+impl Write for LateAnswers {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Unplugged> {
+        Write::write(&mut self.0, bytes)
+    }
+
+    fn flush(&mut self) -> Result<(), Unplugged> {
+        Write::flush(&mut self.0)
+    }
+}
+
+#[test]
+fn a_host_that_is_held_up_behind_a_look_gives_up_no_frame_whose_rest_waits_in_the_port() {
+    let world = World::default();
+    let (near, mut far) = Port::pair(&world, BYTE_US);
+    let mut host = Driver::host(HostConfig::direct(), LateAnswers(near), world.clone());
+    for index in 0..50 {
+        let report = FirmwareReport::new(&Telemetry::default(), 38).frame(index);
+        Write::write_all(&mut far, report.as_bytes()).unwrap();
+        host.run_for(ms(20), |_, _, _| ()).unwrap();
+    }
+    assert_eq!(host.role().statistics().reports, 50);
 }

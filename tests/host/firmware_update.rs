@@ -381,6 +381,7 @@ fn an_update_request_that_comes_back_again_and_again_is_given_up_after_3_s_too()
                 }
             }
             is_over = events(&mut host).contains(&HostEvent::UpdateNotSent);
+            assert_eq!(host.is_updating(), !is_over);
         }
         assert!(requests >= 2, "{unsent:?}: {requests}");
         assert_eq!(host.drive(go(10), at), Ok(()));

@@ -162,3 +162,17 @@ fn an_answer_to_an_update_that_has_been_flushed_is_not_sent_again_for_a_port_tha
         assert_eq!(sent(&mut robot, ms(2)), [] as [Vec<u8>; 0]);
     }
 }
+
+#[test]
+fn an_answer_to_an_update_that_shares_a_failed_flush_with_later_frames_is_sent_again() {
+    let mut robot = quiet_robot();
+    robot.handle_input(&bytes(OtaRequest::start_firmware_update(50)), ms(0));
+    events(&mut robot);
+    assert!(robot.answer_update(OtaStatus::Forbidden, ms(1)));
+    robot.handle_input(&bytes(Ping {}), ms(1));
+    let frames = sent(&mut robot, ms(1));
+    assert!(frames.len() >= 2 && frames[0][4] == 9, "{frames:?}");
+    robot.handle_transmit(Unsent::Unflushed, ms(2));
+    let again: Vec<_> = sent(&mut robot, ms(2)).into_iter().filter(|frame| frame[4] == 9).collect();
+    assert_eq!(again, [frames[0].clone()]);
+}

@@ -269,6 +269,13 @@ impl<S: BiasStore> Host<S> {
         self.state.end_update(now);
     }
 
+    /// Whether a firmware update was asked for and has not ended: no command to move is accepted,
+    /// and once the request has been sent, the line is silent.
+    #[must_use]
+    pub fn is_updating(&self) -> bool {
+        self.state.update != Update::None
+    }
+
     /// State of the link to the robot.
     #[must_use]
     pub const fn link(&self) -> Link {

@@ -19,6 +19,9 @@ impl State {
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         let outgoing = self.next(now)?;
         (self.last, self.is_last_taken) = (Some(outgoing), false);
+        if let Outgoing::UpdateAnswer(status) = outgoing {
+            self.update_answer = Some(status);
+        }
         Some(match outgoing {
             Outgoing::StartAck(kind) => {
                 write(CalibrationStartAck::new(kind, ErrorCode::Fine), 0, buffer)
@@ -78,6 +81,9 @@ impl State {
         if self.is_last_taken {
             self.last = None;
         }
+        if !matches!(self.last, Some(Outgoing::UpdateAnswer(_))) {
+            self.update_answer = None;
+        }
     }
 
     /// Takes back the frame handed out last: its content is decided again.
@@ -86,8 +92,8 @@ impl State {
     /// anyway is not repeated. Results and requests are due at once: a host recognises a
     /// repetition.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
+        let is_answer = matches!(self.last, Some(Outgoing::UpdateAnswer(_)));
         // It stays on record after a failed flush: its rest may still be sent.
-        let last = self.last;
         if unsent == Unsent::Unflushed {
             self.imu_result.again(now);
             self.mag_result.again(now);
@@ -95,7 +101,9 @@ impl State {
         } else if let Some(outgoing) = self.last.take() {
             self.take_back(outgoing, now);
         }
-        if let (Some(Outgoing::UpdateAnswer(status)), false) = (last, self.update_asked) {
+        // Nobody asks again for the answer to an update.
+        let is_lost = (is_answer || unsent == Unsent::Unflushed) && !self.update_asked;
+        if let Some(status) = self.update_answer.filter(|_| is_lost) {
             self.answers.update.get_or_insert(status);
             self.answers.ask(now);
         }

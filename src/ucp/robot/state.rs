@@ -48,6 +48,8 @@ pub(super) struct State {
     pub(super) last: Option<Outgoing>,
     /// The port has taken all of it.
     pub(super) is_last_taken: bool,
+    /// The answer to an update, until it has been flushed.
+    pub(super) update_answer: Option<OtaStatus>,
 }
 
 /// A running calibration.
@@ -79,6 +81,7 @@ impl State {
             update_asked: false,
             last: None,
             is_last_taken: false,
+            update_answer: None,
         }
     }
 
