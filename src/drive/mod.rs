@@ -76,9 +76,10 @@
 //! A failure is returned and breaks nothing: call again.
 //!
 //! * *A receiver that fails* does not keep the driver from sending: it first sends and flushes what
-//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off. In a
-//!   slave or a robot, the beginning of a command waits for 20 ms for a rest that may still be in
-//!   the port, and so do answers and reports: the requests behind may have overtaken them.
+//!   is due, then returns the error. So stops still leave, and the driver-enable pin goes off. In
+//!   all roles but a master, the beginning of a frame waits for 20 ms for a rest that may still be
+//!   in the port. So do the answers and reports of a slave or a robot: the requests behind may have
+//!   overtaken them.
 //! * *A frame of which no byte has left* goes back to its role, which decides again what to send:
 //!   an old command is never sent late.
 //! * *A frame that was cut off* continues with the next call, unless its last byte left too long

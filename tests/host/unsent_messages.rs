@@ -150,3 +150,33 @@ fn a_calibration_request_that_its_port_does_not_take_is_given_up_at_its_bound() 
     assert_eq!((failure.attempts, failure.cause), (0, FailureCause::NoAnswer));
     assert!(wait(&mut host, ms(60_000)).iter().all(|(_, frame)| frame[4] == 2), "and not sent");
 }
+
+#[test]
+fn a_frame_that_was_taken_whole_but_with_a_pause_may_have_arrived() {
+    // The request of an update: the answer to it counts.
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(50, now).unwrap();
+    sent(&mut host, now);
+    host.handle_transmit(Transmit::Taken, now);
+    host.handle_transmit(Unsent::CutOff, now);
+    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
+    assert!(!host.is_updating());
+    // That of a calibration: it counts as an attempt.
+    let mut host = begun();
+    host.start_calibration(IMU, ms(100)).unwrap();
+    let (mut requests, mut at) = (0, ms(100));
+    while host.calibration_outcome().is_none() {
+        host.handle_timeout(at);
+        while let Some(frame) = host.poll_transmit(at) {
+            if frame[4] == 3 {
+                requests += 1;
+                host.handle_transmit(Transmit::Taken, at);
+                host.handle_transmit(Unsent::CutOff, at);
+            }
+        }
+        at += Duration::from_millis(1);
+        assert!(at < ms(1000));
+    }
+    assert_eq!(requests, 3);
+}

@@ -153,6 +153,9 @@ impl<S: BiasStore> State<S> {
     /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
+        // One that was taken whole, with a pause inside, may have arrived all the same.
+        let is_whole = unsent == Unsent::CutOff && self.is_last_taken;
+        let unsent = if is_whole { Unsent::Unflushed } else { unsent };
         // It stays on record after a failed flush: it may have arrived.
         let last = self.last;
         let was_motor = matches!(last, Some(Outgoing::Motor(_)));
