@@ -38,9 +38,7 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
 
 #[test]
 fn a_refused_update_and_a_stop_end_the_silence() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), ms(2000));
     host.drive(go(10), ms(2010)).unwrap();
@@ -69,6 +67,14 @@ pub(crate) fn seen_still<S: BiasStore>(host: &mut Host<S>, from: u64) -> Instant
         wait(host, at);
     }
     at
+}
+
+/// A host that has just been asked for an update to version 40, and when.
+pub(crate) fn asked() -> (Host, Instant) {
+    let mut host = begun();
+    let now = seen_still(&mut host, 10);
+    host.start_firmware_update(40, now).unwrap();
+    (host, now)
 }
 
 /// The port has been flushed: the host is asked for the next frame.
@@ -184,9 +190,7 @@ fn whatever_was_asked_for_during_an_update_is_due_when_it_ends() {
 #[test]
 fn the_rest_of_an_update_request_that_was_ended_is_outdated() {
     for end in [Host::stop as fn(&mut Host, Instant), Host::end_firmware_update] {
-        let mut host = begun();
-        let now = seen_still(&mut host, 30);
-        host.start_firmware_update(50, now).unwrap();
+        let (mut host, now) = asked();
         while let Some(frame) = host.poll_transmit(now) {
             if frame[4] == 9 {
                 break;
@@ -245,9 +249,7 @@ fn a_robot_that_is_not_seen_to_stand_still_is_not_updated() {
 #[test]
 fn an_update_request_that_cannot_be_sent_for_3_s_is_given_up_with_an_event() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let mut host = begun();
-        let now = seen_still(&mut host, 10);
-        host.start_firmware_update(40, now).unwrap();
+        let (mut host, now) = asked();
         sent(&mut host, now);
         host.handle_transmit(unsent, now);
         // No report arrives any more.
@@ -265,9 +267,7 @@ fn an_update_request_that_cannot_be_sent_for_3_s_is_given_up_with_an_event() {
 
 #[test]
 fn an_accepted_update_whose_flush_failed_is_followed_by_silence() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     sent(&mut host, now);
     host.handle_transmit(Unsent::Unflushed, now);
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
@@ -275,17 +275,13 @@ fn an_accepted_update_whose_flush_failed_is_followed_by_silence() {
     host.handle_transmit(Unsent::Unflushed, ms(60_000));
     assert_eq!(wait(&mut host, ms(120_000)), [], "and is not asked for again");
     // A refusal ends it.
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     sent(&mut host, now);
     host.handle_transmit(Unsent::Unflushed, now);
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
     assert_eq!(host.drive(go(10), now), Ok(()));
     // Not so if the request cannot have arrived.
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
     assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
 }
@@ -322,9 +318,7 @@ fn a_stop_asked_for_at_a_standstill_needs_new_reports() {
 
 #[test]
 fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     while host.poll_transmit(now).is_some() {
         host.handle_transmit(Transmit::Taken, now);
     }
@@ -335,9 +329,7 @@ fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced
 
 #[test]
 fn an_update_request_waits_while_reports_that_came_since_show_no_standstill() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     host.handle_input(&report(30), now); // it waited in the port
     assert_eq!(ids(&sent(&mut host, now)), [2, 2]);
     assert_eq!(host.stop_progress(), StopProgress::StillMoving { rpm: [0, 0, 0, 30] });
@@ -365,9 +357,7 @@ fn a_repeated_stop_puts_off_no_repetition_however_long_the_pause_between_command
 #[test]
 fn an_update_request_that_comes_back_again_and_again_is_given_up_after_3_s_too() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let mut host = begun();
-        let begin = seen_still(&mut host, 10);
-        host.start_firmware_update(40, begin).unwrap();
+        let (mut host, begin) = asked();
         let (mut at, mut requests, mut is_over) = (begin, 0, false);
         while !is_over {
             at += Duration::from_millis(20);
@@ -390,9 +380,7 @@ fn an_update_request_that_comes_back_again_and_again_is_given_up_after_3_s_too()
 
 #[test]
 fn a_request_that_may_have_left_once_is_answered_even_if_it_did_not_leave_again() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     sent(&mut host, now);
     host.handle_transmit(Unsent::Unflushed, now);
     let now = seen_still(&mut host, now.as_micros() / 1000);
@@ -403,9 +391,7 @@ fn a_request_that_may_have_left_once_is_answered_even_if_it_did_not_leave_again(
 
 #[test]
 fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(40, now).unwrap();
+    let (mut host, now) = asked();
     while host.poll_transmit(now).is_some_and(|frame| frame[4] != 9) {}
     assert!(!host.is_outdated());
     host.handle_input(&report(30), now);

@@ -1,6 +1,6 @@
 //! Requests and answers that did not reach the line: due again, and counted once (U16).
 
-use crate::{firmware_update::seen_still, rig::*};
+use crate::{firmware_update::asked, rig::*};
 
 #[test]
 fn a_frame_that_never_left_is_not_counted_and_its_content_is_due_again() {
@@ -90,9 +90,7 @@ fn a_stop_between_the_two_copies_of_a_command_is_sent_twice_itself() {
 #[test]
 fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
     for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let mut host = begun();
-        let now = seen_still(&mut host, 10);
-        host.start_firmware_update(50, now).unwrap();
+        let (mut host, now) = asked();
         assert_eq!(sent(&mut host, now).len(), 3);
         host.handle_transmit(unsent, now);
         assert_eq!(
@@ -103,9 +101,7 @@ fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
         assert!(frames.all(|(_, frame)| frame[4] == 2), "no report shows a standstill since");
 
         // Unless the application has changed its mind.
-        let mut host = begun();
-        let now = seen_still(&mut host, 10);
-        host.start_firmware_update(50, now).unwrap();
+        let (mut host, now) = asked();
         sent(&mut host, now);
         host.stop(now);
         host.handle_transmit(unsent, now);
@@ -154,9 +150,7 @@ fn a_calibration_request_that_its_port_does_not_take_is_given_up_at_its_bound() 
 #[test]
 fn a_frame_that_was_taken_whole_but_with_a_pause_may_have_arrived() {
     // The request of an update: the answer to it counts.
-    let mut host = begun();
-    let now = seen_still(&mut host, 10);
-    host.start_firmware_update(50, now).unwrap();
+    let (mut host, now) = asked();
     sent(&mut host, now);
     host.handle_transmit(Transmit::Taken, now);
     host.handle_transmit(Unsent::CutOff, now);
