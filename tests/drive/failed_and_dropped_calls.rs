@@ -1,7 +1,5 @@
 //! Ports that fail and calls that are dropped: the next call continues where this one ended.
 
-use std::mem::ManuallyDrop;
-
 use crate::rig::*;
 
 #[test]
@@ -122,21 +120,4 @@ fn a_dropped_write_or_flush_that_stalled_is_completed_by_the_next_call() {
     }
     assert_eq!(ASYNC(&mut driver), Some(Ok(())));
     assert_eq!((&driver.port().written[..], driver.port().flushed), (&b"12345"[..], 1));
-}
-
-#[test]
-fn a_call_that_was_leaked_does_not_keep_later_rounds_from_sending() {
-    let mut rover = host();
-    let world = rover.port().world.clone();
-    world.block_on(rover.asynch().service()).unwrap();
-    let mut call = ManuallyDrop::new(Box::pin(rover.asynch().drive_for(60, 0, ms(500))));
-    assert_eq!(world.poll_times(3, call.as_mut()), None);
-    let before = rover.port().written.len();
-    for _ in 0..30 {
-        world.step(100_000);
-        rover.port_mut().writes.push_back(Step::Late(1_500));
-        world.block_on(rover.asynch().service()).unwrap();
-    }
-    assert!(rover.port().written.len() > before + 20 * 24, "the command is repeated, as a stop");
-    assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
 }

@@ -4,12 +4,12 @@ use std::{future::Future, pin::pin, task::Poll};
 
 use axlewire::{
     error::EncodeError,
-    ikeya::{Response, ToMaster},
+    ikeya::{Response, ToMaster, VelocityResponse},
     io::{
         self, WriteError,
         asynch::{FrameReader, FrameWriter},
     },
-    stream::{Framing, Gap, Reason},
+    stream::{Event, Framing, Gap, Reason},
     ucp::{
         RawFrame, Ucp,
         message::{ErrorCode, Ping, Pong},

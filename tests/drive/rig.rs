@@ -19,14 +19,13 @@ pub(crate) use axlewire::{
     endpoint::{Arrival, Endpoint, LineRules, Transmit, Unsent},
     ikeya::{
         Master, Mode, NodeId, Position, PositionResponse, ReadRequest, Rps, Slave, Status, Target,
-        VelocityResponse, WriteRequest,
+        WriteRequest,
         board::OneMotor,
         master::{
             Cause, CommandError, Health, MasterConfig, MasterEvent, NodeSet, Polling, StopProgress,
         },
         slave::{SlaveConfig, SlaveEvent},
     },
-    stream::Event,
     time::{Duration, Instant},
 };
 

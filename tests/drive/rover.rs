@@ -1,5 +1,7 @@
 //! High-level calls on a rover link: what pings, commands, stops and calibrations return, and when.
 
+use std::mem::ManuallyDrop;
+
 use std::{cell::RefCell, rc::Rc};
 
 use axlewire::ucp::{
@@ -364,4 +366,21 @@ fn driving_for_a_while_keeps_the_command_alive_whatever_the_dead_man_is() {
             assert_eq!(rover.role().statistics().dead_man, 0, "{timeout_ms} ms");
         }
     }
+}
+
+#[test]
+fn a_call_that_was_leaked_does_not_keep_later_rounds_from_sending() {
+    let mut rover = host();
+    let world = rover.port().world.clone();
+    world.block_on(rover.asynch().service()).unwrap();
+    let mut call = ManuallyDrop::new(Box::pin(rover.asynch().drive_for(60, 0, ms(500))));
+    assert_eq!(world.poll_times(3, call.as_mut()), None);
+    let before = rover.port().written.len();
+    for _ in 0..30 {
+        world.step(100_000);
+        rover.port_mut().writes.push_back(Step::Late(1_500));
+        world.block_on(rover.asynch().service()).unwrap();
+    }
+    assert!(rover.port().written.len() > before + 20 * 24, "the command is repeated, as a stop");
+    assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
 }
