@@ -170,3 +170,18 @@ fn a_result_of_either_kind_without_room_withdraws_the_acknowledgement_of_the_one
         assert_eq!(sent(&mut host, ms(3)).len(), 1);
     }
 }
+
+#[test]
+fn the_rest_of_an_acknowledgement_is_outdated_once_another_result_was_refused() {
+    for (first, second) in [
+        (bytes(imu_bias()), bytes(ImuBias::new([9; 3], [9; 3]))),
+        (bytes(mag_bias()), bytes(MagBias::new([9; 3]))),
+    ] {
+        let mut host = Host::with_store(quiet_config(), Picky::new(|before| before == 1), ms(0));
+        host.handle_input(&first, ms(1));
+        while host.poll_transmit(ms(1)).is_some_and(|frame| !matches!(frame[4], 6 | 7)) {}
+        assert!(!host.is_outdated());
+        host.handle_input(&second, ms(1));
+        assert!(host.is_outdated());
+    }
+}

@@ -396,4 +396,14 @@ fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
     assert!(!host.is_outdated());
     host.handle_input(&report(30), now);
     assert!(host.is_outdated());
+    // Reports that may say so wait in the port meanwhile.
+    let (mut host, now) = asked();
+    while host.poll_transmit(now).is_some_and(|frame| frame[4] != 9) {}
+    host.handle_input(&[], now + Duration::from_millis(19));
+    assert!(!host.is_outdated());
+    host.handle_input(&[], now + Duration::from_millis(20));
+    assert!(host.is_outdated());
+    host.handle_transmit(Unsent::Untouched, now + Duration::from_millis(20));
+    let at = seen_still(&mut host, now.as_micros() / 1000 + 20);
+    assert!(host.is_updating() && !host.is_outdated(), "{at:?}");
 }

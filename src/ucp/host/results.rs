@@ -9,7 +9,7 @@ pub(super) struct Results<B> {
     /// The latest one accepted since the calibration began, to recognise a repetition.
     taken: Option<B>,
     /// Whether the latest one received is not kept anywhere.
-    is_refused: bool,
+    pub(super) is_refused: bool,
     /// Time since which the acknowledgement is due.
     pub(super) ack_due: Option<Instant>,
 }

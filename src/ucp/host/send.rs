@@ -83,7 +83,7 @@ impl<S: BiasStore> State<S> {
         }
         match self.update {
             Update::Asked { version, .. } if self.is_ready_for_update() => {
-                self.begin_update();
+                self.begin_update(now);
                 return Some(Outgoing::Update(version));
             }
             _ => {}
@@ -134,15 +134,20 @@ impl<S: BiasStore> State<S> {
     }
 
     /// Whether the frame handed out last is a motor command that moves the robot, and is no longer
-    /// the latest or goes to a robot that may no longer be heard, or asks for an update that was
-    /// ended or is no longer allowed.
+    /// the latest or goes to a robot that may no longer be heard; asks for an update that was ended
+    /// or is no longer allowed; or would acknowledge a result that was refused.
     pub(super) fn has_sent_old_command(&self) -> bool {
         match self.last {
             Some(Outgoing::Motor(command)) => {
-                let is_old = self.motor.latest() != Some(command) || self.is_link_overdue;
+                let is_old = self.motor.latest() != Some(command) || self.is_overdue;
                 !command.stands_still() && is_old
             }
-            Some(Outgoing::Update(_)) => !self.update.is_silent() || !self.is_ready_for_update(),
+            Some(Outgoing::Update(_)) => {
+                let may_go = self.update.is_silent() && self.is_ready_for_update();
+                !may_go || self.is_overdue
+            }
+            Some(Outgoing::ImuAck) => self.imu.is_refused,
+            Some(Outgoing::MagAck) => self.mag.is_refused,
             _ => false,
         }
     }
@@ -166,7 +171,7 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if let (Some(Outgoing::Update(version)), Update::Silent { at, may_have_left }) =
+        if let (Some(Outgoing::Update(version)), Update::Silent { at, may_have_left, .. }) =
             (last, self.update)
         {
             self.end_update(now);

@@ -28,6 +28,10 @@ use crate::{
     },
 };
 
+/// Longest time for which the request of an update waits for its port before reports are read
+/// again: one report.
+const UPDATE_PATIENCE: Duration = Duration::from_millis(20);
+
 /// Everything except the bytes.
 #[derive(Clone, Debug)]
 pub(super) struct State<S> {
@@ -71,8 +75,9 @@ pub(super) struct State<S> {
     pub(super) arrived_since: Option<Instant>,
     /// The port has taken all of the last frame.
     pub(super) is_last_taken: bool,
-    /// The link timeout has passed, but what has been received may not have been taken in.
-    pub(super) is_link_overdue: bool,
+    /// The link timeout has passed, or that of an update request that waits for its port, but what
+    /// has been received may not have been taken in.
+    pub(super) is_overdue: bool,
 }
 
 /// Progress of a firmware update.
@@ -90,6 +95,8 @@ pub(super) enum Update {
     /// The request has been sent; the line belongs to the update.
     Silent {
         at: Instant,
+        /// When it was handed out.
+        since: Instant,
         /// It had been sent before, and its flush had failed.
         may_have_left: bool,
     },
@@ -131,7 +138,7 @@ impl<S: BiasStore> State<S> {
             last: None,
             arrived_since: None,
             is_last_taken: false,
-            is_link_overdue: false,
+            is_overdue: false,
         }
     }
 
@@ -198,9 +205,10 @@ impl<S: BiasStore> State<S> {
     }
 
     /// Leaves the line to the update that was asked for.
-    pub(super) const fn begin_update(&mut self) {
+    pub(super) const fn begin_update(&mut self, since: Instant) {
         if let Update::Asked { at, may_have_left, .. } = self.update {
-            self.update = Update::Silent { at, may_have_left };
+            self.update = Update::Silent { at, since, may_have_left };
+            self.is_overdue = false;
             self.motor.pause();
         }
     }
@@ -273,7 +281,7 @@ impl<S: BiasStore> State<S> {
     /// Records that a valid frame of a robot has arrived.
     fn heard(&mut self, at: Instant) {
         self.link_until = Some(at + self.config.link_timeout);
-        self.is_link_overdue = false;
+        self.is_overdue = false;
         if self.link != Link::Up {
             self.link = Link::Up;
             self.events.push_latest(HostEvent::LinkUp, is_link);
@@ -424,7 +432,7 @@ impl<S: BiasStore> State<S> {
         if matches!(self.update, Update::Silent { .. } | Update::Asked { may_have_left: true, .. })
         {
             if status == OtaStatus::Accepted {
-                self.begin_update();
+                self.begin_update(at);
                 self.last = None;
             } else {
                 self.end_update(at);
@@ -453,10 +461,13 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Ends a command whose application has gone silent (U10), and notes that the robot may no
-    /// longer be heard.
+    /// Ends a command whose application has gone silent (U10), and notes that what was decided
+    /// because of reports may no longer hold.
     pub(super) fn expire_dead_man(&mut self, now: Instant) {
-        self.is_link_overdue = reached(self.link_until, now);
+        self.is_overdue = match self.update {
+            Update::Silent { since, .. } => now - since >= UPDATE_PATIENCE,
+            _ => reached(self.link_until, now),
+        };
         if self.motor.expire(now) {
             count(&mut self.stats.dead_man);
             self.events.push(HostEvent::DeadMan);
