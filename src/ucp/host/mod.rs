@@ -12,6 +12,7 @@
 //! | `standstill` | whether the robot was seen to obey a stop (U16) |
 //! | `ping`, `link` | whether the robot is there (U10, U12) |
 //! | `calibration`, `results`, `bias` | calibrations and their results (U11, U15) |
+//! | `update` | whether a firmware update was asked for, and until when (U7) |
 
 mod bias;
 mod calibration;
@@ -27,6 +28,7 @@ mod send;
 mod standstill;
 mod state;
 mod statistics;
+mod update;
 
 pub use bias::{BiasStore, MemoryStore, NoStore, NotStored};
 pub use config::HostConfig;

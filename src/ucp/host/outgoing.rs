@@ -17,6 +17,6 @@ pub(super) enum Outgoing {
     /// The flag marks a repetition.
     Calibration(CalibrationStep, CalibrationKind, bool),
     Network(SetNetworkState),
-    Update(i16),
+    Update,
     Ping,
 }

@@ -1,6 +1,6 @@
 //! The host: its commands, and the calls of its driver.
 
-use super::state::{State, Update};
+use super::state::State;
 
 use super::{
     bias::{BiasStore, NoStore},
@@ -120,7 +120,7 @@ impl<S: BiasStore> Host<S> {
     /// [`CommandError::Updating`] during a firmware update, and [`CommandError::LinkDown`] for a
     /// command to move while the robot is not heard.
     pub fn drive(&mut self, command: MotorControl, now: Instant) -> Result<(), CommandError> {
-        if self.state.update != Update::None {
+        if !self.state.update.is_none() {
             return Err(CommandError::Updating);
         }
         if self.state.link == Link::Down && !command.stands_still() {
@@ -273,7 +273,7 @@ impl<S: BiasStore> Host<S> {
     /// and once the request has been sent, the line is silent.
     #[must_use]
     pub fn is_updating(&self) -> bool {
-        self.state.update != Update::None
+        !self.state.update.is_none()
     }
 
     /// State of the link to the robot.

@@ -5,8 +5,8 @@ use super::{
     calibration::Request,
     event::{CalibrationStep, HostEvent},
     outgoing::Outgoing,
-    standstill::{COAST, StopProgress},
-    state::{State, Update},
+    standstill::StopProgress,
+    state::State,
 };
 use crate::{
     endpoint::Unsent,
@@ -44,8 +44,9 @@ impl<S: BiasStore> State<S> {
                 write(CalibrationEnd::new(kind), index, buffer)
             }
             Outgoing::Network(body) => write(body, index, buffer),
-            Outgoing::Update(version) => {
-                write(OtaRequest::start_firmware_update(version), index, buffer)
+            Outgoing::Update => {
+                let request = OtaRequest::start_firmware_update(self.update.version());
+                write(request, index, buffer)
             }
             Outgoing::Ping => write(Ping {}, index, buffer),
         })
@@ -81,12 +82,9 @@ impl<S: BiasStore> State<S> {
         if let Some(body) = self.network.filter(|_| self.network_due.take().is_some()) {
             return Some(Outgoing::Network(body));
         }
-        match self.update {
-            Update::Asked { version, .. } if self.is_ready_for_update() => {
-                self.begin_update(now);
-                return Some(Outgoing::Update(version));
-            }
-            _ => {}
+        if self.update.is_asked() && self.is_ready_for_update() {
+            self.begin_update(now);
+            return Some(Outgoing::Update);
         }
         if self.ping.take_due(now, &self.config) {
             count(&mut self.stats.pings);
@@ -142,7 +140,7 @@ impl<S: BiasStore> State<S> {
                 let is_old = self.motor.latest() != Some(command) || self.is_overdue;
                 !command.stands_still() && is_old
             }
-            Some(Outgoing::Update(_)) => {
+            Some(Outgoing::Update) => {
                 let may_go = self.update.is_silent() && self.is_ready_for_update();
                 !may_go || self.is_overdue
             }
@@ -171,12 +169,9 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if let (Some(Outgoing::Update(version)), Update::Silent { at, may_have_left, .. }) =
-            (last, self.update)
-        {
+        if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() {
             self.end_update(now);
-            let may_have_left = may_have_left || unsent == Unsent::Unflushed;
-            self.update = Update::Asked { version, at, may_have_left };
+            self.update.ask_again(unsent == Unsent::Unflushed);
         }
     }
 
@@ -199,7 +194,7 @@ impl<S: BiasStore> State<S> {
                 }
             }
             Outgoing::Network(_) => self.network_due = self.network.map(|_| now),
-            Outgoing::Update(_) => {} // due again in any case
+            Outgoing::Update => {} // due again in any case
             Outgoing::Ping => {
                 if self.ping.unsent(now) {
                     uncount(&mut self.stats.pings);
@@ -212,11 +207,10 @@ impl<S: BiasStore> State<S> {
         if self.update.is_silent() {
             return self.link_until;
         }
-        let asked = match self.update {
-            Update::Asked { at, .. } if self.is_ready_for_update() => Some(at),
-            Update::Asked { at, .. } => Some(at + COAST),
-            _ => None,
-        };
+        let asked = self.update.is_asked().then(|| match self.is_ready_for_update() {
+            true => self.update.asked_at(),
+            false => self.update.until(),
+        });
         earliest(&[
             self.link_until,
             self.motor.deadline(),

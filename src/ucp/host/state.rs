@@ -12,8 +12,9 @@ use super::{
     outgoing::Outgoing,
     ping::PingState,
     results::Results,
-    standstill::{COAST, StopProgress, Wheels},
+    standstill::{StopProgress, Wheels},
     statistics::HostStatistics,
+    update::Update,
 };
 use crate::{
     events::Events,
@@ -27,10 +28,6 @@ use crate::{
         report::Report,
     },
 };
-
-/// Longest time for which the request of an update waits for its port before reports are read
-/// again: one report.
-const UPDATE_PATIENCE: Duration = Duration::from_millis(20);
 
 /// Everything except the bytes.
 #[derive(Clone, Debug)]
@@ -80,34 +77,6 @@ pub(super) struct State<S> {
     pub(super) is_overdue: bool,
 }
 
-/// Progress of a firmware update.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(super) enum Update {
-    None,
-    /// The request is to be sent behind stops while the reports show a standstill.
-    Asked {
-        version: i16,
-        /// When it was asked for.
-        at: Instant,
-        /// It was sent before, and its flush failed.
-        may_have_left: bool,
-    },
-    /// The request has been sent; the line belongs to the update.
-    Silent {
-        at: Instant,
-        /// When it was handed out.
-        since: Instant,
-        /// It had been sent before, and its flush had failed.
-        may_have_left: bool,
-    },
-}
-
-impl Update {
-    pub(super) const fn is_silent(self) -> bool {
-        matches!(self, Self::Silent { .. })
-    }
-}
-
 impl<S: BiasStore> State<S> {
     pub(super) fn new(config: HostConfig, store: S, now: Instant) -> Self {
         Self {
@@ -124,7 +93,7 @@ impl<S: BiasStore> State<S> {
             last_start: None,
             outcome: None,
             settled: None,
-            update: Update::None,
+            update: Update::new(now),
             network: None,
             last_report: None,
             is_report_new: false,
@@ -148,7 +117,7 @@ impl<S: BiasStore> State<S> {
         kind: CalibrationKind,
         now: Instant,
     ) -> Result<(), CommandError> {
-        if self.update != Update::None {
+        if !self.update.is_none() {
             return Err(CommandError::Updating);
         }
         if self.is_calibrating() {
@@ -184,7 +153,7 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn start_update(&mut self, version: i16, at: Instant) -> Result<(), CommandError> {
         self.allow(9)?;
-        if self.update != Update::None {
+        if !self.update.is_none() {
             return Err(CommandError::Updating);
         }
         if self.is_calibrating() {
@@ -200,22 +169,20 @@ impl<S: BiasStore> State<S> {
         // A robot that is being updated hears no stop, so a damaged stop must not be enough to
         // update it while it drives.
         self.motor.repeat(at);
-        self.update = Update::Asked { version, at, may_have_left: false };
+        self.update.ask(version, at);
         Ok(())
     }
 
     /// Leaves the line to the update that was asked for.
-    pub(super) const fn begin_update(&mut self, since: Instant) {
-        if let Update::Asked { at, may_have_left, .. } = self.update {
-            self.update = Update::Silent { at, since, may_have_left };
-            self.is_overdue = false;
-            self.motor.pause();
-        }
+    pub(super) const fn begin_update(&mut self, now: Instant) {
+        self.update.begin(now);
+        self.is_overdue = false;
+        self.motor.pause();
     }
 
     /// Ends an update: the line is the host's again.
     pub(super) fn end_update(&mut self, now: Instant) {
-        self.update = Update::None;
+        self.update.end();
         self.motor.resume(now);
         self.ping.resume(now);
         // Anything that the robot requested during the silence is due now.
@@ -429,8 +396,7 @@ impl<S: BiasStore> State<S> {
 
     fn update_answer(&mut self, status: OtaStatus, at: Instant) {
         // The request may have arrived, whatever its flush said.
-        if matches!(self.update, Update::Silent { .. } | Update::Asked { may_have_left: true, .. })
-        {
+        if self.update.may_have_left() {
             if status == OtaStatus::Accepted {
                 self.begin_update(at);
                 self.last = None;
@@ -464,9 +430,9 @@ impl<S: BiasStore> State<S> {
     /// Ends a command whose application has gone silent (U10), and notes that what was decided
     /// because of reports may no longer hold.
     pub(super) fn expire_dead_man(&mut self, now: Instant) {
-        self.is_overdue = match self.update {
-            Update::Silent { since, .. } => now - since >= UPDATE_PATIENCE,
-            _ => reached(self.link_until, now),
+        self.is_overdue = match self.update.is_silent() {
+            true => self.update.is_overdue(now),
+            false => reached(self.link_until, now),
         };
         if self.motor.expire(now) {
             count(&mut self.stats.dead_man);
@@ -476,7 +442,7 @@ impl<S: BiasStore> State<S> {
 
     /// Ends an update whose request could not be sent for too long.
     fn expire_update(&mut self, now: Instant) {
-        if matches!(self.update, Update::Asked { at, .. } if now - at >= COAST) {
+        if self.update.is_asked() && self.update.until() <= now {
             self.end_update(now);
             self.events.push(HostEvent::UpdateNotSent);
         }
