@@ -259,6 +259,8 @@ impl Write for SerialPort {
         loop {
             let queued = self.tty.bytes_to_write().map_err(lost)?;
             if queued == 0 {
+                // For so long a signal does not end it; a look has set it to zero.
+                self.tty.set_timeout(WRITE_PATIENCE).map_err(lost)?;
                 return self.tty.flush().map_err(lost);
             }
             if queued < least {

@@ -30,6 +30,9 @@ fn a_write_waits_for_20_ms_at_most_so_that_no_outdated_command_leaves_late() {
     // Nor does a look at what was received wait.
     port.read_ready().unwrap();
     assert_eq!(port.get_ref().timeout(), Duration::ZERO);
+    // With that a signal would end a flush.
+    port.flush().unwrap();
+    assert_eq!(port.get_ref().timeout(), Duration::from_millis(20));
 }
 
 #[test]
