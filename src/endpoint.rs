@@ -10,7 +10,8 @@ use crate::time::{self, Duration, Instant};
 ///
 /// 1. call [`handle_input`](Self::handle_input) with the received bytes, if any;
 /// 2. call [`handle_timeout`](Self::handle_timeout) if [`poll_timeout`](Self::poll_timeout) has
-///    been reached;
+///    been reached, with a time read before the port was last found empty: bytes that have come
+///    since belong before that timeout;
 /// 3. call [`poll_event`](Self::poll_event) until it returns `None`; give commands to the role
 ///    here;
 /// 4. call [`poll_transmit`](Self::poll_transmit) until it returns `None`, and send each frame
