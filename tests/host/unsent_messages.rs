@@ -145,6 +145,9 @@ fn a_calibration_request_that_its_port_does_not_take_is_given_up_at_its_bound() 
     let failure = host.calibration_outcome().unwrap().unwrap_err();
     assert_eq!((failure.attempts, failure.cause), (0, FailureCause::NoAnswer));
     assert!(wait(&mut host, ms(60_000)).iter().all(|(_, frame)| frame[4] == 2), "and not sent");
+    // The time before its first attempt does not count.
+    host.start_calibration(IMU, ms(60_000)).unwrap();
+    assert!(wait(&mut host, ms(61_000)).iter().any(|(_, frame)| frame[4] == 3));
 }
 
 #[test]

@@ -100,8 +100,8 @@ impl Account {
         self.ping_until = None;
     }
 
-    pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind, now: Instant) {
-        (self.request, self.settled) = (Some(Request::new(step, kind, now)), None);
+    pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind) {
+        (self.request, self.settled) = (Some(Request::new(step, kind)), None);
         match kind {
             _ if step == CalibrationStep::End => {}
             CalibrationKind::Imu => self.imu.popped = None,
@@ -164,7 +164,8 @@ impl Account {
         }
         if is_reached(self.request.as_ref().and_then(|request| request.until)) {
             self.retry();
-        } else if self.request.as_ref().is_some_and(|it| it.until.is_none() && it.bound <= now) {
+        } else if self.request.as_ref().is_some_and(|it| it.until.is_none() && is_reached(it.bound))
+        {
             self.given_up = self.request.as_ref().map(|it| it.attempts);
             self.settle(false);
         }

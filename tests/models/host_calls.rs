@@ -31,7 +31,7 @@ impl Site {
                     CalibrationStep::End => self.role.end_calibration(kind, now),
                 };
                 if result.is_ok() {
-                    self.account.calibrate(step, kind, now);
+                    self.account.calibrate(step, kind);
                 }
                 let calibrating = is_calibrating.then_some(CommandError::Calibrating);
                 (result, is_updating.then_some(CommandError::Updating).or(calibrating))

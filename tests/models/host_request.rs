@@ -12,8 +12,8 @@ pub(crate) struct Request {
     pub(crate) attempts: u8,
     /// `None`: has to be sent now.
     pub(crate) until: Option<Instant>,
-    /// When it is given up if it cannot be sent.
-    pub(crate) bound: Instant,
+    /// When it is given up if it cannot be sent; from its first attempt on.
+    pub(crate) bound: Option<Instant>,
 }
 
 /// Time for the acknowledgement of a request.
@@ -40,8 +40,8 @@ pub(crate) struct Results {
 }
 
 impl Request {
-    pub(crate) fn new(step: CalibrationStep, kind: CalibrationKind, now: Instant) -> Self {
-        Self { step, kind, attempts: 0, until: None, bound: now + wait().saturating_mul(3) }
+    pub(crate) const fn new(step: CalibrationStep, kind: CalibrationKind) -> Self {
+        Self { step, kind, attempts: 0, until: None, bound: None }
     }
 
     /// The request is sent; returns whether that is allowed.
@@ -55,6 +55,7 @@ impl Request {
         let is_due = self.until.is_none() && self.attempts < 3;
         self.attempts += 1;
         self.until = Some(now + wait());
+        self.bound.get_or_insert(now + wait().saturating_mul(3));
         is_this && is_due
     }
 }

@@ -5,7 +5,7 @@ use super::{
     event::{CalibrationFailure, CalibrationStep, FailureCause, HostEvent},
 };
 use crate::{
-    time::Instant,
+    time::{Instant, reached},
     ucp::codes::{CalibrationKind, ErrorCode},
 };
 
@@ -20,8 +20,8 @@ pub(super) struct Request {
     /// Outcome of the latest attempt so far.
     cause: FailureCause,
     wait: Wait,
-    /// When it is given up if its port still does not take it.
-    until: Instant,
+    /// When it is given up if its port does not take it; from its first attempt on.
+    until: Option<Instant>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -44,16 +44,14 @@ pub(super) enum Answer {
 }
 
 impl Request {
-    pub(super) fn new(
+    pub(super) const fn new(
         step: CalibrationStep,
         kind: CalibrationKind,
         last_start: Option<CalibrationKind>,
         now: Instant,
-        config: &HostConfig,
     ) -> Self {
         let (cause, wait) = (FailureCause::NoAnswer, Wait::Send(now));
-        let until = now + config.calibration_bound();
-        Self { step, kind, last_start, attempts: 0, cause, wait, until }
+        Self { step, kind, last_start, attempts: 0, cause, wait, until: None }
     }
 
     /// The request to send now, if any, and whether it is a repetition.
@@ -70,6 +68,7 @@ impl Request {
         self.attempts = self.attempts.saturating_add(1);
         self.cause = FailureCause::NoAnswer;
         self.wait = Wait::Ack(now + config.ack_wait());
+        self.until.get_or_insert(now + config.calibration_bound());
         Some((self.step, self.kind, again))
     }
 
@@ -123,7 +122,7 @@ impl Request {
     ) -> Option<CalibrationFailure> {
         match self.wait {
             Wait::Ack(until) if until <= now => self.retry(now, config),
-            Wait::Send(_) if self.until <= now => Some(self.failure()),
+            Wait::Send(_) if reached(self.until, now) => Some(self.failure()),
             _ => None,
         }
     }

@@ -48,7 +48,8 @@ pub enum HostEvent {
     CalibrationEnded(CalibrationKind),
     /// A calibration request has failed.
     CalibrationFailed(CalibrationFailure),
-    /// The result of an IMU calibration has been stored. A repetition causes no event.
+    /// The result of an IMU calibration has been stored. A repetition causes no event, unless a
+    /// calibration was started since.
     ///
     /// If the store does not keep it, this event is the only copy. The result is acknowledged
     /// because the event was queued; without room, the robot repeats it (ruling U15).

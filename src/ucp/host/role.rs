@@ -246,6 +246,9 @@ impl<S: BiasStore> Host<S> {
     /// once the reports show a standstill again. A request that cannot be sent for 3 s is given up:
     /// [`HostEvent::UpdateNotSent`].
     ///
+    /// An answer does not say which request it answers, and a robot may repeat one: after a
+    /// refusal, wait for a second before you ask again.
+    ///
     /// A robot that sends no reports cannot be seen to stand still. To update it, make sure of that
     /// yourself, take the port with `Driver::into_parts`, and write
     /// [`OtaRequest`](crate::ucp::message::OtaRequest) to it.
