@@ -407,3 +407,37 @@ fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
     let at = seen_still(&mut host, now.as_micros() / 1000 + 20);
     assert!(host.is_updating() && !host.is_outdated(), "{at:?}");
 }
+
+#[test]
+fn a_refusal_that_a_robot_repeats_does_not_hide_that_it_accepts_the_next_request() {
+    let (mut host, now) = asked();
+    let forbidden = bytes(OtaAck::new(OtaStatus::Forbidden));
+    let accepted = bytes(OtaAck::new(OtaStatus::Accepted));
+    sent(&mut host, now);
+    host.handle_input(&forbidden, now);
+    assert_eq!(host.start_firmware_update(41, now), Ok(()), "still seen to stand still");
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
+    host.handle_input(&forbidden, now);
+    assert!(!host.is_updating());
+    let mut stopped = host.clone();
+    let mut driven = host.clone();
+    host.handle_input(&accepted, now);
+    assert!(host.is_updating());
+    assert_eq!(wait(&mut host, ms(60_000)), [], "the line belongs to the update");
+    // What the application has done since counts more.
+    stopped.stop(now);
+    driven.drive(go(10), now).unwrap();
+    for mut host in [stopped, driven] {
+        host.handle_input(&accepted, now);
+        assert!(!host.is_updating());
+    }
+}
+
+#[test]
+fn a_flush_that_fails_long_after_the_request_does_not_end_the_silence() {
+    // By a driver that tells neither of frames taken nor of flushes.
+    let (mut host, now) = asked();
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
+    host.handle_transmit(Unsent::Unflushed, now + Duration::from_millis(3000));
+    assert_eq!(wait(&mut host, ms(60_000)), []);
+}

@@ -85,11 +85,13 @@ impl Acts<HostSide> for Site {
             Call::Stop => {
                 self.role.stop(self.now);
                 self.end_update();
+                self.account.update_may_have_left = false;
                 self.account.motion.stop(self.now);
             }
             Call::EndUpdate => {
                 self.role.end_firmware_update(self.now);
                 self.end_update();
+                self.account.update_may_have_left = false;
             }
             Call::SetStore(fails) => self.role.store_mut().fails = fails,
             _ => return self.request(call),

@@ -16,8 +16,6 @@ pub(crate) enum Update {
     Asked {
         version: i16,
         needs_stop: bool,
-        at: Instant,
-        may_have_left: bool,
     },
     /// Nothing is sent.
     Silent,
@@ -46,6 +44,9 @@ pub(crate) struct Account {
     pub(crate) link: Link,
     link_until: Option<Instant>,
     pub(crate) update: Update,
+    pub(crate) update_asked_at: Instant,
+    /// A request may have reached the robot, other than the one that is under way.
+    pub(crate) update_may_have_left: bool,
     pub(crate) request: Option<Request>,
     /// Attempts of the latest request that could not be sent again in time.
     pub(crate) given_up: Option<u8>,
@@ -73,6 +74,8 @@ impl Account {
             link: Link::Waiting,
             link_until: Some(now + ms(500)),
             update: Update::None,
+            update_asked_at: now,
+            update_may_have_left: false,
             request: None,
             given_up: None,
             settled: None,
@@ -146,7 +149,7 @@ impl Account {
     /// the former is new.
     pub(crate) fn expire_command(&mut self, now: Instant) -> bool {
         let is_silent = self.motion.expire(now);
-        if matches!(self.update, Update::Asked { at, .. } if now - at >= ms(3000)) {
+        if matches!(self.update, Update::Asked { .. }) && now - self.update_asked_at >= ms(3000) {
             self.update = Update::None;
         }
         if self.link_until.is_some_and(|at| at <= now) {
@@ -244,8 +247,11 @@ impl Account {
         let last = self.last.take();
         self.motion.unsent(unsent);
         if let (Some(Last::Update(version)), Update::Silent) = (last, self.update) {
-            let may_have_left = unsent == Unsent::Unflushed;
-            self.update = Update::Asked { version, needs_stop: true, at: now, may_have_left };
+            let is_unflushed = unsent == Unsent::Unflushed;
+            if !is_unflushed || now - self.update_asked_at < ms(3000) {
+                self.update = Update::Asked { version, needs_stop: true };
+                self.update_may_have_left |= is_unflushed;
+            }
         }
         if let Update::Asked { needs_stop, .. } = &mut self.update {
             *needs_stop = true;
@@ -280,7 +286,7 @@ impl Account {
 
     /// The robot may have received the request of an update.
     pub(crate) fn may_have_asked(&self) -> bool {
-        matches!(self.update, Update::Silent | Update::Asked { may_have_left: true, .. })
+        self.update == Update::Silent || self.update_may_have_left
     }
 
     /// The latest time for the next action.
@@ -289,7 +295,7 @@ impl Account {
             return self.link_until;
         }
         let asked = match self.update {
-            Update::Asked { at, .. } => Some(at + ms(3000)),
+            Update::Asked { .. } => Some(self.update_asked_at + ms(3000)),
             _ => None,
         };
         let is_due = self.is_network_due

@@ -20,6 +20,7 @@ impl Site {
                 let result = self.role.drive(command(number), now);
                 if result.is_ok() {
                     self.account.motion.call(command(number), now);
+                    self.account.update_may_have_left &= command(number).stands_still();
                 }
                 let is_lost = self.account.link == Link::Down && !command(number).stands_still();
                 let lost = is_lost.then_some(CommandError::LinkDown);
@@ -60,12 +61,8 @@ impl Site {
                 if result.is_ok() {
                     motion.is_called = true;
                     motion.owe_two();
-                    self.account.update = Update::Asked {
-                        version: VERSION,
-                        needs_stop: true,
-                        at: now,
-                        may_have_left: false,
-                    };
+                    self.account.update = Update::Asked { version: VERSION, needs_stop: true };
+                    self.account.update_asked_at = now;
                 }
                 (result, expected)
             }

@@ -94,7 +94,10 @@ impl Checks<HostSide> for Site {
                 };
             }
             Hear::UpdateAnswer(OtaStatus::Accepted) => account.accepted(),
-            Hear::UpdateAnswer(_) if account.may_have_asked() => self.end_update(),
+            Hear::UpdateAnswer(_) if account.may_have_asked() && account.update != Update::None => {
+                account.update_may_have_left = true;
+                self.end_update();
+            }
             _ => {}
         }
         Ok(())

@@ -175,4 +175,7 @@ fn an_answer_to_an_update_that_shares_a_failed_flush_with_later_frames_is_sent_a
     robot.handle_transmit(Unsent::Unflushed, ms(2));
     let again: Vec<_> = sent(&mut robot, ms(2)).into_iter().filter(|frame| frame[4] == 9).collect();
     assert_eq!(again, [frames[0].clone()]);
+    // Not because of a flush long after it, by a driver that does not tell of flushes.
+    robot.handle_transmit(Unsent::Unflushed, ms(5000));
+    assert!(sent(&mut robot, ms(5000)).iter().all(|frame| frame[4] != 9));
 }

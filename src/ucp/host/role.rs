@@ -126,6 +126,9 @@ impl<S: BiasStore> Host<S> {
         if self.state.link == Link::Down && !command.stands_still() {
             return Err(CommandError::LinkDown);
         }
+        if !command.stands_still() {
+            self.state.update.forget();
+        }
         self.state.motor.command(command, now, &self.state.config);
         Ok(())
     }
@@ -138,7 +141,7 @@ impl<S: BiasStore> Host<S> {
     /// when [`is_stop_sent`](Self::is_stop_sent) returns `true` and the port has been flushed since
     /// (U16).
     pub fn stop(&mut self, now: Instant) {
-        self.state.end_update(now);
+        self.end_firmware_update(now);
         self.state.motor.stop(now, &self.state.config);
     }
 
@@ -270,6 +273,7 @@ impl<S: BiasStore> Host<S> {
     /// Ends a firmware update: pings and the zero motor command are sent again.
     pub fn end_firmware_update(&mut self, now: Instant) {
         self.state.end_update(now);
+        self.state.update.forget();
     }
 
     /// Whether a firmware update was asked for and has not ended: no command to move is accepted,

@@ -169,7 +169,9 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() {
+        // A flush that fails so late is not that of the request.
+        let is_other = unsent == Unsent::Unflushed && self.update.until() <= now;
+        if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() && !is_other {
             self.end_update(now);
             self.update.ask_again(unsent == Unsent::Unflushed);
         }

@@ -400,8 +400,9 @@ impl<S: BiasStore> State<S> {
             if status == OtaStatus::Accepted {
                 self.begin_update(at);
                 self.last = None;
-            } else {
+            } else if !self.update.is_none() {
                 self.end_update(at);
+                self.update.refuse();
             }
         }
         let is_answer = |event: &HostEvent| matches!(event, HostEvent::UpdateAnswered(_));

@@ -15,7 +15,8 @@ pub(super) struct Update {
     asked_at: Instant,
     /// When the request was handed out.
     sent_at: Instant,
-    /// A request was sent before, and its flush failed.
+    /// The robot may have an earlier request: its flush failed, or it was refused, perhaps not by
+    /// this answer. Until the application stops or drives.
     may_have_left: bool,
 }
 
@@ -51,14 +52,13 @@ impl Update {
         self.version
     }
 
-    /// Whether the robot may have received the request, whatever its flush said.
+    /// Whether the robot may have received a request, whatever its flush said.
     pub(super) fn may_have_left(&self) -> bool {
-        self.is_silent() || self.is_asked() && self.may_have_left
+        self.is_silent() || self.may_have_left
     }
 
     pub(super) const fn ask(&mut self, version: i16, now: Instant) {
-        (self.step, self.version) = (Step::Asked, version);
-        (self.asked_at, self.may_have_left) = (now, false);
+        (self.step, self.version, self.asked_at) = (Step::Asked, version, now);
     }
 
     /// The request is handed out, or has been accepted.
@@ -74,6 +74,16 @@ impl Update {
 
     pub(super) const fn end(&mut self) {
         self.step = Step::None;
+    }
+
+    /// The robot has refused a request: this one, or one before.
+    pub(super) const fn refuse(&mut self) {
+        self.may_have_left = true;
+    }
+
+    /// The application has decided: an answer that is still to come means nothing.
+    pub(super) const fn forget(&mut self) {
+        self.may_have_left = false;
     }
 
     /// When a request that cannot be sent is given up.

@@ -4,7 +4,7 @@ use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
     endpoint::Unsent,
     stats::{count, uncount},
-    time::{Instant, earliest},
+    time::{Duration, Instant, earliest},
     ucp::{
         body::{CalibrationEndAck, CalibrationStartAck, OtaAck, Pong},
         codes::ErrorCode,
@@ -14,13 +14,16 @@ use crate::{
     },
 };
 
+/// Longest time from handing a frame out to the failure of its flush.
+const FLUSH_TIME: Duration = Duration::from_secs(2);
+
 impl State {
     /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         let outgoing = self.next(now)?;
         (self.last, self.is_last_taken) = (Some(outgoing), false);
         if let Outgoing::UpdateAnswer(status) = outgoing {
-            self.update_answer = Some(status);
+            self.update_answer = Some((status, now));
         }
         Some(match outgoing {
             Outgoing::StartAck(kind) => {
@@ -104,11 +107,13 @@ impl State {
         } else if let Some(outgoing) = self.last.take() {
             self.take_back(outgoing, now);
         }
-        // Nobody asks again for the answer to an update.
+        // Nobody asks again for the answer to an update. A flush that fails late is not its own.
         let is_lost = (is_answer || unsent == Unsent::Unflushed) && !self.update_asked;
-        if let Some(status) = self.update_answer.filter(|_| is_lost) {
-            self.answers.update.get_or_insert(status);
-            self.answers.ask(now);
+        if let Some((status, at)) = self.update_answer.filter(|_| is_lost) {
+            if unsent != Unsent::Unflushed || now - at <= FLUSH_TIME {
+                self.answers.update.get_or_insert(status);
+                self.answers.ask(now);
+            }
         }
     }
 

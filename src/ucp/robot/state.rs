@@ -48,8 +48,8 @@ pub(super) struct State {
     pub(super) last: Option<Outgoing>,
     /// The port has taken all of it.
     pub(super) is_last_taken: bool,
-    /// The answer to an update, until it has been flushed.
-    pub(super) update_answer: Option<OtaStatus>,
+    /// The answer to an update and when it was handed out, until it has been flushed.
+    pub(super) update_answer: Option<(OtaStatus, Instant)>,
 }
 
 /// A running calibration.
