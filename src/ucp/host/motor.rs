@@ -132,14 +132,14 @@ impl Motor {
     pub(super) fn is_stop_sent(&self) -> bool {
         let stands_still = |command: &MotorControl| command.stands_still();
         self.latest.as_ref().is_some_and(stands_still)
-            && self.sent.is_some_and(|(sent, _)| stands_still(&sent))
+            && self.sent.as_ref().is_some_and(|(sent, _)| stands_still(sent))
             && !self.is_stop_new
             && !self.copies.are_due()
     }
 
     /// Progress of the latest stop, whoever asked for it.
     pub(super) fn stop_progress(&self) -> StopProgress {
-        match self.latest {
+        match &self.latest {
             Some(latest) if latest.stands_still() => self.standstill.progress(),
             _ => StopProgress::NotAsked,
         }
@@ -180,7 +180,9 @@ impl Motor {
     fn take(&mut self, command: MotorControl, now: Instant, config: &HostConfig) {
         let still = command.stands_still();
         self.latest = Some(command);
-        self.copy_stop();
+        if still {
+            self.copy_stop();
+        }
         self.dead_man = (!still).then(|| now + config.dead_man);
         let earliest = match self.sent {
             // The first frame takes precedence, and so do its copies.
@@ -225,9 +227,7 @@ impl Motor {
 
     /// Both copies are of the stop, if the first was of a command to move.
     fn copy_stop(&mut self) {
-        let has_moved = self.sent.is_some_and(|(sent, _)| !sent.stands_still());
-        let is_stop = self.latest.is_some_and(|latest| latest.stands_still());
-        if self.copies.are_due() && has_moved && is_stop {
+        if self.copies.are_due() && self.sent.as_ref().is_some_and(|(sent, _)| !sent.stands_still()) {
             self.copies = Copies::BOTH;
         }
     }
