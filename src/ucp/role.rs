@@ -10,6 +10,9 @@ pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 /// millisecond later, which a clock that counts milliseconds may not see. Ruling U16 allows 20 ms.
 pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(4);
 
+/// Longest time from handing a frame out to the failure of its flush: a later one is not its own.
+pub(super) const FLUSH_TIME: Duration = Duration::from_secs(2);
+
 /// Encodes a frame to the front of `buffer`; returns its length.
 pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {
     body.frame(index).encode(buffer).map_or(0, <[u8]>::len)

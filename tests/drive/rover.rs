@@ -1,12 +1,14 @@
 //! High-level calls on a rover link: what pings, commands, stops and calibrations return, and when.
 
-use std::mem::ManuallyDrop;
+use std::{cell::RefCell, mem::ManuallyDrop, rc::Rc};
 
-use std::{cell::RefCell, rc::Rc};
-
-use axlewire::ucp::{
-    host::{CalibrationStep, CommandError, FailureCause, HostEvent, Link},
-    message::NetworkState,
+use axlewire::{
+    stream::Frames,
+    ucp::{
+        Telemetry, Ucp,
+        host::{CalibrationStep, CommandError, FailureCause, HostEvent, Link},
+        message::{FirmwareReport, NetworkState},
+    },
 };
 
 use crate::rig::*;
@@ -383,4 +385,33 @@ fn a_call_that_was_leaked_does_not_keep_later_rounds_from_sending() {
     }
     assert!(rover.port().written.len() > before + 20 * 24, "the command is repeated, as a stop");
     assert_eq!(rover.role().command().map(|command| command.speed()), Some(0));
+}
+
+#[test]
+fn an_update_request_that_waits_for_a_slow_port_does_not_leave_once_a_wheel_turns() {
+    let mut rover = host();
+    let world = rover.port().world.clone();
+    let report = |rpm| {
+        let telemetry = Telemetry { rpm: [rpm; 4], ..Telemetry::default() };
+        FirmwareReport::new(&telemetry, 38).frame(0).as_bytes().to_vec()
+    };
+    rover.service().unwrap();
+    for _ in 0..15 {
+        world.step(100_000);
+        rover.port().receive(&report(0));
+        world.step(10_000);
+        rover.service().unwrap();
+    }
+    let now = rover.now();
+    rover.role_mut().start_firmware_update(50, now).unwrap();
+    let before = rover.port().written.len();
+    rover.port_mut().writes.extend([Step::Few(24), Step::Few(24)]);
+    rover.port_mut().writes.extend(vec![Step::Late(400_000); 40]);
+    rover.port().receive(&report(50)); // while the request waits
+    for _ in 0..40 {
+        let _ = world.block_on(rover.asynch().service());
+    }
+    let sent = rover.port().written[before..].to_vec();
+    assert!(sent.len() >= 48, "two stops");
+    assert!(Frames::<Ucp>::new(&sent).all(|frame| frame.id() != 9));
 }

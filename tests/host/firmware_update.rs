@@ -401,11 +401,12 @@ fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
     while host.poll_transmit(now).is_some_and(|frame| frame[4] != 9) {}
     host.handle_input(&[], now + Duration::from_millis(19));
     assert!(!host.is_outdated());
+    assert_eq!(host.poll_timeout(), Some(now + Duration::from_millis(20)), "its driver looks then");
     host.handle_input(&[], now + Duration::from_millis(20));
     assert!(host.is_outdated());
     host.handle_transmit(Unsent::Untouched, now + Duration::from_millis(20));
-    let at = seen_still(&mut host, now.as_micros() / 1000 + 20);
-    assert!(host.is_updating() && !host.is_outdated(), "{at:?}");
+    seen_still(&mut host, now.as_micros() / 1000 + 20);
+    assert!(host.is_updating(), "it is sent again");
 }
 
 #[test]
@@ -440,4 +441,17 @@ fn a_flush_that_fails_long_after_the_request_does_not_end_the_silence() {
     assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
     host.handle_transmit(Unsent::Unflushed, now + Duration::from_millis(3000));
     assert_eq!(wait(&mut host, ms(60_000)), []);
+    // Its own does, however late it was sent.
+    let (mut host, now) = asked();
+    let late = now + Duration::from_millis(2900);
+    for at in 1..=145 {
+        host.handle_input(&report(30), now + Duration::from_millis(20 * at));
+    }
+    for _ in 0..3 {
+        host.handle_input(&report(0), late);
+    }
+    assert_eq!(ids(&sent(&mut host, late)), [2, 2, 9]);
+    host.handle_transmit(Unsent::Unflushed, late + Duration::from_millis(200));
+    assert_ne!(wait(&mut host, ms(60_000)), []);
+    assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
 }

@@ -102,6 +102,7 @@ impl Acts<HostSide> for Site {
     fn hand_out(&mut self) -> Result<bool, String> {
         let (shelf, now) = (self.role.store().clone(), self.now);
         self.account.motion.asked(now);
+        self.account.request.iter_mut().for_each(|request| request.begin(now));
         self.step.is_halted |= self.account.expire_command(now);
         let is_barred = self.is_update_barred();
         let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };

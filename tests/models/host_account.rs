@@ -45,6 +45,7 @@ pub(crate) struct Account {
     link_until: Option<Instant>,
     pub(crate) update: Update,
     pub(crate) update_asked_at: Instant,
+    update_sent_at: Instant,
     /// A request may have reached the robot, other than the one that is under way.
     pub(crate) update_may_have_left: bool,
     pub(crate) request: Option<Request>,
@@ -75,6 +76,7 @@ impl Account {
             link_until: Some(now + ms(500)),
             update: Update::None,
             update_asked_at: now,
+            update_sent_at: now,
             update_may_have_left: false,
             request: None,
             given_up: None,
@@ -229,7 +231,7 @@ impl Account {
                     self.update,
                     Update::Asked { version: asked, needs_stop: false, .. } if asked == version
                 ) && self.motion.is_stop_sent();
-                self.update = Update::Silent;
+                (self.update, self.update_sent_at) = (Update::Silent, now);
                 (is_right, Last::Update(version))
             }
             _ => (false, Last::Ping),
@@ -248,7 +250,7 @@ impl Account {
         self.motion.unsent(unsent);
         if let (Some(Last::Update(version)), Update::Silent) = (last, self.update) {
             let is_unflushed = unsent == Unsent::Unflushed;
-            if !is_unflushed || now - self.update_asked_at < ms(3000) {
+            if !is_unflushed || now - self.update_sent_at <= ms(2000) {
                 self.update = Update::Asked { version, needs_stop: true };
                 self.update_may_have_left |= is_unflushed;
             }

@@ -12,7 +12,7 @@ pub(crate) struct Request {
     pub(crate) attempts: u8,
     /// `None`: has to be sent now.
     pub(crate) until: Option<Instant>,
-    /// When it is given up if it cannot be sent; from its first attempt on.
+    /// When it is given up if it cannot be sent; from when it could be sent first.
     pub(crate) bound: Option<Instant>,
 }
 
@@ -44,6 +44,11 @@ impl Request {
         Self { step, kind, attempts: 0, until: None, bound: None }
     }
 
+    /// The driver asks for frames.
+    pub(crate) fn begin(&mut self, now: Instant) {
+        self.bound.get_or_insert(now + wait().saturating_mul(3));
+    }
+
     /// The request is sent; returns whether that is allowed.
     pub(crate) fn frame(
         &mut self,
@@ -55,7 +60,6 @@ impl Request {
         let is_due = self.until.is_none() && self.attempts < 3;
         self.attempts += 1;
         self.until = Some(now + wait());
-        self.bound.get_or_insert(now + wait().saturating_mul(3));
         is_this && is_due
     }
 }

@@ -20,7 +20,7 @@ pub(super) struct Request {
     /// Outcome of the latest attempt so far.
     cause: FailureCause,
     wait: Wait,
-    /// When it is given up if its port does not take it; from its first attempt on.
+    /// When it is given up if it cannot be sent; from when it could be sent first.
     until: Option<Instant>,
 }
 
@@ -54,6 +54,11 @@ impl Request {
         Self { step, kind, last_start, attempts: 0, cause, wait, until: None }
     }
 
+    /// Its driver asks for frames, so that it can be sent from now on.
+    pub(super) fn begin(&mut self, now: Instant, config: &HostConfig) {
+        self.until.get_or_insert_with(|| now + config.calibration_bound());
+    }
+
     /// The request to send now, if any, and whether it is a repetition.
     pub(super) fn take_due(
         &mut self,
@@ -68,7 +73,6 @@ impl Request {
         self.attempts = self.attempts.saturating_add(1);
         self.cause = FailureCause::NoAnswer;
         self.wait = Wait::Ack(now + config.ack_wait());
-        self.until.get_or_insert(now + config.calibration_bound());
         Some((self.step, self.kind, again))
     }
 

@@ -227,7 +227,8 @@ impl Motor {
 
     /// Both copies are of the stop, if the first was of a command to move.
     fn copy_stop(&mut self) {
-        if self.copies.are_due() && self.sent.as_ref().is_some_and(|(sent, _)| !sent.stands_still()) {
+        if self.copies.are_due() && self.sent.as_ref().is_some_and(|(sent, _)| !sent.stands_still())
+        {
             self.copies = Copies::BOTH;
         }
     }

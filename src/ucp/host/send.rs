@@ -16,7 +16,7 @@ use crate::{
         body::{Biases, CalibrationEnd, CalibrationStart, ImuBiasAck, MagBiasAck, Ping},
         codes::ErrorCode,
         header::MAX_LEN,
-        role::write,
+        role::{FLUSH_TIME, write},
         update::OtaRequest,
     },
 };
@@ -25,6 +25,9 @@ impl<S: BiasStore> State<S> {
     /// Encodes the most urgent frame that is due; returns its length.
     pub(super) fn fill(&mut self, buffer: &mut [u8; MAX_LEN], now: Instant) -> Option<usize> {
         self.motor.begin_round(now);
+        if let Some(request) = &mut self.calibration {
+            request.begin(now, &self.config);
+        }
         let Some(outgoing) = self.next(now) else {
             self.motor.end_round();
             return None;
@@ -170,7 +173,7 @@ impl<S: BiasStore> State<S> {
         }
         self.motor.unsent(unsent, was_motor, now);
         // A flush that fails so late is not that of the request.
-        let is_other = unsent == Unsent::Unflushed && self.update.until() <= now;
+        let is_other = unsent == Unsent::Unflushed && now - self.update.sent_at() > FLUSH_TIME;
         if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() && !is_other {
             self.end_update(now);
             self.update.ask_again(unsent == Unsent::Unflushed);
@@ -207,7 +210,8 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn deadline(&self) -> Option<Instant> {
         if self.update.is_silent() {
-            return self.link_until;
+            let waits = matches!(self.last, Some(Outgoing::Update)) && !self.is_overdue;
+            return earliest(&[self.link_until, waits.then(|| self.update.overdue_at())]);
         }
         let asked = self.update.is_asked().then(|| match self.is_ready_for_update() {
             true => self.update.asked_at(),

@@ -432,7 +432,7 @@ impl<S: BiasStore> State<S> {
     /// because of reports may no longer hold.
     pub(super) fn expire_dead_man(&mut self, now: Instant) {
         self.is_overdue = match self.update.is_silent() {
-            true => self.update.is_overdue(now),
+            true => self.update.overdue_at() <= now,
             false => reached(self.link_until, now),
         };
         if self.motor.expire(now) {

@@ -96,8 +96,13 @@ impl Update {
         self.asked_at
     }
 
-    /// Whether the request has waited for its port for too long to be sure of a standstill.
-    pub(super) fn is_overdue(&self, now: Instant) -> bool {
-        self.is_silent() && now - self.sent_at >= PATIENCE
+    /// When the request was handed out.
+    pub(super) const fn sent_at(&self) -> Instant {
+        self.sent_at
+    }
+
+    /// When the request has waited for its port for too long to be sure of a standstill.
+    pub(super) fn overdue_at(&self) -> Instant {
+        self.sent_at + PATIENCE
     }
 }

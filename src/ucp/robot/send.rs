@@ -4,18 +4,15 @@ use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
     endpoint::Unsent,
     stats::{count, uncount},
-    time::{Duration, Instant, earliest},
+    time::{Instant, earliest},
     ucp::{
         body::{CalibrationEndAck, CalibrationStartAck, OtaAck, Pong},
         codes::ErrorCode,
         header::MAX_LEN,
         report::{DocumentReport, FirmwareReport},
-        role::write,
+        role::{FLUSH_TIME, write},
     },
 };
-
-/// Longest time from handing a frame out to the failure of its flush.
-const FLUSH_TIME: Duration = Duration::from_secs(2);
 
 impl State {
     /// Encodes the most urgent frame that is due; returns its length.
