@@ -14,6 +14,7 @@
 //! * a dropped `drive_for` leaves a stop that the next call sends. **If there is no next call, a
 //!   motor on a bus runs on, and a robot drives until its watchdog stops it**; that of a vendor
 //!   robot waits for silence on the line;
+//! * a `drive_for` that is leaked (`mem::forget`) instead of dropped leaves no stop;
 //! * a calibration continues, and reports its end as an event;
 //! * call a discovery or a read again.
 //!
@@ -42,6 +43,7 @@
 
 use core::{
     future::{Future, poll_fn, ready},
+    mem,
     ops::{Deref, DerefMut},
     pin::pin,
     task::Poll,
@@ -62,6 +64,10 @@ use crate::{
 
 /// Shortest pause before a frame that waits for its port is looked at again, microseconds.
 const LOOK_US: u32 = 1000;
+
+/// Time by which a delay is too long if the executor was held up, microseconds: what is to be sent
+/// may be old by then.
+const HELD_UP_US: u32 = 10_000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
@@ -129,6 +135,15 @@ pub struct Driver<R, P, C> {
     pub(super) inner: driver::Driver<R, P, C>,
     /// The latest wait for a slow port began with a look at what has been received.
     has_told: bool,
+}
+
+/// Why bytes have not been written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Unwritten {
+    /// The port has not taken them, or they have become wrong.
+    Waited,
+    /// The executor was held up while they waited: the role decides again.
+    HeldUp,
 }
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
@@ -322,24 +337,25 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             let now = self.now();
             let waited = self.sending.write_wait.begin(now);
             let (wait_us, is_last) = self.patience(waited);
-            let written = self.write_rest(wait_us).await;
-            if written.is_none() && self.role.is_outdated() {
-                // The role decides again, within the time that this frame had.
-                self.give_up_outdated();
-                continue;
-            }
-            if written.is_none() && self.is_over() {
-                self.reclaim();
-                return (received, Ok(()));
-            }
-            if written.is_none() && !is_last {
-                return (received, Ok(()));
-            }
-            self.sending.write_wait.end();
-            let Some(written) = written else {
-                self.reclaim();
-                return (received, self.stalled().await);
+            let written = match self.write_rest(wait_us).await {
+                Ok(written) => written,
+                Err(_) if self.role.is_outdated() => {
+                    // The role decides again, within the time that this frame had.
+                    self.give_up_outdated();
+                    continue;
+                }
+                Err(why) if why == Unwritten::HeldUp && waited < STALL || self.is_over() => {
+                    self.reclaim();
+                    return (received, Ok(()));
+                }
+                Err(_) if !is_last => return (received, Ok(())),
+                Err(_) => {
+                    self.sending.write_wait.end();
+                    self.reclaim();
+                    return (received, self.stalled().await);
+                }
             };
+            self.sending.write_wait.end();
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));
             }
@@ -354,16 +370,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         (received, Ok(()))
     }
 
-    /// Asks the port to take the unsent bytes; `None` if it does not within this time, or if they
+    /// Asks the port to take the unsent bytes; an error if it does not within this time, or if they
     /// have become wrong meanwhile: then none of them has left.
-    async fn write_rest(&mut self, wait_us: u32) -> Option<Result<usize, P::Error>> {
+    async fn write_rest(&mut self, wait_us: u32) -> Result<Result<usize, P::Error>, Unwritten> {
         let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
         let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
         loop {
             let left_us = wait_us.saturating_sub((now - begin).as_micros());
             if left_us == 0 {
-                return first(writing, ready(())).await;
+                return first(writing, ready(())).await.ok_or(Unwritten::Waited);
             }
             let decides_at = earliest(&[role.poll_timeout(), *ends_at]);
             let nap_us = decides_at.map_or(left_us, |at| (at - now).as_micros());
@@ -371,12 +387,15 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // The delay first: if this task was held up, the port does not take what has ended.
             let taking = until(writing.as_mut(), &mut written);
             if first(clock.delay_us(nap_us), taking).await.is_none() {
-                return written;
+                return written.ok_or(Unwritten::Waited);
             }
-            now = time.read(clock);
+            let asked_at = mem::replace(&mut now, time.read(clock));
             role.handle_input(&[], now);
             if role.is_outdated() || reached(*ends_at, now) {
-                return None;
+                return Err(Unwritten::Waited);
+            }
+            if (now - asked_at).as_micros() > nap_us.saturating_add(HELD_UP_US) {
+                return Err(Unwritten::HeldUp);
             }
         }
     }
@@ -460,7 +479,7 @@ async fn until<T>(future: impl Future<Output = T>, output: &mut Option<T>) {
 async fn yield_once() {
     let mut has_yielded = false;
     poll_fn(|context| {
-        if core::mem::replace(&mut has_yielded, true) {
+        if mem::replace(&mut has_yielded, true) {
             return Poll::Ready(());
         }
         context.waker().wake_by_ref();

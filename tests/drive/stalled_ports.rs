@@ -161,3 +161,39 @@ fn a_write_that_was_given_up_long_ago_does_not_make_a_slow_port_a_stalled_one() 
     assert_eq!(world.block_on(driver.asynch().service()), Ok(()));
     assert_eq!(driver.port().written, b"456");
 }
+
+/// The speeds that have been written since.
+fn written_rps(bus: &Bus, from: usize) -> Vec<f32> {
+    use axlewire::{ikeya::Request, ikeya::ToSlave, stream::Frames};
+    let requests = Frames::<ToSlave>::new(&bus.port().written[from..]);
+    let speeds = requests.filter_map(|it| match it {
+        Request::Write(write) => Some(write.as_velocity()),
+        Request::Read(_) => None,
+    });
+    speeds.collect()
+}
+
+#[test]
+fn a_set_point_that_waits_for_a_slow_port_does_not_outlive_the_dead_man_nor_a_held_up_executor() {
+    // The port is slow, or the task is not polled.
+    for (late_ms, held_ms) in [(500, 0), (50, 500), (50, 10_000)] {
+        let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |config| {
+            config.dead_man = Some(ms(100));
+        });
+        let from = bus.port().written.len();
+        bus.port_mut().writes = vec![Step::Late(late_ms * 1000); 2].into();
+        {
+            let mut aimed = pin!(bus.asynch().set_velocity(NodeId::N1, Rps::new(5.0).unwrap()));
+            let mut context = Context::from_waker(Waker::noop());
+            assert!(aimed.as_mut().poll(&mut context).is_pending());
+            wire.world.step(held_ms * 1000);
+            let _ = wire.world.block_on(aimed);
+        }
+        for _ in 0..100 {
+            let _ = wire.world.block_on(bus.asynch().service());
+            wire.world.step(1000);
+        }
+        let speeds = written_rps(&bus, from);
+        assert!(!speeds.contains(&5.0), "{late_ms}, {held_ms}: {speeds:?}");
+    }
+}

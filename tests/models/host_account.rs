@@ -107,6 +107,7 @@ impl Account {
 
     pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind) {
         (self.request, self.settled) = (Some(Request::new(step, kind)), None);
+        self.update_may_have_left = false;
         match kind {
             _ if step == CalibrationStep::End => {}
             CalibrationKind::Imu => self.imu.popped = None,
@@ -252,7 +253,7 @@ impl Account {
             let is_unflushed = unsent == Unsent::Unflushed;
             if !is_unflushed || now - self.update_sent_at <= ms(2000) {
                 self.update = Update::Asked { version, needs_stop: true };
-                self.update_may_have_left |= is_unflushed;
+                self.update_may_have_left |= unsent != Unsent::Untouched;
             }
         }
         if let Update::Asked { needs_stop, .. } = &mut self.update {

@@ -446,9 +446,10 @@ impl<B: Board> Endpoint for Master<B> {
         }
     }
 
-    /// Whether it is a WRITE that has been dropped or replaced, or whose mode is in doubt.
+    /// Whether it is a WRITE that has been dropped or replaced, or whose mode is in doubt; or
+    /// anything, once the dead-man has fired: a set-point must not outlive its application.
     fn is_outdated(&self) -> bool {
-        self.has_sent_old_write()
+        self.has_sent_old_write() || reached(self.dead_man_at(), self.now)
     }
 
     fn line_rules(&self) -> LineRules {

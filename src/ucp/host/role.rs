@@ -250,7 +250,7 @@ impl<S: BiasStore> Host<S> {
     /// [`HostEvent::UpdateNotSent`].
     ///
     /// An answer does not say which request it answers, and a robot may repeat one: after a
-    /// refusal, wait for a second before you ask again.
+    /// refusal, wait for two seconds before you ask again.
     ///
     /// A robot that sends no reports cannot be seen to stand still. To update it, make sure of that
     /// yourself, take the port with `Driver::into_parts`, and write

@@ -172,11 +172,12 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        // A flush that fails so late is not that of the request.
-        let is_other = unsent == Unsent::Unflushed && now - self.update.sent_at() > FLUSH_TIME;
+        // Without word of what was taken, a flush that fails late is not that of the request.
+        let is_late = !self.is_last_taken && now - self.update.sent_at() > FLUSH_TIME;
+        let is_other = unsent == Unsent::Unflushed && is_late;
         if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() && !is_other {
             self.end_update(now);
-            self.update.ask_again(unsent == Unsent::Unflushed);
+            self.update.ask_again(unsent != Unsent::Untouched);
         }
     }
 

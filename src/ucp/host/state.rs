@@ -132,6 +132,7 @@ impl<S: BiasStore> State<S> {
             // A result that has already arrived is the one reported.
             (_, CalibrationStep::End) => {}
         }
+        self.update.forget();
         let request = Request::new(step, kind, self.last_start, now);
         (self.calibration, self.settled) = (Some(request), None);
         Ok(())

@@ -16,7 +16,7 @@ pub(super) struct Update {
     /// When the request was handed out.
     sent_at: Instant,
     /// The robot may have an earlier request: its flush failed, or it was refused, perhaps not by
-    /// this answer. Until the application stops or drives.
+    /// this answer. Until the application stops, drives or calibrates.
     may_have_left: bool,
 }
 

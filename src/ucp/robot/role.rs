@@ -206,7 +206,7 @@ impl Endpoint for Robot {
 
     fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         match outcome.into() {
-            Transmit::Taken => self.state.is_last_taken = true,
+            Transmit::Taken => self.state.taken(),
             Transmit::Flushed => self.state.flushed(),
             Transmit::Unsent(unsent) => self.state.unsent(unsent, now),
         }

@@ -4,7 +4,7 @@ use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
     endpoint::Unsent,
     stats::{count, uncount},
-    time::{Instant, earliest},
+    time::{Instant, earliest, reached},
     ucp::{
         body::{CalibrationEndAck, CalibrationStartAck, OtaAck, Pong},
         codes::ErrorCode,
@@ -20,7 +20,7 @@ impl State {
         let outgoing = self.next(now)?;
         (self.last, self.is_last_taken) = (Some(outgoing), false);
         if let Outgoing::UpdateAnswer(status) = outgoing {
-            self.update_answer = Some((status, now));
+            self.update_answer = Some((status, Some(now + FLUSH_TIME)));
         }
         Some(match outgoing {
             Outgoing::StartAck(kind) => {
@@ -76,6 +76,16 @@ impl State {
         }
     }
 
+    /// The port has taken all of the last frame.
+    pub(super) fn taken(&mut self) {
+        self.is_last_taken = true;
+        if let (Some(Outgoing::UpdateAnswer(_)), Some((_, until))) =
+            (self.last, &mut self.update_answer)
+        {
+            *until = None;
+        }
+    }
+
     /// All that the port has taken has left, so it cannot come back.
     pub(super) fn flushed(&mut self) {
         if self.is_last_taken {
@@ -104,10 +114,11 @@ impl State {
         } else if let Some(outgoing) = self.last.take() {
             self.take_back(outgoing, now);
         }
-        // Nobody asks again for the answer to an update. A flush that fails late is not its own.
+        // Nobody asks again for the answer to an update.
         let is_lost = (is_answer || unsent == Unsent::Unflushed) && !self.update_asked;
-        if let Some((status, at)) = self.update_answer.filter(|_| is_lost) {
-            if unsent != Unsent::Unflushed || now - at <= FLUSH_TIME {
+        if let Some((status, until)) = self.update_answer.filter(|_| is_lost) {
+            // Without word of what was taken, a flush that fails late is not its own.
+            if unsent != Unsent::Unflushed || !reached(until, now) {
                 self.answers.update.get_or_insert(status);
                 self.answers.ask(now);
             }

@@ -48,8 +48,9 @@ pub(super) struct State {
     pub(super) last: Option<Outgoing>,
     /// The port has taken all of it.
     pub(super) is_last_taken: bool,
-    /// The answer to an update and when it was handed out, until it has been flushed.
-    pub(super) update_answer: Option<(OtaStatus, Instant)>,
+    /// The answer to an update, until it has been flushed; and until when a failed flush can be
+    /// its own, if the port was not said to have taken it.
+    pub(super) update_answer: Option<(OtaStatus, Option<Instant>)>,
 }
 
 /// A running calibration.
