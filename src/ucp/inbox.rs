@@ -92,6 +92,9 @@ impl Inbox {
                 }
                 None => {
                     let pending = self.decoder.pending();
+                    if self.newest_len == 0 {
+                        return None; // the line is idle
+                    }
                     if pending <= self.newest_len {
                         self.between = self.newest();
                     } else if pending > self.between_len {

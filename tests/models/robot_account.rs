@@ -74,6 +74,8 @@ pub(crate) struct Account {
     pub(crate) pong: bool,
     /// `false`: it may have left.
     pub(crate) update_answer: Option<(OtaStatus, bool)>,
+    /// The latest answer to an update, and when it was handed out.
+    answered: Option<(OtaStatus, Instant)>,
     pub(crate) is_update_asked: bool,
     /// `true` once its result is available.
     pub(crate) calibrating: Option<(CalibrationKind, bool)>,
@@ -98,6 +100,7 @@ impl Account {
             end_ack: None,
             pong: false,
             update_answer: None,
+            answered: None,
             is_update_asked: false,
             calibrating: None,
             imu: Repeat::new(None, now),
@@ -145,6 +148,7 @@ impl Account {
             Message::OtaAck(ack) => {
                 let answer = self.update_answer.take();
                 let is_right = answer.is_some_and(|(status, _)| status == ack.status());
+                self.answered = Some((ack.status(), now));
                 (is_right, Last::UpdateAnswer(ack.status()))
             }
             Message::ImuBias(bias) => (self.imu.frame(|value| imu(value) == *bias, now), Last::Imu),
@@ -174,12 +178,16 @@ impl Account {
     pub(crate) fn unsent(&mut self, unsent: Unsent, now: Instant) {
         let last = self.last.take();
         let is_lost = unsent != Unsent::Unflushed;
-        match last {
-            // An update is requested once: its answer is repeated if it may be lost.
-            Some(Last::UpdateAnswer(status)) if !self.is_update_asked => {
+        // An update is requested once: its answer is repeated if it may be lost.
+        if let Some((status, at)) = self.answered.filter(|_| !self.is_update_asked) {
+            let is_last = matches!(last, Some(Last::UpdateAnswer(_)));
+            if is_last && is_lost || !is_lost && now - at <= ms(2000) {
                 self.update_answer.get_or_insert((status, is_lost));
             }
+        }
+        match last {
             _ if !is_lost => {}
+            Some(Last::UpdateAnswer(_)) => {}
             Some(Last::StartAck(kind)) => {
                 self.start_ack.get_or_insert(kind);
             }

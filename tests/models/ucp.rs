@@ -28,7 +28,7 @@ const SKIPPED: [&str; 11] = [
     "round_trip",
     "new_round_trip",
     "last_report",
-    "chunk_len",
+    "newest_len",
     "framed",
     "inbox",
 ];
@@ -89,8 +89,10 @@ pub(crate) struct Feed<H> {
     /// With their lengths; `true` for one that came in two halves and may be dropped.
     held: Vec<(H, u64, bool)>,
     framed: u64,
-    /// Arrival time of the oldest byte held back.
+    /// The oldest byte held back arrived at this time or later.
     since: Instant,
+    /// A later chunk that may hold it as well: its time, and the number of bytes from there on.
+    between: (Instant, u64),
     /// The newest of them is arriving.
     has_new: bool,
     /// The last thing received is the first part of a frame.
@@ -100,7 +102,8 @@ pub(crate) struct Feed<H> {
 impl<H: Copy + std::fmt::Debug> Feed<H> {
     pub(crate) const fn new() -> Self {
         let since = Instant::from_micros(0);
-        Self { held: Vec::new(), framed: 0, since, has_new: false, is_half: false }
+        let between = (since, 0);
+        Self { held: Vec::new(), framed: 0, since, between, has_new: false, is_half: false }
     }
 
     pub(crate) fn is_holding(&self) -> bool {
@@ -109,8 +112,12 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
 
     /// This many bytes have arrived and been searched.
     pub(crate) fn took(&mut self, len: usize, counters: &Counters, now: Instant) {
-        if pending(counters) <= len as u64 {
-            self.since = now;
+        let (pending, len) = (pending(counters), len as u64);
+        self.between.1 += len;
+        if pending <= len {
+            (self.since, self.between) = (now, (now, len));
+        } else if pending <= self.between.1 {
+            (self.since, self.between) = (self.between.0, (now, len));
         }
     }
 
@@ -120,7 +127,7 @@ impl<H: Copy + std::fmt::Debug> Feed<H> {
     }
 
     /// What the role must have received by now (ruling B2), with its effective age: a whole frame
-    /// that was held back is as old as the first byte held back.
+    /// that was held back is as old as the first byte held back can be.
     pub(crate) fn arrived(
         &mut self,
         counters: &Counters,
