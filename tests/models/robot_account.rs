@@ -52,7 +52,7 @@ impl Repeat {
 enum Last {
     StartAck(CalibrationKind),
     EndAck(CalibrationKind),
-    UpdateAnswer(OtaStatus),
+    UpdateAnswer,
     Pong,
     Imu,
     Mag,
@@ -149,7 +149,7 @@ impl Account {
                 let answer = self.update_answer.take();
                 let is_right = answer.is_some_and(|(status, _)| status == ack.status());
                 self.answered = Some((ack.status(), now));
-                (is_right, Last::UpdateAnswer(ack.status()))
+                (is_right, Last::UpdateAnswer)
             }
             Message::ImuBias(bias) => (self.imu.frame(|value| imu(value) == *bias, now), Last::Imu),
             Message::MagBias(bias) => (self.mag.frame(|value| mag(value) == *bias, now), Last::Mag),
@@ -180,14 +180,14 @@ impl Account {
         let is_lost = unsent != Unsent::Unflushed;
         // An update is requested once: its answer is repeated if it may be lost.
         if let Some((status, at)) = self.answered.filter(|_| !self.is_update_asked) {
-            let is_last = matches!(last, Some(Last::UpdateAnswer(_)));
+            let is_last = matches!(last, Some(Last::UpdateAnswer));
             if is_last && is_lost || !is_lost && now - at <= ms(2000) {
                 self.update_answer.get_or_insert((status, is_lost));
             }
         }
         match last {
             _ if !is_lost => {}
-            Some(Last::UpdateAnswer(_)) => {}
+            Some(Last::UpdateAnswer) => {}
             Some(Last::StartAck(kind)) => {
                 self.start_ack.get_or_insert(kind);
             }
