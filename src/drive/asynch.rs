@@ -65,8 +65,7 @@ use crate::{
 /// Shortest pause before a frame that waits for its port is looked at again, microseconds.
 const LOOK_US: u32 = 1000;
 
-/// Time by which a delay is too long if the executor was held up, microseconds: what is to be sent
-/// may be old by then.
+/// How late a delay ends if the executor was held up, microseconds: what waits may be old by then.
 const HELD_UP_US: u32 = 10_000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.

@@ -4,8 +4,8 @@
 //! they belong to, and in the traits of its port and clock. A file of calls is a macro over these
 //! five; `in_both_worlds` writes it for each world that is enabled.
 //!
-//! A machine that both worlds poll would be plain code. It was tried: as long as a compiler-made
-//! future is in it, the panic of a future that is polled again stays in the blocking calls.
+//! One async function that the blocking calls poll once would be plain code. It was tried: the
+//! panic of a future that is polled after its end then stays in blocking firmware.
 
 /// Writes the calls of a file in both worlds.
 macro_rules! in_both_worlds {

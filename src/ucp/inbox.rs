@@ -42,10 +42,9 @@ impl Inbox {
         }
     }
 
-    /// Announces a chunk of bytes handed in at `now`, which may have arrived at any time since
-    /// `at`. Then call [`next`](Self::next) with it until that returns `None`.
-    ///
-    /// A frame counts as received at `at`, and can have arrived as early as `since`.
+    /// Announces a chunk of bytes handed in at `now`. Its frames count as received at `at`, and can
+    /// have arrived as early as `since`. Then call [`next`](Self::next) with it until that returns
+    /// `None`.
     pub(super) const fn receive(
         &mut self,
         chunk: &[u8],
@@ -72,7 +71,7 @@ impl Inbox {
         is_idle
     }
 
-    /// The next frame, and its arrival time.
+    /// The next frame, the time at which it counts as received, and how early it can have arrived.
     ///
     /// A frame that had arrived completely before the newest chunk was held back by a false header.
     /// It is dated to the oldest byte held, because a command found late is an old command.
@@ -91,10 +90,10 @@ impl Inbox {
                     };
                 }
                 None => {
-                    let pending = self.decoder.pending();
                     if self.newest_len == 0 {
                         return None; // the line is idle
                     }
+                    let pending = self.decoder.pending();
                     if pending <= self.newest_len {
                         self.between = self.newest();
                     } else if pending > self.between_len {

@@ -1,7 +1,7 @@
 //! Common to both roles: frames to be sent.
 
 use super::{frame::Body, header::MAX_LEN};
-use crate::{encode::Encode, time::Duration};
+use crate::{encode::Encode, endpoint::Unsent, time::Duration};
 
 /// Shortest period or timeout of a role: a shorter one would make its driver spin.
 pub(super) const SHORTEST: Duration = Duration::from_millis(1);
@@ -12,6 +12,14 @@ pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(4);
 
 /// Longest time from handing a frame out to the failure of its flush: a later one is not its own.
 pub(super) const FLUSH_TIME: Duration = Duration::from_secs(2);
+
+/// What became of a frame: one that was taken whole, with a pause inside, may have arrived.
+pub(super) const fn fate(unsent: Unsent, is_taken: bool) -> Unsent {
+    match unsent {
+        Unsent::CutOff if is_taken => Unsent::Unflushed,
+        _ => unsent,
+    }
+}
 
 /// Encodes a frame to the front of `buffer`; returns its length.
 pub(super) fn write<B: Body>(body: B, index: u8, buffer: &mut [u8; MAX_LEN]) -> usize {

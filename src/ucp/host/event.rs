@@ -73,9 +73,9 @@ pub enum HostEvent {
     /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids the answer (ruling
     /// U14). The robot asks again after a second.
     BiasesNotAnswered,
-    /// A firmware update was given up, because its request could not be sent behind a stop and a
-    /// seen standstill for 3 s ([`COAST`](super::COAST)): the reports ended or showed that a wheel
-    /// turns, or the port failed. After a failed flush, the robot may have the request anyway.
+    /// A firmware update was given up. Its request could not be sent within 3 s
+    /// ([`COAST`](super::COAST)), because the reports ended or showed that a wheel turns, or
+    /// because the port failed. After a failed flush, the robot may have the request anyway.
     UpdateNotSent,
     /// The robot has answered the firmware update request.
     UpdateAnswered(OtaStatus),

@@ -1,13 +1,12 @@
 //! The host: its commands, and the calls of its driver.
 
-use super::state::State;
-
 use super::{
     bias::{BiasStore, NoStore},
     config::HostConfig,
     event::{CalibrationFailure, CalibrationStep, CommandError, HostEvent, ReceivedReport},
     link::Link,
     standstill::StopProgress,
+    state::State,
     statistics::HostStatistics,
 };
 use crate::{
@@ -123,10 +122,10 @@ impl<S: BiasStore> Host<S> {
         if !self.state.update.is_none() {
             return Err(CommandError::Updating);
         }
-        if self.state.link == Link::Down && !command.stands_still() {
-            return Err(CommandError::LinkDown);
-        }
         if !command.stands_still() {
+            if self.state.link == Link::Down {
+                return Err(CommandError::LinkDown);
+            }
             self.state.update.forget();
         }
         self.state.motor.command(command, now, &self.state.config);

@@ -16,7 +16,7 @@ use crate::{
         body::{Biases, CalibrationEnd, CalibrationStart, ImuBiasAck, MagBiasAck, Ping},
         codes::ErrorCode,
         header::MAX_LEN,
-        role::{FLUSH_TIME, write},
+        role::{FLUSH_TIME, fate, write},
         update::OtaRequest,
     },
 };
@@ -159,9 +159,7 @@ impl<S: BiasStore> State<S> {
     /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
     /// update request is repeated with the stop that may have been lost with it.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        // One that was taken whole, with a pause inside, may have arrived all the same.
-        let is_whole = unsent == Unsent::CutOff && self.is_last_taken;
-        let unsent = if is_whole { Unsent::Unflushed } else { unsent };
+        let unsent = fate(unsent, self.is_last_taken);
         // It stays on record after a failed flush: it may have arrived.
         let last = self.last;
         let was_motor = matches!(last, Some(Outgoing::Motor(_)));

@@ -10,7 +10,7 @@ use crate::{
         codes::ErrorCode,
         header::MAX_LEN,
         report::{DocumentReport, FirmwareReport},
-        role::{FLUSH_TIME, write},
+        role::{FLUSH_TIME, fate, write},
     },
 };
 
@@ -102,9 +102,7 @@ impl State {
     /// anyway is not repeated. Results and requests are due at once: a host recognises a
     /// repetition.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
-        // One that was taken whole, with a pause inside, may have arrived all the same.
-        let is_whole = unsent == Unsent::CutOff && self.is_last_taken;
-        let unsent = if is_whole { Unsent::Unflushed } else { unsent };
+        let unsent = fate(unsent, self.is_last_taken);
         let is_answer = matches!(self.last, Some(Outgoing::UpdateAnswer(_)));
         // It stays on record after a failed flush: its rest may still be sent.
         if unsent == Unsent::Unflushed {
