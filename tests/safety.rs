@@ -107,11 +107,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         endpoint::Endpoint,
         ikeya::{Mode, NodeId, Slave, slave::SlaveConfig},
         time::{Duration, Instant},
-        ucp::{
-            Robot,
-            host::{COAST, HostConfig},
-            robot::RobotConfig,
-        },
+        ucp::{Robot, host::HostConfig, robot::RobotConfig},
     };
     let ms = |it: Duration| format!("{} ms", it.as_micros() / 1000);
     let (now, host, robot) = (Instant::default(), HostConfig::direct(), RobotConfig::direct());
@@ -146,8 +142,8 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         format!("again if it could not be written within {}", constant(order, "HOLD_PATIENCE")),
         format!("all four wheels at {} rpm", constant("src/ucp/host/standstill.rs", "STILL_RPM")),
         format!("the last of them {} after that", ms(host.rpm_average)),
-        format!("A request that cannot leave for {} s", COAST.as_micros() / 1_000_000),
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
+        format!("does not take it within {}", constant("src/ucp/host/update.rs", "PATIENCE")),
         format!("{dead_man} after the application's last call, or after the robot was last heard"),
         format!("From {dead_man} after the last call on, or after the last frame of the robot"),
         format!("that has fallen silent for another {dead_man}"),

@@ -191,10 +191,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     ///
     /// To reopen a port, replace it by [`port_mut`](Self::port_mut) and call `discard`: another
     /// driver does not know whether the clock has stepped back. If it has, a role that is given to
-    /// another driver waits for as long as the step was. A firmware update whose request has not
-    /// been flushed is requested again: a stop or [`end_firmware_update`] prevents that.
-    ///
-    /// [`end_firmware_update`]: crate::ucp::Host::end_firmware_update
+    /// another driver waits for as long as the step was.
     #[must_use]
     pub fn into_parts(mut self) -> (R, P, C) {
         self.discard();

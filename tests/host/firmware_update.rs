@@ -37,19 +37,28 @@ fn a_firmware_update_is_requested_once_and_followed_by_silence() {
 }
 
 #[test]
-fn a_refused_update_and_a_stop_end_the_silence() {
-    let (mut host, now) = asked();
-    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), ms(2000));
-    host.drive(go(10), ms(2010)).unwrap();
-    assert_eq!(sent(&mut host, ms(2010)).len(), 1);
-    host.stop(ms(2030));
-    sent(&mut host, ms(2030));
-    let now = seen_still(&mut host, 2040);
-    host.start_firmware_update(40, now).unwrap();
-    sent(&mut host, now);
-    host.stop(ms(5000));
-    assert_eq!(speeds(&wait(&mut host, ms(5000))), [(5_000_000, 0)]);
+fn only_the_application_ends_the_silence_of_an_update() {
+    for end in [Host::stop as fn(&mut Host, Instant), Host::end_firmware_update] {
+        let (mut host, now) = asked();
+        assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
+        // An answer may be that to a request before.
+        for status in [OtaStatus::Forbidden, OtaStatus::Accepted, OtaStatus::Forbidden] {
+            host.handle_input(&bytes(OtaAck::new(status)), now);
+            assert!(events(&mut host).contains(&HostEvent::UpdateAnswered(status)));
+            assert_eq!(wait(&mut host, ms(4000)), []);
+            assert!(host.is_updating());
+        }
+        // A flush that fails does not tell that the request was lost.
+        host.handle_transmit(Unsent::Unflushed, ms(4000));
+        assert_eq!(wait(&mut host, ms(5000)), []);
+        end(&mut host, ms(5000));
+        assert!(!host.is_updating());
+        assert_eq!(speeds(&wait(&mut host, ms(5000)))[0], (5_000_000, 0));
+        host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), ms(5000));
+        assert!(!host.is_updating(), "a late answer is an event, no more");
+        host.handle_input(&report(0), ms(5000));
+        assert_eq!(host.drive(go(10), ms(5000)), Ok(()));
+    }
 }
 
 /// A report of wheels of which one turns so fast.
@@ -133,34 +142,53 @@ fn two_more_stops_precede_an_update_request() {
     assert_eq!(robot.command(now).speed(), 0);
 }
 
+/// The update has been given up, and its request is not sent any more.
+fn assert_given_up(host: &mut Host, now: Instant) {
+    assert!(events(host).contains(&HostEvent::UpdateNotSent));
+    assert!(!host.is_updating());
+    for at in 1..300 {
+        host.handle_input(&report(0), now + Duration::from_millis(20 * at));
+        let frames = wait(host, now + Duration::from_millis(20 * at));
+        assert!(frames.iter().all(|(_, frame)| frame[4] != 9), "{at}");
+    }
+    assert_eq!(host.drive(go(10), now + Duration::from_millis(6000)), Ok(()));
+}
+
 #[test]
-fn an_update_request_waits_for_a_stop_that_did_not_leave() {
+fn an_update_is_given_up_if_a_stop_before_its_request_is_lost() {
     for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        // A stop is lost before the request, or along with it.
-        for frames in [1, 3] {
-            // The stops before an untouched request may have left.
-            let stops = vec![2; if frames == 3 { copies(unsent) } else { 2 }];
-            let mut host = driving();
-            host.stop(ms(40));
-            sent(&mut host, ms(40));
-            let now = seen_still(&mut host, 40);
-            host.start_firmware_update(40, now).unwrap();
-            (0..frames).for_each(|_| assert!(host.poll_transmit(now).is_some()));
+        for stops in [1, 2] {
+            let (mut host, now) = asked();
+            (0..stops).for_each(|_| assert!(host.poll_transmit(now).and_then(speed).is_some()));
             host.handle_transmit(unsent, now);
-            assert!(!host.is_stop_sent(), "{unsent:?}");
-            let again = sent(&mut host, now);
-            assert_eq!(ids(&again), stops, "{unsent:?}");
-            // What was seen before does not count any more.
-            let (mut at, mut is_sent) = (now, false);
-            while !is_sent {
-                at += Duration::from_millis(20);
-                host.handle_input(&report(0), at);
-                is_sent = wait(&mut host, at).iter().any(|(_, frame)| frame[4] == 9);
-            }
-            assert!(at - now >= HostConfig::default().rpm_average, "{unsent:?}");
-            assert_eq!(wait(&mut host, ms(60_000)), [], "and then silence");
+            assert!(sent(&mut host, now).iter().all(|frame| frame[4] == 2), "{unsent:?}");
+            assert_given_up(&mut host, now);
         }
     }
+}
+
+#[test]
+fn an_update_is_given_up_if_its_request_does_not_leave_whole() {
+    for (unsent, stops) in [(Unsent::Untouched, 1), (Unsent::CutOff, 2)] {
+        let (mut host, now) = asked();
+        assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
+        host.handle_transmit(unsent, now);
+        assert_eq!(ids(&sent(&mut host, now)), vec![2; stops], "{unsent:?}");
+        assert_given_up(&mut host, now);
+    }
+}
+
+#[test]
+fn an_update_is_given_up_if_its_robot_is_not_seen_to_stand_still_when_the_request_is_due() {
+    let (mut host, now) = asked();
+    host.handle_input(&report(30), now); // it waited in the port
+    assert_eq!(ids(&sent(&mut host, now)), [2, 2]);
+    assert_given_up(&mut host, now);
+    // A driver that comes back late has read no report since.
+    let (mut host, now) = asked();
+    let late = now + host.config().link_timeout;
+    assert_eq!(ids(&sent(&mut host, late)), [2, 2]);
+    assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
 }
 
 #[test]
@@ -199,6 +227,8 @@ fn the_rest_of_an_update_request_that_was_ended_is_outdated() {
         assert!(!host.is_outdated());
         end(&mut host, now);
         assert!(host.is_outdated(), "a robot in an update hears no stop");
+        host.handle_transmit(Unsent::Untouched, now);
+        assert!(!events(&mut host).contains(&HostEvent::UpdateNotSent), "it was the application");
     }
 }
 
@@ -247,46 +277,6 @@ fn a_robot_that_is_not_seen_to_stand_still_is_not_updated() {
 }
 
 #[test]
-fn an_update_request_that_cannot_be_sent_for_3_s_is_given_up_with_an_event() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let (mut host, now) = asked();
-        sent(&mut host, now);
-        host.handle_transmit(unsent, now);
-        // No report arrives any more.
-        let before = wait(&mut host, now + Duration::from_micros(2_999_999));
-        assert!(before.iter().all(|(_, frame)| frame[4] == 2), "{unsent:?}");
-        assert_eq!(host.drive(go(10), ms(4000)), Err(CommandError::Updating));
-        assert!(!events(&mut host).contains(&HostEvent::UpdateNotSent));
-        let end = now + Duration::from_millis(3000);
-        wait(&mut host, end);
-        assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
-        assert_eq!(host.drive(go(10), end), Ok(()));
-        seen_still(&mut driven(host, 0, 5000), 5001);
-    }
-}
-
-#[test]
-fn an_accepted_update_whose_flush_failed_is_followed_by_silence() {
-    let (mut host, now) = asked();
-    sent(&mut host, now);
-    host.handle_transmit(Unsent::Unflushed, now);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
-    assert_eq!(wait(&mut host, ms(60_000)), [], "it had arrived");
-    host.handle_transmit(Unsent::Unflushed, ms(60_000));
-    assert_eq!(wait(&mut host, ms(120_000)), [], "and is not asked for again");
-    // A refusal ends it.
-    let (mut host, now) = asked();
-    sent(&mut host, now);
-    host.handle_transmit(Unsent::Unflushed, now);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
-    assert_eq!(host.drive(go(10), now), Ok(()));
-    // Not so if the request cannot have arrived.
-    let (mut host, now) = asked();
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
-    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
-}
-
-#[test]
 fn a_repeated_stop_is_sent_20_ms_behind_the_last_one_and_counts_once_it_was() {
     let mut host = begun();
     host.stop(ms(100));
@@ -317,34 +307,6 @@ fn a_stop_asked_for_at_a_standstill_needs_new_reports() {
 }
 
 #[test]
-fn a_request_that_has_been_flushed_is_not_sent_again_for_a_port_that_is_replaced() {
-    let (mut host, now) = asked();
-    while host.poll_transmit(now).is_some() {
-        host.handle_transmit(Transmit::Taken, now);
-    }
-    host.handle_transmit(Transmit::Flushed, now);
-    host.handle_transmit(Unsent::Unflushed, ms(60_000));
-    assert_eq!(wait(&mut host, ms(120_000)), [], "the robot may be waiting for YMODEM");
-}
-
-#[test]
-fn an_update_request_waits_while_reports_that_came_since_show_no_standstill() {
-    let (mut host, now) = asked();
-    host.handle_input(&report(30), now); // it waited in the port
-    assert_eq!(ids(&sent(&mut host, now)), [2, 2]);
-    assert_eq!(host.stop_progress(), StopProgress::StillMoving { rpm: [0, 0, 0, 30] });
-    let mut reports = 0;
-    while wait(&mut host, now + Duration::from_millis(20 * reports))
-        .iter()
-        .all(|(_, frame)| frame[4] != 9)
-    {
-        reports += 1;
-        host.handle_input(&report(0), now + Duration::from_millis(20 * reports));
-    }
-    assert_eq!(reports, 3, "which show a standstill again");
-}
-
-#[test]
 fn a_repeated_stop_puts_off_no_repetition_however_long_the_pause_between_commands() {
     let mut config = unheard_config(true);
     config.command_gap = Duration::from_millis(1000);
@@ -352,41 +314,6 @@ fn a_repeated_stop_puts_off_no_repetition_however_long_the_pause_between_command
     assert_eq!(speeds(&wait(&mut host, ms(0))), [(0, 0)]);
     host.stop(ms(10));
     assert_eq!(speeds(&wait(&mut host, ms(250))), [(100_000, 0), (200_000, 0)]);
-}
-
-#[test]
-fn an_update_request_that_comes_back_again_and_again_is_given_up_after_3_s_too() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff, Unsent::Unflushed] {
-        let (mut host, begin) = asked();
-        let (mut at, mut requests, mut is_over) = (begin, 0, false);
-        while !is_over {
-            at += Duration::from_millis(20);
-            assert!(at - begin <= Duration::from_millis(3000), "{unsent:?}");
-            host.handle_input(&report(0), at);
-            host.handle_timeout(at);
-            while let Some(frame) = host.poll_transmit(at) {
-                if frame[4] == 9 {
-                    requests += 1;
-                    host.handle_transmit(unsent, at);
-                }
-            }
-            is_over = events(&mut host).contains(&HostEvent::UpdateNotSent);
-            assert_eq!(host.is_updating(), !is_over);
-        }
-        assert!(requests >= 2, "{unsent:?}: {requests}");
-        assert_eq!(host.drive(go(10), at), Ok(()));
-    }
-}
-
-#[test]
-fn a_request_that_may_have_left_once_is_answered_even_if_it_did_not_leave_again() {
-    let (mut host, now) = asked();
-    sent(&mut host, now);
-    host.handle_transmit(Unsent::Unflushed, now);
-    let now = seen_still(&mut host, now.as_micros() / 1000);
-    host.handle_transmit(Unsent::Untouched, now);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Accepted)), now);
-    assert_eq!(wait(&mut host, ms(60_000)), []);
 }
 
 #[test]
@@ -405,53 +332,6 @@ fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
     host.handle_input(&[], now + Duration::from_millis(20));
     assert!(host.is_outdated());
     host.handle_transmit(Unsent::Untouched, now + Duration::from_millis(20));
-    seen_still(&mut host, now.as_micros() / 1000 + 20);
-    assert!(host.is_updating(), "it is sent again");
-}
-
-#[test]
-fn a_refusal_that_a_robot_repeats_does_not_hide_that_it_accepts_the_next_request() {
-    let (mut host, now) = asked();
-    let forbidden = bytes(OtaAck::new(OtaStatus::Forbidden));
-    let accepted = bytes(OtaAck::new(OtaStatus::Accepted));
-    sent(&mut host, now);
-    host.handle_input(&forbidden, now);
-    assert_eq!(host.start_firmware_update(41, now), Ok(()), "still seen to stand still");
-    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
-    host.handle_input(&forbidden, now);
-    assert!(!host.is_updating());
-    let mut stopped = host.clone();
-    let mut driven = host.clone();
-    host.handle_input(&accepted, now);
-    assert!(host.is_updating());
-    assert_eq!(wait(&mut host, ms(60_000)), [], "the line belongs to the update");
-    // What the application has done since counts more.
-    stopped.stop(now);
-    driven.drive(go(10), now).unwrap();
-    for mut host in [stopped, driven] {
-        host.handle_input(&accepted, now);
-        assert!(!host.is_updating());
-    }
-}
-
-#[test]
-fn a_flush_that_fails_long_after_the_request_does_not_end_the_silence() {
-    // By a driver that tells neither of frames taken nor of flushes.
-    let (mut host, now) = asked();
-    assert_eq!(ids(&sent(&mut host, now)), [2, 2, 9]);
-    host.handle_transmit(Unsent::Unflushed, now + Duration::from_millis(3000));
-    assert_eq!(wait(&mut host, ms(60_000)), []);
-    // Its own does, however late it was sent.
-    let (mut host, now) = asked();
-    let late = now + Duration::from_millis(2900);
-    for at in 1..=145 {
-        host.handle_input(&report(30), now + Duration::from_millis(20 * at));
-    }
-    for _ in 0..3 {
-        host.handle_input(&report(0), late);
-    }
-    assert_eq!(ids(&sent(&mut host, late)), [2, 2, 9]);
-    host.handle_transmit(Unsent::Unflushed, late + Duration::from_millis(200));
-    assert_ne!(wait(&mut host, ms(60_000)), []);
     assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
+    assert!(!host.is_updating());
 }

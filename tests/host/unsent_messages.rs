@@ -88,29 +88,6 @@ fn a_stop_between_the_two_copies_of_a_command_is_sent_twice_itself() {
 }
 
 #[test]
-fn an_update_request_that_never_left_is_due_again_behind_a_stop() {
-    for unsent in [Unsent::Untouched, Unsent::CutOff] {
-        let (mut host, now) = asked();
-        assert_eq!(sent(&mut host, now).len(), 3);
-        host.handle_transmit(unsent, now);
-        assert_eq!(
-            ids(&sent(&mut host, now)),
-            if unsent == Unsent::CutOff { vec![2, 2] } else { vec![2] }
-        );
-        let mut frames = wait(&mut host, now + Duration::from_millis(900)).into_iter();
-        assert!(frames.all(|(_, frame)| frame[4] == 2), "no report shows a standstill since");
-
-        // Unless the application has changed its mind.
-        let (mut host, now) = asked();
-        sent(&mut host, now);
-        host.stop(now);
-        host.handle_transmit(unsent, now);
-        let mut frames = wait(&mut host, ms(3000)).into_iter();
-        assert!(frames.all(|(_, frame)| frame[4] == 2), "{unsent:?}");
-    }
-}
-
-#[test]
 fn the_acknowledgement_of_a_result_that_was_refused_before_is_due_again_if_it_did_not_leave() {
     for (kind, result) in [(IMU, bytes(imu_bias())), (MAG, bytes(mag_bias()))] {
         let mut host = Host::with_store(quiet_config(), Picky::new(|before| before == 0), ms(0));
@@ -152,13 +129,12 @@ fn a_calibration_request_that_its_port_does_not_take_is_given_up_at_its_bound() 
 
 #[test]
 fn a_frame_that_was_taken_whole_but_with_a_pause_may_have_arrived() {
-    // The request of an update: the answer to it counts.
+    // The request of an update: silence follows.
     let (mut host, now) = asked();
     sent(&mut host, now);
     host.handle_transmit(Transmit::Taken, now);
     host.handle_transmit(Unsent::CutOff, now);
-    host.handle_input(&bytes(OtaAck::new(OtaStatus::Forbidden)), now);
-    assert!(!host.is_updating());
+    assert_eq!(wait(&mut host, ms(60_000)), []);
     // That of a calibration: it counts as an attempt.
     let mut host = begun();
     host.start_calibration(IMU, ms(100)).unwrap();

@@ -3,7 +3,7 @@
 use axlewire::ucp::host::StopProgress;
 
 use super::{
-    host_account::Account,
+    host_account::{Account, Update},
     host_store::Shelf,
     names::*,
     site::{self, Acts, Menu},
@@ -84,14 +84,12 @@ impl Acts<HostSide> for Site {
         match call {
             Call::Stop => {
                 self.role.stop(self.now);
-                self.end_update();
-                self.account.update_may_have_left = false;
+                self.account.end_update();
                 self.account.motion.stop(self.now);
             }
             Call::EndUpdate => {
                 self.role.end_firmware_update(self.now);
-                self.end_update();
-                self.account.update_may_have_left = false;
+                self.account.end_update();
             }
             Call::SetStore(fails) => self.role.store_mut().fails = fails,
             _ => return self.request(call),
@@ -105,7 +103,14 @@ impl Acts<HostSide> for Site {
         self.account.request.iter_mut().for_each(|request| request.begin(now));
         self.step.is_halted |= self.account.expire_command(now);
         let is_barred = self.is_update_barred();
-        let Some(frame) = self.role.poll_transmit(now) else { return Ok(false) };
+        let is_asked = matches!(self.account.update, Update::Asked { .. });
+        let frame = self.role.poll_transmit(now);
+        // The request is the last that is due, but for pings.
+        if is_asked && frame.is_none_or(|frame| frame[4] == 1) {
+            broken_if!(!is_barred, "the request of an update is missing");
+            self.account.give_up_update();
+        }
+        let Some(frame) = frame else { return Ok(false) };
         broken_if!(is_barred && frame[4] == 9, "an update of a robot that may move");
         self.account.frame(frame, &shelf, now)?;
         Ok(true)
@@ -125,7 +130,7 @@ impl Acts<HostSide> for Site {
     }
 
     fn owed(&self) -> Option<Instant> {
-        self.account.owed(self.now, self.is_update_barred())
+        self.account.owed(self.now)
     }
 
     fn settled(&mut self) -> Checked {

@@ -30,7 +30,7 @@ enum Last {
     Biases,
     Calibration,
     Network,
-    Update(i16),
+    Update,
     Ping,
 }
 
@@ -44,10 +44,8 @@ pub(crate) struct Account {
     pub(crate) link: Link,
     link_until: Option<Instant>,
     pub(crate) update: Update,
-    pub(crate) update_asked_at: Instant,
-    update_sent_at: Instant,
-    /// A request may have reached the robot, other than the one that is under way.
-    pub(crate) update_may_have_left: bool,
+    /// Updates that were given up, and whose events have not been taken.
+    pub(crate) untold_updates: u32,
     pub(crate) request: Option<Request>,
     /// Attempts of the latest request that could not be sent again in time.
     pub(crate) given_up: Option<u8>,
@@ -75,9 +73,7 @@ impl Account {
             link: Link::Waiting,
             link_until: Some(now + ms(500)),
             update: Update::None,
-            update_asked_at: now,
-            update_sent_at: now,
-            update_may_have_left: false,
+            untold_updates: 0,
             request: None,
             given_up: None,
             settled: None,
@@ -107,7 +103,6 @@ impl Account {
 
     pub(crate) fn calibrate(&mut self, step: CalibrationStep, kind: CalibrationKind) {
         (self.request, self.settled) = (Some(Request::new(step, kind)), None);
-        self.update_may_have_left = false;
         match kind {
             _ if step == CalibrationStep::End => {}
             CalibrationKind::Imu => self.imu.popped = None,
@@ -152,9 +147,6 @@ impl Account {
     /// the former is new.
     pub(crate) fn expire_command(&mut self, now: Instant) -> bool {
         let is_silent = self.motion.expire(now);
-        if matches!(self.update, Update::Asked { .. }) && now - self.update_asked_at >= ms(3000) {
-            self.update = Update::None;
-        }
         if self.link_until.is_some_and(|at| at <= now) {
             (self.link, self.link_until) = (Link::Down, None);
             self.motion.halt();
@@ -232,8 +224,8 @@ impl Account {
                     self.update,
                     Update::Asked { version: asked, needs_stop: false, .. } if asked == version
                 ) && self.motion.is_stop_sent();
-                (self.update, self.update_sent_at) = (Update::Silent, now);
-                (is_right, Last::Update(version))
+                self.update = Update::Silent;
+                (is_right, Last::Update)
             }
             _ => (false, Last::Ping),
         };
@@ -249,15 +241,9 @@ impl Account {
     pub(crate) fn unsent(&mut self, unsent: Unsent, now: Instant) {
         let last = self.last.take();
         self.motion.unsent(unsent);
-        if let (Some(Last::Update(version)), Update::Silent) = (last, self.update) {
-            let is_unflushed = unsent == Unsent::Unflushed;
-            if !is_unflushed || now - self.update_sent_at <= ms(2000) {
-                self.update = Update::Asked { version, needs_stop: true };
-                self.update_may_have_left |= unsent != Unsent::Untouched;
-            }
-        }
-        if let Update::Asked { needs_stop, .. } = &mut self.update {
-            *needs_stop = true;
+        let was_request = last == Some(Last::Update) && self.update == Update::Silent;
+        if was_request && unsent != Unsent::Unflushed {
+            self.give_up_update();
         }
         if unsent == Unsent::Unflushed {
             self.is_network_due = self.network.is_some();
@@ -280,34 +266,30 @@ impl Account {
         }
     }
 
-    /// The robot has accepted an update: its request has arrived.
-    pub(crate) fn accepted(&mut self) {
-        if self.may_have_asked() {
-            (self.update, self.last) = (Update::Silent, None);
-        }
+    /// The request of an update was not sent.
+    pub(crate) fn give_up_update(&mut self) {
+        self.end_update();
+        self.untold_updates += 1;
     }
 
-    /// The robot may have received the request of an update.
-    pub(crate) fn may_have_asked(&self) -> bool {
-        self.update == Update::Silent || self.update_may_have_left
+    /// The line belongs to the host again.
+    pub(crate) fn end_update(&mut self) {
+        self.motion.is_called |= self.update == Update::Silent;
+        self.update = Update::None;
     }
 
     /// The latest time for the next action.
-    pub(crate) fn owed(&self, now: Instant, is_update_barred: bool) -> Option<Instant> {
+    pub(crate) fn owed(&self, now: Instant) -> Option<Instant> {
         if self.update == Update::Silent {
             return self.link_until;
         }
-        let asked = match self.update {
-            Update::Asked { .. } => Some(self.update_asked_at + ms(3000)),
-            _ => None,
-        };
         let is_due = self.is_network_due
-            || asked.is_some() && !is_update_barred
+            || self.update != Update::None
             || [self.imu.ack, self.mag.ack, self.biases].contains(&Ack::Must);
         let ping = self.pings.then(|| self.ping_until.unwrap_or(self.ping_at));
         let request = self.request.as_ref().map(|request| request.until.unwrap_or(now));
         let dead_man = self.motion.dead_man;
-        let times = [self.link_until, self.motion.due(now), dead_man, ping, request, asked];
+        let times = [self.link_until, self.motion.due(now), dead_man, ping, request];
         times.into_iter().flatten().chain(is_due.then_some(now)).min()
     }
 }

@@ -20,7 +20,6 @@ impl Site {
                 let result = self.role.drive(command(number), now);
                 if result.is_ok() {
                     self.account.motion.call(command(number), now);
-                    self.account.update_may_have_left &= command(number).stands_still();
                 }
                 let is_lost = self.account.link == Link::Down && !command(number).stands_still();
                 let lost = is_lost.then_some(CommandError::LinkDown);
@@ -62,7 +61,6 @@ impl Site {
                     motion.is_called = true;
                     motion.owe_two();
                     self.account.update = Update::Asked { version: VERSION, needs_stop: true };
-                    self.account.update_asked_at = now;
                 }
                 (result, expected)
             }
@@ -71,12 +69,5 @@ impl Site {
             (found, expected) if found == expected => Ok(()),
             (found, expected) => Err(format!("refused: {found:?} instead of {expected:?}")),
         }
-    }
-
-    /// The line belongs to the host again.
-    pub(super) fn end_update(&mut self) {
-        let was_silent = self.account.update == Update::Silent;
-        self.account.update = Update::None;
-        self.account.motion.is_called |= was_silent;
     }
 }

@@ -93,11 +93,6 @@ impl Checks<HostSide> for Site {
                     false => Ack::May,
                 };
             }
-            Hear::UpdateAnswer(OtaStatus::Accepted) => account.accepted(),
-            Hear::UpdateAnswer(_) if account.may_have_asked() && account.update != Update::None => {
-                account.update_may_have_left = true;
-                self.end_update();
-            }
             _ => {}
         }
         Ok(())
@@ -124,6 +119,11 @@ impl Checks<HostSide> for Site {
                 self.account.mag.popped = Some(event.clone());
                 return Ok(());
             }
+            HostEvent::UpdateNotSent => {
+                broken_if!(self.account.untold_updates == 0, "{event:?} has not happened");
+                self.account.untold_updates -= 1;
+                return Ok(());
+            }
             _ => return Ok(()),
         };
         broken_if!(self.account.untold.first() != Some(&end), "{event:?} has not happened");
@@ -132,6 +132,7 @@ impl Checks<HostSide> for Site {
     }
 
     fn all_told(&self) -> Checked {
+        broken_if!(self.account.untold_updates > 0, "an update was given up, and it is not told");
         match self.account.untold.first() {
             Some(end) => Err(format!("the end of a request is not reported: {end:?}")),
             None => Ok(()),

@@ -73,11 +73,12 @@ pub enum HostEvent {
     /// [`HostConfig::low_ids_only`](super::HostConfig::low_ids_only) forbids the answer (ruling
     /// U14). The robot asks again after a second.
     BiasesNotAnswered,
-    /// A firmware update was given up. Its request could not be sent within 3 s
-    /// ([`COAST`](super::COAST)), because the reports ended or showed that a wheel turns, or
-    /// because the port failed. After a failed flush, the robot may have the request anyway.
+    /// A firmware update was given up: its request was not sent, because the robot was no longer
+    /// seen to stand still, or because the port did not take it whole. Ask again once
+    /// [`stop_progress`](crate::ucp::Host::stop_progress) shows a standstill.
     UpdateNotSent,
-    /// The robot has answered the firmware update request.
+    /// The robot has answered a firmware update request; which one it does not say. The host
+    /// stays as silent as it was.
     UpdateAnswered(OtaStatus),
     /// A good frame for which this crate has no message (ruling U3).
     Unknown(UnknownFrame),

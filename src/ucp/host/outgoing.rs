@@ -17,6 +17,7 @@ pub(super) enum Outgoing {
     /// The flag marks a repetition.
     Calibration(CalibrationStep, CalibrationKind, bool),
     Network(SetNetworkState),
-    Update,
+    /// The request of a firmware update to this version.
+    Update(i16),
     Ping,
 }

@@ -122,11 +122,8 @@ impl<S: BiasStore> Host<S> {
         if !self.state.update.is_none() {
             return Err(CommandError::Updating);
         }
-        if !command.stands_still() {
-            if self.state.link == Link::Down {
-                return Err(CommandError::LinkDown);
-            }
-            self.state.update.forget();
+        if !command.stands_still() && self.state.link == Link::Down {
+            return Err(CommandError::LinkDown);
         }
         self.state.motor.command(command, now, &self.state.config);
         Ok(())
@@ -237,19 +234,17 @@ impl<S: BiasStore> Host<S> {
     /// **Starts a firmware update** in a robot whose firmware is older than `version`.
     ///
     /// The robot then leaves this protocol and waits for YMODEM on the same line. So the request is
-    /// sent once, and nothing after it, not even a ping, until the robot refuses, or
-    /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called. A
-    /// shipped robot does not answer the request.
+    /// sent once, and nothing after it, not even a ping, until
+    /// [`end_firmware_update`](Self::end_firmware_update) or [`stop`](Self::stop) is called,
+    /// whatever the robot answers: call one of them after a refusal. A shipped robot does not
+    /// answer the request.
     ///
     /// During an update the robot hears no stop either, so the call is refused unless
     /// [`stop_progress`](Self::stop_progress) is [`StopProgress::StandingStill`]: **call `stop` and
-    /// `await_standstill` of the driver before**. Two more stops precede the request. If they may
-    /// have been lost with it ([`handle_transmit`](Endpoint::handle_transmit)), all are sent again
-    /// once the reports show a standstill again. A request that cannot be sent for 3 s is given up:
-    /// [`HostEvent::UpdateNotSent`].
-    ///
-    /// An answer does not say which request it answers, and a robot may repeat one: after a
-    /// refusal, wait for two seconds before you ask again.
+    /// `await_standstill` of the driver before**. Two more stops precede the request. If the robot
+    /// is not seen to stand still any more behind them, or the port does not take the request
+    /// within 20 ms, the update is given up: [`HostEvent::UpdateNotSent`]. After a failed flush the
+    /// request may have arrived, and the host stays silent.
     ///
     /// A robot that sends no reports cannot be seen to stand still. To update it, make sure of that
     /// yourself, take the port with `Driver::into_parts`, and write
@@ -272,7 +267,6 @@ impl<S: BiasStore> Host<S> {
     /// Ends a firmware update: pings and the zero motor command are sent again.
     pub fn end_firmware_update(&mut self, now: Instant) {
         self.state.end_update(now);
-        self.state.update.forget();
     }
 
     /// Whether a firmware update was asked for and has not ended: no command to move is accepted,

@@ -7,6 +7,7 @@ use super::{
     outgoing::Outgoing,
     standstill::StopProgress,
     state::State,
+    update::Update,
 };
 use crate::{
     endpoint::Unsent,
@@ -16,7 +17,7 @@ use crate::{
         body::{Biases, CalibrationEnd, CalibrationStart, ImuBiasAck, MagBiasAck, Ping},
         codes::ErrorCode,
         header::MAX_LEN,
-        role::{FLUSH_TIME, fate, write},
+        role::{fate, write},
         update::OtaRequest,
     },
 };
@@ -47,9 +48,8 @@ impl<S: BiasStore> State<S> {
                 write(CalibrationEnd::new(kind), index, buffer)
             }
             Outgoing::Network(body) => write(body, index, buffer),
-            Outgoing::Update => {
-                let request = OtaRequest::start_firmware_update(self.update.version());
-                write(request, index, buffer)
+            Outgoing::Update(version) => {
+                write(OtaRequest::start_firmware_update(version), index, buffer)
             }
             Outgoing::Ping => write(Ping {}, index, buffer),
         })
@@ -85,9 +85,12 @@ impl<S: BiasStore> State<S> {
         if let Some(body) = self.network.filter(|_| self.network_due.take().is_some()) {
             return Some(Outgoing::Network(body));
         }
-        if self.update.is_asked() && self.is_ready_for_update() {
-            self.begin_update(now);
-            return Some(Outgoing::Update);
+        if let Update::Asked { version, .. } = self.update {
+            if self.is_ready_for_update() {
+                self.begin_update(now);
+                return Some(Outgoing::Update(version));
+            }
+            self.give_up_update(now);
         }
         if self.ping.take_due(now, &self.config) {
             count(&mut self.stats.pings);
@@ -143,7 +146,7 @@ impl<S: BiasStore> State<S> {
                 let is_old = self.motor.latest() != Some(command) || self.is_overdue;
                 !command.stands_still() && is_old
             }
-            Some(Outgoing::Update) => {
+            Some(Outgoing::Update(_)) => {
                 let may_go = self.update.is_silent() && self.is_ready_for_update();
                 !may_go || self.is_overdue
             }
@@ -156,13 +159,11 @@ impl<S: BiasStore> State<S> {
     /// Takes back the frame handed out last: its content is decided again.
     ///
     /// After a failed flush the frame may have arrived, so anything that the robot requests again
-    /// anyway is not repeated: a duplicate acknowledgement would count for the next result. An
-    /// update request is repeated with the stop that may have been lost with it.
+    /// anyway is not repeated: a duplicate acknowledgement would count for the next result.
     pub(super) fn unsent(&mut self, unsent: Unsent, now: Instant) {
         let unsent = fate(unsent, self.is_last_taken);
         // It stays on record after a failed flush: it may have arrived.
-        let last = self.last;
-        let was_motor = matches!(last, Some(Outgoing::Motor(_)));
+        let was_motor = matches!(self.last, Some(Outgoing::Motor(_)));
         if unsent == Unsent::Unflushed {
             self.network_due = self.network.map(|_| now);
         } else if let Some(outgoing) = self.last.take() {
@@ -170,13 +171,6 @@ impl<S: BiasStore> State<S> {
             self.take_back(outgoing, now);
         }
         self.motor.unsent(unsent, was_motor, now);
-        // Without word of what was taken, a flush that fails late is not that of the request.
-        let is_late = !self.is_last_taken && now - self.update.sent_at() > FLUSH_TIME;
-        let is_other = unsent == Unsent::Unflushed && is_late;
-        if matches!(last, Some(Outgoing::Update)) && self.update.is_silent() && !is_other {
-            self.end_update(now);
-            self.update.ask_again(unsent != Unsent::Untouched);
-        }
     }
 
     /// Takes back a frame of which nothing that the robot could act on has left.
@@ -198,7 +192,8 @@ impl<S: BiasStore> State<S> {
                 }
             }
             Outgoing::Network(_) => self.network_due = self.network.map(|_| now),
-            Outgoing::Update => {} // due again in any case
+            Outgoing::Update(_) if self.update.is_silent() => self.give_up_update(now),
+            Outgoing::Update(_) => {} // the application has ended it
             Outgoing::Ping => {
                 if self.ping.unsent(now) {
                     uncount(&mut self.stats.pings);
@@ -209,13 +204,13 @@ impl<S: BiasStore> State<S> {
 
     pub(super) fn deadline(&self) -> Option<Instant> {
         if self.update.is_silent() {
-            let waits = matches!(self.last, Some(Outgoing::Update)) && !self.is_overdue;
-            return earliest(&[self.link_until, waits.then(|| self.update.overdue_at())]);
+            let waits = matches!(self.last, Some(Outgoing::Update(_))) && !self.is_overdue;
+            return earliest(&[self.link_until, self.update.overdue_at().filter(|_| waits)]);
         }
-        let asked = self.update.is_asked().then(|| match self.is_ready_for_update() {
-            true => self.update.asked_at(),
-            false => self.update.until(),
-        });
+        let asked = match self.update {
+            Update::Asked { at, .. } => Some(at),
+            _ => None,
+        };
         earliest(&[
             self.link_until,
             self.motor.deadline(),

@@ -22,7 +22,7 @@ use crate::{
     time::{Duration, Instant, reached, wire_time},
     ucp::{
         body::{ImuBias, MagBias, Pong, SetNetworkState},
-        codes::{CalibrationKind, ErrorCode, NetworkState, OtaStatus},
+        codes::{CalibrationKind, ErrorCode, NetworkState},
         frame::{Frame, RawFrame},
         message::Message,
         report::Report,
@@ -93,7 +93,7 @@ impl<S: BiasStore> State<S> {
             last_start: None,
             outcome: None,
             settled: None,
-            update: Update::new(now),
+            update: Update::None,
             network: None,
             last_report: None,
             is_report_new: false,
@@ -132,7 +132,6 @@ impl<S: BiasStore> State<S> {
             // A result that has already arrived is the one reported.
             (_, CalibrationStep::End) => {}
         }
-        self.update.forget();
         let request = Request::new(step, kind, self.last_start, now);
         (self.calibration, self.settled) = (Some(request), None);
         Ok(())
@@ -170,20 +169,20 @@ impl<S: BiasStore> State<S> {
         // A robot that is being updated hears no stop, so a damaged stop must not be enough to
         // update it while it drives.
         self.motor.repeat(at);
-        self.update.ask(version, at);
+        self.update = Update::Asked { version, at };
         Ok(())
     }
 
     /// Leaves the line to the update that was asked for.
     pub(super) const fn begin_update(&mut self, now: Instant) {
-        self.update.begin(now);
+        self.update = Update::Silent { since: now };
         self.is_overdue = false;
         self.motor.pause();
     }
 
     /// Ends an update: the line is the host's again.
     pub(super) fn end_update(&mut self, now: Instant) {
-        self.update.end();
+        self.update = Update::None;
         self.motor.resume(now);
         self.ping.resume(now);
         // Anything that the robot requested during the silence is due now.
@@ -240,7 +239,10 @@ impl<S: BiasStore> State<S> {
             Message::ImuBias(bias) => self.imu_result(*bias, at),
             Message::MagBias(bias) => self.mag_result(*bias, at),
             Message::BiasRequest(_) => self.bias_request(at),
-            Message::OtaAck(ack) => self.update_answer(ack.status(), at),
+            Message::OtaAck(ack) => {
+                let is_answer = |event: &HostEvent| matches!(event, HostEvent::UpdateAnswered(_));
+                self.events.push_latest(HostEvent::UpdateAnswered(ack.status()), is_answer);
+            }
             // Unknown, or a message that a host has no use for. Commands were refused above.
             _ => self.unknown(frame),
         }
@@ -395,21 +397,6 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    fn update_answer(&mut self, status: OtaStatus, at: Instant) {
-        // The request may have arrived, whatever its flush said.
-        if self.update.may_have_left() {
-            if status == OtaStatus::Accepted {
-                self.begin_update(at);
-                self.last = None;
-            } else if !self.update.is_none() {
-                self.end_update(at);
-                self.update.refuse();
-            }
-        }
-        let is_answer = |event: &HostEvent| matches!(event, HostEvent::UpdateAnswered(_));
-        self.events.push_latest(HostEvent::UpdateAnswered(status), is_answer);
-    }
-
     fn unknown(&mut self, frame: &Frame) {
         count(&mut self.stats.unknown);
         let raw = RawFrame { id: frame.id(), index: frame.index(), body: frame.body() };
@@ -433,7 +420,7 @@ impl<S: BiasStore> State<S> {
     /// because of reports may no longer hold.
     pub(super) fn expire_dead_man(&mut self, now: Instant) {
         self.is_overdue = match self.update.is_silent() {
-            true => self.update.overdue_at() <= now,
+            true => reached(self.update.overdue_at(), now),
             false => reached(self.link_until, now),
         };
         if self.motor.expire(now) {
@@ -442,18 +429,15 @@ impl<S: BiasStore> State<S> {
         }
     }
 
-    /// Ends an update whose request could not be sent for too long.
-    fn expire_update(&mut self, now: Instant) {
-        if self.update.is_asked() && self.update.until() <= now {
-            self.end_update(now);
-            self.events.push(HostEvent::UpdateNotSent);
-        }
+    /// Ends an update whose request was not sent.
+    pub(super) fn give_up_update(&mut self, now: Instant) {
+        self.end_update(now);
+        self.events.push(HostEvent::UpdateNotSent);
     }
 
     /// Ends a command whose application has gone silent, or whose robot is no longer heard (U10).
     pub(super) fn expire_command(&mut self, now: Instant) {
         self.expire_dead_man(now);
-        self.expire_update(now);
         if reached(self.link_until, now) {
             (self.link, self.link_until) = (Link::Down, None);
             self.last_index = None;
