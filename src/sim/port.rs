@@ -26,15 +26,12 @@ pub struct Timing {
     pub latency: Duration,
     /// How received bytes are grouped.
     pub input: Input,
-    /// Whether the loop takes events out. Without it they pile up, as with an application that
-    /// ignores them.
-    pub takes_events: bool,
 }
 
 /// A loop that is never late.
 impl Default for Timing {
     fn default() -> Self {
-        Self { latency: Duration::ZERO, input: Input::Bytes, takes_events: true }
+        Self { latency: Duration::ZERO, input: Input::Bytes }
     }
 }
 
@@ -233,14 +230,12 @@ impl Port {
         if endpoint.poll_timeout().is_some_and(|at| is_seen(&at)) {
             endpoint.handle_timeout(now);
         }
-        if self.timing.takes_events {
-            for count in 0.. {
-                let Some(event) = endpoint.poll_event() else { break };
-                tell(event);
-                is_fruitful = true;
-                if count == ROUND_LIMIT {
-                    return Err(Trouble::Endless);
-                }
+        for count in 0.. {
+            let Some(event) = endpoint.poll_event() else { break };
+            tell(event);
+            is_fruitful = true;
+            if count == ROUND_LIMIT {
+                return Err(Trouble::Endless);
             }
         }
         for count in 0.. {

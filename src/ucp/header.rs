@@ -13,7 +13,7 @@ pub const BAUD: u32 = 115_200;
 pub const MAX_LEN: usize = 64;
 
 /// Longest body that is sent, bytes.
-pub const MAX_BODY_LEN: usize = MAX_LEN - Header::LEN - 2;
+pub(super) const MAX_BODY_LEN: usize = MAX_LEN - Header::LEN - 2;
 
 /// `len` of a frame without a body.
 pub(super) const LEN_WITHOUT_BODY: usize = 4;

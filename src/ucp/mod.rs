@@ -161,7 +161,7 @@ mod value;
 pub use contents::Contents;
 pub use frame::{Body, Frame, FrameOf, RawFrame, RelayedFrame};
 pub use framing::{Decoder, Ucp};
-pub use header::{BAUD, Header, MAX_BODY_LEN, MAX_LEN, MessageId, SYNC};
+pub use header::{BAUD, Header, MAX_LEN, MessageId, SYNC};
 pub use host::role::Host;
 #[doc(inline)]
 pub use message::Message;
