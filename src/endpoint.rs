@@ -137,6 +137,9 @@ pub enum Arrival {
     /// A role that acts on commands dates such bytes `since`, so that a stale command is not
     /// treated as new; a master does not take them for the answer to a request that was handed
     /// out after `since` (ruling I7).
+    ///
+    /// With an empty slice: none could be read, although some may wait. A host then takes its robot
+    /// for standing still only after three more reports (U16).
     Between {
         /// The earliest time at which they can have arrived. May be before the time of earlier
         /// calls.

@@ -54,7 +54,7 @@ use embedded_io_async::{Read, Write};
 
 use super::{
     clock::Clock,
-    driver::{self, CHUNK_LEN, ERROR_NAP, FRAMES, Needs, READS, STALL},
+    driver::{self, CHUNK_LEN, ERROR_NAP, FRAMES, Needs, Next, READS, STALL},
     error::DriveError,
 };
 use crate::{
@@ -64,9 +64,6 @@ use crate::{
 
 /// Shortest pause before a frame that waits for its port is looked at again, microseconds.
 const LOOK_US: u32 = 1000;
-
-/// How late a delay ends if the executor was held up, microseconds: what waits may be old by then.
-const HELD_UP_US: u32 = 10_000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
 const NAP_US: u32 = 1_000_000;
@@ -220,12 +217,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // It may have recovered meanwhile.
             self.sending.end_waits();
         }
-        for _ in 0..FRAMES {
+        for count in 0..FRAMES {
             result = result.and(self.receive().await);
             self.expire();
-            match self.load() {
-                Ok(false) => break,
-                Ok(true) => {}
+            match self.load(count == 0) {
+                Ok(Next::End) => break,
+                Ok(Next::Look) => continue,
+                Ok(Next::Send) => {}
                 Err(error) => {
                     result = result.and(Err(error));
                     break;
@@ -310,7 +308,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     }
 
     /// Takes in received bytes: polls each read once, without waiting.
-    async fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
+    pub(super) async fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
         self.look();
         for _ in 0..READS {
@@ -332,8 +330,10 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
-            self.before_write();
-            let now = self.now();
+            if !self.before_write() {
+                return (received, Ok(()));
+            }
+            let now = self.latest();
             let waited = self.sending.write_wait.begin(now);
             let (wait_us, is_last) = self.patience(waited);
             let written = match self.write_rest(wait_us).await {
@@ -372,6 +372,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Asks the port to take the unsent bytes; an error if it does not within this time, or if they
     /// have become wrong meanwhile: then none of them has left.
     async fn write_rest(&mut self, wait_us: u32) -> Result<Result<usize, P::Error>, Unwritten> {
+        let patience_us = self.patience_between_steps().as_micros();
+        let acts = driver::look_period(&self.role).is_some();
         let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
         let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
@@ -393,7 +395,9 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if role.is_outdated() || reached(*ends_at, now) {
                 return Err(Unwritten::Waited);
             }
-            if (now - asked_at).as_micros() > nap_us.saturating_add(HELD_UP_US) {
+            // An answer of a slave or a robot has no more time than that altogether.
+            let (since, nap_us) = if acts { (begin, 0) } else { (asked_at, nap_us) };
+            if (now - since).as_micros() > nap_us.saturating_add(patience_us) {
                 return Err(Unwritten::HeldUp);
             }
         }

@@ -4,7 +4,7 @@ use embedded_io::{Read, ReadReady, Write};
 
 use super::{
     clock::Clock,
-    driver::{CHUNK_LEN, Driver, ERROR_NAP, FRAMES, Needs, READS},
+    driver::{CHUNK_LEN, Driver, ERROR_NAP, FRAMES, Needs, Next, READS},
     error::DriveError,
 };
 use crate::{endpoint::Endpoint, time::Instant};
@@ -30,13 +30,14 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     fn round(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
-        for _ in 0..FRAMES {
+        for count in 0..FRAMES {
             // Before time passes: the rest of a frame may wait in the port.
             result = result.and(self.receive());
             self.expire();
-            match self.load() {
-                Ok(false) => break,
-                Ok(true) => {}
+            match self.load(count == 0) {
+                Ok(Next::End) => break,
+                Ok(Next::Look) => continue,
+                Ok(Next::Send) => {}
                 Err(error) => {
                     result = result.and(Err(error));
                     break;
@@ -101,7 +102,7 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     }
 
     /// Takes in received bytes.
-    fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
+    pub(super) fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
         self.look();
         for _ in 0..READS {
@@ -120,7 +121,9 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
         while !self.sending.rest().is_empty() {
-            self.before_write();
+            if !self.before_write() {
+                return (received, Ok(()));
+            }
             let written = self.port.write(self.sending.rest());
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));

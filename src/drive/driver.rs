@@ -55,6 +55,20 @@ pub(super) const STALL: Duration = Duration::from_secs(1);
 /// Time after which a receiver that keeps failing counts as one that has received nothing.
 const RECOVERY: Duration = Duration::from_millis(20);
 
+/// Longest time between two steps of a driver that was not held up; less for a slave or a robot.
+const HELD_UP: Duration = Duration::from_millis(10);
+
+/// What a round does next.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Next {
+    /// Nothing is due.
+    End,
+    /// Bytes are to be sent, or to be flushed.
+    Send,
+    /// The port is to be looked at again: the driver was held up since.
+    Look,
+}
+
 /// A role with its port and its clock.
 ///
 /// ```
@@ -341,47 +355,66 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Lets time pass, but only until the port was seen empty: whatever has arrived since is still
     /// in it.
     pub(super) fn expire(&mut self) {
-        let now = if self.unsure_since.is_none() { self.empty_at } else { self.now() };
-        // The rest of a frame may wait in a port whose receiver fails.
-        let is_unsure = self.unsure_since.is_some_and(|since| now - since < RECOVERY);
-        if is_unsure && self.role.line_rules().held_up_after.is_some() {
-            self.role.handle_input(&[], now);
-        } else if reached(self.role.poll_timeout(), now) {
+        let mut now = self.empty_at;
+        if let Some(since) = self.unsure_since {
+            now = self.latest();
+            if self.role.line_rules().held_up_after.is_some() {
+                self.role.handle_input(&[], Arrival::Between { since: self.empty_at, now });
+                if now - since < RECOVERY {
+                    // The rest of a frame may wait in a port whose receiver fails.
+                    return;
+                }
+            }
+        }
+        if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);
         }
     }
 
+    /// Longest time between two steps that is no hold-up.
+    pub(super) fn patience_between_steps(&self) -> Duration {
+        let limit = self.role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO);
+        limit.map_or(HELD_UP, |limit| limit.min(HELD_UP))
+    }
+
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
-    /// is outdated.
-    pub(super) fn load<E>(&mut self) -> Result<bool, DriveError<E>> {
+    /// is outdated. `is_first` is set if this is the first time in a round.
+    pub(super) fn load<E>(&mut self, is_first: bool) -> Result<Next, DriveError<E>> {
         if !self.sending.rest().is_empty() {
             // The receiver may have taken long since the round began.
             self.reclaim();
         }
         let now = self.now();
+        if is_first && now - self.looked_at > self.patience_between_steps() {
+            return Ok(Next::Look);
+        }
         self.give_up_outdated();
         if self.sending.is_in_doubt() {
             // Its flush goes first: it was dropped, or the rest of the frame was given up.
-            return Ok(true);
+            return Ok(Next::Send);
         }
         if self.sending.rest().is_empty() {
             if self.may_hold_more() {
-                return Ok(false);
+                return Ok(Next::End);
             }
             let Some(frame) = self.role.poll_transmit(now) else {
                 self.sending.end_write_wait();
-                return Ok(false);
+                return Ok(Next::End);
             };
             self.sending.load(frame)?;
             self.has_overtaken |= self.unsure_since.is_some();
         }
-        Ok(true)
+        Ok(Next::Send)
     }
 
     /// Gives up the rest of a frame that has become wrong. To be called whenever the role has heard
     /// something, or time has passed, since its last bytes left.
     pub(super) fn give_up_outdated(&mut self) {
-        if !self.sending.rest().is_empty() && self.role.is_outdated() {
+        if self.sending.rest().is_empty() {
+            return;
+        }
+        self.tell_time();
+        if self.role.is_outdated() {
             self.give_up();
         }
     }
@@ -391,10 +424,22 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         self.tell_unsent(given_up);
     }
 
-    /// Notes that the port is about to be asked to take the unsent bytes.
-    pub(super) fn before_write(&mut self) {
+    /// Notes that the port is about to be asked to take the unsent bytes. `false` if they have been
+    /// given up: the driver was held up since the role has decided on them.
+    pub(super) fn before_write(&mut self) -> bool {
+        let before = self.latest();
         let now = self.now();
+        if now - before > self.patience_between_steps() {
+            if look_period(&self.role).is_some() {
+                self.reclaim();
+            }
+            self.give_up_outdated();
+            if self.sending.rest().is_empty() {
+                return false;
+            }
+        }
         self.sending.begin_write(now);
+        true
     }
 
     /// Handles the result of a write: the port took bytes, or failed.

@@ -62,6 +62,8 @@ mod rover_standstill;
 #[cfg(all(unix, feature = "serialport"))]
 mod serial_port;
 mod slow_port;
+#[cfg(feature = "ucp")]
+mod stale_looks;
 mod stalled_ports;
 mod stops;
 mod two_wires;

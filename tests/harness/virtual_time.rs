@@ -44,6 +44,8 @@ struct Inner {
     reading_us: Cell<u64>,
     /// After this many readings, one is wrong by this many microseconds.
     glitch: Cell<Option<(u32, u64)>>,
+    /// After this many readings, the thread is held up for this long, microseconds.
+    hold_up: Cell<Option<(u32, u64)>>,
 }
 
 impl World {
@@ -69,6 +71,11 @@ impl World {
     /// After this many readings of the clock, one is wrong by this many microseconds.
     pub(crate) fn glitch(&self, readings: u32, wrong_us: u64) {
         self.0.glitch.set(Some((readings, wrong_us)));
+    }
+
+    /// After this many readings of the clock, the thread is held up for this long, microseconds.
+    pub(crate) fn hold_up(&self, readings: u32, micros: u64) {
+        self.0.hold_up.set(Some((readings, micros)));
     }
 
     /// Calls of ports and clocks.
@@ -204,6 +211,12 @@ impl World {
 impl Clock for World {
     fn now(&self) -> Instant {
         self.count_call();
+        let hold_up = self.0.hold_up.take();
+        let later = hold_up.and_then(|(readings, us)| Some((readings.checked_sub(1)?, us)));
+        self.0.hold_up.set(later);
+        if let (Some((_, us)), None) = (hold_up, later) {
+            self.pass(us);
+        }
         let now_us = self.now_us() + self.0.reading_us.get();
         self.0.now_us.set(now_us);
         let glitch = self.0.glitch.take();

@@ -208,8 +208,8 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
 /// The calls of a slave.
 impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Slave<B>, P, C> {
     /// Returns the next command, and answers requests meanwhile; waits for it for this long. `None`
-    /// if there was none, and at once when the watchdog has fired: its event is then the next of
-    /// [`poll_event`](crate::drive::Driver::poll_event).
+    /// if there was none, and at once when the watchdog has fired: ask [`Slave::command`] after
+    /// each call. An event of the watchdog counts as told.
     ///
     /// # Errors
     ///

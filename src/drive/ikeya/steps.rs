@@ -263,14 +263,11 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
 }
 
 impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
-    /// A command; `Some(None)` for the watchdog, whose event stays in the queue.
+    /// A command; `Some(None)` for the watchdog.
     pub(super) fn command(&mut self) -> Option<Option<Target<B>>> {
         self.tell_time();
-        match *self.role.peek_event()? {
-            SlaveEvent::Command(target) => {
-                self.role.poll_event();
-                Some(Some(target))
-            }
+        match self.role.poll_event()? {
+            SlaveEvent::Command(target) => Some(Some(target)),
             SlaveEvent::Watchdog => Some(None),
         }
     }

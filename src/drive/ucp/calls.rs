@@ -78,7 +78,8 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
     }
 
     /// Stops, and returns when the command has left the port: written and flushed (ruling U16).
-    /// Continues through errors of the port for 100 ms. The stop is repeated as long as the driver
+    /// Continues through errors of the port for 100 ms; an async port that stalls is waited for a
+    /// second longer for each write and flush. The stop is repeated as long as the driver
     /// is called; see [`Host::stop`]. A robot does not answer a stop: whether it obeys is in its
     /// reports, see [`await_standstill`](Self::await_standstill).
     ///
@@ -112,8 +113,21 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
         within: Duration,
     ) -> Result<(), DriveError<P::Error>> {
         let deadline = self.now() + within;
-        let standing = self.until_through_errors(deadline, Driver::standing)$($await)*?;
-        standing.unwrap_or_else(|| Err(self.no_standstill()))
+        loop {
+            let standing = self.until_through_errors(deadline, Driver::standing)$($await)*?;
+            let Some(Ok(())) = standing else {
+                return standing.unwrap_or_else(|| Err(self.no_standstill()));
+            };
+            // Reports may have arrived while the round was sending.
+            let looked = self.receive()$($await)*;
+            self.expire();
+            if let Some(standing) = self.standing() {
+                return standing;
+            }
+            if self.now() >= deadline {
+                return looked.and_then(|()| Err(self.no_standstill()));
+            }
+        }
     }
 
     /// Returns the latest report not returned yet; waits for one for this long, then returns

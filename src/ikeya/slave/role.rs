@@ -239,12 +239,6 @@ impl<B: Board> Slave<B> {
         self.event.put(event);
     }
 
-    /// The next event, left in its place.
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
-    pub(crate) fn peek_event(&self) -> Option<&SlaveEvent<B>> {
-        self.event.peek()
-    }
-
     fn watchdog_at(&self) -> Option<Instant> {
         Some(self.commanded_at? + self.config.watchdog?)
     }

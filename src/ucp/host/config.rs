@@ -46,7 +46,8 @@ pub struct HostConfig {
     pub ping_timeout: Duration,
     /// Time without a valid frame after which the link is down and the robot is told to stand
     /// still (rulings U10 and U16); 500 ms. On a line on which the robot cannot answer, it is
-    /// the time for which it is driven at all.
+    /// the time for which it is driven at all. Allow some report periods, and 10 ms for a driver
+    /// that is held up.
     pub link_timeout: Duration,
     /// Time over which the robot averages the wheel speeds that it reports; 1100 ms, as the
     /// vendor's firmware: ten values, one each 100 ms. After a stop the robot is not seen to

@@ -162,7 +162,9 @@ impl<S: BiasStore> Host<S> {
     /// began. And the last must have begun to arrive 1.1 s after that
     /// ([`HostConfig::rpm_average`]): a vendor robot reports averages, in which wheels that began
     /// to turn a moment ago still stand still. A wheel that moves again, or 500 ms without a report
-    /// ([`HostConfig::link_timeout`]), ends it, with the next call of the driver.
+    /// ([`HostConfig::link_timeout`]), ends it, with the next call of the driver, and so does a
+    /// port that cannot be read to its end. It is as of the last look at the port: a report may
+    /// have arrived while frames were flushed since.
     #[must_use]
     pub fn stop_progress(&self) -> StopProgress {
         self.state.motor.stop_progress()
@@ -359,6 +361,9 @@ impl<S: BiasStore> Endpoint for Host<S> {
         let arrived = arrived.into();
         let now = arrived.now();
         if bytes.is_empty() {
+            if matches!(arrived, Arrival::Between { .. }) {
+                self.state.motor.standstill().doubt();
+            }
             return self.state.expire_dead_man(now);
         }
         self.inbox.receive(bytes, now, arrived.since(), now);

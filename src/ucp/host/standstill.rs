@@ -120,6 +120,13 @@ impl Standstill {
         }
     }
 
+    /// Reports may wait in the port: those read so far are not the latest.
+    pub(super) const fn doubt(&mut self) {
+        if let Self::Reported { still, .. } = self {
+            *still = 0;
+        }
+    }
+
     pub(super) const fn progress(&self) -> StopProgress {
         match *self {
             Self::Untold => StopProgress::Due,

@@ -1,0 +1,181 @@
+//! What was decided after a look at the port, and what has arrived, or has passed, since.
+
+use axlewire::ucp::{Frame, host::StopProgress};
+
+use crate::rig::*;
+
+/// The rover's wheels turn at this speed from now on, whatever it is told.
+fn turn(world: &World, robot: &Running<Robot>, rpm: i16) {
+    let telemetry = Telemetry { rpm: [rpm; 4], ..Telemetry::default() };
+    robot.borrow_mut().role_mut().set_telemetry(&telemetry, world.now());
+}
+
+/// A rover that is seen to stand still.
+fn standing() -> (World, Rover, Running<Robot>) {
+    let (world, mut rover, robot) = rover(|config| config.rpm_average = Duration::ZERO);
+    rover.run_for(ms(300), |_, _, _| ()).unwrap();
+    assert_eq!(rover.role().stop_progress(), StopProgress::StandingStill);
+    (world, rover, robot)
+}
+
+/// Ids and speeds of the frames that the port has taken from this byte on, each with its time.
+fn taken(rover: &Rover, from: usize) -> Vec<(u64, u8, i16)> {
+    let mut frames = vec![];
+    for offer in rover.port().offers.iter().skip(from).filter(|offer| offer.taken > 0) {
+        let frame = Frame::parse(&offer.bytes[..offer.taken]).expect("a frame at once");
+        let speed = match frame.message() {
+            axlewire::ucp::Message::MotorControl(command) => command.speed(),
+            _ => 0,
+        };
+        frames.push((offer.at_us, frame.id(), speed));
+    }
+    frames
+}
+
+#[test]
+fn a_command_does_not_leave_after_its_dead_man_wherever_its_thread_was_held_up() {
+    for (is_async, hold_ms) in BOTH.into_iter().flat_map(|it| [600, 2000].map(|hold| (it, hold))) {
+        for readings in 0..25 {
+            let (world, mut rover, _robot) = standing();
+            // Long enough after the last stop for the command to leave at once.
+            world.pass(30_000);
+            let (from, begin_us) = (rover.port().offers.len(), world.now_us());
+            world.hold_up(readings, hold_ms * 1000);
+            let _ = call!(is_async, rover, drive(40, 0));
+            // When `drive` was called, for the role, is not known better than that.
+            let called_us = if readings == 0 { world.now_us() } else { begin_us };
+            for (at_us, _, speed) in taken(&rover, from) {
+                assert!(
+                    speed == 0 || at_us <= called_us + 500_000,
+                    "reading {readings}, async {is_async}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_link_is_not_lost_because_the_thread_of_its_host_was_held_up() {
+    for (is_async, readings) in BOTH.into_iter().flat_map(|it| (0..25).map(move |n| (it, n))) {
+        let (world, mut rover, _robot) = standing();
+        world.hold_up(readings, 600_000);
+        for _ in 0..10 {
+            call!(is_async, rover, service()).unwrap();
+        }
+        assert_eq!(rover.role().statistics().links_lost, 0, "reading {readings}, async {is_async}");
+    }
+}
+
+#[test]
+fn an_update_request_does_not_leave_past_reports_of_motion_wherever_its_thread_was_held_up() {
+    for (is_async, readings) in BOTH.into_iter().flat_map(|it| (0..25).map(move |n| (it, n))) {
+        let (world, mut rover, robot) = standing();
+        let (from, now) = (rover.port().offers.len(), rover.now());
+        rover.role_mut().start_firmware_update(39, now).unwrap();
+        turn(&world, &robot, 60);
+        world.hold_up(readings, 400_000);
+        let _ = call!(is_async, rover, service());
+        let is_sent = taken(&rover, from).iter().any(|&(at, id, _)| id == 9 && at >= 700_000);
+        assert!(!is_sent, "reading {readings}, async {is_async}");
+    }
+}
+
+#[test]
+fn behind_a_receiver_that_fails_no_robot_is_seen_to_stand_still() {
+    for is_async in BOTH {
+        let (world, mut rover, robot) = standing();
+        rover.port_mut().is_deaf = true;
+        turn(&world, &robot, 60);
+        for _ in 0..20 {
+            world.pass(20_000);
+            assert!(call!(is_async, rover, service()).is_err());
+            let now = rover.now();
+            let asked = rover.role_mut().start_firmware_update(39, now);
+            assert!(asked.is_err());
+        }
+        let waited = call!(is_async, rover, await_standstill(ms(50)));
+        assert!(waited.is_err());
+        // It has recovered.
+        rover.port_mut().is_deaf = false;
+        turn(&world, &robot, 0);
+        assert_eq!(call!(is_async, rover, await_standstill(ms(1000))), Ok(()));
+    }
+}
+
+#[test]
+fn a_standstill_is_not_that_before_a_slow_flush() {
+    for (is_async, flush) in [(false, Step::Blocks(900_000)), (true, Step::Late(900_000))] {
+        let (world, mut rover, robot) = standing();
+        rover.stop().unwrap();
+        world.pass(10_000);
+        rover.service().unwrap();
+        // The first round of the wait reads four reports, and sends a repetition.
+        world.pass(95_000);
+        let turning = robot.clone();
+        let clock = world.clone();
+        let begin_us = world.now_us();
+        world.add(move || {
+            let (Ok(mut robot), now) = (turning.try_borrow_mut(), clock.now()) else { return };
+            if clock.now_us() > begin_us + 20_000 {
+                let telemetry = Telemetry { rpm: [60; 4], ..Telemetry::default() };
+                robot.role_mut().set_telemetry(&telemetry, now);
+            }
+        });
+        rover.port_mut().flushes.extend(vec![flush; 8]);
+        let waited = call!(is_async, rover, await_standstill(ms(3000)));
+        assert!(matches!(waited, Err(DriveError::NoStandstill(_))), "{waited:?}");
+    }
+}
+
+#[test]
+fn the_rest_of_a_set_point_does_not_leave_after_its_dead_man() {
+    for is_async in BOTH {
+        let mut config = MasterConfig::direct();
+        (config.polling, config.nodes) = (Polling::Manual, NodeId::N2.into());
+        (config.dead_man, config.baud, config.reply_timeout) = (Some(ms(100)), 9600, ms(20));
+        let world = World::default();
+        let (near, far) = Port::pair(&world, 1042);
+        let slave = Slave::new(NodeId::N2, Mode::Velocity, SlaveConfig::at(9600), world.now());
+        let _slave = run(slave, far);
+        let mut bus = on(Master::new(config, world.now()), near);
+        bus.discover().unwrap();
+        let now = bus.now();
+        bus.role_mut().set_velocity(NodeId::N2, rps(1.0), now).unwrap();
+        world.pass(98_000);
+        let from = bus.port().written.len();
+        // A byte at a time, each of which takes a millisecond.
+        bus.port_mut().writes.extend(vec![Step::Drains(1, 0); 40]);
+        while world.now() < now + ms(130) {
+            let _ = call!(is_async, bus, service());
+            world.pass(100);
+        }
+        let set_point = WriteRequest::velocity(NodeId::N2, rps(1.0));
+        let written = &bus.port().written[from..];
+        assert!(written.starts_with(&set_point.as_bytes()[..1]), "it had begun");
+        let is_whole = written.windows(8).any(|bytes| bytes == set_point.as_bytes());
+        assert!(!is_whole, "async {is_async}");
+    }
+}
+
+#[test]
+fn an_answer_that_waits_for_its_port_is_not_sent_behind_what_was_said_meanwhile() {
+    let (mut slave, mut far) = slave(SlaveConfig::direct());
+    let world = slave.port().world.clone();
+    slave.service().unwrap();
+    let read = ReadRequest::new(NodeId::N2);
+    embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();
+    world.step(100);
+    slave.port_mut().writes.extend([Step::Late(1000), Step::Late(1000)]);
+    {
+        let mut service = std::pin::pin!(slave.asynch().service());
+        assert!(poll(service.as_mut()).is_pending());
+        let foreign = ReadRequest::new(NodeId::N5);
+        embedded_io::Write::write(&mut far, foreign.as_bytes()).unwrap();
+        // The executor is held up, but for less than ten milliseconds.
+        world.step(9000);
+        let _ = world.block_on(service);
+    }
+    let _ = world.block_on(slave.asynch().service());
+    assert_eq!(slave.port().written, [] as [u8; 0]);
+    assert_eq!(slave.role().statistics().overtaken, 1);
+}
