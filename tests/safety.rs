@@ -144,6 +144,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         format!("the last of them {} after that", ms(host.rpm_average)),
         format!("has one of {}", constant("src/drive/tty.rs", "WRITE_PATIENCE")),
         format!("does not take it within {}", constant("src/ucp/host/update.rs", "PATIENCE")),
+        format!("held up for {} looks at the port", constant("src/drive/driver.rs", "HELD_UP")),
         format!("{dead_man} after the application's last call, or after the robot was last heard"),
         format!("From {dead_man} after the last call on, or after the last frame of the robot"),
         format!("that has fallen silent for another {dead_man}"),
