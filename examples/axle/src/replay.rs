@@ -1,5 +1,7 @@
 //! `axle replay`: sends the frames of a capture, at their own pace or faster.
 
+mod pace;
+
 use std::path::PathBuf;
 
 use crate::{
@@ -11,12 +13,14 @@ use crate::{
     pcapng::Direction,
     play::{self, Due, Limits, Plan, Side},
 };
+use pace::Pace;
 
 /// Send the frames of a capture, at their own pace or faster
 ///
 /// Sends what one side of the line sent, frame by frame, and shows both sides. Bytes between frames
 /// are not sent. Raw bytes have no times: their frames follow each other at --every. No frame is
-/// sent faster than --baud allows.
+/// sent faster than --baud allows. A frame follows the one before it in the capture, so a clock that
+/// was set meanwhile changes nothing but that one step.
 ///
 /// Frames that command motors or a rover need --move, and are given to a master or a host, which
 /// sends them or refuses them. Before, the modes of all nodes that are commanded are read, and
@@ -51,6 +55,11 @@ pub(crate) struct Args {
     /// How much faster than recorded; 0.5 is half as fast
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = factor)]
     speed: f64,
+
+    /// Longest pause between two frames, seconds of the capture; a longer one is shortened to it,
+    /// and that is said
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = args::seconds)]
+    longest_pause: u64,
 
     /// Interval between two frames of raw bytes, seconds
     #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = args::seconds)]
@@ -95,9 +104,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
     let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
     let mut frames = Vec::new();
-    let (mut first, mut last_us) = (None, 0);
+    let mut pace = Pace::new(args.speed, args.longest_pause);
     let mut has_sent = false;
     for Taken { micros, direction, bytes, commands } in taken {
+        let due_us = micros.map(|micros| pace.due_us(micros));
         let (side, effect) = match play::effect_of(protocol, &bytes) {
             Ok(found) => found,
             // Only a commander's frames can be refused.
@@ -109,26 +119,23 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         if side != args.side {
             continue;
         }
-        let after_us = match micros {
-            Some(micros) => {
-                let begin = *first.get_or_insert(micros);
-                (micros.saturating_sub(begin) as f64 / args.speed) as u64
-            }
-            None => frames.len() as u64 * args.every,
-        };
+        let last_us = frames.last().map(|(_, due): &(_, Due)| due.after_us);
+        let unknown_us = last_us.map_or(0, |last_us| last_us + args.every);
+        let after_us = due_us.unwrap_or(unknown_us).max(last_us.unwrap_or(0));
         if after_us > LONGEST_US {
             let line = format!("frame {} is due after more than a year", frames.len() + 1);
             return Err(Failure::Failed(line));
         }
-        // Time may run backwards in a capture, but not here.
-        last_us = after_us.max(last_us);
         // The answers in the capture say how its commands were meant.
         let meant = commands.and_then(|node| modes.of(node));
         has_sent |= direction == Some(Direction::Out);
-        frames.push((direction, Due { after_us: last_us, bytes, meant, effect }));
+        frames.push((direction, Due { after_us, bytes, meant, effect }));
     }
     // Bytes that the recording program sent and then received are its own echo.
     frames.retain(|(direction, _)| !has_sent || *direction == Some(Direction::Out));
+    // It begins with the first of them.
+    let begin_us = frames.first().map_or(0, |(_, due)| due.after_us);
+    frames.iter_mut().for_each(|(_, due)| due.after_us -= begin_us);
     if frames.is_empty() {
         let line = format!("no frame of a {} in the capture", args.side);
         return Err(Failure::Failed(line));
@@ -149,6 +156,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         linger_us: LINGER_US,
         limits: args.limits,
         is_json: args.json,
+        notes: pace.notes(),
     })
 }
 

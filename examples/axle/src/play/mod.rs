@@ -25,6 +25,9 @@ use wheels::Wheels;
 /// Sends the frames of a plan.
 pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
     hidden::refuse(&plan)?;
+    for note in &plan.notes {
+        eprintln!("axle: {note}");
+    }
     let signals = Signals::listen_to_all()?;
     let result =
         plan.bus.open(plan.protocol).and_then(|line| play_on(plan, line, Teller::new(), &signals));

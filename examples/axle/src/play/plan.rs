@@ -30,4 +30,6 @@ pub(crate) struct Plan<'a> {
     pub(crate) linger_us: u64,
     pub(crate) limits: Limits,
     pub(crate) is_json: bool,
+    /// What is not as one would expect, to be said first.
+    pub(crate) notes: Vec<String>,
 }

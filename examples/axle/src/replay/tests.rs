@@ -90,7 +90,8 @@ fn what_is_due_in_ages_or_may_not_be_sent_is_refused_with_the_rest() {
     let far: [(u64, Option<Direction>, &[u8]); 2] =
         [(0, None, &read), (366 * 86_400_000, None, &read)];
     let says = "frame 2 is due after more than a year";
-    assert_eq!(frames(&capture("far", &far), "").unwrap_err(), says);
+    let slow = "--longest-pause 86400 --speed 0.001";
+    assert_eq!(frames(&capture("far", &far), slow).unwrap_err(), says);
     assert!(frames(&capture("faster", &far), "--speed 2").is_ok());
     let mut update = vec![0xFD, 0xFF, 20, 0, 2, 0];
     update.extend([0; 16]);
@@ -104,13 +105,35 @@ fn what_is_due_in_ages_or_may_not_be_sent_is_refused_with_the_rest() {
     assert_eq!(frames(&raw, "-P ucp --move --as device").unwrap_err(), says);
 }
 
-#[test]
-fn time_does_not_run_backwards() {
+/// Times and notes of a capture of READs at these times, milliseconds.
+fn paced(name: &str, millis: &[u64], words: &str) -> (Vec<u64>, Vec<String>) {
     let read = read();
-    let packets: [(u64, Option<Direction>, &[u8]); 3] =
-        [(100, None, &read), (300, None, &read), (200, None, &read)];
-    let found = frames(&capture("back", &packets), "").unwrap();
-    assert_eq!(found.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [0, 200_000, 200_000]);
+    let packets: Vec<_> = millis.iter().map(|at| (*at, None, &read[..])).collect();
+    let capture = capture(name, &packets);
+    let args = parsed(&capture, words);
+    let plan = plan(&args).unwrap();
+    (plan.frames.iter().map(|due| due.after_us / 1000).collect(), plan.notes)
+}
+
+#[test]
+fn behind_a_clock_that_was_set_back_the_pace_is_that_of_the_capture_and_it_is_said() {
+    let (times, notes) = paced("back", &[5000, 5100, 1000, 1100, 1250], "");
+    assert_eq!(times, [0, 100, 100, 200, 350]);
+    let says = "the clock of the capture goes back 1 time, by up to 4s 100ms: the frame behind \
+                that is sent at once";
+    assert_eq!(notes, [says]);
+    let (times, _) = paced("twice", &[5000, 4000, 4100, 10, 30], "--speed 0.5");
+    assert_eq!(times, [0, 0, 200, 200, 240]);
+}
+
+#[test]
+fn a_pause_of_hours_is_shortened_and_it_is_said() {
+    let hours = 3 * 3_600_000;
+    let (times, notes) = paced("hours", &[0, 100, hours + 100, hours + 200], "");
+    assert_eq!(times, [0, 100, 10_100, 10_200]);
+    assert_eq!(notes, ["1 pause of up to 3h shortened to 10s, see --longest-pause"]);
+    let (times, notes) = paced("longer", &[0, 20_000], "--longest-pause 30");
+    assert_eq!((times, notes), (vec![0, 20_000], vec![]));
 }
 
 #[test]

@@ -101,6 +101,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         linger_us: times.linger_us,
         limits: times.limits,
         is_json: times.json,
+        notes: Vec::new(),
     })
 }
 

@@ -63,6 +63,7 @@ impl Run {
             linger_us: self.linger_ms * 1000,
             limits: Limits { max_rps: Rps::new(20.0).unwrap(), max_turns: 100.0 },
             is_json: true,
+            notes: Vec::new(),
         };
         play_on(plan, line.clone(), Teller::to_memory().0, signals)
             .map_err(|failure| failure.to_string())
