@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::{
     args::{self, Protocol},
     bus,
-    decode::{self, Taken},
+    decode::{self, Taken, Walked},
     failure::Failure,
     help::MOTION_HELP,
     pcapng::Direction,
@@ -97,12 +97,14 @@ const LONGEST_US: u64 = 365 * 86_400_000_000;
 
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    play::run(plan(args)?)
+    let (plan, walked) = plan(args)?;
+    play::run(plan)?;
+    walked.missing()
 }
 
 /// The frames of one side of the capture, each with its time.
-fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
-    let (protocol, taken, modes) = decode::frames_of(&args.file, args.protocol)?;
+fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
+    let (protocol, taken, walked) = decode::frames_of(&args.file, args.protocol)?;
     let mut frames = Vec::new();
     let mut pace = Pace::new(args.speed, args.longest_pause);
     let mut has_sent = false;
@@ -127,7 +129,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
             return Err(Failure::Failed(line));
         }
         // The answers in the capture say how its commands were meant.
-        let meant = commands.and_then(|node| modes.of(node));
+        let meant = commands.and_then(|node| walked.modes.of(node));
         has_sent |= direction == Some(Direction::Out);
         frames.push((direction, Due { after_us, bytes, meant, effect }));
     }
@@ -147,7 +149,7 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
             frames.len()
         )));
     }
-    Ok(Plan {
+    let plan = Plan {
         bus: &args.bus,
         protocol,
         side: args.side,
@@ -157,7 +159,8 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         limits: args.limits,
         is_json: args.json,
         notes: pace.notes(),
-    })
+    };
+    Ok((plan, walked))
 }
 
 #[cfg(test)]

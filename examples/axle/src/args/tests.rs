@@ -112,6 +112,7 @@ fn every_default_is_as_it_is_written_here() {
         "ping every 0.2",
         "replay as commander",
         "replay speed 1",
+        "replay longest-pause 10",
         "replay every 0.02",
         "replay max-rps 20",
         "replay max-turns 100",

@@ -28,7 +28,7 @@ pub(super) fn run(args: &Args, mut input: Input, choice: Choice) -> Result<(), F
     let mut printer = printer.unwrap_or_else(|| Printer::new(args.json, None));
     printer.print_sheet(&mut sheet)?;
     let account = walked.account;
-    if let Some(failure) = walked.broken {
+    if let Some(failure) = walked.broken.or(walked.cut) {
         printer.break_off(&account, walked.times_back)?;
         return Err(failure);
     }

@@ -23,7 +23,7 @@ use crate::{
     args::Protocol,
     failure::Failure,
     input::{self, Input},
-    listing::{Modes, Shown},
+    listing::Shown,
     pcapng,
 };
 use args::style;
@@ -70,28 +70,29 @@ pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box
     Choice::default().stream(protocol, None, Some(direction))
 }
 
-/// All frames of a capture of one line, and the modes of its nodes. `chosen` is needed for raw
-/// bytes.
+/// All frames of a capture of one line, as far as it can be read, and the modes of its nodes.
+/// `chosen` is needed for raw bytes.
 ///
 /// The frames are for one line again. So there may be no other in the capture, and no doubt about
 /// how a command was meant: its node must not have changed its mode (ruling I3).
 pub(crate) fn frames_of(
     path: &Path,
     chosen: Option<Protocol>,
-) -> Result<(Protocol, Vec<Taken>, Modes), Failure> {
+) -> Result<(Protocol, Vec<Taken>, Walked), Failure> {
     let mut input = Input::open(Some(path))?;
     let mut sheet = Sheet::new(None);
     sheet.taken = Some(Default::default());
     let choice = Choice { protocol: chosen, direction: None };
     let mut found = None;
-    let walked = walk(&mut input, choice, &mut sheet, |next, _| {
+    let mut walked = walk(&mut input, choice, &mut sheet, |next, _| {
         let (_, interface) = *found.get_or_insert((next.protocol, next.interface));
         if interface != next.interface {
             return Err(Failure::Failed(format!("{path:?} has more than one line")));
         }
         Ok(true)
     });
-    if let Some(failure) = walked.broken {
+    if let Some(failure) = walked.broken.take().or_else(|| walked.cut.take_if(|_| found.is_none()))
+    {
         return Err(failure);
     }
     let protocol = found.map(|(protocol, _)| protocol).or(chosen);
@@ -102,7 +103,7 @@ pub(crate) fn frames_of(
         let line = format!("node {node} changes its mode in {path:?}: its commands are ambiguous");
         return Err(Failure::Failed(line));
     }
-    Ok((protocol, taken, walked.modes))
+    Ok((protocol, taken, walked))
 }
 
 /// Finds out the protocol of raw bytes, and says how sure it is.

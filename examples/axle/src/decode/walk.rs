@@ -35,8 +35,48 @@ pub(crate) struct Walked {
     pub(crate) times_back: u64,
     /// The modes of the nodes at the end of the last line.
     pub(crate) modes: Modes,
-    /// Why reading ended early. What was read is on the sheet.
+    /// Packets whose time no clock can have shown, which count as packets without one: how many,
+    /// and the number of the first.
+    bad_times: (u64, u64),
+    /// Why the capture could not be read to its end. What is before that is on the sheet.
+    pub(crate) cut: Option<Failure>,
+    /// Why the walk was given up. What was read is on the sheet.
     pub(crate) broken: Option<Failure>,
+}
+
+/// The last time that a packet can have, microseconds since 1970: the end of the year 2261, which
+/// every form of export can say.
+const LATEST_US: u64 = i64::MAX as u64 / 1000;
+
+impl Walked {
+    /// The time of the packet with this number, if it can be one.
+    fn time(&mut self, micros: Option<u64>, packet: u64) -> Option<u64> {
+        let (count, first) = &mut self.bad_times;
+        if micros? <= LATEST_US {
+            return micros;
+        }
+        if *count == 0 {
+            *first = packet;
+        }
+        *count += 1;
+        None
+    }
+
+    fn warn(&self) {
+        let (count, first) = self.bad_times;
+        if count > 0 {
+            let (packets, have) = if count == 1 { ("packet", "has") } else { ("packets", "have") };
+            eprintln!(
+                "axle: {count} {packets} {have} an impossible time, which is left out: the first \
+                 is packet {first}"
+            );
+        }
+    }
+
+    /// What is missing of the capture, for whoever has done something with the rest.
+    pub(crate) fn missing(self) -> Result<(), Failure> {
+        self.cut.map_or(Ok(()), |cut| Err(cut.and("what is before that was taken")))
+    }
 }
 
 /// Feeds a capture to a sheet; each interface and each direction is a stream of its own. `go_on` is
@@ -56,6 +96,7 @@ pub(crate) fn walk(
     // Nothing more will come, even if the file was cut off.
     walk.end_lines(sheet);
     walk.walked.broken = result.err();
+    walk.walked.warn();
     walk.walked
 }
 
@@ -81,7 +122,15 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
         let path = input.path().map(ToOwned::to_owned);
         let mut reader = Reader::new(input);
         let (mut latest, mut section) = (0, 0);
-        while let Some(packet) = reader.next().map_err(|problem| problem.failure(path.clone()))? {
+        for number in 1.. {
+            let packet = match reader.next() {
+                Ok(Some(packet)) => packet,
+                Ok(None) => break,
+                Err(problem) => {
+                    self.walked.cut = Some(problem.failure(path));
+                    break;
+                }
+            };
             if packet.section != section {
                 section = packet.section;
                 self.end_lines(sheet);
@@ -97,20 +146,17 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                     new.insert(Line::new(protocol, Some(packet.interface)))
                 }
             };
-            if let Some(micros) = packet.micros {
+            let micros = self.walked.time(packet.micros, number);
+            if let Some(micros) = micros {
                 self.walked.times_back += u64::from(micros < latest);
                 latest = micros;
             }
-            let next = Next {
-                protocol: line.protocol,
-                interface: Some(packet.interface),
-                micros: packet.micros,
-            };
+            let next = Next { protocol: line.protocol, interface: Some(packet.interface), micros };
             for piece in packet.bytes.chunks(PIECE) {
                 if !(self.go_on)(next, sheet)? {
                     return Ok(());
                 }
-                line.feed(self.choice, packet.direction, piece, packet.micros, sheet);
+                line.feed(self.choice, packet.direction, piece, micros, sheet);
                 if sheet.is_full() {
                     return Ok(());
                 }
@@ -127,10 +173,14 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
         self.choice.permits(protocol)?;
         let line = self.lines.entry(0).or_insert_with(|| Line::new(protocol, None));
         loop {
-            let bytes = input.read()?;
-            if bytes.is_empty() {
-                return Ok(());
-            }
+            let bytes = match input.read() {
+                Ok([]) => return Ok(()),
+                Ok(bytes) => bytes,
+                Err(failure) => {
+                    self.walked.cut = Some(failure);
+                    return Ok(());
+                }
+            };
             for piece in bytes.chunks(PIECE) {
                 if !(self.go_on)(Next { protocol, interface: None, micros: None }, sheet)? {
                     return Ok(());

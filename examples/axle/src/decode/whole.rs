@@ -40,7 +40,7 @@ pub(crate) fn choose(input: &mut Input, named: Option<Protocol>) -> Result<Chose
 }
 
 impl Chosen {
-    /// Walks over the whole capture. It fails if not all could be read, and if there is no frame.
+    /// Walks over the whole capture, as far as it can be read. It fails if there is no frame.
     pub(crate) fn walk(
         &self,
         input: &mut Input,
@@ -57,6 +57,9 @@ impl Chosen {
         let account = &walked.account;
         if account.frames > 0 {
             return Ok(walked);
+        }
+        if let Some(cut) = walked.cut {
+            return Err(cut);
         }
         Err(Failure::Failed(match (account.received, self.has_times, self.choice.protocol) {
             (0, ..) => "the capture is empty".to_owned(),

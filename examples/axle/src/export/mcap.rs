@@ -27,14 +27,7 @@ pub(super) fn export(mut job: Job<'_>) -> Result<Walked, Failure> {
     let mut topics = Topics { writer, known: BTreeMap::new(), count: 0, latest: None };
     let mut sheet = Sheet::new(Some(Style::Json));
     sheet.marks = Some(Vec::new());
-    let write = |topics: &mut Topics, sheet: &mut Sheet| match topics.write(sheet) {
-        Ok(()) => Ok(()),
-        Err(Trouble::Late) => Err(cannot_write(
-            job.output,
-            &"MCAP has no times after the year 2554, and the capture has one",
-        )),
-        Err(Trouble::Mcap(error)) => Err(cannot(error)),
-    };
+    let write = |topics: &mut Topics, sheet: &mut Sheet| topics.write(sheet).map_err(cannot);
     let walked = job.chosen.walk(&mut job.input, &mut sheet, |_, sheet| {
         Job::go_on(&job.signals)?;
         write(&mut topics, sheet)
@@ -56,28 +49,16 @@ struct Topics {
     latest: Option<u64>,
 }
 
-enum Trouble {
-    /// A time that MCAP cannot say.
-    Late,
-    Mcap(mcap::McapError),
-}
-
-impl From<mcap::McapError> for Trouble {
-    fn from(error: mcap::McapError) -> Self {
-        Self::Mcap(error)
-    }
-}
-
 impl Topics {
     /// Writes the lines of a sheet, and empties it.
-    fn write(&mut self, sheet: &mut Sheet) -> Result<(), Trouble> {
+    fn write(&mut self, sheet: &mut Sheet) -> Result<(), mcap::McapError> {
         let mut begin = 0;
         for mark in sheet.marks.iter_mut().flat_map(|marks| marks.drain(..)) {
             let line = sheet.out.0.get(begin..mark.end).unwrap_or_default();
             begin = mark.end;
             let channel_id = self.topic(mark.protocol, mark.message)?;
             if let Some(micros) = mark.at.micros {
-                self.latest = Some(micros.checked_mul(1000).ok_or(Trouble::Late)?);
+                self.latest = Some(micros.saturating_mul(1000));
             }
             // A packet without a time has that of the line before it. Raw bytes have none at all: a
             // nanosecond per byte keeps their order.

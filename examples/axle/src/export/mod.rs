@@ -89,7 +89,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         #[allow(unreachable_patterns, reason = "with all features")]
         Format::Mcap | Format::Parquet => return Ok(()),
     }?;
-    tell(&walked, &args.output).map_err(Failure::Write)
+    tell(&walked, &args.output).map_err(Failure::Write)?;
+    walked.missing()
 }
 
 fn tell(walked: &Walked, output: &Path) -> io::Result<()> {

@@ -160,17 +160,9 @@ fn write(
     match &column.values {
         Values::Small(values) => put::<Int32Type>(to, part(values, range), piece),
         Values::Float(values) => put::<FloatType>(to, part(values, range), piece),
-        Values::Large(values) if column.kind != Kind::Time => {
+        Values::Large(values) => {
             // The same 64 bits, whether they have a sign or not.
             let values: Vec<_> = part(values, range).iter().map(|value| *value as i64).collect();
-            put::<Int64Type>(to, &values, piece)
-        }
-        Values::Large(values) => {
-            let values = part(values, range).iter().map(|value| i64::try_from(*value));
-            let values = values.collect::<Result<Vec<_>, _>>().map_err(|_| {
-                let line = "Parquet has no times after the year 294246, and the capture has one";
-                ParquetError::General(line.to_owned())
-            })?;
             put::<Int64Type>(to, &values, piece)
         }
         Values::Name(values) => {

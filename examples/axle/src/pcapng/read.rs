@@ -14,6 +14,9 @@ use crate::failure::Failure;
 /// interfaces in up to a few kilobytes and cut packets at 256 KiB.
 const LONGEST_BLOCK: usize = 1 << 20;
 
+/// Major version of the format.
+const VERSION: u32 = 1;
+
 /// Most accepted interfaces of one section: each is held in memory, and has streams of its own.
 const MOST_INTERFACES: usize = 1024;
 
@@ -81,6 +84,8 @@ pub(crate) enum Problem {
     Io(io::Error),
     /// The block that begins at this offset is cut off by the end of the file.
     CutOff { offset: u64 },
+    /// The section that begins at this offset has another format.
+    Version { offset: u64, major: u32 },
     /// The block that begins at this offset is invalid.
     Invalid { offset: u64, why: &'static str },
 }
@@ -105,6 +110,11 @@ impl fmt::Display for Problem {
             Self::CutOff { offset } => {
                 write!(f, "the file ends inside the pcapng block at byte {offset}")
             }
+            Self::Version { offset, major } => write!(
+                f,
+                "the section at byte {offset} has version {major} of pcapng: axle reads version \
+                 {VERSION}"
+            ),
             Self::Invalid { offset, why } => {
                 write!(f, "invalid pcapng block at byte {offset}: {why}")
             }
@@ -228,6 +238,14 @@ impl<R: Read> Reader<R> {
         }
         if self.peek(8) != Some(BYTE_ORDER) {
             return Err(self.invalid("it has no byte-order mark"));
+        }
+        if !self.fill(16)? {
+            return Err(Problem::CutOff { offset: self.offset });
+        }
+        let versions = self.peek(12).unwrap_or(0);
+        let major = if self.is_big_endian { versions >> 16 } else { versions & 0xFFFF };
+        if major != VERSION {
+            return Err(Problem::Version { offset: self.offset, major });
         }
         // Their numbers begin anew, and nothing refers to those before.
         self.interfaces_before += self.interfaces.len();

@@ -128,6 +128,19 @@ fn times_of_any_unit_and_byte_order_are_microseconds() {
 }
 
 #[test]
+fn a_section_of_another_version_is_refused_by_its_number() {
+    for is_big in [false, true] {
+        let mut bytes = with_option(is_big, 9, &[6], 1);
+        let major = if is_big { 13 } else { 12 };
+        bytes[major] = 2;
+        let (seen, problem) = read(&bytes);
+        assert!(seen.is_empty());
+        let says = "the section at byte 0 has version 2 of pcapng: axle reads version 1";
+        assert_eq!(problem.unwrap().to_string(), says);
+    }
+}
+
+#[test]
 fn packets_of_later_sections_have_interfaces_of_their_own() {
     let one = with_option(false, 9, &[6], 1);
     let two = with_option(true, 9, &[9], 2000);
@@ -154,8 +167,9 @@ fn simple_packets_have_no_time_and_unknown_blocks_are_passed_over() {
 #[test]
 fn the_padding_of_a_simple_packet_is_no_part_of_it() {
     // An interface that cuts packets at 5 bytes, and a packet that had 8 on the line.
-    let section =
-        block(false, 0x0A0D_0D0A, &[&0x1A2B_3C4D_u32.to_le_bytes()[..], &[0; 12]].concat());
+    let version = [1, 0, 0, 0];
+    let head = [&0x1A2B_3C4D_u32.to_le_bytes()[..], &version, &[0xFF; 8]].concat();
+    let section = block(false, 0x0A0D_0D0A, &head);
     let interface = block(false, 1, &[149, 0, 0, 0, 5, 0, 0, 0]);
     let start = [section, interface].concat();
     for (len_on_line, expected) in

@@ -45,13 +45,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut input = Input::open(Some(&args.file))?;
     args.fit(input.is_pcapng()?)?;
     let output = output::Output::create(&args.output, args.force, &input, &signals)?;
-    let picture = read::picture(args, input, &signals)?;
+    let (picture, walked) = read::picture(args, input, &signals)?;
     let bytes = match format {
         output::Format::Svg => draw::to_svg(&picture)?.into_bytes(),
         output::Format::Png => draw::to_png(&picture)?,
         output::Format::Html => html::page(&picture)?.into_bytes(),
     };
-    output.finish(&bytes)
+    output.finish(&bytes)?;
+    walked.missing()
 }
 
 /// Runs the subcommand.

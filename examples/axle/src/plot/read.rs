@@ -12,7 +12,7 @@ use super::{
 use crate::{
     args::Protocol,
     beside,
-    decode::{self, Sheet},
+    decode::{self, Sheet, Walked},
     failure::Failure,
     input::Input,
     listing::Style,
@@ -22,17 +22,16 @@ use crate::{
 /// Bits of a byte on the line, with start and stop bit.
 const BITS: f64 = 10.0;
 
-/// Reads the capture of these arguments.
+/// Reads the capture of these arguments, as far as it can be read.
 pub(super) fn picture(
     args: &Args,
     mut input: Input,
     signals: &Signals,
-) -> Result<Picture, Failure> {
+) -> Result<(Picture, Walked), Failure> {
     let chosen = decode::choose(&mut input, args.protocol.0)?;
     let mut sheet = Sheet::new(Some(Style::Json));
     let mut reading = Reading::new(args);
-    // What was read before a failure is not drawn: nobody would see that the rest is missing.
-    chosen.walk(&mut input, &mut sheet, |next, sheet| {
+    let walked = chosen.walk(&mut input, &mut sheet, |next, sheet| {
         if signals.is_raised() {
             return Err(beside::interrupted());
         }
@@ -40,7 +39,7 @@ pub(super) fn picture(
         reading.is_next(next.protocol, next.interface)
     })?;
     reading.lines(&mut sheet)?;
-    reading.finish()
+    Ok((reading.finish()?, walked))
 }
 
 /// What was read so far.

@@ -48,7 +48,7 @@ fn parsed(capture: &Capture, words: &str) -> Args {
 /// Times in microseconds, and the first four bytes.
 fn frames(capture: &Capture, words: &str) -> Result<Vec<(u64, [u8; 4])>, String> {
     let args = parsed(capture, words);
-    let plan = plan(&args).map_err(|failure| failure.to_string())?;
+    let (plan, _) = plan(&args).map_err(|failure| failure.to_string())?;
     let start = |bytes: &[u8]| [bytes[0], bytes[1], bytes[2], bytes[3]];
     Ok(plan.frames.iter().map(|due| (due.after_us, start(&due.bytes))).collect())
 }
@@ -111,7 +111,7 @@ fn paced(name: &str, millis: &[u64], words: &str) -> (Vec<u64>, Vec<String>) {
     let packets: Vec<_> = millis.iter().map(|at| (*at, None, &read[..])).collect();
     let capture = capture(name, &packets);
     let args = parsed(&capture, words);
-    let plan = plan(&args).unwrap();
+    let (plan, _) = plan(&args).unwrap();
     (plan.frames.iter().map(|due| due.after_us / 1000).collect(), plan.notes)
 }
 
@@ -166,12 +166,12 @@ fn the_options_reach_the_plan_and_the_answers_say_how_a_command_was_meant() {
     let packets: [(u64, Option<Direction>, &[u8]); 2] = [(0, None, &write), (1, None, &answer)];
     let capture = capture("options", &packets);
     let args = parsed(&capture, "--move --max-rps 5 --max-turns 7 -j");
-    let found = plan(&args).unwrap();
+    let (found, _) = plan(&args).unwrap();
     assert_eq!((found.limits.max_rps.get(), found.limits.max_turns), (5.0, 7.0));
     assert!(found.is_json && found.side == Side::Commander && found.linger_us == 200_000);
     assert_eq!(found.frames[0].meant, Some(axlewire::ikeya::Mode::Velocity));
     let args = parsed(&capture, "--as device");
-    let found = plan(&args).unwrap();
+    let (found, _) = plan(&args).unwrap();
     assert!(!found.is_json && found.side == Side::Device);
 }
 

@@ -37,7 +37,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     });
     let (counters, end) = (walked.account, Instant::from_micros(last));
     let is_empty = counters.received == 0;
-    match walked.broken {
+    let broken = walked.broken.or(walked.cut);
+    match broken {
         Some(failure) if is_empty => return Err(failure),
         _ => {}
     }
@@ -55,5 +56,5 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         table.finish(&mut out, &counters, end)
     };
     told.map_err(Failure::Write)?;
-    walked.broken.map_or(Ok(()), Err)
+    broken.map_or(Ok(()), Err)
 }

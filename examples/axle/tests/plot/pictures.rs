@@ -209,6 +209,22 @@ fn the_page_needs_no_network_and_a_file_name_cannot_end_its_script() {
 }
 
 #[test]
+fn what_is_before_the_end_of_a_recording_that_was_cut_is_drawn_and_it_is_said() {
+    let folder = Folder::new("cut");
+    let motors = fs::read(Path::new(CAPTURES).join("motors.pcapng")).unwrap();
+    let path = folder.path("cut.pcapng");
+    fs::write(&path, &motors[..5000]).unwrap();
+    for picture in ["a.svg", "a.png", "a.html"] {
+        let output = folder.path(picture);
+        let said = complaint(&[&path, "-o", &output], 1);
+        let says = "the file ends inside the pcapng block at byte 4960; what is before that was \
+                    taken";
+        assert!(said.ends_with(says), "{said}");
+        assert!(fs::metadata(&output).unwrap().len() > 1000, "{picture}");
+    }
+}
+
+#[test]
 fn bad_input_and_a_bad_output_leave_no_file() {
     let folder = Folder::new("bad");
     let motors = fs::read(Path::new(CAPTURES).join("motors.pcapng")).unwrap();
@@ -218,8 +234,7 @@ fn bad_input_and_a_bad_output_leave_no_file() {
     let mut foreign = PcapNg::new(1, &[(1, 1, &[1, 2, 3, 4])]);
     foreign.packet(0, (2, 1, &[5, 6]));
     let reads = PcapNg::new(147, &[(1, 1, ReadRequest::new(NodeId::N1).as_bytes())]);
-    let inputs: [(&str, &[u8], &[&str], &str); 9] = [
-        ("cut.pcapng", &motors[..5000], &[], "the file ends inside the pcapng block at byte 4960"),
+    let inputs: [(&str, &[u8], &[&str], &str); 8] = [
         ("empty.bin", &[], &[], "the capture is empty"),
         ("empty.pcapng", &PcapNg::new(147, &[]).0, &[], "the capture is empty"),
         ("noise.bin", &[7; 1000], &[], "no frame of any protocol in the first 1000 bytes"),

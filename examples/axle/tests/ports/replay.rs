@@ -163,15 +163,25 @@ fn a_hidden_frame_is_one_in_the_answers_of_a_device_too_and_none_in_a_command_to
 }
 
 #[test]
-fn a_frame_that_is_due_in_ages_is_not_sent_at_once() {
+fn behind_a_clock_that_was_set_the_pace_is_that_of_the_capture_and_it_is_said() {
     let line = played::bus(&[Node::velocity(1)], |_, _| {});
-    let write = *WriteRequest::velocity(NodeId::N1, Rps::new(1.0).unwrap()).as_bytes();
-    let packets: [Packet<'_>; 2] = [(0, 2, &write), (u64::MAX, 2, &write)];
-    let path = file("ages.pcapng", &PcapNg::new(147, &packets).0);
-    let replay = format!("replay {} --move -p {}", path.to_str().unwrap(), line.path);
-    let error = Process::start(&replay).complaint(1);
-    assert_eq!(error, "frame 2 is due after more than a year");
-    assert!(line.said().is_empty());
+    let read = *ReadRequest::new(NodeId::N1).as_bytes();
+    let second = 1_000_000;
+    let times = [5000 * second, 5001 * second, 20 * second, 21 * second];
+    let packets = times.map(|at| (at, 2, &read[..]));
+    let path = file("set_back.pcapng", &PcapNg::new(147, &packets).0);
+    let replay = format!("replay {} -p {}", path.to_str().unwrap(), line.path);
+    let ended = Process::start(&replay).end();
+    let says = "axle: the clock of the capture goes back 1 time, by up to 1h 23m 1s";
+    assert!(ended.code == Some(0) && ended.stderr[0].starts_with(says), "{ended:?}");
+    let at: Vec<f64> = ended
+        .stdout
+        .iter()
+        .filter(|line| line.contains("read_request"))
+        .map(|line| line.split_whitespace().next().unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(at.len(), 4, "{ended:?}");
+    assert!(at.windows(2).all(|two| two[1] >= two[0]) && at[3] - at[0] > 1.9, "{at:?}");
 }
 
 #[test]
