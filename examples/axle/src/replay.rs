@@ -19,8 +19,8 @@ use pace::Pace;
 ///
 /// Sends what one side of the line sent, frame by frame, and shows both sides. Bytes between frames
 /// are not sent. Raw bytes have no times: their frames follow each other at --every. No frame is
-/// sent faster than --baud allows. A frame follows the one before it in the capture, so a clock that
-/// was set meanwhile changes nothing but that one step.
+/// sent faster than --baud allows. A frame follows the one before it in the capture, so a clock
+/// that was set meanwhile changes nothing but that one step.
 ///
 /// Frames that command motors or a rover need --move, and are given to a master or a host, which
 /// sends them or refuses them. Before, the modes of all nodes that are commanded are read, and
