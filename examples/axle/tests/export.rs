@@ -9,7 +9,7 @@ use std::{
     process::Output,
 };
 
-use support::{axle, bytes, decode, pcapng::PcapNg, run};
+use support::{axle, bytes, pcapng::PcapNg, run};
 
 /// An empty folder.
 fn folder(name: &str) -> PathBuf {
