@@ -217,13 +217,6 @@ fn garbage_behind_the_first_bytes_of_a_pcapng_file_is_one_line() {
     assert_eq!(code, Some(1));
 }
 
-#[test]
-fn a_date_that_no_calendar_has_is_printed_in_seconds() {
-    let ping = Ping {}.frame(0).as_bytes().to_vec();
-    let capture = PcapNg::new(UCP, &[(u64::MAX, 1, &ping)]).0;
-    assert_eq!(times(&["-t", "absolute"], &capture), ["18446744073709 s"]);
-}
-
 /// A capture of these interfaces and packets: interface and bytes.
 fn of_lines(link_types: &[u16], packets: &[(u32, &[u8])]) -> Vec<u8> {
     let (first, others) = link_types.split_first().unwrap();
