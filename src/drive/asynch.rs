@@ -217,13 +217,17 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // It may have recovered meanwhile.
             self.sending.end_waits();
         }
-        for count in 0..FRAMES {
+        let mut is_again = false;
+        for _ in 0..FRAMES {
             result = result.and(self.receive().await);
             self.expire();
-            match self.load(count == 0) {
+            match self.load(is_again) {
                 Ok(Next::End) => break,
-                Ok(Next::Look) => continue,
-                Ok(Next::Send) => {}
+                Ok(Next::Look) => {
+                    is_again = true;
+                    continue;
+                }
+                Ok(Next::Send) => is_again = false,
                 Err(error) => {
                     result = result.and(Err(error));
                     break;
@@ -374,6 +378,8 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn write_rest(&mut self, wait_us: u32) -> Result<Result<usize, P::Error>, Unwritten> {
         let patience_us = self.patience_between_steps().as_micros();
         let acts = driver::look_period(&self.role).is_some();
+        // A host says itself what is outdated by now: its stops are not, however late they are.
+        let knows_time = self.role.line_rules().held_up_after == Some(Duration::ZERO);
         let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
         let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
@@ -397,7 +403,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
             // An answer of a slave or a robot has no more time than that altogether.
             let (since, nap_us) = if acts { (begin, 0) } else { (asked_at, nap_us) };
-            if (now - since).as_micros() > nap_us.saturating_add(patience_us) {
+            if !knows_time && (now - since).as_micros() > nap_us.saturating_add(patience_us) {
                 return Err(Unwritten::HeldUp);
             }
         }

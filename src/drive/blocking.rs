@@ -30,14 +30,18 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     fn round(&mut self) -> Result<(), DriveError<P::Error>> {
         self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
-        for count in 0..FRAMES {
+        let mut is_again = false;
+        for _ in 0..FRAMES {
             // Before time passes: the rest of a frame may wait in the port.
             result = result.and(self.receive());
             self.expire();
-            match self.load(count == 0) {
+            match self.load(is_again) {
                 Ok(Next::End) => break,
-                Ok(Next::Look) => continue,
-                Ok(Next::Send) => {}
+                Ok(Next::Look) => {
+                    is_again = true;
+                    continue;
+                }
+                Ok(Next::Send) => is_again = false,
                 Err(error) => {
                     result = result.and(Err(error));
                     break;

@@ -108,6 +108,8 @@ pub struct Driver<R, P, C> {
     /// A frame was handed out although bytes may have waited, by this driver or by one before it:
     /// up to the next empty port, what is received may be from before that frame.
     has_overtaken: bool,
+    /// When the role last decided that what is to be sent may go.
+    decided_at: Instant,
     /// When the call that is running ends, if its command must not be sent after that.
     pub(super) ends_at: Option<Instant>,
     pub(super) sending: Sending,
@@ -160,6 +162,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             empty_at,
             unsure_since: Some(latest),
             has_overtaken: true,
+            decided_at: latest,
             ends_at: None,
             sending: Sending::new(latest),
         }
@@ -378,14 +381,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
-    /// is outdated. `is_first` is set if this is the first time in a round.
-    pub(super) fn load<E>(&mut self, is_first: bool) -> Result<Next, DriveError<E>> {
+    /// is outdated. `is_again` is set if the port has been looked at again because of a hold-up: it
+    /// is not a third time, so that something leaves whatever happens.
+    pub(super) fn load<E>(&mut self, is_again: bool) -> Result<Next, DriveError<E>> {
         if !self.sending.rest().is_empty() {
             // The receiver may have taken long since the round began.
             self.reclaim();
         }
         let now = self.now();
-        if is_first && now - self.looked_at > self.patience_between_steps() {
+        if !is_again && now - self.looked_at > self.patience_between_steps() {
             return Ok(Next::Look);
         }
         self.give_up_outdated();
@@ -397,6 +401,11 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             if self.may_hold_more() {
                 return Ok(Next::End);
             }
+            // A command that has ended while the driver was held up is not repeated.
+            if reached(self.ends_at, now) {
+                return Ok(Next::End);
+            }
+            self.decided_at = now;
             let Some(frame) = self.role.poll_transmit(now) else {
                 self.sending.end_write_wait();
                 return Ok(Next::End);
@@ -414,6 +423,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             return;
         }
         self.tell_time();
+        self.decided_at = self.latest();
         if self.role.is_outdated() {
             self.give_up();
         }
@@ -427,10 +437,10 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// Notes that the port is about to be asked to take the unsent bytes. `false` if they have been
     /// given up: the driver was held up since the role has decided on them.
     pub(super) fn before_write(&mut self) -> bool {
-        let before = self.latest();
         let now = self.now();
-        if now - before > self.patience_between_steps() {
-            if look_period(&self.role).is_some() {
+        if now - self.decided_at > self.patience_between_steps() {
+            let is_late = self.is_over() || look_period(&self.role).is_some();
+            if is_late || self.sending.is_in_parts() {
                 self.reclaim();
             }
             self.give_up_outdated();

@@ -139,6 +139,11 @@ impl Sending {
         self.outbox.is_empty() && matches!(self.taken, Taken::Parts | Taken::CutOff)
     }
 
+    /// Whether the port has taken a part of the frame.
+    pub(super) fn is_in_parts(&self) -> bool {
+        self.taken == Taken::Parts
+    }
+
     /// Whether the frame is not yet known to have left, or to be given up.
     fn is_under_way(&self) -> bool {
         !self.outbox.is_empty() || self.taken == Taken::Parts
