@@ -118,8 +118,12 @@ pub struct Driver<R, P, C> {
 /// How often the port of a role that acts on commands must be read, see
 /// [`LineRules::held_up_after`](crate::endpoint::LineRules::held_up_after).
 pub(super) fn look_period<R: Endpoint>(role: &R) -> Option<Duration> {
-    let limit = role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO)?;
-    Some(Duration::from_micros(limit.as_micros() / 2))
+    Some(Duration::from_micros(commands_wait(role)?.as_micros() / 2))
+}
+
+/// How long a command may wait in the port of a role that acts on commands; `None` for others.
+fn commands_wait<R: Endpoint>(role: &R) -> Option<Duration> {
+    role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO)
 }
 
 /// When the bytes in a port may have arrived that was not looked at before.
@@ -376,13 +380,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Longest time between two steps that is no hold-up.
     pub(super) fn patience_between_steps(&self) -> Duration {
-        let limit = self.role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO);
-        limit.map_or(HELD_UP, |limit| limit.min(HELD_UP))
+        commands_wait(&self.role).map_or(HELD_UP, |limit| limit.min(HELD_UP))
     }
 
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
-    /// is outdated. `is_again` is set if the port has been looked at again because of a hold-up: it
-    /// is not a third time, so that something leaves whatever happens.
+    /// is outdated. `is_again` says that the port has just been looked at again because of a
+    /// hold-up: what is due is then sent, however often the driver is held up.
     pub(super) fn load<E>(&mut self, is_again: bool) -> Result<Next, DriveError<E>> {
         if !self.sending.rest().is_empty() {
             // The receiver may have taken long since the round began.

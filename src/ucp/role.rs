@@ -10,9 +10,6 @@ pub(super) const SHORTEST: Duration = Duration::from_millis(1);
 /// millisecond later, which a clock that counts milliseconds may not see. Ruling U16 allows 20 ms.
 pub(super) const FRAME_PAUSE: Duration = Duration::from_millis(4);
 
-/// Longest time from handing a frame out to the failure of its flush: a later one is not its own.
-pub(super) const FLUSH_TIME: Duration = Duration::from_secs(2);
-
 /// What became of a frame: one that was taken whole, with a pause inside, may have arrived.
 pub(super) const fn fate(unsent: Unsent, is_taken: bool) -> Unsent {
     match unsent {

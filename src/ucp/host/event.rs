@@ -77,8 +77,8 @@ pub enum HostEvent {
     /// seen to stand still, or because the port did not take it whole. Ask again once
     /// [`stop_progress`](crate::ucp::Host::stop_progress) shows a standstill.
     UpdateNotSent,
-    /// The robot has answered a firmware update request; which one it does not say. The host
-    /// stays as silent as it was.
+    /// The robot has answered a firmware update request; which one it does not say. It
+    /// changes nothing in what the host sends.
     UpdateAnswered(OtaStatus),
     /// A good frame for which this crate has no message (ruling U3).
     Unknown(UnknownFrame),

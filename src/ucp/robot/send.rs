@@ -4,15 +4,18 @@ use super::{config::ReportLayout, outgoing::Outgoing, state::State};
 use crate::{
     endpoint::Unsent,
     stats::{count, uncount},
-    time::{Instant, earliest, reached},
+    time::{Duration, Instant, earliest, reached},
     ucp::{
         body::{CalibrationEndAck, CalibrationStartAck, OtaAck, Pong},
         codes::ErrorCode,
         header::MAX_LEN,
         report::{DocumentReport, FirmwareReport},
-        role::{FLUSH_TIME, fate, write},
+        role::{fate, write},
     },
 };
+
+/// Longest time from handing a frame out to the failure of its flush: a later one is not its own.
+const FLUSH_TIME: Duration = Duration::from_secs(2);
 
 impl State {
     /// Encodes the most urgent frame that is due; returns its length.

@@ -44,8 +44,8 @@ pub(crate) struct Walked {
     pub(crate) broken: Option<Failure>,
 }
 
-/// The last time that a packet can have, microseconds since 1970: the end of the year 2261, which
-/// every form of export can say.
+/// The last time that a packet can have, microseconds since 1970: in April 2262. Every form of
+/// export can hold it.
 const LATEST_US: u64 = i64::MAX as u64 / 1000;
 
 impl Walked {

@@ -40,6 +40,7 @@ use crate::{
 /// interface and direction, and MCAP has the offset instead, a nanosecond per byte.
 ///
 /// The output is written under another name first, so that it is there as a whole or not at all.
+/// Of a capture that is cut off, it has what comes before the cut, and the exit code is 1.
 /// Memory use does not grow with the input, except for the index that MCAP and Parquet files have
 /// at their end: less than a thousandth of the file.
 #[derive(Debug, clap::Args)]
