@@ -84,7 +84,6 @@ impl<E, const N: usize, const LATEST: usize> Events<E, N, LATEST> {
     }
 
     /// Removes every event that does not stay; the others keep their order.
-    #[cfg(any(test, feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain(&mut self, mut stays: impl FnMut(&E) -> bool) {
         for _ in 0..self.queue.len() {
             match self.queue.pop_front() {

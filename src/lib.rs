@@ -66,7 +66,6 @@ extern crate alloc;
 extern crate std;
 
 pub mod crc16;
-#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod drive;
 pub mod encode;
 pub mod endpoint;
@@ -86,19 +85,17 @@ pub mod fields;
 pub mod ikeya;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod inbox;
-#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 pub mod io;
 mod machine;
 #[cfg(all(feature = "serde", any(feature = "ikeya", feature = "ucp")))]
 mod map;
-#[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
 mod outbox;
 #[cfg(any(feature = "ikeya", feature = "ucp"))]
 mod record;
 // Pages, not code.
-#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+#[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
 pub mod guide;
-#[cfg(all(any(doc, doctest), feature = "embedded-io", feature = "ikeya", feature = "ucp"))]
+#[cfg(all(any(doc, doctest), feature = "ikeya", feature = "ucp"))]
 #[doc = include_str!("safety.md")]
 pub mod safety {}
 #[cfg(feature = "sim")]

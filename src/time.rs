@@ -208,24 +208,12 @@ impl Wrapping32 {
 
 /// The earliest of these deadlines, if there is one.
 // One copy for all roles and their drivers: flash matters more than the cost of the call.
-#[cfg(any(
-    feature = "ikeya",
-    feature = "ucp",
-    feature = "embedded-io",
-    feature = "embedded-io-async"
-))]
 #[inline(never)]
 pub(crate) fn earliest(deadlines: &[Option<Instant>]) -> Option<Instant> {
     deadlines.iter().flatten().copied().reduce(Instant::min)
 }
 
 /// Whether this deadline has been reached.
-#[cfg(any(
-    feature = "ikeya",
-    feature = "ucp",
-    feature = "embedded-io",
-    feature = "embedded-io-async"
-))]
 pub(crate) fn reached(deadline: Option<Instant>, now: Instant) -> bool {
     deadline.is_some_and(|at| at <= now)
 }

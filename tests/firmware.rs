@@ -10,7 +10,7 @@
 //! tests say so and pass, unless `AXLEWIRE_FIRMWARE=required` is set. An image that cannot be built
 //! fails them.
 
-#![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim", feature = "embedded-io"))]
+#![cfg(all(unix, feature = "ikeya", feature = "ucp", feature = "sim"))]
 
 /// How the programs configure their roles: the file of the firmware.
 #[path = "../examples/firmware/src/config.rs"]

@@ -1,5 +1,5 @@
 //! Which traits public types have, by kind: the table is in CONTRIBUTING.md.
-#![cfg(all(feature = "ikeya", feature = "ucp", feature = "embedded-io", feature = "sim"))]
+#![cfg(all(feature = "ikeya", feature = "ucp", feature = "sim"))]
 #![allow(unused_qualifications, reason = "two modules have the same names")]
 
 use std::{collections::BTreeSet, error::Error, fmt, hash::Hash};

@@ -66,7 +66,6 @@ impl SteadyTime {
     }
 
     /// The same moment on the clock.
-    #[cfg(feature = "embedded-io")]
     pub(super) fn on_clock(&self, at: Instant) -> Instant {
         Instant::from_micros(at.as_micros().wrapping_sub(self.ahead_us.get()))
     }

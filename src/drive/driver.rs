@@ -72,7 +72,7 @@ pub(super) enum Next {
 /// A role with its port and its clock.
 ///
 /// ```
-/// # #[cfg(all(feature = "embedded-io", feature = "ikeya"))]
+/// # #[cfg(feature = "ikeya")]
 /// # fn turn<P, C>(port: P, clock: C) -> Result<(), axlewire::drive::DriveError<P::Error>>
 /// # where
 /// #     P: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write,
@@ -510,7 +510,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// The same moment on the user's clock.
-    #[cfg(feature = "embedded-io")]
     pub(super) fn on_clock(&self, at: Instant) -> Instant {
         self.time.on_clock(at)
     }

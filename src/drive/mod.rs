@@ -3,9 +3,9 @@
 //! A [`Driver`] runs the loop that [`Endpoint`] describes, and nothing else: it moves bytes between
 //! a port and a role, tells the role the time, and keeps bytes that the port has not taken yet. The
 //! role decides when to speak, what to repeat and what a timeout means. Its calls block, over the
-//! traits of `embedded-io` (feature `embedded-io`): the port must implement `ReadReady`, and a call
-//! idles with [`Clock::idle_until`]. [`asynch::Driver`] has the same calls for async code, over the
-//! traits of `embedded-io-async` (feature `embedded-io-async`).
+//! traits of `embedded-io`: the port must implement `ReadReady`, and a call idles with
+//! [`Clock::idle_until`]. [`asynch::Driver`] has the same calls for async code, over the traits of
+//! `embedded-io-async` (feature of that name).
 //!
 //! Each role has high-level calls, such as [`discover`](Driver::discover) and
 //! [`read`](Driver::read) of a master, [`drive`](Driver::drive) and
@@ -14,7 +14,7 @@
 //! the driver's calls is running: if you stop calling, a master stops repeating its set-points.
 //!
 //! ```
-//! # #[cfg(all(feature = "embedded-io", feature = "ikeya"))] {
+//! # #[cfg(feature = "ikeya")] {
 //! use axlewire::drive::{Clock, DriveError, Driver};
 //! use axlewire::ikeya::{master::MasterConfig, Master, Mode, NodeId, Rps};
 //! use axlewire::time::Duration;
@@ -148,7 +148,6 @@ mod worlds;
 
 #[cfg(feature = "embedded-io-async")]
 pub mod asynch;
-#[cfg(feature = "embedded-io")]
 mod blocking;
 mod calls;
 mod clock;

@@ -3,10 +3,7 @@
 use core::{error::Error, fmt};
 
 use embedded_hal::digital::OutputPin;
-#[cfg(feature = "embedded-io")]
 use embedded_io as io;
-#[cfg(not(feature = "embedded-io"))]
-use embedded_io_async as io;
 
 use crate::time::Duration;
 
@@ -228,7 +225,6 @@ where
     }
 }
 
-#[cfg(feature = "embedded-io")]
 impl<P: embedded_io::Read, O: OutputPin, D> embedded_io::Read for Rs485<P, O, D>
 where
     P::Error: 'static,
@@ -238,7 +234,6 @@ where
     }
 }
 
-#[cfg(feature = "embedded-io")]
 impl<P: embedded_io::Write, O: OutputPin, D: embedded_hal::delay::DelayNs> embedded_io::Write
     for Rs485<P, O, D>
 where

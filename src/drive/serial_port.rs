@@ -101,13 +101,7 @@ impl SerialPort {
             .map_err(|cause| io::Error::new(io::ErrorKind::InvalidInput, cause))
     }
 
-    /// The port of the `serialport` crate.
-    #[must_use]
-    pub fn get_ref(&self) -> &dyn serialport::SerialPort {
-        &*self.tty
-    }
-
-    /// The port of the `serialport` crate, to change its settings. Its timeout is changed by every
+    /// The port of the `serialport` crate, to read or change its settings. Its timeout is changed by every
     /// call here.
     pub fn get_mut(&mut self) -> &mut dyn serialport::SerialPort {
         &mut *self.tty
@@ -177,7 +171,14 @@ impl SerialPort {
 }
 
 /// A port that is already open, as it is: bytes that it has received are not discarded, and its
-/// speed is not checked; see [`check_baud`](SerialPort::check_baud).
+/// speed is not checked.
+///
+/// ```no_run
+/// let tty = serialport::new("/dev/ttyUSB0", 500_000).open()?; // with settings of your own
+/// let port = axlewire::drive::SerialPort::from(tty);
+/// port.check_baud(500_000)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 impl From<Box<dyn serialport::SerialPort>> for SerialPort {
     fn from(tty: Box<dyn serialport::SerialPort>) -> Self {
         Self { tty, held: [0; HELD_LEN], unread: 0..0 }

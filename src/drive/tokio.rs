@@ -76,13 +76,7 @@ impl TokioSerialPort {
         tty::is_pseudo_terminal(&self.tty)
     }
 
-    /// The port of the `tokio-serial` crate.
-    #[must_use]
-    pub const fn get_ref(&self) -> &SerialStream {
-        &self.tty
-    }
-
-    /// The port of the `tokio-serial` crate, to change its settings.
+    /// The port of the `tokio-serial` crate, to read or change its settings.
     pub const fn get_mut(&mut self) -> &mut SerialStream {
         &mut self.tty
     }

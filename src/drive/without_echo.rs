@@ -1,9 +1,6 @@
 //! A port on a line that hears itself.
 
-#[cfg(feature = "embedded-io")]
 use embedded_io as io;
-#[cfg(not(feature = "embedded-io"))]
-use embedded_io_async as io;
 use heapless::Deque;
 
 use crate::stream::Echo;
@@ -12,7 +9,7 @@ use crate::stream::Echo;
 /// while sending.
 ///
 /// ```
-/// # #[cfg(all(feature = "ikeya", feature = "embedded-io"))]
+/// # #[cfg(feature = "ikeya")]
 /// # fn open<P>(port: P, clock: impl axlewire::drive::Clock) -> Result<(), impl core::fmt::Debug>
 /// # where P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady {
 /// use axlewire::{drive::{Driver, WithoutEcho}, ikeya::{Master, master::MasterConfig}};
@@ -98,7 +95,6 @@ impl<P: io::ErrorType> io::ErrorType for WithoutEcho<P> {
     type Error = P::Error;
 }
 
-#[cfg(feature = "embedded-io")]
 impl<P: io::ReadReady + io::Read> io::ReadReady for WithoutEcho<P> {
     /// Reads the echo that has come, so that a `read` does not wait behind it.
     fn read_ready(&mut self) -> Result<bool, Self::Error> {
@@ -121,7 +117,6 @@ impl<P: io::ReadReady + io::Read> io::ReadReady for WithoutEcho<P> {
     }
 }
 
-#[cfg(feature = "embedded-io")]
 impl<P: io::Read> io::Read for WithoutEcho<P> {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
         if !self.held.is_empty() {
@@ -137,7 +132,6 @@ impl<P: io::Read> io::Read for WithoutEcho<P> {
     }
 }
 
-#[cfg(feature = "embedded-io")]
 impl<P: io::Write> io::Write for WithoutEcho<P> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
         let written = self.port.write(bytes);

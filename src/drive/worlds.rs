@@ -10,7 +10,6 @@
 /// Writes the calls of a file in both worlds.
 macro_rules! in_both_worlds {
     ($calls:ident) => {
-        #[cfg(feature = "embedded-io")]
         $calls! {
             Driver,
             [embedded_io::Read + embedded_io::ReadReady + embedded_io::Write],

@@ -28,7 +28,7 @@ macro_rules! pages {
 
 pages! {
     start_on_a_pc: "serialport"
-    start_on_a_board: "embedded-io"
+    start_on_a_board: "sim"
     ikeya: "sim"
     ucp: "sim"
     streams: "sim"

@@ -73,7 +73,6 @@ impl<W: $Write, const N: usize> $Writer<W, N> {
 };
 }
 
-#[cfg(feature = "embedded-io")]
 calls!(FrameReader, embedded_io::Read, FrameWriter, embedded_io::Write, [], []);
 
 #[cfg(feature = "embedded-io-async")]

@@ -4,11 +4,11 @@
 //! a small buffer, and add no rules. Received bytes stay in the reader through read errors, end of
 //! file and cancelled futures; unsent bytes stay in the writer.
 //!
-//! These have blocking calls (feature `embedded-io`); their namesakes in [`asynch`] have the same
-//! calls for async code (feature `embedded-io-async`).
+//! These have blocking calls; their namesakes in [`asynch`] have the same calls for async code
+//! (feature `embedded-io-async`).
 //!
 //! ```
-//! # #[cfg(all(feature = "embedded-io", feature = "ucp"))] {
+//! # #[cfg(feature = "ucp")] {
 //! use axlewire::{io::{FrameReader, FrameWriter}, stream::Event, ucp::{message::Ping, Body, Ucp}};
 //!
 //! let mut line = [0; 16];

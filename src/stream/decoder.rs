@@ -265,7 +265,6 @@ impl<F: Framing, const N: usize> Decoder<F, N> {
     }
 
     /// Finds and books the next event in the held bytes.
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     #[inline]
     pub(crate) fn advance_held(&mut self) -> Option<Held> {
         if self.fill.is_early() { None } else { self.judge_held(0) }

@@ -3,7 +3,7 @@
 //! does stop.
 
 #![cfg(all(feature = "ikeya", feature = "std", feature = "sim"))]
-#![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
+#![cfg(feature = "embedded-io-async")]
 
 #[path = "../harness/dice.rs"]
 #[allow(dead_code, reason = "others use more of it")]

@@ -85,7 +85,7 @@
 //! | the same in other states and settings | 2 | 1,100 to 3,100 |
 //! | a driver of a host | 3 | 8,100 to 9,600 |
 #![cfg(all(feature = "ikeya", feature = "ucp", feature = "std"))]
-#![cfg(all(feature = "embedded-io", feature = "embedded-io-async"))]
+#![cfg(feature = "embedded-io-async")]
 
 /// An invariant is broken if this is true: returns what to say of it.
 macro_rules! broken_if {

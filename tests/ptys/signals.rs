@@ -51,7 +51,7 @@ fn a_flush_waits_until_the_system_has_sent_everything_and_then_for_the_uart() {
     let mut port = script.port();
     port.flush().unwrap();
     assert_eq!(*flushes.lock().unwrap(), 1);
-    assert_eq!(port.get_ref().bytes_to_write().unwrap(), 0);
+    assert_eq!(port.get_mut().bytes_to_write().unwrap(), 0);
 }
 
 #[test]

@@ -194,7 +194,6 @@ fn the_port_of_tokio_serial_is_lent_and_given_back() {
         let (mut port, _far, held) = line();
         let name = held.name();
         assert!(name.is_some());
-        assert_eq!(port.get_ref().name(), name);
         assert_eq!(port.get_mut().name(), name);
         assert_eq!(port.into_inner().name(), name);
     });

@@ -40,7 +40,6 @@ impl<P, C: Clock> Driver<Master, P, C> {
     /// [`with`](Driver::with).
     ///
     /// ```
-    /// # #[cfg(feature = "embedded-io")] {
     /// use axlewire::{drive::{Clock, DriveError, Driver}, ikeya::{NodeId, Rps, master::MasterConfig}};
     /// use axlewire::time::Duration;
     /// use embedded_io::{Read, ReadReady, Write};
@@ -55,7 +54,6 @@ impl<P, C: Clock> Driver<Master, P, C> {
     ///     bus.discover()?;
     ///     bus.drive_for(NodeId::N1, Rps::new(2.0)?, Duration::from_secs(3))
     /// }
-    /// # }
     /// ```
     pub fn master(config: MasterConfig, port: P, clock: C) -> Self {
         Self::with(|now| Master::new(config, now), port, clock)
@@ -67,7 +65,6 @@ impl<P, C: Clock> Driver<Slave, P, C> {
     /// [`with`](Driver::with).
     ///
     /// ```
-    /// # #[cfg(feature = "embedded-io")] {
     /// use axlewire::drive::{Clock, Driver};
     /// use axlewire::ikeya::{Mode, NodeId, Rps, Target, slave::SlaveConfig};
     /// use axlewire::time::Duration;
@@ -92,7 +89,6 @@ impl<P, C: Clock> Driver<Slave, P, C> {
     ///         slave.role_mut().set_velocity(measure()); // what it answers
     ///     }
     /// }
-    /// # }
     /// ```
     pub fn slave(node: NodeId, mode: Mode, config: SlaveConfig, port: P, clock: C) -> Self {
         Self::with(|now| Slave::new(node, mode, config, now), port, clock)

@@ -28,7 +28,6 @@ impl<P, C: Clock> Driver<Host, P, C> {
     /// [`with`](Driver::with) and [`Host::with_store`].
     ///
     /// ```
-    /// # #[cfg(feature = "embedded-io")] {
     /// use axlewire::{drive::{Clock, DriveError, Driver}, time::Duration, ucp::host::HostConfig};
     /// use embedded_io::{Read, ReadReady, Write};
     ///
@@ -42,7 +41,6 @@ impl<P, C: Clock> Driver<Host, P, C> {
     ///     rover.ping(Duration::from_secs(1))?;
     ///     rover.drive_for(30, 0, Duration::from_secs(2)) // percent ahead, percent of turn
     /// }
-    /// # }
     /// ```
     pub fn host(config: HostConfig, port: P, clock: C) -> Self {
         Self::with(|now| Host::new(config, now), port, clock)
@@ -53,7 +51,6 @@ impl<P, C: Clock> Driver<Robot, P, C> {
     /// A new [robot](Robot) with a port and a clock.
     ///
     /// ```
-    /// # #[cfg(feature = "embedded-io")] {
     /// use axlewire::drive::{Clock, Driver};
     /// use axlewire::{time::Duration, ucp::{MotorControl, Telemetry, robot::RobotConfig}};
     /// use embedded_io::{Read, ReadReady, Write};
@@ -72,7 +69,6 @@ impl<P, C: Clock> Driver<Robot, P, C> {
     ///         robot.role_mut().set_telemetry(&measure(), now);
     ///     }
     /// }
-    /// # }
     /// ```
     pub fn robot(config: RobotConfig, port: P, clock: C) -> Self {
         Self::with(|now| Robot::new(config, now), port, clock)

@@ -306,7 +306,6 @@ impl<B: Board> Master<B> {
     }
 
     /// Removes the events that `stays` rejects.
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&MasterEvent<B>) -> bool) {
         self.events.retain(stays);
     }

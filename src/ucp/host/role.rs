@@ -327,7 +327,6 @@ impl<S: BiasStore> Host<S> {
     }
 
     /// Removes the events that `stays` rejects, including a calibration's that waits for room.
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&HostEvent) -> bool) {
         self.state.retain_events(stays);
     }
@@ -417,7 +416,7 @@ impl<S: BiasStore> Endpoint for Host<S> {
     }
 }
 
-#[cfg(all(test, any(feature = "embedded-io", feature = "embedded-io-async")))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::ucp::{

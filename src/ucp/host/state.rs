@@ -206,7 +206,6 @@ impl<S: BiasStore> State<S> {
         event
     }
 
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(super) fn retain_events(&mut self, mut stays: impl FnMut(&HostEvent) -> bool) {
         self.events.retain(&mut stays);
         self.outcome = self.outcome.take().filter(stays);

@@ -166,7 +166,6 @@ impl Robot {
     }
 
     /// Removes the events that `stays` rejects.
-    #[cfg(any(feature = "embedded-io", feature = "embedded-io-async"))]
     pub(crate) fn retain_events(&mut self, stays: impl FnMut(&RobotEvent) -> bool) {
         self.state.events.retain(stays);
     }
