@@ -62,7 +62,8 @@ use crate::{
     time::{Duration, Instant, earliest, reached},
 };
 
-/// Shortest pause before a frame that waits for its port is looked at again, microseconds.
+/// Shortest pause before a frame that waits for its port is looked at again, microseconds; the
+/// only one for an answer, which has little time.
 const LOOK_US: u32 = 1000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
@@ -204,16 +205,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     async fn fair_round(&mut self) -> Result<(), DriveError<P::Error>> {
         let result = self.round().await;
         // A runaway port, which always has more, must not starve other tasks either.
-        if result.is_err() || self.unsure_since.is_some() {
+        if result.is_err() || self.looks.unsure_since.is_some() {
             yield_once().await;
         }
         result
     }
 
     async fn round(&mut self) -> Result<(), DriveError<P::Error>> {
-        self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
-        if begin - self.looked_at >= STALL {
+        self.reclaim(begin);
+        if begin - self.looks.latest >= STALL {
             // It may have recovered meanwhile.
             self.sending.end_waits();
         }
@@ -314,14 +315,16 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// Takes in received bytes: polls each read once, without waiting.
     pub(super) async fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
-        self.look();
+        let now = self.latest();
+        self.looks.begin(now);
         for _ in 0..READS {
             match first(self.port.read(&mut chunk), ready(())).await {
                 Some(count) => {
                     self.receive_chunk(&chunk, count.map_err(DriveError::Port)?)?;
                 }
                 None => {
-                    self.saw_empty();
+                    let now = self.latest();
+                    self.looks.saw_empty(now);
                     break;
                 }
             }
@@ -344,17 +347,20 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 Ok(written) => written,
                 Err(_) if self.role.is_outdated() => {
                     // The role decides again, within the time that this frame had.
-                    self.give_up_outdated();
-                    continue;
+                    let now = self.latest();
+                    self.give_up(now);
+                    return (received, Ok(()));
                 }
                 Err(why) if why == Unwritten::HeldUp && waited < STALL || self.is_over() => {
-                    self.reclaim();
+                    let now = self.latest();
+                    self.reclaim(now);
                     return (received, Ok(()));
                 }
                 Err(_) if !is_last => return (received, Ok(())),
                 Err(_) => {
                     self.sending.write_wait.end();
-                    self.reclaim();
+                    let now = self.now();
+                    self.reclaim(now);
                     return (received, self.stalled().await);
                 }
             };
@@ -364,7 +370,6 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
             if !self.sending.rest().is_empty() {
                 received = received.and(self.receive().await);
-                self.give_up_outdated();
                 if self.is_held_up(begin) {
                     return (received, Ok(()));
                 }
@@ -390,7 +395,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             }
             let decides_at = earliest(&[role.poll_timeout(), *ends_at]);
             let nap_us = decides_at.map_or(left_us, |at| (at - now).as_micros());
-            let nap_us = nap_us.max(LOOK_US).min(left_us);
+            let nap_us = if acts { LOOK_US } else { nap_us.max(LOOK_US) }.min(left_us);
             // The delay first: if this task was held up, the port does not take what has ended.
             let taking = until(writing.as_mut(), &mut written);
             if first(clock.delay_us(nap_us), taking).await.is_none() {

@@ -28,8 +28,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     }
 
     fn round(&mut self) -> Result<(), DriveError<P::Error>> {
-        self.reclaim();
         let (mut result, begin) = (Ok(()), self.now());
+        self.reclaim(begin);
         let mut is_again = false;
         for _ in 0..FRAMES {
             // Before time passes: the rest of a frame may wait in the port.
@@ -108,10 +108,10 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// Takes in received bytes.
     pub(super) fn receive(&mut self) -> Result<(), DriveError<P::Error>> {
         let mut chunk = [0; CHUNK_LEN];
-        self.look();
+        self.looks.begin(self.time.latest());
         for _ in 0..READS {
             if !self.port.read_ready().map_err(DriveError::Port)? {
-                self.saw_empty();
+                self.looks.saw_empty(self.time.latest());
                 break;
             }
             let count = self.port.read(&mut chunk).map_err(DriveError::Port)?;
@@ -134,7 +134,6 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
             }
             if !self.sending.rest().is_empty() {
                 received = received.and(self.receive());
-                self.give_up_outdated();
                 if self.is_held_up(begin) {
                     break;
                 }

@@ -17,7 +17,9 @@ pub trait Clock {
 
     /// Idles until `until`, or for a part of that time: the caller checks for received bytes when
     /// this returns. Return in time: if the driver of a slave or a robot is late, the bytes that it
-    /// finds count as old ([module](super#when-a-driver-is-held-up)).
+    /// finds count as old ([module](super#when-a-driver-is-held-up)). For the driver of a host,
+    /// idle for at most 20 ms, or until a byte is received: it takes each report to be as old as
+    /// the look before.
     ///
     /// Only the blocking calls use it. By default it returns at once, so that they spin: right for
     /// a processor with nothing else to do.

@@ -3,6 +3,7 @@
 use super::{
     clock::{Clock, SteadyTime},
     error::DriveError,
+    looks::{Looks, long_before},
     sending::{FRAME_LEN, Sending},
 };
 use crate::{
@@ -99,15 +100,7 @@ pub struct Driver<R, P, C> {
     pub(super) port: P,
     pub(super) clock: C,
     pub(super) time: SteadyTime,
-    /// When the port was last checked for received bytes.
-    pub(super) looked_at: Instant,
-    /// When it was last seen empty: all received bytes have arrived since.
-    pub(super) empty_at: Instant,
-    /// The first look since that did not end there, but in an error or at its limit.
-    pub(super) unsure_since: Option<Instant>,
-    /// A frame was handed out although bytes may have waited, by this driver or by one before it:
-    /// up to the next empty port, what is received may be from before that frame.
-    has_overtaken: bool,
+    pub(super) looks: Looks,
     /// When the role last decided that what is to be sent may go.
     decided_at: Instant,
     /// When the call that is running ends, if its command must not be sent after that.
@@ -124,12 +117,6 @@ pub(super) fn look_period<R: Endpoint>(role: &R) -> Option<Duration> {
 /// How long a command may wait in the port of a role that acts on commands; `None` for others.
 fn commands_wait<R: Endpoint>(role: &R) -> Option<Duration> {
     role.line_rules().held_up_after.filter(|&limit| limit != Duration::ZERO)
-}
-
-/// When the bytes in a port may have arrived that was not looked at before.
-fn long_before(now: Instant) -> Instant {
-    const HOUR_US: u64 = 3_600_000_000;
-    Instant::from_micros(now.as_micros().wrapping_sub(HOUR_US))
 }
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
@@ -162,10 +149,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             port,
             clock,
             time: SteadyTime::new(latest),
-            looked_at: latest,
-            empty_at,
-            unsure_since: Some(latest),
-            has_overtaken: true,
+            looks: Looks::new(latest, empty_at),
             decided_at: latest,
             ends_at: None,
             sending: Sending::new(latest),
@@ -242,7 +226,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// ([`LineRules::held_up_after`](crate::endpoint::LineRules::held_up_after)).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let look_at = look_period(&self.role).map(|period| self.looked_at + period);
+        let look_at = look_period(&self.role).map(|period| self.looks.latest + period);
         let retry_at = self.is_pending().then(|| self.latest() + ERROR_NAP);
         earliest(&[self.role.poll_timeout(), look_at, retry_at])
     }
@@ -259,21 +243,20 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     pub fn discard(&mut self) -> usize {
         let discarded = self.sending.rest().len();
         self.sending.end_waits();
-        self.give_up();
+        let now = self.now();
+        self.give_up(now);
         // What has left before may have left through another port: a stop is due again (U16).
         self.sending.flush_failed();
-        self.tell_unsent(Some(Unsent::Unflushed));
+        self.tell_unsent(Some(Unsent::Unflushed), now);
         self.sending.ask_flush();
-        self.empty_at = long_before(self.latest());
-        (self.unsure_since, self.has_overtaken) = (Some(self.latest()), true);
+        self.looks.forget(now);
         discarded
     }
 
     /// Lets the role decide again about a frame that did not leave.
-    pub(super) fn reclaim(&mut self) {
-        let now = self.now();
+    pub(super) fn reclaim(&mut self, now: Instant) {
         let unsent = self.sending.reclaim(now, self.silence());
-        self.tell_unsent(unsent);
+        self.tell_unsent(unsent, now);
     }
 
     /// Longest silence inside a frame. The other end measures from byte to byte, which includes the
@@ -284,16 +267,13 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Duration::from_micros(pause.as_micros().saturating_sub(byte.as_micros()))
     }
 
-    pub(super) fn tell_unsent(&mut self, unsent: Option<Unsent>) {
-        let now = self.now();
+    pub(super) fn tell_unsent(&mut self, unsent: Option<Unsent>, now: Instant) {
         if let Some(unsent) = unsent {
             self.role.handle_transmit(unsent, now);
         }
     }
 
-    /// Hands in the bytes of a read. If the port was not seen empty recently, the driver was held
-    /// up, in a call of the port, by its caller or by another task, and the bytes may have arrived
-    /// at any time since it was. So they may if a frame has been sent past them.
+    /// Hands in the bytes of a read.
     pub(super) fn receive_chunk<E>(
         &mut self,
         chunk: &[u8],
@@ -304,29 +284,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
         let now = self.now();
         let bytes = chunk.get(..count).unwrap_or(chunk);
-        let is_old = match self.role.line_rules().held_up_after {
-            Some(limit) => now - self.empty_at > limit,
-            None => self.has_overtaken,
-        };
-        let arrived = match is_old {
-            true => Arrival::Between { since: self.empty_at, now },
-            false => Arrival::Now(now),
-        };
+        let arrived = self.looks.arrived(now, self.role.line_rules().held_up_after);
         self.role.handle_input(bytes, arrived);
         Ok(())
-    }
-
-    /// Notes that the port is checked for received bytes now, or a little later.
-    pub(super) fn look(&mut self) {
-        self.looked_at = self.latest();
-        self.unsure_since.get_or_insert(self.latest());
-    }
-
-    /// Notes that the port was empty at `latest` or a little later. A short read does not show
-    /// that: a ring buffer returns only the bytes up to its end.
-    pub(super) fn saw_empty(&mut self) {
-        self.empty_at = self.latest();
-        (self.unsure_since, self.has_overtaken) = (None, false);
     }
 
     /// Time after which a round sends nothing more: through a slow port the application of a slave
@@ -355,18 +315,19 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// because there is too much for one look: its line is not idle then, and an answer may be
     /// overtaken.
     fn may_hold_more(&mut self) -> bool {
-        let Some(since) = self.unsure_since else { return false };
+        let Some(since) = self.looks.unsure_since else { return false };
         look_period(&self.role).is_some() && self.now() - since < RECOVERY
     }
 
     /// Lets time pass, but only until the port was seen empty: whatever has arrived since is still
     /// in it.
     pub(super) fn expire(&mut self) {
-        let mut now = self.empty_at;
-        if let Some(since) = self.unsure_since {
+        let mut now = self.looks.empty_at;
+        if let Some(since) = self.looks.unsure_since {
             now = self.latest();
             if self.role.line_rules().held_up_after.is_some() {
-                self.role.handle_input(&[], Arrival::Between { since: self.empty_at, now });
+                let since_empty = Arrival::Between { since: self.looks.empty_at, now };
+                self.role.handle_input(&[], since_empty);
                 if now - since < RECOVERY {
                     // The rest of a frame may wait in a port whose receiver fails.
                     return;
@@ -387,15 +348,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     /// is outdated. `is_again` says that the port has just been looked at again because of a
     /// hold-up: what is due is then sent, however often the driver is held up.
     pub(super) fn load<E>(&mut self, is_again: bool) -> Result<Next, DriveError<E>> {
+        let now = self.now();
         if !self.sending.rest().is_empty() {
             // The receiver may have taken long since the round began.
-            self.reclaim();
+            self.reclaim(now);
         }
-        let now = self.now();
-        if !is_again && now - self.looked_at > self.patience_between_steps() {
+        if !is_again && now - self.looks.latest > self.patience_between_steps() {
             return Ok(Next::Look);
         }
-        self.give_up_outdated();
+        self.give_up_outdated(now);
         if self.sending.is_in_doubt() {
             // Its flush goes first: it was dropped, or the rest of the frame was given up.
             return Ok(Next::Send);
@@ -414,42 +375,46 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
                 return Ok(Next::End);
             };
             self.sending.load(frame)?;
-            self.has_overtaken |= self.unsure_since.is_some();
+            self.looks.note_frame();
         }
         Ok(Next::Send)
     }
 
-    /// Gives up the rest of a frame that has become wrong. To be called whenever the role has heard
-    /// something, or time has passed, since its last bytes left.
-    pub(super) fn give_up_outdated(&mut self) {
+    /// Gives up a frame, or the rest of one, that has become wrong since the role decided on it.
+    fn give_up_outdated(&mut self, now: Instant) {
         if self.sending.rest().is_empty() {
             return;
         }
-        self.tell_time();
-        self.decided_at = self.latest();
+        self.role.handle_input(&[], now);
+        self.decided_at = now;
         if self.role.is_outdated() {
-            self.give_up();
+            self.give_up(now);
         }
     }
 
-    fn give_up(&mut self) {
+    pub(super) fn give_up(&mut self, now: Instant) {
         let given_up = self.sending.give_up();
-        self.tell_unsent(given_up);
+        self.tell_unsent(given_up, now);
     }
 
     /// Notes that the port is about to be asked to take the unsent bytes. `false` if they have been
-    /// given up: the driver was held up since the role has decided on them.
+    /// given up: too much time has passed since the role decided on them, the role has heard
+    /// something since their first part left, or the call has ended.
+    ///
+    /// All of it is decided by one reading of the clock, the last before the port is asked.
     pub(super) fn before_write(&mut self) -> bool {
         let now = self.now();
-        if now - self.decided_at > self.patience_between_steps() {
-            let is_late = self.is_over() || look_period(&self.role).is_some();
-            if is_late || self.sending.is_in_parts() {
-                self.reclaim();
-            }
-            self.give_up_outdated();
-            if self.sending.rest().is_empty() {
-                return false;
-            }
+        let is_held_up = now - self.decided_at > self.patience_between_steps();
+        let is_late = is_held_up && look_period(&self.role).is_some();
+        let is_rest = self.sending.is_in_parts();
+        if is_rest || is_late || reached(self.ends_at, now) {
+            self.reclaim(now);
+        }
+        if is_rest || is_held_up {
+            self.give_up_outdated(now);
+        }
+        if self.sending.rest().is_empty() {
+            return false;
         }
         self.sending.begin_write(now);
         true
@@ -470,12 +435,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
                 if is_whole {
                     self.role.handle_transmit(Transmit::Taken, now);
                 }
-                self.tell_unsent(unsent);
+                self.tell_unsent(unsent, now);
                 return Ok(());
             }
             Err(error) => DriveError::Port(error),
         };
-        self.reclaim();
+        self.reclaim(now);
         Err(failure)
     }
 
@@ -486,16 +451,17 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         }
         let now = self.now();
         let unsent = self.sending.flushed(now, self.silence());
-        self.tell_unsent(unsent);
+        self.tell_unsent(unsent, now);
         self.role.handle_transmit(Transmit::Flushed, now);
         Ok(())
     }
 
     /// Notes that bytes sent since the last flush may not have left; their frame has no rest then.
     pub(super) fn unflushed(&mut self) {
-        self.give_up();
+        let now = self.now();
+        self.give_up(now);
         let unsent = self.sending.flush_failed();
-        self.tell_unsent(unsent);
+        self.tell_unsent(unsent, now);
     }
 
     /// Whether everything that the role handed out has left the port.

@@ -51,11 +51,11 @@
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
 //! either after one second ([`DriveError::Stalled`]). A slave or a robot waits for its port for
-//! less in each call: for 10 ms, or for two of its longest frames and a millisecond if that is
-//! longer, by which time a healthy port is done. Then its application hears of a watchdog at most
-//! four such times late, and a call may leave a frame, and a driver-enable pin, to the next one. A
-//! command that ends while a write of its first bytes waits, by the dead-man of a host or because
-//! its call is over, does not leave.
+//! less in each call: for half of [`LineRules::held_up_after`], or for two of its longest frames
+//! and a millisecond if that is longer, by which time a healthy port is done. Then its application
+//! hears of a watchdog at most four such times late, and a call may leave a frame, and a
+//! driver-enable pin, to the next one. A command that ends while a write of its first bytes waits,
+//! by the dead-man of a host or because its call is over, does not leave.
 //!
 //! # When a driver is held up
 //!
@@ -140,6 +140,7 @@
 //! [`LineRules::baud`]: crate::endpoint::LineRules::baud
 //! [`LineRules::frame_pause`]: crate::endpoint::LineRules::frame_pause
 //! [`LineRules::held_up_after`]: crate::endpoint::LineRules::held_up_after
+//! [`LineRules::held_up_after`]: crate::endpoint::LineRules::held_up_after
 //! [`Transmit::Taken`]: crate::endpoint::Transmit::Taken
 //! [`Endpoint::is_outdated`]: crate::endpoint::Endpoint::is_outdated
 
@@ -155,6 +156,7 @@ mod driver;
 mod error;
 #[cfg(feature = "ikeya")]
 mod ikeya;
+mod looks;
 #[cfg(all(feature = "serialport", any(feature = "ikeya", feature = "ucp")))]
 mod opened;
 mod rs485;

@@ -101,8 +101,8 @@ impl SerialPort {
             .map_err(|cause| io::Error::new(io::ErrorKind::InvalidInput, cause))
     }
 
-    /// The port of the `serialport` crate, to read or change its settings. Its timeout is changed by every
-    /// call here.
+    /// The port of the `serialport` crate, to read or change its settings. Its timeout is changed
+    /// by every call here.
     pub fn get_mut(&mut self) -> &mut dyn serialport::SerialPort {
         &mut *self.tty
     }

@@ -32,6 +32,15 @@ fn taken(rover: &Rover, from: usize) -> Vec<(u64, u8, i16)> {
     frames
 }
 
+/// All strings of this length that the port has taken, each with the time of its last byte.
+fn windows(rover: &Rover, len: usize) -> Vec<(u64, &[u8])> {
+    let offers = rover.port().offers.iter();
+    let times: Vec<_> = offers.flat_map(|offer| vec![offer.at_us; offer.taken]).collect();
+    let written = &rover.port().written[..];
+    assert_eq!(written.len(), times.len());
+    times[len - 1..].iter().copied().zip(written.windows(len)).collect()
+}
+
 #[test]
 fn a_command_does_not_leave_after_its_dead_man_wherever_its_thread_was_held_up() {
     for (is_async, hold_ms) in BOTH.into_iter().flat_map(|it| [600, 2000].map(|hold| (it, hold))) {
@@ -60,19 +69,13 @@ fn the_rest_of_a_command_does_not_leave_after_its_dead_man_wherever_its_thread_w
         let (world, mut rover, _robot) = standing();
         world.pass(30_000);
         rover.port_mut().most = 12;
-        let (from, begin_us) = (rover.port().offers.len(), world.now_us());
+        let begin_us = world.now_us();
         world.hold_up(readings, 600_000);
         let _ = call!(is_async, rover, drive(40, 0));
-        // When a command to move was whole, by the time of its last byte.
-        let offers = rover.port().offers.iter().skip(from);
-        let parts = offers.map(|offer| (offer.at_us, &offer.bytes[..offer.taken]));
-        let times: Vec<_> = parts.flat_map(|(at, part)| vec![at; part.len()]).collect();
-        let written = &rover.port().written;
-        let bytes = &written[written.len() - times.len()..];
         let moves = MotorControl::new(40, 0).unwrap();
-        for (start, frame) in bytes.windows(24).enumerate() {
+        for (at_us, frame) in windows(&rover, 24) {
             let is_move = frame == moves.frame(frame[5]).as_bytes();
-            let is_late = times[start + 23] > begin_us + 500_000;
+            let is_late = at_us > begin_us + 500_000;
             assert!(!(is_move && is_late && readings > 0), "reading {readings}, async {is_async}");
         }
     }
@@ -208,4 +211,58 @@ fn an_answer_that_waits_for_its_port_is_not_sent_behind_what_was_said_meanwhile(
     let _ = world.block_on(slave.asynch().service());
     assert_eq!(slave.port().written, [] as [u8; 0]);
     assert_eq!(slave.role().statistics().overtaken, 1);
+}
+
+#[test]
+fn the_rest_of_a_command_does_not_leave_after_the_span_of_its_call() {
+    for (is_async, readings) in BOTH.into_iter().flat_map(|it| (1..25).map(move |n| (it, n))) {
+        let (world, mut rover, _robot) = standing();
+        world.pass(30_000);
+        rover.port_mut().most = 12;
+        let begin_us = world.now_us();
+        world.hold_up(readings, 100_000);
+        let _ = call!(is_async, rover, drive_for(40, 0, ms(30)));
+        // A pause inside a frame may take 20 ms.
+        let late = begin_us + 30_000 + 20_000;
+        let moves = MotorControl::new(40, 0).unwrap();
+        for (at_us, frame) in windows(&rover, 24) {
+            let is_move = frame == moves.frame(frame[5]).as_bytes();
+            assert!(!(is_move && at_us > late), "reading {readings}, async {is_async}");
+        }
+    }
+}
+
+#[test]
+fn the_rest_of_an_answer_does_not_leave_after_a_pause_inside_it() {
+    for readings in 0..40 {
+        let (mut slave, mut far) = slave(SlaveConfig::direct());
+        let world = slave.port().world.clone();
+        slave.service().unwrap();
+        let read = ReadRequest::new(NodeId::N2);
+        embedded_io::Write::write(&mut far, read.as_bytes()).unwrap();
+        world.step(100);
+        slave.port_mut().most = 3;
+        world.hold_up(readings, 1000);
+        for _ in 0..3 {
+            let _ = slave.service();
+        }
+        let offers = slave.port().offers.iter().filter(|offer| offer.taken > 0);
+        let times: Vec<_> = offers.map(|offer| offer.at_us).collect();
+        let pauses = times.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(pauses.max().unwrap_or(0) < 1000, "reading {readings}: {times:?}");
+    }
+}
+
+#[test]
+fn an_answer_that_waits_for_its_port_is_taken_back_once_its_time_has_passed() {
+    let (mut slave, mut far) = slave(SlaveConfig::direct());
+    let world = slave.port().world.clone();
+    slave.service().unwrap();
+    embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
+    world.step(100);
+    slave.port_mut().writes.extend(vec![Step::Late(2500); 4]);
+    let _ = world.block_on(slave.asynch().next_command(ms(20)));
+    assert_eq!(slave.port().written, [] as [u8; 0]);
+    let counted = slave.role().statistics();
+    assert_eq!((counted.replies, counted.expired, counted.overtaken), (0, 1, 0));
 }

@@ -211,11 +211,14 @@ impl World {
 impl Clock for World {
     fn now(&self) -> Instant {
         self.count_call();
-        let hold_up = self.0.hold_up.take();
-        let later = hold_up.and_then(|(readings, us)| Some((readings.checked_sub(1)?, us)));
-        self.0.hold_up.set(later);
-        if let (Some((_, us)), None) = (hold_up, later) {
-            self.pass(us);
+        // Not a reading of an actor.
+        if self.0.actors.try_borrow_mut().is_ok() {
+            let hold_up = self.0.hold_up.take();
+            let later = hold_up.and_then(|(readings, us)| Some((readings.checked_sub(1)?, us)));
+            self.0.hold_up.set(later);
+            if let (Some((_, us)), None) = (hold_up, later) {
+                self.pass(us);
+            }
         }
         let now_us = self.now_us() + self.0.reading_us.get();
         self.0.now_us.set(now_us);

@@ -20,6 +20,13 @@ fn the_presets_of_a_role_differ_in_the_pause_that_cuts_off_a_frame_and_in_nothin
     assert_eq!(other, direct);
 }
 
+#[test]
+fn a_pause_between_commands_is_short_enough_for_a_stop_to_leave_in_time() {
+    let mut config = HostConfig::default();
+    config.command_gap = Duration::from_secs(1);
+    assert_eq!(Host::new(config, ms(0)).config().command_gap, Duration::from_millis(50));
+}
+
 /// The settings that a role really uses.
 #[test]
 fn every_period_and_timeout_below_a_millisecond_counts_as_one() {

@@ -1,6 +1,6 @@
 //! What the scenarios use of the library.
 pub(crate) use axlewire::{
-    endpoint::{Arrival, Endpoint, Unsent},
+    endpoint::{Arrival, Endpoint, Transmit, Unsent},
     ikeya::{
         Mode, NodeId, Position, ReadRequest, Rps, Slave,
         board::{Target, ThreeMotors},

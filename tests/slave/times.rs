@@ -141,6 +141,56 @@ fn the_time_for_an_answer_begins_after_the_gap_and_its_end_is_in_time() {
 }
 
 #[test]
+fn the_gap_is_kept_behind_a_request_of_unknown_age_too() {
+    let mut config = SlaveConfig::direct();
+    (config.turnaround_gap, config.answer_within) = (US(30), US(200));
+    let mut slave = Slave::new(NODE, Mode::Velocity, config, T0);
+    let now = T0 + US(100);
+    slave.handle_input(&read(NODE), Arrival::Between { since: T0, now });
+    assert!(slave.poll_transmit(now + US(29)).is_none(), "it may have ended now");
+    assert!(slave.poll_transmit(now + US(30)).is_some(), "it may have ended at once");
+    // Then its time is over before the gap.
+    let now = T0 + US(1201);
+    slave.handle_input(&read(NODE), Arrival::Between { since: T0 + US(1000), now });
+    assert!(slave.poll_transmit(now + US(30)).is_none());
+    assert_eq!((slave.statistics().replies, slave.statistics().expired), (1, 1));
+}
+
+#[test]
+fn an_answer_that_its_port_does_not_take_is_outdated_a_packet_time_after_its_own() {
+    let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+    let ask = |slave: &mut Slave, at| {
+        slave.handle_input(&read(NODE), at);
+        assert!(slave.poll_transmit(at).is_some());
+    };
+    ask(&mut slave, T0);
+    slave.handle_input(&[], T0 + US(500 + 160));
+    assert!(!slave.is_outdated());
+    slave.handle_input(&[], T0 + US(500 + 161));
+    assert!(slave.is_outdated());
+    slave.handle_transmit(Unsent::Untouched, T0 + US(700));
+    assert!(slave.poll_transmit(T0 + US(700)).is_none());
+    assert_eq!((slave.statistics().replies, slave.statistics().expired), (0, 1));
+    // Once it has been taken, nothing is outdated.
+    ask(&mut slave, T0 + MS(1));
+    slave.handle_transmit(Transmit::Taken, T0 + MS(1));
+    slave.handle_timeout(T0 + MS(9));
+    assert!(!slave.is_outdated());
+}
+
+#[test]
+fn an_answer_that_did_not_leave_before_more_was_heard_counts_as_overtaken() {
+    let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
+    slave.handle_input(&read(NODE), T0);
+    assert!(slave.poll_transmit(T0).is_some());
+    slave.handle_input(&[0], T0);
+    assert!(slave.is_outdated());
+    slave.handle_transmit(Unsent::Untouched, T0);
+    assert_eq!((slave.statistics().replies, slave.statistics().overtaken), (0, 1));
+    assert!(slave.poll_transmit(T0).is_none());
+}
+
+#[test]
 fn a_command_ends_with_its_watchdog_to_the_microsecond_even_if_nobody_calls() {
     let mut slave = watched();
     let (just_before, end) = (T0 + US(99_999), T0 + MS(100));

@@ -181,8 +181,8 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
     /// cut-off set-point. The node may have heard it anyway, and its previous order is gone: it is
     /// owed a stop.
     pub(super) fn withdraw(&mut self, node: NodeId) {
-        let cut_off = self.sending.give_up();
-        self.tell_unsent(cut_off);
+        let now = self.now();
+        self.give_up(now);
         self.begin_stop(node.into());
     }
 

@@ -179,14 +179,14 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
         outcome.ok_or(DriveError::Timeout(Operation::Calibration))?
     }
 
-    /// Keeps a command alive for `span`.
+    /// Keeps a command that was just given alive for `span`.
     $($async)? fn hold_command(
         &mut self,
         speed: i16,
         angular: i16,
         span: Duration,
     ) -> Result<(), DriveError<P::Error>> {
-        let end = self.now() + span;
+        let end = self.latest() + span;
         let refused = |driver: &mut Driver<_, _, _>| {
             driver.drop_routine();
             driver.command(speed, angular).err()

@@ -57,8 +57,12 @@ pub struct Slave<B: Board = OneMotor> {
     commanded_at: Option<Instant>,
     /// The answer to the latest request.
     answer: Option<Answer>,
-    /// The answer handed out, until more bytes are received.
+    /// The answer handed out last, until the port has taken it.
     sent: Option<Answer>,
+    /// Whether more has been heard since.
+    is_overtaken: bool,
+    /// Whether its time has passed, and the time of a packet on the line.
+    is_late: bool,
     requests: Requests<B>,
     packet: Vec<u8, PACKET_LEN>,
     event: Latest<SlaveEvent<B>>,
@@ -73,10 +77,11 @@ struct Answer {
 }
 
 impl Answer {
-    /// The answer to a request that ended at `request_end`.
-    fn new(request_end: Instant, config: &SlaveConfig) -> Self {
-        let from = request_end + config.turnaround_gap;
-        Self { from, until: from + config.answer_within }
+    /// The answer to a request that ended in this time. The gap is kept even if it ended last.
+    fn new(request_end: Arrival, config: &SlaveConfig) -> Self {
+        let gap = config.turnaround_gap;
+        let until = request_end.since() + gap + config.answer_within;
+        Self { from: request_end.now() + gap, until }
     }
 }
 
@@ -104,6 +109,8 @@ impl<B: Board> Slave<B> {
             commanded_at: None,
             answer: None,
             sent: None,
+            is_overtaken: false,
+            is_late: false,
             requests: Requests::new(config.two_wire, config.idle, now),
             packet: Vec::new(),
             event: Latest::new(),
@@ -183,20 +190,20 @@ impl<B: Board> Slave<B> {
         self.event.lost()
     }
 
-    /// Processes bytes that arrived at `at`, and the packets that they complete.
-    fn receive(&mut self, mut bytes: &[u8], at: Instant) {
+    /// Processes received bytes, and the packets that they complete.
+    fn receive(&mut self, mut bytes: &[u8], arrived: Arrival) {
         while let Some(found) = self.requests.next(&mut bytes) {
             match found {
                 Found::Answer => count(&mut self.statistics.answers),
                 Found::Request { request: (node, command), is_last } => {
-                    self.hear(node, command, is_last, at);
+                    self.hear(node, command, is_last, arrived);
                 }
             }
         }
     }
 
     /// Handles one complete request, for any node.
-    fn hear(&mut self, node: NodeId, command: Option<Command<B>>, is_last: bool, at: Instant) {
+    fn hear(&mut self, node: NodeId, command: Option<Command<B>>, is_last: bool, at: Arrival) {
         self.overtake();
         if node != self.node {
             return count(&mut self.statistics.foreign);
@@ -205,7 +212,7 @@ impl<B: Board> Slave<B> {
             None => count(&mut self.statistics.reads),
             Some(command) => {
                 count(&mut self.statistics.writes);
-                self.obey(command, at);
+                self.obey(command, at.since());
             }
         }
         if command.is_none() || B::ANSWERS_WRITE {
@@ -243,7 +250,9 @@ impl<B: Board> Slave<B> {
         Some(self.commanded_at? + self.config.watchdog?)
     }
 
-    fn expire_command(&mut self, now: Instant) {
+    fn expire(&mut self, now: Instant) {
+        let packet_time = self.line_rules().wire_time(self.packet.len());
+        self.is_late |= self.sent.is_some_and(|answer| now > answer.until + packet_time);
         if reached(self.watchdog_at(), now) {
             (self.command, self.commanded_at) = (None, None);
             count(&mut self.statistics.watchdog);
@@ -260,20 +269,20 @@ impl<B: Board> Endpoint for Slave<B> {
         let arrived = arrived.into();
         let (since, now) = (arrived.since(), arrived.now());
         if !bytes.is_empty() {
-            self.sent = None;
+            self.is_overtaken = true;
             self.overtake();
             self.requests.receive(since, now);
-            self.receive(bytes, since);
+            self.receive(bytes, arrived);
         }
         // A command may be too old already.
-        self.expire_command(now);
+        self.expire(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         if self.requests.settle(now) {
-            self.receive(&[], self.requests.last());
+            self.receive(&[], self.requests.last().into());
         }
-        self.expire_command(now);
+        self.expire(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
@@ -291,22 +300,29 @@ impl<B: Board> Endpoint for Slave<B> {
         self.packet.clear();
         self.packet.extend_from_slice(packet.ok()?).ok()?;
         count(&mut self.statistics.replies);
-        self.sent = Some(answer);
+        (self.sent, self.is_overtaken, self.is_late) = (Some(answer), false, false);
         Some(&self.packet)
     }
 
-    /// Whether more has been heard since the answer was handed out (I14).
+    /// Whether more has been heard since the answer was handed out, or its time has passed (I14).
     fn is_outdated(&self) -> bool {
-        self.sent.is_none()
+        self.is_overtaken || self.is_late
     }
 
     /// An answer of which no byte has left remains due, within its time. One that was cut off is
     /// not repeated: the master asks again.
     fn handle_transmit(&mut self, outcome: impl Into<Transmit>, _: Instant) {
-        let Transmit::Unsent(unsent) = outcome.into() else { return };
-        if let (Unsent::Untouched, Some(answer)) = (unsent, self.sent.take()) {
+        let outcome = outcome.into();
+        if outcome == Transmit::Flushed {
+            return;
+        }
+        let Some(answer) = self.sent.take() else { return };
+        if outcome == Transmit::Unsent(Unsent::Untouched) {
             uncount(&mut self.statistics.replies);
-            self.answer = Some(answer);
+            match self.is_overtaken {
+                true => count(&mut self.statistics.overtaken),
+                false => self.answer = Some(answer),
+            }
         }
     }
 

@@ -5,6 +5,9 @@ use crate::{
     ucp::{body::CalibrationStart, frame::FrameOf, header::BAUD, role::SHORTEST},
 };
 
+/// Longest [`HostConfig::command_gap`]: half of the time that a driver gives a stop to leave.
+const LONGEST_GAP: Duration = Duration::from_millis(50);
+
 /// Settings of a [`Host`](crate::ucp::Host): start from [`direct`](Self::direct) or
 /// [`usb_adapter`](Self::usb_adapter) and change what differs.
 ///
@@ -25,7 +28,8 @@ pub struct HostConfig {
     /// Period at which the latest motor command is repeated (ruling U10); 100 ms.
     pub command_period: Duration,
     /// Shortest pause between two different motor commands; 20 ms, a tenth of the line. Within it
-    /// the latest wins. A command to stand still does not wait for it, but behind another one.
+    /// the latest wins. A command to stand still does not wait for it, but behind another one. At
+    /// most 50 ms: a driver gives a stop 100 ms to leave.
     pub command_gap: Duration,
     /// Whether the first frame is a zero motor command, before any ping or answer (ruling U16);
     /// `true`.
@@ -92,11 +96,11 @@ impl HostConfig {
         wire_time(FrameOf::<CalibrationStart>::LEN, self.baud) + self.ack_timeout
     }
 
-    /// The same settings, with periods and timeouts raised to what a driver can keep.
+    /// The same settings, with periods and timeouts that a driver can keep.
     pub(super) fn sane(self) -> Self {
         Self {
             command_period: self.command_period.max(SHORTEST),
-            command_gap: self.command_gap.max(SHORTEST),
+            command_gap: self.command_gap.clamp(SHORTEST, LONGEST_GAP),
             dead_man: self.dead_man.max(SHORTEST),
             ping_period: self.ping_period.map(|period| period.max(SHORTEST)),
             ping_timeout: self.ping_timeout.max(SHORTEST),
