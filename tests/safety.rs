@@ -107,7 +107,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         endpoint::Endpoint,
         ikeya::{Mode, NodeId, Slave, slave::SlaveConfig},
         time::{Duration, Instant},
-        ucp::{Robot, host::HostConfig, robot::RobotConfig},
+        ucp::{Host, Robot, host::HostConfig, robot::RobotConfig},
     };
     let ms = |it: Duration| format!("{} ms", it.as_micros() / 1000);
     let (now, host, robot) = (Instant::default(), HostConfig::direct(), RobotConfig::direct());
@@ -118,6 +118,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
     };
     let (robot_held_up, watchdog) =
         (ms(Robot::new(robot, now).line_rules().held_up_after.unwrap()), ms(robot.watchdog));
+    let pause = Host::new(host, now).line_rules().frame_pause;
     let (dead_man, period) = (ms(host.dead_man), ms(host.command_period));
     assert_eq!(dead_man, ms(host.link_timeout), "the page has one figure for both");
     let (order, board) = ("src/ikeya/master/order.rs", "src/ikeya/board.rs");
@@ -154,6 +155,7 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         format!("A robot of this crate stops {watchdog} after the last *valid* command. A"),
         format!("A robot of this crate stops {watchdog} after the last *valid* command (U10)"),
         format!("at least {} and at most {}, go unnoticed", held_up(0), held_up(1000)),
+        format!("has paused for more than {}", ms(pause)),
         format!("not seen the port empty for {robot_held_up}"),
         format!("it drives for up to {robot_held_up} longer"),
     ] {

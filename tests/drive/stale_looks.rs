@@ -222,8 +222,8 @@ fn the_rest_of_a_command_does_not_leave_after_the_span_of_its_call() {
         let begin_us = world.now_us();
         world.hold_up(readings, 100_000);
         let _ = call!(is_async, rover, drive_for(40, 0, ms(30)));
-        // A pause inside a frame may take 20 ms.
-        let late = begin_us + 30_000 + 20_000;
+        // A pause inside a frame may take 4 ms.
+        let late = begin_us + 30_000 + 4_000;
         let moves = MotorControl::new(40, 0).unwrap();
         for (at_us, frame) in windows(&rover, 24) {
             let is_move = frame == moves.frame(frame[5]).as_bytes();
