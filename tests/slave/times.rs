@@ -157,24 +157,24 @@ fn the_gap_is_kept_behind_a_request_of_unknown_age_too() {
 }
 
 #[test]
-fn an_answer_that_its_port_does_not_take_is_outdated_a_packet_time_after_its_own() {
+fn an_answer_that_its_port_does_not_take_is_outdated_four_pauses_after_its_time() {
     let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
     let ask = |slave: &mut Slave, at| {
         slave.handle_input(&read(NODE), at);
         assert!(slave.poll_transmit(at).is_some());
     };
     ask(&mut slave, T0);
-    slave.handle_input(&[], T0 + US(500 + 160));
+    slave.handle_input(&[], T0 + US(500 + 400));
     assert!(!slave.is_outdated());
-    slave.handle_input(&[], T0 + US(500 + 161));
+    slave.handle_input(&[], T0 + US(500 + 401));
     assert!(slave.is_outdated());
-    slave.handle_transmit(Unsent::Untouched, T0 + US(700));
-    assert!(slave.poll_transmit(T0 + US(700)).is_none());
+    slave.handle_transmit(Unsent::Untouched, T0 + US(901));
+    assert!(slave.poll_transmit(T0 + US(901)).is_none());
     assert_eq!((slave.statistics().replies, slave.statistics().expired), (0, 1));
     // Once it has been taken, nothing is outdated.
     ask(&mut slave, T0 + MS(1));
     slave.handle_transmit(Transmit::Taken, T0 + MS(1));
-    slave.handle_timeout(T0 + MS(9));
+    slave.handle_input(&[], T0 + MS(9));
     assert!(!slave.is_outdated());
 }
 

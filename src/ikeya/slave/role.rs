@@ -61,7 +61,7 @@ pub struct Slave<B: Board = OneMotor> {
     sent: Option<Answer>,
     /// Whether more has been heard since.
     is_overtaken: bool,
-    /// Whether its time has passed, and the time of a packet on the line.
+    /// Whether its time has passed, and that of a packet on the line.
     is_late: bool,
     requests: Requests<B>,
     packet: Vec<u8, PACKET_LEN>,
@@ -250,9 +250,7 @@ impl<B: Board> Slave<B> {
         Some(self.commanded_at? + self.config.watchdog?)
     }
 
-    fn expire(&mut self, now: Instant) {
-        let packet_time = self.line_rules().wire_time(self.packet.len());
-        self.is_late |= self.sent.is_some_and(|answer| now > answer.until + packet_time);
+    fn expire_command(&mut self, now: Instant) {
         if reached(self.watchdog_at(), now) {
             (self.command, self.commanded_at) = (None, None);
             count(&mut self.statistics.watchdog);
@@ -273,16 +271,19 @@ impl<B: Board> Endpoint for Slave<B> {
             self.overtake();
             self.requests.receive(since, now);
             self.receive(bytes, arrived);
+        } else if let Some(answer) = self.sent {
+            // Once it has begun, it may end: four pauses are the time of the longest packet.
+            self.is_late |= now > answer.until + self.config.idle.saturating_mul(4);
         }
         // A command may be too old already.
-        self.expire(now);
+        self.expire_command(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
         if self.requests.settle(now) {
             self.receive(&[], self.requests.last().into());
         }
-        self.expire(now);
+        self.expire_command(now);
     }
 
     fn poll_transmit(&mut self, now: Instant) -> Option<&[u8]> {
