@@ -62,8 +62,8 @@ use crate::{
     time::{Duration, Instant, earliest, reached},
 };
 
-/// Shortest pause before a frame that waits for its port is looked at again, microseconds; the
-/// only one for an answer, which has little time.
+/// Pause before a frame that waits for its port is looked at again, microseconds: an answer, which
+/// has little time, and one whose role is due for something else.
 const LOOK_US: u32 = 1000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.
@@ -387,20 +387,20 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         let knows_time = self.role.line_rules().held_up_after == Some(Duration::ZERO);
         let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
-        let (begin, mut now, mut written) = (time.latest(), time.latest(), None);
+        let (begin, mut now) = (time.latest(), time.latest());
         loop {
+            // The clock has been read just before: the port does not take what has ended.
+            if let Some(written) = first(writing.as_mut(), ready(())).await {
+                return Ok(written);
+            }
             let left_us = wait_us.saturating_sub((now - begin).as_micros());
             if left_us == 0 {
-                return first(writing, ready(())).await.ok_or(Unwritten::Waited);
+                return Err(Unwritten::Waited);
             }
             let decides_at = earliest(&[role.poll_timeout(), *ends_at]);
             let nap_us = decides_at.map_or(left_us, |at| (at - now).as_micros());
             let nap_us = if acts { LOOK_US } else { nap_us.max(LOOK_US) }.min(left_us);
-            // The delay first: if this task was held up, the port does not take what has ended.
-            let taking = until(writing.as_mut(), &mut written);
-            if first(clock.delay_us(nap_us), taking).await.is_none() {
-                return written.ok_or(Unwritten::Waited);
-            }
+            wake(clock.delay_us(nap_us)).await;
             let asked_at = mem::replace(&mut now, time.read(clock));
             role.handle_input(&[], now);
             if role.is_outdated() || reached(*ends_at, now) {
@@ -484,9 +484,15 @@ async fn first<T>(read: impl Future<Output = T>, wait: impl Future<Output = ()>)
     .await
 }
 
-/// Ends with `future`, and keeps its output.
-async fn until<T>(future: impl Future<Output = T>, output: &mut Option<T>) {
-    *output = Some(future.await);
+/// Ends with `delay`, or when the task is woken before, by a port for example.
+async fn wake(delay: impl Future<Output = ()>) {
+    let mut delay = pin!(delay);
+    let mut is_woken = false;
+    poll_fn(|context| match mem::replace(&mut is_woken, true) {
+        true => Poll::Ready(()),
+        false => delay.as_mut().poll(context),
+    })
+    .await;
 }
 
 /// Lets other tasks run.

@@ -398,21 +398,18 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// Notes that the port is about to be asked to take the unsent bytes. `false` if they have been
-    /// given up: too much time has passed since the role decided on them, the role has heard
-    /// something since their first part left, or the call has ended.
+    /// given up: the call or their command has ended, an answer had to wait, or their frame has
+    /// paused for too long.
     ///
     /// All of it is decided by one reading of the clock, the last before the port is asked.
     pub(super) fn before_write(&mut self) -> bool {
         let now = self.now();
-        let is_held_up = now - self.decided_at > self.patience_between_steps();
-        let is_late = is_held_up && look_period(&self.role).is_some();
-        let is_rest = self.sending.is_in_parts();
-        if is_rest || is_late || reached(self.ends_at, now) {
+        let is_late = look_period(&self.role).is_some()
+            && now - self.decided_at > self.patience_between_steps();
+        if is_late || self.sending.is_in_parts() || reached(self.ends_at, now) {
             self.reclaim(now);
         }
-        if is_rest || is_held_up {
-            self.give_up_outdated(now);
-        }
+        self.give_up_outdated(now);
         if self.sending.rest().is_empty() {
             return false;
         }

@@ -11,11 +11,14 @@ fn a_round_takes_in_then_lets_time_pass_then_sends_and_flushes_once() {
         role.timeout = Some(at_ms(0));
         let mut driver = on(role, Port::reading([Step::Bytes(b"in".into())]));
         assert_eq!(round(&mut driver), Some(Ok(())));
+        // The time is told again right before each write.
         let expected = [
             Call::Input(b"in".into()),
             Call::Timeout,
             Call::Transmit(Some(b"one".into())),
+            Call::Input(vec![]),
             Call::Transmit(Some(b"two".into())),
+            Call::Input(vec![]),
             Call::Transmit(None),
         ];
         assert_eq!(driver.role().calls, expected);

@@ -64,6 +64,44 @@ fn a_command_does_not_leave_after_its_dead_man_wherever_its_thread_was_held_up()
 }
 
 #[test]
+fn a_repetition_does_not_leave_after_its_dead_man_however_short_the_hold_up() {
+    for (is_async, readings) in BOTH.into_iter().flat_map(|it| (1..25).map(move |n| (it, n))) {
+        let (world, mut rover, _robot) = standing();
+        let mut called_us = 0;
+        // The same command again feeds the dead-man: it fires 6 ms after a repetition is due.
+        for _ in 0..2 {
+            called_us = world.now_us();
+            call!(is_async, rover, drive(40, 0)).unwrap();
+            call!(is_async, rover, run_for(ms(6), |_, _, _| ())).unwrap();
+        }
+        call!(is_async, rover, run_for(ms(487), |_, _, _| ())).unwrap();
+        let from = rover.port().offers.len();
+        world.hold_up(readings, 8000);
+        call!(is_async, rover, run_for(ms(20), |_, _, _| ())).unwrap();
+        for (at_us, _, speed) in taken(&rover, from) {
+            let is_late = at_us > called_us + 500_000;
+            assert!(speed == 0 || !is_late, "reading {readings}, async {is_async}");
+        }
+    }
+}
+
+#[test]
+fn a_write_that_waits_is_not_taken_after_the_span_of_its_call() {
+    // Just before its end a repetition is due, which looks at the time, too.
+    let span = Duration::from_micros(100_700);
+    for late_us in (100_000..102_000).step_by(100) {
+        let (world, mut rover, _robot) = standing();
+        world.pass(30_000);
+        let (from, begin_us) = (rover.port().offers.len(), world.now_us());
+        rover.port_mut().writes.push_back(Step::Late(late_us));
+        let _ = world.block_on(rover.asynch().drive_for(40, 0, span));
+        for (at_us, _, speed) in taken(&rover, from) {
+            assert!(speed == 0 || at_us <= begin_us + 100_700, "{late_us} us");
+        }
+    }
+}
+
+#[test]
 fn the_rest_of_a_command_does_not_leave_after_its_dead_man_wherever_its_thread_was_held_up() {
     for (is_async, readings) in BOTH.into_iter().flat_map(|it| (0..25).map(move |n| (it, n))) {
         let (world, mut rover, _robot) = standing();
