@@ -15,7 +15,7 @@ use core::{
 /// A span of time in microseconds, up to 71 minutes.
 #[derive(Clone, Copy, Default, Eq, Hash, Ord, PartialEq, PartialOrd)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct Duration {
     micros: u32,
 }
@@ -53,6 +53,12 @@ impl Duration {
     #[must_use]
     pub const fn as_micros(self) -> u32 {
         self.micros
+    }
+
+    /// The span in milliseconds; fractions are cut off.
+    #[must_use]
+    pub const fn as_millis(self) -> u32 {
+        self.micros / 1000
     }
 
     /// The sum of both spans, at most 71 minutes.

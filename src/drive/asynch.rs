@@ -139,8 +139,9 @@ pub struct Driver<R, P, C> {
 enum Unwritten {
     /// The port has not taken them, or they have become wrong.
     Waited,
-    /// The executor was held up while they waited: the role decides again.
-    HeldUp,
+    /// The executor was held up while they waited, or their frame paused for too long: the role
+    /// decides again.
+    Late,
 }
 
 impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
@@ -351,7 +352,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     self.give_up(now);
                     return (received, Ok(()));
                 }
-                Err(why) if why == Unwritten::HeldUp && waited < STALL || self.is_over() => {
+                Err(why) if why == Unwritten::Late && waited < STALL || self.is_over() => {
                     let now = self.latest();
                     self.reclaim(now);
                     return (received, Ok(()));
@@ -385,6 +386,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
         let acts = driver::look_period(&self.role).is_some();
         // A host says itself what is outdated by now: its stops are not, however late they are.
         let knows_time = self.role.line_rules().held_up_after == Some(Duration::ZERO);
+        let whole_by = self.sending.whole_by(self.silence());
         let driver::Driver { role, port, clock, time, sending, ends_at, .. } = &mut self.inner;
         let mut writing = pin!(port.write(sending.rest()));
         let (begin, mut now) = (time.latest(), time.latest());
@@ -397,7 +399,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if left_us == 0 {
                 return Err(Unwritten::Waited);
             }
-            let decides_at = earliest(&[role.poll_timeout(), *ends_at]);
+            let decides_at = earliest(&[role.poll_timeout(), *ends_at, whole_by]);
             let nap_us = decides_at.map_or(left_us, |at| (at - now).as_micros());
             let nap_us = if acts { LOOK_US } else { nap_us.max(LOOK_US) }.min(left_us);
             wake(clock.delay_us(nap_us)).await;
@@ -406,10 +408,13 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             if role.is_outdated() || reached(*ends_at, now) {
                 return Err(Unwritten::Waited);
             }
+            if whole_by.is_some_and(|by| now > by) {
+                return Err(Unwritten::Late);
+            }
             // An answer of a slave or a robot has no more time than that altogether.
             let (since, nap_us) = if acts { (begin, 0) } else { (asked_at, nap_us) };
             if !knows_time && (now - since).as_micros() > nap_us.saturating_add(patience_us) {
-                return Err(Unwritten::HeldUp);
+                return Err(Unwritten::Late);
             }
         }
     }

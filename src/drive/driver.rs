@@ -326,8 +326,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         if let Some(since) = self.looks.unsure_since {
             now = self.latest();
             if self.role.line_rules().held_up_after.is_some() {
-                let since_empty = Arrival::Between { since: self.looks.empty_at, now };
-                self.role.handle_input(&[], since_empty);
+                self.doubt(now);
                 if now - since < RECOVERY {
                     // The rest of a frame may wait in a port whose receiver fails.
                     return;
@@ -337,6 +336,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         if reached(self.role.poll_timeout(), now) {
             self.role.handle_timeout(now);
         }
+    }
+
+    /// Tells the role that bytes may wait in the port, from any time since it was seen empty.
+    fn doubt(&mut self, now: Instant) {
+        let since_empty = Arrival::Between { since: self.looks.empty_at, now };
+        self.role.handle_input(&[], since_empty);
     }
 
     /// Longest time between two steps that is no hold-up.
@@ -353,8 +358,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             // The receiver may have taken long since the round began.
             self.reclaim(now);
         }
-        if !is_again && now - self.looks.latest > self.patience_between_steps() {
-            return Ok(Next::Look);
+        if now - self.looks.latest > self.patience_between_steps() {
+            if !is_again {
+                return Ok(Next::Look);
+            }
+            // Held up once more: what has arrived since the look is not known.
+            self.doubt(now);
         }
         self.give_up_outdated(now);
         if self.sending.is_in_doubt() {

@@ -35,8 +35,7 @@ pub enum DriveError<E> {
     },
     /// The operation timed out.
     Timeout(Operation),
-    /// A value that no frame can have, such as a speed out of range: nothing was sent. Returned by
-    /// no call; it converts, so that `?` works where the values are made.
+    /// A value that no frame can have, such as a speed out of range: nothing was sent.
     Value(EncodeError),
     /// The master refuses the command.
     #[cfg(feature = "ikeya")]
@@ -184,17 +183,20 @@ impl fmt::Display for Operation {
     }
 }
 
+/// Its text has that of the error inside, whose own source is the next one.
 impl<E: Error + 'static> Error for DriveError<E> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            Self::Port(error) => Some(error),
-            Self::Value(error) => Some(error),
-            #[cfg(feature = "ikeya")]
-            Self::Bus(error) => Some(error),
-            #[cfg(feature = "ucp")]
-            Self::Rover(error) => Some(error),
+            Self::Port(error) => error.source(),
             _ => None,
         }
+    }
+}
+
+#[cfg(feature = "std")]
+impl From<std::io::Error> for DriveError<std::io::Error> {
+    fn from(error: std::io::Error) -> Self {
+        Self::Port(error)
     }
 }
 
@@ -214,6 +216,9 @@ impl<E> From<ikeya::master::CommandError> for DriveError<E> {
 #[cfg(feature = "ucp")]
 impl<E> From<ucp::host::CommandError> for DriveError<E> {
     fn from(error: ucp::host::CommandError) -> Self {
-        Self::Rover(error)
+        match error {
+            ucp::host::CommandError::Value(error) => Self::Value(error),
+            error => Self::Rover(error),
+        }
     }
 }

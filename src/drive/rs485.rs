@@ -193,7 +193,7 @@ impl<E: fmt::Display, F: fmt::Debug> fmt::Display for Rs485Error<E, F> {
 impl<E: Error + 'static, F: fmt::Debug> Error for Rs485Error<E, F> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            Self::Port(error) => Some(error),
+            Self::Port(error) => error.source(),
             Self::Pin(_) | Self::Lost => None,
         }
     }

@@ -163,9 +163,14 @@ impl Sending {
         }
     }
 
+    /// Until when a frame in parts has not paused for too long.
+    pub(super) fn whole_by(&self, silence: Duration) -> Option<Instant> {
+        self.is_in_parts().then_some(self.unbroken_at + silence)
+    }
+
     /// Gives up a frame in parts that has paused for too long, or may have.
     fn give_up_late(&mut self, now: Instant, silence: Duration) -> Option<Unsent> {
-        let is_late = self.taken == Taken::Parts && now > self.unbroken_at + silence;
+        let is_late = self.whole_by(silence).is_some_and(|by| now > by);
         if is_late { self.give_up() } else { None }
     }
 

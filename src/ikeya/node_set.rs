@@ -1,6 +1,6 @@
 //! A set of nodes.
 
-use core::fmt;
+use core::{fmt, ops::BitOr};
 
 use crate::ikeya::units::NodeId;
 
@@ -9,14 +9,13 @@ use crate::ikeya::units::NodeId;
 /// ```
 /// use axlewire::ikeya::{master::NodeSet, NodeId};
 ///
-/// let mut nodes: NodeSet = [NodeId::N1, NodeId::N3].into_iter().collect();
-/// nodes.insert(NodeId::N8);
+/// let nodes = NodeSet::from([NodeId::N1, NodeId::N3]) | NodeId::N8;
 /// assert_eq!(nodes.to_string(), "1, 3 and 8");
 /// assert_eq!((nodes.len(), nodes.contains(NodeId::N2)), (3, false));
 /// ```
 #[derive(Clone, Copy, Default, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
 pub struct NodeSet {
     bits: u8,
 }
@@ -78,11 +77,24 @@ impl From<NodeId> for NodeSet {
     }
 }
 
+impl<const N: usize> From<[NodeId; N]> for NodeSet {
+    fn from(nodes: [NodeId; N]) -> Self {
+        nodes.into_iter().collect()
+    }
+}
+
 impl FromIterator<NodeId> for NodeSet {
     fn from_iter<I: IntoIterator<Item = NodeId>>(nodes: I) -> Self {
-        let mut set = Self::NONE;
-        nodes.into_iter().for_each(|node| set.insert(node));
-        set
+        nodes.into_iter().fold(Self::NONE, BitOr::bitor)
+    }
+}
+
+/// The nodes that are in either set.
+impl<T: Into<Self>> BitOr<T> for NodeSet {
+    type Output = Self;
+
+    fn bitor(self, other: T) -> Self {
+        Self { bits: self.bits | other.into().bits }
     }
 }
 

@@ -30,9 +30,8 @@ impl<E: fmt::Display> fmt::Display for WriteError<E> {
 impl<E: Error + 'static> Error for WriteError<E> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            Self::Encode(error) => Some(error),
-            Self::Port(error) => Some(error),
-            Self::Zero => None,
+            Self::Port(error) => error.source(),
+            Self::Encode(_) | Self::Zero => None,
         }
     }
 }

@@ -269,7 +269,7 @@ fn a_read_that_fails_takes_no_failure_of_another_node() {
 }
 
 #[test]
-fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
+fn a_slaves_next_command_or_its_end_arrives_in_time_or_not_at_all() {
     for is_async in BOTH {
         let mut config = SlaveConfig::direct();
         config.watchdog = Some(ms(5));
@@ -280,10 +280,11 @@ fn a_slaves_next_command_arrives_in_time_or_not_at_all() {
         assert_eq!(world.now(), at_ms(2));
         let write = WriteRequest::velocity(NodeId::N2, rps(1.5));
         embedded_io::Write::write(&mut far, write.as_bytes()).unwrap();
-        assert_eq!(next(ms(98)), Ok(Some(Target::Velocity(rps(1.5)))));
+        let command = SlaveEvent::Command(Target::Velocity(rps(1.5)));
+        assert_eq!(next(ms(98)), Ok(Some(command)));
         assert_eq!(world.now(), Instant::from_micros(2160));
         // Then the watchdog ends the wait, but not that of the next call.
-        assert_eq!(next(ms(98)), Ok(None));
+        assert_eq!(next(ms(98)), Ok(Some(SlaveEvent::Watchdog)));
         assert_eq!(world.now(), Instant::from_micros(7160));
         assert_eq!(next(ms(98)), Ok(None));
         assert_eq!(world.now(), Instant::from_micros(105_160));

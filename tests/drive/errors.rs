@@ -1,4 +1,4 @@
-//! Errors of a driver: each message is one line, and the cause is its source.
+//! Errors of a driver: each message is one line, with its cause, which is no source then.
 
 use std::error::Error;
 
@@ -17,12 +17,12 @@ fn assert_texts(table: impl IntoIterator<Item = (DriveError<Unplugged>, String, 
 }
 
 #[test]
-fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
+fn every_error_is_one_line_with_all_that_is_known() {
     let node = NodeId::N2;
     let told = |error: DriveError<Unplugged>, text: &str| (error, text.to_owned(), None);
     let failed = |cause| DriveError::ReadFailed { node, cause };
     assert_texts([
-        (DriveError::Port(Unplugged), "port failed: unplugged".into(), Some("unplugged".into())),
+        (DriveError::Port(Unplugged), "port failed: unplugged".into(), None),
         told(DriveError::Closed, "port is closed: the other end has gone"),
         told(DriveError::WriteZero, "port took no bytes"),
         told(DriveError::Stalled, "port has stalled for a second"),
@@ -43,7 +43,7 @@ fn an_error_of_the_port_is_the_source_and_every_error_is_one_line() {
         told(failed(Cause::Dropped), "node 2 did not answer: its set-point was dropped"),
     ]);
     let bus = CommandError::NotOnline { node };
-    assert_texts([(bus.into(), bus.to_string(), Some(bus.to_string()))]);
+    assert_texts([(bus.into(), bus.to_string(), None)]);
 }
 
 #[cfg(feature = "ucp")]
@@ -56,13 +56,15 @@ fn an_error_of_a_rover_says_what_the_robot_did_or_did_not_do() {
         told(Operation::Ping, "the robot did not answer a ping in time"),
         told(Operation::Calibration, "the robot did not answer a calibration in time"),
     ]);
-    // A refused value is the source of the refusal, which is the source of the error.
     let value = MotorControl::new(101, 0).unwrap_err();
-    let rover = CommandError::Value(value);
-    assert_texts([(rover.into(), rover.to_string(), Some(rover.to_string()))]);
-    assert_eq!(rover.source().unwrap().to_string(), value.to_string());
+    let refused = CommandError::Value(value);
+    assert_eq!(DriveError::<Unplugged>::from(refused), DriveError::Value(value));
+    assert_eq!(refused.to_string(), "101 is outside -100..=100");
     let moving = CommandError::Moving;
-    assert_texts([(moving.into(), moving.to_string(), Some(moving.to_string()))]);
+    assert_texts([
+        (refused.into(), refused.to_string(), None),
+        (moving.into(), moving.to_string(), None),
+    ]);
 }
 
 #[cfg(feature = "ucp")]

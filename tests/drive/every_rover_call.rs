@@ -91,7 +91,7 @@ fn a_refusal_of_the_host_is_the_error_of_its_call_and_changes_nothing() {
     assert_eq!(begun, updating_now);
     for (speed, angular) in [(101, 0), (0, -101)] {
         let value = MotorControl::new(speed, angular).unwrap_err();
-        let out = refused(CommandError::Value(value));
+        let out = Err(DriveError::Value(value));
         for is_async in BOTH {
             let mut rover = host();
             assert_eq!(call!(is_async, rover, drive(speed, angular)), out);

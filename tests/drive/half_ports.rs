@@ -28,7 +28,7 @@ fn a_command_counts_although_the_answers_cannot_be_sent() {
         let deadline = at_ms(10);
         let within = deadline - driver.now();
         let mut next = || call!(is_async, driver, next_command(within));
-        assert_eq!(next(), Ok(Some(Target::Velocity(rps(1.5)))));
+        assert_eq!(next(), Ok(Some(SlaveEvent::Command(Target::Velocity(rps(1.5))))));
         // Without a command to report, a failure is reported.
         far.write_all(ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
         assert_eq!(next(), Err(GONE));

@@ -276,17 +276,17 @@ fn a_frame_without_room_is_refused_and_the_queue_stays_as_it_was() {
 }
 
 #[test]
-fn a_write_error_keeps_the_ports_own_as_its_source() {
+fn a_write_error_has_the_text_of_the_ports_own_and_its_source() {
     use std::error::Error;
     let error = WriteError::Port(Unplugged);
-    assert_eq!(error.source().unwrap().to_string(), "unplugged");
+    assert!(error.source().is_none());
     assert_eq!(error.to_string(), "port failed while sending: unplugged");
     let zero = WriteError::<Unplugged>::Zero;
     assert_eq!((zero.to_string().as_str(), zero.source().is_none()), ("port took no bytes", true));
     let refused = EncodeError::KnownId { id: 5 };
     let error = WriteError::<Unplugged>::from(refused);
     assert_eq!(error.to_string(), format!("frame cannot be encoded: {refused}"));
-    assert_eq!(error.source().unwrap().to_string(), refused.to_string());
+    assert!(error.source().is_none());
 }
 
 #[test]

@@ -152,6 +152,42 @@ fn an_update_request_does_not_leave_past_reports_of_motion_wherever_its_thread_w
 }
 
 #[test]
+fn an_update_request_does_not_leave_past_reports_of_motion_if_its_thread_was_held_up_twice() {
+    let pairs = (0..14).flat_map(|first| (0..5).map(move |second| (first, second)));
+    for (is_async, (first, second)) in
+        BOTH.into_iter().flat_map(|it| pairs.clone().map(move |n| (it, n)))
+    {
+        let (world, mut rover, robot) = standing();
+        let (from, now) = (rover.port().offers.len(), rover.now());
+        rover.role_mut().start_firmware_update(39, now).unwrap();
+        turn(&world, &robot, 60);
+        world.hold_up(first, 12_000);
+        world.hold_up(second, 80_000);
+        let _ = call!(is_async, rover, service());
+        let held_us = now.as_micros() + 92_000;
+        let is_late = |&(at, id, _): &(u64, u8, i16)| id == 9 && at >= held_us;
+        let is_sent = taken(&rover, from).iter().any(is_late);
+        assert!(!is_sent, "readings {first} and {second}, async {is_async}");
+    }
+}
+
+#[test]
+fn the_rest_of_a_command_does_not_leave_behind_a_pause_in_which_an_async_port_took_nothing() {
+    for late_us in [3000, 5000, 30_000, 180_000] {
+        let (world, mut rover, _robot) = standing();
+        world.pass(30_000);
+        let from = rover.port().offers.len();
+        rover.port_mut().writes.extend([Step::Few(12), Step::Late(late_us)]);
+        let _ = world.block_on(rover.asynch().drive(40, 0));
+        rover.run_for(ms(100), |_, _, _| ()).unwrap();
+        let times = rover.port().offers.iter().skip(from).filter(|offer| offer.taken > 0);
+        let parts: Vec<_> = times.map(|offer| offer.taken).collect();
+        let rest = if late_us == 3000 { 12 } else { 24 };
+        assert_eq!(parts[..2], [12, rest], "{late_us} us: the whole command again");
+    }
+}
+
+#[test]
 fn behind_a_receiver_that_fails_no_robot_is_seen_to_stand_still() {
     for is_async in BOTH {
         let (world, mut rover, robot) = standing();

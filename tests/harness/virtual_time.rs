@@ -45,7 +45,7 @@ struct Inner {
     /// After this many readings, one is wrong by this many microseconds.
     glitch: Cell<Option<(u32, u64)>>,
     /// After this many readings, the thread is held up for this long, microseconds.
-    hold_up: Cell<Option<(u32, u64)>>,
+    hold_ups: RefCell<VecDeque<(u32, u64)>>,
 }
 
 impl World {
@@ -73,9 +73,10 @@ impl World {
         self.0.glitch.set(Some((readings, wrong_us)));
     }
 
-    /// After this many readings of the clock, the thread is held up for this long, microseconds.
+    /// After this many readings of the clock, since the end of the last hold-up, the thread is held
+    /// up for this long, microseconds.
     pub(crate) fn hold_up(&self, readings: u32, micros: u64) {
-        self.0.hold_up.set(Some((readings, micros)));
+        self.0.hold_ups.borrow_mut().push_back((readings, micros));
     }
 
     /// Calls of ports and clocks.
@@ -213,11 +214,13 @@ impl Clock for World {
         self.count_call();
         // Not a reading of an actor.
         if self.0.actors.try_borrow_mut().is_ok() {
-            let hold_up = self.0.hold_up.take();
-            let later = hold_up.and_then(|(readings, us)| Some((readings.checked_sub(1)?, us)));
-            self.0.hold_up.set(later);
-            if let (Some((_, us)), None) = (hold_up, later) {
-                self.pass(us);
+            let next = self.0.hold_ups.borrow_mut().pop_front();
+            match next {
+                Some((0, us)) => self.pass(us),
+                Some((readings, us)) => {
+                    self.0.hold_ups.borrow_mut().push_front((readings - 1, us));
+                }
+                None => {}
             }
         }
         let now_us = self.now_us() + self.0.reading_us.get();

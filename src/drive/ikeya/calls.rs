@@ -11,6 +11,7 @@ use crate::{
         Master, NodeId, Slave,
         board::{Board, Status, Target},
         master::NodeSet,
+        slave::SlaveEvent,
     },
     time::Duration,
 };
@@ -207,9 +208,9 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
 
 /// The calls of a slave.
 impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Slave<B>, P, C> {
-    /// Returns the next command, and answers requests meanwhile; waits for it for this long. `None`
-    /// if there was none, and at once when the watchdog has fired: ask [`Slave::command`] after
-    /// each call. An event of the watchdog counts as told.
+    /// Returns the next command, or that the watchdog has ended the last one; answers requests
+    /// meanwhile, and waits for this long, then returns `None`. What is in force at any time is
+    /// [`Slave::command`].
     ///
     /// # Errors
     ///
@@ -217,9 +218,9 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Slave<B>, P, C> {
     pub $($async)? fn next_command(
         &mut self,
         within: Duration,
-    ) -> Result<Option<Target<B>>, DriveError<P::Error>> {
+    ) -> Result<Option<SlaveEvent<B>>, DriveError<P::Error>> {
         let deadline = self.now() + within;
-        self.until_with(deadline, Needs::HalfPort, Driver::command)$($await)*.map(Option::flatten)
+        self.until_with(deadline, Needs::HalfPort, Driver::poll_event)$($await)*
     }
 }
 };

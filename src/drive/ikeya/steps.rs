@@ -6,12 +6,11 @@ use heapless::Vec;
 use crate::drive::asynch;
 use crate::drive::{clock::Clock, driver::Driver, error::DriveError};
 use crate::{
-    endpoint::Endpoint,
     ikeya::{
         Master, Mode, NodeId, Slave,
         board::{Board, Status, Target},
         master::{CommandError, Health, MasterConfig, MasterEvent, NodeSet, StopProgress},
-        slave::{SlaveConfig, SlaveEvent},
+        slave::SlaveConfig,
     },
     time::{Duration, Instant},
 };
@@ -255,17 +254,6 @@ impl<B: Board, P, C: Clock> Driver<Master<B>, P, C> {
         self.role.keep_alive(now);
         let limit = self.role.config().dead_man.map_or(u32::MAX, |limit| limit.as_micros() / 2);
         now + Duration::from_micros(limit.max(1))
-    }
-}
-
-impl<B: Board, P, C: Clock> Driver<Slave<B>, P, C> {
-    /// A command; `Some(None)` for the watchdog.
-    pub(super) fn command(&mut self) -> Option<Option<Target<B>>> {
-        self.tell_time();
-        match self.role.poll_event()? {
-            SlaveEvent::Command(target) => Some(Some(target)),
-            SlaveEvent::Watchdog => Some(None),
-        }
     }
 }
 

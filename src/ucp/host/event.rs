@@ -208,7 +208,7 @@ pub enum CommandError {
 impl fmt::Display for CommandError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Value(_) => f.write_str("the value is out of range"),
+            Self::Value(error) => error.fmt(f),
             Self::CalibrationKind { kind } => write!(f, "no robot can calibrate {kind}"),
             Self::Calibrating => f.write_str("a calibration request is still unanswered"),
             Self::LowIdsOnly { id } => {
@@ -223,11 +223,4 @@ impl fmt::Display for CommandError {
     }
 }
 
-impl Error for CommandError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match self {
-            Self::Value(error) => Some(error),
-            _ => None,
-        }
-    }
-}
+impl Error for CommandError {}

@@ -2,7 +2,10 @@
 
 use arbitrary::{Result, Unstructured};
 use axlewire::{
-    ikeya::{Mode, NodeId, Position, ReadRequest, Slave, Target, WriteRequest, slave::SlaveConfig},
+    ikeya::{
+        Mode, NodeId, Position, ReadRequest, Slave, Target, WriteRequest,
+        slave::{SlaveConfig, SlaveEvent},
+    },
     time::{Duration, Instant},
 };
 
@@ -52,7 +55,7 @@ where
             Do::NextEvent { ms } | Do::RunUntil { ms } => {
                 let done = call!(rig, how, next_command(MS(ms.into())));
                 rig.end(&before, MS(ms.into()), done.as_ref());
-                if let Some(Ok(Some(target))) = done {
+                if let Some(Ok(Some(SlaveEvent::Command(target)))) = done {
                     assert!(written.iter().any(|(_, write)| means(write, target)), "{target:?}");
                 }
             }
