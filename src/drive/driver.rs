@@ -418,6 +418,9 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         if is_late || self.sending.is_in_parts() || reached(self.ends_at, now) {
             self.reclaim(now);
         }
+        if now - self.looks.latest > self.patience_between_steps() {
+            self.doubt(now);
+        }
         self.give_up_outdated(now);
         if self.sending.rest().is_empty() {
             return false;
