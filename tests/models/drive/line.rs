@@ -70,6 +70,8 @@ pub(crate) struct DrivenLine {
     pub(crate) failures: Vec<(u64, Failure)>,
     /// The first of them was a write failure.
     pub(crate) has_write_failed_first: bool,
+    /// A write was given up behind a failure, which its call may not tell.
+    pub(crate) may_be_untold: bool,
     /// A flush has failed, or the port has stalled: the bytes it has taken may be lost.
     pub(crate) is_given_up: bool,
     pub(crate) sleepers: Vec<(u64, u32, Waker)>,
@@ -122,6 +124,7 @@ impl DrivenLine {
             failures: vec![],
             has_write_failed_first: false,
             is_given_up: false,
+            may_be_untold: false,
             sleepers: vec![],
             sleepers_so_far: 0,
             operations: 0,
@@ -136,7 +139,7 @@ impl DrivenLine {
         self.operations = 0;
         self.failures.clear();
         self.has_write_failed_first = false;
-        (self.is_given_up, self.may_have_stalled) = (false, false);
+        (self.is_given_up, self.may_have_stalled, self.may_be_untold) = (false, false, false);
         self.wire.begin();
     }
 

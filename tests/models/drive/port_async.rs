@@ -48,6 +48,8 @@ impl Drop for Sending<'_> {
             let is_long = line.now_us >= self.begun_us + LEAST_US;
             line.may_have_stalled |= is_long && line.now_us + 100 >= waits_since_us + SECOND_US;
             line.is_given_up |= line.may_have_stalled;
+            // A write of the pin's port is given up while that port flushes behind its failure.
+            line.may_be_untold |= !line.failures.is_empty();
         }
     }
 }
