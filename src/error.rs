@@ -1,4 +1,4 @@
-//! Errors: one type per operation, each with the values that explain it.
+//! Errors: one type per operation, with the values that explain it.
 //!
 //! Bad bytes on a line are not errors: the decoder counts them (see [`stream`](crate::stream)).
 //! These types are for code that parses or builds single packets.

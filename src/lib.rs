@@ -38,9 +38,9 @@
 //! | stream | finds frames in bytes, accounts for every byte, resyncs after noise | [`stream`] |
 //! | checksum | CRC-16/MODBUS without a table | [`crc16`] |
 //!
-//! Nothing here allocates, blocks, reads a clock or panics, with three exceptions: `drive` and `io`
-//! wait for their port, `drive` asks the clock that it is given, and `stream::decode_capture`
-//! collects into a `Vec`.
+//! Nothing here allocates, blocks, reads a clock or panics, with these exceptions: `drive` and `io`
+//! wait for their port, `drive` asks the clock that it is given, `stream::decode_capture` and `sim`
+//! collect into `Vec`s, and `TokioSerialPort::open` needs a runtime with I/O.
 //!
 //! # Features
 #![doc = include_str!("features.md")]

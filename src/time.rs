@@ -82,6 +82,15 @@ impl Add for Duration {
     }
 }
 
+/// The difference; zero if `other` is longer.
+impl Sub for Duration {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { micros: self.micros.saturating_sub(other.micros) }
+    }
+}
+
 impl From<Duration> for core::time::Duration {
     fn from(span: Duration) -> Self {
         Self::from_micros(span.micros.into())
@@ -109,6 +118,9 @@ impl TryFrom<core::time::Duration> for Duration {
 /// assert!(end > start);
 /// assert_eq!(end - start, Duration::from_micros(500));
 /// assert_eq!(start - end, Duration::ZERO);
+/// assert_eq!(end - Duration::from_micros(500), start);
+/// assert_eq!(Duration::from_secs(2) - Duration::from_millis(500), Duration::from_millis(1500));
+/// assert_eq!((end - start).as_millis(), 0); // fractions are cut off
 /// ```
 #[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -164,6 +176,14 @@ impl Add<Duration> for Instant {
 impl AddAssign<Duration> for Instant {
     fn add_assign(&mut self, span: Duration) {
         *self = *self + span;
+    }
+}
+
+impl Sub<Duration> for Instant {
+    type Output = Self;
+
+    fn sub(self, span: Duration) -> Self {
+        Self { micros: self.micros.wrapping_sub(span.micros.into()) }
     }
 }
 

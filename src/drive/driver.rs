@@ -73,22 +73,21 @@ pub(super) enum Next {
 /// A role with its port and its clock.
 ///
 /// ```
-/// # #[cfg(feature = "ikeya")]
-/// # fn turn<P, C>(port: P, clock: C) -> Result<(), axlewire::drive::DriveError<P::Error>>
-/// # where
-/// #     P: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write,
-/// #     C: axlewire::drive::Clock,
-/// # {
-/// use axlewire::drive::Driver;
-/// use axlewire::ikeya::{NodeId, Rps, master::MasterConfig};
-/// use axlewire::time::Duration;
+/// # #[cfg(feature = "ikeya")] {
+/// use axlewire::drive::{Clock, DriveError, Driver};
+/// use axlewire::{ikeya::{NodeId, Rps, master::MasterConfig}, time::Duration};
+/// use embedded_io::{Read, ReadReady, Write};
 ///
-/// let mut bus = Driver::master(MasterConfig::direct(), port, clock);
-/// println!("{} nodes", bus.discover()?.len());
-/// bus.set_velocity(NodeId::N2, Rps::new(1.5)?)?;
-/// bus.run_for(Duration::from_secs(2), |_master, event, _now| println!("{event:?}"))?;
-/// bus.stop(NodeId::N2)?; // `Ok` only once the motor is seen to be still
-/// # Ok(())
+/// fn turn<P, C: Clock>(port: P, clock: C) -> Result<(), DriveError<P::Error>>
+/// where
+///     P: Read + ReadReady + Write,
+/// {
+///     let mut bus = Driver::master(MasterConfig::direct(), port, clock);
+///     println!("{} nodes", bus.discover()?.len());
+///     bus.set_velocity(NodeId::N2, Rps::new(1.5)?)?;
+///     bus.run_for(Duration::from_secs(2), |_master, event, _now| println!("{event:?}"))?;
+///     bus.stop(NodeId::N2) // `Ok` only once the motor is seen to be still
+/// }
 /// # }
 /// ```
 ///

@@ -27,7 +27,7 @@
 //!     C: Clock,
 //! {
 //!     let mut config = MasterConfig::usb_adapter();
-//!     config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus
+//!     config.nodes = [NodeId::N1, NodeId::N2].into(); // the whole bus
 //!     let mut bus = Driver::master(config, port, clock);
 //!     let moved = (|| {
 //!         for (node, mode) in bus.discover()? {

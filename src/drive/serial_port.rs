@@ -32,7 +32,7 @@ const NAP: Duration = Duration::from_micros(200);
 /// ```no_run
 /// # #[cfg(feature = "ikeya")] {
 /// use axlewire::drive::{Driver, SerialPort, StdClock};
-/// use axlewire::ikeya::{BAUD, Master, master::MasterConfig};
+/// use axlewire::ikeya::{BAUD, master::MasterConfig};
 ///
 /// let port = SerialPort::open("/dev/ttyUSB0", BAUD)?;
 /// let mut config = MasterConfig::usb_adapter();

@@ -24,7 +24,7 @@ const NAP: Duration = Duration::from_millis(1);
 /// # #[cfg(feature = "ikeya")]
 /// # async fn run() -> Result<(), Box<dyn std::error::Error>> {
 /// use axlewire::drive::{TokioClock, TokioSerialPort, asynch::Driver};
-/// use axlewire::ikeya::{BAUD, Master, master::MasterConfig};
+/// use axlewire::ikeya::{BAUD, master::MasterConfig};
 ///
 /// let port = TokioSerialPort::open("/dev/ttyUSB0", BAUD)?;
 /// let mut config = MasterConfig::usb_adapter();

@@ -12,7 +12,7 @@ use crate::stream::Echo;
 /// # #[cfg(feature = "ikeya")]
 /// # fn open<P>(port: P, clock: impl axlewire::drive::Clock) -> Result<(), impl core::fmt::Debug>
 /// # where P: embedded_io::Read + embedded_io::Write + embedded_io::ReadReady {
-/// use axlewire::{drive::{Driver, WithoutEcho}, ikeya::{Master, master::MasterConfig}};
+/// use axlewire::{drive::{Driver, WithoutEcho}, ikeya::master::MasterConfig};
 ///
 /// let port = WithoutEcho::new(port); // around an `Rs485`, if there is a pin
 /// let config = MasterConfig::direct();

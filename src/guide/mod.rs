@@ -4,7 +4,7 @@
 //! the tool, which compare what is printed.
 //!
 //! 1. [Start on a PC](start_on_a_pc): the tool, a program, ports, permissions, latency.
-//! 2. [Start on a board](start_on_a_board): twenty lines of firmware, interrupts, DMA, RS485.
+//! 2. [Start on a board](start_on_a_board): a page of firmware, interrupts, DMA, RS485.
 //! 3. [Ikeya](ikeya): four packets, a master, a loose plug.
 //! 4. [UCP](ucp): frames, a host, a robot, two watchdogs, adding a message.
 //! 5. [Streams and resync](streams): what a stray byte costs; the same for another protocol.

@@ -176,6 +176,12 @@ impl Rps {
     }
 }
 
+impl fmt::Display for Rps {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} rps", self.get())
+    }
+}
+
 impl TryFrom<f32> for Rps {
     type Error = EncodeError;
 
@@ -212,6 +218,7 @@ impl<'a> arbitrary::Arbitrary<'a> for Rps {
 /// assert_eq!((back.count(), back.rotation()), (-4096, -1));
 /// let back = Position::from_counts_euclidean(-12_288)?;
 /// assert_eq!((back.count(), back.rotation()), (4096, -2));
+/// assert_eq!(back.to_string(), "-1.5000 turns");
 /// # Ok::<(), axlewire::error::EncodeError>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, Eq, Hash, PartialEq)]
@@ -221,6 +228,12 @@ impl<'a> arbitrary::Arbitrary<'a> for Rps {
 pub struct Position {
     count: i16,
     rotation: i16,
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.4} turns", self.revolutions())
+    }
 }
 
 impl Position {

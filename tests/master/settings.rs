@@ -3,6 +3,13 @@
 use crate::rig::*;
 
 #[test]
+fn a_line_without_a_speed_has_the_usual_one() {
+    let mut config = MasterConfig::direct();
+    config.baud = 0;
+    assert_eq!(Master::new(config, Instant::default()).config().baud, 500_000);
+}
+
+#[test]
 fn periodic_polling_keeps_its_period_without_drift() {
     let (mut desk, begin) = read_every_10_ms();
     for turn in 1..100 {

@@ -133,6 +133,16 @@ fn a_slave_takes_id_and_mode_from_its_switch_as_configured() {
 }
 
 #[test]
+fn a_slave_whose_speed_alone_was_changed_waits_for_packets_of_that_speed() {
+    for (baud, idle_us) in [(9600, 5209), (500_000, 100), (1_000_000, 100), (0, 100)] {
+        let config = with(SlaveConfig::direct(), |config| config.baud = baud);
+        let slave = Slave::new(NodeId::N1, Mode::Velocity, config, T0);
+        assert_eq!(slave.config().idle, US(idle_us), "{baud}");
+        assert!(slave.config().baud > 0);
+    }
+}
+
+#[test]
 fn a_turnaround_gap_holds_the_answer_back() {
     let config = with(SlaveConfig::direct(), |config| config.turnaround_gap = US(30));
     let mut slave = Slave::new(NodeId::N2, Mode::Velocity, config, Instant::from_micros(0));

@@ -22,8 +22,8 @@ macro_rules! calls {
     ($Driver:ident, [$($Port:tt)+], [$($Clock:tt)+], [$($async:tt)?], [$($await:tt)*]) => {
 /// The calls of a master.
 ///
-/// Each ends within four times [`Master::read_bound`], or at its deadline argument; those that stop
-/// within [`Master::stop_bound`] and the time to coast. Readings received meanwhile are not kept as
+/// Each ends within four times [`Master::read_bound`], behind its span if it has one; those that
+/// stop within [`Master::stop_bound`] and the time to coast. Readings received meanwhile are not kept as
 /// events, because [`Master::status`] has the latest; all other events are kept.
 impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     /// Asks every id on the bus and returns the nodes that are online. Removes the events of the
@@ -31,7 +31,8 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     ///
     /// # Errors
     ///
-    /// Port errors. It is not an error if no node answers.
+    /// Port errors, and [`DriveError::Timeout`] if a port that is too slow did not let it end in
+    /// time. It is not an error if no node answers.
     pub $($async)? fn discover(&mut self) -> Result<OnlineNodes, DriveError<P::Error>> {
         self.begin_discovery();
         let bound = self.bound();
@@ -116,7 +117,8 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     /// [`DriveError::StillMoving`] if the motor moves for longer than
     /// [`MasterConfig::coast`](crate::ikeya::master::MasterConfig::coast) after it is. The call
     /// ends after the sum of both at the latest. **The motor may be running.** The stop is repeated
-    /// as long as the driver is called.
+    /// as long as the driver is called. An error of the port is not returned: a stop that it kept
+    /// from the node is among those owed.
     pub $($async)? fn stop(
         &mut self,
         nodes: impl Into<NodeSet>,
@@ -145,7 +147,8 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     /// # Errors
     ///
     /// [`DriveError::ReadFailed`] after all attempts, [`DriveError::Bus`] for a node that is not
-    /// online, and port errors.
+    /// online, [`DriveError::Timeout`] if a port that is too slow did not let it be asked, and port
+    /// errors.
     pub $($async)? fn read(&mut self, node: NodeId) -> Result<Status<B>, DriveError<P::Error>> {
         self.begin_read(node)?;
         let bound = self.bound();

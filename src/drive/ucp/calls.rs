@@ -34,7 +34,9 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
         pong.ok_or(DriveError::Timeout(Operation::Ping))
     }
 
-    /// Drives with speed and turn in percent (ruling U6); the lamp stays as it is. A new command is
+    /// Drives with speed and turn in percent; the lamp stays as it is. A positive turn is a steering
+    /// wheel turned to the right: ahead and in reverse, see [`MotorControl::yaw_right`]
+    /// (ruling U6). A new command is
     /// sent now or, right after another one, within the next 20 ms, and repeated every 100 ms as
     /// long as the driver is called. The same command again is not sent more often, and only feeds
     /// the dead-man: call it as often as you like, and at least every 500 ms (see [`Host::drive`]),
@@ -42,7 +44,8 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
     ///
     /// # Errors
     ///
-    /// [`DriveError::Rover`], and port errors. **After a port error the command stays in force**
+    /// [`DriveError::Value`] for more than 100 percent, [`DriveError::Rover`], and port errors.
+    /// **After a port error the command stays in force**
     /// until 500 ms after this call, and is sent when the port works again: call
     /// [`stop`](Self::stop).
     pub $($async)? fn drive(
@@ -55,13 +58,15 @@ impl<S: BiasStore, P: $($Port)+, C: $($Clock)+> $Driver<Host<S>, P, C> {
     }
 
     /// Drives for `span`, then stops, and waits until the robot is seen to stand still, for at most
-    /// [`COAST`](crate::ucp::host::COAST).
+    /// [`COAST`](crate::ucp::host::COAST). A span below
+    /// [`command_gap`](crate::ucp::host::HostConfig::command_gap) may be over before the command
+    /// has left.
     ///
     /// # Errors
     ///
     /// The errors of [`stop`](Self::stop), then those of
     /// [`await_standstill`](Self::await_standstill), whatever else failed before; otherwise
-    /// [`DriveError::Rover`] and port errors. A refused call changes nothing, and stops nothing.
+    /// those of [`drive`](Self::drive). A refused call changes nothing, and stops nothing.
     pub $($async)? fn drive_for(
         &mut self,
         speed: i16,

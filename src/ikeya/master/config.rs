@@ -12,15 +12,16 @@ use crate::{
 /// use axlewire::{ikeya::{master::{MasterConfig, NodeSet}, NodeId}, time::Duration};
 /// let mut config = MasterConfig::usb_adapter();
 /// config.reply_timeout = Duration::from_millis(5); // an adapter with a latency timer of 1 ms
-/// config.nodes = [NodeId::N1, NodeId::N2].into_iter().collect(); // the whole bus
+/// config.nodes = [NodeId::N1, NodeId::N2].into(); // the whole bus
 /// config.dead_man = Some(Duration::from_millis(500));
+/// config.hold_age = Duration::from_millis(10); // a stop may hold the last answer, see there
 /// ```
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct MasterConfig {
-    /// Speed of the line, bit/s. Not less than it really is: a pause inside a packet would count
-    /// as its time on the line.
+    /// Speed of the line, bit/s; 0 counts as 500,000. Not less than it really is: a pause inside a
+    /// packet would count as its time on the line.
     pub baud: u32,
     /// Ids on this bus; all eight by default. A discovery polls these, and
     /// [`stop_all`](crate::ikeya::Master::stop_all) is done only when each of them has stopped
@@ -46,7 +47,7 @@ pub struct MasterConfig {
     /// Whether an answer may arrive before the line could have carried it, as behind a pipe, a
     /// socket or an emulator. Otherwise such bytes must be older than the request: they are
     /// counted as [`early`](super::NodeStatistics::early) and ignored. Also set it if the
-    /// clock is coarser than 50 µs.
+    /// [clock](crate::drive::Clock) is coarser than 20 µs.
     pub accepts_early: bool,
     /// Maximum age of a measured position that a stop may hold without reading a new one; zero by
     /// default: always read (I6). If it cannot be written within 20 ms, a new one is read anyway.

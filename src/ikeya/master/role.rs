@@ -13,7 +13,7 @@ use crate::{
     events::Events,
     ikeya::{
         board::{Board, OneMotor, PACKET_LEN, Target},
-        units::NodeId,
+        units::{BAUD, NodeId},
     },
     stats::count_apart,
     time::{Instant, reached, wire_time},
@@ -132,6 +132,9 @@ impl<B: Board> Master<B> {
     pub fn for_board(config: MasterConfig, now: Instant) -> Self {
         let mut config = config;
         config.attempts = config.attempts.max(1);
+        if config.baud == 0 {
+            config.baud = BAUD;
+        }
         Self {
             config,
             queue: Queue::default(),

@@ -11,7 +11,7 @@ use crate::{
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct SlaveConfig {
-    /// Speed of the line, bit/s.
+    /// Speed of the line, bit/s; 0 counts as 500,000.
     pub baud: u32,
     /// Time without a valid command before [`SlaveEvent::Watchdog`](super::SlaveEvent::Watchdog).
     /// The protocol document defines none, so the default is `None`: **a motor then keeps its last
@@ -20,8 +20,9 @@ pub struct SlaveConfig {
     /// Silence kept between a request and its answer, for transceivers that need it. Together with
     /// the processing time it should stay below 50 µs (ruling I9).
     pub turnaround_gap: Duration,
-    /// Silence after which an incomplete packet is given up (ruling B3). Must exceed the longest
-    /// pause that the port makes inside a packet.
+    /// Silence after which an incomplete packet is given up (ruling B3); less than the time of
+    /// five bytes counts as that. Must exceed the longest pause that the port makes inside a
+    /// packet.
     pub idle: Duration,
     /// Time during which an answer may still be sent, from the end of the request plus
     /// [`turnaround_gap`](Self::turnaround_gap) (ruling I14): after it the master has given up,
@@ -53,6 +54,12 @@ impl SlaveConfig {
             answer_within: Duration::from_micros(500),
             two_wire: false,
         }
+    }
+
+    /// The same settings, as a slave can work with them.
+    pub(super) fn sane(self) -> Self {
+        let baud = if self.baud == 0 { BAUD } else { self.baud };
+        Self { baud, idle: self.idle.max(wire_time(5, baud)), ..self }
     }
 
     /// For a slave on a host: a USB adapter makes pauses of up to 16 ms.

@@ -99,6 +99,7 @@ impl<B: Board> Slave<B> {
     /// Creates a slave with this [`Board`], which is not moving and has heard nothing yet.
     #[must_use]
     pub fn for_board(node: NodeId, mode: Mode, config: SlaveConfig, now: Instant) -> Self {
+        let config = config.sane();
         Self {
             node,
             mode,

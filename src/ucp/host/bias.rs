@@ -11,6 +11,31 @@ use crate::ucp::body::{ImuBias, MagBias};
 /// per received frame, and [`load`](Self::load) from
 /// [`poll_transmit`](crate::endpoint::Endpoint::poll_transmit): a slow store should work on a copy
 /// in memory.
+///
+/// ```
+/// use axlewire::time::Instant;
+/// use axlewire::ucp::message::{ImuBias, MagBias};
+/// use axlewire::ucp::{Host, host::{BiasStore, HostConfig, NotStored}};
+///
+/// /// A robot whose IMU needs no biases.
+/// struct OnlyMag(Option<MagBias>);
+///
+/// impl BiasStore for OnlyMag {
+///     fn load(&mut self) -> (Option<ImuBias>, Option<MagBias>) {
+///         (None, self.0) // the robot is then not answered: it needs both
+///     }
+///     fn store_imu(&mut self, _: ImuBias) -> Result<(), NotStored> {
+///         Err(NotStored) // the robot sends it again
+///     }
+///     fn store_mag(&mut self, bias: MagBias) -> Result<(), NotStored> {
+///         self.0 = Some(bias);
+///         Ok(())
+///     }
+/// }
+/// let now = Instant::from_micros(0);
+/// let host = Host::with_store(HostConfig::default(), OnlyMag(None), now);
+/// # let _ = host;
+/// ```
 pub trait BiasStore {
     /// Whether results that were stored without an error stay in the store; the default is `true`.
     /// `false` means that they are only passed on. A result is then acknowledged only when its

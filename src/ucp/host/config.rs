@@ -14,9 +14,11 @@ const LONGEST_GAP: Duration = Duration::from_millis(50);
 /// A period or timeout below 1 ms counts as 1 ms, because a driver would spin otherwise.
 ///
 /// ```
-/// use axlewire::ucp::host::HostConfig;
+/// use axlewire::{time::Duration, ucp::host::HostConfig};
 /// let mut config = HostConfig::default();
 /// config.ping_period = None; // the reports say enough
+/// config.command_period = Duration::from_millis(40); // the robot's watchdog fires after 100 ms
+/// config.link_timeout = Duration::from_millis(100);
 /// ```
 #[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -85,6 +85,5 @@ fn a_refused_command_says_why() {
     ]);
     let value = EncodeError::NetworkState { value: 256 };
     let refused = Rover::Value(value);
-    assert_eq!(refused.to_string(), "the value is out of range");
-    assert_eq!(refused.source().unwrap().to_string(), value.to_string());
+    assert_eq!((refused.to_string(), refused.source().is_none()), (value.to_string(), true));
 }
