@@ -219,17 +219,17 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
             // It may have recovered meanwhile.
             self.sending.end_waits();
         }
-        let mut is_again = false;
+        let mut again = 0;
         for _ in 0..FRAMES {
             result = result.and(self.receive().await);
             self.expire();
-            match self.load(is_again) {
+            match self.load(again) {
                 Ok(Next::End) => break,
                 Ok(Next::Look) => {
-                    is_again = true;
+                    again += 1;
                     continue;
                 }
-                Ok(Next::Send) => is_again = false,
+                Ok(Next::Send) => again = 0,
                 Err(error) => {
                     result = result.and(Err(error));
                     break;

@@ -30,18 +30,18 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     fn round(&mut self) -> Result<(), DriveError<P::Error>> {
         let (mut result, begin) = (Ok(()), self.now());
         self.reclaim(begin);
-        let mut is_again = false;
+        let mut again = 0;
         for _ in 0..FRAMES {
             // Before time passes: the rest of a frame may wait in the port.
             result = result.and(self.receive());
             self.expire();
-            match self.load(is_again) {
+            match self.load(again) {
                 Ok(Next::End) => break,
                 Ok(Next::Look) => {
-                    is_again = true;
+                    again += 1;
                     continue;
                 }
-                Ok(Next::Send) => is_again = false,
+                Ok(Next::Send) => again = 0,
                 Err(error) => {
                     result = result.and(Err(error));
                     break;

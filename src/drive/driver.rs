@@ -59,6 +59,9 @@ const RECOVERY: Duration = Duration::from_millis(20);
 /// Longest time between two steps of a driver that was not held up; less for a slave or a robot.
 const HELD_UP: Duration = Duration::from_millis(10);
 
+/// Looks at the port in a row because of hold-ups, at most.
+const LOOKS: u8 = 3;
+
 /// What a round does next.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Next {
@@ -349,16 +352,16 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
     }
 
     /// Whether there is something to send. The rest of a frame goes before the next one, unless it
-    /// is outdated. `is_again` says that the port has just been looked at again because of a
-    /// hold-up: what is due is then sent, however often the driver is held up.
-    pub(super) fn load<E>(&mut self, is_again: bool) -> Result<Next, DriveError<E>> {
+    /// is outdated. `again` counts how often the port has just been looked at again because of a
+    /// hold-up: in the end what is due is sent, however often the driver is held up.
+    pub(super) fn load<E>(&mut self, again: u8) -> Result<Next, DriveError<E>> {
         let now = self.now();
         if !self.sending.rest().is_empty() {
             // The receiver may have taken long since the round began.
             self.reclaim(now);
         }
         if now - self.looks.latest > self.patience_between_steps() {
-            if !is_again {
+            if again < LOOKS {
                 return Ok(Next::Look);
             }
             // Held up once more: what has arrived since the look is not known.

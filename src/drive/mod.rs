@@ -140,7 +140,6 @@
 //! [`LineRules::baud`]: crate::endpoint::LineRules::baud
 //! [`LineRules::frame_pause`]: crate::endpoint::LineRules::frame_pause
 //! [`LineRules::held_up_after`]: crate::endpoint::LineRules::held_up_after
-//! [`LineRules::held_up_after`]: crate::endpoint::LineRules::held_up_after
 //! [`Transmit::Taken`]: crate::endpoint::Transmit::Taken
 //! [`Endpoint::is_outdated`]: crate::endpoint::Endpoint::is_outdated
 

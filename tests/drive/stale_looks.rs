@@ -132,6 +132,21 @@ fn a_link_is_not_lost_because_the_thread_of_its_host_was_held_up() {
 }
 
 #[test]
+fn a_link_is_not_lost_because_the_thread_of_its_host_was_held_up_twice() {
+    let pairs = (0..14).flat_map(|first| (0..5).map(move |second| (first, second)));
+    for (first, second) in pairs {
+        let (world, mut rover, _robot) = rover(|config| config.link_timeout = ms(100));
+        rover.run_for(ms(300), |_, _, _| ()).unwrap();
+        world.hold_up(first, 12_000);
+        world.hold_up(second, 150_000);
+        for _ in 0..10 {
+            rover.service().unwrap();
+        }
+        assert_eq!(rover.role().statistics().links_lost, 0, "readings {first} and {second}");
+    }
+}
+
+#[test]
 fn an_update_request_does_not_leave_past_reports_of_motion_wherever_its_thread_was_held_up() {
     // The second one is too short for a repetition of the stop to go before the request.
     for (is_async, hold_us) in BOTH.into_iter().flat_map(|it| [400_000, 60_000].map(|us| (it, us)))

@@ -327,12 +327,12 @@ fn an_update_request_that_waits_for_its_port_is_outdated_once_a_wheel_turns() {
     // Reports that may say so wait in the port meanwhile.
     let (mut host, now) = asked();
     while host.poll_transmit(now).is_some_and(|frame| frame[4] != 9) {}
-    host.handle_input(&[], now + Duration::from_millis(19));
+    host.handle_input(&[], now + Duration::from_millis(9));
     assert!(!host.is_outdated());
-    assert_eq!(host.poll_timeout(), Some(now + Duration::from_millis(20)), "its driver looks then");
-    host.handle_input(&[], now + Duration::from_millis(20));
+    assert_eq!(host.poll_timeout(), Some(now + Duration::from_millis(10)), "its driver looks then");
+    host.handle_input(&[], now + Duration::from_millis(10));
     assert!(host.is_outdated());
-    host.handle_transmit(Unsent::Untouched, now + Duration::from_millis(20));
+    host.handle_transmit(Unsent::Untouched, now + Duration::from_millis(10));
     assert!(events(&mut host).contains(&HostEvent::UpdateNotSent));
     assert!(!host.is_updating());
 }

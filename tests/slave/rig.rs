@@ -2,11 +2,12 @@
 pub(crate) use axlewire::{
     endpoint::{Arrival, Endpoint, Transmit, Unsent},
     ikeya::{
-        Mode, NodeId, Position, ReadRequest, Rps, Slave,
+        BAUD, Mode, NodeId, Position, ReadRequest, Rps, Slave,
         board::{Target, ThreeMotors},
         slave::{DipSwitch, IdReading, SlaveConfig, SlaveEvent},
+        three,
     },
-    time::{Duration, Instant},
+    time::{Duration, Instant, wire_time},
 };
 
 pub(crate) use crate::packets::*;

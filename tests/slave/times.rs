@@ -157,16 +157,31 @@ fn the_gap_is_kept_behind_a_request_of_unknown_age_too() {
 }
 
 #[test]
-fn an_answer_that_its_port_does_not_take_is_outdated_four_pauses_after_its_time() {
+fn the_gap_is_kept_behind_a_request_that_only_a_pause_has_found() {
+    let mut config = SlaveConfig::direct();
+    (config.turnaround_gap, config.answer_within) = (US(1000), US(6000));
+    let mut slave = Slave::new(NODE, Mode::Velocity, config, T0);
+    let now = T0 + US(6100);
+    let cut_off = [&[0xBB, 3][..], &read(NODE)].concat();
+    slave.handle_input(&cut_off, Arrival::Between { since: T0, now });
+    slave.handle_timeout(now + US(100));
+    assert_eq!(slave.statistics().reads, 1);
+    assert!(slave.poll_transmit(now + US(1000)).is_none(), "it may have ended now");
+}
+
+#[test]
+fn an_answer_that_its_port_does_not_take_is_outdated_the_time_of_a_packet_after_its_own() {
+    /// Time of the longest packet of any board.
+    const LONGEST: u32 = wire_time(three::MAX_LEN, BAUD).as_micros();
     let mut slave = Slave::new(NODE, Mode::Velocity, SlaveConfig::direct(), T0);
     let ask = |slave: &mut Slave, at| {
         slave.handle_input(&read(NODE), at);
         assert!(slave.poll_transmit(at).is_some());
     };
     ask(&mut slave, T0);
-    slave.handle_input(&[], T0 + US(500 + 400));
+    slave.handle_input(&[], T0 + US(500 + LONGEST));
     assert!(!slave.is_outdated());
-    slave.handle_input(&[], T0 + US(500 + 401));
+    slave.handle_input(&[], T0 + US(500 + LONGEST + 1));
     assert!(slave.is_outdated());
     slave.handle_transmit(Unsent::Untouched, T0 + US(901));
     assert!(slave.poll_transmit(T0 + US(901)).is_none());

@@ -18,7 +18,7 @@ use crate::{
     },
     stats::{count, uncount},
     stream::Counters,
-    time::{Duration, Instant, earliest, reached},
+    time::{Duration, Instant, earliest, reached, wire_time},
 };
 
 /// A slave: follows the traffic of all nodes, answers a READ for its own id with the status that
@@ -273,8 +273,8 @@ impl<B: Board> Endpoint for Slave<B> {
             self.requests.receive(since, now);
             self.receive(bytes, arrived);
         } else if let Some(answer) = self.sent {
-            // Once it has begun, it may end: four pauses are the time of the longest packet.
-            self.is_late |= now > answer.until + self.config.idle.saturating_mul(4);
+            // Once it has begun, it may end.
+            self.is_late |= now > answer.until + wire_time(PACKET_LEN, self.config.baud);
         }
         // A command may be too old already.
         self.expire_command(now);
@@ -282,7 +282,7 @@ impl<B: Board> Endpoint for Slave<B> {
 
     fn handle_timeout(&mut self, now: Instant) {
         if self.requests.settle(now) {
-            self.receive(&[], self.requests.last().into());
+            self.receive(&[], Arrival::Between { since: self.requests.last(), now });
         }
         self.expire_command(now);
     }

@@ -3,7 +3,7 @@
 use crate::time::{Duration, Instant};
 
 /// Longest time for which the request waits for its port before reports are read again: one report.
-const PATIENCE: Duration = Duration::from_millis(20);
+const PATIENCE: Duration = Duration::from_millis(10);
 
 /// Progress of a firmware update. Its request is sent once, or not at all.
 #[derive(Clone, Copy, Debug)]
