@@ -2,7 +2,8 @@
 
 use crate::time::{Duration, Instant};
 
-/// Longest time for which the request waits for its port before reports are read again: one report.
+/// Longest time for which the request waits for its port. With the time since the last look, at
+/// most as much, no report of motion behind it is older than 20 ms.
 const PATIENCE: Duration = Duration::from_millis(10);
 
 /// Progress of a firmware update. Its request is sent once, or not at all.
