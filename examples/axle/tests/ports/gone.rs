@@ -21,7 +21,7 @@ fn a_port_that_disappears_ends_each_subcommand_with_one_line() {
         ("ucp", "watch --plain --protocol ucp -p PORT".to_owned(), "report"),
         ("ucp", "ping --for 600 -p PORT".to_owned(), "ms"),
         ("ucp", "send -p PORT --for 600 ucp ping".to_owned(), "pong"),
-        ("ucp", format!("replay {capture} -p PORT"), "pong"),
+        ("ucp", format!("replay {capture} --longest-pause 600 -p PORT"), "pong"),
         (TWO_NODES, "send -p PORT --for 600 ikeya read 1".to_owned(), "velocity_response"),
         (TWO_NODES, "watch --json --protocol ikeya -p PORT".to_owned(), "{"),
     ];
