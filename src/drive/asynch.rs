@@ -62,8 +62,8 @@ use crate::{
     time::{Duration, Instant, earliest, reached},
 };
 
-/// Pause before a frame that waits for its port is looked at again, microseconds: an answer, which
-/// has little time, and one whose role is due for something else.
+/// Shortest pause before a frame that waits for its port is decided again, microseconds; the only
+/// one for an answer, which has little time.
 const LOOK_US: u32 = 1000;
 
 /// Longest single delay, microseconds, so that the errors of a delay do not add up.

@@ -9,6 +9,11 @@ use crate::error::EncodeError;
 /// Speed of the line, bit/s.
 pub const BAUD: u32 = 500_000;
 
+/// The speed of a setting: 0 means the usual one. Nothing would ever end on a line without a speed.
+pub(super) const fn speed(baud: u32) -> u32 {
+    if baud == 0 { BAUD } else { baud }
+}
+
 /// Address of a motor driver on the bus, 1 to 8 (ruling I1).
 ///
 /// The master has no id on the wire; 0 and anything above 8 are not values of this type.

@@ -13,7 +13,7 @@ use crate::{
     events::Events,
     ikeya::{
         board::{Board, OneMotor, PACKET_LEN, Target},
-        units::{BAUD, NodeId},
+        units::{NodeId, speed},
     },
     stats::count_apart,
     time::{Instant, reached, wire_time},
@@ -132,9 +132,7 @@ impl<B: Board> Master<B> {
     pub fn for_board(config: MasterConfig, now: Instant) -> Self {
         let mut config = config;
         config.attempts = config.attempts.max(1);
-        if config.baud == 0 {
-            config.baud = BAUD;
-        }
+        config.baud = speed(config.baud);
         Self {
             config,
             queue: Queue::default(),

@@ -1,7 +1,7 @@
 //! Settings of a slave.
 
 use crate::{
-    ikeya::units::BAUD,
+    ikeya::units::{BAUD, speed},
     time::{Duration, wire_time},
 };
 
@@ -58,7 +58,7 @@ impl SlaveConfig {
 
     /// The same settings, as a slave can work with them.
     pub(super) fn sane(self) -> Self {
-        let baud = if self.baud == 0 { BAUD } else { self.baud };
+        let baud = speed(self.baud);
         Self { baud, idle: self.idle.max(wire_time(5, baud)), ..self }
     }
 
