@@ -337,14 +337,21 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
     /// that may forbid the rest. A failing receiver does not stop the sending.
     async fn send(&mut self, begin: Instant) -> (Received<P::Error>, Sent<P::Error>) {
         let mut received = Ok(());
+        let mut asked = None;
         while !self.sending.rest().is_empty() {
             if !self.before_write() {
                 return (received, Ok(()));
             }
             let now = self.latest();
-            let waited = self.sending.write_wait.begin(now);
+            let (since, waited) =
+                *asked.get_or_insert_with(|| (now, self.sending.write_wait.begin(now)));
             let (wait_us, is_last) = self.patience(waited);
-            let written = match self.write_rest(wait_us).await {
+            let left_us = wait_us.saturating_sub((now - since).as_micros());
+            let look_us = self.port_time(self.sending.rest().len()).as_micros();
+            // The last wait is no shorter than a look: a healthy port needs some time.
+            let is_look = left_us >= look_us.saturating_mul(2);
+            let wait_us = if is_look { look_us } else { left_us };
+            let written = match self.write_rest(wait_us, since).await {
                 Ok(written) => written,
                 Err(_) if self.role.is_outdated() => {
                     // The role decides again, within the time that this frame had.
@@ -357,6 +364,11 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                     self.reclaim(now);
                     return (received, Ok(()));
                 }
+                // What is received meanwhile may forbid it.
+                Err(Unwritten::Waited) if is_look => {
+                    received = received.and(self.receive().await);
+                    continue;
+                }
                 Err(_) if !is_last => return (received, Ok(())),
                 Err(_) => {
                     self.sending.write_wait.end();
@@ -366,6 +378,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 }
             };
             self.sending.write_wait.end();
+            asked = None;
             if let Err(error) = self.after_write(written) {
                 return (received, Err(error));
             }
@@ -381,7 +394,11 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
 
     /// Asks the port to take the unsent bytes; an error if it does not within this time, or if they
     /// have become wrong meanwhile: then none of them has left.
-    async fn write_rest(&mut self, wait_us: u32) -> Result<Result<usize, P::Error>, Unwritten> {
+    async fn write_rest(
+        &mut self,
+        wait_us: u32,
+        first_asked_at: Instant,
+    ) -> Result<Result<usize, P::Error>, Unwritten> {
         let patience_us = self.patience_between_steps().as_micros();
         let acts = driver::look_period(&self.role).is_some();
         // A host says itself what is outdated by now: its stops are not, however late they are.
@@ -412,7 +429,7 @@ impl<R: Endpoint, P: Read + Write, C: Clock + DelayNs> Driver<R, P, C> {
                 return Err(Unwritten::Late);
             }
             // An answer of a slave or a robot has no more time than that altogether.
-            let (since, nap_us) = if acts { (begin, 0) } else { (asked_at, nap_us) };
+            let (since, nap_us) = if acts { (first_asked_at, 0) } else { (asked_at, nap_us) };
             if !knows_time && (now - since).as_micros() > nap_us.saturating_add(patience_us) {
                 return Err(Unwritten::Late);
             }

@@ -310,7 +310,12 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Time within which a healthy port takes or flushes a frame.
     pub(super) fn frame_time(&self) -> Duration {
-        self.role.line_rules().wire_time(FRAME_LEN).saturating_mul(2) + Duration::from_millis(1)
+        self.port_time(FRAME_LEN)
+    }
+
+    /// The same for this many bytes.
+    pub(super) fn port_time(&self, bytes: usize) -> Duration {
+        self.role.line_rules().wire_time(bytes).saturating_mul(2) + Duration::from_millis(1)
     }
 
     /// Whether the port of a slave or a robot may hold more, because its receiver has failed, or

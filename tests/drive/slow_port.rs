@@ -70,6 +70,7 @@ fn the_time_of_a_frame_is_twice_that_of_the_longest_and_a_millisecond() {
     for (write_us, expected) in [(3559, Ok(())), (3561, Err(DriveError::Stalled))] {
         let role = Pausing { repeats: true, ..Pausing::default() };
         let mut driver = slow(role, write_us, 0);
+        driver.port_mut().writes.push_front(Step::Stall);
         let world = driver.port().world.clone();
         assert_eq!(world.poll_times(1, driver.asynch().service()), None);
         world.step(999_000 - write_us);

@@ -2,7 +2,10 @@
 
 use axlewire::ucp::{Frame, host::StopProgress};
 
-use crate::rig::*;
+use crate::{
+    motor_line::{ALL, Wire},
+    rig::*,
+};
 
 /// The rover's wheels turn at this speed from now on, whatever it is told.
 fn turn(world: &World, robot: &Running<Robot>, rpm: i16) {
@@ -351,4 +354,55 @@ fn an_answer_that_waits_for_its_port_is_taken_back_once_its_time_has_passed() {
     assert_eq!(slave.port().written, [] as [u8; 0]);
     let counted = slave.role().statistics();
     assert_eq!((counted.replies, counted.expired, counted.overtaken), (0, 1, 0));
+}
+
+#[test]
+fn a_set_point_that_waits_for_its_port_does_not_leave_behind_an_answer_in_the_other_mode() {
+    let set_point = WriteRequest::velocity(NodeId::N1, rps(5.0));
+    for late_us in [3000, 30_000, 900_000] {
+        let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
+        let waits = std::rc::Rc::new(std::cell::Cell::new(false));
+        let has_waited = waits.clone();
+        wire.write_with(move |bytes| {
+            let is_first = bytes == set_point.as_bytes() && !has_waited.replace(true);
+            if is_first { Step::Late(late_us) } else { ALL }
+        });
+        let from = bus.port().written.len();
+        {
+            let mut aimed = std::pin::pin!(bus.asynch().set_velocity(NodeId::N1, rps(5.0)));
+            while !waits.get() {
+                assert!(poll(aimed.as_mut()).is_pending());
+                wire.world.step(20);
+            }
+            // The switch of the node is moved, and its last answer is late.
+            wire.motor().switch(Mode::Position, wire.world.now_us());
+            wire.receive(PositionResponse::new(NodeId::N1, Position::new(3, 0)).as_bytes());
+            let _ = wire.world.block_on(aimed);
+        }
+        let _ = wire.world.block_on(bus.asynch().run_for(ms(50), |_, _, _| ()));
+        let written = &bus.port().written[from..];
+        let has_left = written.windows(8).any(|bytes| bytes == set_point.as_bytes());
+        assert!(!has_left, "{late_us} us");
+    }
+}
+
+#[test]
+fn an_answer_that_waits_for_its_port_is_taken_back_when_another_request_is_heard() {
+    let mut config = SlaveConfig::direct();
+    config.answer_within = ms(4);
+    let (mut slave, mut far) = slave(config);
+    let world = slave.port().world.clone();
+    slave.service().unwrap();
+    embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N2).as_bytes()).unwrap();
+    world.step(100);
+    slave.port_mut().writes.push_back(Step::Late(3000));
+    {
+        let mut service = std::pin::pin!(slave.asynch().service());
+        assert!(poll(service.as_mut()).is_pending());
+        embedded_io::Write::write(&mut far, ReadRequest::new(NodeId::N5).as_bytes()).unwrap();
+        let _ = world.block_on(service);
+    }
+    let _ = world.block_on(slave.asynch().next_command(ms(20)));
+    assert_eq!(slave.port().written, [] as [u8; 0]);
+    assert_eq!(slave.role().statistics().overtaken, 1);
 }

@@ -18,7 +18,7 @@ fn turning() -> (Wire, Bus) {
 /// The same; async writes or flushes are never ready.
 fn hanging(flushes_hang: bool) -> (Wire, Bus) {
     let (wire, mut bus) = turning();
-    script(&mut bus, flushes_hang).extend(vec![Step::Stall; 1000]);
+    script(&mut bus, flushes_hang).extend(vec![Step::Stall; 10_000]);
     (wire, bus)
 }
 

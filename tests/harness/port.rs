@@ -47,7 +47,8 @@ pub(crate) enum Step {
     Error,
     /// Reports end of file, or that it takes nothing.
     Zero,
-    /// Takes this long, microseconds; an async call is not ready until then.
+    /// Takes this long, microseconds; async calls are not ready until then, even if the first is
+    /// dropped.
     Late(u64),
     /// Takes this long, microseconds, in an async call as well.
     Blocks(u64),
@@ -116,6 +117,8 @@ pub(crate) struct Port {
     pub(crate) is_blind: bool,
     /// It becomes deaf when something is written.
     pub(crate) is_deafened: bool,
+    /// Until when async writes are not ready, because of a step of one that was dropped.
+    pub(crate) busy_until_us: Option<u64>,
     /// Every write fails.
     pub(crate) is_mute: bool,
     /// Async writes and flushes are ready only on the second poll.
@@ -131,8 +134,6 @@ pub(crate) struct Port {
     pub(crate) flush_calls: u64,
     pub(crate) flushed: usize,
     pub(crate) flushed_bytes: usize,
-    /// Time spent in late calls, microseconds.
-    pub(crate) stalled_us: u64,
     /// Every call of `write` and of `flush`.
     pub(crate) log: Option<Log>,
 }
@@ -166,6 +167,7 @@ impl Port {
             is_deaf: false,
             is_blind: false,
             is_deafened: false,
+            busy_until_us: None,
             is_mute: false,
             stutters: false,
             unplugged: Rc::default(),
@@ -175,7 +177,6 @@ impl Port {
             flush_calls: 0,
             flushed: 0,
             flushed_bytes: 0,
-            stalled_us: 0,
             log: None,
         }
     }
@@ -249,9 +250,8 @@ impl Port {
         }
     }
 
-    async fn stall(&mut self, micros: u64, is_async: bool) {
+    async fn stall(&self, micros: u64, is_async: bool) {
         self.wait_until(self.world.now_us() + micros, is_async).await;
-        self.stalled_us += micros;
     }
 
     async fn reading_some(&mut self, buffer: &mut [u8], is_async: bool) -> Reply<usize> {
@@ -323,15 +323,19 @@ impl Port {
             return Err(Unplugged);
         }
         let mut most = self.most;
-        let step = match &mut *self.writer.borrow_mut() {
-            Some(writer) => Some(writer(bytes)),
-            None => self.writes.pop_front(),
+        let step = match (&mut *self.writer.borrow_mut(), self.busy_until_us) {
+            (_, Some(_)) => None,
+            (Some(writer), None) => Some(writer(bytes)),
+            (None, None) => self.writes.pop_front(),
         };
         match step {
             Some(Step::Few(count)) => most = most.min(count),
             Some(Step::Error) => return Err(Unplugged),
             Some(Step::Zero) => most = 0,
-            Some(Step::Late(micros)) => self.stall(micros, is_async).await,
+            Some(Step::Late(micros)) if is_async => {
+                self.busy_until_us = Some(self.world.now_us() + micros);
+            }
+            Some(Step::Late(micros)) => self.stall(micros, false).await,
             Some(Step::Blocks(micros)) => self.stall(micros, false).await,
             Some(Step::BlocksAndFails(micros)) => {
                 self.stall(micros, false).await;
@@ -349,6 +353,10 @@ impl Port {
             Some(Step::Stall) => pending().await,
             Some(Step::Bytes(_)) => panic!("a write gives nothing"),
             None => {}
+        }
+        if let Some(until_us) = self.busy_until_us.filter(|_| is_async) {
+            self.wait_until(until_us, true).await;
+            self.busy_until_us = None;
         }
         Ok(self.take(bytes, most))
     }
