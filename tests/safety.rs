@@ -177,6 +177,8 @@ fn each_bound_on_the_page_is_the_one_in_the_code() {
         "until the second stop, some 1 ms later",
         "until the second stop, some 2 ms later",
         "the next one follows 100 ms later",
+        "an async one for less than 2 ms at 500 kbit/s",
+        "and within 2 ms at 500 kbit/s when another request is heard",
         "0 rps",
         "1 rps",
         "1 to 5 %",

@@ -19,9 +19,9 @@
 //! * call a discovery or a read again.
 //!
 //! The port must do its part: a `read` or `write` that is dropped before it is ready must not have
-//! moved any bytes, and each round drops one `read`. Buffered ports, such as embassy's
-//! `BufferedUart`, comply; ports that lend the caller's buffer to a DMA channel for one call do
-//! not.
+//! moved any bytes. Each round drops one `read`, and a `write` that waits is dropped and repeated:
+//! what is received meanwhile may forbid it. Buffered ports, such as embassy's `BufferedUart`,
+//! comply; ports that lend the caller's buffer to a DMA channel for one call do not.
 //!
 //! # With embassy
 //!

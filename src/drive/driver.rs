@@ -7,7 +7,7 @@ use super::{
     sending::{FRAME_LEN, Sending},
 };
 use crate::{
-    endpoint::{Arrival, Endpoint, Transmit, Unsent},
+    endpoint::{Endpoint, Transmit, Unsent},
     time::{Duration, Instant, earliest, reached},
 };
 
@@ -347,8 +347,7 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
 
     /// Tells the role that bytes may wait in the port, from any time since it was seen empty.
     fn doubt(&mut self, now: Instant) {
-        let since_empty = Arrival::Between { since: self.looks.empty_at, now };
-        self.role.handle_input(&[], since_empty);
+        self.role.handle_input(&[], self.looks.since_empty(now));
     }
 
     /// Longest time between two steps that is no hold-up.
@@ -372,7 +371,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
             // Held up once more: what has arrived since the look is not known.
             self.doubt(now);
         }
-        self.give_up_outdated(now);
         if self.sending.is_in_doubt() {
             // Its flush goes first: it was dropped, or the rest of the frame was given up.
             return Ok(Next::Send);
@@ -396,18 +394,6 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         Ok(Next::Send)
     }
 
-    /// Gives up a frame, or the rest of one, that has become wrong since the role decided on it.
-    fn give_up_outdated(&mut self, now: Instant) {
-        if self.sending.rest().is_empty() {
-            return;
-        }
-        self.role.handle_input(&[], now);
-        self.decided_at = now;
-        if self.role.is_outdated() {
-            self.give_up(now);
-        }
-    }
-
     pub(super) fn give_up(&mut self, now: Instant) {
         let given_up = self.sending.give_up();
         self.tell_unsent(given_up, now);
@@ -425,11 +411,15 @@ impl<R: Endpoint, P, C: Clock> Driver<R, P, C> {
         if is_late || self.sending.is_in_parts() || reached(self.ends_at, now) {
             self.reclaim(now);
         }
-        if now - self.looks.latest > self.patience_between_steps() {
-            self.doubt(now);
-        }
-        self.give_up_outdated(now);
         if self.sending.rest().is_empty() {
+            return false;
+        }
+        let is_held_up = now - self.looks.latest > self.patience_between_steps();
+        let arrived = if is_held_up { self.looks.since_empty(now) } else { now.into() };
+        self.role.handle_input(&[], arrived);
+        self.decided_at = now;
+        if self.role.is_outdated() {
+            self.give_up(now);
             return false;
         }
         self.sending.begin_write(now);

@@ -57,9 +57,14 @@ impl Looks {
             None => self.has_overtaken,
         };
         match is_old {
-            true => Arrival::Between { since: self.empty_at, now },
+            true => self.since_empty(now),
             false => Arrival::Now(now),
         }
+    }
+
+    /// At any time since the port was seen empty.
+    pub(super) const fn since_empty(&self, now: Instant) -> Arrival {
+        Arrival::Between { since: self.empty_at, now }
     }
 }
 

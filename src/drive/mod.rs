@@ -54,8 +54,10 @@
 //! less in each call: for half of [`LineRules::held_up_after`], or for two of its longest frames
 //! and a millisecond if that is longer, by which time a healthy port is done. Then its application
 //! hears of a watchdog at most four such times late, and a call may leave a frame, and a
-//! driver-enable pin, to the next one. A command that ends while a write of its first bytes waits,
-//! by the dead-man of a host or because its call is over, does not leave.
+//! driver-enable pin, to the next one. While a write of a frame's first bytes waits, the driver
+//! looks at what is received, after twice the time of those bytes and a millisecond, and again and
+//! again: a command does not leave that has ended by then, by a dead-man, because its call is over,
+//! or because its node has answered in the other mode.
 //!
 //! # When a driver is held up
 //!

@@ -58,7 +58,8 @@ impl<P, O: OutputPin> Rs485<P, O> {
 
 impl<P, O: OutputPin, D> Rs485<P, O, D> {
     /// The same for a transceiver that needs a delay `before`, between the pin and the first byte,
-    /// or `after`, between the last byte and the pin.
+    /// or `after`, between the last byte and the pin. `before` must be shorter than a millisecond
+    /// in async code, where a `write` that waits is dropped and repeated.
     ///
     /// # Errors
     ///

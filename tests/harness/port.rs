@@ -134,6 +134,8 @@ pub(crate) struct Port {
     pub(crate) flush_calls: u64,
     pub(crate) flushed: usize,
     pub(crate) flushed_bytes: usize,
+    /// Time of late calls, microseconds.
+    pub(crate) stalled_us: u64,
     /// Every call of `write` and of `flush`.
     pub(crate) log: Option<Log>,
 }
@@ -177,6 +179,7 @@ impl Port {
             flush_calls: 0,
             flushed: 0,
             flushed_bytes: 0,
+            stalled_us: 0,
             log: None,
         }
     }
@@ -250,7 +253,8 @@ impl Port {
         }
     }
 
-    async fn stall(&self, micros: u64, is_async: bool) {
+    async fn stall(&mut self, micros: u64, is_async: bool) {
+        self.stalled_us += micros;
         self.wait_until(self.world.now_us() + micros, is_async).await;
     }
 
@@ -333,6 +337,7 @@ impl Port {
             Some(Step::Error) => return Err(Unplugged),
             Some(Step::Zero) => most = 0,
             Some(Step::Late(micros)) if is_async => {
+                self.stalled_us += micros;
                 self.busy_until_us = Some(self.world.now_us() + micros);
             }
             Some(Step::Late(micros)) => self.stall(micros, false).await,
