@@ -6,15 +6,34 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use flate2::read::MultiGzDecoder;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
-use crate::{failure::Failure, pcapng::MAGIC};
+use crate::{
+    failure::Failure,
+    hex::{self, Hex},
+    pcapng,
+};
 
 /// Maximum number of bytes read at once.
 pub(crate) const CHUNK_LEN: usize = 64 * 1024;
 
+/// The first bytes of a file that is packed with gzip, and how.
+const GZIP: [u8; 3] = [0x1F, 0x8B, 8];
+
+/// Number of bytes that tell text from other captures.
+const SAMPLE_LEN: usize = 16;
+
 /// Files up to this many bytes are decoded too quickly for a progress bar.
 const NO_PROGRESS_UP_TO: u64 = 8 * 1024 * 1024;
+
+/// How the bytes of an input are written.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct Form {
+    /// The capture is text: two hexadecimal digits for each byte
+    #[arg(long)]
+    hex: bool,
+}
 
 /// A byte source of any length that holds one chunk in memory.
 pub(crate) struct Input {
@@ -28,15 +47,17 @@ pub(crate) struct Input {
     first_len: usize,
     /// A second handle and the length, if it is a regular file.
     file: Option<(File, u64)>,
+    /// It is read as it is, neither packed nor text.
+    is_plain: bool,
     progress: Option<ProgressBar>,
 }
 
 impl Input {
     /// Opens `path`, or standard input for `None` and `-`.
-    pub(crate) fn open(path: Option<&Path>) -> Result<Self, Failure> {
+    pub(crate) fn open(path: Option<&Path>, form: Form) -> Result<Self, Failure> {
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
-            return Ok(Self::new(None, reader, None, None));
+            return Self::new(None, reader, None, None).unpack(form);
         };
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
@@ -49,7 +70,7 @@ impl Input {
             whole = Some((file.try_clone().map_err(cannot_open)?, metadata.len()));
         }
         let progress = whole.as_ref().and_then(|(_, len)| progress(*len));
-        Ok(Self::new(Some(path.to_owned()), Box::new(file), whole, progress))
+        Self::new(Some(path.to_owned()), Box::new(file), whole, progress).unpack(form)
     }
 
     fn new(
@@ -60,7 +81,8 @@ impl Input {
     ) -> Self {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let (ahead, first) = (Vec::new(), Vec::new());
-        Self { path, reader, chunk, ahead, first, first_len: 0, file, progress }
+        let (first_len, is_plain) = (0, true);
+        Self { path, reader, chunk, ahead, first, first_len, file, is_plain, progress }
     }
 
     /// Keeps the first `len` bytes.
@@ -73,9 +95,10 @@ impl Input {
         &self.first
     }
 
-    /// The file and its length, if the input is a regular file and not a stream.
+    /// The file and its length, if the input is a regular file and not a stream, nor packed, nor
+    /// text.
     pub(crate) fn file(&self) -> Option<(&File, u64)> {
-        self.file.as_ref().map(|(file, len)| (file, *len))
+        self.file.as_ref().filter(|_| self.is_plain).map(|(file, len)| (file, *len))
     }
 
     /// Its path; `None` is standard input.
@@ -116,9 +139,39 @@ impl Input {
     }
 
     /// Whether the input is a capture with times.
-    pub(crate) fn is_pcapng(&mut self) -> Result<bool, Failure> {
-        let front = self.peek(MAGIC.len(), |front| !MAGIC.starts_with(front))?;
-        Ok(front.starts_with(&MAGIC))
+    pub(crate) fn has_times(&mut self) -> Result<bool, Failure> {
+        let front = self.peek(4, |_| false)?;
+        Ok(pcapng::is_capture(front).unwrap_or(false))
+    }
+
+    /// Unpacks the input, if it is packed, and turns text into bytes.
+    fn unpack(mut self, form: Form) -> Result<Self, Failure> {
+        let front = self.peek(GZIP.len(), |front| !GZIP.starts_with(front))?;
+        if front.starts_with(&GZIP) {
+            self = self.behind(|packed| Box::new(MultiGzDecoder::new(packed)));
+        }
+        if form.hex {
+            return Ok(self.behind(|text| Box::new(Hex::new(io::BufReader::new(text)))));
+        }
+        let front = self.peek(SAMPLE_LEN, |front| !hex::is_hex(front))?;
+        if front.len() >= SAMPLE_LEN && hex::is_hex(front) {
+            return Err(Failure::Usage("the capture is hex text: use --hex".to_owned()));
+        }
+        if let [0xFF, 0xFB..=0xFE, ..] = front {
+            eprintln!(
+                "axle: the capture begins as telnet does, which doubles each FF byte: frames with \
+                 such a byte are lost; record from a raw TCP port"
+            );
+        }
+        Ok(self)
+    }
+
+    /// Reads through another reader from now on.
+    fn behind(mut self, with: impl FnOnce(Box<dyn Read>) -> Box<dyn Read>) -> Self {
+        let ahead = io::Cursor::new(core::mem::take(&mut self.ahead));
+        self.reader = with(Box::new(ahead.chain(self.reader)));
+        (self.is_plain, self.progress) = (false, None);
+        self
     }
 
     /// Reads ahead: up to `len` bytes, fewer at the end of the input, or once they are enough

@@ -18,6 +18,7 @@ mod failure;
 mod flaky;
 mod freely;
 mod help;
+mod hex;
 mod input;
 mod lamp;
 mod line;

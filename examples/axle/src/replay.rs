@@ -10,6 +10,7 @@ use crate::{
     decode::{self, Taken, Walked},
     failure::Failure,
     help::MOTION_HELP,
+    input::Form,
     pcapng::Direction,
     play::{self, Due, Limits, Plan, Side},
 };
@@ -76,7 +77,10 @@ pub(crate) struct Args {
     #[arg(short, long)]
     json: bool,
 
-    /// The capture: pcapng or raw bytes
+    #[command(flatten)]
+    form: Form,
+
+    /// The capture
     file: PathBuf,
 }
 
@@ -104,7 +108,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 /// The frames of one side of the capture, each with its time.
 fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
-    let (protocol, taken, walked) = decode::frames_of(&args.file, args.protocol)?;
+    let (protocol, taken, walked) = decode::frames_of(&args.file, args.form, args.protocol)?;
     let mut frames = Vec::new();
     let mut pace = Pace::new(args.speed, args.longest_pause);
     let mut has_sent = false;

@@ -7,12 +7,14 @@ use clap::{ValueEnum, builder::PossibleValue};
 use crate::{
     args::Protocol,
     help::EXIT_CODES,
+    input::Form,
     listing::{Style, TimeColumn},
 };
 
 /// List the frames of a capture, and the gaps between them
 ///
-/// Reads raw bytes, or pcapng as `axle record` writes it; standard input too. Every byte appears in
+/// Reads raw bytes, pcapng as `axle record` writes it, or pcap, packed with gzip or not; standard
+/// input too. Every byte appears in
 /// exactly one line: a frame, or a gap with the reason why no frame starts there. The end of the
 /// input, or of a section of pcapng, counts as a quiet line: a truncated frame becomes a gap. Times
 /// do not: how long a line was quiet cannot be told from the moments at which its bytes were read.
@@ -24,8 +26,8 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
-    /// most bytes at the beginning of raw bytes
+    /// Protocol of the line; auto takes that of a pcapng or pcap file, or the one whose frames
+    /// have the most bytes at the beginning of raw bytes
     #[arg(short = 'P', long, value_enum, default_value = "auto")]
     pub(super) protocol: Named,
 
@@ -49,6 +51,9 @@ pub(crate) struct Args {
     /// are cores
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(super) jobs: Option<u16>,
+
+    #[command(flatten)]
+    pub(super) form: Form,
 
     /// The capture; if omitted or -, standard input
     pub(super) file: Option<PathBuf>,

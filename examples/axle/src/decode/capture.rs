@@ -1,4 +1,4 @@
-//! Lists a capture with times: pcapng.
+//! Lists a capture with times: pcapng, or classic pcap.
 
 use super::{
     Choice, Printer, Sheet,
@@ -20,8 +20,11 @@ pub(super) fn run(args: &Args, mut input: Input, choice: Choice) -> Result<(), F
             sheet.style = style(args, next.protocol, true);
             Printer::new(args.json, sheet.style)
         });
-        if sheet.out.0.len() > LINES_LEN {
+        if next.waits || sheet.out.0.len() > LINES_LEN {
             printer.print_sheet(sheet)?;
+        }
+        if next.waits {
+            printer.flush()?;
         }
         Ok(true)
     });

@@ -22,7 +22,7 @@ use axlewire::stream::{Counters, Framing};
 use crate::{
     args::Protocol,
     failure::Failure,
-    input::{self, Input},
+    input::{self, Form, Input},
     listing::Shown,
     pcapng,
 };
@@ -47,8 +47,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(protocol) = choice.protocol {
         choice.permits(protocol)?;
     }
-    let mut input = Input::open(args.file.as_deref())?;
-    if input.is_pcapng()? {
+    let mut input = Input::open(args.file.as_deref(), args.form)?;
+    if input.has_times()? {
         return capture::run(args, input, choice);
     }
     let protocol = match choice.protocol {
@@ -77,9 +77,10 @@ pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box
 /// how a command was meant: its node must not have changed its mode (ruling I3).
 pub(crate) fn frames_of(
     path: &Path,
+    form: Form,
     chosen: Option<Protocol>,
 ) -> Result<(Protocol, Vec<Taken>, Walked), Failure> {
-    let mut input = Input::open(Some(path))?;
+    let mut input = Input::open(Some(path), form)?;
     let mut sheet = Sheet::new(None);
     sheet.taken = Some(Default::default());
     let choice = Choice { protocol: chosen, direction: None };

@@ -25,6 +25,8 @@ pub(crate) struct Next {
     pub(crate) interface: Option<usize>,
     /// Microseconds since 1970, if the capture has times.
     pub(crate) micros: Option<u64>,
+    /// None come for now: they are the last ones once more.
+    pub(crate) waits: bool,
 }
 
 /// What was found in a capture.
@@ -80,7 +82,8 @@ impl Walked {
 }
 
 /// Feeds a capture to a sheet; each interface and each direction is a stream of its own. `go_on` is
-/// called before every piece, may empty the sheet, and tells whether to go on.
+/// called before every piece, and before a wait for more packets; it may empty the sheet, and tells
+/// whether to go on.
 pub(crate) fn walk(
     input: &mut Input,
     choice: Choice,
@@ -88,7 +91,7 @@ pub(crate) fn walk(
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
     let mut walk = Walk { choice, lines: BTreeMap::new(), walked: Walked::default(), go_on };
-    let result = match input.is_pcapng() {
+    let result = match input.has_times() {
         Ok(true) => walk.packets(input, sheet),
         Ok(false) => walk.raw(input, sheet),
         Err(failure) => Err(failure),
@@ -121,8 +124,12 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
     fn packets(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<(), Failure> {
         let path = input.path().map(ToOwned::to_owned);
         let mut reader = Reader::new(input);
-        let (mut latest, mut section) = (0, 0);
+        let (mut latest, mut section, mut last) = (0, 0, None);
         for number in 1.. {
+            match last.filter(|_| reader.waits()) {
+                Some(last) if !(self.go_on)(Next { waits: true, ..last }, sheet)? => return Ok(()),
+                Some(_) | None => {}
+            }
             let packet = match reader.next() {
                 Ok(Some(packet)) => packet,
                 Ok(None) => break,
@@ -151,7 +158,9 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 self.walked.times_back += u64::from(micros < latest);
                 latest = micros;
             }
-            let next = Next { protocol: line.protocol, interface: Some(packet.interface), micros };
+            let (protocol, interface) = (line.protocol, Some(packet.interface));
+            let next = Next { protocol, interface, micros, waits: false };
+            last = Some(next);
             for piece in packet.bytes.chunks(PIECE) {
                 if !(self.go_on)(next, sheet)? {
                     return Ok(());
@@ -182,7 +191,10 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                 }
             };
             for piece in bytes.chunks(PIECE) {
-                if !(self.go_on)(Next { protocol, interface: None, micros: None }, sheet)? {
+                if !(self.go_on)(
+                    Next { protocol, interface: None, micros: None, waits: false },
+                    sheet,
+                )? {
                     return Ok(());
                 }
                 line.feed(self.choice, None, piece, None, sheet);

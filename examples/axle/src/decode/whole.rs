@@ -27,7 +27,7 @@ pub(crate) struct Chosen {
 /// of the named one, or of the one that they look like.
 pub(crate) fn choose(input: &mut Input, named: Option<Protocol>) -> Result<Chosen, Failure> {
     let mut choice = Choice { protocol: named, direction: None };
-    let has_times = input.is_pcapng()?;
+    let has_times = input.has_times()?;
     let mut found = None;
     if !has_times && named.is_none() {
         let guess = guess(choice, input)?;

@@ -20,7 +20,7 @@ use crate::{
     decode::{self, Named, Walked},
     failure::Failure,
     help::EXIT_CODES,
-    input::Input,
+    input::{Form, Input},
     listing,
     signals::Signals,
 };
@@ -36,8 +36,8 @@ use crate::{
 ///   .parquet  the same as Parquet
 ///
 /// A table has the name of its protocol and message, such as ucp.report; the gaps are in skipped.
-/// Times are those of a pcapng file. Raw bytes have none: their tables have no columns for time,
-/// interface and direction, and MCAP has the offset instead, a nanosecond per byte.
+/// Times are those of a pcapng or pcap file. Raw bytes have none: their tables have no columns for
+/// time, interface and direction, and MCAP has the offset instead, a nanosecond per byte.
 ///
 /// The output is written under another name first, so that it is there as a whole or not at all.
 /// Of a capture that is cut off, it has what comes before the cut, and the exit code is 1.
@@ -46,8 +46,8 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES, verbatim_doc_comment)]
 pub(crate) struct Args {
-    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
-    /// most bytes at the beginning of raw bytes
+    /// Protocol of the line; auto takes that of a pcapng or pcap file, or the one whose frames
+    /// have the most bytes at the beginning of raw bytes
     #[arg(short = 'P', long, value_enum, default_value = "auto")]
     protocol: Named,
 
@@ -58,6 +58,9 @@ pub(crate) struct Args {
     /// Overwrite the output if there is one
     #[arg(long)]
     force: bool,
+
+    #[command(flatten)]
+    form: Form,
 
     /// The capture; - is standard input
     file: PathBuf,
@@ -76,7 +79,7 @@ enum Format {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = format_of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(Some(&args.file))?;
+    let mut input = Input::open(Some(&args.file), args.form)?;
     let chosen = decode::choose(&mut input, args.protocol.0)?;
     let (output, force) = (&*args.output, args.force);
     let job = Job { input, chosen, output, force, signals };

@@ -1,4 +1,4 @@
-//! Reads the packets of a capture, including damaged and hostile ones.
+//! Reads the packets of a capture, pcapng or classic pcap, including damaged and hostile ones.
 
 use std::{
     fmt,
@@ -7,7 +7,10 @@ use std::{
     path::PathBuf,
 };
 
-use super::format::{BYTE_ORDER, Direction, MAGIC, block, option};
+use super::{
+    classic::Classic,
+    format::{BYTE_ORDER, Direction, MAGIC, block, option},
+};
 use crate::failure::Failure;
 
 /// Longest accepted block. Those of `axle record` are much shorter; other programs describe their
@@ -37,11 +40,11 @@ pub(crate) struct Interface {
 
 /// Unit of time, as coded in the option.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-struct Unit(u8);
+pub(super) struct Unit(pub(super) u8);
 
 impl Unit {
     /// A time in this unit, in microseconds.
-    fn micros(self, time: u64) -> u64 {
+    pub(super) fn micros(self, time: u64) -> u64 {
         let (time, exponent) = (u128::from(time), u32::from(self.0 & 0x7F));
         let per_second = if self.0 & 0x80 == 0 {
             10_u128.checked_pow(exponent)
@@ -82,12 +85,12 @@ struct Found {
 pub(crate) enum Problem {
     /// The input failed.
     Io(io::Error),
-    /// The block that begins at this offset is cut off by the end of the file.
-    CutOff { offset: u64 },
+    /// The block or record that begins at this offset is cut off by the end of the file.
+    CutOff { what: &'static str, offset: u64 },
     /// The section that begins at this offset has another format.
     Version { offset: u64, major: u32 },
-    /// The block that begins at this offset is invalid.
-    Invalid { offset: u64, why: &'static str },
+    /// The block or record that begins at this offset is invalid.
+    Invalid { what: &'static str, offset: u64, why: &'static str },
 }
 
 impl Problem {
@@ -107,16 +110,16 @@ impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Io(error) => error.fmt(f),
-            Self::CutOff { offset } => {
-                write!(f, "the file ends inside the pcapng block at byte {offset}")
+            Self::CutOff { what, offset } => {
+                write!(f, "the file ends inside the {what} at byte {offset}")
             }
             Self::Version { offset, major } => write!(
                 f,
                 "the section at byte {offset} has version {major} of pcapng: axle reads version \
                  {VERSION}"
             ),
-            Self::Invalid { offset, why } => {
-                write!(f, "invalid pcapng block at byte {offset}: {why}")
+            Self::Invalid { what, offset, why } => {
+                write!(f, "invalid {what} at byte {offset}: {why}")
             }
         }
     }
@@ -125,6 +128,8 @@ impl fmt::Display for Problem {
 /// Reads a capture block by block; memory use does not depend on its length.
 pub(crate) struct Reader<R> {
     input: R,
+    /// A classic capture has records instead of blocks.
+    is_classic: bool,
     buffer: Vec<u8>,
     /// The unread bytes of `buffer`.
     start: usize,
@@ -141,10 +146,11 @@ pub(crate) struct Reader<R> {
 }
 
 impl<R: Read> Reader<R> {
-    /// `input` begins with [`MAGIC`].
+    /// `input` begins as [`is_capture`](super::is_capture) asks.
     pub(crate) fn new(input: R) -> Self {
         Self {
             input,
+            is_classic: false,
             buffer: vec![0; 64 * 1024],
             start: 0,
             end: 0,
@@ -162,15 +168,15 @@ impl<R: Read> Reader<R> {
     /// The bytes of a packet that the end of the file cuts off are returned, followed by
     /// [`Problem::CutOff`].
     pub(crate) fn next(&mut self) -> Result<Option<Packet<'_>>, Problem> {
+        if self.offset == 0 {
+            self.begin_classic()?;
+        }
+        if self.is_classic {
+            return self.next_record();
+        }
         loop {
-            if self.is_cut_off {
-                return Err(Problem::CutOff { offset: self.offset });
-            }
-            if !self.fill(8)? {
-                return match self.end - self.start {
-                    0 => Ok(None),
-                    _ => Err(Problem::CutOff { offset: self.offset }),
-                };
+            if !self.has_next(8)? {
+                return Ok(None);
             }
             if self.peek(0) == Some(u32::from_le_bytes(MAGIC)) {
                 self.begin_section()?;
@@ -188,21 +194,19 @@ impl<R: Read> Reader<R> {
                 return Err(self.invalid("its two lengths differ"));
             }
             self.is_cut_off = !is_whole;
-            let (from, offset) = (self.start, self.offset);
+            let (from, offset, what) = (self.start, self.offset, self.what());
+            let invalid = |why| Problem::Invalid { what, offset, why };
             if is_whole {
-                self.start += len;
-                self.offset += len as u64;
+                self.skip(len);
             }
             let body = from + 8..from + if is_whole { held - 4 } else { held };
             match kind {
                 block::INTERFACE if is_whole => {
                     if self.interfaces.len() == MOST_INTERFACES {
-                        let why = "its section has more than 1024 interfaces";
-                        return Err(Problem::Invalid { offset, why });
+                        return Err(invalid("its section has more than 1024 interfaces"));
                     }
                     let Some(interface) = self.interface(body) else {
-                        let why = "it is too short for an interface";
-                        return Err(Problem::Invalid { offset, why });
+                        return Err(invalid("it is too short for an interface"));
                     };
                     self.interfaces.push(interface);
                 }
@@ -210,9 +214,7 @@ impl<R: Read> Reader<R> {
                     if is_whole || body.len() >= header_len(kind) =>
                 {
                     let body = self.buffer.get(body).unwrap_or_default();
-                    let (found, described) = self
-                        .packet(kind, body, is_whole)
-                        .map_err(|why| Problem::Invalid { offset, why })?;
+                    let (found, described) = self.packet(kind, body, is_whole).map_err(invalid)?;
                     return Ok(Some(Packet {
                         section: self.section,
                         interface: self.interfaces_before + found.interface,
@@ -227,10 +229,77 @@ impl<R: Read> Reader<R> {
         }
     }
 
+    /// Reads the header of a classic capture: it has one interface.
+    fn begin_classic(&mut self) -> Result<(), Problem> {
+        self.fill(4)?;
+        let Some(classic) = self.peek(0).and_then(Classic::of) else { return Ok(()) };
+        (self.is_classic, self.is_big_endian) = (true, classic.is_big_endian);
+        if !self.fill(24)? {
+            return Err(self.cut_off());
+        }
+        // The upper half of the link type tells of check sums.
+        let (longest_packet, link_type) = (self.peek(16).unwrap_or(0), self.peek(20).unwrap_or(0));
+        let (name, unit) = (None, Unit(classic.unit));
+        let link_type = link_type as u16;
+        self.interfaces.push(Interface { link_type, name, longest_packet, unit, offset_s: 0 });
+        self.section = 1;
+        self.skip(24);
+        Ok(())
+    }
+
+    /// The next packet of a classic capture.
+    fn next_record(&mut self) -> Result<Option<Packet<'_>>, Problem> {
+        if !self.has_next(16)? {
+            return Ok(None);
+        }
+        let word = |at| self.peek(at).unwrap_or(0);
+        let (seconds, fraction, len) = (word(0), word(4), word(8) as usize);
+        if len > LONGEST_BLOCK {
+            return Err(self.invalid("its packet is longer than 1 MiB"));
+        }
+        self.is_cut_off = !self.fill(16 + len)?;
+        let bytes = self.start + 16..self.end.min(self.start + 16 + len);
+        if !self.is_cut_off {
+            self.skip(16 + len);
+        }
+        let described =
+            self.interfaces.first().ok_or_else(|| self.invalid("it has no interface"))?;
+        Ok(Some(Packet {
+            section: self.section,
+            interface: 0,
+            described,
+            micros: Some(u64::from(seconds) * 1_000_000 + described.unit.micros(fraction.into())),
+            direction: None,
+            bytes: self.buffer.get(bytes).unwrap_or_default(),
+        }))
+    }
+
+    /// Whether a block or record follows, of at least this length; `false` at the end.
+    fn has_next(&mut self, least: usize) -> Result<bool, Problem> {
+        if self.is_cut_off || !self.fill(least)? && self.start < self.end {
+            return Err(self.cut_off());
+        }
+        Ok(self.start < self.end)
+    }
+
+    /// Whether `next` waits for the input.
+    pub(crate) fn waits(&self) -> bool {
+        let (held, header, at) = match self.is_classic {
+            true => (self.end - self.start, 16, 8),
+            false => (self.end - self.start, 0, 4),
+        };
+        held < at + 4 || self.peek(at).is_none_or(|len| held < header + len as usize)
+    }
+
+    const fn skip(&mut self, len: usize) {
+        self.start += len;
+        self.offset += len as u64;
+    }
+
     /// Learns the byte order of a new section.
     fn begin_section(&mut self) -> Result<(), Problem> {
         if !self.fill(12)? {
-            return Err(Problem::CutOff { offset: self.offset });
+            return Err(self.cut_off());
         }
         self.is_big_endian = false;
         if self.peek(8) != Some(BYTE_ORDER) {
@@ -240,7 +309,7 @@ impl<R: Read> Reader<R> {
             return Err(self.invalid("it has no byte-order mark"));
         }
         if !self.fill(16)? {
-            return Err(Problem::CutOff { offset: self.offset });
+            return Err(self.cut_off());
         }
         let versions = self.peek(12).unwrap_or(0);
         let major = if self.is_big_endian { versions >> 16 } else { versions & 0xFFFF };
@@ -370,8 +439,17 @@ impl<R: Read> Reader<R> {
         Ok(true)
     }
 
-    fn invalid(&self, why: &'static str) -> Problem {
-        Problem::Invalid { offset: self.offset, why }
+    /// What begins at the current offset.
+    const fn what(&self) -> &'static str {
+        if self.is_classic { "pcap record" } else { "pcapng block" }
+    }
+
+    const fn invalid(&self, why: &'static str) -> Problem {
+        Problem::Invalid { what: self.what(), offset: self.offset, why }
+    }
+
+    const fn cut_off(&self) -> Problem {
+        Problem::CutOff { what: self.what(), offset: self.offset }
     }
 }
 

@@ -94,7 +94,7 @@ fn a_file_cut_off_anywhere_gives_every_byte_that_is_there() {
         assert_eq!(found.len(), expected, "{cut}");
         match problem {
             None => assert!(is_whole, "{cut}"),
-            Some(Problem::CutOff { offset }) => {
+            Some(Problem::CutOff { offset, .. }) => {
                 assert!(!is_whole && offset <= cut as u64, "{cut}");
             }
             Some(other) => panic!("{cut}: {other}"),
@@ -256,7 +256,7 @@ fn an_invalid_block_is_named_with_its_offset() {
         let (seen, problem) = read(&[&start[..], &bad].concat());
         assert_eq!(seen.len(), 1, "{expected}");
         match problem {
-            Some(Problem::Invalid { offset, why }) => {
+            Some(Problem::Invalid { offset, why, .. }) => {
                 assert_eq!((offset, why), (start.len() as u64, expected));
             }
             other => panic!("{expected}: {other:?}"),

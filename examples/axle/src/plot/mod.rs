@@ -42,8 +42,8 @@ pub(crate) use options::Args;
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(Some(&args.file))?;
-    args.fit(input.is_pcapng()?)?;
+    let mut input = Input::open(Some(&args.file), args.form)?;
+    args.fit(input.has_times()?)?;
     let output = output::Output::create(&args.output, args.force, &input, &signals)?;
     let (picture, walked) = read::picture(args, input, &signals)?;
     let bytes = match format {
@@ -64,6 +64,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         baud: _,
         output: _,
         force: _,
+        form: _,
         file: _,
     } = args;
     Err(Failure::without_feature("plot"))

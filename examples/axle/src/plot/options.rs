@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 #[cfg(feature = "plot")]
 use crate::failure::Failure;
-use crate::{args, decode::Named, help::EXIT_CODES};
+use crate::{args, decode::Named, help::EXIT_CODES, input::Form};
 
 /// Draw a capture: as SVG, as PNG, or as a page to zoom in
 ///
@@ -21,8 +21,8 @@ use crate::{args, decode::Named, help::EXIT_CODES};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
-    /// Protocol of the line; auto takes that of a pcapng file, or the one whose frames have the
-    /// most bytes at the beginning of raw bytes
+    /// Protocol of the line; auto takes that of a pcapng or pcap file, or the one whose frames
+    /// have the most bytes at the beginning of raw bytes
     #[arg(short = 'P', long, value_enum, default_value = "auto")]
     pub(super) protocol: Named,
 
@@ -42,7 +42,10 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(super) force: bool,
 
-    /// The capture, raw bytes or pcapng; - is standard input
+    #[command(flatten)]
+    pub(super) form: Form,
+
+    /// The capture; - is standard input
     pub(super) file: PathBuf,
 }
 

@@ -7,6 +7,7 @@ use axlewire::time::Instant;
 use crate::{
     args::{self, Protocol},
     help::MOTION_HELP,
+    input::Form,
 };
 
 /// Watch a line without sending anything
@@ -28,11 +29,14 @@ pub(crate) struct Args {
     #[command(flatten)]
     pub(super) from: From,
 
+    #[command(flatten)]
+    pub(super) form: Form,
+
     /// Line speed, bit/s; by default 500000 for Ikeya and 115200 for UCP
     #[arg(short, long, value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) baud: Option<u32>,
 
-    /// Protocol of the line; a pcapng file has its own
+    /// Protocol of the line; a pcapng or pcap file has its own
     #[arg(short = 'P', long, value_enum, required_unless_present = "file")]
     pub(super) protocol: Option<Protocol>,
 
@@ -73,7 +77,7 @@ pub(super) struct From {
     #[arg(short, long, value_name = "PATH")]
     pub(super) port: Option<String>,
 
-    /// A capture, raw bytes or pcapng, to be summed up; - is standard input
+    /// A capture to be summed up; - is standard input
     pub(super) file: Option<PathBuf>,
 }
 

@@ -21,6 +21,7 @@ fn a_second_recording_is_another_file() {
     let (port, protocol, baud) = ("port", Protocol::Ucp, 115_200);
     let args = Args {
         udp: None,
+        form: crate::input::Form::default(),
         from: From { port: Some(port.to_owned()), file: None },
         baud: None,
         protocol: Some(protocol),

@@ -1,0 +1,143 @@
+//! The forms of a capture: each is listed like the others, and what is none of them is named.
+
+mod support;
+
+use std::{
+    io::{BufRead, BufReader, Write},
+    process::Stdio,
+};
+
+use axlewire::ucp::{Body, message::Ping};
+use flate2::{Compression, write::GzEncoder};
+use support::{
+    axle, decode,
+    pcapng::{Packet, PcapNg, outcome},
+    run,
+};
+
+/// A moment in 2026, microseconds since 1970.
+const T: u64 = 1_795_386_000_000_000;
+
+const UCP: u16 = 150;
+
+fn pings() -> [Vec<u8>; 3] {
+    [0, 1, 2].map(|index| Ping {}.frame(index).as_bytes().to_vec())
+}
+
+/// The pings 20 ms apart, in pcapng and in classic pcap of each kind.
+fn captures() -> Vec<Vec<u8>> {
+    let pings = pings();
+    let at = |number: usize| T + 20_000 * number as u64;
+    let packets: Vec<Packet<'_>> =
+        pings.iter().enumerate().map(|(number, ping)| (at(number), 0, &ping[..])).collect();
+    let mut captures = vec![PcapNg::new(UCP, &packets).0];
+    for (magic, per_micro) in [(0xA1B2_C3D4_u32, 1), (0xA1B2_3C4D, 1000)] {
+        for is_big in [false, true] {
+            let word = |it: u32| if is_big { it.to_be_bytes() } else { it.to_le_bytes() };
+            let half = |it: u16| if is_big { it.to_be_bytes() } else { it.to_le_bytes() };
+            let mut file = [&word(magic)[..], &half(2), &half(4), &[0; 8]].concat();
+            file.extend([word(65535), word(UCP.into())].concat());
+            for (micros, _, bytes) in &packets {
+                let (seconds, fraction) = (micros / 1_000_000, micros % 1_000_000 * per_micro);
+                let len = bytes.len() as u32;
+                file.extend([seconds as u32, fraction as u32, len, len].map(word).concat());
+                file.extend(*bytes);
+            }
+            captures.push(file);
+        }
+    }
+    captures
+}
+
+fn packed(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = GzEncoder::new(vec![], Compression::default());
+    packed.write_all(bytes).unwrap();
+    packed.finish().unwrap()
+}
+
+#[test]
+fn pcapng_and_every_kind_of_pcap_packed_or_not_are_listed_alike() {
+    let captures = captures();
+    let expected = decode(&[], &captures[0]);
+    assert_eq!((expected.0.len(), &expected.0[2]["t"]), (3, &serde_json::json!(1_795_386_000.04)));
+    for capture in &captures {
+        assert_eq!(decode(&[], capture), expected, "{capture:02x?}");
+        assert_eq!(decode(&[], &packed(capture)), expected, "{capture:02x?}");
+        // Two packed files in a row are one, as gzip has it.
+        let (first, second) = capture.split_at(70);
+        assert_eq!(decode(&[], &[packed(first), packed(second)].concat()), expected);
+    }
+}
+
+#[test]
+fn raw_bytes_packed_or_as_hex_text_are_listed_alike() {
+    let raw = pings().concat();
+    let expected = decode(&[], &raw);
+    let text: String = raw.iter().map(|byte| format!("{byte:02X}\n")).collect();
+    assert_eq!(decode(&[], &packed(&raw)), expected);
+    assert_eq!(decode(&["--hex"], text.as_bytes()), expected);
+    assert_eq!(decode(&["--hex"], &packed(text.as_bytes())), expected);
+}
+
+#[test]
+fn a_packed_or_classic_capture_that_was_cut_gives_all_that_is_there_and_one_line() {
+    let classic = &captures()[1];
+    let cut = &classic[..classic.len() - 9];
+    let whole = packed(classic);
+    let cases = [
+        (cut, "\"standard input\": the file ends inside the pcap record at byte 72"),
+        (&whole[..whole.len() - 9], "cannot read standard input: "),
+    ];
+    for (input, says) in cases {
+        let (listing, code, line) = outcome(run(&["decode", "--json"], input));
+        assert!(listing.lines().count() >= 2, "{listing}");
+        assert!(code == Some(1) && line.starts_with(&format!("axle: {says}")), "{line}");
+        assert_eq!(line.lines().count(), 1);
+    }
+}
+
+#[test]
+fn hex_text_and_telnet_are_named() {
+    let text = "fd ff 04 00 01 00 e2 75\n".repeat(3);
+    for command in ["decode", "watch", "replay --port /none"] {
+        let mut words: Vec<_> = command.split(' ').collect();
+        let path = support::file("hex.txt", text.as_bytes());
+        words.push(path.to_str().unwrap());
+        let (_, code, line) = outcome(run(&words, &[]));
+        let says = "axle: the capture is hex text: use --hex\n";
+        assert_eq!((code, &*line), (Some(2), says), "{command}");
+    }
+    let telnet = [&[0xFF, 0xFB, 3, 0xFF, 0xFB, 1][..], &pings().concat()].concat();
+    let (_, code, line) = outcome(run(&["decode"], &telnet));
+    assert_eq!(code, Some(0));
+    assert!(line.starts_with("axle: the capture begins as telnet does,"), "{line}");
+}
+
+#[test]
+fn each_packet_of_a_capture_from_a_pipe_is_listed_before_the_next_one_arrives() {
+    for capture in captures() {
+        let mut child = axle(&["decode", "--json", "-"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut input = child.stdin.take().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let rest = pings().iter().rev().try_fold(capture.as_slice(), |rest, ping| {
+            let at = rest.windows(ping.len()).rposition(|bytes| bytes == ping)?;
+            Some(&rest[..at])
+        });
+        let header = rest.unwrap().len();
+        let step = (capture.len() - header).div_ceil(3);
+        let ends: Vec<_> = (1..=3).map(|count| capture.len() - (3 - count) * step).collect();
+        let mut from = 0;
+        for end in ends {
+            input.write_all(&capture[from..end.min(capture.len())]).unwrap();
+            from = end;
+            assert!(lines.next().unwrap().unwrap().contains("\"ping"), "one per packet");
+        }
+        drop(input);
+        assert!(lines.next().unwrap().unwrap().contains("summary"));
+        assert!(child.wait().unwrap().success());
+    }
+}
