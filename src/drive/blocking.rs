@@ -13,8 +13,8 @@ impl<R: Endpoint, P: Read + Write + ReadReady, C: Clock> Driver<R, P, C> {
     /// Runs one round: takes in received bytes, lets time pass, sends what is due. Waits for
     /// nothing but the port's own `write` and `flush`.
     ///
-    /// Its work is bounded: 8 frames sent, and 4096 bytes taken in at a time. Call it repeatedly
-    /// from a main loop, no later than [`poll_timeout`](Self::poll_timeout).
+    /// Its work is bounded: 8 frames sent, and 64 reads of up to 64 bytes at a time. Call it
+    /// repeatedly from a main loop, no later than [`poll_timeout`](Self::poll_timeout).
     ///
     /// # Errors
     ///

@@ -14,7 +14,8 @@ use crate::{
 /// Bytes read at once, at most.
 pub(super) const CHUNK_LEN: usize = 64;
 
-/// Reads in a row, at most: 4096 bytes. A line is slower than that; a runaway port is not.
+/// Reads in a row, at most: 4096 bytes, or fewer from a port that returns fewer at once. A line is
+/// slower than that; a runaway port is not.
 pub(super) const READS: usize = 64;
 
 /// Frames sent in one round, at most: a role flooded with requests could go on forever.

@@ -1,5 +1,7 @@
 //! What was decided after a look at the port, and what has arrived, or has passed, since.
 
+use std::cell::Cell;
+
 use axlewire::ucp::{Frame, host::StopProgress};
 
 use crate::{
@@ -361,7 +363,7 @@ fn a_set_point_that_waits_for_its_port_does_not_leave_behind_an_answer_in_the_ot
     let set_point = WriteRequest::velocity(NodeId::N1, rps(5.0));
     for late_us in [2000, 30_000, 900_000] {
         let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
-        let waits = std::rc::Rc::new(std::cell::Cell::new(false));
+        let waits = std::rc::Rc::new(Cell::new(false));
         let has_waited = waits.clone();
         wire.write_with(move |bytes| {
             let is_first = bytes == set_point.as_bytes() && !has_waited.replace(true);
@@ -405,4 +407,38 @@ fn an_answer_that_waits_for_its_port_is_taken_back_when_another_request_is_heard
     let _ = world.block_on(slave.asynch().next_command(ms(20)));
     assert_eq!(slave.port().written, [] as [u8; 0]);
     assert_eq!(slave.role().statistics().overtaken, 1);
+}
+
+#[test]
+fn a_set_point_does_not_leave_after_its_span_however_long_the_port_was_busy_behind_the_first() {
+    for (is_async, busy_ms) in BOTH.into_iter().flat_map(|it| [40, 400, 900].map(|busy| (it, busy)))
+    {
+        let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
+        let (first, set_point) = (Cell::new(true), WriteRequest::velocity(NodeId::N1, rps(5.0)));
+        let from = bus.port().offers.len();
+        // Busy with the READ behind the first WRITE.
+        let mut follows = false;
+        wire.write_with(move |bytes| {
+            if follows && first.take() {
+                return if is_async {
+                    Step::Late(busy_ms * 1000)
+                } else {
+                    Step::Blocks(busy_ms * 1000)
+                };
+            }
+            follows |= bytes == set_point.as_bytes();
+            ALL
+        });
+        let begin_us = wire.world.now_us();
+        let turned = call!(is_async, bus, drive_for(NodeId::N1, rps(5.0), ms(100)));
+        // The stop of an async call may have had to wait for the port for too long.
+        let owed = DriveError::StopsOwed(NodeId::N1.into());
+        assert!(turned == Ok(()) || is_async && turned == Err(owed), "{busy_ms} ms: {turned:?}");
+        call!(is_async, bus, stop(NodeId::N1)).unwrap();
+        assert_eq!(wire.rps(), 0.0);
+        let offers = bus.port().offers.iter().skip(from);
+        let sent = offers.filter(|offer| offer.bytes == set_point.as_bytes() && offer.taken > 0);
+        let times: Vec<_> = sent.map(|offer| offer.at_us - begin_us).collect();
+        assert!(!times.is_empty() && times.iter().all(|&at| at <= 100_000), "{times:?}");
+    }
 }

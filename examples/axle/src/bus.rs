@@ -70,10 +70,34 @@ pub(crate) struct MasterArgs {
     #[arg(long)]
     direct: bool,
 
+    /// Wait this long for an answer, seconds; by default 0.02, and 0.1 behind tcp:. axle scan
+    /// finds out what a line needs
+    #[arg(long, value_name = "SECONDS", value_parser = reply_timeout, conflicts_with = "direct")]
+    reply_timeout: Option<Duration>,
+
     /// The adapter hears what it sends, as on two wires with the receiver always on: take these
     /// echoes out
     #[arg(long)]
     echo: bool,
+}
+
+/// Time for an answer behind a network.
+const NETWORK_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// Longest time for an answer.
+const LONGEST_TIMEOUT: Duration = Duration::from_secs(1);
+
+fn reply_timeout(text: &str) -> Result<Duration, String> {
+    match args::seconds(text)?.try_into().map(Duration::from_micros) {
+        Ok(timeout) if timeout > Duration::ZERO && timeout <= LONGEST_TIMEOUT => Ok(timeout),
+        _ => Err("it is not above 0 and up to 1 second".to_owned()),
+    }
+}
+
+/// A late answer may be that late as well.
+const fn with_reply_timeout(mut config: MasterConfig, timeout: Duration) -> MasterConfig {
+    (config.reply_timeout, config.late_guard) = (timeout, timeout);
+    config
 }
 
 /// A port and the master on it.
@@ -87,7 +111,7 @@ pub(crate) struct Bus<B: Boards = OneMotor> {
 impl MasterArgs {
     #[cfg(test)]
     pub(crate) const fn new(line: args::PortArgs, direct: bool) -> Self {
-        Self { line, direct, echo: false }
+        Self { line, direct, reply_timeout: None, echo: false }
     }
 
     pub(crate) const fn line(&self) -> &args::PortArgs {
@@ -95,8 +119,20 @@ impl MasterArgs {
     }
 
     /// Settings of a master for this adapter.
-    pub(crate) const fn config(&self) -> MasterConfig {
-        if self.direct { MasterConfig::direct() } else { MasterConfig::usb_adapter() }
+    pub(crate) fn config(&self) -> MasterConfig {
+        if self.direct {
+            return MasterConfig::direct();
+        }
+        let is_network = self.line.port.starts_with("tcp:");
+        let timeout = self.reply_timeout.or(is_network.then_some(NETWORK_TIMEOUT));
+        timeout.map_or(MasterConfig::usb_adapter(), |timeout| {
+            with_reply_timeout(MasterConfig::usb_adapter(), timeout)
+        })
+    }
+
+    /// Whether a longer time may be tried for answers that come too late.
+    pub(crate) const fn may_wait_longer(&self) -> bool {
+        !self.direct && self.reply_timeout.is_none()
     }
 
     /// Opens the port, for a bus of this protocol.
@@ -135,6 +171,39 @@ impl<B: Boards> Bus<B> {
             self.look()?;
         }
         Ok(!signals.is_raised())
+    }
+
+    /// Begins anew with a longer time for answers, if an id gives only answers that are too late;
+    /// from then on with the ids that have answered in any way.
+    ///
+    /// The line is left alone before: an old answer must not count as a new one.
+    pub(crate) fn wait_longer(&mut self) -> bool {
+        let mut config = *self.master().config();
+        let is_late = |node| self.status(node).is_none() && self.late(node) > 0;
+        if config.reply_timeout >= LONGEST_TIMEOUT || !config.nodes.iter().any(is_late) {
+            return false;
+        }
+        let is_there = |node: &NodeId| {
+            self.status(*node).is_some() || self.is_untimely(*node) || self.is_damaged(*node)
+        };
+        config.nodes = config.nodes.iter().filter(is_there).collect();
+        let timeout = config.reply_timeout.saturating_mul(4).min(LONGEST_TIMEOUT);
+        clock::sleep(span(timeout));
+        self.session.begin_anew(|now| Master::for_board(with_reply_timeout(config, timeout), now));
+        true
+    }
+
+    /// Number of answers of a node that were too late.
+    fn late(&self, node: NodeId) -> u32 {
+        self.master().node_statistics(node).late
+    }
+
+    /// What to do about a node that does not answer in time, for the end of a message.
+    pub(crate) fn hint(&self, node: NodeId) -> &'static str {
+        match self.is_untimely(node) && self.late(node) > 0 {
+            true => " in time, but later: axle scan finds the --reply-timeout that this line needs",
+            false => "",
+        }
     }
 
     /// Reads a node now, so that no decision uses an old mode or position. `None` if it does not
@@ -379,16 +448,20 @@ impl<B: Boards> Bus<B> {
             Halt::Damaged => {
                 format!("id {node} gives only damaged answers: its motor may be moving")
             }
+            Halt::Untimely if self.late(node) > 0 => format!(
+                "id {node} gives only answers that are too late: its motor may be moving; use a \
+                 longer --reply-timeout"
+            ),
             Halt::Untimely => format!(
-                "id {node} gives only answers that are too late or too early: its motor may be \
-                 moving"
+                "id {node} gives only answers that are too early: its motor may be moving; use \
+                 --instant if the port has no line speed"
             ),
             Halt::Silent => format!("node {node} does not answer"),
         })
     }
 }
 
-fn span(duration: Duration) -> Span {
+pub(crate) fn span(duration: Duration) -> Span {
     Span::from_micros(duration.as_micros().into())
 }
 

@@ -57,7 +57,13 @@ enum Record {
     /// An id that gave only damaged answers.
     Damaged { node: NodeId },
     /// Totals.
-    Summary { nodes: usize, damaged: usize },
+    Summary {
+        nodes: usize,
+        damaged: usize,
+        /// What the line needs for `--reply-timeout`, seconds, if not the default.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reply_timeout: Option<f64>,
+    },
 }
 
 /// The four digits of a node's DIP switch under both readings (ruling I2).
@@ -89,12 +95,20 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     let mut bus = Bus::<B>::open(&args.bus)?;
-    if !bus.discover(&signals)? {
-        return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
+    loop {
+        if !bus.discover(&signals)? {
+            return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
+        }
+        if !args.bus.may_wait_longer() || !bus.wait_longer() {
+            break;
+        }
     }
+    let timeout = bus.master().config().reply_timeout;
+    let needs = (timeout != args.bus.config().reply_timeout).then(|| bus::span(timeout));
+    let needs = needs.map(|span| span.as_secs_f64());
     match args.json {
-        true => print_json(&bus, &mut io::stdout().lock()),
-        false => print_table(&bus, &mut anstream::stdout().lock()),
+        true => print_json(&bus, needs, &mut io::stdout().lock()),
+        false => print_table(&bus, needs, &mut anstream::stdout().lock()),
     }
     .map_err(Failure::Write)?;
     bus.check_recording()
@@ -105,13 +119,17 @@ fn damaged<B: Boards>(bus: &Bus<B>) -> Vec<NodeId> {
     NodeId::ALL.into_iter().filter(|&node| bus.is_damaged(node)).collect()
 }
 
-fn print_json<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
+fn print_json<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write) -> io::Result<()> {
     let nodes = bus.nodes().map(|(node, mode, status)| {
         let dip = Dip::of(node, mode);
         Record::Node { node, mode, status: B::data(status), dip }
     });
     let damaged = damaged(bus);
-    let summary = Record::Summary { nodes: bus.nodes().count(), damaged: damaged.len() };
+    let summary = Record::Summary {
+        nodes: bus.nodes().count(),
+        damaged: damaged.len(),
+        reply_timeout: needs,
+    };
     let damaged = damaged.into_iter().map(|node| Record::Damaged { node });
     for record in nodes.chain(damaged).chain([summary]) {
         serde_json::to_writer(&mut *out, &record)?;
@@ -120,7 +138,7 @@ fn print_json<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
     out.flush()
 }
 
-fn print_table<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
+fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write) -> io::Result<()> {
     let count = bus.nodes().count();
     if count > 0 {
         writeln!(
@@ -139,6 +157,12 @@ fn print_table<B: Boards>(bus: &Bus<B>, out: &mut dyn Write) -> io::Result<()> {
             out,
             "{WARNING}id {node}: only damaged answers{WARNING:#}: noise, two boards with this id, an \
              adapter that hears itself (--echo), another --protocol, or a wrong --baud"
+        )?;
+    }
+    if let Some(seconds) = needs {
+        writeln!(
+            out,
+            "{WARNING}answers come late{WARNING:#}: use --reply-timeout {seconds} on this line"
         )?;
     }
     let (path, baud) = (bus.path(), bus.baud);

@@ -42,6 +42,13 @@ impl<R: Endpoint> Session<R> {
         Self { driver: Driver::with(role, line, clock), awake, stuck_since: None }
     }
 
+    /// Continues with another role, which takes nothing that was received before for an answer.
+    pub(crate) fn begin_anew(&mut self, role: impl FnOnce(Instant) -> R) {
+        let now = self.now();
+        *self.driver.role_mut() = role(now);
+        self.driver.discard();
+    }
+
     /// The time for which the tool has been running since then, without suspensions.
     pub(crate) fn awake(&self) -> Span {
         self.awake.get()

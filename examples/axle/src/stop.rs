@@ -204,7 +204,13 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
-    let failure = bus.stop(nodes).err();
+    let failure = loop {
+        let nodes = bus.master().config().nodes;
+        let failure = bus.stop(nodes).err();
+        if !args.bus.may_wait_longer() || !bus.wait_longer() {
+            break failure;
+        }
+    };
     let mut silent = Vec::new();
     let mut stopped = Stopped {
         path: bus.path().to_owned(),

@@ -13,7 +13,7 @@ use crate::{
         master::NodeSet,
         slave::SlaveEvent,
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use super::steps::OnlineNodes;
@@ -58,7 +58,7 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
         node: NodeId,
         target: B::Velocity,
     ) -> Result<(), DriveError<P::Error>> {
-        self.send_target(node, Target::Velocity(target))$($await)*
+        self.send_target(node, Target::Velocity(target), None)$($await)*
     }
 
     /// Moves a position node, and returns when the command is on the line. The command is repeated
@@ -73,11 +73,11 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
         node: NodeId,
         target: B::Position,
     ) -> Result<(), DriveError<P::Error>> {
-        self.send_target(node, Target::Position(target))$($await)*
+        self.send_target(node, Target::Position(target), None)$($await)*
     }
 
-    /// Turns a velocity node for `span`, then stops it and returns when it is seen to be
-    /// still. Meanwhile the set-point is repeated, and counts as a sign of life; with
+    /// Turns a velocity node up to `span` after the call, then stops it and returns when it is seen
+    /// to be still. Meanwhile the set-point is repeated, and counts as a sign of life; with
     /// [`Polling::Manual`](crate::ikeya::master::Polling::Manual) it is sent once, and the motor
     /// does not turn if it is lost.
     ///
@@ -85,18 +85,18 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     ///
     /// Those of [`stop`](Self::stop), whatever else failed before. Otherwise
     /// the errors of [`set_velocity`](Self::set_velocity), returned at once if the node loses its
-    /// set-point on the way.
+    /// set-point on the way; the set-point is not sent after `span`.
     pub $($async)? fn drive_for(
         &mut self,
         node: NodeId,
         target: B::Velocity,
         span: Duration,
     ) -> Result<(), DriveError<P::Error>> {
-        let target = Target::Velocity(target);
+        let (target, end) = (Target::Velocity(target), self.now() + span);
         self.role.check(node, &target)?;
         let guard = AtEnd { driver: self, then: |driver| driver.begin_stop(node.into()) };
-        let moved = match guard.driver.send_target(node, target)$($await)* {
-            Ok(()) => guard.driver.hold_target(node, target, span)$($await)*,
+        let moved = match guard.driver.send_target(node, target, Some(end))$($await)* {
+            Ok(()) => guard.driver.hold_target(node, target, end)$($await)*,
             failed => failed,
         };
         drop(guard);
@@ -160,24 +160,29 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
         &mut self,
         node: NodeId,
         target: Target<B>,
+        end: Option<Instant>,
     ) -> Result<(), DriveError<P::Error>> {
         self.aim(node, target)?;
         let bound = self.bound();
-        let sent = self.until(bound, |driver| driver.aimed(node, target))$($await)*;
+        let (by, needs) = match end.filter(|&end| end < bound) {
+            Some(end) => (end, Needs::WholePortInTime),
+            None => (bound, Needs::WholePort),
+        };
+        let aimed = |driver: &mut Driver<_, _, _>| driver.aimed(node, target);
+        let sent = self.until_with(by, needs, aimed)$($await)*;
         if !matches!(sent, Ok(Some(Ok(())))) {
             self.withdraw(node);
         }
         Ok(sent?.ok_or(DriveError::Timeout(Operation::SetPoint))??)
     }
 
-    /// Keeps a set-point alive for `span`, as long as the node has it.
+    /// Keeps a set-point alive up to this time, as long as the node has it.
     $($async)? fn hold_target(
         &mut self,
         node: NodeId,
         target: Target<B>,
-        span: Duration,
+        end: Instant,
     ) -> Result<(), DriveError<P::Error>> {
-        let end = self.now() + span;
         let lost = |driver: &mut Driver<_, _, _>| {
             driver.drop_readings();
             driver.still_aimed(node, target).err()

@@ -66,8 +66,10 @@ impl<B: Boards> Voice for Nodes<B> {
                 if signals.is_raised() {
                     return Ok(None);
                 }
-                let line =
-                    format!("node {node} does not answer: without its mode, nothing is sent to it");
+                let hint = bus.hint(node);
+                let line = format!(
+                    "node {node} does not answer{hint}: without its mode, nothing is sent to it"
+                );
                 return Err(Failure::Failed(line));
             };
             modes.learn(node, status.mode());

@@ -81,7 +81,8 @@ impl<B: Boards> Goal<B> {
                     .map(|(node, mode, _)| format!("{node} ({mode})"))
                     .collect();
                 let found = if found.is_empty() { "none".to_owned() } else { found.join(", ") };
-                refuse(format!("node {node} does not answer; nodes that do: {found}"))
+                let hint = bus.hint(node);
+                refuse(format!("node {node} does not answer{hint}; nodes that do: {found}"))
             }
         }
     }
