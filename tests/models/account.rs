@@ -129,6 +129,7 @@ impl Account {
         let number = 3 - self.last_target.max(1);
         (self.target, self.last_target, self.is_target_new) = (Some(number), number, true);
         (self.is_under_order, self.is_halted, self.hold) = (true, false, None);
+        self.is_let_go = false;
         (self.coasting_since, self.is_still, self.waits) = (None, false, 0);
         self.begin_coasting(None);
     }

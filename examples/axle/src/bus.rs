@@ -84,8 +84,9 @@ pub(crate) struct MasterArgs {
 /// Time for an answer behind a network.
 const NETWORK_TIMEOUT: Duration = Duration::from_millis(100);
 
-/// Longest time for an answer.
+/// Longest time for an answer, and what is tried if answers come late.
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(1);
+const SLOW_TIMEOUT: Duration = Duration::from_millis(500);
 
 fn reply_timeout(text: &str) -> Result<Duration, String> {
     match args::seconds(text)?.try_into().map(Duration::from_micros) {
@@ -173,29 +174,46 @@ impl<B: Boards> Bus<B> {
         Ok(!signals.is_raised())
     }
 
-    /// Begins anew with a longer time for answers, if an id gives only answers that are too late;
-    /// from then on with the ids that have answered in any way.
+    /// Begins anew with half a second for answers, if an id gives only answers that are too late;
+    /// from then on with the ids that may have answered.
     ///
     /// The line is left alone before: an old answer must not count as a new one.
     pub(crate) fn wait_longer(&mut self) -> bool {
         let mut config = *self.master().config();
         let is_late = |node| self.status(node).is_none() && self.late(node) > 0;
-        if config.reply_timeout >= LONGEST_TIMEOUT || !config.nodes.iter().any(is_late) {
+        if config.reply_timeout >= SLOW_TIMEOUT || !config.nodes.iter().any(is_late) {
             return false;
         }
+        // A part of a late answer is a damaged one of another id, which is asked in vain.
         let is_there = |node: &NodeId| {
             self.status(*node).is_some() || self.is_untimely(*node) || self.is_damaged(*node)
         };
+        config.attempts = config.attempts.min(2);
         config.nodes = config.nodes.iter().filter(is_there).collect();
-        let timeout = config.reply_timeout.saturating_mul(4).min(LONGEST_TIMEOUT);
-        clock::sleep(span(timeout));
-        self.session.begin_anew(|now| Master::for_board(with_reply_timeout(config, timeout), now));
+        clock::sleep(span(SLOW_TIMEOUT));
+        let config = with_reply_timeout(config, SLOW_TIMEOUT);
+        self.session.begin_anew(|now| Master::for_board(config, now));
         true
     }
 
+    /// What this line needs for `--reply-timeout`, seconds: the longest time of an answer so far,
+    /// and half of it more, in steps of 10 ms.
+    pub(crate) fn needed_timeout(&self) -> Option<f64> {
+        let longest = NodeId::ALL
+            .into_iter()
+            .filter_map(|node| self.master().node_statistics(node).latency.max());
+        let steps = (longest.max()?.as_micros() * 3 / 2).div_ceil(10_000);
+        Some(f64::from(steps) / 100.0)
+    }
+
     /// Number of answers of a node that were too late.
-    fn late(&self, node: NodeId) -> u32 {
+    pub(crate) fn late(&self, node: NodeId) -> u32 {
         self.master().node_statistics(node).late
+    }
+
+    /// Number of answers of a node that were too early for the speed of the line.
+    pub(crate) fn early(&self, node: NodeId) -> u32 {
+        self.master().node_statistics(node).early
     }
 
     /// What to do about a node that does not answer in time, for the end of a message.
@@ -298,8 +316,7 @@ impl<B: Boards> Bus<B> {
 
     /// Whether an id has given whole answers, but none in its window.
     fn is_untimely(&self, node: NodeId) -> bool {
-        let counts = self.master().node_statistics(node);
-        self.status(node).is_none() && (counts.late > 0 || counts.early > 0)
+        self.status(node).is_none() && (self.late(node) > 0 || self.early(node) > 0)
     }
 
     pub(crate) fn is_online(&self, node: NodeId) -> bool {
@@ -461,7 +478,7 @@ impl<B: Boards> Bus<B> {
     }
 }
 
-pub(crate) fn span(duration: Duration) -> Span {
+fn span(duration: Duration) -> Span {
     Span::from_micros(duration.as_micros().into())
 }
 

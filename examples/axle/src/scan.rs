@@ -95,23 +95,25 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     let mut bus = Bus::<B>::open(&args.bus)?;
-    loop {
-        if !bus.discover(&signals)? {
-            return Err(Failure::Failed("interrupted before all ids were asked".to_owned()));
-        }
-        if !args.bus.may_wait_longer() || !bus.wait_longer() {
-            break;
-        }
+    discover(&mut bus, &signals)?;
+    let mut needs = None;
+    if args.bus.may_wait_longer() && bus.wait_longer() {
+        discover(&mut bus, &signals)?;
+        needs = bus.needed_timeout();
     }
-    let timeout = bus.master().config().reply_timeout;
-    let needs = (timeout != args.bus.config().reply_timeout).then(|| bus::span(timeout));
-    let needs = needs.map(|span| span.as_secs_f64());
     match args.json {
         true => print_json(&bus, needs, &mut io::stdout().lock()),
         false => print_table(&bus, needs, &mut anstream::stdout().lock()),
     }
     .map_err(Failure::Write)?;
     bus.check_recording()
+}
+
+fn discover<B: Boards>(bus: &mut Bus<B>, signals: &Signals) -> Result<(), Failure> {
+    match bus.discover(signals)? {
+        true => Ok(()),
+        false => Err(Failure::Failed("interrupted before all ids were asked".to_owned())),
+    }
 }
 
 /// Ids that have given only damaged answers.
@@ -166,7 +168,17 @@ fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write)
         )?;
     }
     let (path, baud) = (bus.path(), bus.baud);
+    let are =
+        |kind: fn(&Bus<B>, NodeId) -> u32| NodeId::ALL.into_iter().any(|id| kind(bus, id) > 0);
     match (count, damaged.is_empty()) {
+        (0, _) if are(Bus::late) => writeln!(
+            out,
+            "No node answers in time on {path:?}, but later: use a longer --reply-timeout instead of --direct."
+        ),
+        (0, _) if are(Bus::early) => writeln!(
+            out,
+            "Nodes answer on {path:?} sooner than {baud} bit/s allows: use --instant if it has no line speed."
+        ),
         (0, true) => writeln!(
             out,
             "No node answers on {path:?} at {baud} bit/s: check power, wires A and B, --protocol and --baud."

@@ -204,13 +204,15 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let line = args.bus.without_echo(lines.open(B::PROTOCOL)?);
     let config = bus::complete(config, args.bus.line(), &line);
     let mut bus = Bus::<B>::new(line, config);
-    let failure = loop {
-        let nodes = bus.master().config().nodes;
-        let failure = bus.stop(nodes).err();
-        if !args.bus.may_wait_longer() || !bus.wait_longer() {
-            break failure;
+    let mut failure = bus.stop(nodes).err();
+    if args.bus.may_wait_longer() && bus.wait_longer() {
+        failure = bus.stop(bus.master().config().nodes).err();
+        if let Some(seconds) = bus.needed_timeout() {
+            eprintln!(
+                "axle: answers come late: others need --reply-timeout {seconds} on this line"
+            );
         }
-    };
+    }
     let mut silent = Vec::new();
     let mut stopped = Stopped {
         path: bus.path().to_owned(),

@@ -73,7 +73,7 @@ fn a_direct_line_has_to_answer_at_once_and_an_adapter_has_20_ms() {
     // Only a stall of the machine can change a result: at 8 ms, 12 are left until the adapter's
     // time is up; at 15 ms, a direct line is that much too late.
     for (delay_ms, option, expected) in
-        [(8, "", "1 node answers."), (15, "--direct", "No node answers on")]
+        [(8, "", "1 node answers."), (15, "--direct", "No node answers in time on")]
     {
         let slow = Node { delay: Duration::from_millis(delay_ms), ..Node::velocity(1) };
         let line = played::bus(&[slow], |_, _| {});
@@ -92,4 +92,32 @@ fn a_pseudo_terminal_may_answer_before_its_line_speed_allows() {
     let lines = scan.success();
     std::fs::remove_file(&link).unwrap();
     assert_eq!(lines.last().unwrap(), "1 node answers.", "{lines:?}");
+}
+
+#[test]
+fn a_line_on_which_answers_come_late_is_scanned_moved_on_and_stopped_and_its_option_is_named() {
+    for line in ["--delay 0.011", "--delay 0.05 --jitter 0.02", "--delay 0.2"] {
+        let (sim, port) = sim(&format!("{TWO_NODES} {line}"));
+        let scan = Process::start(&format!("scan --port {port}")).success();
+        let [rest @ .., says, count] = scan.as_slice() else { panic!("{scan:?}") };
+        assert_eq!((rest.len(), &**count), (3, "2 nodes answer."), "{line}: {scan:?}");
+        let option = says.strip_prefix("answers come late: use ").unwrap();
+        let option = option.strip_suffix(" on this line").unwrap();
+        let spin = format!("spin --port {port} --node 1 --rps 1 --for 1");
+        let complaint = Process::start(&spin).complaint(1);
+        assert!(complaint.starts_with("node 1 does not answer"), "{complaint}");
+        let spin = Process::start(&format!("{spin} {option}")).end();
+        let last = spin.stdout.last().unwrap();
+        assert!(last.ends_with("stopped and confirmed"), "{line}: {last}");
+        sim.line("command 1.00 rps");
+        // Commanded again by another program, which was killed.
+        let spin = format!("spin --port {port} --node 1 --rps 3 --for 600 {option}");
+        let killed = Process::start(&spin);
+        sim.line("command 3.00 rps");
+        killed.kill();
+        let stop = Process::start(&format!("stop --port {port} --protocol ikeya")).end();
+        assert_eq!((stop.code, stop.stdout.len()), (Some(0), 3), "{line}: {stop:?}");
+        sim.line("node 1: at rest");
+        assert!(stop.stderr[0].starts_with("axle: answers come late: "), "{:?}", stop.stderr);
+    }
 }
