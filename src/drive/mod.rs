@@ -50,14 +50,15 @@
 //! [`service`](Driver::service) does not wait. All other calls end after a time that is an
 //! argument or follows from the role's settings. The blocking calls cannot bound the port's own
 //! `write` and `flush`: these must return, with an error if need be. The async calls give up on
-//! either after one second ([`DriveError::Stalled`]). A slave or a robot waits for its port for
-//! less in each call: for half of [`LineRules::held_up_after`], or for two of its longest frames
-//! and a millisecond if that is longer, by which time a healthy port is done. Then its application
-//! hears of a watchdog at most four such times late, and a call may leave a frame, and a
-//! driver-enable pin, to the next one. While a write of a frame's first bytes waits, the driver
-//! looks at what is received, after twice the time of those bytes and a millisecond, and again and
-//! again: a command does not leave that has ended by then, by a dead-man, because its call is over,
-//! or because its node has answered in the other mode.
+//! either after one second ([`DriveError::Stalled`]), and may meet one such wait behind another. A
+//! slave or a robot waits for its port for less in each call: for half of
+//! [`LineRules::held_up_after`], or for two of its longest frames and a millisecond if that is
+//! longer, by which time a healthy port is done. Then its application hears of a watchdog at most
+//! four such times late, and a call may leave a frame, and a driver-enable pin, to the next one.
+//! While a write of a frame's first bytes waits, the driver looks at what is received, after twice
+//! the time of those bytes and a millisecond, and again and again: a command does not leave that
+//! has ended by then, by a dead-man, because its call is over, or because its node has answered in
+//! the other mode; nor a hold whose measurement is old.
 //!
 //! # When a driver is held up
 //!

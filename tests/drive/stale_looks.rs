@@ -442,3 +442,27 @@ fn a_set_point_does_not_leave_after_its_span_however_long_the_port_was_busy_behi
         assert!(!times.is_empty() && times.iter().all(|&at| at <= 100_000), "{times:?}");
     }
 }
+
+#[test]
+fn a_hold_that_waits_for_its_port_does_not_leave_when_its_measurement_is_old() {
+    for late_us in [5000, 25_000, 60_000] {
+        let (wire, mut bus) = Wire::one_motor(Mode::Position, |_| ());
+        bus.set_position(NodeId::N1, Position::new(500, 0)).unwrap();
+        bus.run_for(ms(100), |_, _, _| ()).unwrap();
+        let (is_first, from) = (Cell::new(true), bus.port().offers.len());
+        wire.write_with(move |bytes| match bytes[0] == 0xBB && is_first.take() {
+            true => Step::Late(late_us),
+            false => ALL,
+        });
+        let _ = wire.world.block_on(bus.asynch().stop(NodeId::N1));
+        let (mut read_at, mut ages) = (0, vec![]);
+        for offer in bus.port().offers.iter().skip(from).filter(|offer| offer.taken > 0) {
+            match offer.bytes[0] {
+                0xBB => ages.push(offer.at_us - read_at),
+                _ if ages.is_empty() => read_at = offer.at_us,
+                _ => {}
+            }
+        }
+        assert!(ages[0] <= 21_000, "{late_us} us: {ages:?}");
+    }
+}

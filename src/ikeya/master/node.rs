@@ -392,6 +392,10 @@ impl<B: Board> Node<B> {
     pub(super) fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
         self.order.forget_old_hold(now, gap);
     }
+
+    pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
+        self.order.stop_owed().is_some_and(|stop| stop.has_old_hold(now, gap))
+    }
 }
 
 /// What happens on the line.

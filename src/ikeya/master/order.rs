@@ -565,13 +565,18 @@ impl<B: Board> Stop<B> {
         }
     }
 
-    /// Reads the node again if no answer has come in time behind the measured position, allowing
-    /// for the `gap` after each packet.
+    /// Reads the node again if no answer has come in time behind the measured position.
     fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
-        if is_due && now - self.measured_at > self.patience + gap {
+        if self.has_old_hold(now, gap) {
             self.read_again();
         }
+    }
+
+    /// Whether no answer has come in time behind the measured position, allowing for the `gap`
+    /// after each packet.
+    pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
+        let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
+        is_due && now - self.measured_at > self.patience + gap
     }
 
     fn read_again(&mut self) {

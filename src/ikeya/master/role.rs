@@ -371,10 +371,14 @@ impl<B: Board> Master<B> {
     }
 
     /// Whether the packet handed out last is a WRITE that the node would not get now: its set-point
-    /// was dropped or replaced, or its mode is in doubt or another one (I11).
+    /// was dropped or replaced, its mode is in doubt or another one (I11), or what it holds was
+    /// measured too long ago (I6).
     fn has_sent_old_write(&self) -> bool {
         self.line.sent().is_some_and(|sent| match sent.request {
-            Request::Write(target) => !self.node(sent.turn.node).takes(target),
+            Request::Write(target) => {
+                let node = self.node(sent.turn.node);
+                !node.takes(target) || node.has_old_hold(self.now, self.config.turnaround_gap)
+            }
             Request::Read => false,
         })
     }
@@ -446,8 +450,9 @@ impl<B: Board> Endpoint for Master<B> {
         }
     }
 
-    /// Whether it is a WRITE that has been dropped or replaced, or whose mode is in doubt; or
-    /// anything, once the dead-man has fired: a set-point must not outlive its application.
+    /// Whether it is a WRITE that has been dropped or replaced, whose mode is in doubt, or which
+    /// holds a position that was measured too long ago; or anything, once the dead-man has fired: a
+    /// set-point must not outlive its application.
     fn is_outdated(&self) -> bool {
         self.has_sent_old_write() || reached(self.dead_man_at(), self.now)
     }
