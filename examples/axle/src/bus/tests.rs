@@ -182,8 +182,14 @@ fn an_id_whose_answers_all_come_too_late_is_not_silent() {
     let mut bus = on(&line.line, NodeId::N1.into());
     bus.stop(NodeId::N1.into()).unwrap();
     assert_eq!(bus.halt(NodeId::N1), Halt::Untimely);
-    let says = "id 1 gives only answers that are too late or too early: its motor may be moving";
+    let says = "id 1 gives only answers that are too late: its motor may be moving; use a longer \
+                --reply-timeout";
     assert_eq!(bus.complaint(NodeId::N1).unwrap(), says);
+    // With more time, they are answers: of a motor that does not stop.
+    assert!(bus.wait_longer() && !bus.wait_longer());
+    bus.stop(NodeId::N1.into()).unwrap();
+    assert_eq!(bus.halt(NodeId::N1), Halt::Moving);
+    assert_eq!(bus.needed_timeout(), Some(0.05));
 }
 
 #[test]
