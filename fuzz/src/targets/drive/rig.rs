@@ -149,7 +149,8 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
     fn faults(&mut self) -> usize {
         let pin = self.pin.state.borrow().1.len();
         let port = self.port();
-        port.reads.len() + port.writes.len() + port.flushes.len() + pin
+        let busy = usize::from(port.busy_until_us.is_some());
+        port.reads.len() + port.writes.len() + port.flushes.len() + busy + pin
     }
 
     pub(super) fn begin(&mut self) -> Before {
@@ -166,7 +167,10 @@ impl<R: Endpoint, P: Wired> Rig<R, P> {
             flushes: port.flush_calls,
             idles: world.naps(),
             stalled_us: port.stalled_us,
-            backlog_us: port.free_us.saturating_sub(world.now_us()),
+            backlog_us: port
+                .free_us
+                .max(port.busy_until_us.unwrap_or(0))
+                .saturating_sub(world.now_us()),
             faults,
         }
     }
