@@ -141,7 +141,7 @@ impl Input {
     /// Whether the input is a capture with times.
     pub(crate) fn has_times(&mut self) -> Result<bool, Failure> {
         let front = self.peek(4, |_| false)?;
-        Ok(pcapng::is_capture(front).unwrap_or(false))
+        Ok(pcapng::is_capture(front))
     }
 
     /// Unpacks the input, if it is packed, and turns text into bytes.

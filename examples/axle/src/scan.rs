@@ -173,7 +173,7 @@ fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write)
     match (count, damaged.is_empty()) {
         (0, _) if are(Bus::late) => writeln!(
             out,
-            "No node answers in time on {path:?}, but later: use a longer --reply-timeout instead of --direct."
+            "No node answers in time on {path:?}, but later: use a longer --reply-timeout, without --direct."
         ),
         (0, _) if are(Bus::early) => writeln!(
             out,

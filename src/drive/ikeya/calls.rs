@@ -83,10 +83,11 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     ///
     /// # Errors
     ///
-    /// Those of [`stop`](Self::stop), whatever else failed before. Otherwise
-    /// the errors of [`set_velocity`](Self::set_velocity), returned at once if the node loses its
-    /// set-point on the way; the set-point is not sent after `span`. A port that holds
-    /// a READ back in its flush delays the stop, by a second at most.
+    /// Those of [`stop`](Self::stop), whatever else failed before. Otherwise the errors of
+    /// [`set_velocity`](Self::set_velocity), returned at once if the node loses its set-point on
+    /// the way, and [`DriveError::Timeout`] if the set-point could not be sent within `span`: it is
+    /// not sent later. A port that holds a READ back in its flush delays the stop, by a second at
+    /// most.
     pub $($async)? fn drive_for(
         &mut self,
         node: NodeId,

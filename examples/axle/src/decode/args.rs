@@ -14,10 +14,10 @@ use crate::{
 /// List the frames of a capture, and the gaps between them
 ///
 /// Reads raw bytes, pcapng as `axle record` writes it, or pcap, packed with gzip or not; standard
-/// input too. Every byte appears in
-/// exactly one line: a frame, or a gap with the reason why no frame starts there. The end of the
-/// input, or of a section of pcapng, counts as a quiet line: a truncated frame becomes a gap. Times
-/// do not: how long a line was quiet cannot be told from the moments at which its bytes were read.
+/// input too. Every byte appears in exactly one line: a frame, or a gap with the reason why no
+/// frame starts there. The end of the input, or of a section of pcapng, counts as a quiet line: a
+/// truncated frame becomes a gap. Times do not: how long a line was quiet cannot be told from the
+/// moments at which its bytes were read.
 /// Memory use does not grow with the input.
 ///
 /// The time of a frame is that of its last byte: of the moment when the recording program got it

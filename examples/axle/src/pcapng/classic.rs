@@ -25,8 +25,9 @@ impl Classic {
     }
 }
 
-/// Whether these first bytes are of a capture, classic or pcapng; `None` if there are too few.
-pub(crate) fn is_capture(first: &[u8]) -> Option<bool> {
-    let magic: [u8; 4] = first.first_chunk().copied()?;
-    Some(magic == super::format::MAGIC || Classic::of(u32::from_le_bytes(magic)).is_some())
+/// Whether a capture begins with these bytes, classic or pcapng.
+pub(crate) fn is_capture(first: &[u8]) -> bool {
+    first.first_chunk().is_some_and(|&magic| {
+        magic == super::format::MAGIC || Classic::of(u32::from_le_bytes(magic)).is_some()
+    })
 }
