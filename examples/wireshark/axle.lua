@@ -103,7 +103,7 @@ local function new_stream(kind, direction)
         held = "", -- received, neither framed nor skipped yet
         offset = 0, -- of the first held byte
         received = 0,
-        chunks = {}, -- end, packet number and time of each packet of the stream
+        chunks = {}, -- the packets of the stream
         chunk = 1, -- the first that the next event may end in
         events = {}, -- frames and gaps, in order, without a hole between them
         gap = nil, -- the open one
@@ -126,7 +126,7 @@ end
 local function add_event(stream, event)
     local chunks = stream.chunks
     while chunks[stream.chunk].finish < event.finish do stream.chunk = stream.chunk + 1 end
-    event.number, event.micros = chunks[stream.chunk].number, chunks[stream.chunk].micros
+    event.packet, event.micros = chunks[stream.chunk], chunks[stream.chunk].micros
     event.direction = stream.direction
     stream.events[#stream.events + 1] = event
 end
@@ -313,10 +313,20 @@ local KINDS = {
     [wtap.USER3] = { name = "ucp", judge = judge_ucp, meet = meet_ucp },
 }
 
-local lines, packets = {}, {}
+-- A read filter (`-R`) drops packets after they were shown here, and gives their numbers to the
+-- next ones. So `packets` has those that are in the list, by number, but `latest` may be dropped
+-- still; what was dropped has no number.
+local lines, packets, latest, has_dropped
 
 local function reset()
-    lines, packets = {}, {}
+    lines, packets, latest, has_dropped = {}, {}, nil, false
+end
+reset()
+
+-- The number by which to refer to a packet, if it is in the list.
+local function number_of(packet)
+    local is_sure = packet.is_listed or packet ~= latest or not has_dropped
+    return is_sure and packet.number or nil
 end
 
 -- The order in which `axle decode` ends the directions of a line.
@@ -367,11 +377,17 @@ local function take(key, kind, direction, bytes, number, micros)
     local finish = begin + #bytes
     stream.received, line.received = finish, line.received + #bytes
     if #bytes > 0 then line.last_micros = math.max(line.last_micros, micros or 0) end
-    stream.chunks[#stream.chunks + 1] = { finish = finish, number = number, micros = micros }
+    local packet = {
+        line = line, stream = stream, begin = begin, finish = finish, number = number,
+        micros = micros,
+    }
+    local dropped = packets[number]
+    if dropped then dropped.number, has_dropped = nil, true end
+    packets[number], latest = packet, packet
+    stream.chunks[#stream.chunks + 1] = packet
     stream.held = stream.held .. bytes
     search(stream, false, function(frame) kind.meet(line, frame) end)
-    packets[number] = { line = line, stream = stream, begin = begin, finish = finish }
-    return packets[number]
+    return packet
 end
 
 -- The events that share bytes with a packet; `events` are in order.
@@ -671,8 +687,7 @@ local function show_ikeya(frame, range, item, kind)
         warn(item, IKEYA_EXPERTS.late, "Late answer: %d µs (ruling I7)", frame.took)
     elseif frame.is_foreign then
         warn(item, IKEYA_EXPERTS.foreign,
-            "Node %d answered when node %d was asked in packet %d (ruling I7)",
-            frame.node, frame.asked.node, frame.asked.number)
+            "Node %d answered when node %d was asked (ruling I7)", frame.node, frame.asked.node)
     elseif frame.is_unasked then
         warn(item, IKEYA_EXPERTS.foreign,
             "Node %d answered, but no answer was due (ruling I7)", frame.node)
@@ -819,6 +834,12 @@ local function range_of(event, packet, tvb)
     return whole:tvb("Frame of several packets"):range()
 end
 
+-- Adds the number of the packet in which an event ends.
+local function refer(item, field, event)
+    local number = number_of(event.packet)
+    if number then item:add(field, number):set_generated() end
+end
+
 -- The frame that ends in this packet.
 local function show_frame(event, packet, tvb, tree, view)
     local kind, fields, experts = packet.line.kind, view.fields, view.experts
@@ -833,7 +854,7 @@ local function show_frame(event, packet, tvb, tree, view)
     local state, ending = packet.line.state, view.ending and view.ending.state
     local answer = state.answers[event] or (ending and ending.answers[event])
     if event.request then
-        item:add(fields.request, event.request.number):set_generated()
+        refer(item, fields.request, event.request)
         if event.took then
             item:add(fields.took, u64(event.took)):set_generated()
             local port = interface_name()
@@ -841,7 +862,7 @@ local function show_frame(event, packet, tvb, tree, view)
             text = text .. (" (%d µs)"):format(event.took)
         end
     elseif answer then
-        item:add(fields.answer, answer.number):set_generated()
+        refer(item, fields.answer, answer)
     elseif state.unanswered[event] then
         warn(item, experts.unanswered, "Not answered before the next request")
     elseif ending and ending.unanswered[event] then
@@ -899,7 +920,7 @@ local function show_part(event, packet, tvb, tree, view)
     local range = tvb(first, packet.finish - packet.begin - first)
     local item = tree:add(view.proto, range)
     local what = event.name and "frame" or "gap"
-    item:add(view.fields.ends_in, range, event.number):set_generated()
+    refer(item, view.fields.ends_in, event)
     local text = ("%d of %d bytes of a %s"):format(range:len(), event.finish - event.begin, what)
     item:append_text(", " .. text)
     if event.reason then warn_of_gap(event, item, view, text) end
@@ -941,8 +962,10 @@ VIEWS["ikeya-3"] = VIEWS.ikeya
 local function dissect(tvb, pinfo, tree)
     local kind = KINDS[pinfo.match_uint]
     if not kind then return 0 end
-    local packet = packets[pinfo.number]
-    if not packet then
+    local packet = pinfo.visited and packets[pinfo.number]
+    if packet then
+        packet.is_listed = true
+    else
         local interface, section = interface_id(), section_number()
         local key = ("%s:%s:%s"):format(kind.name, section and section.value or "",
             interface and interface.value or "")
@@ -963,7 +986,7 @@ local function dissect(tvb, pinfo, tree)
     local texts = {}
     for _, event in ipairs(shared) do
         local show = show_part
-        if event.number == pinfo.number then show = event.name and show_frame or show_gap end
+        if event.packet == packet then show = event.name and show_frame or show_gap end
         texts[#texts + 1] = show(event, packet, tvb, tree, view)
         if event.name then
             local from, to = addresses(event, kind)

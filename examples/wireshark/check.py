@@ -129,8 +129,8 @@ class User:
             sys.exit(f"{' '.join(map(str, command))}: {err.decode(errors='replace')}")
         return out
 
-    def tshark(self, path, *options):
-        return self.run("tshark", "-2", "-R", "frame", "-r", path, *options)
+    def tshark(self, path, *options, read_filter="frame"):
+        return self.run("tshark", "-2", "-R", read_filter, "-r", path, *options)
 
 
 class Shown:
@@ -290,6 +290,36 @@ class Comparison:
         hint = b"as if there were one interface only"
         self.expect("without -R frame, it is told", hint in told, True)
 
+    def read_filters(self, user, path):
+        """Packets show the same with a read filter, which gives their numbers to others."""
+        names = [f"axle_{of}.{name}" for of in ("ikeya", "ucp")
+                 for name in ("request_in", "answer_in", "ends_in")]
+        options = [it for name in ("frame.number", "frame.time_epoch", "_ws.col.Info", *names)
+                   for it in ("-e", name)]
+
+        def rows(read_filter):
+            out = user.tshark(path, "-T", "fields", *options, read_filter=read_filter).decode()
+            packets = [line.split("\t") for line in out.splitlines()]
+            times = {number: time for number, time, *_ in packets}
+            return {time: (info, [[times.get(it, it) for it in field.split(",") if it]
+                                  for field in numbers])
+                    for _, time, info, *numbers in packets}
+
+        everything = rows("frame")
+        for wanted in ("frame.len == 8", "frame.packet_flags_direction == 1",
+                       "axle_ikeya.node == 2 or axle_ucp.message == report"):
+            found = rows(wanted)
+            self.expect(f"{path.stem}: found by -R {wanted}",
+                        0 < len(found) < len(everything), True)
+            # What is not in the list is not referred to; of the last packet it is not known.
+            last = next(reversed(found), None)
+            listed = found.keys() - {last}
+            for time, (info, fields) in found.items():
+                text, numbers = everything[time]
+                fields = [[it for it in field if it != last] for field in fields]
+                numbers = [[it for it in field if it in listed] for field in numbers]
+                self.expect(f"{path.stem}: -R {wanted}: {time}", (info, fields), (text, numbers))
+
     def hanging(self, user):
         """Captures that cannot begin end by themselves."""
         for port, protocol, *more in (("/dev/no-such-port", "ucp"), ("/dev/null", "modbus"),
@@ -341,6 +371,9 @@ def main():
                 found.story(user, path, shown)
         frames = sum(row["event"] == "frame" for row in rows)
         found.expect("live: enough frames", frames > LIVE_PACKETS * 2 // 3, True)
+        for path in paths:
+            if path.stem in ("motors", "drive", "noise"):
+                found.read_filters(user, path)
         found.filters(user, paths)
         found.settings(user, paths[0], Path(folder) / "vectors.pcapng")
         found.hanging(user)
