@@ -35,14 +35,29 @@ pub(crate) struct Args {
     #[command(flatten)]
     line: args::PortArgs,
 
-    /// Speed, -100 to 100 percent; positive is forward
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = args::percent())]
+    /// Speed, -100 to 100 percent; positive is forward; by default 0, for turning on the spot
+    #[arg(
+        long,
+        value_name = "S",
+        allow_negative_numbers = true,
+        value_parser = args::percent(),
+        default_value = "0",
+        hide_default_value = true,
+        required_unless_present = "turn"
+    )]
     speed: i16,
 
     /// Steering, -100 to 100 percent; positive is to the right, as on shipped robots (the protocol
     /// document says left). Going forward or turning on the spot, the nose then swings right; in
-    /// reverse, with a speed below -5, it swings left, as in a car
-    #[arg(long, value_name = "T", allow_negative_numbers = true, value_parser = args::percent())]
+    /// reverse, with a speed below -5, it swings left, as in a car; by default 0
+    #[arg(
+        long,
+        value_name = "T",
+        allow_negative_numbers = true,
+        value_parser = args::percent(),
+        default_value = "0",
+        hide_default_value = true
+    )]
     turn: i16,
 
     /// Duration, seconds

@@ -40,11 +40,11 @@ pub(crate) struct Args {
     #[command(flatten)]
     line: args::PortArgs,
 
-    /// End when this many pings were answered or lost; by default, until --for or Ctrl-C
+    /// End when this many pings were answered or lost; by default 10, unless --for is given
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     count: Option<u32>,
 
-    /// Duration, seconds; by default, until --count or Ctrl-C
+    /// End after this time, seconds
     #[arg(short = 'f', long = "for", value_name = "SECONDS", value_parser = args::seconds)]
     micros: Option<u64>,
 
@@ -56,6 +56,9 @@ pub(crate) struct Args {
     #[arg(short, long)]
     json: bool,
 }
+
+/// Number of pings without --count and --for.
+const DEFAULT_COUNT: u32 = 10;
 
 fn interval(text: &str) -> Result<Duration, String> {
     let micros = args::seconds(text)?;
@@ -117,13 +120,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut rover = Rover::open_with(&args.line, config)?;
     let (form, start) = (Form::of(args.json), rover.now());
     let end = args.micros.map(|micros| Instant::from_micros(start.as_micros() + micros));
+    let count = args.count.or(args.micros.is_none().then_some(DEFAULT_COUNT));
     let mut lost = 0;
     let broken = loop {
         let now = rover.now();
         let seen = rover.host().statistics();
         let settled = seen.round_trip.count().saturating_add(seen.pings_lost);
         let is_over =
-            args.count.is_some_and(|count| settled >= count) || end.is_some_and(|end| now >= end);
+            count.is_some_and(|count| settled >= count) || end.is_some_and(|end| now >= end);
         if is_over || signals.is_raised() {
             break Ok(());
         }

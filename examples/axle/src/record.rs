@@ -2,7 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    io::{self, Write},
+    io::{self, IsTerminal, Write},
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -21,7 +21,7 @@ use crate::{
     help::EXIT_CODES,
     line::{Line, PATIENCE, QUIET},
     listing::{self, Shown},
-    pcapng::{Direction, Recording},
+    pcapng::{Direction, Recording, Rotation},
     signals::Signals,
 };
 
@@ -32,8 +32,9 @@ use crate::{
 /// those at which this program got the bytes from the system; behind a USB adapter, that can be
 /// 16 ms after they were on the line. Name of the port, protocol and speed are in the file.
 ///
-/// Ends after --for, on Ctrl-C, and when the port fails; what was recorded by then is complete. If
-/// the disk is full, the file ends with the last whole packet.
+/// Ends after --for, on Ctrl-C, and when the port fails; what was recorded by then is complete. A
+/// power cut costs at most the last second. With less than 16 MB left on the disk, or a twentieth
+/// of a small one, the recording ends; on a full one the file ends with the last whole packet.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Args {
@@ -57,6 +58,12 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 
+    /// Go on in another file before one has more than this, as in 100MB, or has packets of a
+    /// longer time, as in 1h. Each has its number and time (UTC) in its name: bus.pcapng becomes
+    /// bus_00001_20261231235959.pcapng, which Wireshark lists as a set
+    #[arg(long, value_name = "SIZE|TIME")]
+    rotate: Option<Rotation>,
+
     /// Overwrite the file if there is one
     #[arg(long)]
     force: bool,
@@ -78,16 +85,43 @@ where
 {
     let signals = Signals::listen()?;
     let baud = args.baud.unwrap_or(args.protocol.default_baud());
+    let is_piped = args.output == Path::new("-");
     let line = Line::connect(&args.port, baud)?;
-    let file = Recording::create(&args.output, args.force, args.protocol, line.path(), baud)?;
+    let file = match args.rotate {
+        Some(_) if is_piped => {
+            let line = "--rotate goes on in another file: name one instead of standard output";
+            return Err(Failure::Usage(line.to_owned()));
+        }
+        Some(rotation) => {
+            let of = (args.protocol, line.path(), baud);
+            Recording::create_first(&args.output, args.force, rotation, of)?
+        }
+        None => Recording::create(&args.output, args.force, args.protocol, line.path(), baud)?,
+    };
+    if args.micros.is_none() && io::stderr().is_terminal() {
+        eprintln!("axle: recording {:?} until Ctrl-C", args.port);
+    }
     let end = args.micros.map(|micros| clock::now() + Duration::from_micros(micros));
-    let (account, recorded) = record_line::<F>(line, file, end, &signals);
-    if args.output != Path::new("-") {
+    let Recorded { account, files, outcome } = record_line::<F>(line, file, end, &signals);
+    if !is_piped {
         let mut out = io::stdout().lock();
         let told = listing::print_summary(&mut out, &account, false);
-        told.and_then(|()| out.flush()).map_err(Failure::Write)?;
+        told.and_then(|()| match files {
+            Some((count, last)) => writeln!(out, "{count:>10} files, the last is {last:?}"),
+            None => Ok(()),
+        })
+        .and_then(|()| out.flush())
+        .map_err(Failure::Write)?;
     }
-    recorded
+    outcome
+}
+
+/// What has become of a recording.
+pub(crate) struct Recorded {
+    account: Counters,
+    /// How many files there are, and the last, if there may be several.
+    files: Option<(u32, PathBuf)>,
+    pub(crate) outcome: Result<(), Failure>,
 }
 
 /// Records a line until `end`, a signal, or a failure of the file or the port.
@@ -96,7 +130,7 @@ pub(crate) fn record_line<F>(
     file: Recording,
     end: Option<Instant>,
     signals: &Signals,
-) -> (Counters, Result<(), Failure>)
+) -> Recorded
 where
     F: Framing,
     for<'a> F::Frame<'a>: Shown,
@@ -115,11 +149,10 @@ where
             Err(failure) => break Err(failure),
         }
     };
-    let (account, recorded) = match recorded {
-        Ok(()) => frames.finish(),
-        failed => (frames.account(), failed),
-    };
-    (account, recorded.and(broken))
+    let recorded = recorded.and_then(|()| frames.finish());
+    let file = &frames.file;
+    let files = file.files().map(|count| (count, file.path().to_owned()));
+    Recorded { account: frames.account(), files, outcome: recorded.and(broken) }
 }
 
 /// Cuts what is received into frames and the bytes between them, a packet each.
@@ -215,17 +248,17 @@ where
     }
 
     /// The account of what was received.
-    fn account(&self) -> Counters {
+    pub(crate) fn account(&self) -> Counters {
         self.decoder.counters()
     }
 
-    /// Writes what is left; returns the account.
-    pub(crate) fn finish(mut self) -> (Counters, Result<(), Failure>) {
+    /// Writes what is left.
+    pub(crate) fn finish(&mut self) -> Result<(), Failure> {
         loop {
             self.decoder.idle();
-            let written = self.write(&[]);
-            if written.is_err() || self.decoder.pending() == 0 {
-                return (self.account(), written);
+            self.write(&[])?;
+            if self.decoder.pending() == 0 {
+                return Ok(());
             }
         }
     }

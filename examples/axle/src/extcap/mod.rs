@@ -202,8 +202,7 @@ where
     // Waits for a reader; a signal ends the process then, because nothing listens yet.
     let file = Recording::to_pipe(fifo, protocol, line.path(), baud)?;
     let signals = Signals::listen()?;
-    let (_, recorded) = record_line::<F>(line, file, None, &signals);
-    recorded
+    record_line::<F>(line, file, None, &signals).outcome
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@
 mod background;
 mod classic;
 mod format;
+mod keeper;
 mod read;
 mod recording;
 mod write;
@@ -22,7 +23,7 @@ pub(crate) use background::Background;
 pub(crate) use classic::is_capture;
 pub(crate) use format::{Direction, link_type, protocol_of};
 pub(crate) use read::{Packet, Reader};
-pub(crate) use recording::{Recording, Stamp};
+pub(crate) use recording::{Recording, Rotation, Stamp};
 pub(crate) use write::Writer;
 
 #[cfg(test)]

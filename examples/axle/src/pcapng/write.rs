@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use super::format::{BYTE_ORDER, Direction, MAGIC, block, link_type, option};
 use crate::args::Protocol;
 
-/// Writes blocks, each with a single call: a full disk cuts off no more than one.
+/// Writes blocks, each with a single call.
 #[derive(Debug)]
 pub(crate) struct Writer<W> {
     out: W,
@@ -95,6 +95,23 @@ impl<W: Write> Writer<W> {
         }
         self.out.write_all(&self.block)
     }
+}
+
+/// The length of a packet with these bytes, and a direction.
+pub(super) const fn packet_len(bytes: &[u8]) -> u64 {
+    44 + bytes.len().next_multiple_of(4) as u64
+}
+
+/// Of blocks, the last of which may be cut off: the length of the whole ones, and how many of them
+/// are packets.
+pub(super) fn whole_blocks(blocks: &[u8]) -> (usize, u64) {
+    let (mut rest, mut packets) = (blocks, 0);
+    while let Some(([kind, len], _)) = rest.as_chunks::<4>().0.split_first_chunk::<2>() {
+        let Some(next) = rest.get(u32::from_le_bytes(*len) as usize..) else { break };
+        packets += u64::from(u32::from_le_bytes(*kind) == block::PACKET);
+        rest = next;
+    }
+    (blocks.len() - rest.len(), packets)
 }
 
 fn put_option(body: &mut Vec<u8>, code: u16, value: &[u8]) {

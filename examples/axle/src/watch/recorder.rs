@@ -78,7 +78,7 @@ where
 
     /// Ends the recording, if there is one.
     pub(super) fn finish(&mut self) -> Result<(), Failure> {
-        self.running.take().map_or(Ok(()), |(_, frames)| frames.finish().1)
+        self.running.take().map_or(Ok(()), |(_, mut frames)| frames.finish())
     }
 
     /// Gives up a recording that has failed.

@@ -41,6 +41,19 @@ fn drive_moves_the_rover_and_stops_it_at_the_end() {
 }
 
 #[test]
+fn speed_or_steering_alone_is_enough_but_not_neither() {
+    let (_sim, port) = sim("ucp");
+    for (args, target) in
+        [("--speed 30", "speed 30 %, turn 0 %"), ("--turn -30", "speed 0 %, turn 30 % left")]
+    {
+        let lines = Process::start(&format!("drive -p {port} {args} -f 0.2")).success();
+        assert!(lines[0].ends_with(&format!("target: {target}")), "{lines:?}");
+    }
+    let error = Process::start(&format!("drive -p {port} -f 0.2")).complaint(2);
+    assert_eq!(error, "the following required arguments were not provided: --speed <S>");
+}
+
+#[test]
 fn reports_from_before_the_robot_heard_of_the_stop_do_not_count() {
     for delay in ["0.05", "0.3"] {
         let (sim, port) = sim(&format!("ucp --delay {delay}"));

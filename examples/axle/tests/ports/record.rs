@@ -92,6 +92,28 @@ fn a_recording_that_a_signal_ends_is_complete() {
 }
 
 #[test]
+fn a_recording_in_several_files_loses_nothing_between_them() {
+    let (_sim, port) = sim("ucp");
+    let path = fresh("set.pcapng");
+    let told =
+        Process::start(&format!("record -p {port} -P ucp -o {path} --rotate 10kB -f 3")).success();
+    let stem = path.strip_suffix(".pcapng").unwrap();
+    let (folder, stem) = stem.rsplit_once('/').unwrap();
+    let mut paths: Vec<_> = fs::read_dir(folder).unwrap().map(|it| it.unwrap().path()).collect();
+    paths.retain(|path| path.file_name().unwrap().to_str().unwrap().starts_with(stem));
+    paths.sort();
+    let last = paths.last().unwrap();
+    assert!(paths.len() > 1, "{paths:?}");
+    let files = format!("{:>10} files, the last is {last:?}", paths.len());
+    assert_eq!(told.last(), Some(&files));
+    let events: Vec<_> = paths.iter().flat_map(|it| decoded(it.to_str().unwrap()).0).collect();
+    assert_reports(&events);
+    let piped = format!("record -p {port} -P ucp -o - --rotate 10kB");
+    let error = Process::start(&piped).complaint(2);
+    assert!(error.contains("name one instead of standard output"), "{error}");
+}
+
+#[test]
 fn a_recording_of_an_unplugged_port_is_complete() {
     let (sim, port) = sim("ucp");
     let path = fresh("unplugged.pcapng");

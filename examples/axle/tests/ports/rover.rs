@@ -66,6 +66,13 @@ fn ping_ends_after_its_time_and_on_a_signal_with_a_summary() {
 }
 
 #[test]
+fn ping_ends_by_itself_after_ten_pings() {
+    let (_sim, port) = sim("ucp");
+    let lines = Process::start(&format!("ping -p {port} --every 0.02")).success();
+    assert!(lines.last().unwrap().starts_with("10 pings, 10 pongs, 0 lost"), "{lines:?}");
+}
+
+#[test]
 fn pings_without_a_pong_are_lost_and_the_exit_code_says_so() {
     let line = parrot(&[]);
     let ended = Process::start(&format!("ping -p {} -c 2 --every 0.05", line.path)).end();
