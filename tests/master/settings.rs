@@ -130,6 +130,19 @@ fn a_turnaround_gap_is_kept_after_requests_and_answers() {
 }
 
 #[test]
+fn a_turnaround_gap_begins_when_a_slow_port_has_taken_the_write() {
+    let mut desk = Desk::tuned(|config| config.turnaround_gap = US(100), &[N1]);
+    desk.turn_with(290, &velocity(NodeId::N1, 0.0));
+    desk.master.set_velocity(NodeId::N1, rps(1.0), desk.now).unwrap();
+    assert_eq!(desk.packet(), write(NodeId::N1, 1.0));
+    desk.now += US(5000);
+    desk.master.handle_transmit(Transmit::Taken, desk.now);
+    let taken = desk.now;
+    assert_eq!(desk.turn(), read(NodeId::N1));
+    assert_eq!(desk.now, taken + US(160 + 100));
+}
+
+#[test]
 fn a_queue_that_fills_keeps_the_oldest_events_and_counts_the_rest() {
     let mut desk = Desk::with_nodes(direct(), &[N1]);
     for turn in 0..20 {

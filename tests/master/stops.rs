@@ -250,6 +250,47 @@ fn a_hold_that_is_kept_and_cannot_be_written_for_20_ms_is_looked_at_again() {
     }
 }
 
+/// What follows when a port refuses the first WRITE of each measured position for so long, ms.
+fn behind_outages(desk: &mut Desk, outages_ms: &[u32]) -> Vec<u8> {
+    let mut packet = read(NodeId::N3).to_vec();
+    for &outage in outages_ms {
+        assert_eq!(desk.packets(1)[0][0], WRITE);
+        desk.master.handle_transmit(Unsent::Untouched, desk.now);
+        desk.now = desk.now + MS(outage);
+        packet = desk.packets(1).remove(0);
+        if packet[0] == WRITE {
+            break;
+        }
+    }
+    packet
+}
+
+#[test]
+fn however_a_port_fails_no_position_is_held_first_160_ms_after_it_was_measured() {
+    let stopped = || {
+        let mut desk = Desk::with_nodes(direct(), &[N3]);
+        desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        desk.master.stop(NodeId::N3, desk.now);
+        assert_eq!(desk.packets(1), [read(NodeId::N3)]);
+        desk
+    };
+    for outages in [&[30, 50, 90, 170, 330, 650, 1200][..], &[161; 20], &[21, 41, 81, 161, 161]] {
+        assert_eq!(behind_outages(&mut stopped(), outages), read(NodeId::N3), "{outages:?}");
+    }
+    // A port that always takes this long takes it in the end.
+    for outages in [[155; 4], [155, 155, 155, 10]] {
+        let last = behind_outages(&mut stopped(), &outages);
+        assert_eq!(last, hold(NodeId::N3, turns(40)), "{outages:?}");
+    }
+    // After a loss, as at first.
+    let mut desk = stopped();
+    behind_outages(&mut desk, &[155; 3]);
+    desk.lose(NodeId::N3);
+    desk.answer(NodeId::N3, Answer::Position(turns(90)));
+    while desk.packets(1)[0][0] != READ || desk.master.health(NodeId::N3) != Some(Health::Online) {}
+    assert_eq!(behind_outages(&mut desk, &[25]), read(NodeId::N3));
+}
+
 #[test]
 fn a_loaded_node_that_is_lost_again_and_again_does_not_sink() {
     for between in [MS(3), MS(200)] {
@@ -289,6 +330,33 @@ fn a_loaded_node_that_misses_each_read_behind_a_write_does_not_creep_from_hold_t
             }
         }
         assert_eq!(told, beside(turns(40), -sag));
+    }
+}
+
+#[test]
+fn a_loaded_node_that_misses_each_read_behind_a_write_sinks_a_few_times_at_most_before_it_is_lost()
+{
+    for config in [direct(), MasterConfig::usb_adapter()] {
+        let mut desk = Desk::with_nodes(config, &[N3]);
+        desk.answer(NodeId::N3, Answer::Position(turns(40)));
+        desk.master.stop(NodeId::N3, desk.now);
+        let (mut told, mut losses, mut holds) = (turns(40), 0, 1);
+        for _ in 0..3000 {
+            let was_online = desk.master.health(NodeId::N3) != Some(Health::Abnormal);
+            let packet = desk.packet();
+            if packet[0] == WRITE {
+                holds += u32::from(place_of(&packet) != told);
+                told = place_of(&packet);
+                // All READs until the next answer is needed for a hold.
+                while desk.packet()[0] == WRITE {}
+                desk.silence();
+            } else {
+                desk.hear(340, &position(NodeId::N3, beside(told, -300)));
+            }
+            let is_lost = desk.master.health(NodeId::N3) == Some(Health::Abnormal);
+            losses += u32::from(was_online && is_lost);
+        }
+        assert!(holds <= 9 + losses, "{holds} {losses}");
     }
 }
 

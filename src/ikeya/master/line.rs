@@ -266,11 +266,20 @@ impl<B: Board> Line<B> {
         self.is_behind_write = false;
     }
 
-    /// The port has taken a request, and may hold it: the next one waits for its flush.
-    pub(super) fn hold(&mut self, now: Instant) {
-        if let (Some(window), Held::Nothing) = (&self.window, self.held) {
-            self.held = Held::Last(window.node);
-            self.free_at = now + HELD;
+    /// The port has taken the packet, and may hold it. Behind a request, the next one waits for the
+    /// flush; behind a silent WRITE, only for the gap.
+    pub(super) fn hold(&mut self, config: &MasterConfig, now: Instant) {
+        let gap = config.turnaround_gap;
+        match (&self.window, self.held) {
+            (Some(window), Held::Nothing) => {
+                self.held = Held::Last(window.node);
+                self.free_at = now + HELD;
+            }
+            (None, _) if gap > Duration::ZERO => {
+                let end = now + wire_time(PACKET_LEN, config.baud);
+                self.free_at = self.free_at.max(end + gap);
+            }
+            _ => {}
         }
     }
 

@@ -17,8 +17,13 @@ use crate::{
 const CONFIRMATIONS: u8 = 2;
 
 /// Time within which a WRITE of a measured position must be followed by an answer, or the node is
-/// read again. It doubles each time, so that even a slow loop eventually writes one.
+/// read again. It doubles each time up to a limit, so that a slow port, too, eventually takes one.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
+const MOST_HOLD_PATIENCE: Duration = Duration::from_millis(160);
+
+/// How often a node is read again because no answer has followed the WRITE. Not more: a loaded one
+/// that never answers behind a WRITE would creep away.
+const MOST_MISSES: u8 = 8;
 
 /// Minimum time between two answers that show a standstill.
 const STILL_TIME: Duration = Duration::from_millis(20);
@@ -396,6 +401,10 @@ pub(super) struct Stop<B: Board> {
     is_second: bool,
     /// Stop WRITEs that were followed by a good answer.
     followed: u8,
+    /// How often the node was read again because none has followed.
+    misses: u8,
+    /// Whether its hold was written and is kept, although no answer has followed.
+    is_kept: bool,
     /// Whether the node was read since it may have moved, or been moved, away from `hold`.
     is_there: bool,
     /// Whether a stop WRITE has been sent and waits for an answer.
@@ -436,6 +445,8 @@ impl<B: Board> Stop<B> {
             was_confirmed: false,
             is_second: false,
             followed: 0,
+            misses: 0,
+            is_kept: false,
             lost_attempts: 0,
             is_there: false,
             hold: held,
@@ -510,6 +521,7 @@ impl<B: Board> Stop<B> {
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
         (self.is_written, self.written_at) = (false, None);
         (self.hold, self.is_there) = (None, false);
+        (self.patience, self.misses) = (HOLD_PATIENCE, 0);
     }
 
     /// The node is abnormal. It has no more time to become still than before.
@@ -553,15 +565,18 @@ impl<B: Board> Stop<B> {
         if !is_near {
             self.hold = Some(position);
         }
-        (self.measured_at, self.is_there) = (now, true);
+        (self.measured_at, self.is_there, self.is_kept) = (now, true, false);
     }
 
-    /// If the node has perhaps never heard the position to hold, it is read first. Not each time: a
-    /// loaded node that never answers behind a WRITE would creep away.
+    /// If the node has perhaps never heard the position to hold, it is read first.
     fn missed(&mut self) {
         self.is_written = false;
-        if self.is_there && self.followed == 0 && self.patience <= HOLD_PATIENCE + HOLD_PATIENCE {
-            self.read_again();
+        if self.is_there && self.followed == 0 {
+            self.is_kept = self.misses >= MOST_MISSES;
+            if !self.is_kept {
+                self.misses += 1;
+                self.read_again();
+            }
         }
     }
 
@@ -569,19 +584,21 @@ impl<B: Board> Stop<B> {
     fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
         if self.has_old_hold(now, gap) {
             self.read_again();
+            // Two gaps for each node that may be asked in between.
+            let most = MOST_HOLD_PATIENCE + gap.saturating_mul(16);
+            self.patience = most.min(self.patience + self.patience);
         }
     }
 
     /// Whether no answer has come in time behind the measured position, allowing for the `gap`
     /// after each packet.
     pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
-        let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
-        is_due && now - self.measured_at > self.patience + gap
+        let is_unheard = self.is_there && self.followed == 0 && !self.is_kept;
+        self.stage == Stage::Owed && is_unheard && now - self.measured_at > self.patience + gap
     }
 
     fn read_again(&mut self) {
         (self.is_there, self.is_written, self.written_at) = (false, false, None);
-        self.patience = self.patience + self.patience;
     }
 
     /// Takes a good answer of the node in its mode, to a request that ended at `asked_at`.

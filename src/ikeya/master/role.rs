@@ -444,7 +444,7 @@ impl<B: Board> Endpoint for Master<B> {
     fn handle_transmit(&mut self, outcome: impl Into<Transmit>, now: Instant) {
         self.now = now;
         match outcome.into() {
-            Transmit::Taken => self.line.hold(now),
+            Transmit::Taken => self.line.hold(&self.config, now),
             Transmit::Flushed => self.flushed(now),
             Transmit::Unsent(unsent) => self.take_back(unsent, now),
         }

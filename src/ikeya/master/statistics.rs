@@ -45,7 +45,8 @@ pub struct NodeStatistics {
     pub retries: u32,
     /// READs given up after all attempts.
     pub failures: u32,
-    /// Times from the end of a request to the start of its answer.
+    /// Times from the end of a request to the start of its answer. If the port has kept the
+    /// request waiting, that is counted too.
     pub latency: Latency,
 }
 

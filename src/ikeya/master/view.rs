@@ -152,8 +152,10 @@ impl<B: Board> Master<B> {
         self.attempts_bound(round.saturating_mul(16))
     }
 
-    /// Time within which a stop of nodes that answer is confirmed, with room for lost packets. A
-    /// call that waits for stops gives up after it.
+    /// Time within which a stop of nodes that are online is confirmed, with room for lost packets.
+    /// A call that waits for stops gives up after it. A node that was abnormal when the call began
+    /// may take longer, even if it answers again: it has its stop as soon as it can hear one (I13),
+    /// but waits for its turn of the search to confirm it.
     ///
     /// It is four times [`MasterConfig::attempts`] times the longest time between two reads of a
     /// node while stops are owed: the guard, an exchange with every other node and with one that is

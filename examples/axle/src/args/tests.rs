@@ -59,7 +59,8 @@ fn a_command_line_that_would_do_harm_is_refused() {
         ("spin -p x --rps 1", "--node"),
         ("drive -p x --speed 101 --turn 0", "101 is not in -100..=100"),
         ("drive -p x --speed 0 --turn 101", "101 is not in -100..=100"),
-        ("drive -p x --speed 0", "--turn"),
+        ("drive -p x", "--speed"),
+        ("record -p x -P ucp -o a --rotate 9kB", "at least 10kB or 1s"),
         ("drive -p x --speed 0 --turn 0 --page --json", "cannot be used with"),
         ("send -p x ucp motor -101 0", "-101 is not in -100..=100"),
         ("send -p x -c 0 ucp ping", "0 is not in 1"),
@@ -73,7 +74,11 @@ fn a_command_line_that_would_do_harm_is_refused() {
         let error = parsed(words).unwrap_err();
         assert!(error.contains(says), "{words}: {error}");
     }
-    for words in ["drive -p x --speed -100 --turn 100", "scan -p x -b 9600 --record a"] {
+    for words in [
+        "drive -p x --speed -100 --turn 100",
+        "drive -p x --turn 5",
+        "scan -p x -b 9600 --record a",
+    ] {
         assert!(parsed(words).is_ok(), "{words}");
     }
 }
@@ -108,6 +113,8 @@ fn every_default_is_as_it_is_written_here() {
         "spin protocol ikeya",
         "spin max-rps 20",
         "spin for 3",
+        "drive speed 0",
+        "drive turn 0",
         "drive for 3",
         "ping every 0.2",
         "replay as commander",
