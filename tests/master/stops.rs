@@ -256,7 +256,7 @@ fn behind_outages(desk: &mut Desk, outages_ms: &[u32]) -> Vec<u8> {
     for &outage in outages_ms {
         assert_eq!(desk.packets(1)[0][0], WRITE);
         desk.master.handle_transmit(Unsent::Untouched, desk.now);
-        desk.now = desk.now + MS(outage);
+        desk.now += MS(outage);
         packet = desk.packets(1).remove(0);
         if packet[0] == WRITE {
             break;
