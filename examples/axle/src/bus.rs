@@ -1,5 +1,7 @@
 //! A motor bus on a port, with its master; shared by `scan`, `spin` and `stop`.
 
+mod patience;
+
 use std::time::Duration as Span;
 
 use axlewire::{
@@ -22,6 +24,7 @@ use crate::{
 };
 
 pub(crate) use crate::boards::Boards;
+pub(crate) use patience::Patience;
 
 /// Period at which each node is read and its set-point repeated: short enough for every motor, and
 /// a USB adapter keeps up with three nodes.
@@ -65,15 +68,11 @@ pub(crate) struct MasterArgs {
     #[command(flatten)]
     line: args::PortArgs,
 
-    /// Wait 500 us for an answer, as the protocol specifies, instead of the 20 ms that a USB
-    /// adapter may need; for a UART built into this machine
-    #[arg(long)]
-    direct: bool,
-
-    /// Wait this long for an answer, seconds; by default 0.02, and 0.1 behind tcp:. axle scan
-    /// finds out what a line needs
-    #[arg(long, value_name = "SECONDS", value_parser = reply_timeout, conflicts_with = "direct")]
-    reply_timeout: Option<Duration>,
+    /// How long to wait for an answer: direct (500 us, as the protocol specifies, for a UART built
+    /// into this machine), usb (20 ms, for an adapter), network (0.1 s), or seconds; by default
+    /// network behind tcp:, otherwise usb. axle scan --measure finds out what a line needs
+    #[arg(long, value_name = "TIME")]
+    reply_timeout: Option<Patience>,
 
     /// The adapter hears what it sends, as on two wires with the receiver always on: take these
     /// echoes out
@@ -81,25 +80,8 @@ pub(crate) struct MasterArgs {
     echo: bool,
 }
 
-/// Time for an answer behind a network.
-const NETWORK_TIMEOUT: Duration = Duration::from_millis(100);
-
-/// Longest time for an answer, and what is tried if answers come late.
-const LONGEST_TIMEOUT: Duration = Duration::from_secs(1);
+/// What is tried if answers come late.
 const SLOW_TIMEOUT: Duration = Duration::from_millis(500);
-
-fn reply_timeout(text: &str) -> Result<Duration, String> {
-    match args::seconds(text)?.try_into().map(Duration::from_micros) {
-        Ok(timeout) if timeout > Duration::ZERO && timeout <= LONGEST_TIMEOUT => Ok(timeout),
-        _ => Err("it is not above 0 and up to 1 second".to_owned()),
-    }
-}
-
-/// A late answer may be that late as well.
-const fn with_reply_timeout(mut config: MasterConfig, timeout: Duration) -> MasterConfig {
-    (config.reply_timeout, config.late_guard) = (timeout, timeout);
-    config
-}
 
 /// A port and the master on it.
 pub(crate) struct Bus<B: Boards = OneMotor> {
@@ -111,8 +93,8 @@ pub(crate) struct Bus<B: Boards = OneMotor> {
 
 impl MasterArgs {
     #[cfg(test)]
-    pub(crate) const fn new(line: args::PortArgs, direct: bool) -> Self {
-        Self { line, direct, reply_timeout: None, echo: false }
+    pub(crate) const fn new(line: args::PortArgs, reply_timeout: Option<Patience>) -> Self {
+        Self { line, reply_timeout, echo: false }
     }
 
     pub(crate) const fn line(&self) -> &args::PortArgs {
@@ -121,19 +103,14 @@ impl MasterArgs {
 
     /// Settings of a master for this adapter.
     pub(crate) fn config(&self) -> MasterConfig {
-        if self.direct {
-            return MasterConfig::direct();
-        }
         let is_network = self.line.port.starts_with("tcp:");
-        let timeout = self.reply_timeout.or(is_network.then_some(NETWORK_TIMEOUT));
-        timeout.map_or(MasterConfig::usb_adapter(), |timeout| {
-            with_reply_timeout(MasterConfig::usb_adapter(), timeout)
-        })
+        let usual = if is_network { Patience::Network } else { Patience::Usb };
+        self.reply_timeout.unwrap_or(usual).config()
     }
 
     /// Whether a longer time may be tried for answers that come too late.
     pub(crate) const fn may_wait_longer(&self) -> bool {
-        !self.direct && self.reply_timeout.is_none()
+        self.reply_timeout.is_none()
     }
 
     /// Opens the port, for a bus of this protocol.
@@ -179,7 +156,7 @@ impl<B: Boards> Bus<B> {
     ///
     /// The line is left alone before: an old answer must not count as a new one.
     pub(crate) fn wait_longer(&mut self) -> bool {
-        let mut config = *self.master().config();
+        let config = self.master().config();
         let is_late = |node| self.status(node).is_none() && self.late(node) > 0;
         if config.reply_timeout >= SLOW_TIMEOUT || !config.nodes.iter().any(is_late) {
             return false;
@@ -188,22 +165,31 @@ impl<B: Boards> Bus<B> {
         let is_there = |node: &NodeId| {
             self.status(*node).is_some() || self.is_untimely(*node) || self.is_damaged(*node)
         };
-        config.attempts = config.attempts.min(2);
-        config.nodes = config.nodes.iter().filter(is_there).collect();
-        clock::sleep(span(SLOW_TIMEOUT));
-        let config = with_reply_timeout(config, SLOW_TIMEOUT);
-        self.session.begin_anew(|now| Master::for_board(config, now));
+        let nodes = config.nodes.iter().filter(is_there).collect();
+        self.begin_patiently(nodes, 2);
         true
     }
 
-    /// What this line needs for `--reply-timeout`, seconds: the longest time of an answer so far,
-    /// and half of it more, in steps of 10 ms.
-    pub(crate) fn needed_timeout(&self) -> Option<f64> {
+    /// Begins anew with half a second for answers, for these nodes, each read this often at most.
+    pub(crate) fn begin_patiently(&mut self, nodes: NodeSet, attempts: u8) {
+        let mut config = *self.master().config();
+        (config.nodes, config.attempts) = (nodes, config.attempts.min(attempts));
+        (config.reply_timeout, config.late_guard) = (SLOW_TIMEOUT, SLOW_TIMEOUT);
+        clock::sleep(span(SLOW_TIMEOUT));
+        self.session.begin_anew(|now| Master::for_board(config, now));
+    }
+
+    /// What this line needs for `--reply-timeout`, by the answers so far.
+    pub(crate) fn needed_patience(&self) -> Option<Patience> {
         let longest = NodeId::ALL
             .into_iter()
             .filter_map(|node| self.master().node_statistics(node).latency.max());
-        let steps = (longest.max()?.as_micros() * 3 / 2).div_ceil(10_000);
-        Some(f64::from(steps) / 100.0)
+        Some(Patience::for_slowest(longest.max()?))
+    }
+
+    /// Time from the latest READ of a node that was answered to its answer.
+    pub(crate) fn last_latency(&self, node: NodeId) -> Option<Duration> {
+        self.master().node_statistics(node).latency.last()
     }
 
     /// Number of answers of a node that were too late.
@@ -219,7 +205,9 @@ impl<B: Boards> Bus<B> {
     /// What to do about a node that does not answer in time, for the end of a message.
     pub(crate) fn hint(&self, node: NodeId) -> &'static str {
         match self.is_untimely(node) && self.late(node) > 0 {
-            true => " in time, but later: axle scan finds the --reply-timeout that this line needs",
+            true => {
+                " in time, but later: axle scan --measure finds the --reply-timeout that this line needs"
+            }
             false => "",
         }
     }

@@ -1,5 +1,7 @@
 //! `axle scan`: lists the nodes of a motor bus.
 
+mod measure;
+
 use std::io::{self, Write};
 
 use anstyle::{AnsiColor, Effects, Style};
@@ -13,11 +15,12 @@ use serde::Serialize;
 use crate::{
     args::BusProtocol,
     boards::{Boards, Data},
-    bus::{self, Bus},
+    bus::{self, Bus, Patience},
     failure::Failure,
     help::EXIT_CODES,
     signals::Signals,
 };
+use measure::Times;
 
 /// List the nodes of a motor bus
 ///
@@ -33,6 +36,11 @@ pub(crate) struct Args {
     /// Boards on the bus
     #[arg(short = 'P', long, value_enum, default_value = "ikeya")]
     protocol: BusProtocol,
+
+    /// Then read each node 100 times, for 15 seconds at the most, and print how long the answers
+    /// take and the --reply-timeout that the line needs
+    #[arg(long, conflicts_with = "reply_timeout")]
+    measure: bool,
 
     /// Print one JSON object per line
     #[arg(short, long)]
@@ -55,14 +63,17 @@ enum Record {
         dip: Dip,
     },
     /// An id that gave only damaged answers.
-    Damaged { node: NodeId },
+    Damaged {
+        node: NodeId,
+    },
+    Times(Times),
     /// Totals.
     Summary {
         nodes: usize,
         damaged: usize,
-        /// What the line needs for `--reply-timeout`, seconds, if not the default.
+        /// What the line needs for `--reply-timeout`, if that was measured.
         #[serde(skip_serializing_if = "Option::is_none")]
-        reply_timeout: Option<f64>,
+        reply_timeout: Option<String>,
     },
 }
 
@@ -96,14 +107,18 @@ fn scan<B: Boards>(args: &Args) -> Result<(), Failure> {
     let signals = Signals::listen()?;
     let mut bus = Bus::<B>::open(&args.bus)?;
     discover(&mut bus, &signals)?;
-    let mut needs = None;
+    let (mut needs, mut times) = (None, Vec::new());
     if args.bus.may_wait_longer() && bus.wait_longer() {
         discover(&mut bus, &signals)?;
-        needs = bus.needed_timeout();
+        needs = bus.needed_patience();
+    }
+    if args.measure {
+        times = measure::measure(&mut bus, &signals)?;
+        needs = measure::proposal(&times);
     }
     match args.json {
-        true => print_json(&bus, needs, &mut io::stdout().lock()),
-        false => print_table(&bus, needs, &mut anstream::stdout().lock()),
+        true => print_json(&bus, needs, times, &mut io::stdout().lock()),
+        false => print_table(&bus, needs, &times, &mut anstream::stdout().lock()),
     }
     .map_err(Failure::Write)?;
     bus.check_recording()
@@ -121,7 +136,12 @@ fn damaged<B: Boards>(bus: &Bus<B>) -> Vec<NodeId> {
     NodeId::ALL.into_iter().filter(|&node| bus.is_damaged(node)).collect()
 }
 
-fn print_json<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write) -> io::Result<()> {
+fn print_json<B: Boards>(
+    bus: &Bus<B>,
+    needs: Option<Patience>,
+    times: Vec<Times>,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let nodes = bus.nodes().map(|(node, mode, status)| {
         let dip = Dip::of(node, mode);
         Record::Node { node, mode, status: B::data(status), dip }
@@ -130,17 +150,23 @@ fn print_json<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write) 
     let summary = Record::Summary {
         nodes: bus.nodes().count(),
         damaged: damaged.len(),
-        reply_timeout: needs,
+        reply_timeout: needs.map(|needs| needs.to_string()),
     };
     let damaged = damaged.into_iter().map(|node| Record::Damaged { node });
-    for record in nodes.chain(damaged).chain([summary]) {
+    let times = times.into_iter().map(Record::Times);
+    for record in nodes.chain(damaged).chain(times).chain([summary]) {
         serde_json::to_writer(&mut *out, &record)?;
         writeln!(out)?;
     }
     out.flush()
 }
 
-fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write) -> io::Result<()> {
+fn print_table<B: Boards>(
+    bus: &Bus<B>,
+    needs: Option<Patience>,
+    times: &[Times],
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let count = bus.nodes().count();
     if count > 0 {
         writeln!(
@@ -161,11 +187,17 @@ fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write)
              adapter that hears itself (--echo), another --protocol, or a wrong --baud"
         )?;
     }
-    if let Some(seconds) = needs {
-        writeln!(
+    if !times.is_empty() {
+        writeln!(out, "{TITLE}{}{TITLE:#}", measure::TITLES)?;
+        times.iter().try_for_each(|times| writeln!(out, "{times}"))?;
+    }
+    match needs {
+        None => {}
+        Some(needs) if times.is_empty() => writeln!(
             out,
-            "{WARNING}answers come late{WARNING:#}: use --reply-timeout {seconds} on this line"
-        )?;
+            "{WARNING}answers come late{WARNING:#}: use --reply-timeout {needs} on this line"
+        )?,
+        Some(needs) => writeln!(out, "use --reply-timeout {needs} on this line")?,
     }
     let (path, baud) = (bus.path(), bus.baud);
     let are =
@@ -173,7 +205,7 @@ fn print_table<B: Boards>(bus: &Bus<B>, needs: Option<f64>, out: &mut dyn Write)
     match (count, damaged.is_empty()) {
         (0, _) if are(Bus::late) => writeln!(
             out,
-            "No node answers in time on {path:?}, but later: use a longer --reply-timeout, without --direct."
+            "No node answers in time on {path:?}, but later: use a longer --reply-timeout, or --measure."
         ),
         (0, _) if are(Bus::early) => writeln!(
             out,

@@ -207,9 +207,9 @@ fn stop_bus<B: Boards>(args: &Args, lines: &mut Lines<'_>) -> Result<Stopped, Fa
     let mut failure = bus.stop(nodes).err();
     if args.bus.may_wait_longer() && bus.wait_longer() {
         failure = bus.stop(bus.master().config().nodes).err();
-        if let Some(seconds) = bus.needed_timeout() {
+        if let Some(patience) = bus.needed_patience() {
             eprintln!(
-                "axle: answers come late: others need --reply-timeout {seconds} on this line"
+                "axle: answers come late: others need --reply-timeout {patience} on this line"
             );
         }
     }

@@ -31,9 +31,9 @@ fn turning(on_request: impl FnMut(Said, &mut BusState) + 'static) -> Played<BusS
 
 #[test]
 fn the_options_of_a_master_are_its_settings() {
-    let config = |direct| MasterArgs::new(PortArgs::new(None), direct).config();
-    assert_eq!(config(false), MasterConfig::usb_adapter());
-    assert_eq!(config(true), MasterConfig::direct());
+    let config = |patience| MasterArgs::new(PortArgs::new(None), patience).config();
+    assert_eq!(config(None), MasterConfig::usb_adapter());
+    assert_eq!(config(Some(Patience::Direct)), MasterConfig::direct());
 }
 
 #[test]
@@ -189,14 +189,14 @@ fn an_id_whose_answers_all_come_too_late_is_not_silent() {
     assert!(bus.wait_longer() && !bus.wait_longer());
     bus.stop(NodeId::N1.into()).unwrap();
     assert_eq!(bus.halt(NodeId::N1), Halt::Moving);
-    assert_eq!(bus.needed_timeout(), Some(0.05));
+    assert_eq!(bus.needed_patience(), Some(Patience::Network));
 }
 
 #[test]
 fn a_stop_that_is_not_confirmed_is_waited_for_two_seconds_and_on_a_slow_line_longer() {
     for (baud, is_slow) in [(500_000, false), (9600, true)] {
         let line = turning(|said, bus| bus.nodes[0].is_dumb |= matches!(said, Said::Write(..)));
-        let args = MasterArgs::new(PortArgs::new(Some(baud)), true);
+        let args = MasterArgs::new(PortArgs::new(Some(baud)), Some(Patience::Direct));
         let mut bus: Bus =
             Bus::new(line.line.clone(), complete(args.config(), args.line(), &line.line));
         let (begin, bound) = (clock::now(), span(bus.master().stop_bound()));

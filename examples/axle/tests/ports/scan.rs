@@ -73,12 +73,37 @@ fn a_direct_line_has_to_answer_at_once_and_an_adapter_has_20_ms() {
     // Only a stall of the machine can change a result: at 8 ms, 12 are left until the adapter's
     // time is up; at 15 ms, a direct line is that much too late.
     for (delay_ms, option, expected) in
-        [(8, "", "1 node answers."), (15, "--direct", "No node answers in time on")]
+        [(8, "", "1 node answers."), (15, "--reply-timeout direct", "No node answers in time on")]
     {
         let slow = Node { delay: Duration::from_millis(delay_ms), ..Node::velocity(1) };
         let line = played::bus(&[slow], |_, _| {});
         let scan = Process::start(&format!("scan {option} --port {}", line.path)).success();
         assert!(scan.last().unwrap().starts_with(expected), "{scan:?}");
+    }
+}
+
+#[test]
+fn the_times_of_answers_are_measured_and_the_option_that_they_need_is_named() {
+    for (line, least_us, option) in
+        [("", 0, "direct"), ("--delay 0.004", 8_000, "usb"), ("--delay 0.02", 40_000, "network")]
+    {
+        let (_sim, port) = sim(&format!("{TWO_NODES} {line}"));
+        let records = Process::start(&format!("scan --measure --json --port {port}")).success();
+        let records: Vec<Value> =
+            records.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let times: Vec<_> = records.iter().filter(|record| record["event"] == "times").collect();
+        assert_eq!(times.len(), 2, "{records:?}");
+        for times in times {
+            assert_eq!(times["answers"], times["reads"], "{times}");
+            let micros = ["min_us", "median_us", "p90_us", "p99_us", "max_us"]
+                .map(|name| times[name].as_u64().unwrap());
+            assert!(micros.is_sorted() && micros[0] >= least_us, "{times}");
+        }
+        let proposal = records.last().unwrap()["reply_timeout"].as_str().unwrap();
+        // A machine with other work to do may have been late once.
+        assert!(least_us == 0 || !["direct"].contains(&proposal), "{line}: {proposal}");
+        let scan = Process::start(&format!("scan --reply-timeout {option} --port {port}"));
+        assert_eq!(scan.success().last().unwrap(), "2 nodes answer.", "{line}");
     }
 }
 

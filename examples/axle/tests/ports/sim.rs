@@ -43,7 +43,7 @@ fn a_link_in_a_folder_that_does_not_exist_is_told() {
 fn help_tells_of_units_signs_and_exit_codes() {
     let cases = [
         ("--help", "Commands:"),
-        ("scan --help", "--direct"),
+        ("scan --help", "--reply-timeout"),
         ("spin --help", "revolutions per second"),
         ("spin --help", "[default: 20]"),
         ("drive --help", "positive is to the right"),

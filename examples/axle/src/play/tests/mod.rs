@@ -49,7 +49,7 @@ impl Run {
     }
 
     fn on_line(&self, line: &Line, frames: &Frames<'_>, signals: &Signals) -> Result<(), String> {
-        let bus = MasterArgs::new(PortArgs::new(self.baud), false);
+        let bus = MasterArgs::new(PortArgs::new(self.baud), None);
         let due = |(after_ms, bytes): &(u64, &[u8])| {
             let (_, effect) = effect_of(self.protocol, bytes).unwrap();
             Due { after_us: after_ms * 1000, bytes: (*bytes).into(), meant: self.meant, effect }
