@@ -444,6 +444,24 @@ fn a_set_point_does_not_leave_after_its_span_however_long_the_port_was_busy_behi
 }
 
 #[test]
+fn a_set_point_does_not_leave_after_its_span_wherever_its_thread_was_held_up() {
+    // The first reading begins the span.
+    for (is_async, readings) in BOTH.into_iter().flat_map(|it| (1..60).map(move |at| (it, at))) {
+        let (wire, mut bus) = Wire::one_motor(Mode::Velocity, |_| ());
+        let (from, begin_us) = (bus.port().offers.len(), wire.world.now_us());
+        wire.world.hold_up(readings, 6_000_000);
+        // Longer than a read may take.
+        let _ = call!(is_async, bus, drive_for(NodeId::N1, rps(5.0), ms(5000)));
+        call!(is_async, bus, stop(NodeId::N1)).unwrap();
+        let set_point = WriteRequest::velocity(NodeId::N1, rps(5.0));
+        let offers = bus.port().offers.iter().skip(from);
+        let sent = offers.filter(|offer| offer.bytes == set_point.as_bytes() && offer.taken > 0);
+        let late = sent.map(|offer| offer.at_us - begin_us).find(|&at| at > 5_000_000);
+        assert_eq!(late, None, "{is_async} {readings}");
+    }
+}
+
+#[test]
 fn a_hold_that_waits_for_its_port_does_not_leave_when_its_measurement_is_old() {
     for late_us in [5000, 25_000, 60_000] {
         let (wire, mut bus) = Wire::one_motor(Mode::Position, |_| ());

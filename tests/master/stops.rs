@@ -292,6 +292,44 @@ fn however_a_port_fails_no_position_is_held_first_160_ms_after_it_was_measured()
 }
 
 #[test]
+fn stops_of_position_nodes_are_confirmed_however_long_a_round_of_all_nodes_takes() {
+    for (timeout, baud) in [(MS(20), 9600), (MS(100), 500_000), (MS(500), 9600)] {
+        let config = with(MasterConfig::usb_adapter(), |config| {
+            (config.reply_timeout, config.late_guard, config.baud) = (timeout, timeout, baud);
+            config.accepts_early = true;
+        });
+        let nodes = NodeId::ALL.map(|node| (node, Mode::Position));
+        let mut desk = Desk::with_nodes(config, &nodes);
+        for node in NodeId::ALL {
+            desk.answer(node, Answer::Position(turns(40)));
+            desk.master.stop(node, desk.now);
+        }
+        for node in NodeId::ALL {
+            let sent = desk.until(node, StopProgress::StandingStill);
+            assert!(sent.len() < 300, "{timeout:?} {}", sent.len());
+        }
+    }
+}
+
+#[test]
+fn a_hold_that_has_left_is_not_repeated_after_20_ms_before_it_is_answered() {
+    let config = with(MasterConfig::usb_adapter(), |config| config.reply_timeout = MS(100));
+    let mut desk = Desk::with_nodes(config, &[N1, N3]);
+    desk.answer(NodeId::N3, Answer::Position(turns(40)));
+    desk.master.stop(NodeId::N3, desk.now);
+    assert_eq!(desk.packets(2), [read(NodeId::N3), hold(NodeId::N3, turns(40))]);
+    // The cable is out: the READ behind it, and those of the other node, take 100 ms each.
+    let left = desk.now;
+    desk.answer(NodeId::N3, Answer::Silence);
+    desk.answer(NodeId::N1, Answer::Silence);
+    while desk.now - left < MS(1000) {
+        let age = desk.now - left;
+        let packet = desk.packets(1).remove(0);
+        assert!(packet[0] == READ || age < MS(21), "{age:?}: {packet:02x?}");
+    }
+}
+
+#[test]
 fn a_loaded_node_that_is_lost_again_and_again_does_not_sink() {
     for between in [MS(3), MS(200)] {
         let mut desk = Desk::stopping_at(direct(), turns(40));

@@ -166,8 +166,8 @@ impl<B: Board, P: $($Port)+, C: $($Clock)+> $Driver<Master<B>, P, C> {
     ) -> Result<(), DriveError<P::Error>> {
         self.aim(node, target)?;
         let bound = self.bound();
-        let (by, needs) = match end.filter(|&end| end < bound) {
-            Some(end) => (end, Needs::WholePortInTime),
+        let (by, needs) = match end {
+            Some(end) => (end.min(bound), Needs::WholePortInTime),
             None => (bound, Needs::WholePort),
         };
         let aimed = |driver: &mut Driver<_, _, _>| driver.aimed(node, target);

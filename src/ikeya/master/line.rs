@@ -276,7 +276,8 @@ impl<B: Board> Line<B> {
                 self.free_at = now + HELD;
             }
             (None, _) if gap > Duration::ZERO => {
-                let end = now + wire_time(PACKET_LEN, config.baud);
+                let len = self.sent.as_ref().map_or(PACKET_LEN, |sent| sent.len);
+                let end = now + wire_time(len, config.baud);
                 self.free_at = self.free_at.max(end + gap);
             }
             _ => {}
@@ -301,7 +302,8 @@ impl<B: Board> Line<B> {
             }
             _ => {
                 // The answer comes too late, or may be that of an earlier request.
-                (self.free_at, self.is_behind_write) = (answer_by, false);
+                self.free_at = answer_by.max(left_by + config.turnaround_gap);
+                self.is_behind_write = false;
                 Some(Overdue { held, closed: self.window.take(), answer_by })
             }
         }
@@ -354,6 +356,9 @@ impl<B: Board> Line<B> {
     /// Judges a response of this node; the answer closes its window.
     pub(super) fn judge(&mut self, id: NodeId, config: &MasterConfig, now: Instant) -> Response {
         let half_answer = Duration::from_micros(self.answer_wire_time.as_micros() / 2);
+        if config.turnaround_gap > Duration::ZERO {
+            self.free_at = self.free_at.max(now + config.turnaround_gap);
+        }
         match &mut self.window {
             Some(window)
                 if window.node == id && now <= window.deadline && self.held != Held::Several =>
