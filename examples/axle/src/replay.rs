@@ -12,7 +12,7 @@ use crate::{
     help::MOTION_HELP,
     input::Form,
     pcapng::Direction,
-    play::{self, Due, Limits, Plan, Side},
+    play::{self, Due, Limits, Plan, Side, Summary},
 };
 use pace::Pace;
 
@@ -41,6 +41,7 @@ use pace::Pace;
 /// The capture is held in memory: 4 to 40 times its size, most for the short packets of a bus.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MOTION_HELP)]
+#[command(mut_arg("port", without_dry_run))]
 pub(crate) struct Args {
     #[command(flatten)]
     bus: bus::MasterArgs,
@@ -70,6 +71,10 @@ pub(crate) struct Args {
     #[arg(long = "move")]
     moves: bool,
 
+    /// List what would be sent and when, without a port
+    #[arg(long)]
+    dry_run: bool,
+
     #[command(flatten)]
     limits: Limits,
 
@@ -82,6 +87,14 @@ pub(crate) struct Args {
 
     /// The capture
     file: PathBuf,
+}
+
+/// A dry run needs no port.
+fn without_dry_run(port: clap::Arg) -> clap::Arg {
+    port.required(false)
+        .required_unless_present("dry_run")
+        .default_value_if("dry_run", "true", "")
+        .hide_default_value(true)
 }
 
 fn factor(text: &str) -> Result<f64, String> {
@@ -102,7 +115,11 @@ const LONGEST_US: u64 = 365 * 86_400_000_000;
 /// Runs the subcommand.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (plan, walked) = plan(args)?;
-    play::run(plan)?;
+    if args.dry_run {
+        play::list(&plan)?
+    } else {
+        play::run(plan)?
+    }
     walked.missing()
 }
 
@@ -111,7 +128,8 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
     let (protocol, taken, walked) = decode::frames_of(&args.file, args.form, args.protocol)?;
     let mut frames = Vec::new();
     let mut pace = Pace::new(args.speed, args.longest_pause);
-    let mut has_sent = false;
+    let (mut has_sent, mut summary) = (false, Summary::default());
+    summary.skipped_bytes = walked.account.skipped();
     for Taken { micros, direction, bytes, commands } in taken {
         let due_us = micros.map(|micros| pace.due_us(micros));
         let (side, effect) = match play::effect_of(protocol, &bytes) {
@@ -120,9 +138,13 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
             Err(why) if args.side == Side::Commander => {
                 return Err(Failure::Failed(format!("the capture has {why}: nothing is sent")));
             }
-            Err(_) => continue,
+            Err(_) => {
+                summary.other_side += 1;
+                continue;
+            }
         };
         if side != args.side {
+            summary.other_side += 1;
             continue;
         }
         let last_us = frames.last().map(|(_, due): &(_, Due)| due.after_us);
@@ -138,7 +160,9 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         frames.push((direction, Due { after_us, bytes, meant, effect }));
     }
     // Bytes that the recording program sent and then received are its own echo.
+    let all = frames.len();
     frames.retain(|(direction, _)| !has_sent || *direction == Some(Direction::Out));
+    summary.echoes = all - frames.len();
     // It begins with the first of them.
     let begin_us = frames.first().map_or(0, |(_, due)| due.after_us);
     frames.iter_mut().for_each(|(_, due)| due.after_us -= begin_us);
@@ -147,7 +171,7 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         return Err(Failure::Failed(line));
     }
     let moving = frames.iter().filter(|(_, due)| due.effect.moves()).count();
-    if moving > 0 && !args.moves {
+    if moving > 0 && !args.moves && !args.dry_run {
         return Err(Failure::Failed(format!(
             "{moving} of {} frames move something: use --move if you mean it; nothing is sent",
             frames.len()
@@ -163,6 +187,8 @@ fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
         limits: args.limits,
         is_json: args.json,
         notes: pace.notes(),
+        modes: walked.modes,
+        summary: Some(summary),
     };
     Ok((plan, walked))
 }

@@ -2,6 +2,8 @@
 
 use std::{
     cell::RefCell,
+    io::{self, Write},
+    mem,
     rc::Rc,
     time::{SystemTime, UNIX_EPOCH},
 };
@@ -32,11 +34,7 @@ struct Lists {
 impl Lister {
     /// The same line, whose bytes are listed.
     pub(super) fn tap(plan: &Plan<'_>, line: Line) -> (Self, Line) {
-        let style = match plan.is_json {
-            true => Style::Json,
-            false => Style::text(plan.protocol.number(), TimeColumn::Relative),
-        };
-        let lists = Rc::new(RefCell::new(Lists::new(plan.protocol, style)));
+        let lists = Rc::new(RefCell::new(Lists::new(plan.protocol, style(plan))));
         let tapped = Rc::clone(&lists);
         let line = line.tapped(move |direction, bytes| tapped.borrow_mut().take(direction, bytes));
         (Self(lists), line)
@@ -60,6 +58,25 @@ impl Lister {
     /// Finished lines.
     pub(super) fn lines(&self) -> Option<String> {
         self.0.borrow_mut().lines()
+    }
+}
+
+/// Lists the frames of a plan as they would be sent.
+pub(super) fn list(plan: &Plan<'_>, out: &mut dyn Write) -> io::Result<()> {
+    let mut lists = Lists::new(plan.protocol, style(plan));
+    lists.sheet.modes = plan.modes;
+    for due in &plan.frames {
+        lists.sent.feed(&due.bytes, Some(due.after_us), &mut lists.sheet);
+        out.write_all(&mem::take(&mut lists.sheet.out.0))?;
+    }
+    lists.sent.finish(&mut lists.sheet);
+    out.write_all(&lists.sheet.out.0)
+}
+
+fn style(plan: &Plan<'_>) -> Style {
+    match plan.is_json {
+        true => Style::Json,
+        false => Style::text(plan.protocol.number(), TimeColumn::Relative),
     }
 }
 
@@ -91,7 +108,7 @@ impl Lists {
     }
 
     fn lines(&mut self) -> Option<String> {
-        let lines = std::mem::take(&mut self.sheet.out.0);
+        let lines = mem::take(&mut self.sheet.out.0);
         (!lines.is_empty()).then(|| String::from_utf8_lossy(&lines).trim_end().to_owned())
     }
 }

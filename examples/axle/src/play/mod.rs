@@ -11,7 +11,10 @@ mod lister;
 mod nodes;
 mod plan;
 mod playing;
+mod summary;
 mod wheels;
+
+use std::io::{self, Write};
 
 use axlewire::ikeya::board::{OneMotor, ThreeMotors};
 
@@ -20,6 +23,7 @@ pub(crate) use effect::{Limits, Side, of as effect_of};
 use nodes::Nodes;
 pub(crate) use plan::{Due, Plan};
 use playing::play;
+pub(crate) use summary::Summary;
 use wheels::Wheels;
 
 /// Sends the frames of a plan.
@@ -33,6 +37,14 @@ pub(crate) fn run(plan: Plan<'_>) -> Result<(), Failure> {
         plan.bus.open(plan.protocol).and_then(|line| play_on(plan, line, Teller::new(), &signals));
     // The port is closed here.
     signals.suspend_if_wanted(result)
+}
+
+/// Lists the frames of a plan, at their times, without a port.
+pub(crate) fn list(plan: &Plan<'_>) -> Result<(), Failure> {
+    hidden::refuse(plan)?;
+    let mut out = io::stdout().lock();
+    plan.notes.iter().for_each(|note| eprintln!("axle: {note}"));
+    lister::list(plan, &mut out).and_then(|()| out.flush()).map_err(Failure::Write)
 }
 
 fn play_on(plan: Plan<'_>, line: Line, teller: Teller, signals: &Signals) -> Result<(), Failure> {

@@ -4,8 +4,11 @@ use std::collections::VecDeque;
 
 use axlewire::ikeya::Mode;
 
-use super::effect::{Effect, Limits, Side};
-use crate::{args::Protocol, bus::MasterArgs};
+use super::{
+    effect::{Effect, Limits, Side},
+    summary::Summary,
+};
+use crate::{args::Protocol, bus::MasterArgs, listing::Modes};
 
 /// A frame and when to send it.
 #[derive(Clone, Debug)]
@@ -24,6 +27,8 @@ pub(crate) struct Plan<'a> {
     pub(crate) protocol: Protocol,
     pub(crate) side: Side,
     pub(crate) frames: VecDeque<Due>,
+    /// The modes of the nodes in the capture.
+    pub(crate) modes: Modes,
     /// Whether a READ goes behind each WRITE.
     pub(crate) reads_back: bool,
     /// How long to listen after the last frame, microseconds; motors keep moving meanwhile.
@@ -32,4 +37,6 @@ pub(crate) struct Plan<'a> {
     pub(crate) is_json: bool,
     /// What is not as one would expect, to be said first.
     pub(crate) notes: Vec<String>,
+    /// What is not in the plan, for a summary at the end.
+    pub(crate) summary: Option<Summary>,
 }

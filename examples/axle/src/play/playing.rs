@@ -9,6 +9,7 @@ use super::{
     effect::Effect,
     lister::Lister,
     plan::{Due, Plan},
+    summary::Summary,
 };
 use crate::{
     args::Protocol,
@@ -68,9 +69,11 @@ pub(super) fn play<V: Voice>(
     };
     lister.begin(voice.modes());
     let moves = plan.frames.iter().any(|due| due.effect.moves());
-    let mut playing = Playing { voice, lister, teller, lost: 0, plan };
+    let mut playing =
+        Playing { voice, lister, teller, sum: plan.summary.unwrap_or_default(), plan };
     let played = guarded(|| playing.until_over(signals));
-    let Playing { voice, lister, mut teller, lost, plan } = playing;
+    let Playing { voice, lister, mut teller, mut sum, plan } = playing;
+    sum.left = plan.frames.len();
     if let Some(lines) = lister.end() {
         let _ = teller.say(lines);
     }
@@ -80,12 +83,14 @@ pub(super) fn play<V: Voice>(
         // If the output fails, what moved has stopped all the same.
         let _ = teller.say(line.clone());
     }
+    if plan.summary.is_some() {
+        let _ = teller.say(sum.line(plan.side, plan.is_json));
+    }
     let told = teller.finish();
     stopped?;
     let besides = if moves { "what was commanded is stopped and at rest" } else { "nothing moves" };
     played.map_err(|failure| failure.and(besides))?;
-    let left = plan.frames.len();
-    for (count, what) in [(lost, "did not leave whole"), (left, "not sent: interrupted")] {
+    for (count, what) in [(sum.lost, "did not leave whole"), (sum.left, "not sent: interrupted")] {
         if count > 0 {
             let frames = if count == 1 { "frame" } else { "frames" };
             return Err(Failure::Failed(format!("{count} {frames} {what}; {besides}")));
@@ -98,8 +103,9 @@ struct Playing<'a, V> {
     voice: V,
     lister: Lister,
     teller: Teller,
-    /// Frames that did not leave whole. They are not sent again: they would come late.
-    lost: usize,
+    /// What has become of the frames. Those that did not leave whole are not sent again: they
+    /// would come late.
+    sum: Summary,
     /// With the frames that are left.
     plan: Plan<'a>,
 }
@@ -127,7 +133,8 @@ impl<V: Voice> Playing<'_, V> {
                 if self.voice.is_free()
                     && let Some(due) = self.plan.frames.pop_front()
                 {
-                    self.lost += usize::from(!self.voice.give(&due, now)?);
+                    let is_sent = self.voice.give(&due, now)?;
+                    self.sum.count(is_sent, now - after(start, due.after_us));
                     end = after(now, self.plan.linger_us);
                     free_at = now + self.line_time(&due);
                     until = now;

@@ -102,6 +102,8 @@ fn plan(args: &Args) -> Result<Plan<'_>, Failure> {
         limits: times.limits,
         is_json: times.json,
         notes: Vec::new(),
+        modes: crate::listing::Modes::default(),
+        summary: None,
     })
 }
 

@@ -6,6 +6,8 @@ use axlewire::{
     ucp::{Body, MotorControl, message::Ping},
 };
 
+use serde_json::Value;
+
 use super::{
     Process, TWO_NODES,
     played::{self, Node, Said, speeds},
@@ -37,6 +39,21 @@ fn capture(speeds: &[f32], mode_is_known: bool) -> String {
 }
 
 #[test]
+fn a_dry_run_lists_what_would_be_sent_and_when_and_needs_no_port_and_no_permission_to_move() {
+    let path = capture(&[2.0, -2.0, 0.0], true);
+    let lines = Process::start(&format!("replay {path} --dry-run --speed 0.5 --json")).success();
+    let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let listed: Vec<_> = lines
+        .iter()
+        .map(|line| (line["t"].as_f64().unwrap(), line["rps"].as_f64().unwrap()))
+        .collect();
+    assert_eq!(listed, [(0.0, 2.0), (0.1, -2.0), (0.2, 0.0)]);
+    assert!(lines.iter().all(|line| line["direction"] == "out"), "{lines:?}");
+    let without = format!("replay {path} --move");
+    assert!(Process::start(&without).complaint(2).contains("--port"));
+}
+
+#[test]
 fn a_recording_is_sent_again_and_what_it_moves_is_stopped() {
     let (sim, port) = sim(TWO_NODES);
     let path = fresh("spin.pcapng");
@@ -44,7 +61,10 @@ fn a_recording_is_sent_again_and_what_it_moves_is_stopped() {
     let again = fresh("again.pcapng");
     let replay = format!("replay {path} -p {port} --move --record {again}");
     let lines = Process::start(&replay).success();
-    assert!(lines.last().unwrap().ends_with("stopped and confirmed"), "{lines:?}");
+    let [.., stopped, summary] = &lines[..] else { panic!("{lines:?}") };
+    assert!(stopped.ends_with("stopped and confirmed"), "{stopped}");
+    assert!(summary.contains(" frames sent, at most "), "{summary}");
+    assert!(summary.contains(" frames of the other side, which answers"), "{summary}");
     let commands = |path: &str| -> Vec<_> {
         let (events, _) = decoded(path);
         let sent = events.into_iter().filter(|event| event["message"] == "write");

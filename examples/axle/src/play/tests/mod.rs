@@ -64,6 +64,8 @@ impl Run {
             limits: Limits { max_rps: Rps::new(20.0).unwrap(), max_turns: 100.0 },
             is_json: true,
             notes: Vec::new(),
+            modes: crate::listing::Modes::default(),
+            summary: None,
         };
         play_on(plan, line.clone(), Teller::to_memory().0, signals)
             .map_err(|failure| failure.to_string())

@@ -1,0 +1,85 @@
+//! What was sent, how late, and what was not.
+
+use axlewire::time::Duration;
+use serde::Serialize;
+
+use super::effect::Side;
+
+/// The end of a replay, as an object or as a line.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct Summary {
+    /// Frames that were sent.
+    pub(super) sent: usize,
+    /// How much later than in the plan the latest of them was sent, microseconds.
+    pub(super) late_us: u32,
+    /// Frames that did not leave whole, and those that are left.
+    pub(super) lost: usize,
+    pub(super) left: usize,
+    /// Of the capture: frames of the other side, echoes, and bytes between frames.
+    pub(crate) other_side: usize,
+    pub(crate) echoes: usize,
+    pub(crate) skipped_bytes: u64,
+}
+
+impl Summary {
+    /// A frame was sent, or not whole, this much later than planned.
+    pub(super) fn count(&mut self, is_sent: bool, late: Duration) {
+        if is_sent {
+            self.sent += 1;
+            self.late_us = self.late_us.max(late.as_micros());
+        } else {
+            self.lost += 1;
+        }
+    }
+
+    pub(super) fn line(&self, side: Side, is_json: bool) -> String {
+        if is_json {
+            let object = serde_json::to_string(self).unwrap_or_default();
+            return format!("{{\"event\":\"summary\",{}", object.trim_start_matches('{'));
+        }
+        let mut line = format!("{} sent", counted(self.sent, "frame"));
+        if self.sent > 0 {
+            line += &format!(", at most {:.1} ms late", f64::from(self.late_us) / 1e3);
+        }
+        let other = match side {
+            Side::Commander => "of the other side, which answers",
+            Side::Device => "of the other side, which asks",
+        };
+        for (count, what, why) in [
+            (self.lost, "frame", "did not leave whole"),
+            (self.left, "frame", "not sent: the end came first"),
+            (self.other_side, "frame", other),
+            (self.echoes, "frame", "an echo"),
+            (self.skipped_bytes as usize, "byte", "between frames"),
+        ] {
+            if count > 0 {
+                line += &format!("; {} {why}", counted(count, what));
+            }
+        }
+        line
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_not_sent_is_told_with_its_reason() {
+        let mut summary = Summary { sent: 1, late_us: 1234, ..Summary::default() };
+        assert_eq!(summary.line(Side::Commander, false), "1 frame sent, at most 1.2 ms late");
+        (summary.lost, summary.left, summary.echoes, summary.skipped_bytes) = (1, 2, 3, 1);
+        summary.other_side = 4;
+        let says = "1 frame sent, at most 1.2 ms late; 1 frame did not leave whole; 2 frames not \
+                    sent: the end came first; 4 frames of the other side, which asks; 3 frames an \
+                    echo; 1 byte between frames";
+        assert_eq!(summary.line(Side::Device, false), says);
+        let object = "{\"event\":\"summary\",\"sent\":1,\"late_us\":1234,\"lost\":1,\"left\":2,\
+                      \"other_side\":4,\"echoes\":3,\"skipped_bytes\":1}";
+        assert_eq!(summary.line(Side::Device, true), object);
+    }
+}
