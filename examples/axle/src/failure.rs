@@ -22,8 +22,6 @@ pub(crate) enum Failure {
     Usage(String),
     /// The file cannot be opened.
     Open { path: PathBuf, error: io::Error },
-    /// The file is a directory.
-    Directory { path: PathBuf },
     /// Reading the input failed; `None` is standard input.
     Read { path: Option<PathBuf>, error: io::Error },
     /// Writing the output failed.
@@ -122,7 +120,6 @@ impl fmt::Display for Failure {
         match self {
             Self::Usage(line) | Self::Failed(line) => f.write_str(line),
             Self::Open { path, error } => write!(f, "cannot open {path:?}: {error}"),
-            Self::Directory { path } => write!(f, "cannot read {path:?}: it is a directory"),
             Self::Read { path: Some(path), error } => write!(f, "cannot read {path:?}: {error}"),
             Self::Read { path: None, error } => write!(f, "cannot read standard input: {error}"),
             Self::Write(error) => write!(f, "cannot write the output: {error}"),

@@ -1,8 +1,10 @@
 //! Input bytes from a file or standard input, one chunk at a time.
 
 use std::{
+    collections::VecDeque,
     fs::File,
     io::{self, ErrorKind, IsTerminal, Read},
+    mem,
     path::{Path, PathBuf},
 };
 
@@ -10,6 +12,7 @@ use flate2::read::MultiGzDecoder;
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
 use crate::{
+    captures,
     failure::Failure,
     hex::{self, Hex},
     pcapng,
@@ -50,11 +53,45 @@ pub(crate) struct Input {
     /// It is read as it is, neither packed nor text.
     is_plain: bool,
     progress: Option<ProgressBar>,
+    form: Form,
+    /// The files behind this one, and all of them.
+    rest: VecDeque<PathBuf>,
+    all: Vec<PathBuf>,
 }
 
 impl Input {
+    /// Opens files and folders of captures, in the order of time, one at a time; or standard input
+    /// for none and `-`.
+    pub(crate) fn open(paths: &[PathBuf], form: Form) -> Result<Self, Failure> {
+        let all = match paths {
+            [] => Vec::new(),
+            paths => captures::in_order(paths, form)?,
+        };
+        let mut rest = VecDeque::from(all.clone());
+        let first = rest.pop_front();
+        let mut input = Self::open_one(first.as_deref(), form)?;
+        if !rest.is_empty() {
+            (input.file, input.progress) = (None, None);
+        }
+        Ok(Self { rest, all, ..input })
+    }
+
+    /// Whether there are several files.
+    pub(crate) fn is_one_of_several(&self) -> bool {
+        self.all.len() > 1
+    }
+
+    /// Goes on with the next file; `false` if this was the last.
+    pub(crate) fn advance(&mut self) -> Result<bool, Failure> {
+        let Some(path) = self.rest.pop_front() else { return Ok(false) };
+        let next = Self::open_one(Some(&path), self.form)?;
+        let (rest, all) = (mem::take(&mut self.rest), mem::take(&mut self.all));
+        *self = Self { rest, all, file: None, progress: None, ..next };
+        Ok(true)
+    }
+
     /// Opens `path`, or standard input for `None` and `-`.
-    pub(crate) fn open(path: Option<&Path>, form: Form) -> Result<Self, Failure> {
+    pub(crate) fn open_one(path: Option<&Path>, form: Form) -> Result<Self, Failure> {
         let Some(path) = path.filter(|path| *path != "-") else {
             let reader = Box::new(io::stdin());
             return Self::new(None, reader, None, None).unpack(form);
@@ -62,9 +99,6 @@ impl Input {
         let cannot_open = |error| Failure::Open { path: path.to_owned(), error };
         let file = File::open(path).map_err(cannot_open)?;
         let metadata = file.metadata().map_err(cannot_open)?;
-        if metadata.is_dir() {
-            return Err(Failure::Directory { path: path.to_owned() });
-        }
         let mut whole = None;
         if metadata.is_file() {
             whole = Some((file.try_clone().map_err(cannot_open)?, metadata.len()));
@@ -82,7 +116,21 @@ impl Input {
         let chunk = vec![0; CHUNK_LEN].into_boxed_slice();
         let (ahead, first) = (Vec::new(), Vec::new());
         let (first_len, is_plain) = (0, true);
-        Self { path, reader, chunk, ahead, first, first_len, file, is_plain, progress }
+        let (form, rest, all) = (Form::default(), VecDeque::new(), Vec::new());
+        Self {
+            path,
+            reader,
+            chunk,
+            ahead,
+            first,
+            first_len,
+            file,
+            is_plain,
+            progress,
+            form,
+            rest,
+            all,
+        }
     }
 
     /// Keeps the first `len` bytes.
@@ -109,11 +157,9 @@ impl Input {
     /// Whether it is the file of this name, or in the folder of this name, so that replacing that
     /// would lose it. Standard input may be a file, too.
     pub(crate) fn is_at(&self, other: &Path) -> bool {
-        let path = self.path.as_deref().and_then(|path| path.canonicalize().ok());
-        let is_below = path
-            .zip(other.canonicalize().ok())
-            .is_some_and(|(path, other)| path.starts_with(other));
-        is_below || self.is_same(other)
+        let Ok(place) = other.canonicalize() else { return self.is_same(other) };
+        let mut paths = self.path.iter().chain(&self.all).filter_map(|it| it.canonicalize().ok());
+        paths.any(|path| path.starts_with(&place)) || self.is_same(other)
     }
 
     /// Whether it is the same file under any name.
@@ -146,6 +192,7 @@ impl Input {
 
     /// Unpacks the input, if it is packed, and turns text into bytes.
     fn unpack(mut self, form: Form) -> Result<Self, Failure> {
+        self.form = form;
         let front = self.peek(GZIP.len(), |front| !GZIP.starts_with(front))?;
         if front.starts_with(&GZIP) {
             self = self.behind(|packed| Box::new(MultiGzDecoder::new(packed)));
@@ -168,7 +215,7 @@ impl Input {
 
     /// Reads through another reader from now on.
     fn behind(mut self, with: impl FnOnce(Box<dyn Read>) -> Box<dyn Read>) -> Self {
-        let ahead = io::Cursor::new(core::mem::take(&mut self.ahead));
+        let ahead = io::Cursor::new(mem::take(&mut self.ahead));
         self.reader = with(Box::new(ahead.chain(self.reader)));
         (self.is_plain, self.progress) = (false, None);
         self
@@ -181,7 +228,7 @@ impl Input {
         len: usize,
         is_enough: impl Fn(&[u8]) -> bool,
     ) -> Result<&[u8], Failure> {
-        let mut ahead = core::mem::take(&mut self.ahead);
+        let mut ahead = mem::take(&mut self.ahead);
         while ahead.len() < len && !is_enough(&ahead) {
             let bytes = self.read()?;
             if bytes.is_empty() {
@@ -196,7 +243,7 @@ impl Input {
     /// The next bytes; empty at the end.
     pub(crate) fn read(&mut self) -> Result<&[u8], Failure> {
         if !self.ahead.is_empty() {
-            self.chunk = core::mem::take(&mut self.ahead).into_boxed_slice();
+            self.chunk = mem::take(&mut self.ahead).into_boxed_slice();
             self.keep(self.chunk.len());
             return Ok(&self.chunk);
         }

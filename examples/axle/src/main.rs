@@ -8,6 +8,7 @@ mod beside;
 mod boards;
 mod bus;
 mod calibrate;
+mod captures;
 mod clock;
 mod decode;
 mod drive;

@@ -85,8 +85,9 @@ pub(crate) struct Args {
     #[command(flatten)]
     form: Form,
 
-    /// The capture
-    file: PathBuf,
+    /// The capture. Several, and folders of them, follow each other in the order of time
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
 }
 
 /// A dry run needs no port.
@@ -125,7 +126,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 /// The frames of one side of the capture, each with its time.
 fn plan(args: &Args) -> Result<(Plan<'_>, Walked), Failure> {
-    let (protocol, taken, walked) = decode::frames_of(&args.file, args.form, args.protocol)?;
+    let (protocol, taken, walked) = decode::frames_of(&args.files, args.form, args.protocol)?;
     let mut frames = Vec::new();
     let mut pace = Pace::new(args.speed, args.longest_pause);
     let (mut has_sent, mut summary) = (false, Summary::default());

@@ -238,7 +238,10 @@ fn bad_input_leaves_nothing_behind() {
     for form in forms() {
         let to = folder.join(format!("out.{form}"));
         let line = complaint(&export(folder.to_str().unwrap(), &[], &to, &[]), 1);
-        assert_eq!(line, format!("cannot read {folder:?}: it is a directory"));
+        assert!(
+            line.starts_with(&format!("{folder:?} has no files that end in .pcapng")),
+            "{line}"
+        );
         let line = complaint(&export("/no/such/file", &[], &to, &[]), 1);
         assert!(line.starts_with("cannot open \"/no/such/file\": "), "{line}");
         let nowhere = folder.join("nowhere").join(format!("out.{form}"));

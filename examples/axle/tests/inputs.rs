@@ -3,12 +3,18 @@
 mod support;
 
 use std::{
+    fs,
     io::{BufRead, BufReader, Write},
+    path::PathBuf,
     process::Stdio,
 };
 
-use axlewire::ucp::{Body, message::Ping};
+use axlewire::{
+    ikeya::{NodeId, ReadRequest},
+    ucp::{Body, message::Ping},
+};
 use flate2::{Compression, write::GzEncoder};
+use serde_json::Value;
 use support::{
     axle, decode,
     pcapng::{Packet, PcapNg, outcome},
@@ -140,4 +146,78 @@ fn each_packet_of_a_capture_from_a_pipe_is_listed_before_the_next_one_arrives() 
         assert!(lines.next().unwrap().unwrap().contains("summary"));
         assert!(child.wait().unwrap().success());
     }
+}
+
+/// A recording in several files, as of `--rotate`, the second packed, in a folder with other files.
+fn set(name: &str) -> (PathBuf, String) {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(folder.join("sub")).unwrap();
+    let ping = Ping {}.frame(0);
+    let capture = |begin: u64| {
+        let packet = |at: u64| (begin + 20_000 * at, 1, ping.as_bytes());
+        PcapNg::new(150, &[packet(0), packet(1), packet(2)]).0
+    };
+    // Neither their names nor their places tell the order.
+    fs::write(folder.join("c.pcapng"), capture(1_000_000)).unwrap();
+    fs::write(folder.join("a.pcapng.gz"), packed(&capture(2_000_000))).unwrap();
+    fs::write(folder.join("sub/b.pcapng"), capture(3_000_000)).unwrap();
+    let path = folder.to_str().unwrap().to_owned();
+    (folder, path)
+}
+
+#[test]
+fn several_files_and_a_folder_are_one_capture_in_the_order_of_time() {
+    let (folder, path) = set("set");
+    let run = |args: &[&str]| {
+        let output = axle(args).output().unwrap();
+        assert!(output.status.success(), "{args:?}: {output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let files = ["sub/b.pcapng", "a.pcapng.gz", "c.pcapng"].map(|it| format!("{path}/{it}"));
+    let [b, a, c] = files.each_ref().map(String::as_str);
+    let times = |lines: &str| -> Vec<_> {
+        let lines = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        lines.filter_map(|line| line["t"].as_f64()).collect()
+    };
+    let whole = [0.0, 1.0, 2.0].map(|at| [at, at + 0.02, at + 0.04]).concat();
+    let absolute: Vec<_> = whole.iter().map(|at| at + 1.0).collect();
+    assert_eq!(times(&run(&["decode", "--json", &path])), absolute);
+    assert_eq!(times(&run(&["replay", "--dry-run", "--json", &path])), whole);
+    assert!(run(&["watch", &path]).contains("9 frames"));
+    for command in [&["decode"][..], &["watch", "--json"], &["replay", "--dry-run"]] {
+        let expected = run(&[command, &[&path]].concat());
+        assert_eq!(run(&[command, &[b, a, c]].concat()), expected, "{command:?}");
+    }
+    let output = folder.join("set.jsonl");
+    run(&["export", &path, "-o", output.to_str().unwrap()]);
+    assert_eq!(times(&fs::read_to_string(output).unwrap()), absolute);
+}
+
+#[test]
+fn a_bad_file_among_several_is_named_and_costs_nothing_of_the_others() {
+    let (folder, path) = set("bad-set");
+    let cut = fs::read(folder.join("c.pcapng")).unwrap();
+    fs::write(folder.join("c.pcapng"), &cut[..cut.len() - 10]).unwrap();
+    let output = axle(&["decode", "--json", &path]).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|it| String::from_utf8(it).unwrap());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error.contains("c.pcapng"), "{error}");
+    assert_eq!(out.lines().filter(|line| line.contains("\"ping\"")).count(), 9, "{out}");
+    // Raw bytes have no times, and a folder without captures has nothing.
+    fs::write(folder.join("raw.bin"), [0; 8]).unwrap();
+    let raw = folder.join("raw.bin");
+    let output = axle(&["decode", &path, raw.to_str().unwrap()]).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("raw.bin\" is no pcapng or pcap"), "{error}");
+    let read = *ReadRequest::new(NodeId::N1).as_bytes();
+    fs::write(folder.join("bus.pcapng"), PcapNg::new(147, &[(4_000_000, 2, &read)]).0).unwrap();
+    let output = axle(&["replay", "--dry-run", &path]).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("has more than one line"), "{error}");
+    let empty = folder.join("empty");
+    fs::create_dir(&empty).unwrap();
+    let output = axle(&["watch", empty.to_str().unwrap()]).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("has no files that end in .pcapng"), "{error}");
 }

@@ -55,8 +55,10 @@ pub(crate) struct Args {
     #[command(flatten)]
     pub(super) form: Form,
 
-    /// The capture; if omitted or -, standard input
-    pub(super) file: Option<PathBuf>,
+    /// The capture; if omitted or -, standard input. Several, and folders of them, follow each
+    /// other in the order of time
+    #[arg(value_name = "FILE")]
+    pub(super) files: Vec<PathBuf>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -13,7 +13,7 @@ mod whole;
 
 use std::{
     io::{self, Write},
-    path::Path,
+    path::PathBuf,
     thread,
 };
 
@@ -21,6 +21,7 @@ use axlewire::stream::{Counters, Framing};
 
 use crate::{
     args::Protocol,
+    captures,
     failure::Failure,
     input::{self, Form, Input},
     listing::Shown,
@@ -47,7 +48,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(protocol) = choice.protocol {
         choice.permits(protocol)?;
     }
-    let mut input = Input::open(args.file.as_deref(), args.form)?;
+    let mut input = Input::open(&args.files, args.form)?;
     if input.has_times()? {
         return capture::run(args, input, choice);
     }
@@ -76,19 +77,22 @@ pub(crate) fn stream_of(protocol: Protocol, direction: pcapng::Direction) -> Box
 /// The frames are for one line again. So there may be no other in the capture, and no doubt about
 /// how a command was meant: its node must not have changed its mode (ruling I3).
 pub(crate) fn frames_of(
-    path: &Path,
+    paths: &[PathBuf],
     form: Form,
     chosen: Option<Protocol>,
 ) -> Result<(Protocol, Vec<Taken>, Walked), Failure> {
-    let mut input = Input::open(Some(path), form)?;
+    let mut input = Input::open(paths, form)?;
     let mut sheet = Sheet::new(None);
     sheet.taken = Some(Default::default());
     let choice = Choice { protocol: chosen, direction: None };
     let mut found = None;
     let mut walked = walk(&mut input, choice, &mut sheet, |next, _| {
-        let (_, interface) = *found.get_or_insert((next.protocol, next.interface));
-        if interface != next.interface {
-            return Err(Failure::Failed(format!("{path:?} has more than one line")));
+        let line = (next.protocol, next.interface);
+        if *found.get_or_insert(line) != line {
+            return Err(Failure::Failed(format!(
+                "{} has more than one line",
+                captures::named(paths)
+            )));
         }
         Ok(true)
     });
@@ -97,11 +101,13 @@ pub(crate) fn frames_of(
         return Err(failure);
     }
     let protocol = found.map(|(protocol, _)| protocol).or(chosen);
-    let protocol = protocol.ok_or_else(|| Failure::Failed(format!("{path:?} has no bytes")))?;
+    let protocol = protocol
+        .ok_or_else(|| Failure::Failed(format!("{} has no bytes", captures::named(paths))))?;
     let (taken, turned) = sheet.taken.unwrap_or_default();
     let mut commanded = taken.iter().filter_map(|taken| taken.commands);
     if let Some(node) = commanded.find(|node| turned.contains(node)) {
-        let line = format!("node {node} changes its mode in {path:?}: its commands are ambiguous");
+        let paths = captures::named(paths);
+        let line = format!("node {node} changes its mode in {paths}: its commands are ambiguous");
         return Err(Failure::Failed(line));
     }
     Ok((protocol, taken, walked))

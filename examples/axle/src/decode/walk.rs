@@ -90,7 +90,9 @@ pub(crate) fn walk(
     sheet: &mut Sheet,
     go_on: impl FnMut(Next, &mut Sheet) -> Result<bool, Failure>,
 ) -> Walked {
-    let mut walk = Walk { choice, lines: BTreeMap::new(), walked: Walked::default(), go_on };
+    let (lines, walked) = (BTreeMap::new(), Walked::default());
+    let ports = input.is_one_of_several().then(Vec::new);
+    let mut walk = Walk { choice, lines, walked, number: 0, latest: 0, ports, go_on };
     let result = match input.has_times() {
         Ok(true) => walk.packets(input, sheet),
         Ok(false) => walk.raw(input, sheet),
@@ -108,6 +110,12 @@ struct Walk<G> {
     /// Those of a section, by the number of the interface.
     lines: BTreeMap<usize, Line>,
     walked: Walked,
+    /// Packets so far, and the time of the last one.
+    number: u64,
+    latest: u64,
+    /// In several files: the port and link type of each interface. The numbers of the files do not
+    /// tell the lines apart.
+    ports: Option<Vec<(Option<String>, u16)>>,
     go_on: G,
 }
 
@@ -122,27 +130,43 @@ struct Line {
 
 impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
     fn packets(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<(), Failure> {
+        while self.packets_of_one(input, sheet)? && input.advance()? {
+            // The next file may be of another line.
+            self.end_lines(sheet);
+        }
+        Ok(())
+    }
+
+    /// The packets of a file; returns whether to go on.
+    fn packets_of_one(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<bool, Failure> {
         let path = input.path().map(ToOwned::to_owned);
         let mut reader = Reader::new(input);
-        let (mut latest, mut section, mut last) = (0, 0, None);
-        for number in 1.. {
+        let (mut section, mut last) = (0, None);
+        loop {
+            self.number += 1;
             match last.filter(|_| reader.waits()) {
-                Some(last) if !(self.go_on)(Next { waits: true, ..last }, sheet)? => return Ok(()),
+                Some(last) if !(self.go_on)(Next { waits: true, ..last }, sheet)? => {
+                    return Ok(false);
+                }
                 Some(_) | None => {}
             }
             let packet = match reader.next() {
                 Ok(Some(packet)) => packet,
-                Ok(None) => break,
+                Ok(None) => return Ok(true),
                 Err(problem) => {
-                    self.walked.cut = Some(problem.failure(path));
-                    break;
+                    self.walked.cut.get_or_insert(problem.failure(path));
+                    return Ok(true);
                 }
             };
             if packet.section != section {
                 section = packet.section;
                 self.end_lines(sheet);
             }
-            let line = match self.lines.entry(packet.interface) {
+            let interface = match &mut self.ports {
+                Some(ports) => number_of(ports, &packet),
+                None => packet.interface,
+            };
+            let line = match self.lines.entry(interface) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
                     let protocol = match self.choice.protocol {
@@ -150,28 +174,27 @@ impl<G: FnMut(Next, &mut Sheet) -> Result<bool, Failure>> Walk<G> {
                         None => protocol_of(&packet)?,
                     };
                     self.choice.permits(protocol)?;
-                    new.insert(Line::new(protocol, Some(packet.interface)))
+                    new.insert(Line::new(protocol, Some(interface)))
                 }
             };
-            let micros = self.walked.time(packet.micros, number);
+            let micros = self.walked.time(packet.micros, self.number);
             if let Some(micros) = micros {
-                self.walked.times_back += u64::from(micros < latest);
-                latest = micros;
+                self.walked.times_back += u64::from(micros < self.latest);
+                self.latest = micros;
             }
-            let (protocol, interface) = (line.protocol, Some(packet.interface));
+            let (protocol, interface) = (line.protocol, Some(interface));
             let next = Next { protocol, interface, micros, waits: false };
             last = Some(next);
             for piece in packet.bytes.chunks(PIECE) {
                 if !(self.go_on)(next, sheet)? {
-                    return Ok(());
+                    return Ok(false);
                 }
                 line.feed(self.choice, packet.direction, piece, micros, sheet);
                 if sheet.is_full() {
-                    return Ok(());
+                    return Ok(false);
                 }
             }
         }
-        Ok(())
     }
 
     fn raw(&mut self, input: &mut Input, sheet: &mut Sheet) -> Result<(), Failure> {
@@ -249,6 +272,16 @@ impl Line {
         core::mem::swap(&mut self.modes, &mut sheet.modes);
         account
     }
+}
+
+/// The number of its port.
+fn number_of(ports: &mut Vec<(Option<String>, u16)>, packet: &Packet<'_>) -> usize {
+    let port = (packet.described.name.clone(), packet.described.link_type);
+    let known = ports.iter().position(|known| *known == port);
+    known.unwrap_or_else(|| {
+        ports.push(port);
+        ports.len() - 1
+    })
 }
 
 /// The protocol of a packet, by the link type of its interface.

@@ -62,8 +62,10 @@ pub(crate) struct Args {
     #[command(flatten)]
     form: Form,
 
-    /// The capture; - is standard input
-    file: PathBuf,
+    /// The capture; - is standard input. Several, and folders of them, follow each other in the
+    /// order of time
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
 }
 
 /// A form of the output.
@@ -79,7 +81,7 @@ enum Format {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = format_of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(Some(&args.file), args.form)?;
+    let mut input = Input::open(&args.files, args.form)?;
     let chosen = decode::choose(&mut input, args.protocol.0)?;
     let (output, force) = (&*args.output, args.force);
     let job = Job { input, chosen, output, force, signals };

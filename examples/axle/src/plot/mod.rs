@@ -42,7 +42,7 @@ pub(crate) use options::Args;
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let format = output::Format::of(&args.output)?;
     let signals = Signals::listen()?;
-    let mut input = Input::open(Some(&args.file), args.form)?;
+    let mut input = Input::open(&args.files, args.form)?;
     args.fit(input.has_times()?)?;
     let output = output::Output::create(&args.output, args.force, &input, &signals)?;
     let (picture, walked) = read::picture(args, input, &signals)?;
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         output: _,
         force: _,
         form: _,
-        file: _,
+        files: _,
     } = args;
     Err(Failure::without_feature("plot"))
 }

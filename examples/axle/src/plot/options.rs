@@ -45,8 +45,10 @@ pub(crate) struct Args {
     #[command(flatten)]
     pub(super) form: Form,
 
-    /// The capture; - is standard input
-    pub(super) file: PathBuf,
+    /// The capture; - is standard input. Several, and folders of them, follow each other in the
+    /// order of time
+    #[arg(value_name = "FILE", required = true)]
+    pub(super) files: Vec<PathBuf>,
 }
 
 #[cfg(feature = "plot")]

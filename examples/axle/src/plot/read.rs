@@ -12,6 +12,7 @@ use super::{
 use crate::{
     args::Protocol,
     beside,
+    captures::named,
     decode::{self, Sheet, Walked},
     failure::Failure,
     input::Input,
@@ -143,11 +144,10 @@ impl<'a> Reading<'a> {
     }
 
     fn finish(self) -> Result<Picture, Failure> {
-        let file = &self.args.file;
         let failed = |line| Err(Failure::Failed(line));
         let (Some((protocol, _)), Some(curves), Some(reach)) = (self.line, self.curves, self.reach)
         else {
-            return failed(format!("{file:?} has nothing on that interface"));
+            return failed(format!("{} has nothing on that interface", named(&self.args.files)));
         };
         let name = protocol.name();
         let axis = axis(self.has_times == Some(true), self.args.baud, reach);
@@ -168,8 +168,12 @@ impl<'a> Reading<'a> {
             return failed(format!("no {name} frame of this capture has a value to draw"));
         }
         notes.extend(reduced(&panels, &axis));
-        let file = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-        let title = format!("{}  ·  {name}  ·  {} frames", printable(&file), self.frames);
+        let files = self.args.files.iter().map(|file| {
+            let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+            printable(&name).to_string()
+        });
+        let files = files.collect::<Vec<_>>().join(", ");
+        let title = format!("{files}  ·  {name}  ·  {} frames", self.frames);
         Ok(Picture { title, axis, panels, notes })
     }
 }

@@ -37,7 +37,7 @@ pub(crate) struct Args {
     pub(super) baud: Option<u32>,
 
     /// Protocol of the line; a pcapng or pcap file has its own
-    #[arg(short = 'P', long, value_enum, required_unless_present = "file")]
+    #[arg(short = 'P', long, value_enum, required_unless_present = "files")]
     pub(super) protocol: Option<Protocol>,
 
     /// Print lines, on a terminal too
@@ -58,13 +58,13 @@ pub(crate) struct Args {
 
     /// Record to this file, as axle record does, from the start; the key r ends it. Without this
     /// option, r records to a file of its own name
-    #[arg(long, value_name = "FILE", conflicts_with = "file")]
+    #[arg(long, value_name = "FILE", conflicts_with = "files")]
     pub(super) record: Option<PathBuf>,
 
     /// Send each frame and gap to this host, as a datagram with the object of axle decode --json,
     /// without interface, as a line that is watched has no number; t is that of --record. Of a
     /// name with several addresses, to each. For PlotJuggler: UDP server, JSON, timestamp t
-    #[arg(long, value_name = "HOST:PORT", conflicts_with = "file")]
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "files")]
     pub(super) udp: Option<String>,
 }
 
@@ -77,8 +77,10 @@ pub(super) struct From {
     #[arg(short, long, value_name = "PATH")]
     pub(super) port: Option<String>,
 
-    /// A capture to be summed up; - is standard input
-    pub(super) file: Option<PathBuf>,
+    /// A capture to be summed up; - is standard input. Several, and folders of them, follow each
+    /// other in the order of time
+    #[arg(value_name = "FILE")]
+    pub(super) files: Vec<PathBuf>,
 }
 
 /// A line to be watched.

@@ -14,7 +14,7 @@ use crate::{
 };
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let mut input = Input::open(args.from.file.as_deref(), args.form)?;
+    let mut input = Input::open(&args.from.files, args.form)?;
     let (mut sheet, mut found) = (Sheet::new(None), args.protocol);
     sheet.wanted = args.count;
     // The times of a capture, microseconds since the first; raw bytes have none.

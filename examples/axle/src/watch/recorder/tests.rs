@@ -22,7 +22,7 @@ fn a_second_recording_is_another_file() {
     let args = Args {
         udp: None,
         form: crate::input::Form::default(),
-        from: From { port: Some(port.to_owned()), file: None },
+        from: From { port: Some(port.to_owned()), files: Vec::new() },
         baud: None,
         protocol: Some(protocol),
         plain: false,
