@@ -94,10 +94,10 @@
 //! * **I6** Position mode has no stop: a stop reads the node and then writes back the position of
 //!   that answer, never "go to 0". An older position is used only if [`MasterConfig::hold_age`]
 //!   allows it. The position then becomes the set-point, and is measured again only for another
-//!   stop, after the node was abnormal or its mode in doubt, or if its first WRITE cannot leave
-//!   within 20 ms (160 ms at the most, if that was too short before) or no answer follows it.
-//!   Except after a doubt it is kept unless the node is more than 256 counts (1/32 of a turn) away:
-//!   a loaded motor stands beside the position that it holds.
+//!   stop, after the node was abnormal or its mode in doubt, or if no answer follows its first
+//!   WRITE within 20 ms, or longer if that was too short before. Except after a doubt it is kept
+//!   unless the node is more than 256 counts (1/32 of a turn) away: a loaded motor stands beside
+//!   the position that it holds.
 //! * **I7** The reply timeout, 500 µs by default, runs from the end of the request on the wire, and
 //!   the answer's own wire time is added. Bytes received before the request are dropped. Answers
 //!   from another node, of another kind or after the deadline are counted, and never accepted.

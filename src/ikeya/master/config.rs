@@ -34,7 +34,7 @@ pub struct MasterConfig {
     /// meets a closed window. Other nodes are polled meanwhile.
     pub late_guard: Duration,
     /// Minimum silence between a request or an answer and the next request, for transceivers that
-    /// need it.
+    /// need it. Not behind an answer that comes outside its window.
     pub turnaround_gap: Duration,
     /// Attempts of a READ before it is reported as failed (I8); 0 counts as 1.
     pub attempts: u8,

@@ -269,16 +269,14 @@ impl<B: Board> Line<B> {
     /// The port has taken the packet, and may hold it. Behind a request, the next one waits for the
     /// flush; behind a silent WRITE, only for the gap.
     pub(super) fn hold(&mut self, config: &MasterConfig, now: Instant) {
-        let gap = config.turnaround_gap;
-        match (&self.window, self.held) {
-            (Some(window), Held::Nothing) => {
+        match (&self.window, self.held, &self.sent) {
+            (Some(window), Held::Nothing, _) => {
                 self.held = Held::Last(window.node);
                 self.free_at = now + HELD;
             }
-            (None, _) if gap > Duration::ZERO => {
-                let len = self.sent.as_ref().map_or(PACKET_LEN, |sent| sent.len);
-                let end = now + wire_time(len, config.baud);
-                self.free_at = self.free_at.max(end + gap);
+            (None, _, Some(sent)) if config.turnaround_gap > Duration::ZERO => {
+                // Its bytes and the gap begin now.
+                self.free_at = self.free_at.max(now + (self.free_at - sent.start));
             }
             _ => {}
         }
@@ -356,9 +354,6 @@ impl<B: Board> Line<B> {
     /// Judges a response of this node; the answer closes its window.
     pub(super) fn judge(&mut self, id: NodeId, config: &MasterConfig, now: Instant) -> Response {
         let half_answer = Duration::from_micros(self.answer_wire_time.as_micros() / 2);
-        if config.turnaround_gap > Duration::ZERO {
-            self.free_at = self.free_at.max(now + config.turnaround_gap);
-        }
         match &mut self.window {
             Some(window)
                 if window.node == id && now <= window.deadline && self.held != Held::Several =>

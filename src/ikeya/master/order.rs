@@ -16,15 +16,10 @@ use crate::{
 /// Stop WRITEs that must be followed by a good answer before a stop is confirmed.
 const CONFIRMATIONS: u8 = 2;
 
-/// Time within which the first WRITE of a measured position must leave, or the node is read again,
-/// and within which it is repeated before an answer has followed. It doubles each time up to a
-/// limit, so that a slow port, too, eventually takes one.
+/// Time within which a WRITE of a measured position must be followed by an answer, or the node is
+/// read again. It doubles each time, so that even on a slow line an answer eventually follows. If
+/// the WRITE has not left, it only grows by as much: a port that fails makes no hold old.
 const HOLD_PATIENCE: Duration = Duration::from_millis(20);
-const MOST_HOLD_PATIENCE: Duration = Duration::from_millis(160);
-
-/// How often a node holds another position because it has perhaps never heard the first. Not more:
-/// a loaded one that never answers behind a WRITE would creep away.
-const MOST_MISSES: u8 = 8;
 
 /// Minimum time between two answers that show a standstill.
 const STILL_TIME: Duration = Duration::from_millis(20);
@@ -387,6 +382,8 @@ impl<B: Board> Order<B> {
 pub(super) struct Stop<B: Board> {
     /// When it was read there.
     measured_at: Instant,
+    /// Whether a stop WRITE has been sent and waits for an answer.
+    is_written: bool,
     stage: Stage,
     /// Whether it is no longer repeated once the node is still.
     is_released: bool,
@@ -402,14 +399,8 @@ pub(super) struct Stop<B: Board> {
     is_second: bool,
     /// Stop WRITEs that were followed by a good answer.
     followed: u8,
-    /// How often another position was held because the WRITE has perhaps never been heard.
-    misses: u8,
-    /// Whether its hold was written and is kept, although no answer has followed.
-    is_kept: bool,
     /// Whether the node was read since it may have moved, or been moved, away from `hold`.
     is_there: bool,
-    /// Whether a stop WRITE has been sent and waits for an answer.
-    is_written: bool,
     /// Time from which the node has to become still: that of the first confirmation, or of a stop
     /// that was asked for again.
     confirmed_at: Instant,
@@ -446,8 +437,6 @@ impl<B: Board> Stop<B> {
             was_confirmed: false,
             is_second: false,
             followed: 0,
-            misses: 0,
-            is_kept: false,
             lost_attempts: 0,
             is_there: false,
             hold: held,
@@ -522,7 +511,6 @@ impl<B: Board> Stop<B> {
         (self.stage, self.followed, self.seen) = (Stage::Owed, 0, None);
         (self.is_written, self.written_at) = (false, None);
         (self.hold, self.is_there) = (None, false);
-        self.patience = HOLD_PATIENCE;
     }
 
     /// The node is abnormal. It has no more time to become still than before.
@@ -553,72 +541,50 @@ impl<B: Board> Stop<B> {
     /// Keeps the position of an answer to hold, if it was requested after the stop and the stop is
     /// owed: a velocity node that is still has none, and may just be in doubt.
     fn measure(&mut self, status: &Status<B>, now: Instant) {
-        let is_due = self.is_asked && self.stage == Stage::Owed;
-        let (Status::Position(position), true) = (status, is_due) else { return };
-        if !self.is_there {
+        let is_due = self.is_asked && self.stage == Stage::Owed && !self.is_there;
+        if let (Status::Position(position), true) = (status, is_due) {
             self.hold_at(*position, now);
-        } else if self.is_written && self.written_at.is_none() && self.is_away(*position) {
-            // What was written long ago has perhaps never been heard.
-            self.miss(|stop| {
-                stop.is_written = false;
-                stop.hold_at(*position, now);
-            });
-        }
-    }
-
-    fn is_away(&self, position: B::Position) -> bool {
-        self.hold.is_some_and(|held| B::distance(held, position) > HOLD_COUNTS)
-    }
-
-    /// The hold has perhaps never been heard: a new one, or what was written is kept.
-    fn miss(&mut self, renew: impl FnOnce(&mut Self)) {
-        self.is_kept = self.misses >= MOST_MISSES;
-        if !self.is_kept {
-            self.misses += 1;
-            renew(self);
         }
     }
 
     /// Holds a position that was measured now, or what it has held before, if that is near: a
     /// loaded motor stands beside what it holds, and would creep away if that were held next.
     fn hold_at(&mut self, position: B::Position, now: Instant) {
-        if self.hold.is_none() || self.is_away(position) {
+        let is_near = self.hold.is_some_and(|held| B::distance(held, position) <= HOLD_COUNTS);
+        if !is_near {
             self.hold = Some(position);
         }
-        (self.measured_at, self.is_there, self.is_kept) = (now, true, false);
+        (self.measured_at, self.is_there) = (now, true);
     }
 
-    /// If the node has perhaps never heard the position to hold, it is read first.
+    /// If the node has perhaps never heard the position to hold, it is read first. Not each time: a
+    /// loaded node that never answers behind a WRITE would creep away.
     fn missed(&mut self) {
         self.is_written = false;
-        if self.is_there && self.followed == 0 {
-            self.miss(Self::read_again);
-        }
-    }
-
-    /// Reads the node again if the measured position could not be written in time. If it was, its
-    /// answer is waited for, however long the other nodes take, and it is not repeated before.
-    fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
-        if !self.has_old_hold(now, gap) {
-            return;
-        }
-        if self.is_written {
-            self.written_at = None;
-        } else {
+        if self.is_there && self.followed == 0 && self.patience <= HOLD_PATIENCE + HOLD_PATIENCE {
             self.read_again();
-            self.patience = MOST_HOLD_PATIENCE.min(self.patience + self.patience);
         }
     }
 
-    /// Whether the position was measured too long ago to be written before an answer has followed,
-    /// allowing for the `gap` after each packet.
+    /// Reads the node again if no answer has come in time behind the measured position.
+    fn forget_old_hold(&mut self, now: Instant, gap: Duration) {
+        if self.has_old_hold(now, gap) {
+            self.read_again();
+        }
+    }
+
+    /// Whether no answer has come in time behind the measured position, allowing for the `gap`
+    /// after each packet.
     pub(super) fn has_old_hold(&self, now: Instant, gap: Duration) -> bool {
-        let is_unheard = self.is_there && self.followed == 0 && !self.is_kept;
-        self.stage == Stage::Owed && is_unheard && now - self.measured_at > self.patience + gap
+        let is_due = self.stage == Stage::Owed && self.is_there && self.followed == 0;
+        is_due && now - self.measured_at > self.patience + gap
     }
 
     fn read_again(&mut self) {
+        // The order of the fields and of these lines saves flash.
+        let more = if self.is_written { self.patience } else { HOLD_PATIENCE };
         (self.is_there, self.is_written, self.written_at) = (false, false, None);
+        self.patience = self.patience + more;
     }
 
     /// Takes a good answer of the node in its mode, to a request that ended at `asked_at`.
